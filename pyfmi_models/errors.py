@@ -1,0 +1,18 @@
+"""What can go wrong with a model.
+
+    ModelError
+    ├── CardError      a model card is missing, unreadable or breaks a rule
+    └── ExportError    the equations could not be turned into C, a binary or an archive
+"""
+
+
+class ModelError(Exception):
+    """Base of every error this package raises on purpose; its text is one sentence for a person."""
+
+
+class CardError(ModelError):
+    """A model card is missing, unreadable, or a key or value in it breaks a rule."""
+
+
+class ExportError(ModelError):
+    """The equations could not be turned into C, a shared library or an archive."""

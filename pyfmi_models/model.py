@@ -1,0 +1,113 @@
+"""The vocabulary: what physics and export say to each other.
+
+A `Model` is a finished set of equations between named variables. Export reads nothing else, so a new law or effect
+never touches it. A component (friction law, effect, mount) is a frozen dataclass whose fields, made by `parameter`,
+*are* its documentation, its FMU variables, its bounds in a fit and its keys in a card.
+"""
+
+from dataclasses import MISSING, dataclass, field, fields, replace
+from math import inf
+from typing import Any, NamedTuple, TypeVar
+
+import casadi as ca
+
+Scalar = Any
+"""A number, a `Pair` of numbers, or a CasADi symbol in the place of one."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variable:
+    """A named quantity with its unit, bounds and start value (SI; "1" means dimensionless)."""
+
+    name: str
+    unit: str
+    description: str
+    start: float = 0.0
+    low: float = -inf
+    high: float = inf
+    nominal: float = 1.0
+
+
+class Pair(NamedTuple):
+    """A number that depends on the direction of motion."""
+
+    positive: float
+    negative: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Model:
+    """Equations between named variables, ready to be exported, fitted or simulated.
+
+    `equations` maps (time, states, inputs, parameters), each a column, to (next, outputs): with `period` None the
+    states are continuous and `next` holds their time derivatives; otherwise the model is sampled every `period`
+    seconds and `next` holds the states after the tick. Outputs of a sampled model are those of the tick and hold
+    until the next one. States may be set before the start; their `start` is the default.
+    """
+
+    name: str
+    description: str
+    inputs: tuple[Variable, ...]
+    parameters: tuple[Variable, ...]
+    states: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    equations: ca.Function
+    period: float | None = None
+
+
+Component = TypeVar("Component")
+
+
+def parameter(
+    unit: str,
+    description: str,
+    *,
+    default: Any = MISSING,
+    low: float = -inf,
+    high: float = inf,
+    nominal: float = 1.0,
+) -> Any:
+    """Declare a physical parameter of a component: unit, meaning and the bounds every user of it respects."""
+    variable = Variable(name="", unit=unit, description=description, low=low, high=high, nominal=nominal)
+    return field(default=default, metadata={"variable": variable})
+
+
+def parameters_of(component: Any, prefix: str = "") -> tuple[Variable, ...]:
+    """List the parameters of a component with their present values as start values.
+
+    A `Pair` becomes two variables, `name.positive` and `name.negative`. `prefix` is put before each name with a dot.
+    """
+    found: list[Variable] = []
+    for name, variable, value in _declared(component):
+        full = f"{prefix}.{name}" if prefix else name
+        if isinstance(value, Pair):
+            found += [replace(variable, name=f"{full}.{side}", start=getattr(value, side)) for side in Pair._fields]
+        else:
+            found.append(replace(variable, name=full, start=float(value)))
+    return tuple(found)
+
+
+def with_symbols(component: Component, symbols: dict[str, Any], direction: Any, prefix: str = "") -> Component:
+    """Return the component with a symbol in the place of each number; `symbols` maps full names to them.
+
+    A `Pair` becomes the symbol of the side that `direction` (a signed speed) points to.
+    """
+    changes: dict[str, Any] = {}
+    for name, _, value in _declared(component):
+        full = f"{prefix}.{name}" if prefix else name
+        if isinstance(value, Pair):
+            changes[name] = ca.if_else(direction >= 0, symbols[f"{full}.positive"], symbols[f"{full}.negative"])
+        else:
+            changes[name] = symbols[full]
+    return replace(component, **changes)  # type: ignore[type-var]
+
+
+def symbols_of(variables: tuple[Variable, ...]) -> tuple[Any, dict[str, Any]]:
+    """Make one CasADi column of symbols for the variables, and a dictionary from name to entry."""
+    column = ca.SX.sym("p", len(variables))
+    return column, {variable.name: column[index] for index, variable in enumerate(variables)}
+
+
+def _declared(component: Any) -> list[tuple[str, Variable, Any]]:
+    declared = [(item.name, item.metadata.get("variable"), getattr(component, item.name)) for item in fields(component)]
+    return [(name, variable, value) for name, variable, value in declared if variable is not None and value is not None]
