@@ -1,0 +1,30 @@
+"""A load off the axis."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import casadi as ca
+
+from pyfmi_models.effects.base import LoadEffect, Motion
+from pyfmi_models.model import Scalar, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class GravityUnbalance(LoadEffect):
+    """Weight of a load off the axis: torque = mgl sin(angle + phase), resisting."""
+
+    id: ClassVar[str] = "gravity_unbalance"
+    title: ClassVar[str] = "Gravity unbalance"
+    rivals: ClassVar[tuple[str, ...]] = ("torque_offset", "encoder_eccentricity", "cable_wrap", "cogging")
+    told_apart_by: ClassVar[str] = "an off-centre load needs holding torque at standstill; an off-centre encoder does not"
+    action: ClassVar[str] = "Move the counterweight until the axis stays where it is left."
+    mgl: Scalar = parameter("N.m", "Weight times lever arm", low=0)
+    phase: Scalar = parameter("rad", "Phase at position zero", default=0.0)
+
+    def load(self, motion: Motion) -> Scalar:
+        """`mgl sin(angle + phase)`."""
+        return self.mgl * ca.sin(motion.angle + self.phase)
+
+    def statement(self, unit: str = "N·m") -> str:
+        """Say it to a mechanic."""
+        return f"The axis is out of balance by {self.mgl:.3g} {unit}."

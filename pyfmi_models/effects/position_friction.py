@@ -1,0 +1,58 @@
+"""Friction that depends on where the axis is."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import casadi as ca
+
+from pyfmi_models.effects.base import FrictionEffect, Motion
+from pyfmi_models.model import Scalar, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class _PositionFriction(FrictionEffect):
+    id: ClassVar[str] = "position_friction"
+    title: ClassVar[str] = "Position-dependent friction"
+    rivals: ClassVar[tuple[str, ...]] = ("cogging", "gravity_unbalance")
+    told_apart_by: ClassVar[str] = "cogging pushes the same way in both directions; friction always resists"
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeriodicFriction(_PositionFriction):
+    """Friction level times 1 + r cos(cycles angle + phase)."""
+
+    action: ClassVar[str] = "Check the bearing ring and the gear for run-out."
+    cycles_per_rev: Scalar = parameter("1", "Cycles per turn (per metre of a linear axis)", low=0)
+    relative_amplitude: Scalar = parameter("1", "Relative amplitude of the level", low=0, high=0.95)
+    phase: Scalar = parameter("rad", "Phase at position zero", default=0.0)
+
+    def level(self, level: Scalar, motion: Motion) -> Scalar:
+        """`level (1 + r cos(cycles angle + phase))`."""
+        return level * (1 + self.relative_amplitude * ca.cos(self.cycles_per_rev * motion.angle + self.phase))
+
+    def statement(self, unit: str = "N·m") -> str:
+        """Say it to a mechanic."""
+        per = "metre" if unit == "N" else "turn"
+        size = 100 * self.relative_amplitude
+        return f"Friction rises and falls by {size:.0f} % {self.cycles_per_rev:.4g} times per {per}."
+
+
+@dataclass(frozen=True, kw_only=True)
+class LocalFriction(_PositionFriction):
+    """A rough spot: friction level times 1 + r exp(-((q - q_center)/width)^2 / 2)."""
+
+    action: ClassVar[str] = "Look at the track there: dirt, a dent, a damaged seal or a stiff cable."
+    q_center: Scalar = parameter("rad", "Position of the rough spot")
+    width: Scalar = parameter("rad", "Width (standard deviation) of the rough spot", low=1e-6)
+    relative_amplitude: Scalar = parameter("1", "Relative rise of the level", low=-0.95, high=20)
+
+    def level(self, level: Scalar, motion: Motion) -> Scalar:
+        """`level (1 + r exp(-((q - q_center)/width)^2 / 2))`."""
+        distance = (motion.q - self.q_center) / self.width
+        return level * (1 + self.relative_amplitude * ca.exp(-ca.fmin(distance * distance, 1e3) / 2))
+
+    def statement(self, unit: str = "N·m") -> str:
+        """Say it to a mechanic."""
+        where = "m" if unit == "N" else "rad"
+        size = 100 * self.relative_amplitude
+        return f"Around {self.q_center:.4g} {where} friction is {size:+.0f} % off, over about {4 * self.width:.2g} {where}."

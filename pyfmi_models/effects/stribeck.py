@@ -1,0 +1,33 @@
+"""Friction that falls with speed."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from pyfmi_models.effects.base import FrictionEffect, Motion
+from pyfmi_models.friction.base import stribeck_decay
+from pyfmi_models.model import Scalar, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class StribeckEffect(FrictionEffect):
+    """Friction level that rises towards break-away at low speed: g + (Fs - g) exp(-(v/Vs)^2).
+
+    Reference: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083, with shape exponent 2.
+    """
+
+    id: ClassVar[str] = "stribeck"
+    title: ClassVar[str] = "Stribeck friction"
+    rivals: ClassVar[tuple[str, ...]] = ("presliding", "dwell_breakaway")
+    told_apart_by: ClassVar[str] = "Stribeck friction is the same leaving and reaching standstill"
+    action: ClassVar[str] = "Look at lubrication if slow motion is jerky; otherwise use the improved model."
+    Fs: Scalar = parameter("N.m", "Break-away level at rest", low=0)
+    Vs: Scalar = parameter("rad/s", "Speed over which friction falls", low=1e-7, nominal=0.01)
+
+    def level(self, level: Scalar, motion: Motion) -> Scalar:
+        """`level + (Fs - level) exp(-(v/Vs)^2)`."""
+        return level + (self.Fs - level) * stribeck_decay(motion.v, self.Vs, 2.0)
+
+    def statement(self, unit: str = "N·m") -> str:
+        """Say it to a mechanic."""
+        speed = "m/s" if unit == "N" else "rad/s"
+        return f"Friction rises to {self.Fs:.3g} {unit} when the axis goes slower than about {self.Vs:.2g} {speed}."

@@ -1,0 +1,67 @@
+"""The contract of a friction law.
+
+A law splits the friction torque into a contact part, bounded by a *level* g(v) >= 0, and a viscous part:
+
+    tau_f = contact(state, v, level) + viscous(v).
+
+Effects change the level and the viscous torque from outside (by position, temperature, direction) and never touch the
+law. Signs: tau_f resists, so it has the sign of v in steady sliding.
+"""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import casadi as ca
+
+from pyfmi_models.model import Scalar, Variable, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionLaw:
+    """A friction law; subclasses state their equation, their limits and their reference."""
+
+    key: ClassVar[str]
+
+    def states(self) -> tuple[Variable, ...]:
+        """Name the internal states of the contact, in N m (N for a linear axis)."""
+        return ()
+
+    def level(self, v: Scalar) -> Scalar:
+        """Steady sliding level g(v) >= 0 of the contact part [N m] at speed v [rad/s]."""
+        raise TypeError(f"{type(self).__name__} has no level")
+
+    def viscous(self, v: Scalar) -> Scalar:
+        """Viscous torque [N m] at speed v [rad/s], odd in v."""
+        raise TypeError(f"{type(self).__name__} has no viscous part")
+
+    def rate(self, state: Any, v: Scalar, level: Scalar) -> Any:
+        """Time derivative of the states at speed v and level g(v), a column."""
+        return ca.SX(0, 1)
+
+    def advance(self, state: Any, v: Scalar, level: Scalar, dt: Scalar) -> Any:
+        """States after dt seconds at constant speed v, in closed form."""
+        return state
+
+    def contact(self, state: Any, v: Scalar, level: Scalar) -> Scalar:
+        """Contact torque [N m]."""
+        raise TypeError(f"{type(self).__name__} has no contact torque")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MemorylessLaw(FrictionLaw):
+    """A law whose contact torque follows the speed at once: level times a steep, smooth sign of v."""
+
+    smoothing: Scalar = parameter(
+        "rad/s", "Speed below which the sign of the speed is smoothed", default=1e-5, low=1e-9, nominal=1e-5
+    )
+
+    def contact(self, state: Any, v: Scalar, level: Scalar) -> Scalar:
+        """`level tanh(v / smoothing)`."""
+        return level * ca.tanh(v / self.smoothing)
+
+
+def stribeck_decay(v: Scalar, Vs: Scalar, delta: Scalar) -> Scalar:
+    """`exp(-|v/Vs|^delta)`, with finite derivatives in all arguments at v = 0 and far above Vs."""
+    # |x|^delta as exp(delta log x): pow has NaN derivatives at 0, and exp(-exp(large)) has them far above Vs.
+    ratio = ca.fmin(ca.fabs(v) / Vs, 1e3) + 1e-12
+    return ca.exp(-ca.exp(delta * ca.log(ratio)))
