@@ -1,0 +1,221 @@
+"""Model cards: what a mount is, as data.
+
+A card is TOML (see `cards/` for examples). Only `[mount] inertia` and `[friction]` are required. `read_card` checks
+everything and names file, key, value and rule; `Card.plant` and `Card.controller_model` make the equations.
+"""
+
+import tomllib
+from dataclasses import MISSING, dataclass, field, fields
+from importlib.resources import files
+from math import isfinite
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from pyfmi_models.adrc import Adrc, Compensation, Gains, compensation_case
+from pyfmi_models.effects import CATALOGUE, Effect, GravityUnbalance
+from pyfmi_models.errors import CardError
+from pyfmi_models.friction import LAWS, FrictionLaw, LuGre
+from pyfmi_models.model import Model, Pair, Variable
+from pyfmi_models.mount import Axis, Mount
+
+Part = TypeVar("Part")
+Table = dict[str, Any]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class MountSection(_Section):
+    """`[mount]`: name, motion, inertia [kg m2 or kg], torque limit [N m or N]."""
+
+    name: str = "mount"
+    motion: Literal["rotary", "linear"] = "rotary"
+    inertia: float = Field(gt=0)
+    torque_limit: float = Field(default=1e6, gt=0)
+
+
+class EncoderSection(_Section):
+    """`[encoder]`: counts per turn (0: no quantisation), white noise RMS [rad], encoder turns per axis turn."""
+
+    counts_per_rev: float = Field(default=0, ge=0)
+    noise_rms: float = Field(default=0, ge=0)
+    ratio: float = Field(default=1, gt=0)
+
+
+class ControllerSection(_Section):
+    """`[controller]`: gains of the ADRC, loop and record rate [Hz], friction compensation case."""
+
+    type: Literal["adrc"] = "adrc"
+    kp: float = Field(gt=0)
+    kd: float = Field(gt=0)
+    loop_hz: float = Field(default=10_000, gt=0)
+    record_hz: float = Field(default=1_000, gt=0)
+    observer_bandwidth: float = Field(default=220, gt=0)
+    compensation: Literal["C1", "C2a", "C2b", "C3a", "C3b"] = "C1"
+
+
+class _Card(_Section):
+    mount: MountSection
+    friction: Table
+    unbalance: Table | None = None
+    encoder: EncoderSection = EncoderSection()
+    controller: ControllerSection | None = None
+    columns: dict[str, str] = {}
+    effects: list[Table] = []
+    origin: Table = {}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Card:
+    """A checked card: sections as numbers, friction and effects as objects."""
+
+    path: str
+    mount: MountSection
+    friction: FrictionLaw
+    unbalance: GravityUnbalance | None = None
+    effects: tuple[Effect, ...] = ()
+    encoder: EncoderSection = EncoderSection()
+    controller: ControllerSection | None = None
+    columns: dict[str, str] = field(default_factory=dict)
+    origin: Table = field(default_factory=dict)
+
+    def plant(self) -> Mount:
+        """Make the plant: the base, the known load, the effects."""
+        known = (self.unbalance,) if self.unbalance else ()
+        axis = Axis(inertia=self.mount.inertia, torque_limit=self.mount.torque_limit)
+        return Mount(
+            name=_identifier(self.mount.name),
+            axis=axis,
+            friction=self.friction,
+            effects=(*known, *self.effects),
+            motion=self.mount.motion,
+        )
+
+    def controller_model(self) -> Model:
+        """Make the controller; the card must have a `[controller]` section."""
+        if self.controller is None:
+            raise CardError(f"{self.path}: there is no [controller] section, so there is no controller to export.")
+        tuning = self.controller
+        gains = Gains(
+            inertia=self.mount.inertia,
+            kp=tuning.kp,
+            kd=tuning.kd,
+            observer_bandwidth=tuning.observer_bandwidth,
+            torque_limit=self.mount.torque_limit,
+        )
+        name = _identifier(self.mount.name)
+        return Adrc(name=name, gains=gains, period=1 / tuning.loop_hz, compensation=self._compensation()).model()
+
+    def _compensation(self) -> Compensation | None:
+        case = self.controller.compensation if self.controller else "C1"
+        if case == "C1":
+            return None
+        if not isinstance(self.friction, LuGre):
+            rule = 'needs [friction] model = "lugre"'
+            raise CardError(f'{self.path}: [controller] compensation = "{case}" {rule}; it is "{self.friction.key}".')
+        return compensation_case(case, self.friction)
+
+
+def read_card(source: str | Path) -> Card:
+    """Read a card from a file, or by the name of a shipped one; raise `CardError` with one sentence if it is not good."""
+    path = Path(source)
+    shipped = files("pyfmi_models") / "cards" / f"{source}.toml"
+    try:
+        text = path.read_text("utf-8") if path.exists() or not shipped.is_file() else shipped.read_text("utf-8")
+    except IsADirectoryError:
+        raise CardError(f"{source} is a folder, not a card.") from None
+    except OSError:
+        raise CardError(f"{source}: no such card. Shipped cards are: {', '.join(shipped_cards())}.") from None
+    except UnicodeDecodeError:
+        raise CardError(f"{source} is not a card: it is not UTF-8 text.") from None
+    return parse_card(text, str(source))
+
+
+def shipped_cards() -> list[str]:
+    """Return the names of the cards that come with the package."""
+    return sorted(p.name.removesuffix(".toml") for p in (files("pyfmi_models") / "cards").iterdir())
+
+
+def parse_card(text: str, path: str) -> Card:
+    """Check the text of a card; `path` is its name in errors."""
+    try:
+        raw = _Card.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise CardError(f"{path} is not valid TOML: {error}.") from None
+    except ValidationError as error:
+        raise CardError(f"{path}: {_sentence(error)}") from None
+    known = dict(raw.unbalance) if raw.unbalance else None
+    return Card(
+        path=path,
+        mount=raw.mount,
+        friction=_friction(dict(raw.friction), path),
+        unbalance=_build(GravityUnbalance, known, f"{path}: [unbalance]") if known else None,
+        effects=tuple(_effect(dict(table), path, index) for index, table in enumerate(raw.effects)),
+        encoder=raw.encoder,
+        controller=raw.controller,
+        columns=raw.columns,
+        origin=raw.origin,
+    )
+
+
+def _sentence(error: ValidationError) -> str:
+    first = error.errors()[0]
+    *section, key = [str(part) for part in first["loc"]]
+    where = f"[{'.'.join(section)}] {key}" if section else f"[{key}]"
+    if first["type"] == "extra_forbidden":
+        return f"{where} is not a key of a card."
+    if first["type"] == "missing":
+        return f"{where} is missing."
+    return f"{where} = {first['input']!r} breaks the rule: {first['msg'].lower()}."
+
+
+def _friction(table: Table, path: str) -> FrictionLaw:
+    key = table.pop("model", None)
+    if key not in LAWS:
+        raise CardError(f"{path}: [friction] model = {key!r} is unknown; models are: {', '.join(LAWS)}.")
+    return _build(LAWS[key], table, f"{path}: [friction]")
+
+
+def _effect(table: Table, path: str, index: int) -> Effect:
+    where = f"{path}: [[effects]] number {index + 1}"
+    name = table.pop("effect", None)
+    if name not in CATALOGUE:
+        raise CardError(f"{where}: effect = {name!r} is unknown; effects are: {', '.join(CATALOGUE)}.")
+    forms = CATALOGUE[name]
+    fitting = [form for form in forms if set(table) <= set(_keys(form))]
+    return _build(fitting[0] if fitting else forms[0], table, f"{where} ({name})")
+
+
+def _keys(part: type[Any]) -> dict[str, tuple[Variable, Any]]:
+    return {f.name: (f.metadata["variable"], f.default) for f in fields(part) if "variable" in f.metadata}
+
+
+def _build(part: type[Part], table: Table, where: str) -> Part:
+    keys = _keys(part)
+    for key, value in table.items():
+        if key not in keys:
+            raise CardError(f'{where}: "{key}" is not a key here; keys are: {", ".join(keys)}.')
+        table[key] = _number(value, keys[key][0], f"{where}: {key}")
+    missing = [key for key, (_, default) in keys.items() if key not in table and default is MISSING]
+    if missing:
+        raise CardError(f"{where}: {missing[0]} is missing.")
+    return part(**table)
+
+
+def _number(value: Any, variable: Variable, where: str) -> float | Pair:
+    if isinstance(value, dict) and set(value) == set(Pair._fields):
+        sides = [_number(value[side], variable, f"{where}.{side}") for side in Pair._fields]
+        return Pair(*sides)  # type: ignore[arg-type]
+    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        raise CardError(f"{where} = {value!r} is not a number.")
+    if not variable.low <= value <= variable.high:
+        raise CardError(f"{where} = {value:g} is outside {variable.low:g} .. {variable.high:g}.")
+    return float(value)
+
+
+def _identifier(name: str) -> str:
+    clean = "".join(c if c.isascii() and c.isalnum() else "_" for c in name) or "mount"
+    return f"_{clean}" if clean[0].isdigit() else clean

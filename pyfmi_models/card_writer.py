@@ -1,0 +1,62 @@
+"""Cards as text: what a diagnosis writes, `read_card` reads back."""
+
+import json
+from typing import Any
+
+from pyfmi_models.card import Card
+from pyfmi_models.effects import Effect
+from pyfmi_models.model import Pair, parameters_of
+
+
+def card_text(card: Card, comment: str = "") -> str:
+    """Write a card as TOML; defaults that were never set are written too, so that a card says all it means."""
+    lines = [f"# {line}".rstrip() for line in comment.splitlines()]
+    lines += _section("mount", card.mount.model_dump())
+    lines += _section("friction", {"model": card.friction.key, **_numbers(card.friction)})
+    if card.unbalance:
+        lines += _section("unbalance", _numbers(card.unbalance))
+    lines += _section("encoder", card.encoder.model_dump())
+    if card.controller:
+        lines += _section("controller", card.controller.model_dump())
+    if card.columns:
+        lines += _section("columns", card.columns)
+    for effect in card.effects:
+        lines += ["", "[[effects]]", *_pairs(effect_table(effect))]
+    if card.origin:
+        lines += _section("origin", card.origin)
+    return "\n".join(lines).lstrip("\n") + "\n"
+
+
+def effect_table(effect: Effect) -> dict[str, Any]:
+    """Return an effect as the table that stands for it in a card."""
+    return {"effect": effect.id, **_numbers(effect)}
+
+
+def _numbers(part: Any) -> dict[str, Any]:
+    names = [variable.name.split(".")[0] for variable in parameters_of(part)]
+    return {name: getattr(part, name) for name in dict.fromkeys(names)}
+
+
+def _section(name: str, table: dict[str, Any]) -> list[str]:
+    return ["", f"[{name}]", *_pairs(table)]
+
+
+def _pairs(table: dict[str, Any]) -> list[str]:
+    return [f"{key} = {_value(value)}" for key, value in table.items() if value is not None]
+
+
+def _value(value: Any) -> str:
+    if isinstance(value, Pair):
+        return f"{{ positive = {_value(value.positive)}, negative = {_value(value.negative)} }}"
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(_value(v) for v in value) + "]"
+    if isinstance(value, bool | str):
+        return json.dumps(value, ensure_ascii=False)
+    return repr(value)
+
+
+def _key(key: str) -> str:
+    plain = key.replace("_", "").replace("-", "")
+    return key if plain.isascii() and plain.isalnum() else json.dumps(key)
