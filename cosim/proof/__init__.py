@@ -1,0 +1,1 @@
+"""Concealed-effect benchmark: recordings whose physics the tool was not told, and how well it finds it."""

@@ -1,0 +1,134 @@
+"""Set points for concealed recordings: smooth, with speed and acceleration in closed form, none a plain sine.
+
+Every motion starts at rest at `home`; `amplitude` [rad] bounds the travel and `hertz` sets its pace.
+"""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from cosim.proof.truth import TICK, Array
+
+_SOFT_START = 2.0  # s
+
+
+class Motion(NamedTuple):
+    """Position, speed and acceleration of the set point, one value a tick."""
+
+    q: Array
+    v: Array
+    a: Array
+
+
+class Pace(NamedTuple):
+    """How far and how fast a mount is used."""
+
+    home: float
+    amplitude: float
+    hertz: float
+    duration: float
+
+    @property
+    def time(self) -> Array:
+        """Ticks of the loop [s]."""
+        return np.arange(round(self.duration / TICK)) * TICK
+
+    @property
+    def speed(self) -> float:
+        """Typical peak speed [rad/s]."""
+        return 2 * np.pi * self.hertz * self.amplitude
+
+
+def _soft(time: Array) -> Motion:
+    """A quintic step from 0 to 1 in the first two seconds, with its derivatives."""
+    x = np.minimum(time / _SOFT_START, 1)
+    q = x**3 * (10 - 15 * x + 6 * x**2)
+    v = 30 * x**2 * (1 - x) ** 2 / _SOFT_START
+    return Motion(q, v, 60 * x * (1 - x) * (1 - 2 * x) / _SOFT_START**2)
+
+
+def _product(f: Motion, g: Motion) -> Motion:
+    return Motion(f.q * g.q, f.v * g.q + f.q * g.v, f.a * g.q + 2 * f.v * g.v + f.q * g.a)
+
+
+def _placed(pace: Pace, wave: Motion) -> Motion:
+    """`wave` started softly, scaled to the travel and set at home."""
+    soft = _product(_soft(pace.time), wave)
+    scale = pace.amplitude / float(np.max(np.abs(soft.q)))
+    return Motion(pace.home + scale * soft.q, scale * soft.v, scale * soft.a)
+
+
+def wander(pace: Pace, rng: np.random.Generator) -> Motion:
+    """A sum of eight tones of unrelated pitch; high ones are small."""
+    pitch = pace.hertz * np.exp(rng.uniform(np.log(0.35), np.log(3.0), 8))
+    weight = rng.uniform(0.5, 1.5, 8) * (pace.hertz / pitch) ** 1.3
+    q, v, a = np.zeros((3, pace.time.size))
+    for w, angle, phase in zip(weight, 2 * np.pi * pitch, rng.uniform(0, 2 * np.pi, 8), strict=True):
+        wave = w * np.sin(angle * pace.time + phase)
+        q += wave
+        v += w * angle * np.cos(angle * pace.time + phase)
+        a -= angle**2 * wave
+    return _placed(pace, Motion(q, v, a))
+
+
+def slews(pace: Pace, rng: np.random.Generator) -> Motion:
+    """Point to point with rests of 0.3 to 8 s, some moves at crawling speed: how a telescope spends its night."""
+    motion = Motion(np.full(pace.time.size, pace.home), *np.zeros((2, pace.time.size)))
+    start, here = 0.5, pace.home
+    while start < pace.duration:
+        there, takes = _next_move(pace, rng, here)
+        _move(motion, start, takes, here, there)
+        start, here = start + takes + float(np.exp(rng.uniform(np.log(0.3), np.log(8.0)))), there
+    return motion
+
+
+def _next_move(pace: Pace, rng: np.random.Generator, here: float) -> tuple[float, float]:
+    """Next target and the seconds it takes; every third move crawls, the way a star is followed."""
+    there = pace.home + pace.amplitude * float(rng.uniform(-1, 1))
+    if rng.random() < 0.33:
+        takes = float(rng.uniform(3, 8))
+        reach = 0.03 * pace.speed * takes * float(rng.uniform(0.3, 2))
+        return here - float(np.copysign(reach, here - pace.home)), takes
+    brisk = float(rng.uniform(0.5, 1.0))
+    return there, max(1.2, 1.9 * abs(there - here) / (pace.speed * brisk))
+
+
+def _move(motion: Motion, start: float, takes: float, here: float, there: float) -> None:
+    """Write one minimum-jerk move into `motion`, and rest at its end."""
+    first = round(start / TICK)
+    x = np.minimum((np.arange(motion.q.size - first) * TICK) / takes, 1)
+    d = there - here
+    motion.q[first:] = here + d * x**3 * (10 - 15 * x + 6 * x**2)
+    motion.v[first:] = d / takes * 30 * x**2 * (1 - x) ** 2
+    motion.a[first:] = d / takes**2 * 60 * x * (1 - x) * (1 - 2 * x)
+
+
+def swell(pace: Pace, rng: np.random.Generator) -> Motion:
+    """An oscillation whose amplitude breathes and whose pitch glides: seen by no training recording."""
+    t, w = pace.time, 2 * np.pi * pace.hertz * float(rng.uniform(0.8, 1.1))
+    slow, deep = w * float(rng.uniform(0.17, 0.23)), float(rng.uniform(0.2, 0.35))
+    glide = w * float(rng.uniform(-0.3, 0.5)) / pace.duration
+    phase, rate = w * t + 0.5 * glide * t**2, w + glide * t
+    tone = Motion(np.sin(phase), rate * np.cos(phase), glide * np.cos(phase) - rate**2 * np.sin(phase))
+    breath = Motion(
+        1 - deep + deep * np.cos(slow * t), -deep * slow * np.sin(slow * t), -deep * slow**2 * np.cos(slow * t)
+    )
+    return _placed(pace, _product(breath, tone))
+
+
+def chirp(pace: Pace, rng: np.random.Generator) -> Motion:
+    """A warped sweep: pitch itself swings between half and twice the pace."""
+    t, w = pace.time, 2 * np.pi * pace.hertz
+    turn, depth = w * float(rng.uniform(0.1, 0.16)), float(rng.uniform(0.4, 0.6))
+    phase = w * t - depth * w / turn * np.sin(turn * t) + float(rng.uniform(0, 6))
+    rate, change = w * (1 - depth * np.cos(turn * t)), w * depth * turn * np.sin(turn * t)
+    return _placed(pace, Motion(np.sin(phase), rate * np.cos(phase), change * np.cos(phase) - rate**2 * np.sin(phase)))
+
+
+MOTIONS: dict[str, Callable[[Pace, np.random.Generator], Motion]] = {
+    "wander": wander,
+    "slews": slews,
+    "swell": swell,
+    "chirp": chirp,
+}
