@@ -1,0 +1,86 @@
+"""What can go wrong, drawn as a tree.
+
+CosimError                  everything this package raises on purpose
+├── InputError              something the user gave breaks a rule: culprit, value, rule, choices
+│   ├── RecordingError      a recording is missing, unreadable, or its numbers break a rule
+│   ├── UnitError           a unit is unknown or is of another kind than needed
+│   ├── SignalError         a set-point generator or recorded signal cannot be made
+│   ├── ScenarioError       a scenario file is missing, unreadable, or a key or value breaks a rule
+│   ├── WiringError         a connection names what is not there, or joins what does not fit
+│   ├── FmuError            a file is no FMU, or one that cannot run here
+│   └── OutputError         a result would overwrite a file, or cannot be written
+├── StepError               a component failed while stepping: component, tick, time, last inputs
+└── MissingPackageError     an optional package is needed and not installed
+"""
+
+from typing import Any
+
+
+class CosimError(Exception):
+    """Base of every error this package raises on purpose; its text is one sentence for a person."""
+
+
+class InputError(CosimError):
+    """Something the user gave breaks a rule.
+
+    Args:
+        message: one sentence that names culprit, value, rule and choices.
+        culprit: the file, key, column or wire at fault.
+        value: what was found there.
+        choices: what would have been legal, if that can be listed.
+    """
+
+    def __init__(self, message: str, *, culprit: str = "", value: Any = None, choices: tuple[str, ...] = ()) -> None:
+        super().__init__(message)
+        self.culprit = culprit
+        self.value = value
+        self.choices = choices
+
+
+class RecordingError(InputError):
+    """A recording is missing, unreadable, or its numbers break a rule."""
+
+
+class UnitError(InputError):
+    """A unit is unknown, or of another kind than the one needed."""
+
+
+class SignalError(InputError):
+    """A set-point generator or recorded signal cannot be made."""
+
+
+class ScenarioError(InputError):
+    """A scenario file is missing, unreadable, or a key or value in it breaks a rule."""
+
+
+class WiringError(InputError):
+    """A connection names what is not there, or joins what does not fit."""
+
+
+class FmuError(InputError):
+    """A file is no FMU, or one that cannot run here."""
+
+
+class OutputError(InputError):
+    """A result would overwrite a file, or cannot be written."""
+
+
+class StepError(CosimError):
+    """A component failed while stepping; what was recorded before stays readable.
+
+    Args:
+        message: one sentence.
+        component: name of the component that failed.
+        tick: number of the tick in which it failed; its time is tick times step.
+        inputs: the last inputs of the component, by name.
+    """
+
+    def __init__(self, message: str, *, component: str, tick: int, inputs: dict[str, float]) -> None:
+        super().__init__(message)
+        self.component = component
+        self.tick = tick
+        self.inputs = inputs
+
+
+class MissingPackageError(CosimError):
+    """An optional package is needed and not installed; the text says how to install it."""

@@ -1,0 +1,56 @@
+"""Files that are complete or absent, never half written, and never overwritten unasked."""
+
+import hashlib
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from cosim.errors import OutputError
+
+
+def sha256(path: Path) -> str:
+    """Return the SHA-256 of a file as hexadecimal text."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def check_free(path: Path, force: bool) -> None:
+    """Refuse a path that is taken.
+
+    Raises:
+        OutputError: the file exists and `force` is not set.
+    """
+    if path.exists() and not force:
+        raise OutputError(f"{path} exists already; give --force to overwrite it.", culprit=str(path))
+
+
+def directory(path: Path) -> Path:
+    """Make a directory for results and return it.
+
+    Raises:
+        OutputError: it cannot be made, for example because a file has its name.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = "a file has this name" if path.is_file() else (error.strerror or str(error)).lower()
+        raise OutputError(f"The directory {path} cannot be made: {reason}.", culprit=str(path)) from error
+    return path
+
+
+@contextmanager
+def replacing(path: Path, force: bool = False) -> Iterator[Path]:
+    """Yield a temporary path beside `path` that takes its place when the block ends well, and vanishes otherwise.
+
+    Raises:
+        OutputError: `path` exists and `force` is not set, or its directory cannot be made.
+    """
+    check_free(path, force)
+    directory(path.parent)
+    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
+    try:
+        yield partial
+        os.replace(partial, path)
+    finally:
+        partial.unlink(missing_ok=True)
