@@ -2,8 +2,7 @@
 
 Names and parameters are those of the contract; the physics itself is in `truth.c`. `size` 1 means about a quarter of
 the friction torque (root mean square over the training motions) or, for effects of timing and mechanics, a value in the
-middle of what is met on mounts; 0.3 is weak. `OUTSIDE` holds effects that no listed name explains: the truth about
-them is "unknown".
+middle of what is met on mounts; 0.3 is weak. Effects outside the contract's list are in `outside.py`.
 """
 
 from collections.abc import Callable
@@ -12,35 +11,37 @@ from typing import Any
 
 import numpy as np
 
-from cosim.proof.bench import Bench, drift, log_uniform, root_mean_square
-from cosim.proof.truth import TICK, Array
+from cosim.proof.bench import Bench, log_uniform, root_mean_square
+from cosim.proof.truth import Array, ticks
 
 Parameters = dict[str, Any]
 Family = Callable[[Bench, np.random.Generator, float], Parameters]
 
 
-def _goal(bench: Bench, rng: np.random.Generator, size: float) -> float:
-    """The torque [N m rms] that an effect of this size contributes."""
+def goal(bench: Bench, rng: np.random.Generator, size: float) -> float:
+    """Torque [N m rms] that an effect of this size contributes."""
     return size * float(rng.uniform(0.18, 0.28)) * bench.friction_rms
 
 
-def _angle(rng: np.random.Generator) -> float:
+def angle(rng: np.random.Generator) -> float:
+    """Any phase."""
     return float(rng.uniform(-np.pi, np.pi))
 
 
-def _signed(rng: np.random.Generator, low: float, high: float) -> float:
+def signed(rng: np.random.Generator, low: float, high: float) -> float:
+    """A magnitude between low and high, of either sign."""
     return float(rng.choice([-1, 1]) * rng.uniform(low, high))
 
 
-def _push(bench: Bench, torque: Callable[[str, Array], Array]) -> None:
+def add_push(bench: Bench, torque: Callable[[str, Array], Array]) -> None:
     """Add a resisting torque, a function of recording and time, to every recording."""
     for name, drive in bench.drives.items():
-        bench.drives[name] = replace(drive, push=drive.push + torque(name, np.arange(drive.push.size) * TICK))
+        bench.drives[name] = replace(drive, push=drive.push + torque(name, ticks(drive.push.size)))
 
 
 def friction_asymmetry(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """Harder one way than the other."""
-    level, viscous = size * _signed(rng, 0.18, 0.3), size * _signed(rng, 0.05, 0.3)
+    level, viscous = size * signed(rng, 0.18, 0.3), size * signed(rng, 0.05, 0.3)
     bench.mount |= {"level_asymmetry": level, "viscous_asymmetry": viscous}
     return {"level_asymmetry": level, "viscous_asymmetry": viscous}
 
@@ -70,9 +71,9 @@ def presliding(bench: Bench, rng: np.random.Generator, size: float) -> Parameter
 
 def cogging(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """Magnets: a torque over position that does not care about speed."""
-    cycles, phase = int(rng.integers(8, 73)), _angle(rng)
+    cycles, phase = int(rng.integers(8, 73)), angle(rng)
     second, third = (0.0, 0.0) if rng.random() < 0.5 else (float(rng.uniform(0.2, 0.5)), float(rng.uniform(0, 0.25)))
-    fundamental = _goal(bench, rng, size) / np.sqrt((1 + second**2 + third**2) / 2)
+    fundamental = goal(bench, rng, size) / np.sqrt((1 + second**2 + third**2) / 2)
     bench.mount |= {"cogging_cycles": cycles, "cogging_phase": phase, "cogging_1": fundamental}
     bench.mount |= {"cogging_2": second * fundamental, "cogging_3": third * fundamental}
     x = np.linspace(0, 2 * np.pi, 2000)
@@ -86,7 +87,7 @@ def position_friction(bench: Bench, rng: np.random.Generator, size: float) -> Pa
     if rng.random() < 0.5:
         return _rough_spot(bench, rng, size)
     cycles = int(rng.integers(1, 7)) * max(1, round(0.5 / bench.pace.amplitude))
-    relative, phase = size * float(rng.uniform(0.3, 0.45)), _angle(rng)
+    relative, phase = size * float(rng.uniform(0.3, 0.45)), angle(rng)
     bench.mount |= {"rough_relative": relative, "rough_cycles": cycles, "rough_phase": phase}
     return {"cycles_per_rev": cycles, "relative_amplitude": relative, "phase": phase}
 
@@ -101,15 +102,15 @@ def _rough_spot(bench: Bench, rng: np.random.Generator, size: float) -> Paramete
 
 def gravity_unbalance(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """A weight that was not balanced."""
-    phase = _angle(rng)
-    mgl = 1.3 * _goal(bench, rng, size) / root_mean_square(np.sin(bench.training.q + phase))
+    phase = angle(rng)
+    mgl = 1.3 * goal(bench, rng, size) / root_mean_square(np.sin(bench.training.q + phase))
     bench.mount |= {"unbalance": mgl, "unbalance_phase": phase}
     return {"mgl": mgl, "phase": phase}
 
 
 def torque_offset(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """A constant pull."""
-    bench.mount["offset"] = float(rng.choice([-1, 1])) * _goal(bench, rng, size)
+    bench.mount["offset"] = float(rng.choice([-1, 1])) * goal(bench, rng, size)
     return {"torque": bench.mount["offset"]}
 
 
@@ -168,10 +169,10 @@ def backlash(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
 def encoder_eccentricity(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """A disc off centre: the reading errs once and twice per encoder turn, felt as torque ~ J A (n v)^2."""
     v2 = root_mean_square(bench.training.v**2)
-    amplitude, goal = log_uniform(rng, 1e-4, 1e-3), 2 * _goal(bench, rng, size) / bench.mount["inertia"]
+    amplitude, goal = log_uniform(rng, 1e-4, 1e-3), 2 * goal(bench, rng, size) / bench.mount["inertia"]
     cycles = int(np.clip(round(np.sqrt(goal / (amplitude * v2))), 4, 64))
     amplitude = float(np.clip(goal / (v2 * cycles**2), 5e-5 * size, 2e-3))
-    phase, second = _angle(rng), float(rng.uniform(0, 0.2))
+    phase, second = angle(rng), float(rng.uniform(0, 0.2))
     bench.mount |= {"ripple_cycles": cycles, "ripple_phase": phase}
     bench.mount |= {"ripple_1": amplitude, "ripple_2": second * amplitude}
     quantum = 2 * np.pi / bench.belief["encoder"]["counts_per_rev"] / bench.belief["encoder"]["ratio"]
@@ -181,7 +182,7 @@ def encoder_eccentricity(bench: Bench, rng: np.random.Generator, size: float) ->
 
 def quadratic_drag(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """Wind of its own making."""
-    bench.mount["quadratic"] = 1.3 * _goal(bench, rng, size) / root_mean_square(bench.training.v**2)
+    bench.mount["quadratic"] = 1.3 * goal(bench, rng, size) / root_mean_square(bench.training.v**2)
     return {"coefficient": bench.mount["quadratic"]}
 
 
@@ -190,7 +191,7 @@ def cable_wrap(bench: Bench, rng: np.random.Generator, size: float) -> Parameter
     home = bench.pace.home + bench.pace.amplitude * float(rng.uniform(-0.3, 0.3))
     hardening = 0.0 if rng.random() < 0.5 else float(rng.uniform(0.3, 1.5)) / bench.pace.amplitude**2
     x = bench.training.q - home
-    stiffness = 1.2 * _goal(bench, rng, size) / root_mean_square(x * (1 + hardening * x**2))
+    stiffness = 1.2 * goal(bench, rng, size) / root_mean_square(x * (1 + hardening * x**2))
     bench.mount |= {"cable": stiffness, "cable_home": home, "cable_hardening": hardening}
     return {"stiffness": stiffness, "home": home, "hardening": hardening}
 
@@ -198,10 +199,10 @@ def cable_wrap(bench: Bench, rng: np.random.Generator, size: float) -> Parameter
 def inertia_variation(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """Inertia that changes with position."""
     cycles = 2 if bench.pace.amplitude < 1 else int(rng.integers(1, 3))
-    phase = _angle(rng)
+    phase = angle(rng)
     shape = np.cos(cycles * bench.training.q + phase)
     felt = bench.mount["inertia"] * root_mean_square((shape - shape.mean()) * bench.training.a)
-    relative = min(0.5, 1.2 * _goal(bench, rng, size) / felt)
+    relative = min(0.5, 1.2 * goal(bench, rng, size) / felt)
     bench.mount |= {"inertia_swing": relative, "inertia_cycles": cycles, "inertia_phase": phase}
     return {"relative_amplitude": relative, "cycles_per_rev": cycles, "phase": phase}
 
@@ -228,66 +229,18 @@ def torque_saturation(bench: Bench, rng: np.random.Generator, size: float) -> Pa
 
 def periodic_disturbance(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """A machine next door."""
-    hertz, amplitude = log_uniform(rng, 0.7, 15), np.sqrt(2) * _goal(bench, rng, size)
-    phases = {name: _angle(rng) for name in bench.drives}
-    _push(bench, lambda name, t: amplitude * np.sin(2 * np.pi * hertz * t + phases[name]))
+    hertz, amplitude = log_uniform(rng, 0.7, 15), np.sqrt(2) * goal(bench, rng, size)
+    phases = {name: angle(rng) for name in bench.drives}
+    add_push(bench, lambda name, t: amplitude * np.sin(2 * np.pi * hertz * t + phases[name]))
     return {"frequency_hz": hertz, "amplitude": float(amplitude), "phases": phases}
 
 
 def clock_skew(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """Two clocks: the reading runs ahead of (or behind) the torque, by a constant or ever more."""
-    bench.clock["offset_ms"] = size * _signed(rng, 3, 8)
+    bench.clock["offset_ms"] = size * signed(rng, 3, 8)
     if rng.random() < 0.5:
-        bench.clock["drift_ppm"] = size * _signed(rng, 80, 200)
+        bench.clock["drift_ppm"] = size * signed(rng, 80, 200)
     return dict(bench.clock)
-
-
-def acceleration_drag(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
-    """Drag that needs speed and acceleration at once: c |a| v."""
-    shape = root_mean_square(bench.training.a * bench.training.v)
-    bench.mount["swerve"] = 1.6 * _goal(bench, rng, size) / shape
-    return {"coefficient": bench.mount["swerve"]}
-
-
-def remanence(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
-    """Magnetised iron: a hysteretic spring with a long stroke."""
-    length = bench.pace.amplitude * float(rng.uniform(0.3, 0.8))
-    bench.mount |= {"remanence": 2 * _goal(bench, rng, size), "remanence_length": length}
-    return {"torque": bench.mount["remanence"], "length_rad": length}
-
-
-def reversal_kick(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
-    """A squeezed oil film: extra drag that fades with the time since the last reversal."""
-    fade = float(rng.uniform(0.25, 0.8))
-    bench.mount |= {"kick": 3 * _goal(bench, rng, size), "kick_time": fade}
-    return {"torque": bench.mount["kick"], "fade_s": fade}
-
-
-def random_walk(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
-    """A torque that wanders off and never returns for long."""
-    goal = 1.3 * _goal(bench, rng, size)
-    _push(bench, lambda _, t: drift(rng, t.size, goal, 4.0))
-    return {"rms": goal, "correlation_s": 4.0}
-
-
-def rubbing(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
-    """Something rubs for a few seconds, now and then."""
-    extra, spans = size * float(rng.uniform(0.6, 1.0)), {}
-    for name, drive in bench.drives.items():
-        starts = np.sort(rng.uniform(0.05, 0.85, 3)) * bench.pace.duration
-        spans[name] = [[float(s), float(s + rng.uniform(0.06, 0.12) * bench.pace.duration)] for s in starts]
-        time = np.arange(drive.level.size) * TICK
-        gate = np.any([(time > low) & (time < high) for low, high in spans[name]], axis=0)
-        bench.drives[name] = replace(drive, level=drive.level * (1 + extra * gate))
-    return {"relative": extra, "where": {"axis": "time", "intervals": spans}}
-
-
-def thermal_tilt(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
-    """Friction that depends on the product of position and temperature."""
-    spread = 6.0 * bench.pace.amplitude
-    bench.mount["thermal_tilt"] = size * _signed(rng, 0.6, 1.0) / spread
-    bench.shows_temperature = True
-    return {"per_degC_rad": bench.mount["thermal_tilt"]}
 
 
 _LISTED: tuple[Family, ...] = (
@@ -296,8 +249,5 @@ _LISTED: tuple[Family, ...] = (
     *(quadratic_drag, cable_wrap, inertia_variation, load_dependent_friction, torque_saturation),
     *(periodic_disturbance, clock_skew),
 )
-_FOREIGN: tuple[Family, ...] = (acceleration_drag, remanence, reversal_kick, random_walk, rubbing, thermal_tilt)
 
-EFFECTS: dict[str, Family] = {family.__name__: family for family in (*_LISTED, *_FOREIGN)}  # type: ignore[attr-defined]
-FAMILIES = tuple(EFFECTS)[: len(_LISTED)]
-OUTSIDE = tuple(EFFECTS)[len(_LISTED) :]
+LISTED_EFFECTS = {family.__name__: family for family in _LISTED}

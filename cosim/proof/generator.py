@@ -1,7 +1,7 @@
 """Recordings of a mount whose physics is partly concealed, with the card its owner believes in and the sealed truth.
 
     case = make_case(3, ["cogging"])            # two training recordings, one held out, a card, the truth
-    write_case(case, Path("case"))              # train_1.parquet, train_2.parquet, heldout.parquet, card.toml, truth.json
+    write_case(case, Path("case"))              # three Parquet recordings, card.toml, truth.json
 
     python -m cosim.proof.generator --seed 3 --effects cogging --out case
 
@@ -19,11 +19,16 @@ import numpy as np
 import pandas as pd
 
 from cosim.proof.bench import FRICTIONS, RECORDINGS, Bench, draw_bench, stream
-from cosim.proof.families import EFFECTS, FAMILIES, OUTSIDE
+from cosim.proof.families import LISTED_EFFECTS
+from cosim.proof.outside import OUTSIDE_EFFECTS
 from cosim.proof.recorder import columns_of, decoys, oracle
 from cosim.proof.truth import TICK, Array, simulate
 
 __all__ = ["FAMILIES", "OUTSIDE", "Case", "make_case", "write_case"]
+
+EFFECTS = {**LISTED_EFFECTS, **OUTSIDE_EFFECTS}
+FAMILIES = tuple(LISTED_EFFECTS)
+OUTSIDE = tuple(OUTSIDE_EFFECTS)
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,7 @@ def conceal(bench: Bench, name: str, seed: int, size: float) -> dict[str, Any]:
     parameters = EFFECTS[name](bench, stream(seed, f"effect {name}"), size)
     where = parameters.pop("where", None)
     entry: dict[str, Any] = {"effect": name, "size": size, "listed": name in FAMILIES, "parameters": parameters}
-    return plain(entry | ({"where": where} if where else {}))
+    return dict(plain(entry | ({"where": where} if where else {})))
 
 
 def assemble(

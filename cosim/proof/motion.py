@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cosim.proof.truth import TICK, Array
+from cosim.proof.truth import TICK, Array, ticks
 
 _SOFT_START = 2.0  # s
 
@@ -32,7 +32,7 @@ class Pace(NamedTuple):
     @property
     def time(self) -> Array:
         """Ticks of the loop [s]."""
-        return np.arange(round(self.duration / TICK)) * TICK
+        return ticks(round(self.duration / TICK))
 
     @property
     def speed(self) -> float:

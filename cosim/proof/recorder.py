@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from cosim.proof.bench import RECORDINGS, Bench, drift
 from cosim.proof.truth import TICK, Array
@@ -15,13 +16,13 @@ _DECOYS: dict[str, tuple[float, float, float]] = {  # mean, rms, correlation [s]
 }
 
 
-def _ticks(n: int, rate_hz: int) -> tuple[int, Array]:
+def _ticks(n: int, rate_hz: int) -> tuple[int, NDArray[np.int64]]:
     """Ticks per row, and the tick of every row that has a full interval around it."""
     every = round(1 / TICK / rate_hz)
-    return every, np.arange(every, n - every, every)
+    return every, np.arange(every, n - every, every, dtype=np.int64)
 
 
-def centred_mean(held: Array, every: int, rows: Array) -> Array:
+def centred_mean(held: Array, every: int, rows: NDArray[np.int64]) -> Array:
     """Mean of a value held from tick to tick over the interval of `every` ticks centred at each row."""
     total = np.concatenate([[0.0], np.cumsum(held)])
     edge = np.arange(total.size, dtype=float)
@@ -40,7 +41,7 @@ def columns_of(bench: Bench, name: str, raw: dict[str, Array], rate_hz: int, rng
     return pd.DataFrame(columns)
 
 
-def _readings(bench: Bench, raw: dict[str, Array], rows: Array, rng: np.random.Generator) -> Array:
+def _readings(bench: Bench, raw: dict[str, Array], rows: NDArray[np.int64], rng: np.random.Generator) -> Array:
     """The controller's own readings; with a skewed clock the encoder is read again at other times."""
     offset, skew = bench.clock["offset_ms"] * 1e-3, bench.clock["drift_ppm"] * 1e-6
     if offset == 0 and skew == 0:

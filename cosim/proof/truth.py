@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 TICK = 1e-4
 BLOCKS = 10
-SCALARS = """
+_SCALARS = """
     tick inertia inertia_swing inertia_cycles inertia_phase
     load_inertia drive_stiffness drive_damping gap load_friction load_viscous load_stiffness
     coulomb breakaway stribeck_speed stribeck_power stiffness damping viscous blend level_asymmetry viscous_asymmetry
@@ -23,7 +23,7 @@ SCALARS = """
     unbalance unbalance_phase offset cogging_1 cogging_2 cogging_3 cogging_cycles cogging_phase
     quadratic cable cable_home cable_hardening swerve remanence remanence_length home kick kick_time
     delay lag knee knee_slope ripple_1 ripple_2 ripple_cycles ripple_phase quantum kp kd observer loop_inertia
-""".split()
+"""  # the order of `struct mount`
 ROWS = ("block_weight", "block_reach")
 INPUTS = ("target", "target_speed", "target_acceleration", "push", "level", "noise", "ambient")
 OUTPUTS = ("command", "reading", "clean_reading", "angle", "speed", "temperature", "friction", "extra")
@@ -31,8 +31,15 @@ OUTPUTS = ("command", "reading", "clean_reading", "angle", "speed", "temperature
 _Pointer = ctypes.POINTER(ctypes.c_double)
 
 
+def ticks(n: int) -> Array:
+    """Times of the first n ticks of the loop [s]."""
+    return TICK * np.arange(n, dtype=np.float64)
+
+
 class _Mount(ctypes.Structure):
-    _fields_ = [(name, ctypes.c_double) for name in SCALARS] + [(name, ctypes.c_double * BLOCKS) for name in ROWS]
+    _fields_ = [(name, ctypes.c_double) for name in _SCALARS.split()] + [
+        (name, ctypes.c_double * BLOCKS) for name in ROWS
+    ]
 
 
 class _Inputs(ctypes.Structure):
