@@ -1,0 +1,75 @@
+/* Saving, restoring and serializing everything an instance remembers. */
+#include "core.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+size_t memory_size(void) { return sizeof(Memory) + (size_t)model.size * sizeof(double); }
+
+size_t serialized_size(void) { return memory_size() + sizeof(uint64_t); }
+
+/* FNV-1a, 64 bits: a check against accidents, not against intent. */
+uint64_t hash_bytes(const void *bytes, size_t count) {
+    const unsigned char *byte = bytes;
+    uint64_t hash = 0xCBF29CE484222325ull;
+    for (size_t i = 0; i < count; i++) hash = (hash ^ byte[i]) * 0x100000001B3ull;
+    return hash;
+}
+
+/* An array that *memory already holds is used again. */
+static Status provide(Instance *instance, Memory **memory) {
+    if (!memory) return fail(instance, FAILED, "there is no place for the state");
+    if (!*memory) *memory = malloc(memory_size());
+    return *memory ? OK : fail(instance, FAILED, "no memory for a state of %zu bytes", memory_size());
+}
+
+Status save(Instance *instance, Memory **memory) {
+    Status status = provide(instance, memory);
+    if (status == OK) memcpy(*memory, instance->memory, memory_size());
+    return status;
+}
+
+void release(Memory **memory) {
+    if (!memory) return;
+    free(*memory);
+    *memory = NULL;
+}
+
+static Status check(Instance *instance, const Memory *memory) {
+    if (!memory) return fail(instance, FAILED, "there is no state to restore");
+    if (memory->mark != instance->memory->mark) return fail(instance, FAILED, "the state belongs to another model");
+    if (memory->interface != instance->memory->interface)
+        return fail(instance, FAILED, "the state belongs to the other interface (model exchange or co-simulation)");
+    return OK;
+}
+
+Status restore(Instance *instance, const Memory *memory) {
+    Status status = check(instance, memory);
+    if (status == OK) memcpy(instance->memory, memory, memory_size());
+    return status;
+}
+
+Status serialize(Instance *instance, const Memory *memory, unsigned char *bytes, size_t size) {
+    Status status = check(instance, memory);
+    if (status != OK) return status;
+    if (!bytes || size < serialized_size())
+        return fail(instance, FAILED, "a serialized state needs %zu bytes, not %zu", serialized_size(), size);
+    uint64_t hash = hash_bytes(memory, memory_size());
+    memcpy(bytes, memory, memory_size());
+    memcpy(bytes + memory_size(), &hash, sizeof hash);
+    return OK;
+}
+
+Status deserialize(Instance *instance, const unsigned char *bytes, size_t size, Memory **memory) {
+    uint64_t hash, mark;
+    if (!bytes || size != serialized_size())
+        return fail(instance, FAILED, "a serialized state of %zu bytes cannot be right: this model's has %zu", size,
+                    serialized_size());
+    memcpy(&hash, bytes + memory_size(), sizeof hash);
+    memcpy(&mark, bytes, sizeof mark);
+    if (hash != hash_bytes(bytes, memory_size())) return fail(instance, FAILED, "the serialized state is corrupted");
+    if (mark != instance->memory->mark) return fail(instance, FAILED, "the state belongs to another model");
+    Status status = provide(instance, memory);
+    if (status == OK) memcpy(*memory, bytes, memory_size());
+    return status;
+}

@@ -1,0 +1,129 @@
+/* How time passes: the solver of a continuous model, the counted ticks of a sampled one.
+ *
+ * Tick k of a sampled model is due at start + k period. A co-simulation step over [t, t + h) executes the ticks that are
+ * due in it, with the inputs set before the step: the tick at the start of the step belongs to it, that at its end does
+ * not. Outputs read after the step are those of the last tick, so a command computed from the sample of tick k acts from
+ * tick k + 1. Ticks are counted, and one hundredth of a period (or of the step) is allowed for the master's rounding of t.
+ */
+#include "core.h"
+#include "detmath.h"
+
+#include <string.h>
+
+static const double slack = 0.01;
+
+int all_finite(const double *values, int count) {
+    for (int i = 0; i < count; i++)
+        if (!(fabs(values[i]) < INFINITY)) return 0;
+    return 1;
+}
+
+int evaluate(Instance *instance, const Code *code, double time, const double *x, double *first, double *second) {
+    instance->arg[0] = &time;
+    instance->arg[1] = x;
+    instance->arg[2] = instance->inputs;
+    instance->arg[3] = instance->parameters;
+    instance->res[0] = first;
+    instance->res[1] = second;
+    return code->function(instance->arg, instance->res, instance->iw, instance->w, 0);
+}
+
+int solver_rates(void *context, double time, const double *x, double *rates) {
+    return evaluate(context, &model.rates_code, time, x, rates, NULL) || !all_finite(rates, model.rates);
+}
+
+int solver_jacobian(void *context, double time, const double *x, double *jacobian, double *by_time) {
+    return evaluate(context, &model.jacobian_code, time, x, jacobian, by_time) ||
+           !all_finite(jacobian, model.rates * model.rates) || !all_finite(by_time, model.rates);
+}
+
+double next_tick_time(const Instance *instance) {
+    return instance->memory->start + (double)instance->memory->ticks * model.period;
+}
+
+int tick_is_due(const Instance *instance) {
+    return instance->values[0] >= next_tick_time(instance) - slack * model.period;
+}
+
+/* Evaluate the tick that is due; with advance its new states are kept, without only its outputs are shown. */
+Status tick(Instance *instance, int advance) {
+    double *next = instance->scratch, *outputs = instance->scratch + model.states;
+    evaluate(instance, &model.tick_code, next_tick_time(instance), instance->states, next, outputs);
+    int first_state = (int)(instance->states - instance->values), offset = first_state;
+    for (int i = 0; i < model.states + model.outputs; i++)
+        if (!(fabs(next[i]) < INFINITY))
+            return fail(instance, FAILED, "\"%s\" is not finite after the tick at t = %.17g s",
+                        model.table[offset + i].name, next_tick_time(instance));
+    if (model.outputs) memcpy(instance->outputs, outputs, (size_t)model.outputs * sizeof(double));
+    if (!advance) return OK;
+    if (model.states) memcpy(instance->states, next, (size_t)model.states * sizeof(double));
+    instance->memory->ticks++;
+    return OK;
+}
+
+Status update_discrete(Instance *instance) {
+    Status status = OK;
+    while (status == OK && model.period > 0 && tick_is_due(instance)) status = tick(instance, 1);
+    return status;
+}
+
+/* On failure the states and outputs of the ticks already done are taken back. */
+static Status step_sampled(Instance *instance, double time, double length) {
+    Memory *memory = instance->memory;
+    double margin = slack * (length < model.period ? length / model.period : 1);
+    double due = ceil((time + length - memory->start) / model.period - margin);
+    int64_t before = memory->ticks;
+    size_t bytes = (size_t)(model.states + model.outputs) * sizeof(double);
+    Status status = OK;
+    if (due > before + 1 && bytes) memcpy(instance->seeds, instance->states, bytes);
+    while (status == OK && (double)memory->ticks < due) status = tick(instance, 1);
+    if (status != OK && memory->ticks > before) {
+        memcpy(instance->states, instance->seeds, bytes);
+        memory->ticks = before;
+    }
+    return status;
+}
+
+static Status explain(Instance *instance, SolverResult result, int culprit, double time) {
+    const char *name = model.table[1 + model.inputs + model.parameters + culprit].name;
+    if (result == TOO_MANY_STEPS)
+        return fail(instance, FAILED, "more than a million solver steps from t = %.17g s; \"%s\" changes fastest", time,
+                    name);
+    if (result == NOT_FINITE)
+        return fail(instance, FAILED, "the rates or their derivatives are not finite near t = %.17g s", time);
+    return fail(instance, FAILED, "the solver step became too small after t = %.17g s, because of \"%s\"", time, name);
+}
+
+static Status step_continuous(Instance *instance, double time, double length) {
+    int culprit = 0;
+    if (!model.rates) return OK;
+    instance->solver.tolerance = instance->memory->tolerance;
+    SolverResult result = solver_advance(&instance->solver, instance->values[0], time + length, instance->states,
+                                         &instance->memory->step, &culprit);
+    return result == SOLVED ? OK : explain(instance, result, culprit, time);
+}
+
+static Status check_step(Instance *instance, double time, double length) {
+    double now = instance->values[0], margin = 1e-6 * length + 1e-14 * fabs(now), stop = instance->memory->stop;
+    if (!(fabs(time) < INFINITY) || !(length > 0 && length < INFINITY))
+        return fail(instance, FAILED, "a step of %.17g s from t = %.17g s: the length must be positive and finite", length,
+                    time);
+    if (time < now - margin)
+        return fail(instance, FAILED, "a step from t = %.17g s goes backwards: the model is at t = %.17g s", time, now);
+    if (time > now + margin)
+        return fail(instance, FAILED, "a step from t = %.17g s leaves a gap: the model is at t = %.17g s", time, now);
+    if (time + length > stop + margin)
+        return fail(instance, FAILED, "a step to t = %.17g s passes the stop time %.17g s", time + length, stop);
+    if (!(time + length > now)) return fail(instance, FAILED, "a step of %.17g s is lost in rounding", length);
+    return OK;
+}
+
+Status do_step(Instance *instance, double time, double length) {
+    Status status = check_step(instance, time, length);
+    if (status == OK)
+        status = model.period > 0 ? step_sampled(instance, time, length) : step_continuous(instance, time, length);
+    if (status != OK) return status;
+    instance->values[0] = time + length;
+    instance->memory->fresh = 0;
+    return OK;
+}

@@ -1,0 +1,242 @@
+"""modelDescription.xml of FMI 2.0 and FMI 3.0 from the layout of a model."""
+
+import math
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+
+import casadi as ca
+
+from pyfmi_models.export.codegen import TOLERANCE, Generated
+from pyfmi_models.export.layout import Layout, Row
+from pyfmi_models.export.units import BASE, parse_unit
+
+TICK_RULE = (
+    "Sampled every {period!r} s: tick k is at start + k * period, counted. A co-simulation step over [t, t + h) executes the "
+    "ticks in it with the inputs set before the step; outputs read after it are those of its last tick, so the command "
+    "computed from the sample of tick k acts from tick k + 1. In model exchange ticks are time events."
+)
+LOG_CATEGORIES = {
+    "logStatusError": "Why a call was refused or failed, with the variable and the rule",
+    "logEvents": "Changes of mode",
+}
+_NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A calculated variable and what it depends on: among time, inputs and states; `initial` adds the parameters."""
+
+    row: Row
+    dependencies: tuple[int, ...]
+    initial: tuple[int, ...]
+
+
+def unknowns_of(layout: Layout) -> list[Unknown]:
+    """Rates and outputs with their true dependencies (value references), from CasADi's sparsity."""
+    equations = layout.model.equations
+    calculated = [(0, row) for row in layout.of("rate")], [(1, row) for row in layout.of("output")]
+    return [
+        Unknown(
+            row,
+            _known(layout, equations, part, i, ("time", "state", "input")),
+            _known(layout, equations, part, i, ("time", "state", "input", "parameter")),
+        )
+        for group in calculated
+        for i, (part, row) in enumerate(group)
+    ]
+
+
+def _known(layout: Layout, equations: ca.Function, part: int, entry: int, kinds: tuple[str, ...]) -> tuple[int, ...]:
+    found: list[int] = []
+    for argument, kind in enumerate(("time", "state", "input", "parameter")):
+        # A state of a sampled model is no known of FMI: its past value is hidden in the tick.
+        if kind not in kinds or (kind == "state" and layout.model.period):
+            continue
+        columns = equations.jac_sparsity(part, argument)
+        found += [row.reference for i, row in enumerate(layout.of(kind)) if columns.has_nz(entry, i)]  # type: ignore[arg-type]
+    return tuple(sorted(found))
+
+
+def description_text(model_description: str, period: float | None) -> str:
+    """The model's sentence, and for a sampled model the rule of its ticks."""
+    return f"{model_description} {TICK_RULE.format(period=period)}" if period else model_description
+
+
+def fmi2_description(generated: Generated, sources: Iterable[str]) -> bytes:
+    """The XML of FMI 2.0; `sources` are the C files to compile. Raises ExportError for an unknown unit."""
+    layout = generated.layout
+    root = ET.Element("fmiModelDescription", fmiVersion="2.0", guid=generated.token, numberOfEventIndicators="0")
+    _head(root, layout)
+    continuous = "false" if layout.model.period else "true"
+    flags = {
+        "modelIdentifier": layout.identifier,
+        "canNotUseMemoryManagementFunctions": "true",
+        "canGetAndSetFMUstate": "true",
+        "canSerializeFMUstate": "true",
+        "providesDirectionalDerivative": continuous,
+    }
+    exchange = ET.SubElement(root, "ModelExchange", {**flags, "completedIntegratorStepNotNeeded": "true"})
+    simulation = ET.SubElement(root, "CoSimulation", {**flags, "canHandleVariableCommunicationStepSize": "true"})
+    for interface in (exchange, simulation):
+        group = ET.SubElement(interface, "SourceFiles")
+        for name in sources:
+            ET.SubElement(group, "File", name=name)
+    _units(root, layout)
+    _log_categories(root)
+    _default_experiment(root, layout)
+    variables = ET.SubElement(root, "ModelVariables")
+    for row in layout.rows:
+        _variable2(variables, row, layout)
+    _structure2(root, layout)
+    return _text(root)
+
+
+def fmi3_description(generated: Generated) -> bytes:
+    """The XML of FMI 3.0. Raises ExportError for an unknown unit."""
+    layout = generated.layout
+    root = ET.Element("fmiModelDescription", fmiVersion="3.0", instantiationToken=generated.token)
+    _head(root, layout)
+    continuous = "false" if layout.model.period else "true"
+    flags = {
+        "modelIdentifier": layout.identifier,
+        "canGetAndSetFMUState": "true",
+        "canSerializeFMUState": "true",
+        "providesDirectionalDerivatives": continuous,
+    }
+    ET.SubElement(root, "ModelExchange", {**flags, "needsCompletedIntegratorStep": "false"})
+    step = {"fixedInternalStepSize": repr(layout.model.period)} if layout.model.period else {}
+    ET.SubElement(root, "CoSimulation", {**flags, "canHandleVariableCommunicationStepSize": "true", **step})
+    _units(root, layout)
+    _log_categories(root)
+    _default_experiment(root, layout)
+    variables = ET.SubElement(root, "ModelVariables")
+    for row in layout.rows:
+        _variable3(variables, row, layout)
+    _structure3(root, layout)
+    return _text(root)
+
+
+def _head(root: ET.Element, layout: Layout) -> None:
+    model = layout.model
+    structured = all(_NAME.fullmatch(row.variable.name) for row in layout.rows if row.kind != "rate")
+    root.set("modelName", model.name)
+    root.set("description", description_text(model.description, model.period))
+    root.set("generationTool", f"mount-cosim {_version()}")
+    root.set("variableNamingConvention", "structured" if structured else "flat")
+
+
+def _version() -> str:
+    try:
+        return version("mount-cosim")
+    except PackageNotFoundError:
+        return "(not installed)"
+
+
+def _units(root: ET.Element, layout: Layout) -> None:
+    group = ET.SubElement(root, "UnitDefinitions")
+    for name in sorted({row.variable.unit for row in layout.rows}):
+        unit = parse_unit(name)
+        element = ET.SubElement(group, "Unit", name=name)
+        base = {key: str(power) for key, power in zip(BASE, unit.exponents, strict=True) if power}
+        base |= {"factor": repr(unit.factor)} if unit.factor != 1 else {}
+        base |= {"offset": repr(unit.offset)} if unit.offset else {}
+        ET.SubElement(element, "BaseUnit", base)
+        for display, factor in unit.display.items():
+            ET.SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
+
+
+def _log_categories(root: ET.Element) -> None:
+    group = ET.SubElement(root, "LogCategories")
+    for name, text in LOG_CATEGORIES.items():
+        ET.SubElement(group, "Category", name=name, description=text)
+
+
+def _default_experiment(root: ET.Element, layout: Layout) -> None:
+    step = repr(layout.model.period or 1e-4)
+    ET.SubElement(root, "DefaultExperiment", startTime="0.0", stopTime="1.0", tolerance=repr(TOLERANCE), stepSize=step)
+
+
+def _role(row: Row, layout: Layout) -> dict[str, str]:
+    """Causality, variability and initial. Outputs of a sampled model hold their start value until the first tick."""
+    changing = "discrete" if layout.model.period else "continuous"
+    return {
+        "time": {"causality": "independent", "variability": "continuous"},
+        "input": {"causality": "input", "variability": "continuous"},
+        "parameter": {"causality": "parameter", "variability": "tunable", "initial": "exact"},
+        "state": {"causality": "local", "variability": changing, "initial": "exact"},
+        "rate": {"causality": "local", "variability": "continuous", "initial": "calculated"},
+        "output": {"causality": "output", "variability": changing, "initial": _initial_of_output(layout)},
+    }[row.kind]
+
+
+def _initial_of_output(layout: Layout) -> str:
+    return "exact" if layout.model.period else "calculated"
+
+
+def _numbers(row: Row, role: dict[str, str]) -> dict[str, str]:
+    variable = row.variable
+    found = {"unit": variable.unit}
+    if row.kind != "time":
+        found |= {"min": repr(float(variable.low))} if math.isfinite(variable.low) else {}
+        found |= {"max": repr(float(variable.high))} if math.isfinite(variable.high) else {}
+        found |= {"nominal": repr(float(variable.nominal))} if variable.nominal != 1 else {}
+    if row.kind == "input" or role.get("initial") == "exact":
+        found["start"] = repr(float(variable.start))
+    return found
+
+
+def _variable2(parent: ET.Element, row: Row, layout: Layout) -> None:
+    role = _role(row, layout)
+    head = {"name": row.variable.name, "valueReference": str(row.reference), "description": row.variable.description}
+    element = ET.SubElement(parent, "ScalarVariable", {**head, **role})
+    numbers = _numbers(row, role)
+    if row.state is not None:
+        numbers["derivative"] = str(row.state + 1)
+    ET.SubElement(element, "Real", numbers)
+
+
+def _variable3(parent: ET.Element, row: Row, layout: Layout) -> None:
+    role = _role(row, layout)
+    head = {"name": row.variable.name, "valueReference": str(row.reference), "description": row.variable.description}
+    state = {"derivative": str(row.state)} if row.state is not None else {}
+    ET.SubElement(parent, "Float64", {**head, **role, **_numbers(row, role), **state})
+
+
+def _structure2(root: ET.Element, layout: Layout) -> None:
+    structure = ET.SubElement(root, "ModelStructure")
+    unknowns = unknowns_of(layout)
+    for group, kind in (("Outputs", "output"), ("Derivatives", "rate")):
+        chosen = [(u.row, u.dependencies) for u in unknowns if u.row.kind == kind]
+        _unknowns2(structure, group, chosen)
+    initial = [] if layout.model.period else [(u.row, u.initial) for u in unknowns]
+    _unknowns2(structure, "InitialUnknowns", initial)
+
+
+def _unknowns2(structure: ET.Element, group: str, unknowns: list[tuple[Row, tuple[int, ...]]]) -> None:
+    if not unknowns:
+        return
+    parent = ET.SubElement(structure, group)
+    for row, dependencies in unknowns:
+        indices = " ".join(str(reference + 1) for reference in dependencies)
+        ET.SubElement(parent, "Unknown", index=str(row.reference + 1), dependencies=indices)
+
+
+def _structure3(root: ET.Element, layout: Layout) -> None:
+    structure = ET.SubElement(root, "ModelStructure")
+    unknowns = unknowns_of(layout)
+    groups = [("Output", [(u.row, u.dependencies) for u in unknowns if u.row.kind == "output"])]
+    groups += [("ContinuousStateDerivative", [(u.row, u.dependencies) for u in unknowns if u.row.kind == "rate"])]
+    groups += [("InitialUnknown", [] if layout.model.period else [(u.row, u.initial) for u in unknowns])]
+    for name, rows in groups:
+        for row, dependencies in rows:
+            ET.SubElement(
+                structure, name, valueReference=str(row.reference), dependencies=" ".join(map(str, dependencies))
+            )
+
+
+def _text(root: ET.Element) -> bytes:
+    ET.indent(root)
+    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="utf-8") + b"\n"
