@@ -34,7 +34,8 @@ def directory(path: Path) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        reason = "a file has this name" if path.is_file() else (error.strerror or str(error)).lower()
+        file = next((one for one in (path, *path.parents) if one.is_file()), None)
+        reason = f"{file} is a file" if file else (error.strerror or str(error)).lower()
         raise OutputError(f"The directory {path} cannot be made: {reason}.", culprit=str(path)) from error
     return path
 

@@ -99,8 +99,8 @@ def _split_unit(header: str) -> tuple[str, str]:
 def _read_parquet(path: Path) -> Columns:
     from pyarrow import parquet
 
-    table = parquet.read_table(path)
-    metadata = table.schema.metadata or {}
+    with parquet.ParquetFile(path) as file:
+        table, metadata = file.read(), file.metadata.metadata or {}
     units = {field.name: (field.metadata or {}).get(UNIT_KEY, b"").decode() for field in table.schema}
     values = {name: _array(table[name]) for name in table.column_names if not name.startswith("__index_level_")}
     origin = json.loads(metadata.get(ORIGIN_KEY, b"{}"))

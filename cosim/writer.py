@@ -5,7 +5,6 @@ import json
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -16,30 +15,60 @@ from cosim.files import check_free, directory
 from cosim.formats import ORIGIN_KEY, UNIT_KEY
 
 Table = Mapping[str, np.ndarray]
+GROUP = 65_536
+"""Rows of a row group in a streamed file."""
 ENCODING = {"use_dictionary": False, "compression": "none", "write_statistics": False}
 """Doubles of a simulation hardly compress; plain pages are written about as fast as the disk takes them."""
 
 
-class StreamWriter:
+class MemoryWriter:
+    """Keeps what is written, for runs whose recording is wanted as arrays."""
+
+    def __init__(self, units: Mapping[str, str], origin: dict[str, Any]) -> None:
+        self.units, self.origin, self.rows = dict(units), origin, 0
+        self._chunks: list[Table] = []
+
+    def write(self, table: Table) -> None:
+        """Append rows; `table` has the columns of `units`, each of shape (rows,)."""
+        self._chunks.append(table)
+        self.rows += len(next(iter(table.values())))
+
+    def table(self) -> dict[str, np.ndarray]:
+        """Return all rows by column."""
+        empty = np.empty(0)
+        return {name: np.concatenate([empty, *(chunk[name] for chunk in self._chunks)]) for name in self.units}
+
+    def clear(self) -> None:
+        """Forget the rows that were taken out; the count goes on."""
+        self._chunks = []
+
+    def close(self) -> None:
+        """Do nothing; the rows stay."""
+
+
+class StreamWriter(MemoryWriter):
     """A Parquet file that grows chunk by chunk and takes its name when it is closed.
 
     Closing makes the file complete whatever ended the run; `origin` may be filled until then.
     """
 
     def __init__(self, path: Path, units: Mapping[str, str], origin: dict[str, Any], force: bool = False) -> None:
+        super().__init__(units, origin)
         check_free(path, force)
-        self.path, self.origin = path, origin
+        self.path, self._written = path, 0
         self._partial = directory(path.parent) / f".{path.name}.{os.getpid()}.partial"
         self._schema = schema(units)
         self._file = parquet.ParquetWriter(self._partial, self._schema, **ENCODING)
 
     def write(self, table: Table) -> None:
-        """Append rows; `table` has the columns of `units`, each of shape (rows,)."""
-        arrays = [pa.array(table[name]) for name in self._schema.names]
-        self._file.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
+        """Append rows; they go to the file in groups of at least GROUP."""
+        super().write(table)
+        if self.rows - self._written >= GROUP:
+            self._flush()
 
     def close(self) -> None:
         """Complete the file."""
+        self._flush()
         self._file.add_key_value_metadata({ORIGIN_KEY: json.dumps(self.origin).encode()})
         self._file.close()
         os.replace(self._partial, self.path)
@@ -47,10 +76,14 @@ class StreamWriter:
     def __enter__(self) -> "StreamWriter":
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _flush(self) -> None:
+        arrays = [pa.array(column) for column in self.table().values()]
+        self._file.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
+        self.clear()
+        self._written = self.rows
 
 
 def schema(units: Mapping[str, str]) -> Any:

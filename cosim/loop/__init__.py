@@ -1,0 +1,31 @@
+"""The loop that steps everything: compiled where its library is there, in Python otherwise, with the same bits."""
+
+import ctypes
+import sys
+from functools import cache
+from pathlib import Path
+
+from cosim.loop.compiled import CompiledLoop, load
+from cosim.loop.interpreted import InterpretedLoop
+from cosim.loop.plan import Column, Failure, Link, Part, Plan
+
+__all__ = ["Column", "CompiledLoop", "Failure", "InterpretedLoop", "Link", "Part", "Plan", "library", "make_loop"]
+
+SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+
+@cache
+def library() -> ctypes.CDLL | None:
+    """Load the compiled loop; None where it was not built or does not fit this machine."""
+    path = Path(__file__).with_name(f"_loop{SUFFIX}")
+    try:
+        return load(str(path)) if path.exists() else None
+    except OSError:
+        return None
+
+
+def make_loop(plan: Plan, compiled: bool = True) -> CompiledLoop | InterpretedLoop:
+    """Return the fastest loop that can execute the plan; `compiled` False asks for the one in Python."""
+    native = all(part.component.functions is not None for part in plan.parts)
+    found = library() if compiled and native else None
+    return CompiledLoop(plan, found) if found is not None else InterpretedLoop(plan)

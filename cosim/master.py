@@ -1,0 +1,233 @@
+"""The master: checks the wiring, starts the components, runs the loop in chunks, and streams what is recorded.
+
+Jacobi coupling: at each tick all inputs are gathered from the outputs at that tick, then every component steps. A value
+computed in a step is seen by the others at its end, so each wire from component to component delays by one tick.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+import cosim
+from cosim.component import STATUSES, Component
+from cosim.errors import StepError, WiringError
+from cosim.fmu import FmuComponent
+from cosim.loop import CompiledLoop, InterpretedLoop, Plan, make_loop
+from cosim.recording import Recording
+from cosim.signals import Samples, Signal
+from cosim.wiring import Record, Wire, Wiring
+from cosim.writer import MemoryWriter, StreamWriter
+
+Progress = Callable[[int, int], None]
+"""Called between chunks with ticks done and ticks in all."""
+
+CHUNK = 32_768
+"""Ticks between two looks at progress and Ctrl-C at most; fewer where steps are slow."""
+CHUNK_SECONDS = 0.1
+
+
+@dataclass(frozen=True)
+class Run:
+    """What came out: statistics, and the recording (read from its file when it is first asked for)."""
+
+    statistics: dict[str, Any]
+    path: Path | None = None
+    _recording: Recording | None = field(default=None, repr=False)
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The recording, whole in memory."""
+        if self._recording is not None:
+            return self._recording
+        assert self.path is not None  # a run without a file keeps its recording
+        return Recording.read(self.path, required=())
+
+
+def simulate(
+    components: Mapping[str, Component | Path | str],
+    wires: Sequence[Wire | tuple[str, str]],
+    *,
+    record: Mapping[str, str | Record],
+    step: float,
+    ticks: int,
+    signals: Mapping[str, Any] | None = None,
+    parameters: Mapping[str, Mapping[str, Any]] | None = None,
+    decimation: int = 1,
+    path: Path | None = None,
+    force: bool = False,
+    name: str = "run",
+    origin: Mapping[str, Any] | None = None,
+    progress: Progress | None = None,
+    compiled: bool = True,
+) -> Run:
+    """Step components together and record.
+
+    Args:
+        components: FMU paths, or components (which are left open and can be used again).
+        wires: `Wire`s or pairs (source, target); sources are "component.output", "signal.output" or "signal".
+        record: column to what it records: "component.variable", "signal.output" or a `Record`.
+        step: length of a tick in s.
+        ticks: how many; the recording has rows at ticks 0, decimation, 2 decimation, ...
+        signals: generators (see `signals`), arrays with one value a tick, or numbers.
+        parameters: by component, parameters and start values by name.
+        decimation: ticks for each row.
+        path: Parquet file to stream to; None keeps the recording in memory.
+        force: overwrite the file.
+        name: of a recording kept in memory.
+        origin: what else the recording shall say about where it comes from.
+        progress: called between chunks.
+        compiled: False asks for the loop in Python, which gives the same bits.
+
+    Raises:
+        WiringError, FmuError, SignalError: before the first step.
+        StepError: a component failed; what was recorded before is in the file.
+    """
+    with ExitStack() as stack:
+        opened = {key: _opened(stack, key, one) for key, one in components.items()}
+        wiring = Wiring(
+            components=opened,
+            signals={key: _signal(key, one, ticks) for key, one in (signals or {}).items()},
+            wires=[wire if isinstance(wire, Wire) else Wire(*wire) for wire in wires],
+            records={key: one if isinstance(one, Record) else Record(one) for key, one in record.items()},
+        )
+        plan = wiring.plan(step, decimation)
+        settings = _settings(opened, parameters or {})
+        for key, component in opened.items():
+            component.start(settings[key])
+        story = _story(wiring, settings, step, decimation) | dict(origin or {})
+        units = {"t": "s"} | {key: wiring.unit(one) for key, one in wiring.records.items()}
+        writer = StreamWriter(path, units, story, force) if path else MemoryWriter(units, story)
+        work = _Work(wiring, plan, make_loop(plan, compiled), writer, ticks, progress)
+        with closing(writer):
+            work.execute()
+    recording = None if path else Recording(name, writer.table(), writer.units, writer.origin)
+    return Run(work.statistics(), path, recording)
+
+
+@dataclass
+class _Work:
+    """A plan on its way: what the loop runs and where its rows go."""
+
+    wiring: Wiring
+    plan: Plan
+    loop: CompiledLoop | InterpretedLoop
+    writer: MemoryWriter
+    ticks: int
+    progress: Progress | None
+    seconds: float = 0.0
+
+    def execute(self) -> None:
+        """Run the loop to its end, writing row after row; the last row may be cut short."""
+        begun = perf_counter()
+        self.writer.origin["complete"] = False
+        try:
+            self._run_chunks()
+        finally:
+            self._write(self.loop.flush())
+            self.seconds = perf_counter() - begun
+        self.writer.origin["complete"] = True
+
+    def statistics(self) -> dict[str, Any]:
+        """Tell how it went, for people and programs."""
+        simulated = self.loop.tick * self.plan.step
+        return {
+            "steps": self.loop.tick,
+            "step": self.plan.step,
+            "simulated_seconds": simulated,
+            "seconds": self.seconds,
+            "ratio_to_real_time": simulated / self.seconds,
+            "microseconds_per_step": 1e6 * self.seconds / max(self.loop.tick, 1),
+            "rows": self.writer.rows,
+            "loop": self.loop.kind,
+            "algorithm": "jacobi",
+            "warnings": self.loop.warnings,
+            "unconnected": list(self.wiring.unconnected()),
+        }
+
+    def _run_chunks(self) -> None:
+        streams = [signal.stream(self.plan.step) for signal in self.wiring.signals.values()]
+        self.loop.start()
+        self._check()
+        for chunk in _chunks(self.ticks):
+            columns = [stream(chunk) for stream in streams]
+            rows = self.loop.run(len(chunk), np.concatenate(columns) if columns else np.empty((0, len(chunk))))
+            self._write(rows)
+            self._check()
+            if self.progress:
+                self.progress(self.loop.tick, self.ticks)
+
+    def _write(self, rows: np.ndarray) -> None:
+        first, count = self.writer.rows, rows.shape[1]
+        if count:
+            t = np.arange(first, first + count) * self.plan.decimation * self.plan.step
+            self.writer.write({"t": t} | dict(zip(self.wiring.records, rows, strict=True)))
+
+    def _check(self) -> None:
+        """Raise the failure of the loop, if there is one, as a sentence."""
+        failure = self.loop.failure
+        if failure is None:
+            return
+        name, component = list(self.wiring.components.items())[failure.part]
+        inputs = self.plan.inputs(failure.part)
+        what = STATUSES.get(failure.status, f"returned status {failure.status}")
+        last = ", ".join(f"{key} = {value:.9g}" for key, value in inputs.items()) or "none"
+        said = "".join(f'; it said "{text}"' for text in component.messages()[-1:])
+        when = f"at tick {failure.tick:,} ({failure.tick * self.plan.step:.9g} s)"
+        raise StepError(
+            f"{name} {what} {when}{said}; its last inputs: {last}.", component=name, tick=failure.tick, inputs=inputs
+        )
+
+
+def _chunks(ticks: int) -> Iterator[np.ndarray]:
+    """Yield all ticks in pieces that take about CHUNK_SECONDS each, as measured on the piece before."""
+    first, size = 0, 1024
+    while first < ticks:
+        begun = perf_counter()
+        last = min(first + size, ticks)
+        yield np.arange(first, last)
+        fitting = size * CHUNK_SECONDS / max(perf_counter() - begun, 1e-9)
+        first, size = last, int(max(16, min(CHUNK, 8 * size, fitting)))
+
+
+def _opened(stack: ExitStack, name: str, component: Component | Path | str) -> Component:
+    """Open an FMU for this run; a component given as such stays open after it."""
+    if isinstance(component, Path | str):
+        return stack.enter_context(FmuComponent(component, name))
+    return component
+
+
+def _signal(name: str, signal: Any, ticks: int) -> Signal:
+    made: Signal = signal if hasattr(signal, "stream") else Samples(signal, name=name)
+    if isinstance(made, Samples):
+        made.check(ticks)
+    return made
+
+
+def _settings(
+    components: Mapping[str, Component], parameters: Mapping[str, Mapping[str, Any]]
+) -> dict[str, dict[str, Any]]:
+    for name in parameters:
+        if name not in components:
+            have = tuple(components)
+            message = f'Parameters are given for "{name}", which is no component; components are: {", ".join(have)}.'
+            raise WiringError(message, culprit=name, choices=have)
+    return {name: dict(parameters.get(name, {})) for name in components}
+
+
+def _story(wiring: Wiring, settings: Mapping[str, Any], step: float, decimation: int) -> dict[str, Any]:
+    """Say where a recording comes from."""
+    return {
+        "version": f"mount-cosim {cosim.__version__}",
+        "step": step,
+        "decimation": decimation,
+        "algorithm": "jacobi",
+        "components": {name: one.origin | {"parameters": settings[name]} for name, one in wiring.components.items()},
+        "wires": [asdict(wire) for wire in wiring.wires],
+        "record": {name: asdict(record) for name, record in wiring.records.items()},
+    }

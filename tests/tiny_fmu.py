@@ -1,0 +1,119 @@
+"""Small FMUs for tests of the master: y' = k (a - b), or y = k (a - b) from the step before, that can fail on demand."""
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import fmpy
+
+SOURCE = r"""
+#include <math.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdlib.h>
+enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, COUNT };
+typedef struct { double v[COUNT]; void *environment; void *log; } M;
+typedef void Log2(void *, const char *, int, const char *, const char *, ...);
+typedef void Log3(void *, int, const char *, const char *);
+static M *make(void) { M *m = calloc(1, sizeof(M)); m->v[K] = 1; m->v[FAIL_AT] = m->v[NAN_AT] = 1e9; return m; }
+static int set(M *m, const unsigned *r, size_t n, const double *x) { while (n--) m->v[r[n]] = x[n]; return 0; }
+static int get(M *m, const unsigned *r, size_t n, double *x) { while (n--) x[n] = m->v[r[n]]; return 0; }
+static int step(M *m, double t, double h) {
+  double e = m->v[K] * (m->v[A] - m->v[B]);
+  m->v[Y] = m->v[MODE] > 0 ? e : m->v[Y] + h * e;
+  if (t + h / 2 > m->v[NAN_AT]) m->v[Y] = NAN;
+  return t + h / 2 > m->v[FAIL_AT] ? 3 : 0;
+}
+#define API __attribute__((visibility("default")))
+#define NONE(name) API int name(void *m) { (void)m; return 0; }
+#define UNUSED(name) API int name(void) { return 3; }
+typedef struct { Log2 *log; } Callbacks;
+API void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, Callbacks *c, int v, int l) {
+  M *m = make(); m->log = (void *)c->log; return m; }
+API int fmi2SetupExperiment(void *m, int a, double b, double c, int d, double e) { return 0; }
+NONE(fmi2EnterInitializationMode) NONE(fmi2ExitInitializationMode) NONE(fmi2Terminate)
+API int fmi2Reset(M *m) { M *n = make(); n->log = m->log; *m = *n; free(n); return 0; }
+API void fmi2FreeInstance(void *m) { free(m); }
+API int fmi2SetReal(M *m, const unsigned *r, size_t n, const double *x) { return set(m, r, n, x); }
+API int fmi2GetReal(M *m, const unsigned *r, size_t n, double *x) { return get(m, r, n, x); }
+API int fmi2DoStep(M *m, double t, double h, int p) {
+  int s = step(m, t, h); if (s) ((Log2 *)m->log)(NULL, "tiny", 3, "error", "the %s broke", "shaft"); return s; }
+API const char *fmi2GetVersion(void) { return "2.0"; }
+API const char *fmi2GetTypesPlatform(void) { return "default"; }
+API void *fmi3InstantiateCoSimulation(const char *n, const char *g, const char *r, bool a, bool b, bool c, bool d,
+  const unsigned *q, size_t w, void *environment, void *log, void *i) { M *m = make(); m->log = log; return m; }
+API int fmi3EnterInitializationMode(void *m, bool a, double b, double c, bool d, double e) { return 0; }
+NONE(fmi3ExitInitializationMode) NONE(fmi3Terminate)
+API int fmi3Reset(M *m) { return fmi2Reset(m); }
+API void fmi3FreeInstance(void *m) { free(m); }
+API int fmi3SetFloat64(M *m, const unsigned *r, size_t n, const double *x, size_t k) { return set(m, r, n, x); }
+API int fmi3GetFloat64(M *m, const unsigned *r, size_t n, double *x, size_t k) { return get(m, r, n, x); }
+API int fmi3DoStep(M *m, double t, double h, bool p, bool *e, bool *x, bool *y, double *l) {
+  int s = step(m, t, h); if (s) ((Log3 *)m->log)(NULL, 3, "error", "the shaft broke"); return s; }
+API const char *fmi3GetVersion(void) { return "3.0"; }
+"""
+
+VARIABLES = [
+    # name, causality, unit, start, limits
+    ("a", "input", "rad", "0", ""),
+    ("b", "input", "rad", "0", ""),
+    ("k", "parameter", "1", "1", 'min="0"'),
+    ("mode", "parameter", "1", "0", ""),
+    ("fail_at", "parameter", "s", "1e9", ""),
+    ("nan_at", "parameter", "s", "1e9", ""),
+    ("y", "output", "rad", "", ""),
+]
+
+
+def build(directory: Path, version: int) -> Path:
+    """Compile and pack the tiny FMU for one FMI version."""
+    platform = fmpy.platform if version == 2 else fmpy.platform_tuple
+    library, source = directory / f"tiny{version}{fmpy.sharedLibraryExtension}", directory / f"tiny{version}.c"
+    source.write_text(SOURCE + _stubs(version))
+    command = [sys.executable, "-m", "ziglang", "cc", "-shared", "-fPIC", "-O2", "-w", "-o", str(library), str(source)]
+    subprocess.run(command, check=True)
+    path = directory / f"tiny{version}.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", description(version))
+        archive.write(library, f"binaries/{platform}/tiny{fmpy.sharedLibraryExtension}")
+    return path
+
+
+def description(version: int) -> str:
+    """Write the XML of one FMI version."""
+    units = "".join(f'<Unit name="{unit}"/>' for unit in ("rad", "1", "s"))
+    if version == 3:
+        rows = "".join(
+            f'<Float64 name="{name}" valueReference="{number}" causality="{causality}" unit="{unit}" {limits} '
+            f'variability="{"fixed" if causality == "parameter" else "continuous"}" {f"start={chr(34)}{start}{chr(34)}" if start else ""}/>'
+            for number, (name, causality, unit, start, limits) in enumerate(VARIABLES)
+        )
+        return (
+            '<fmiModelDescription fmiVersion="3.0" modelName="tiny" instantiationToken="t">'
+            f'<CoSimulation modelIdentifier="tiny"/><UnitDefinitions>{units}</UnitDefinitions>'
+            f'<ModelVariables>{rows}</ModelVariables><ModelStructure><Output valueReference="6"/></ModelStructure>'
+            "</fmiModelDescription>"
+        )
+    rows = "".join(
+        f'<ScalarVariable name="{name}" valueReference="{number}" causality="{causality}" '
+        f'variability="{"fixed" if causality == "parameter" else "continuous"}">'
+        f'<Real unit="{unit}" {limits} {f"start={chr(34)}{start}{chr(34)}" if start else ""}/></ScalarVariable>'
+        for number, (name, causality, unit, start, limits) in enumerate(VARIABLES)
+    )
+    return (
+        '<fmiModelDescription fmiVersion="2.0" modelName="tiny" guid="t">'
+        f'<CoSimulation modelIdentifier="tiny"/><UnitDefinitions>{units}</UnitDefinitions>'
+        f"<ModelVariables>{rows}</ModelVariables>"
+        '<ModelStructure><Outputs><Unknown index="7"/></Outputs></ModelStructure></fmiModelDescription>'
+    )
+
+
+def _stubs(version: int) -> str:
+    """Define the functions that FMPy asks for and no test calls."""
+    from fmpy.fmi2 import FMU2Slave
+    from fmpy.fmi3 import FMU3Slave
+
+    kind = FMU2Slave if version == 2 else FMU3Slave
+    wanted = [name for name in dir(kind) if name.startswith(f"fmi{version}")]
+    return "".join(f"UNUSED({name})\n" for name in wanted if f"{name}(" not in SOURCE and f"({name})" not in SOURCE)
