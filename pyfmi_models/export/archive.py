@@ -10,7 +10,7 @@ from typing import Literal
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export.build import FLAGS, PLATFORMS, host, library_of, sources_of, units_of
 from pyfmi_models.export.codegen import Generated, generate
-from pyfmi_models.export.description import fmi2_description, fmi3_description
+from pyfmi_models.export.description import fmi2_description, fmi3_description, xml_text
 from pyfmi_models.export.documentation import documentation_page
 from pyfmi_models.model import Model
 
@@ -72,8 +72,7 @@ def _build_description(generated: Generated, units: list[str]) -> bytes:
     group = ET.SubElement(configuration, "SourceFileSet", language="C11", compiler="clang", compilerOptions=options)
     for name in units:
         ET.SubElement(group, "SourceFile", name=name)
-    ET.indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="utf-8") + b"\n"
+    return xml_text(root)
 
 
 def _write_zip(path: Path, files: dict[str, bytes]) -> None:

@@ -28,7 +28,7 @@ FLAGS = (
     "-shared",
     "-fPIC",
 )
-"""No contraction: one rounding an operation on every machine. Without errno sqrt is an instruction, not a call of libm."""
+"""No contraction: one rounding an operation on every machine. Without errno sqrt is an instruction, no call of libm."""
 
 
 @dataclass(frozen=True)

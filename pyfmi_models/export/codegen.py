@@ -6,6 +6,7 @@ import math
 import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import casadi as ca
 
@@ -43,10 +44,10 @@ def generate(model: Model) -> Generated:
 
 
 def _functions(model: Model) -> dict[str, ca.Function]:
-    symbol = ca.SX if model.equations.is_a("SXFunction") else ca.MX
+    symbol: Any = ca.SX if model.equations.is_a("SXFunction") else ca.MX
     sizes = (1, len(model.states), len(model.inputs), len(model.parameters))
     point = [symbol.sym(name, size) for name, size in zip("txup", sizes, strict=True)]
-    following, outputs = (ca.densify(part) for part in model.equations(*point))
+    following, outputs = (ca.densify(part) for part in model.equations.call(point))
     if model.period:
         return {"tick": _function("tick", point, [following, outputs])}
     seeds = [symbol.sym(f"d{name}", size) for name, size in zip("txup", sizes, strict=True)]
@@ -60,11 +61,11 @@ def _functions(model: Model) -> dict[str, ca.Function]:
     }
 
 
-def _function(role: str, arguments: list[ca.SX], results: list[ca.SX]) -> ca.Function:
+def _function(role: str, arguments: list[Any], results: list[Any]) -> ca.Function:
     return ca.Function(f"model_{role}", arguments, results, {"cse": True})
 
 
-def _directional(part: ca.SX, point: list[ca.SX], seeds: list[ca.SX]) -> ca.SX:
+def _directional(part: Any, point: list[Any], seeds: list[Any]) -> Any:
     total = sum(ca.jtimes(part, place, seed) for place, seed in zip(point, seeds, strict=True) if place.numel())
     return ca.densify(total)
 
@@ -94,7 +95,7 @@ def _model_code(layout: Layout, token: str, functions: dict[str, ca.Function]) -
     nominals = ", ".join(_number(state.nominal) for state in model.states) or "1"
     counts = [len(layout.rows), *(len(layout.of(kind)) for kind in ("input", "parameter", "state", "rate", "output"))]
     codes = ",\n".join(_code(role, functions.get(role)) for role in _ROLES)
-    return f"""/* Generated from the equations of "{_comment(model.name)}"; equations.c is CasADi's, this is the table beside it. */
+    return f"""/* Generated for "{_comment(model.name)}": the table beside what CasADi wrote (equations.c). */
 #include "detmath.h"
 
 #include "equations.c"

@@ -14,9 +14,9 @@ from pyfmi_models.export.layout import Layout, Row
 from pyfmi_models.export.units import BASE, parse_unit
 
 TICK_RULE = (
-    "Sampled every {period!r} s: tick k is at start + k * period, counted. A co-simulation step over [t, t + h) executes the "
-    "ticks in it with the inputs set before the step; outputs read after it are those of its last tick, so the command "
-    "computed from the sample of tick k acts from tick k + 1. In model exchange ticks are time events."
+    "Sampled every {period!r} s: tick k is at start + k * period, counted. A co-simulation step over [t, t + h) "
+    "executes the ticks in it with the inputs set before the step; outputs read after it are those of its last tick, "
+    "so the command computed from the sample of tick k acts from tick k + 1. In model exchange ticks are time events."
 )
 LOG_CATEGORIES = {
     "logStatusError": "Why a call was refused or failed, with the variable and the rule",
@@ -91,7 +91,7 @@ def fmi2_description(generated: Generated, sources: Iterable[str]) -> bytes:
     for row in layout.rows:
         _variable2(variables, row, layout)
     _structure2(root, layout)
-    return _text(root)
+    return xml_text(root)
 
 
 def fmi3_description(generated: Generated) -> bytes:
@@ -116,7 +116,7 @@ def fmi3_description(generated: Generated) -> bytes:
     for row in layout.rows:
         _variable3(variables, row, layout)
     _structure3(root, layout)
-    return _text(root)
+    return xml_text(root)
 
 
 def _head(root: ET.Element, layout: Layout) -> None:
@@ -237,6 +237,8 @@ def _structure3(root: ET.Element, layout: Layout) -> None:
             )
 
 
-def _text(root: ET.Element) -> bytes:
+def xml_text(root: ET.Element) -> bytes:
+    """The element as an indented XML file."""
     ET.indent(root)
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="utf-8") + b"\n"
+    text: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
+    return text + b"\n"

@@ -99,7 +99,7 @@ def _check(model: Model, rows: list[Row]) -> None:
 def _check_numbers(variable: Variable) -> None:
     if not variable.low <= variable.start <= variable.high or not math.isfinite(variable.start):
         raise ExportError(
-            f'"{variable.name}": the start value {variable.start} is not a number from {variable.low} to {variable.high}'
+            f'"{variable.name}": the start value {variable.start} is no number from {variable.low} to {variable.high}'
         )
     if not 0 < variable.nominal < math.inf:
         raise ExportError(f'"{variable.name}": the nominal value {variable.nominal} is not positive and finite')
@@ -107,13 +107,17 @@ def _check_numbers(variable: Variable) -> None:
 
 def _check_sizes(model: Model) -> None:
     equations = model.equations
-    sizes = [("inputs", equations.numel_in, 2, model.inputs), ("parameters", equations.numel_in, 3, model.parameters)]
-    sizes += [("states", equations.numel_in, 1, model.states), ("rates", equations.numel_out, 0, model.states)]
-    sizes += [("outputs", equations.numel_out, 1, model.outputs)]
     if (equations.n_in(), equations.n_out()) != (4, 2):
         raise ExportError(f'model "{model.name}": equations must map (t, x, u, p) to (next, outputs)')
-    for what, size, index, variables in sizes:
-        if size(index) != len(variables):
+    sizes = [
+        ("states", equations.numel_in(1), model.states),
+        ("inputs", equations.numel_in(2), model.inputs),
+        ("parameters", equations.numel_in(3), model.parameters),
+        ("rates", equations.numel_out(0), model.states),
+        ("outputs", equations.numel_out(1), model.outputs),
+    ]
+    for what, size, variables in sizes:
+        if size != len(variables):
             raise ExportError(
-                f'model "{model.name}": the equations have {size(index)} {what}, but {len(variables)} are listed'
+                f'model "{model.name}": the equations have {size} {what}, but {len(variables)} are listed'
             )
