@@ -9,9 +9,12 @@ import zipfile
 from collections import deque
 from collections.abc import Mapping
 from contextlib import suppress
+from functools import cache
+from itertools import count
 from math import inf
 from pathlib import Path
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 
@@ -20,6 +23,9 @@ from cosim.errors import CosimError, FmuError
 from cosim.files import sha256
 
 _REAL = ("Real", "Float64")
+_NUMBERS = count(1)
+_LISTENERS: WeakValueDictionary[str, "FmuComponent"] = WeakValueDictionary()
+"""Who hears what an FMI 2.0 instance says, by instance name; FMPy's logger can serve only one callback a process."""
 _STEP2 = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
 _VALUES2 = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
 _VALUES3 = ctypes.CFUNCTYPE(
@@ -152,12 +158,14 @@ class FmuComponent:
         extract(str(self.path), self._directory.name, include=lambda name: name.startswith(("binaries/", "resources/")))
         kind = FMU2Slave if self._version == 2 else FMU3Slave
         description = self._description
+        instance = f"{self.name}.{next(_NUMBERS)}"
+        _LISTENERS[instance] = self
         try:
             fmu = kind(
                 guid=description.guid if self._version == 2 else description.instantiationToken,
                 modelIdentifier=description.coSimulation.modelIdentifier,
                 unzipDirectory=self._directory.name,
-                instanceName=self.name,
+                instanceName=instance,
             )
             self._begin(fmu)
         except Exception as error:
@@ -166,11 +174,12 @@ class FmuComponent:
 
     def _begin(self, fmu: Any) -> None:
         if self._version == 2:
-            fmu.instantiate(callbacks=_callbacks2(self._heard))
+            fmu.instantiate(callbacks=_callbacks2())
         else:
-            fmu.instantiate(logMessage=lambda _, status, category, message: self._heard(message))
+            fmu.instantiate(logMessage=lambda _, status, category, message: self.hear(message))
 
-    def _heard(self, message: bytes | None) -> None:
+    def hear(self, message: bytes | None) -> None:
+        """Keep what the FMU says."""
         self._messages.append((message or b"").decode("utf-8", "replace").strip())
 
     def _check_binary(self) -> None:
@@ -272,13 +281,21 @@ def _origin(path: Path, description: Any) -> dict[str, Any]:
     }
 
 
-def _callbacks2(heard: Any) -> Any:
-    """Callbacks of FMI 2.0 that collect what the FMU says; FMPy's own would print it on stdout."""
+def _tell(_: Any, name: bytes | None, status: int, category: bytes, message: bytes | None) -> None:
+    """Pass on what an FMI 2.0 instance says."""
+    listener = _LISTENERS.get((name or b"").decode("utf-8", "replace"))
+    if listener is not None:
+        listener.hear(message)
+
+
+@cache
+def _callbacks2() -> Any:
+    """Callbacks of FMI 2.0 that collect what the FMUs say; FMPy's own would print it on stdout."""
     from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
     from fmpy.logging import addLoggerProxy
 
     callbacks = fmi2CallbackFunctions()
-    callbacks.logger = fmi2CallbackLoggerTYPE(lambda _, name, status, category, message: heard(message))
+    callbacks.logger = fmi2CallbackLoggerTYPE(_tell)
     callbacks.allocateMemory, callbacks.freeMemory = defaultCallbacks.allocateMemory, defaultCallbacks.freeMemory
     with suppress(Exception):  # without the proxy, messages come with their printf formats unfilled
         addLoggerProxy(ctypes.byref(callbacks))

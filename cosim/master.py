@@ -16,10 +16,11 @@ import numpy as np
 
 import cosim
 from cosim.component import STATUSES, Component
-from cosim.errors import StepError, WiringError
+from cosim.errors import ScenarioError, StepError, WiringError
 from cosim.fmu import FmuComponent
 from cosim.loop import CompiledLoop, InterpretedLoop, Plan, make_loop
 from cosim.recording import Recording
+from cosim.scenario import Scenario
 from cosim.signals import Samples, Signal
 from cosim.wiring import Record, Wire, Wiring
 from cosim.writer import MemoryWriter, StreamWriter
@@ -108,6 +109,43 @@ def simulate(
             work.execute()
     recording = None if path else Recording(name, writer.table(), writer.units, writer.origin)
     return Run(work.statistics(), path, recording)
+
+
+def run(
+    scenario: Scenario,
+    path: Path | None = None,
+    *,
+    force: bool = False,
+    progress: Progress | None = None,
+    compiled: bool = True,
+    command: str = "",
+) -> Run:
+    """Run a scenario whose components all have their FMU; arguments and errors as in `simulate`.
+
+    Raises:
+        ScenarioError: a component is made from a card and has no FMU yet.
+    """
+    for name, component in scenario.components.items():
+        if component.fmu is None:
+            message = f'{scenario.path}: the component "{name}" has no FMU yet; `cosim run` builds it from its card.'
+            raise ScenarioError(message, culprit=name)
+    told = {"scenario": scenario.text, "command": command}
+    return simulate(
+        {name: component.fmu for name, component in scenario.components.items() if component.fmu},
+        scenario.wires,
+        record=scenario.records,
+        step=scenario.step,
+        ticks=scenario.ticks,
+        signals=scenario.signals,
+        parameters={name: component.parameters for name, component in scenario.components.items()},
+        decimation=scenario.decimation,
+        path=path,
+        force=force,
+        name=scenario.name,
+        origin=told,
+        progress=progress,
+        compiled=compiled,
+    )
 
 
 @dataclass

@@ -12,8 +12,9 @@ SOURCE = r"""
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdlib.h>
+#include <string.h>
 enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, COUNT };
-typedef struct { double v[COUNT]; void *environment; void *log; } M;
+typedef struct { double v[COUNT]; char name[99]; void *log; } M;
 typedef void Log2(void *, const char *, int, const char *, const char *, ...);
 typedef void Log3(void *, int, const char *, const char *);
 static M *make(void) { M *m = calloc(1, sizeof(M)); m->v[K] = 1; m->v[FAIL_AT] = m->v[NAN_AT] = 1e9; return m; }
@@ -30,15 +31,15 @@ static int step(M *m, double t, double h) {
 #define UNUSED(name) API int name(void) { return 3; }
 typedef struct { Log2 *log; } Callbacks;
 API void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, Callbacks *c, int v, int l) {
-  M *m = make(); m->log = (void *)c->log; return m; }
+  M *m = make(); m->log = (void *)c->log; strncpy(m->name, n, 98); return m; }
 API int fmi2SetupExperiment(void *m, int a, double b, double c, int d, double e) { return 0; }
 NONE(fmi2EnterInitializationMode) NONE(fmi2ExitInitializationMode) NONE(fmi2Terminate)
-API int fmi2Reset(M *m) { M *n = make(); n->log = m->log; *m = *n; free(n); return 0; }
+API int fmi2Reset(M *m) { M *n = make(); n->log = m->log; strcpy(n->name, m->name); *m = *n; free(n); return 0; }
 API void fmi2FreeInstance(void *m) { free(m); }
 API int fmi2SetReal(M *m, const unsigned *r, size_t n, const double *x) { return set(m, r, n, x); }
 API int fmi2GetReal(M *m, const unsigned *r, size_t n, double *x) { return get(m, r, n, x); }
 API int fmi2DoStep(M *m, double t, double h, int p) {
-  int s = step(m, t, h); if (s) ((Log2 *)m->log)(NULL, "tiny", 3, "error", "the %s broke", "shaft"); return s; }
+  int s = step(m, t, h); if (s) ((Log2 *)m->log)(NULL, m->name, 3, "error", "the %s broke", "shaft"); return s; }
 API const char *fmi2GetVersion(void) { return "2.0"; }
 API const char *fmi2GetTypesPlatform(void) { return "default"; }
 API void *fmi3InstantiateCoSimulation(const char *n, const char *g, const char *r, bool a, bool b, bool c, bool d,

@@ -1,0 +1,210 @@
+"""Scenarios: a TOML file that names components, wires, inputs, the step and what to record.
+
+    name, step [s], stop [s]
+    [components.NAME]   fmu = "file.fmu", or card = "CARD" with part = "plant" | "controller";  parameters = { ... }
+    [signals.NAME]      kind = "sine" | "constant" | "steps" | "multisine" | "chirp" | "slews" | "recorded" | "noise"; ...
+    [[connections]]     from, to; gain, offset, quantum, noise, unit where wanted
+    [record]            signals = { column = "component.variable", ... } or a list of them; decimation; mode
+
+Files are relative to the scenario. A name without .toml is a shipped scenario.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+
+from cosim.errors import ScenarioError
+from cosim.signals import Generator, Recorded, Signal
+from cosim.wiring import Record, Wire
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
+
+
+class ComponentSection(_Section):
+    """`[components.NAME]`: an FMU, or a part of a card from which one is built."""
+
+    fmu: Path | None = None
+    card: str | None = None
+    part: Literal["plant", "controller"] | None = None
+    parameters: dict[str, float | bool | str] = {}
+
+    @model_validator(mode="after")
+    def _one_source(self) -> "ComponentSection":
+        if (self.fmu is None) == (self.card is None) or (self.card is None) != (self.part is None):
+            raise ValueError('give fmu = "...", or card = "..." with part = "plant" or "controller"')
+        return self
+
+
+class ConnectionSection(_Section):
+    """`[[connections]]`: one wire."""
+
+    source: str = Field(alias="from")
+    target: str = Field(alias="to")
+    gain: float = 1.0
+    offset: float = 0.0
+    quantum: float = Field(default=0.0, ge=0)
+    noise: str = ""
+    unit: str = ""
+
+
+class RecordSection(_Section):
+    """A recorded signal with its mode."""
+
+    signal: str
+    mode: Literal["sample", "mean"]
+
+
+class RecordingSection(_Section):
+    """`[record]`: columns, ticks for each row, and the mode of columns that state none."""
+
+    signals: dict[str, str | RecordSection] | list[str] = Field(min_length=1)
+    decimation: int = Field(default=1, ge=1)
+    mode: Literal["sample", "mean"] = "sample"
+
+
+class _File(_Section):
+    name: str = ""
+    description: str = ""
+    step: float = Field(default=1e-4, gt=0)
+    stop: float = Field(gt=0)
+    components: dict[str, ComponentSection] = Field(min_length=1)
+    signals: dict[str, Generator] = {}
+    connections: list[ConnectionSection] = []
+    record: RecordingSection
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A checked scenario; components made from cards get their FMU from `with_fmus` before it can run."""
+
+    path: str
+    text: str
+    name: str
+    description: str
+    step: float
+    ticks: int
+    components: Mapping[str, ComponentSection]
+    signals: Mapping[str, Signal]
+    wires: tuple[Wire, ...]
+    records: Mapping[str, Record]
+    decimation: int
+
+    @property
+    def stop(self) -> float:
+        """Length of the run in s."""
+        return self.ticks * self.step
+
+    def with_fmus(self, fmus: Mapping[str, Path]) -> "Scenario":
+        """Return the scenario with these FMUs in the place of the cards of the components named."""
+        changed = {name: self.components[name].model_copy(update={"fmu": path}) for name, path in fmus.items()}
+        return replace(self, components={**self.components, **changed})
+
+
+def read_scenario(source: str | Path) -> Scenario:
+    """Read a scenario from a file or by the name of a shipped one.
+
+    Raises:
+        ScenarioError: one sentence that names file, key, value and rule.
+    """
+    path = Path(source)
+    shipped = files("cosim") / "scenarios" / f"{source}.toml"
+    if not path.exists() and shipped.is_file():
+        return parse_scenario(shipped.read_text("utf-8"), str(source), Path())
+    if path.suffix != ".toml" or not path.is_file():
+        choices = shipped_scenarios()
+        rule = f"a scenario is a .toml file or one of: {', '.join(choices)}."
+        raise ScenarioError(f"{source}: no such scenario; {rule}", culprit=str(source), choices=choices)
+    try:
+        return parse_scenario(path.read_text("utf-8"), str(source), path.parent)
+    except UnicodeDecodeError as error:
+        raise ScenarioError(f"{source} is no scenario: it is not UTF-8 text.", culprit=str(source)) from error
+
+
+def shipped_scenarios() -> tuple[str, ...]:
+    """Return the names of the scenarios that come with the package."""
+    return tuple(sorted(one.name.removesuffix(".toml") for one in (files("cosim") / "scenarios").iterdir()))
+
+
+def parse_scenario(text: str, path: str, directory: Path) -> Scenario:
+    """Check the text of a scenario; `path` is its name in errors, `directory` where its files are."""
+    try:
+        raw = _File.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise ScenarioError(f"{path} is not valid TOML: {error}.", culprit=path) from error
+    except ValidationError as error:
+        raise _sentence(error, path) from error
+    return Scenario(
+        path=path,
+        text=text,
+        name=raw.name or Path(path).stem,
+        description=raw.description,
+        step=raw.step,
+        ticks=_ticks(raw, path),
+        components={name: _located(one, directory) for name, one in raw.components.items()},
+        signals={name: _located_signal(one, directory) for name, one in raw.signals.items()},
+        wires=tuple(Wire(**one.model_dump()) for one in raw.connections),
+        records=_records(raw.record),
+        decimation=raw.record.decimation,
+    )
+
+
+def _ticks(raw: _File, path: str) -> int:
+    ticks = round(raw.stop / raw.step)
+    if ticks < 1 or abs(raw.stop / raw.step - ticks) > 1e-6 * ticks:
+        message = f"{path}: stop = {raw.stop} is not a whole number of steps of {raw.step} s."
+        raise ScenarioError(message, culprit="stop", value=raw.stop)
+    return ticks
+
+
+def _located(component: ComponentSection, directory: Path) -> ComponentSection:
+    """Make paths relative to the scenario; the name of a shipped card stays as it is."""
+    fmu = None if component.fmu is None else directory / component.fmu
+    card = component.card
+    if card is not None and (directory / card).is_file():
+        card = str(directory / card)
+    return component.model_copy(update={"fmu": fmu, "card": card})
+
+
+def _located_signal(signal: Any, directory: Path) -> Any:
+    return signal.model_copy(update={"file": directory / signal.file}) if isinstance(signal, Recorded) else signal
+
+
+def _records(section: RecordingSection) -> dict[str, Record]:
+    named = section.signals if isinstance(section.signals, dict) else {name: name for name in section.signals}
+    modes = {name: Record(one, section.mode) for name, one in named.items() if isinstance(one, str)}
+    return {name: modes.get(name) or Record(**one.model_dump()) for name, one in named.items()}  # type: ignore[union-attr]
+
+
+def _sentence(error: ValidationError, path: str) -> ScenarioError:
+    """Turn the first complaint of pydantic into a sentence."""
+    first = error.errors(include_url=False)[0]
+    where = ".".join(str(part) for part in first["loc"]) or "the file"
+    message = first["msg"].removeprefix("Value error, ").rstrip(".")
+    message = message[0].lower() + message[1:]
+    if first["type"] == "extra_forbidden":
+        choices = _keys(first["loc"])
+        sentence = f'{path}: "{where}" is no key of a scenario; keys there are: {", ".join(choices)}.'
+        return ScenarioError(sentence, culprit=where, choices=choices)
+    if first["type"] == "missing":
+        return ScenarioError(f'{path}: "{where}" is missing.', culprit=where)
+    value = first["input"]
+    shown = "" if isinstance(value, dict | list) else f" = {value!r}"
+    return ScenarioError(f"{path}: {where}{shown} breaks a rule: {message}.", culprit=where, value=value)
+
+
+def _keys(location: tuple[int | str, ...]) -> tuple[str, ...]:
+    """List the legal keys beside the one at `location`."""
+    kinds = {one.model_fields["kind"].annotation: one for one in get_args(get_args(Generator)[0])}
+    generators = {get_args(kind)[0]: one for kind, one in kinds.items()}
+    section: type[BaseModel] = _File
+    if len(location) > 1:
+        sections = {"components": ComponentSection, "connections": ConnectionSection, "record": RecordingSection}
+        section = sections.get(str(location[0])) or generators[str(location[2])]
+    return tuple(field.alias or name for name, field in section.model_fields.items())
