@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from cosim.proof.motion import MOTIONS, Motion, Pace
+from cosim.proof.motion import MOTIONS, Motion, Pace, shaken
 from cosim.proof.truth import BLOCKS, TICK, Array, Drive
 
 RECORDINGS = ("train_1", "train_2", "heldout")
@@ -66,10 +66,10 @@ def draw_pace(rng: np.random.Generator, duration: float) -> Pace:
     return Pace(float(rng.uniform(-1, 1)), amplitude, hertz, duration)
 
 
-def draw_motions(rng: np.random.Generator, pace: Pace) -> dict[str, Motion]:
-    """Two kinds for training, a third held out."""
-    kinds = ["wander", "slews", str(rng.choice(["swell", "chirp"]))]
-    return {name: MOTIONS[kind](pace, rng) for name, kind in zip(RECORDINGS, kinds, strict=True)}
+def draw_motions(rng: np.random.Generator, pace: Pace, tremble: float = 0.4) -> dict[str, Motion]:
+    """Two kinds for training, a third held out; each with short bursts of tremble that excite the drive."""
+    kinds = zip(RECORDINGS, ["wander", "slews", str(rng.choice(["swell", "chirp"]))], strict=True)
+    return {name: shaken(MOTIONS[kind](pace, rng), rng, tremble) for name, kind in kinds}
 
 
 def draw_mount(rng: np.random.Generator, friction: str, motions: dict[str, Motion], pace: Pace) -> dict[str, Any]:

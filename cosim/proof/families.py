@@ -50,7 +50,7 @@ def stribeck(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """Break-away above the Coulomb level; the card knows only the latter."""
     mount = bench.mount
     breakaway = mount["coulomb"] * (1 + size * float(rng.uniform(0.6, 1.1)))
-    speed = bench.pace.speed * log_uniform(rng, 0.06, 0.2)
+    speed = bench.pace.speed * log_uniform(rng, 0.08, 0.25)
     mount |= {"breakaway": breakaway, "stribeck_speed": speed}
     bench.belief["friction"] |= {"Fs": mount["coulomb"], "Vs": speed}
     return {"Fs": breakaway, "Vs": speed, "delta": mount["stribeck_power"]}
@@ -116,7 +116,7 @@ def torque_offset(bench: Bench, rng: np.random.Generator, size: float) -> Parame
 
 def thermal_viscosity(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """Grease that thins as it warms up."""
-    viscous, level = -size * float(rng.uniform(0.025, 0.045)), -size * float(rng.uniform(0.012, 0.025))
+    viscous, level = -size * float(rng.uniform(0.03, 0.06)), -size * float(rng.uniform(0.02, 0.035))
     bench.mount |= {"thermal_viscous": viscous, "thermal_level": level}
     bench.mount["viscous"] *= 1.5
     bench.belief["friction"]["sigma2"] *= 1.5
@@ -156,12 +156,13 @@ def delay(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
 
 def backlash(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """Load and motor meet only at the ends of a gap."""
-    total, gap = bench.mount["inertia"], size * log_uniform(rng, 4e-4, 2e-3)
-    load = float(rng.uniform(0.3, 0.55)) * total
-    spring = load * (2 * np.pi * float(rng.uniform(50, 90))) ** 2
+    total, gap = bench.mount["inertia"], size * log_uniform(rng, 3e-4, 1.5e-3)
+    felt = bench.friction_rms / total / root_mean_square(bench.training.a)
+    load = float(np.clip(rng.uniform(0.6, 1.2) * felt, 0.12, 0.5)) * total
+    spring = load * (2 * np.pi * float(rng.uniform(25, 50))) ** 2
     dry = float(rng.uniform(0.1, 0.25)) * bench.mount["coulomb"]
     bench.mount |= {"inertia": total - load, "load_inertia": load, "gap": gap, "drive_stiffness": spring}
-    bench.mount |= {"drive_damping": 1.2 * np.sqrt(spring * load), "load_friction": dry, "load_stiffness": dry / 2e-4}
+    bench.mount |= {"drive_damping": 1.5 * np.sqrt(spring * load), "load_friction": dry, "load_stiffness": dry / 2e-4}
     bench.mount["load_viscous"] = 0.2 * bench.mount["viscous"]
     return {"gap_rad": gap, "load_share": load / total}
 
@@ -169,9 +170,9 @@ def backlash(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
 def encoder_eccentricity(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """A disc off centre: the reading errs once and twice per encoder turn, felt as torque ~ J A (n v)^2."""
     v2 = root_mean_square(bench.training.v**2)
-    amplitude, goal = log_uniform(rng, 1e-4, 1e-3), 2 * goal(bench, rng, size) / bench.mount["inertia"]
-    cycles = int(np.clip(round(np.sqrt(goal / (amplitude * v2))), 4, 64))
-    amplitude = float(np.clip(goal / (v2 * cycles**2), 5e-5 * size, 2e-3))
+    amplitude, wanted = log_uniform(rng, 1e-4, 1e-3), 2 * goal(bench, rng, size) / bench.mount["inertia"]
+    cycles = int(np.clip(round(np.sqrt(wanted / (amplitude * v2))), 4, 64))
+    amplitude = float(np.clip(wanted / (v2 * cycles**2), 5e-5 * size, 2e-3))
     phase, second = angle(rng), float(rng.uniform(0, 0.2))
     bench.mount |= {"ripple_cycles": cycles, "ripple_phase": phase}
     bench.mount |= {"ripple_1": amplitude, "ripple_2": second * amplitude}

@@ -126,6 +126,30 @@ def chirp(pace: Pace, rng: np.random.Generator) -> Motion:
     return _placed(pace, Motion(np.sin(phase), rate * np.cos(phase), change * np.cos(phase) - rate**2 * np.sin(phase)))
 
 
+def shaken(motion: Motion, rng: np.random.Generator, share: float) -> Motion:
+    """`motion` with two bursts of a faint tremble, 2 to 20 Hz, whose acceleration is `share` of the motion's peak."""
+    strength = share * float(np.quantile(np.abs(motion.a), 0.98))
+    time, total = ticks(motion.q.size), motion
+    for center in rng.uniform([0.15, 0.55], [0.45, 0.85]) * time[-1]:
+        burst = _burst(
+            time - center, float(rng.uniform(2, 4)), 2 * np.pi * np.exp(rng.uniform(*np.log([2, 20]), 5)), rng
+        )
+        scale = strength / float(np.max(np.abs(burst.a)))
+        total = Motion(*(whole + scale * part for whole, part in zip(total, burst, strict=True)))
+    return total
+
+
+def _burst(time: Array, half: float, pitches: Array, rng: np.random.Generator) -> Motion:
+    """Tones of equal acceleration under a cos^4 window of +- `half` seconds."""
+    x = np.clip(time / half, -1, 1) * np.pi / 2
+    c, s, w = np.cos(x), np.sin(x), np.pi / 2 / half
+    window = Motion(c**4, -4 * w * c**3 * s, 4 * w**2 * c**2 * (3 * s**2 - c**2))
+    phases = rng.uniform(0, 2 * np.pi, pitches.size)[:, None] + pitches[:, None] * time
+    power = pitches[:, None]
+    tones = Motion(*(np.sum(f, axis=0) for f in (np.sin(phases) / power**2, np.cos(phases) / power, -np.sin(phases))))
+    return _product(window, tones)
+
+
 MOTIONS: dict[str, Callable[[Pace, np.random.Generator], Motion]] = {
     "wander": wander,
     "slews": slews,

@@ -32,9 +32,9 @@ def reversal_kick(bench: Bench, rng: np.random.Generator, size: float) -> Parame
 
 def random_walk(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """A torque that wanders off and never returns for long."""
-    goal = 1.3 * goal(bench, rng, size)
-    add_push(bench, lambda _, t: drift(rng, t.size, goal, 4.0))
-    return {"rms": goal, "correlation_s": 4.0}
+    rms = 1.3 * goal(bench, rng, size)
+    add_push(bench, lambda _, t: drift(rng, t.size, rms, 4.0))
+    return {"rms": rms, "correlation_s": 4.0}
 
 
 def rubbing(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
