@@ -52,10 +52,9 @@ static double scaled(double x, int exponent) {
 
 /* exp(x + tail) = (head + tail) 2^exponent for |x| < 800. Taylor of degree 5 on |r| <= ln 2 / 256: error 6e-19. */
 static Double2 exp_parts(double x, double tail, int *exponent) {
-    double k = det_floor(x * INV_LN2_128 + 0.5);
-    double r = (x - k * LN2_128_HIGH) - k * LN2_128_LOW + tail;
-    double rest = r + r * r * (0.5 + r * (1.0 / 6 + r * (1.0 / 24 + r * (1.0 / 120))));
-    int index = (int)k, entry = index & 127;
+    int index = (int)(x * INV_LN2_128 + (x < 0 ? -0.5 : 0.5)), entry = index & 127;
+    double r = (x - index * LN2_128_HIGH) - index * LN2_128_LOW + tail, square = r * r;
+    double rest = r + square * ((0.5 + r * (1.0 / 6)) + square * (1.0 / 24 + r * (1.0 / 120)));
     Double2 result = {exp_table[entry][0], exp_table[entry][1] + exp_table[entry][0] * rest};
     *exponent = (index - entry) / 128;
     return result;
@@ -102,11 +101,12 @@ double det_expm1(double x) {
     return less_one.head + (less_one.tail + parts.tail * scale);
 }
 
-/* log(z) - [k ln 2 - log(inverse)] for r = z inverse - 1, given as r + r_tail: the part beyond r - r^2/2. */
+/* log(1 + r) - r + r^2/2 for |r| <= 1/128: r^3/3 - r^4/4 ... + r^11/11, in pairs that a processor can overlap. */
 static double log1p_rest(double r) {
-    double series = 0;
-    for (int i = 11; i >= 3; i--) series = series * r + (i % 2 ? 1.0 : -1.0) * inverse[i];
-    return r * r * r * series;
+    double r2 = r * r, r4 = r2 * r2;
+    double low = (inverse[3] - r * inverse[4]) + r2 * (inverse[5] - r * inverse[6]);
+    double high = (inverse[7] - r * inverse[8]) + r2 * (inverse[9] - r * inverse[10]) + r4 * inverse[11];
+    return r * r2 * (low + r4 * high);
 }
 
 /* log(x) of a positive finite x, relative error below 2^-65: z = x 2^-k in [0.7, 1.42), r = z inverse - 1. */

@@ -120,24 +120,27 @@ double det_atan(double x) {
     return copysign(size <= 1 ? atan_of_ratio(size, 1) : (PI_2 - atan_of_ratio(1, size)) + PI_2_TAIL, x);
 }
 
-/* Angle in the first quadrant of (x, y) >= 0, not both zero or infinite. */
-static double first_quadrant(double y, double x) {
-    if (y == INFINITY) return PI_2;
-    if (x == INFINITY) return 0;
-    return y <= x ? atan_of_ratio(y, x) : (PI_2 - atan_of_ratio(x, y)) + PI_2_TAIL;
-}
+/* y / x <= 1, both not negative; 0 for an infinite x. */
+static double small_angle(double y, double x) { return x == INFINITY ? 0 : atan_of_ratio(y, x); }
 
+/* Counted from the nearest axis, so that pi/2 and pi are rounded once. */
 double det_atan2(double y, double x) {
     double height = fabs(y), width = fabs(x), angle;
     if (x != x || y != y) return NAN;
     if (height == 0 && width == 0) width = 1;
     if (height == INFINITY && width == INFINITY) height = width = 1;
-    if (height > 1e300 || width > 1e300) {
+    if ((height > 1e300 || width > 1e300) && height != INFINITY && width != INFINITY) {
         height *= 0x1p-100; /* keeps x + c y finite */
         width *= 0x1p-100;
     }
-    angle = first_quadrant(height, width);
-    return copysign(signbit(x) ? (2 * PI_2 - angle) + 2 * PI_2_TAIL : angle, y);
+    if (height <= width) {
+        angle = small_angle(height, width);
+        if (signbit(x)) angle = (2 * PI_2 - angle) + 2 * PI_2_TAIL;
+    } else {
+        angle = small_angle(width, height);
+        angle = (signbit(x) ? PI_2 + angle : PI_2 - angle) + PI_2_TAIL;
+    }
+    return copysign(angle, y);
 }
 
 double det_asin(double x) {

@@ -130,7 +130,8 @@ SolverResult rodas4_step(const Solver *solver, double time, double h, const doub
 static double error_norm(const Solver *solver, const double *x, const Work *work, int *culprit) {
     double total = 0, largest = -1;
     for (int i = 0; i < solver->size; i++) {
-        double size = fmax(fabs(x[i]), fabs(work->x_new[i])) + 0.01 * solver->nominals[i];
+        double before = fabs(x[i]), after = fabs(work->x_new[i]);
+        double size = (before > after ? before : after) + 0.01 * solver->nominals[i];
         double part = work->error[i] / (solver->tolerance * size);
         total += part * part;
         if (!(part * part <= largest)) {

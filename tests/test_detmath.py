@@ -1,0 +1,183 @@
+"""The elementary functions compiled into every FMU: last bits against mpmath, special values, tables."""
+
+import ctypes
+import math
+import re
+
+import mpmath
+import numpy as np
+import pytest
+
+from pyfmi_models.export.build import PLATFORMS, compile_shared, host
+from pyfmi_models.export.codegen import SHIM
+
+COUNT = 1500
+
+
+@pytest.fixture(scope="module")
+def library():
+    sources = {path.name: path.read_bytes() for path in SHIM.glob("detmath*")}
+    flags = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC")
+    return ctypes.CDLL(str(compile_shared(sources, "detmath.so", PLATFORMS[host()].target, flags)))
+
+
+def function(library, name, arguments=1):
+    found = getattr(library, f"det_{name}")
+    found.restype, found.argtypes = ctypes.c_double, [ctypes.c_double] * arguments
+    return found
+
+
+def error_in_ulp(value, exact):
+    exponent = max(mpmath.frexp(exact)[1] - 1, -1022) if exact else -1022
+    return float(abs(mpmath.mpf(value) - exact) / mpmath.mpf(2) ** (exponent - 52))
+
+
+def decades(low, high, seed=0, signed=True):
+    random = np.random.default_rng(seed)
+    values = 10 ** random.uniform(low, high, COUNT)
+    return values * random.choice([-1, 1], COUNT) if signed else values
+
+
+def between(low, high):
+    return np.random.default_rng(7).uniform(low, high, COUNT)
+
+
+NEAR_ROOTS = np.concatenate([np.arange(1, 1000) * np.pi / 2, np.arange(62000, 63000) * np.pi / 2])
+NEAR_ONE = 1 + decades(-15, -0.5)
+
+# name: arguments, largest error in units in the last place
+UNARY = {
+    "exp": ((between(-745.1, 709.7), decades(-20, 0)), 1),
+    "expm1": ((between(-60, 709), decades(-20, 0)), 1),
+    "exp2": ((between(-1074, 1023), decades(-20, 0)), 1),
+    "log": ((decades(-323, 308, signed=False), NEAR_ONE, between(0.5, 2)), 1),
+    "log1p": ((decades(-20, -0.01), decades(-5, 300, signed=False)), 1),
+    "log2": ((decades(-300, 300, signed=False), NEAR_ONE), 1),
+    "log10": ((decades(-300, 300, signed=False), NEAR_ONE), 1),
+    "sin": ((decades(-9, 5), between(-10, 10), NEAR_ROOTS), 1),
+    "cos": ((decades(-9, 5), between(-10, 10), NEAR_ROOTS), 1),
+    "tan": ((decades(-9, 5), between(-10, 10), NEAR_ROOTS), 2),
+    "atan": ((decades(-9, 9), between(-3, 3)), 2),
+    "asin": ((between(-1, 1), decades(-9, 0)), 2),
+    "acos": ((between(-1, 1), decades(-9, 0)), 2),
+    "sinh": ((between(-700, 700), decades(-9, 2)), 2),
+    "cosh": ((between(-700, 700), decades(-9, 2)), 2),
+    "tanh": ((between(-30, 30), decades(-9, 1)), 2),
+    "asinh": ((decades(-9, 20),), 2),
+    "acosh": ((1 + decades(-9, 20, signed=False),), 2),
+    "atanh": ((between(-1, 1), decades(-9, -0.001)), 2),
+}
+EXACT = {"exp2": lambda x: mpmath.mpf(2) ** x, "log2": lambda x: mpmath.log(x, 2)}
+
+
+@pytest.mark.parametrize("name", UNARY)
+def test_the_last_place_agrees_with_mpmath(library, name):
+    arguments, limit = UNARY[name]
+    tested, exact = function(library, name), EXACT.get(name, getattr(mpmath, name, None))
+    with mpmath.workprec(180):
+        worst = max(error_in_ulp(tested(x), exact(mpmath.mpf(x))) for x in np.concatenate(arguments).tolist())
+    assert worst <= limit
+
+
+def test_a_power_is_within_one_unit_in_the_last_place(library):
+    power, worst = function(library, "pow", 2), 0.0
+    bases = np.concatenate([decades(-300, 300, 1, False), decades(-3, 3, 2, False), 1 + decades(-12, -1, 3)])
+    exponents = np.concatenate([between(-1, 1), between(-100, 100), decades(0, 12, 4)])
+    with mpmath.workprec(220):
+        for x, y in zip(bases.tolist(), exponents.tolist(), strict=True):
+            exact = mpmath.mpf(x) ** mpmath.mpf(y)
+            if mpmath.mpf(2) ** -1074 < exact < mpmath.mpf(2) ** 1023:
+                worst = max(worst, error_in_ulp(power(x, y), exact))
+    assert worst <= 1
+
+
+def test_small_whole_powers_of_small_whole_numbers_are_exact(library):
+    power = function(library, "pow", 2)
+    assert all(power(base, n) == base**n for base in range(-9, 10) for n in range(16))
+
+
+def same(a, b):
+    return (math.isnan(a) and math.isnan(b)) or (a == b and math.copysign(1, a) == math.copysign(1, b))
+
+
+INF, NAN = math.inf, math.nan
+SPECIAL = {
+    "exp": {INF: INF, -INF: 0.0, NAN: NAN, 0.0: 1.0, 710.0: INF, -746.0: 0.0, -745.1: 5e-324},
+    "expm1": {INF: INF, -INF: -1.0, NAN: NAN, -0.0: -0.0},
+    "log": {INF: INF, 0.0: -INF, -0.0: -INF, -1.0: NAN, -INF: NAN, NAN: NAN, 1.0: 0.0},
+    "log1p": {INF: INF, -1.0: -INF, -2.0: NAN, NAN: NAN, -0.0: -0.0},
+    "sin": {INF: NAN, -INF: NAN, NAN: NAN, -0.0: -0.0},
+    "cos": {INF: NAN, NAN: NAN, 0.0: 1.0},
+    "tanh": {INF: 1.0, -INF: -1.0, NAN: NAN, -0.0: -0.0},
+    "sinh": {INF: INF, -INF: -INF, NAN: NAN, -0.0: -0.0, 711.0: INF},
+    "cosh": {INF: INF, -INF: INF, NAN: NAN, 711.0: INF},
+    "atan": {INF: math.pi / 2, -INF: -math.pi / 2, NAN: NAN, -0.0: -0.0},
+    "asin": {2.0: NAN, 1.0: math.pi / 2, NAN: NAN, -0.0: -0.0},
+    "acos": {2.0: NAN, 1.0: 0.0, -1.0: math.pi, NAN: NAN},
+    "acosh": {0.5: NAN, 1.0: 0.0, INF: INF, NAN: NAN},
+    "asinh": {INF: INF, -INF: -INF, NAN: NAN, -0.0: -0.0},
+    "atanh": {1.0: INF, -1.0: -INF, 2.0: NAN, -0.0: -0.0},
+    "floor": {-0.0: -0.0, -0.5: -1.0, 2.5: 2.0, INF: INF, NAN: NAN, 1e300: 1e300},
+    "ceil": {-0.5: -0.0, 2.5: 3.0, -INF: -INF, NAN: NAN},
+}
+
+
+@pytest.mark.parametrize("name", SPECIAL)
+def test_special_values_follow_annex_f_of_c99(library, name):
+    tested = function(library, name)
+    assert {x: tested(x) for x, y in SPECIAL[name].items() if not same(tested(x), y)} == {}
+
+
+def test_powers_of_special_values_are_those_of_python(library):
+    power = function(library, "pow", 2)
+    values = (0.0, -0.0, 1.0, -1.0, 0.5, -0.5, 2.0, -2.0, 3.0, -3.0, 1e300, -1e300, INF, -INF, NAN)
+    wrong = [(x, y) for x in values for y in values if not same(power(x, y), reference_power(x, y))]
+    assert wrong == []
+
+
+def reference_power(x, y):
+    try:
+        return math.pow(x, y)
+    except OverflowError:
+        return -INF if x < 0 and y % 2 else INF
+    except ValueError:
+        if x == 0:
+            return math.copysign(INF, x) if y % 2 == 1 else INF
+        return NAN
+
+
+def test_angles_of_special_points_are_those_of_python(library):
+    angle = function(library, "atan2", 2)
+    values = (0.0, -0.0, 1.0, -1.0, INF, -INF, NAN)
+    wrong = [(y, x) for y in values for x in values if not same(angle(y, x), math.atan2(y, x))]
+    assert wrong == []
+
+
+def test_remainders_hypotenuse_and_extremes_are_those_of_python(library):
+    fmod, hypot = function(library, "fmod", 2), function(library, "hypot", 2)
+    pairs = list(zip(decades(-20, 20, 1).tolist(), decades(-20, 20, 2).tolist(), strict=True))
+    assert all(fmod(x, y) == math.fmod(x, y) for x, y in pairs)
+    assert all(hypot(x, y) == pytest.approx(math.hypot(x, y), rel=4e-16, abs=0) for x, y in pairs)
+    assert hypot(3e300, 4e300) == pytest.approx(5e300, rel=4e-16)
+    assert function(library, "fmin", 2)(NAN, 1.0) == 1.0
+    assert function(library, "fmax", 2)(-1.0, NAN) == -1.0
+
+
+def test_tables_are_their_definitions_rounded_to_nearest():
+    text = (SHIM / "detmath_tables.h").read_text()
+    with mpmath.workprec(300):
+        for j, (head, tail) in enumerate(table(text, "exp_table")):
+            exact = mpmath.mpf(2) ** (mpmath.mpf(j) / 128)
+            assert (head, tail) == (float(exact), float(exact - mpmath.mpf(float(exact))))
+        for inverse, head, tail in table(text, "log_table"):
+            exact = -mpmath.log(inverse)
+            assert head * 2**42 == int(head * 2**42)
+            assert tail == float(exact - mpmath.mpf(head))
+        for i, (head, tail) in enumerate(table(text, "atan_table")):
+            exact = mpmath.atan(mpmath.mpf(i) / 32)
+            assert (head, tail) == (float(exact), float(exact - mpmath.mpf(float(exact))))
+
+
+def table(text, name):
+    body = re.search(rf"{name}\[\d+\]\[\d+\] = {{(.*?)}};", text, re.S)[1]
+    return [tuple(float.fromhex(n) for n in row.split(",")) for row in re.findall(r"{(.*?)}", body)]
