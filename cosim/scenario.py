@@ -1,8 +1,8 @@
 """Scenarios: a TOML file that names components, wires, inputs, the step and what to record.
 
     name, step [s], stop [s]
-    [components.NAME]   fmu = "file.fmu", or card = "CARD" with part = "plant" | "controller";  parameters = { ... }
-    [signals.NAME]      kind = "sine" | "constant" | "steps" | "multisine" | "chirp" | "slews" | "recorded" | "noise"; ...
+    [components.NAME]   fmu = "file.fmu", or card = "CARD" with part = "plant" | "controller"; parameters = { ... }
+    [signals.NAME]      kind = "sine" | "constant" | "steps" | "multisine" | "chirp" | "slews" | "recorded" | "noise"
     [[connections]]     from, to; gain, offset, quantum, noise, unit where wanted
     [record]            signals = { column = "component.variable", ... } or a list of them; decimation; mode
 
@@ -199,12 +199,16 @@ def _sentence(error: ValidationError, path: str) -> ScenarioError:
     return ScenarioError(f"{path}: {where}{shown} breaks a rule: {message}.", culprit=where, value=value)
 
 
+def _generators() -> dict[str, Any]:
+    """Map the kinds of signals to their classes."""
+    classes = get_args(get_args(Generator)[0])
+    return {get_args(one.model_fields["kind"].annotation)[0]: one for one in classes}
+
+
 def _keys(location: tuple[int | str, ...]) -> tuple[str, ...]:
     """List the legal keys beside the one at `location`."""
-    kinds = {one.model_fields["kind"].annotation: one for one in get_args(get_args(Generator)[0])}
-    generators = {get_args(kind)[0]: one for kind, one in kinds.items()}
-    section: type[BaseModel] = _File
+    sections = {"components": ComponentSection, "connections": ConnectionSection, "record": RecordingSection}
+    section: Any = _File
     if len(location) > 1:
-        sections = {"components": ComponentSection, "connections": ConnectionSection, "record": RecordingSection}
-        section = sections.get(str(location[0])) or generators[str(location[2])]
+        section = sections.get(str(location[0])) or _generators()[str(location[2])]
     return tuple(field.alias or name for name, field in section.model_fields.items())

@@ -80,6 +80,8 @@ class StreamWriter(MemoryWriter):
         self.close()
 
     def _flush(self) -> None:
+        if self.rows == self._written:
+            return
         arrays = [pa.array(column) for column in self.table().values()]
         self._file.write_table(pa.Table.from_arrays(arrays, schema=self._schema))
         self.clear()

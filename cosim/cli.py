@@ -1,0 +1,91 @@
+"""The command `cosim`: verbs that take files to files.
+
+A verb `x` is the function `x` in the module `cosim.cli_x`, or the typer `app` there if it has verbs of its own. Only the
+module of the verb that is called is imported, and it imports what is heavy inside its functions: so a run needs neither
+CasADi nor a compiler.
+
+Exit codes: 0 done, 1 only where a yes or no was asked, 2 wrong use or bad input (one sentence), 130 interrupted.
+"""
+
+import functools
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Annotated, Any
+
+import typer
+
+import cosim
+from cosim.errors import CosimError
+from cosim.terminal import put, say
+from pyfmi_models.errors import ModelError
+
+VERBS = ("demo", "export", "run", "identify", "diagnose", "prove", "paper", "sweep", "hardware", "show")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and leave with its exit code."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in given
+    rest = [argument for argument in given if argument != "--debug"]
+    application(rest, debug)(rest, prog_name="cosim")
+
+
+def application(arguments: Sequence[str], debug: bool = False) -> typer.Typer:
+    """Make the command with the verb that is called, or with all that there are."""
+    app = typer.Typer(
+        name="cosim",
+        add_completion=False,
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback()(_options)
+    present = [verb for verb in VERBS if find_spec(f"cosim.cli_{verb}")]
+    called = [argument for argument in arguments if not argument.startswith("-")][:1]
+    for verb in [verb for verb in present if [verb] == called] or present:
+        module = import_module(f"cosim.cli_{verb}")
+        if isinstance(getattr(module, "app", None), typer.Typer):
+            for command in module.app.registered_commands:
+                command.callback = guarded(command.callback, debug) if command.callback else None
+            app.add_typer(module.app, name=verb)
+        else:
+            app.command(verb)(guarded(getattr(module, verb), debug))
+    return app
+
+
+def guarded(verb: Callable[..., Any], debug: bool) -> Callable[..., Any]:
+    """Turn what this project raises on purpose into one sentence and exit code 2, and Ctrl-C into 130."""
+
+    @functools.wraps(verb)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        try:
+            return verb(*args, **kwargs)
+        except (CosimError, ModelError) as error:
+            if debug:
+                raise
+            say(f"cosim: {error}")
+            sys.exit(2)
+        except KeyboardInterrupt:
+            if debug:
+                raise
+            say("cosim: interrupted")
+            sys.exit(130)
+
+    return call
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        put(f"mount-cosim {cosim.__version__}")
+        raise typer.Exit
+
+
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks; may stand anywhere.")] = False,
+) -> None:
+    """Co-simulation of a telescope mount that finds the physics its model left out."""

@@ -1,0 +1,87 @@
+"""FMUs built from cards, kept in the user's cache under the content they were made from.
+
+Looking one up hashes the card and the sources that make FMUs; CasADi and the compiler are imported only to build one.
+"""
+
+import hashlib
+from collections.abc import Callable
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Literal
+
+from cosim.errors import ScenarioError
+from cosim.files import directory
+from cosim.scenario import ComponentSection, Scenario
+
+FMI: Literal[3] = 3
+"""Version of the FMUs built for a run."""
+
+
+def with_fmus(scenario: Scenario, say: Callable[[str], None] = lambda text: None) -> Scenario:
+    """Return the scenario with an FMU for every component that comes from a card; `say` is told of each one built.
+
+    Raises:
+        ScenarioError: there is no such card.
+        ModelError: the card is not good, or cannot be exported.
+    """
+    made = {}
+    for name, component in scenario.components.items():
+        if component.fmu is None:
+            made[name] = _fmu(component, f"{scenario.path}: components.{name}.card", say)
+    return scenario.with_fmus(made)
+
+
+def _fmu(component: ComponentSection, where: str, say: Callable[[str], None]) -> Path:
+    card, part = str(component.card), str(component.part)
+    source = _card_file(card, where)
+    key = hashlib.sha256(f"{_sources()} {part} {FMI} ".encode() + source.read_bytes()).hexdigest()[:16]
+    path = _home() / f"{source.stem}-{part}-{key}.fmu"
+    if not path.exists():
+        say(f"building the FMU of the {part} of {card}")
+        _build(card if not Path(card).exists() else str(source), part, path)
+    return path
+
+
+def _build(card: str, part: str, path: Path) -> None:
+    from pyfmi_models.card import read_card
+    from pyfmi_models.export import export_fmu
+
+    read = read_card(card)
+    model = read.plant().model() if part == "plant" else read.controller_model()
+    directory(path.parent)
+    export_fmu(model, path, fmi=FMI, force=True)
+
+
+def _card_file(card: str, where: str) -> Path:
+    path = Path(card)
+    if path.is_file():
+        return path
+    shipped = _package() / "cards"
+    if (shipped / f"{card}.toml").is_file():
+        return shipped / f"{card}.toml"
+    choices = tuple(sorted(one.stem for one in shipped.glob("*.toml")))
+    rule = f"a card is a .toml file or one of: {', '.join(choices)}."
+    raise ScenarioError(f'{where} = "{card}": no such card; {rule}', culprit=where, value=card, choices=choices)
+
+
+@cache
+def _sources() -> str:
+    """Return a hash of everything that makes an FMU of a card."""
+    digest = hashlib.sha256()
+    for path in sorted(one for one in _package().rglob("*") if one.suffix in {".py", ".c", ".h", ".j2", ".xml"}):
+        digest.update(path.name.encode() + path.read_bytes())
+    return digest.hexdigest()
+
+
+def _package() -> Path:
+    found = find_spec("pyfmi_models")
+    assert found is not None  # both packages come in one distribution
+    assert found.origin is not None
+    return Path(found.origin).parent
+
+
+def _home() -> Path:
+    from platformdirs import user_cache_path
+
+    return Path(user_cache_path("mount-cosim")) / "fmus"
