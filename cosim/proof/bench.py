@@ -66,7 +66,7 @@ def draw_pace(rng: np.random.Generator, duration: float) -> Pace:
     return Pace(float(rng.uniform(-1, 1)), amplitude, hertz, duration)
 
 
-def draw_motions(rng: np.random.Generator, pace: Pace, tremble: float = 0.4) -> dict[str, Motion]:
+def draw_motions(rng: np.random.Generator, pace: Pace, tremble: float = 0.25) -> dict[str, Motion]:
     """Two kinds for training, a third held out; each with short bursts of tremble that excite the drive."""
     kinds = zip(RECORDINGS, ["wander", "slews", str(rng.choice(["swell", "chirp"]))], strict=True)
     return {name: shaken(MOTIONS[kind](pace, rng), rng, tremble) for name, kind in kinds}
@@ -81,8 +81,8 @@ def draw_mount(rng: np.random.Generator, friction: str, motions: dict[str, Motio
         "inertia": inertia,
         **_draw_friction(rng, friction, inertia, coulomb, pace.speed),
         **_draw_loop(rng),
-        "warm_up_time": float(rng.uniform(15, 40)),
-        "heating": float(rng.uniform(6, 14)) / (1.2 * coulomb * 0.6 * pace.speed),
+        "warm_up_time": float(rng.uniform(12, 30)),
+        "heating": float(rng.uniform(10, 20)) / (1.2 * coulomb * 0.6 * pace.speed),
         "home": pace.home,
     }
 

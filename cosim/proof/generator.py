@@ -19,15 +19,16 @@ import numpy as np
 import pandas as pd
 
 from cosim.proof.bench import FRICTIONS, RECORDINGS, Bench, draw_bench, stream
-from cosim.proof.families import LISTED_EFFECTS
+from cosim.proof.drivetrain import BETWEEN_COMMAND_AND_READING
+from cosim.proof.families import AT_THE_AXIS
 from cosim.proof.outside import OUTSIDE_EFFECTS
 from cosim.proof.recorder import columns_of, decoys, oracle
 from cosim.proof.truth import TICK, Array, simulate
 
 __all__ = ["FAMILIES", "OUTSIDE", "Case", "make_case", "write_case"]
 
-EFFECTS = {**LISTED_EFFECTS, **OUTSIDE_EFFECTS}
-FAMILIES = tuple(LISTED_EFFECTS)
+EFFECTS = {**AT_THE_AXIS, **BETWEEN_COMMAND_AND_READING, **OUTSIDE_EFFECTS}
+FAMILIES = (*AT_THE_AXIS, *BETWEEN_COMMAND_AND_READING)
 OUTSIDE = tuple(OUTSIDE_EFFECTS)
 
 

@@ -130,10 +130,9 @@ def shaken(motion: Motion, rng: np.random.Generator, share: float) -> Motion:
     """`motion` with two bursts of a faint tremble, 2 to 20 Hz, whose acceleration is `share` of the motion's peak."""
     strength = share * float(np.quantile(np.abs(motion.a), 0.98))
     time, total = ticks(motion.q.size), motion
-    for center in rng.uniform([0.15, 0.55], [0.45, 0.85]) * time[-1]:
-        burst = _burst(
-            time - center, float(rng.uniform(2, 4)), 2 * np.pi * np.exp(rng.uniform(*np.log([2, 20]), 5)), rng
-        )
+    for place in (rng.uniform(0.15, 0.45), rng.uniform(0.55, 0.85)):
+        pitches = np.array([2 * np.pi * np.exp(rng.uniform(np.log(2), np.log(20))) for _ in range(5)])
+        burst = _burst(time - place * time[-1], float(rng.uniform(2, 4)), pitches, rng)
         scale = strength / float(np.max(np.abs(burst.a)))
         total = Motion(*(whole + scale * part for whole, part in zip(total, burst, strict=True)))
     return total

@@ -1,0 +1,278 @@
+"""The concealed mount obeys physics, and every effect does what its name says."""
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.signal import butter, filtfilt
+
+from cosim.proof import truth
+from cosim.proof.demo import demo_case
+from cosim.proof.generator import FAMILIES, OUTSIDE, Case, make_case, write_case
+from cosim.proof.truth import BLOCKS, TICK, Array, Drive
+
+FRICTION = {
+    **{"coulomb": 2.0, "breakaway": 3.0, "stribeck_speed": 0.02, "stribeck_power": 2.0, "viscous": 5.0},
+    **{"stiffness": 3e4, "damping": 200.0},
+    **{"block_weight": np.full(BLOCKS, 1 / BLOCKS), "block_reach": np.geomspace(2e-5, 3e-4, BLOCKS)},
+}
+SMOOTH = {"inertia": 2.0, "stiffness": 1.0, "breakaway": 1e-9, "coulomb": 1e-9}  # as good as no friction
+
+
+def still(n: int, start: float = 0.0, push: float | Array = 0.0) -> Drive:
+    zero = np.zeros(n)
+    return Drive(zero + start, zero, zero, push=zero + push, level=zero + 1, noise=zero, ambient=zero + 20)
+
+
+def low_pass(table: pd.DataFrame, x: Array) -> Array:
+    b, a = butter(4, 60 * (table.t[1] - table.t[0]))
+    return np.asarray(filtfilt(b, a, np.asarray(x)))
+
+
+def torques(case: Case, k: int) -> tuple[pd.DataFrame, Array, Array]:
+    """Recording k after 2 s, and its low-passed command and J a + true friction."""
+    table, hidden, mount = [*case.train, case.heldout][k], case.oracle[k], case.truth["mount"]
+    dt = table.t[1] - table.t[0]
+    a = np.gradient(np.gradient(low_pass(table, table.q), dt), dt)
+    inside = (table.t > 2) & (table.t < table.t.iloc[-1] - 0.5)
+    need = (mount["inertia"] + mount.get("load_inertia", 0)) * a + low_pass(table, hidden.friction)
+    return table[inside], low_pass(table, table.tau)[inside], need[inside]
+
+
+def lateness(case: Case) -> float:
+    """Seconds by which the motion follows the command, by least squares on the slope of what it needs."""
+    late = []
+    for k in range(3):
+        table, command, need = torques(case, k)
+        slope = np.gradient(need, table.t)
+        late.append(float(np.dot(slope, command - need) / np.dot(slope, slope)))
+    return float(np.median(late))
+
+
+@pytest.mark.parametrize("blend", [0.0, 0.5, 1.0])
+def test_friction_never_gives_more_energy_than_it_took(blend: float) -> None:
+    rng = np.random.default_rng(1)
+    path = np.cumsum(np.convolve(rng.standard_normal(40_000), np.ones(400) / 400, "same")) * 2e-6
+    work = np.cumsum(truth.rub(FRICTION | {"blend": blend}, path, 1e-4)[1:] * np.diff(path))
+    assert work.min() > -1e-12
+    assert work[-1] > 0
+
+
+@pytest.mark.parametrize("blend", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("speed", [0.002, 0.3, -0.3])
+def test_steady_sliding_costs_the_level_and_viscous_drag(blend: float, speed: float) -> None:
+    path = speed * np.arange(20_000) * 1e-4
+    level = 2 + np.exp(-((speed / 0.02) ** 2))
+    expected = np.sign(speed) * level + 5 * speed
+    assert truth.rub(FRICTION | {"blend": blend}, path, 1e-4)[-1] == pytest.approx(expected, rel=1e-6)
+
+
+def test_slip_blocks_do_not_know_time() -> None:
+    plain = FRICTION | {"blend": 1.0, "damping": 0.0, "viscous": 0.0, "breakaway": 2.0}
+    path = 3e-4 * np.sin(np.linspace(0, 20, 5000)) * np.linspace(0, 1, 5000)
+    assert np.array_equal(truth.rub(plain, path, 1e-4), truth.rub(plain, path, 1e-2))
+
+
+@pytest.mark.parametrize("blend", [0.0, 1.0])
+def test_the_axis_rests_below_break_away_and_slides_above(blend: float) -> None:
+    mount = FRICTION | {"inertia": 3.0, "blend": blend}
+    held, freed = (truth.simulate(mount, still(20_000, push=push)) for push in (-1.5, -3.6))
+    assert 0 < held["angle"][-1] < 1.5e-4
+    assert abs(held["speed"][-1]) < 1e-6
+    assert freed["angle"][-1] > 0.05
+
+
+def test_a_pendulum_with_varying_inertia_keeps_its_energy() -> None:
+    swing = {"inertia_swing": 0.4, "inertia_cycles": 2, "inertia_phase": 0.3, "unbalance": 5.0}
+    out = truth.simulate(SMOOTH | swing, still(100_000, start=1.2))
+    q, v = out["angle"], out["speed"]
+    energy = 0.5 * 2.0 * (1 + 0.4 * np.cos(2 * q + 0.3)) * v**2 - 5 * np.cos(q)
+    assert np.ptp(energy) < 5e-4 * 5
+
+
+def test_a_spring_swings_as_the_closed_form_says() -> None:
+    out = truth.simulate(SMOOTH | {"cable": 50.0, "offset": 1.0}, still(50_000, start=0.1))
+    expected = -0.02 + 0.12 * np.cos(5 * np.arange(50_000) * TICK)
+    assert np.max(np.abs(out["angle"] - expected)) < 2e-5
+
+
+def test_two_masses_ring_at_the_resonance() -> None:
+    parts = {"load_inertia": 1.0, "drive_stiffness": (2 * np.pi * 20) ** 2, "drive_damping": 0.2}
+    push = np.where(np.arange(40_000) < 10, -5.0, 0.0)
+    speed = truth.simulate(SMOOTH | parts, still(40_000, push=push))["speed"]
+    spectrum = np.abs(np.fft.rfft((speed - speed.mean()) * np.hanning(speed.size)))
+    assert np.argmax(spectrum) / 4.0 == pytest.approx(20 * np.sqrt(1.5), abs=0.25)
+
+
+def test_inside_the_gap_the_motor_feels_its_own_inertia_only() -> None:
+    parts = {"load_inertia": 2.0, "drive_stiffness": 1e5, "drive_damping": 1e3, "gap": 1e-2}
+    out = truth.simulate(SMOOTH | parts, still(20_000, push=-1.0))
+    rate = np.gradient(out["speed"], TICK)
+    assert rate[500] == pytest.approx(1 / 2, rel=1e-3)
+    assert rate[-100:].mean() == pytest.approx(1 / 4, rel=1e-2)
+
+
+def test_a_longer_rest_costs_its_logarithm_in_break_away() -> None:
+    mount = FRICTION | {"dwell_torque": 0.3, "dwell_time": 0.1, "dwell_length": 1e-2, "breakaway": 2.0, "viscous": 0.0}
+    mount["damping"] = 0.0
+
+    def peak(rest: float) -> float:
+        slide = np.linspace(0, 0.1, 20_000)
+        path = np.concatenate([slide, np.full(round(rest / 1e-4), 0.1), 0.1 + slide])
+        return float(truth.rub(mount, path, 1e-4)[-20_000:].max())
+
+    assert peak(8) - peak(1) == pytest.approx(0.3 * np.log(8.1 / 1.1), rel=0.1)
+
+
+def test_warm_grease_is_thin() -> None:
+    mount = FRICTION | {"thermal_viscous": -0.05, "thermal_level": -0.02}
+    cold, warm = (truth.rub(mount, np.linspace(0, 1, 20_000), 1e-4, degrees)[-1] for degrees in (20.0, 30.0))
+    assert cold - warm == pytest.approx(2 * (1 - np.exp(-0.2)) + 2.5 * (1 - np.exp(-0.5)), rel=1e-3)
+
+
+def test_asymmetry_and_a_rough_spot_scale_the_level() -> None:
+    mount = FRICTION | {"breakaway": 2.0, "viscous": 0.0, "level_asymmetry": 0.2}
+    forth, back = (truth.rub(mount, sign * np.linspace(0, 1, 20_000), 1e-4)[-1] for sign in (1, -1))
+    assert [forth, back] == pytest.approx([2.4, -1.6], rel=1e-4)
+    spot = mount | {"level_asymmetry": 0.0, "spot_relative": 0.5, "spot_center": 0.5, "spot_width": 0.05}
+    torque = truth.rub(spot, np.linspace(0, 1, 20_000), 1e-4)
+    assert torque[[10_000, 19_999]] == pytest.approx([3.0, 2.0], rel=1e-3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_null_needs_inertia_and_friction_and_nothing_else(seed: int) -> None:
+    case = make_case(seed, duration=12)
+    for k in range(3):
+        _, command, need = torques(case, k)
+        assert np.std(command - need) < 0.1 * case.truth["friction_rms"]
+
+
+def test_delay_lag_and_clock_show_as_lateness() -> None:
+    assert abs(lateness(make_case(4, duration=8))) < 2e-4
+    for name, key in (("delay", "delay_ms"), ("actuator_lag", "time_constant_ms")):
+        case = make_case(4, [name], duration=8)
+        assert lateness(case) == pytest.approx(1e-3 * case.truth["effects"][0]["parameters"][key], rel=0.25)
+    case = make_case(4, ["clock_skew"], duration=8)
+    table, hidden, expected = case.heldout, case.oracle[2], case.truth["effects"][0]["parameters"]
+    ahead = np.dot(table.q - hidden.angle, hidden.speed) / np.dot(hidden.speed, hidden.speed)
+    assert ahead == pytest.approx(1e-3 * expected["offset_ms"] + 4e-6 * expected["drift_ppm"], abs=3e-4)
+
+
+def test_cogging_is_a_line_over_position() -> None:
+    case = make_case(5, ["cogging"], duration=12)
+    found = case.truth["effects"][0]["parameters"]
+    table, command, need = torques(case, 2)
+    phase = found["cycles_per_rev"] * table.q.to_numpy()
+    columns = np.column_stack([np.sin(phase), np.cos(phase), *(np.sin(2 * phase), np.cos(2 * phase))])
+    line = np.linalg.lstsq(columns, command - need, rcond=None)[0]
+    assert np.hypot(*line[:2]) == pytest.approx(found["fundamental"], rel=0.1)
+    assert np.arctan2(line[1], line[0]) == pytest.approx(found["phase"], abs=0.1)
+
+
+def test_a_periodic_disturbance_is_a_line_over_time() -> None:
+    case = make_case(6, ["periodic_disturbance"], duration=12)
+    found = case.truth["effects"][0]["parameters"]
+    table, command, need = torques(case, 0)
+    turn = np.exp(-2j * np.pi * found["frequency_hz"] * table.t.to_numpy())
+    assert 2 * abs(np.mean(turn * (command - need))) == pytest.approx(found["amplitude"], rel=0.1)
+
+
+def test_eccentricity_is_in_the_reading_only() -> None:
+    case = make_case(7, ["encoder_eccentricity"], duration=6)
+    found = case.truth["effects"][0]["parameters"]
+    error = case.heldout.q - case.oracle[2].angle
+    assert error.abs().max() == pytest.approx(found["amplitude_rad"], rel=0.3)
+    assert case.card["encoder"]["ratio"] == found["cycles_per_rev"]
+
+
+def test_a_saturated_drive_gives_less_than_it_was_asked() -> None:
+    case = make_case(8, ["torque_saturation"], duration=12)
+    knee, slope = (case.truth["effects"][0]["parameters"][key] for key in ("knee_torque", "slope"))
+    _, command, need = torques(case, 0)
+    short = np.abs(command) - np.abs(need)
+    over = np.abs(command) > 1.15 * knee
+    assert short[over].mean() == pytest.approx((1 - slope) * (np.abs(command)[over] - knee).mean(), rel=0.1)
+    assert np.abs(short[np.abs(command) < 0.8 * knee]).mean() < 0.03 * knee
+
+
+@pytest.mark.parametrize(
+    ("name", "shape"),
+    [
+        ("torque_offset", lambda p, q, v: p["torque"] + 0 * q),
+        ("gravity_unbalance", lambda p, q, v: p["mgl"] * np.sin(q + p["phase"])),
+        ("quadratic_drag", lambda p, q, v: p["coefficient"] * v * np.abs(v)),
+        ("cable_wrap", lambda p, q, v: p["stiffness"] * ((q - p["home"]) + p["hardening"] * (q - p["home"]) ** 3)),
+    ],
+)
+def test_simple_torques_follow_their_formula(name, shape) -> None:
+    case = make_case(9, [name], duration=3)
+    hidden = case.oracle[0]
+    expected = shape(case.truth["effects"][0]["parameters"], hidden.angle, hidden.speed)
+    assert np.allclose(hidden.extra, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("index", range(len(FAMILIES) + len(OUTSIDE)))
+def test_every_effect_shows_and_the_loop_still_follows(index: int) -> None:
+    name, seed = (*FAMILIES, *OUTSIDE)[index], index % 21
+    case, null = (make_case(seed, effects, duration=4) for effects in ([name], []))
+    pairs = list(zip([*case.train, case.heldout], [*null.train, null.heldout], strict=True))
+    assert all((table.q - table.q_d).abs().max() < 0.02 * case.truth["pace"]["amplitude"] for table, _ in pairs)
+    assert any(np.ptp(table.tau - plain.tau) + np.ptp(table.q - plain.q) > 0 for table, plain in pairs)
+    assert case.truth["verdict"] == ([name] if name in FAMILIES else ["unknown"])
+
+
+def test_a_seed_gives_the_same_bits(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        write_case(make_case(10, ["cogging", "delay"], duration=3), tmp_path / name)
+    files = sorted(path.name for path in (tmp_path / "one").iterdir())
+    assert files == ["card.toml", "heldout.parquet", "train_1.parquet", "train_2.parquet", "truth.json"]
+    assert all((tmp_path / "one" / f).read_bytes() == (tmp_path / "two" / f).read_bytes() for f in files)
+    assert not make_case(11, duration=3).heldout.equals(make_case(10, duration=3).heldout)
+
+
+def test_the_card_keeps_the_secret_and_the_truth_tells_it(tmp_path: Path) -> None:
+    write_case(make_case(12, ["remanence"], duration=3), tmp_path)
+    card = tomllib.loads((tmp_path / "card.toml").read_text())
+    told = json.loads((tmp_path / "truth.json").read_text())
+    assert set(card) <= {"mount", "friction", "unbalance", "encoder", "controller"}
+    assert card["mount"]["inertia"] == pytest.approx(told["mount"]["inertia"], rel=0.16)
+    assert told["verdict"] == ["unknown"]
+
+
+@pytest.mark.parametrize("rate_hz", [100, 2000, 10_000])
+def test_torque_is_the_mean_around_the_sample_at_any_rate(rate_hz: int) -> None:
+    case = make_case(13, duration=3, rate_hz=rate_hz)
+    assert np.diff(case.heldout.t) == pytest.approx(1 / rate_hz)
+    fast = make_case(13, duration=3, rate_hz=10_000).heldout
+    mean = np.interp(case.heldout.t, fast.t, fast.tau.rolling(round(10_000 / rate_hz) + 1, center=True).mean())
+    inside = slice(20, -20)
+    assert np.allclose(case.heldout.tau[inside], mean[inside], atol=0.02 * fast.tau.std())
+
+
+def test_the_demo_is_the_mount_of_the_paper() -> None:
+    case = demo_case(duration=10)
+    assert case.truth["verdict"] == ["friction_asymmetry", "cogging"]
+    assert (case.card["controller"]["kp"], case.card["controller"]["kd"]) == (225, 30)
+    assert case.card["mount"]["inertia"] == pytest.approx(30, rel=0.15)
+    assert all((table.q - table.q_d).abs().max() < 5e-4 for table in case.train)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"effects": ["coging"]}, "no effect is called 'coging'"),
+        ({"friction": "dry"}, "friction 'dry' is none of"),
+        ({"rate_hz": 3000}, "rate_hz 3000 does not divide"),
+    ],
+)
+def test_wrong_wishes_are_named(arguments, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make_case(0, **arguments)
+
+
+def test_arrays_of_another_length_are_refused() -> None:
+    with pytest.raises(ValueError, match="push"):
+        truth.simulate(SMOOTH, Drive(*(np.zeros(9) for _ in range(3)), np.zeros(8), *(np.zeros(9) for _ in range(3))))
