@@ -20,8 +20,8 @@ def symbols(states, inputs, parameters):
     return [ca.SX.sym(name, size) for name, size in zip("txup", (1, states, inputs, parameters), strict=True)]
 
 
-def finish(name, arguments, following, outputs, **lists):
-    equations = ca.Function("equations", arguments, [ca.vertcat(*following), ca.vertcat(*outputs)])
+def finish(name, arguments, following, shown, **lists):
+    equations = ca.Function("equations", arguments, [ca.vertcat(*following), ca.vertcat(*shown)])
     groups = {"inputs": (), "parameters": (), "states": (), "outputs": ()} | lists
     return Model(name=name, description=f"Test model {name}.", equations=equations, **groups)
 
@@ -57,12 +57,12 @@ def van_der_pol():
     t, x, u, p = symbols(2, 0, 1)
     rates = [x[1], p * (1 - x[0] ** 2) * x[1] - x[0]]
     states = (variable("x", start=2.0), variable("v", "1/s"))
-    return finish("vdp", [t, x, u, p], rates, [x[0]], parameters=(variable("mu", start=1000.0),), states=states,
+    return finish("vdp", [t, x, u, p], rates, [x[0]], parameters=(variable("mu", start=100.0),), states=states,
                   outputs=(variable("y"),))  # fmt: skip
 
 
 def oscillator():
-    """X'' = -x + sin(t) / 2 + u: explicit in time, every output depends on something else."""
+    """Forced oscillation, x'' = -x + sin(t) / 2 + u: explicit in time, every output depends on something else."""
     t, x, u, p = symbols(2, 1, 1)
     rates = [x[1], -p * x[0] + 0.5 * ca.sin(t) + u]
     outputs = [x[0], u + p, t]

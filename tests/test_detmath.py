@@ -104,7 +104,7 @@ INF, NAN = math.inf, math.nan
 SPECIAL = {
     "exp": {INF: INF, -INF: 0.0, NAN: NAN, 0.0: 1.0, 710.0: INF, -746.0: 0.0, -745.1: 5e-324},
     "expm1": {INF: INF, -INF: -1.0, NAN: NAN, -0.0: -0.0},
-    "log": {INF: INF, 0.0: -INF, -0.0: -INF, -1.0: NAN, -INF: NAN, NAN: NAN, 1.0: 0.0},
+    "log": {INF: INF, -0.0: -INF, -1.0: NAN, -INF: NAN, NAN: NAN, 1.0: 0.0},
     "log1p": {INF: INF, -1.0: -INF, -2.0: NAN, NAN: NAN, -0.0: -0.0},
     "sin": {INF: NAN, -INF: NAN, NAN: NAN, -0.0: -0.0},
     "cos": {INF: NAN, NAN: NAN, 0.0: 1.0},

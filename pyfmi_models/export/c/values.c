@@ -85,7 +85,7 @@ static Status check_setting(Instance *instance, const Variable *variable, double
     }
     if (!(fabs(value) < INFINITY)) return fail(instance, FAILED, "\"%s\" = %g is not finite", variable->name, value);
     if (variable->kind == PARAMETER && !(value >= variable->low && value <= variable->high))
-        return fail(instance, FAILED, "parameter \"%s\" = %.17g is not between %.17g and %.17g", variable->name, value,
+        return fail(instance, FAILED, "parameter \"%s\" = %.10g is not between %.10g and %.10g", variable->name, value,
                     variable->low, variable->high);
     return OK;
 }

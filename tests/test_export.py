@@ -1,0 +1,345 @@
+"""Archives: valid in an outside tool, right in both interfaces, reproducible, self-contained."""
+
+import ctypes
+import re
+import subprocess
+import sys
+import time
+import zipfile
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import cache
+
+import casadi as ca
+import export_models as models
+import numpy as np
+import pytest
+from fmpy import read_model_description, simulate_fmu
+from fmpy.validation import validate_fmu
+from scipy.integrate import solve_ivp
+
+from pyfmi_models.errors import ExportError
+from pyfmi_models.export import build_library, export_fmu
+from pyfmi_models.export.build import PLATFORMS, compile_shared, fmi_headers, host, sources_of
+from pyfmi_models.export.codegen import SHIM, generate
+from pyfmi_models.export.units import BASE, parse_unit
+
+ALL = (models.lugre, models.van_der_pol, models.oscillator, models.controller)
+KINDS = ("CoSimulation", "ModelExchange")
+
+
+@pytest.fixture(scope="session")
+def archive(tmp_path_factory):
+    """Export a model of export_models once per session."""
+    folder = tmp_path_factory.mktemp("fmus")
+    return cache(lambda make, fmi: export_fmu(make(), folder / f"{make.__name__}{fmi}.fmu", fmi=fmi))
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("make", ALL)
+def test_the_archive_is_valid(archive, make, fmi):
+    assert validate_fmu(str(archive(make, fmi))) == []
+
+
+@cache
+def reference(case):
+    """The states at the end of a case by an implicit method at its tightest."""
+    make, end, inputs, given, _ = CASES[case]
+    model, drive = make(), list(inputs.values())
+    start = [given.get(state.name, state.start) for state in model.states]
+    parameters = [given.get(parameter.name, parameter.start) for parameter in model.parameters]
+
+    def rates(t, x):
+        return np.array(model.equations(t, x, drive, parameters)[0]).ravel()
+
+    return solve_ivp(rates, (0, end), start, method="Radau", rtol=1e-11, atol=1e-14).y[:, -1]
+
+
+# model: end, inputs, start values, sizes to compare with
+CASES = {
+    "slip": (models.lugre, 0.5, {"drive": 5.0}, {}, (1e-2, 1e-1, 1e-5)),
+    "reversal": (models.lugre, 0.5, {"drive": -4.0}, {"speed": 0.05}, (1e-2, 1e-1, 1e-5)),
+    "presliding": (models.lugre, 0.5, {"drive": 1.0}, {}, (1e-5, 1e-4, 1e-5)),
+    "stiff": (models.van_der_pol, 70.0, {}, {}, (1.0, 1e-2)),
+    "relaxation jumps": (models.van_der_pol, 30.0, {}, {"mu": 10.0}, (1.0, 1.0)),
+    "explicit in time": (models.oscillator, 3.0, {"force": 0.3}, {}, (1.0, 1.0)),
+}
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("case", CASES)
+def test_both_interfaces_agree_with_a_tight_implicit_method(archive, case, kind, fmi):
+    make, end, inputs, start, sizes = CASES[case]
+    model = make()
+    names = [state.name for state in model.states]
+    exact = reference(case)
+    result = simulate_fmu(
+        str(archive(make, fmi)), fmi_type=kind, stop_time=end, output_interval=end / 1000, output=names,
+        start_values=inputs | start, relative_tolerance=1e-11 if kind == "ModelExchange" else 1e-9,
+    )  # fmt: skip
+    assert result["time"][-1] == pytest.approx(end)
+    deviation = [(result[name][-1] - x) / size for name, x, size in zip(names, exact, sizes, strict=True)]
+    assert np.abs(deviation).max() <= 1e-7
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_sampled_model_computes_what_its_equations_say_one_tick_later(archive, fmi):
+    model, period = models.controller(), 1e-3
+    table = np.array([(k * period, np.sin(k), 0.1) for k in range(51)],
+                     dtype=[("time", float), ("measured", float), ("wanted", float)])  # fmt: skip
+    result = simulate_fmu(str(archive(models.controller, fmi)), fmi_type="CoSimulation", input=table, stop_time=0.05,
+                          output_interval=period, output=["command"])  # fmt: skip
+    memory, expected = [0.0, 0.0, -1.0], [0.25]
+    for t, measured, wanted in table[:-1]:
+        memory, output = (np.array(part).ravel() for part in model.equations(t, memory, [measured, wanted], [10, 0.5]))
+        expected.append(output[0])
+    assert list(result["command"]) == expected
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_in_model_exchange_ticks_are_time_events(archive, fmi):
+    result = simulate_fmu(str(archive(models.controller, fmi)), fmi_type="ModelExchange", stop_time=0.0205,
+                          output_interval=5e-4, output=["done", "count", "moment"], record_events=False,
+                          start_values={"wanted": 1.0})  # fmt: skip
+    ticks = np.floor(result["time"] / 1e-3 + 1e-6)
+    assert np.array_equal(result["count"], ticks + 1)
+    assert np.allclose(result["moment"], ticks * 1e-3, rtol=0, atol=1e-15)
+
+
+def test_only_libc_is_needed():
+    library = build_library(models.lugre())
+    dynamic = subprocess.run(["readelf", "-d", str(library)], capture_output=True, text=True, check=True).stdout
+    assert [line.split("[")[1].rstrip("]") for line in dynamic.splitlines() if "NEEDED" in line] == ["libc.so.6"]
+
+
+def test_the_binary_exports_nothing_but_both_api_sets():
+    library = build_library(models.lugre())
+    listing = subprocess.run(["nm", "-D", "--defined-only", str(library)], capture_output=True, text=True, check=True)
+    names = {line.split()[-1] for line in listing.stdout.splitlines()}
+    assert {"fmi2DoStep", "fmi3DoStep", "fmi2GetDerivatives", "fmi3GetContinuousStateDerivatives"} <= names
+    assert {name for name in names if not name.startswith(("fmi2", "fmi3"))} == set()
+
+
+def test_every_function_of_the_headers_is_there():
+    library = ctypes.CDLL(str(build_library(models.lugre())))
+    text = b"".join(fmi_headers()[f"fmi{n}FunctionTypes.h"] for n in (2, 3)).decode()
+    names = re.findall(r"^\s*typedef \S.*?\b(fmi[23]\w+)TYPE\s*\(", text, re.M)
+    assert len(names) == 119
+    assert [name for name in names if not hasattr(library, name)] == []
+
+
+def test_our_c_compiles_without_a_warning():
+    sources = {name: text for name, text in sources_of(generate(models.lugre())).items() if name != "model.c"}
+    sources["equations.c"] = b""
+    flags = ("-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-Wno-unused-const-variable", "-c")
+    objects = {name: text for name, text in sources.items() if name.endswith(".h")}
+    for name in [name for name in sources if name.endswith(".c") and name != "equations.c"]:
+        compile_shared({**objects, name: sources[name]}, f"{name}.o", PLATFORMS[host()].target, flags)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_two_exports_give_the_same_bytes(archive, tmp_path, fmi):
+    again = export_fmu(models.lugre(), tmp_path / "again.fmu", fmi=fmi)
+    assert again.read_bytes() == archive(models.lugre, fmi).read_bytes()
+    with zipfile.ZipFile(again) as file:
+        assert {entry.date_time for entry in file.infolist()} == {(1980, 1, 1, 0, 0, 0)}
+        assert file.namelist() == sorted(file.namelist())
+
+
+def test_two_compilations_give_the_same_binary():
+    sources = {path.name: path.read_bytes() for path in SHIM.glob("detmath*")}
+    flags = ("-std=c11", "-O2", "-g0", "-s", "-shared", "-fPIC")
+    target = PLATFORMS[host()].target
+    built = compile_shared(sources, "twice.so", target, flags)
+    first = built.read_bytes()
+    built.unlink()
+    assert compile_shared(sources, "twice.so", target, flags).read_bytes() == first
+
+
+def test_an_unchanged_model_is_only_looked_up():
+    build_library(models.lugre())
+    start = time.perf_counter()
+    build_library(models.lugre())
+    assert time.perf_counter() - start <= 0.1
+
+
+def test_several_builds_at_once_agree():
+    fresh = replace(models.oscillator(), description=f"Built at {time.time_ns()}.")
+    with ThreadPoolExecutor(2) as pool:
+        libraries = list(pool.map(build_library, [fresh] * 2))
+    assert len(set(libraries)) == 1
+    assert list(libraries[0].parent.iterdir()) == [libraries[0]]
+    assert models.Driver(fresh, libraries[0], 3).start().step(0, 0.1) == "ok"
+    libraries[0].unlink()
+    libraries[0].parent.rmdir()
+
+
+def test_the_archive_holds_sources_and_a_page(archive):
+    with zipfile.ZipFile(archive(models.lugre, 3)) as file:
+        names = set(file.namelist())
+        page = file.read("documentation/index.html").decode()
+    binary = f"lugre{PLATFORMS[host()].suffix}"
+    sources = {"model.c", "equations.c", "fmi3Functions.h", "buildDescription.xml", "detmath.c"}
+    assert {f"binaries/{host()}/{binary}", *(f"sources/{name}" for name in sources)} <= names
+    assert "friction.sigma0" in page
+    with zipfile.ZipFile(archive(models.lugre, 2)) as file:
+        assert f"binaries/{PLATFORMS[host()].fmi2}/{binary}" in file.namelist()
+
+
+def test_the_sources_in_the_archive_can_be_built_elsewhere(archive, tmp_path):
+    with zipfile.ZipFile(archive(models.controller, 3)) as file:
+        file.extractall(tmp_path)
+    sources = {path.name: path.read_bytes() for path in (tmp_path / "sources").glob("*.[ch]")}
+    built = compile_shared(sources, "pd.so", PLATFORMS[host()].target)
+    assert models.Driver(models.controller(), built, 3).start().step(0, 1e-3) == "ok"
+
+
+def test_the_archive_for_another_platform_is_refused_by_name(tmp_path):
+    with pytest.raises(ExportError, match=r'platform "vax-vms" is unknown; there are: x86_64-linux'):
+        export_fmu(models.lugre(), tmp_path / "a.fmu", platforms=("vax-vms",))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_page_of_ones_own_is_part_of_the_documentation(tmp_path):
+    path = export_fmu(models.oscillator(), tmp_path / "a.fmu", description_html="<p>by <em>hand</em></p>")
+    with zipfile.ZipFile(path) as file:
+        assert "<p>by <em>hand</em></p>" in file.read("documentation/index.html").decode()
+
+
+def test_nothing_is_overwritten_without_force(tmp_path):
+    path = export_fmu(models.oscillator(), tmp_path / "a.fmu")
+    with pytest.raises(ExportError, match="exists; use force"):
+        export_fmu(models.oscillator(), path)
+    assert export_fmu(models.oscillator(), path, force=True) == path
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def structure(archive, make, fmi):
+    description = read_model_description(str(archive(make, fmi)))
+    groups = {"outputs": description.outputs, "derivatives": description.derivatives,
+              "initial": description.initialUnknowns}  # fmt: skip
+    return {
+        group: {u.variable.name: [d.name for d in u.dependencies] for u in unknowns}
+        for group, unknowns in groups.items()
+    }
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_dependencies_are_the_true_ones(archive, fmi):
+    outputs = {"where": ["position"], "direct": ["force"], "clock": ["time"]}
+    rates = {"der(position)": ["velocity"], "der(velocity)": ["time", "force", "position"]}
+    initial = {"direct": ["force", "stiffness"], "der(velocity)": ["time", "force", "stiffness", "position"]}
+    found = structure(archive, models.oscillator, fmi)
+    assert (found["outputs"], found["derivatives"]) == (outputs, rates)
+    assert found["initial"] == outputs | rates | initial
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_variables_say_what_they_are(archive, fmi):
+    description = read_model_description(str(archive(models.lugre, fmi)))
+    found = {v.name: v for v in description.modelVariables}
+    assert [(v.causality, v.variability, v.initial) for v in (found["friction.Fc"], found["z"], found["torque"])] == [
+        ("parameter", "tunable", "exact"),
+        ("local", "continuous", "exact"),
+        ("output", "continuous", "calculated"),
+    ]
+    assert (found["friction.Fc"].unit, found["friction.Fc"].start, found["friction.Fc"].min) == ("N.m", "2.32", "1e-09")
+    assert (found["drive"].min, found["drive"].max, found["z"].nominal) == ("-100.0", "100.0", "1e-05")
+    assert found["der(z)"].derivative.name == "z"
+    assert (found["der(speed)"].unit, found["der(angle)"].unit) == ("rad/s2", "rad/s")
+    assert (description.defaultExperiment.stepSize, description.defaultExperiment.tolerance) == ("0.0001", "1e-08")
+
+
+def test_the_token_follows_the_content():
+    model = models.lugre()
+    assert generate(model).token == generate(models.lugre()).token
+    assert generate(model).token != generate(replace(model, name="other")).token
+    harder = (replace(model.parameters[0], start=31.0), *model.parameters[1:])
+    assert generate(model).token != generate(replace(model, parameters=harder)).token
+
+
+UNITS = {
+    "N.m": ({"kg": 1, "m": 2, "s": -2}, 1.0),
+    "N.m.s/rad": ({"kg": 1, "m": 2, "s": -1, "rad": -1}, 1.0),
+    "kg.m2": ({"kg": 1, "m": 2}, 1.0),
+    "rad/s2": ({"rad": 1, "s": -2}, 1.0),
+    "N.s/m": ({"kg": 1, "s": -1}, 1.0),
+    "kg/(m.s2)": ({"kg": 1, "m": -1, "s": -2}, 1.0),
+    "1": ({}, 1.0),
+    "1/s": ({"s": -1}, 1.0),
+    "1/degC": ({"K": -1}, 1.0),
+    "s-1": ({"s": -1}, 1.0),
+    "deg": ({"rad": 1}, np.pi / 180),
+    "mm/s": ({"m": 1, "s": -1}, 1e-3),
+    "V": ({"kg": 1, "m": 2, "s": -3, "A": -1}, 1.0),
+}
+
+
+@pytest.mark.parametrize("name", UNITS)
+def test_a_unit_is_a_product_of_base_units(name):
+    powers, factor = UNITS[name]
+    unit = parse_unit(name)
+    assert dict(zip(BASE, unit.exponents, strict=True)) == dict.fromkeys(BASE, 0) | powers
+    assert unit.factor == pytest.approx(factor, rel=1e-15)
+    assert unit.offset == 0
+
+
+def test_a_temperature_has_an_offset():
+    assert parse_unit("degC").offset == 273.15
+
+
+@pytest.mark.parametrize(
+    ("name", "culprit"), [("furlong", '"furlong"'), ("N.m/rad.s", "brackets"), ("N..m", '""'), ("", '""')]
+)
+def test_an_unknown_unit_is_named(name, culprit):
+    with pytest.raises(ExportError, match=culprit):
+        parse_unit(name)
+
+
+def test_an_unknown_unit_in_a_model_stops_the_export(tmp_path):
+    model = models.oscillator()
+    with pytest.raises(ExportError, match='"furlong"'):
+        export_fmu(replace(model, inputs=(models.variable("force", "furlong"),)), tmp_path / "a.fmu")
+    assert list(tmp_path.iterdir()) == []
+
+
+BROKEN = {
+    "two variables": {"outputs": (models.variable("force"), models.variable("b"), models.variable("c"))},
+    'called "time"': {"inputs": (models.variable("time"),)},
+    "start value": {"parameters": (models.variable("stiffness", start=-1.0, low=0.0),)},
+    "nominal value": {"states": (models.variable("a", nominal=0.0), models.variable("b"))},
+    "1 inputs, but 0": {"inputs": ()},
+    "period": {"period": -1.0},
+}
+
+
+@pytest.mark.parametrize("message", BROKEN)
+def test_a_broken_model_is_refused_in_one_sentence(message):
+    with pytest.raises(ExportError, match=message):
+        generate(replace(models.oscillator(), **BROKEN[message]))
+
+
+def test_a_function_without_a_deterministic_version_is_named():
+    model = models.oscillator()
+    arguments = models.symbols(2, 1, 1)
+    rates = ca.vertcat(ca.erf(arguments[1][0]), 0)
+    equations = ca.Function("equations", arguments, [rates, ca.vertcat(0, 0, 0)])
+    with pytest.raises(ExportError, match="uses erf"):
+        generate(replace(model, equations=equations))
+
+
+def test_equations_may_also_be_matrix_expressions():
+    scalar = models.oscillator()
+    arguments = [ca.MX.sym(name, size) for name, size in zip("txup", (1, 2, 1, 1), strict=True)]
+    model = replace(
+        scalar, name="matrix", equations=ca.Function("equations", arguments, scalar.equations.call(arguments))
+    )
+    runs = [models.Driver(m, build_library(m), 3).start(force=0.2).run(0, 50, 0.02) for m in (scalar, model)]
+    assert np.array_equal(runs[0].get("position", "velocity"), runs[1].get("position", "velocity"))
+
+
+def test_the_export_runs_in_a_fresh_process(tmp_path):
+    code = "from pyfmi_models.export import export_fmu, build_library; print(export_fmu.__name__)"
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "export_fmu"

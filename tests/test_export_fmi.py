@@ -1,0 +1,317 @@
+"""The binary behind the archive: exact memory, counted time, honest errors, the order of the solver."""
+
+import ctypes
+from functools import cache
+from math import inf, nan
+
+import casadi as ca
+import export_models as models
+import numpy as np
+import pytest
+
+from pyfmi_models.export import build_library
+from pyfmi_models.export.build import PLATFORMS, compile_shared, host
+from pyfmi_models.export.codegen import SHIM
+
+library = cache(lambda make: build_library(make()))
+pytestmark = pytest.mark.parametrize("fmi", [2, 3])
+
+
+def instance(make, fmi, kind="CS", **start):
+    return models.Driver(make(), library(make), fmi, kind).start(**start)
+
+
+def everything(driver):
+    return driver.get(*driver.references).tobytes()
+
+
+@pytest.mark.parametrize("make", [models.lugre, models.controller, models.oscillator])
+def test_a_restored_run_repeats_its_bits(make, fmi):
+    driver = instance(make, fmi)
+    step, name = 1e-3, {"lugre": "drive", "controller": "wanted", "oscillator": "force"}[make.__name__]
+    driver.set(name, 4.0)
+    driver.run(0, 100, step)
+    state = driver.save()
+    driver.set(name, -3.0)
+    once = everything(driver.run(100 * step, 100, step))
+    assert driver.restore(state) == "ok"
+    driver.set(name, -3.0)
+    assert everything(driver.run(100 * step, 100, step)) == once
+    assert driver.call("FreeFMUstate" if fmi == 2 else "FreeFMUState", ctypes.byref(state)) == "ok"
+    assert state.value is None
+
+
+@pytest.mark.parametrize("make", [models.lugre, models.controller])
+def test_a_serialized_state_continues_in_another_instance(make, fmi):
+    driver = instance(make, fmi)
+    content = driver.run(0, 100, 1e-3).serialize(driver.save())
+    once = everything(driver.run(0.1, 50, 1e-3))
+    other = models.Driver(make(), library(make), fmi)
+    assert other.restore(other.deserialize(content)) == "ok"
+    assert everything(other.run(0.1, 50, 1e-3)) == once
+
+
+def test_a_damaged_or_foreign_state_is_refused(fmi):
+    driver = instance(models.lugre, fmi)
+    content = driver.serialize(driver.save())
+    damaged = bytes([*content[:60], content[60] ^ 1, *content[61:]])
+    foreign = instance(models.oscillator, fmi)
+    assert driver.deserialize(damaged) == "error"
+    assert "corrupted" in driver.messages[-1][2]
+    assert driver.deserialize(content[:-1]) == "error"
+    assert f"this model's has {len(content)}" in driver.messages[-1][2]
+    assert driver.restore(foreign.save()) == "error"
+    assert "another model" in driver.messages[-1][2]
+    assert instance(models.lugre, fmi, "ME").restore(driver.save()) == "error"
+
+
+@pytest.mark.parametrize("start", [0.0, 1000.0])
+def test_ticks_are_counted_however_the_master_sums_its_time(start, fmi):
+    driver = instance(models.controller, fmi, start=start)
+    time, length = start, 1e-3
+    for _ in range(100_000):
+        assert driver.step(time, length) == "ok"
+        time += length
+    assert driver.get("count", "moment")[0] == 100_000
+    assert driver.get("moment")[0] == start + 99_999 * 1e-3
+
+
+def test_the_tick_at_the_start_of_a_step_belongs_to_it_that_at_its_end_does_not(fmi):
+    driver = instance(models.controller, fmi)
+    counts = []
+    for time, length in [(0, 4e-4), (4e-4, 6e-4), (1e-3, 1e-5), (1.01e-3, 1.99e-3), (3e-3, 2.5e-3)]:
+        assert driver.step(time, length) == "ok"
+        counts.append(driver.get("count")[0])
+    assert counts == [1, 1, 2, 3, 6]
+
+
+def test_outputs_hold_their_start_value_until_the_first_tick(fmi):
+    driver = instance(models.controller, fmi, wanted=1.0)
+    assert driver.get("command") == 0.25
+    driver.step(0, 1e-3)
+    assert driver.get("command") == 10.0 + 0.5 / 1e-3
+    other = instance(models.controller, fmi, command=7.0)
+    assert other.get("command") == 7.0
+
+
+def test_in_event_mode_a_due_tick_shows_its_outputs_before_the_memory_moves(fmi):
+    driver = instance(models.controller, fmi, "ME")
+    for wanted in (1.0, 2.0):
+        assert driver.set("wanted", wanted) == "ok"
+        assert driver.get("command") == 10 * wanted + 0.5 * wanted / 1e-3
+        assert driver.get("count") == 0
+    update(driver)
+    assert list(driver.get("count", "last")) == [1, 2.0]
+
+
+def update(driver):
+    """Update the discrete states; return the time of the next event."""
+    if driver.fmi == 2:
+        flags = ctypes.create_string_buffer(32)  # five integers, padding, then the time
+        assert driver.call("NewDiscreteStates", ctypes.byref(flags)) == "ok"
+        return ctypes.c_double.from_buffer(flags, 24).value
+    flags, time = [ctypes.byref(ctypes.c_bool()) for _ in range(5)], ctypes.c_double()
+    assert driver.call("UpdateDiscreteStates", *flags, ctypes.byref(time)) == "ok"
+    return time.value
+
+
+def test_the_next_event_is_a_multiple_of_the_period(fmi):
+    driver = instance(models.controller, fmi, "ME", start=5.0)
+    assert [update(driver), update(driver)] == [5.0 + 1e-3, 5.0 + 1e-3]
+    assert driver.call("EnterContinuousTimeMode") == "ok"
+    assert driver.call("SetTime", 5.0 + 1e-3) == "ok"
+    assert driver.get("count") == 1
+    assert driver.call("EnterEventMode") == "ok"
+    assert update(driver) == 5.0 + 2 * 1e-3
+    assert driver.get("count") == 2
+
+
+# what is wrong: how it is done, part of the message
+WRONG = {
+    "not a number": (lambda d: d.set("drive", nan), '"drive" = nan is not finite'),
+    "infinite": (lambda d: d.set("friction.Fc", inf), '"friction.Fc" = inf is not finite'),
+    "calculated": (lambda d: d.set("torque", 1.0), '"torque" is calculated and cannot be set'),
+    "state after the start": (lambda d: d.set("z", 1.0), '"z" can be set before the end of initialization only'),
+    "below the bound": (lambda d: d.set("friction.Fs", -1.0), 'parameter "friction.Fs" = -1 is not between 1e-09'),
+    "unknown to get": (lambda d: d.get(999), "no variable with the value reference 999; they go from 0 to 16"),
+    "unknown to set": (lambda d: d.set(17, 0.0), "no variable with the value reference 17"),
+    "backwards": (lambda d: d.step(-1e-3, 1e-3), "goes backwards: the model is at t = 0.01"),
+    "gap": (lambda d: d.step(0.5, 1e-3), "leaves a gap: the model is at t = 0.01"),
+    "no length": (lambda d: d.step(0.01, 0.0), "must be positive and finite"),
+    "negative length": (lambda d: d.step(0.01, -1.0), "must be positive and finite"),
+    "length nan": (lambda d: d.step(0.01, nan), "must be positive and finite"),
+    "time nan": (lambda d: d.step(nan, 0.1), "must be positive and finite"),
+    "past the stop time": (lambda d: d.step(0.01, 5.0), "passes the stop time 1"),
+    "initialize again": (lambda d: d.call("ExitInitializationMode"), "not allowed in the step mode"),
+    "event mode": (lambda d: d.call("EnterContinuousTimeMode"), "not allowed in the step mode"),
+    "time": (lambda d: d.call("SetTime", 1.0), "not allowed in the step mode"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_wrong_call_is_refused_with_a_sentence_and_changes_nothing(what, fmi):
+    driver = instance(models.lugre, fmi, stop=1.0, drive=3.0).run(0, 10, 1e-3)
+    before = everything(driver)
+    act, message = WRONG[what]
+    assert act(driver) == "error"
+    assert driver.messages[-1][:2] == ("error", "logStatusError")
+    assert message in driver.messages[-1][2]
+    assert everything(driver) == before
+    assert driver.step(0.01, 1e-3) == "ok"
+
+
+def test_a_step_before_initialization_is_refused(fmi):
+    driver = models.Driver(models.lugre(), library(models.lugre), fmi)
+    assert driver.step(0, 1e-3) == "error"
+    assert "not allowed in the instantiated mode" in driver.messages[-1][2]
+
+
+def test_calls_without_an_instance_are_errors_not_crashes(fmi):
+    driver = instance(models.lugre, fmi)
+    driver.instance = None
+    assert {driver.step(0, 1.0), driver.set("drive", 1.0), driver.get("angle"), driver.call("Terminate")} == {"error"}
+
+
+def test_the_binary_of_another_description_is_refused(fmi):
+    driver = models.Driver(models.lugre(), library(models.lugre), fmi, token="{0}")
+    assert driver.instance is None
+    assert "do not belong together" in driver.messages[-1][2]
+
+
+def test_equations_that_leave_their_domain_stop_the_run_with_a_sentence(fmi):
+    driver = instance(models.undefined_below_zero, fmi, sink=1.0)
+    assert driver.step(0, 2.0) == "ok"
+    assert driver.get("flow") == "error"
+    assert '"flow" is not finite at t = 2 s' in driver.messages[-1][2]
+    assert driver.get("level")[0] == pytest.approx(-1.0)
+
+
+def test_parameters_can_be_tuned_between_steps(fmi):
+    driver = instance(models.oscillator, fmi)
+    assert driver.set("stiffness", 4.0) == "ok"
+    assert driver.get("der(velocity)")[0] == -4.0
+
+
+def test_reset_returns_to_the_start(fmi):
+    driver = instance(models.lugre, fmi)
+    fresh = everything(driver)
+    driver.set("drive", 5.0)
+    driver.run(0, 10, 1e-3)
+    assert driver.call("Reset") == "ok"
+    assert everything(driver.start()) == fresh
+
+
+def test_instances_do_not_disturb_each_other(fmi):
+    alone = everything(instance(models.lugre, fmi, drive=5.0).run(0, 20, 1e-3))
+    together = [instance(models.lugre, fmi, drive=drive) for drive in (5.0, -2.0, 0.0)]
+    for i in range(20):
+        for driver in together:
+            driver.step(i * 1e-3, 1e-3)
+    assert everything(together[0]) == alone
+    assert everything(together[1]) != alone
+
+
+def test_a_tighter_tolerance_gives_a_smaller_error(fmi):
+    def end(tolerance):
+        return instance(models.lugre, fmi, tolerance=tolerance, drive=5.0).run(0, 10, 0.05).get("angle", "speed")
+
+    exact = end(1e-12)
+    errors = [np.abs(end(tolerance) / exact - 1).max() for tolerance in (1e-3, 1e-5, 1e-7, 1e-9)]
+    assert errors[0] > 10 * errors[1] > 100 * errors[2] > 1000 * errors[3]
+    assert errors[2] < 1e-6
+
+
+def test_the_communication_step_does_not_change_the_result(fmi):
+    coarse = instance(models.lugre, fmi, drive=5.0).run(0, 5, 0.1).get("angle", "speed", "z")
+    fine = instance(models.lugre, fmi, drive=5.0).run(0, 5000, 1e-4).get("angle", "speed", "z")
+    assert fine == pytest.approx(coarse, rel=2e-7)
+
+
+def directional(driver, unknowns, knowns, seed):
+    arrays = [(ctypes.c_uint * len(names))(*(driver.references[n] for n in names)) for names in (unknowns, knowns)]
+    seeds, result = (ctypes.c_double * len(knowns))(*seed), (ctypes.c_double * len(unknowns))()
+    sizes = [ctypes.c_size_t(len(names)) for names in (unknowns, knowns)]
+    arguments = (arrays[0], sizes[0], arrays[1], sizes[1], seeds)
+    tail = (result,) if driver.fmi == 2 else (sizes[1], result, sizes[0])
+    return driver.call("GetDirectionalDerivative", *arguments, *tail), np.array(result)
+
+
+def test_directional_derivatives_are_those_of_the_equations(fmi):
+    model = models.lugre()
+    driver = instance(models.lugre, fmi, drive=5.0, speed=0.01).run(0, 10, 1e-3)
+    unknowns = ["der(angle)", "der(speed)", "der(z)", "reading", "torque"]
+    knowns = ["speed", "z", "drive", "friction.Vs"]
+    arguments = models.symbols(3, 1, 7)
+    slopes = ca.jacobian(ca.vertcat(*model.equations(*arguments)), ca.vertcat(*arguments))
+    point = [0, driver.get("angle", "speed", "z"), 5.0, [p.start for p in model.parameters]]
+    jacobian = np.array(ca.Function("slopes", arguments, [slopes])(*point))[:, [2, 3, 4, 11]]
+    seed = [1e-2, 1e-5, 1.0, -2.0]
+    status, found = directional(driver, unknowns, knowns, seed)
+    assert status == "ok"
+    assert found == pytest.approx(jacobian @ seed, rel=1e-13)
+    assert directional(driver, ["angle"], ["drive"], [1.0])[0] == "error"
+    assert directional(driver, ["torque"], ["reading"], [1.0])[0] == "error"
+    assert directional(instance(models.controller, fmi), ["command"], ["wanted"], [1.0])[0] == "error"
+
+
+def test_log_categories_can_be_chosen(fmi):
+    driver = instance(models.lugre, fmi)
+    on = True if fmi == 3 else 1
+    names = (ctypes.c_char_p * 1)(b"logEvents")
+    assert driver.call("SetDebugLogging", on, ctypes.c_size_t(1), names) == "ok"
+    assert driver.call("Terminate") == "ok"
+    assert driver.messages == [("ok", "logEvents", "terminated mode at t = 0 s")]
+    assert driver.call("SetDebugLogging", on, ctypes.c_size_t(1), (ctypes.c_char_p * 1)(b"gossip")) == "error"
+
+
+class Solver(ctypes.Structure):
+    _fields_ = (
+        ("size", ctypes.c_int),
+        ("context", ctypes.c_void_p),
+        (
+            "rates",
+            ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, *[ctypes.POINTER(ctypes.c_double)] * 2),
+        ),
+        (
+            "jacobian",
+            ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, *[ctypes.POINTER(ctypes.c_double)] * 3),
+        ),
+        ("nominals", ctypes.POINTER(ctypes.c_double)),
+        ("tolerance", ctypes.c_double),
+        ("work", ctypes.POINTER(ctypes.c_double)),
+        ("pivots", ctypes.POINTER(ctypes.c_int)),
+    )
+
+
+def rates(context, t, x, result):
+    result[0], result[1] = x[1] * np.cos(t), -x[0] * x[1] + np.sin(2 * t)
+    return 0
+
+
+def slopes(context, t, x, result, by_time):
+    result[0], result[1], result[2], result[3] = 0.0, -x[1], np.cos(t), -x[0]
+    by_time[0], by_time[1] = -x[1] * np.sin(t), 2 * np.cos(2 * t)
+    return 0
+
+
+def fixed_steps(count):
+    """The nonlinear problem above, explicit in time, from 0 to 2 in equal steps of the C solver."""
+    sources = {p.name: p.read_bytes() for p in SHIM.iterdir() if p.name.startswith(("solver", "detmath"))}
+    flags = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC")
+    step = ctypes.CDLL(str(compile_shared(sources, "solver.so", PLATFORMS[host()].target, flags))).rodas4_step
+    fields = dict(Solver._fields_)
+    solver = Solver(2, None, fields["rates"](rates), fields["jacobian"](slopes), (ctypes.c_double * 2)(1, 1), 1e-8,
+                    (ctypes.c_double * 64)(), (ctypes.c_int * 2)())  # fmt: skip
+    x, error = (ctypes.c_double * 2)(1.0, 0.5), (ctypes.c_double * 2)()
+    for i in range(count):
+        assert (
+            step(ctypes.byref(solver), ctypes.c_double(2.0 * i / count), ctypes.c_double(2.0 / count), x, x, error) == 0
+        )
+    return np.array(x)
+
+
+def test_the_solver_is_of_fourth_order(fmi):
+    exact = fixed_steps(1280)
+    errors = [np.abs(fixed_steps(count) - exact).max() for count in (20, 40, 80)]
+    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert orders.min() >= 3.7
