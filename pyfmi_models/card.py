@@ -5,7 +5,7 @@ everything and names file, key, value and rule; `Card.plant` and `Card.controlle
 """
 
 import tomllib
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
 from importlib.resources import files
 from math import isfinite
 from pathlib import Path
@@ -176,7 +176,9 @@ def _friction(table: Table, path: str) -> FrictionLaw:
     key = table.pop("model", None)
     if key not in LAWS:
         raise CardError(f"{path}: [friction] model = {key!r} is unknown; models are: {', '.join(LAWS)}.")
-    return _build(LAWS[key], table, f"{path}: [friction]")
+    law = _build(LAWS[key], table, f"{path}: [friction]")
+    # A card says "no Stribeck term" by Fs = Fc; the law says it by having no Fs, so that a fit of Fc cannot make one.
+    return replace(law, Fs=None, Vs=None) if getattr(law, "Fs", None) == getattr(law, "Fc", 0) else law  # type: ignore[call-arg]
 
 
 def _effect(table: Table, path: str, index: int) -> Effect:
@@ -199,6 +201,8 @@ def _build(part: type[Part], table: Table, where: str) -> Part:
         if key not in keys:
             raise CardError(f'{where}: "{key}" is not a key here; keys are: {", ".join(keys)}.')
         table[key] = _number(value, keys[key][0], f"{where}: {key}")
+    if table.get("Fs") is not None and "Vs" in keys and table.get("Vs") is None:
+        raise CardError(f"{where}: Fs needs Vs, the speed over which friction falls.")
     missing = [key for key, (_, default) in keys.items() if key not in table and default is MISSING]
     if missing:
         raise CardError(f"{where}: {missing[0]} is missing.")

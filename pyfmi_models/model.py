@@ -111,3 +111,8 @@ def symbols_of(variables: tuple[Variable, ...]) -> tuple[Any, dict[str, Any]]:
 def _declared(component: Any) -> list[tuple[str, Variable, Any]]:
     declared = [(item.name, item.metadata.get("variable"), getattr(component, item.name)) for item in fields(component)]
     return [(name, variable, value) for name, variable, value in declared if variable is not None and value is not None]
+
+
+def fields_of(component: Any) -> tuple[str, ...]:
+    """Names of the parameters of a component as its fields, without prefix and side."""
+    return tuple(name for name, _, _ in _declared(component))

@@ -65,3 +65,10 @@ def stribeck_decay(v: Scalar, Vs: Scalar, delta: Scalar) -> Scalar:
     # |x|^delta as exp(delta log x): pow has NaN derivatives at 0, and exp(-exp(large)) has them far above Vs.
     ratio = ca.fmin(ca.fabs(v) / Vs, 1e3) + 1e-12
     return ca.exp(-ca.exp(delta * ca.log(ratio)))
+
+
+def stribeck_level(v: Scalar, Fc: Scalar, Fs: Scalar, Vs: Scalar, delta: Scalar) -> Scalar:
+    """`Fc + (Fs - Fc) exp(-|v/Vs|^delta)`, or Fc where there is no Stribeck term (Fs or Vs is None)."""
+    if Fs is None or Vs is None:
+        return Fc
+    return Fc + (Fs - Fc) * stribeck_decay(v, Vs, delta)

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.friction.base import FrictionLaw, stribeck_decay
+from pyfmi_models.friction.base import FrictionLaw, stribeck_level
 from pyfmi_models.friction.stribeck import Stribeck
 from pyfmi_models.model import Scalar, Variable, parameter
 
@@ -27,8 +27,8 @@ class LuGre(FrictionLaw):
     sigma1: Scalar = parameter("N.m.s/rad", "Bristle damping", default=0.0, low=0, nominal=100)
     sigma2: Scalar = parameter("N.m.s/rad", "Viscous friction coefficient", default=0.0, low=0)
     Fc: Scalar = parameter("N.m", "Coulomb level at high speed", low=1e-9)
-    Fs: Scalar = parameter("N.m", "Break-away level at rest", low=1e-9)
-    Vs: Scalar = parameter("rad/s", "Stribeck speed", low=1e-9, nominal=0.01)
+    Fs: Scalar = parameter("N.m", "Break-away level at rest; none: Fc, no Stribeck term", default=None, low=1e-9)
+    Vs: Scalar = parameter("rad/s", "Stribeck speed", default=None, low=1e-9, nominal=0.01)
     delta: Scalar = parameter("1", "Shape exponent of the Stribeck curve", default=2.0, low=0.1, high=5)
 
     def states(self) -> tuple[Variable, ...]:
@@ -37,7 +37,7 @@ class LuGre(FrictionLaw):
 
     def level(self, v: Scalar) -> Scalar:
         """`Fc + (Fs - Fc) exp(-|v/Vs|^delta)`."""
-        return self.Fc + (self.Fs - self.Fc) * stribeck_decay(v, self.Vs, self.delta)
+        return stribeck_level(v, self.Fc, self.Fs, self.Vs, self.delta)
 
     def viscous(self, v: Scalar) -> Scalar:
         """`sigma2 v`."""

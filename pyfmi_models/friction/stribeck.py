@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from pyfmi_models.friction.base import MemorylessLaw, stribeck_decay
+from pyfmi_models.friction.base import MemorylessLaw, stribeck_level
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -19,14 +19,14 @@ class Stribeck(MemorylessLaw):
 
     key: ClassVar[str] = "static"
     Fc: Scalar = parameter("N.m", "Coulomb level at high speed", low=0)
-    Fs: Scalar = parameter("N.m", "Break-away level at rest", low=0)
-    Vs: Scalar = parameter("rad/s", "Stribeck speed", low=1e-9)
+    Fs: Scalar = parameter("N.m", "Break-away level at rest; none: Fc, no Stribeck term", default=None, low=0)
+    Vs: Scalar = parameter("rad/s", "Stribeck speed", default=None, low=1e-9)
     delta: Scalar = parameter("1", "Shape exponent of the Stribeck curve", default=2.0, low=0.1, high=5)
     sigma2: Scalar = parameter("N.m.s/rad", "Viscous friction coefficient", default=0.0, low=0)
 
     def level(self, v: Scalar) -> Scalar:
         """`Fc + (Fs - Fc) exp(-|v/Vs|^delta)`."""
-        return self.Fc + (self.Fs - self.Fc) * stribeck_decay(v, self.Vs, self.delta)
+        return stribeck_level(v, self.Fc, self.Fs, self.Vs, self.delta)
 
     def viscous(self, v: Scalar) -> Scalar:
         """`sigma2 v`."""

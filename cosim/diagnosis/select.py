@@ -1,0 +1,148 @@
+"""Choose the effects: forward one at a time with full refits, backward deletion, swaps among rivals.
+
+An effect is accepted on significance *and* size, both on data its own fit did not use: it must lower the
+cross-validated energy in most blocks, and by more than a few per cent; a delay must be longer than the time stamps can
+be trusted.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cosim.diagnosis.evidence import Blocks
+from cosim.diagnosis.fit import Fit, fit
+from cosim.diagnosis.prepare import Array, Prepared
+from cosim.diagnosis.structure import Bench, nuisances, screen
+from pyfmi_models.effects import Delay, Effect
+from pyfmi_models.mount import Mount
+
+LEAST_GAIN, LEAST_T = 0.03, 1.8
+"""Share of the cross-validated energy, and block t value, that an effect must reach together ..."""
+SURE_GAIN = 0.05
+"""... or the share that is enough with a t value of 1."""
+SCREEN_GAIN = 0.004
+REFINED = 4
+"""How many effects are refined by a nonlinear fit in each stage."""
+MOST_EFFECTS = 4
+TIE = 0.96
+"""A rival that reaches this share of the winner's gain is not excluded; a simpler one that does so wins."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One effect added to (or exchanged in) a structure: the refitted structure and what it gained."""
+
+    effect: str
+    fit: Fit
+    before: Array
+    after: Array
+
+    @property
+    def gain(self) -> float:
+        """Share of the cross-validated energy removed."""
+        return float(1 - self.after.sum() / self.before.sum())
+
+    @property
+    def t(self) -> float:
+        """Mean improvement over blocks in units of its standard error."""
+        return t_value(self.before - self.after)
+
+    @property
+    def nats(self) -> float:
+        """Gain of cross-validated log-likelihood."""
+        return float((self.before - self.after).sum() / 2)
+
+
+@dataclass(frozen=True)
+class Selection:
+    """The chosen structure, how it was reached, and what was looked at."""
+
+    base: Fit
+    chosen: Fit
+    bench: Bench
+    accepted: dict[str, Trial] = field(default_factory=dict)
+    rivals: dict[str, list[Trial]] = field(default_factory=dict)
+    """For each accepted effect, the rivals tried in its place."""
+    looked_at: dict[str, Trial] = field(default_factory=dict)
+    """The best trial of each effect that was not accepted."""
+
+
+def t_value(better: Array) -> float:
+    """Mean over standard error of the mean."""
+    error = better.std(ddof=1) / np.sqrt(len(better)) if len(better) > 1 else 0.0
+    return float(better.mean() / error) if error > 0 else 0.0
+
+
+def select(
+    mount: Mount, prepared: Prepared, weight: Array, sample_time: float, say: Callable[[str], None] = lambda _: None
+) -> Selection:
+    """Find which effects the recordings demand beside a mount.
+
+    Args:
+        mount: the base, as the card has it.
+        prepared: the training recordings.
+        weight: weight of each kept row in fits.
+        sample_time: sample time of the recordings, s.
+        say: told what is being tried.
+    """
+    base = fit(mount, prepared.pieces, weight)
+    blocks, current = Blocks.of(prepared), base
+    accepted: dict[str, Trial] = {}
+    looked_at: dict[str, Trial] = {}
+    while True:
+        nuisance = nuisances(current, prepared, sample_time)
+        screening = screen(current, prepared, blocks, nuisance)
+        bench = screening.bench
+        before = bench.energy(current)
+        tried = []
+        for candidate, score in screening.best[:REFINED]:
+            if score.gain < SCREEN_GAIN:
+                break
+            say(candidate.effect)
+            width = candidate.start(score.coefficients)
+            tried.append(_trial(current, candidate.effect, width, prepared, weight, bench, before, mount))
+        looked_at |= {t.effect: t for t in tried if t.effect not in accepted}
+        best = winner([t for t in tried if is_real(t, sample_time)])
+        if best is None or len(accepted) >= MOST_EFFECTS:
+            break
+        accepted[_label(best.effect, accepted)] = best
+        current = best.fit
+    return Selection(base, current, bench, accepted, {}, looked_at)
+
+
+def _label(effect: str, accepted: dict[str, Trial]) -> str:
+    count = sum(name.rstrip("0123456789") == effect for name in accepted)
+    return effect + (str(count + 1) if count else "")
+
+
+def _trial(
+    current: Fit,
+    name: str,
+    effect: Effect,
+    prepared: Prepared,
+    weight: Array,
+    bench: Bench,
+    before: Array,
+    prior: Mount,
+) -> Trial:
+    mount = replace(current.mount, effects=(*current.mount.effects, effect))
+    found = fit(mount, prepared.pieces, weight, prior, evaluations=12)
+    return Trial(name, found, before, bench.energy(found))
+
+
+def winner(trials: Sequence[Trial]) -> Trial | None:
+    """The trial with the largest gain, or a simpler one that nearly reaches it."""
+    if not trials:
+        return None
+    best = max(trials, key=lambda trial: trial.gain)
+    near = [trial for trial in trials if trial.gain >= TIE * best.gain]
+    return min(near, key=lambda trial: (len(trial.fit.free), -trial.gain))
+
+
+def is_real(trial: Trial, sample_time: float) -> bool:
+    """Significant and large enough; a delay also longer than the time stamps can be trusted."""
+    added = trial.fit.mount.effects[-1]
+    if isinstance(added, Delay) and added.delay_ms < 1e3 * max(0.3 * sample_time, 1.5e-4):
+        return False
+    return (trial.gain > LEAST_GAIN and trial.t > LEAST_T) or (trial.gain > SURE_GAIN and trial.t > 1)
