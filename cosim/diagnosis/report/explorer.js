@@ -1,0 +1,139 @@
+// Draws the recordings on a canvas. Drag to zoom, double-click for all, arrow keys move, + and - zoom.
+(async () => {
+  const box = document.getElementById("explorer"), canvas = box.querySelector("canvas");
+  const data = JSON.parse(document.getElementById("recordings").textContent);
+  const ink = { tau: "#1A1A1A", before: "#CC6A00", after: "#00558C", q: "#1A1A1A", grey: "#5A6068", line: "#E3E6E8" };
+  if (!window.DecompressionStream || !data.recordings.length) return;
+  let record, view, drag;
+
+  async function unpack(recording) {
+    if (recording.values) return recording;
+    const bytes = Uint8Array.from(atob(recording.data), (c) => c.charCodeAt(0));
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
+    const deltas = new Uint16Array(await new Response(stream).arrayBuffer());
+    recording.values = {};
+    recording.signals.forEach(([name, low, step], row) => {
+      const values = new Float32Array(recording.count);
+      let level = 0;
+      for (let i = 0; i < recording.count; i++) {
+        level = (level + deltas[row * recording.count + i]) & 65535;
+        values[i] = level === 65535 ? NaN : low + step * level;
+      }
+      recording.values[name] = values;
+    });
+    const { tau, before, after } = recording.values;
+    recording.values.lost = tau.map((x, i) => x - before[i]);
+    recording.values.left = tau.map((x, i) => x - after[i]);
+    return recording;
+  }
+
+  const index = (t) => ((t - record.start) / record.length) * record.count;
+
+  function ticks(low, high, room) {
+    const raw = (high - low) / Math.max(2, room), power = 10 ** Math.floor(Math.log10(raw));
+    const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= raw), out = [];
+    for (let k = Math.ceil(low / step); k * step <= high + 1e-9 * step; k++) out.push(k * step);
+    return [out, Math.max(0, -Math.floor(Math.log10(step) + 1e-9))];
+  }
+
+  function panel(g, frame, lines, title) {
+    const first = Math.max(0, Math.floor(index(view[0]))), last = Math.min(record.count - 1, Math.ceil(index(view[1])));
+    let low = Infinity, high = -Infinity;
+    for (const [name] of lines) for (let i = first; i <= last; i++) {
+      const y = record.values[name][i];
+      if (y < low) low = y;
+      if (y > high) high = y;
+    }
+    if (!(high > low)) { low -= 1; high += 1; }
+    const x = (t) => frame.x + ((t - view[0]) / (view[1] - view[0])) * frame.w;
+    const y = (v) => frame.y + frame.h - ((v - low) / (high - low)) * frame.h;
+    g.fillStyle = record.heldout ? "#EEF0F1" : "#fff";
+    g.fillRect(frame.x, frame.y, frame.w, frame.h);
+    const [marks, places] = ticks(low, high, frame.h / 38);
+    g.textAlign = "right";
+    for (const mark of marks) {
+      g.fillStyle = ink.line; g.fillRect(frame.x, y(mark), frame.w, 1);
+      g.fillStyle = ink.grey; g.fillText(mark.toFixed(places).replace("-", "−"), frame.x - 6, y(mark) + 4);
+    }
+    g.textAlign = "left"; g.fillStyle = ink.grey; g.fillText(title, 0, frame.y - 9);
+    g.save(); g.beginPath(); g.rect(frame.x, frame.y, frame.w, frame.h); g.clip();
+    for (const [name, colour, dash] of lines) {
+      g.beginPath(); g.strokeStyle = colour; g.lineWidth = 1.4; g.setLineDash(dash);
+      let pen = false;
+      for (let i = first; i <= last; i++) {
+        const value = record.values[name][i];
+        if (Number.isNaN(value)) { pen = false; continue; }
+        const at = x(record.start + ((i + 0.5) / record.count) * record.length);
+        if (pen) g.lineTo(at, y(value)); else g.moveTo(at, y(value));
+        pen = true;
+      }
+      g.stroke();
+    }
+    g.restore();
+    return x;
+  }
+
+  function draw() {
+    const ratio = window.devicePixelRatio || 1, w = canvas.clientWidth, h = canvas.clientHeight;
+    canvas.width = w * ratio; canvas.height = h * ratio;
+    const g = canvas.getContext("2d");
+    g.scale(ratio, ratio); g.font = getComputedStyle(canvas).font;
+    const left = 50, width = w - left - 4, free = h - 24 * 3 - 42;
+    const heights = [free * 0.45, free * 0.32, free * 0.23];
+    let top = 24, x;
+    const sheets = [
+      [[["tau", ink.tau, []], ["before", ink.before, [6, 3]], ["after", ink.after, []]], `${box.dataset.noun} [${data.torque}]`],
+      [[["lost", ink.before, []], ["left", ink.after, []]], `error: measured minus model [${data.torque}]`],
+      [[["q", ink.q, []]], `position [${data.position}]`],
+    ];
+    sheets.forEach(([lines, title], row) => {
+      x = panel(g, { x: left, y: top, w: width, h: heights[row] }, lines, title);
+      top += heights[row] + 24;
+    });
+    const [marks, places] = ticks(view[0], view[1], width / 90);
+    g.textAlign = "center"; g.fillStyle = ink.grey;
+    for (const mark of marks) g.fillText(mark.toFixed(places), x(mark), top - 24 + 18);
+    g.fillText("time [s]", left + width / 2, top - 24 + 38);
+    if (drag && drag.to !== undefined) {
+      g.fillStyle = "rgba(0,85,140,.15)"; g.fillRect(Math.min(drag.from, drag.to), 24, Math.abs(drag.to - drag.from), top - 48);
+    }
+  }
+
+  function show(low, high) {
+    const end = record.start + record.length, span = Math.min(Math.max(high - low, 0.05), record.length);
+    const start = Math.min(Math.max(low, record.start), end - span);
+    view = [start, start + span];
+    draw();
+  }
+
+  async function open(number, span) {
+    record = await unpack(data.recordings[number]);
+    show(...(span || record.worst[1]));
+  }
+
+  const time = (px) => view[0] + ((px - 50) / (canvas.clientWidth - 54)) * (view[1] - view[0]);
+  canvas.addEventListener("pointerdown", (e) => { drag = { from: e.offsetX }; canvas.setPointerCapture(e.pointerId); });
+  canvas.addEventListener("pointermove", (e) => { if (drag) { drag.to = e.offsetX; draw(); } });
+  canvas.addEventListener("pointercancel", () => { drag = undefined; draw(); });
+  canvas.addEventListener("pointerup", (e) => {
+    const from = drag && drag.from; drag = undefined;
+    if (from !== undefined && Math.abs(e.offsetX - from) > 6) show(...[time(from), time(e.offsetX)].sort((a, b) => a - b));
+    else draw();
+  });
+  canvas.addEventListener("dblclick", () => show(record.start, record.start + record.length));
+  canvas.addEventListener("keydown", (e) => {
+    const span = view[1] - view[0], move = { ArrowLeft: -0.25, ArrowRight: 0.25 }[e.key], zoom = { "+": 0.5, "-": 2 }[e.key];
+    if (move) show(view[0] + move * span, view[1] + move * span);
+    if (zoom) show(view[0] + (span - span * zoom) / 2, view[1] - (span - span * zoom) / 2);
+    if (move || zoom) e.preventDefault();
+  });
+  const select = box.querySelector("select");
+  data.recordings.forEach((r, i) => select.add(new Option(r.name + (r.heldout ? " (not fitted)" : ""), i, false, i === data.open)));
+  select.addEventListener("change", () => open(+select.value));
+  const buttons = { before: () => show(...record.worst[0]), after: () => show(...record.worst[1]), all: () => show(record.start, record.start + record.length) };
+  for (const button of box.querySelectorAll("button")) button.addEventListener("click", buttons[button.dataset.to]);
+  new ResizeObserver(() => view && draw()).observe(canvas);
+  box.hidden = false;
+  await open(data.open);
+  box.dataset.ready = "yes";
+})();

@@ -1,0 +1,105 @@
+"""When: missing torque and its band over time, RMS by the second, and the worst seconds as lines."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cosim.diagnosis.report.derive import bars
+from cosim.diagnosis.report.quantities import Scales
+from cosim.diagnosis.report.sheet import AFTER, BEFORE, COLUMN, GREY, MEASURED, SHADE, Picture, Sheet, heading, thin
+from cosim.diagnosis.result import Array, Trace
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+BUCKETS = 260
+WIDE = 738
+"""Two columns of a desk, the whole width of a printed page."""
+
+
+def recording(index: int, trace: Trace, scales: Scales, most: tuple[float, float]) -> Picture:
+    """Draw missing torque with its 95 % band, then RMS bars before and after; `most` scales all recordings alike."""
+    sheet = Sheet(f"time{index}", 296)
+    top, middle, low = (sheet.axes(top=a, bottom=b) for a, b in ((24, 156), (172, 84), (222, 42)))
+    unit = scales.torque
+    _missing(top, trace, unit.factor)
+    top.set_ylim(-most[0] * unit.factor, most[0] * unit.factor)
+    heading(top, f"missing, and the band of pure noise [{unit.unit}]")
+    edges, before, after = bars(trace)
+    for axes, values, colour in ((middle, before, BEFORE), (low, after, AFTER)):
+        axes.stairs(np.nan_to_num(values) * unit.factor, edges, fill=True, color=colour, lw=0)
+        axes.set_ylim(0, most[1] * unit.factor)
+    heading(middle, f"RMS by {_width(edges)}, before and after [{unit.unit}]")
+    _times((top, middle, low), trace)
+    _flags(top, trace)
+    low.set_xlabel("time [s]")
+    kind = "not used for fitting" if trace.heldout else "used for fitting"
+    label = f"Error over time of {trace.name}, {kind}."
+    return sheet.picture(label, f"{kind[0].upper()}{kind[1:]}. {_flagged(trace)}".strip(), trace.name)
+
+
+def _missing(axes: "Axes", trace: Trace, factor: float) -> None:
+    size = max(1, len(trace.t) // BUCKETS)
+    rows = len(trace.t) // size
+    t, band = (x[: rows * size].reshape(rows, size).mean(axis=1) for x in (trace.t, trace.band))
+    axes.plot(*thin(trace.t, trace.missing * factor, BUCKETS), color=BEFORE, lw=0.8)
+    axes.fill_between(t, -band * factor, band * factor, color="#8A939B", alpha=0.55, lw=0, zorder=3)
+
+
+def _times(strips: "tuple[Axes, ...]", trace: Trace) -> None:
+    for axes in strips:
+        axes.set_xlim(trace.t[0], trace.t[-1])
+        axes.set_facecolor(SHADE if trace.heldout else "white")
+        axes.locator_params(axis="y", nbins=4 if axes is strips[0] else 2)
+        axes.tick_params(labelbottom=axes is strips[-1])
+
+
+def _width(edges: Array) -> str:
+    width = edges[1] - edges[0]
+    return "the second" if width == 1 else f"{width:g} s"
+
+
+def _flags(axes: "Axes", trace: Trace) -> None:
+    bottom = axes.get_ylim()[0]
+    for low, high in trace.intervals:
+        axes.plot([low, high], [bottom * 0.96] * 2, color=MEASURED, lw=4, solid_capstyle="butt")
+
+
+def _flagged(trace: Trace) -> str:
+    if not trace.intervals:
+        return ""
+    return "Black line: outside the band for long."
+
+
+def overlay(trace: Trace, span: tuple[float, float], scales: Scales, width: int = COLUMN) -> Picture:
+    """Draw measured, before and after over the worst seconds, and the errors below."""
+    sheet = Sheet(f"overlay{width}", 356, width)
+    top, low = sheet.axes(bottom=172, top=28), sheet.axes(top=226)
+    unit = scales.torque
+    cut = (trace.t >= span[0]) & (trace.t <= span[1])
+    t, buckets = trace.t[cut], max(60, int((width - 54) * 0.4))
+    for y, style in zip((trace.tau, trace.before, trace.after), _LINES, strict=True):
+        top.plot(*thin(t, y[cut] * unit.factor, buckets), **style)
+    for y, colour in ((trace.missing, BEFORE), (trace.tau - trace.after, AFTER)):
+        low.plot(*thin(t, y[cut] * unit.factor, buckets), color=colour, lw=1.2)
+    low.axhline(0, color=GREY, lw=0.8, zorder=1)
+    heading(top, f"{_noun(unit.unit)} [{unit.unit}]")
+    heading(low, f"error: measured minus model [{unit.unit}]")
+    for axes in (top, low):
+        axes.set_xlim(*span)
+        axes.locator_params(axis="y", nbins=5)
+    top.tick_params(labelbottom=False)
+    low.set_xlabel("time [s]")
+    words = f"Measured, model before and model after, {span[0]:.1f} to {span[1]:.1f} s of {trace.name}."
+    return sheet.picture(words, words)
+
+
+_LINES: tuple[dict[str, object], ...] = (
+    {"color": MEASURED, "lw": 1.4},
+    {"color": BEFORE, "lw": 1.6, "dashes": (4, 2)},
+    {"color": AFTER, "lw": 1.6},
+)
+
+
+def _noun(unit: str) -> str:
+    return "torque" if unit.endswith("N·m") else "force"

@@ -1,0 +1,199 @@
+"""Everything the template prints, put together from a diagnosis."""
+
+import base64
+import hashlib
+from collections.abc import Iterator
+from importlib.resources import files as resources
+from typing import Any
+
+import numpy as np
+
+from cosim.diagnosis.report import tables, unknown, words
+from cosim.diagnosis.report.derive import Samples, bars, parts, samples, worst
+from cosim.diagnosis.report.explorer import payload
+from cosim.diagnosis.report.figures_dynamic import effect
+from cosim.diagnosis.report.figures_proof import looked_for, proof
+from cosim.diagnosis.report.figures_time import WIDE, overlay, recording
+from cosim.diagnosis.report.figures_where import plane, region, strongest
+from cosim.diagnosis.report.findings import block
+from cosim.diagnosis.report.quantities import Scales, joined, number
+from cosim.diagnosis.report.sheet import Picture
+from cosim.diagnosis.result import Diagnosis, Trace
+
+MOST_RECORDINGS, MOST_REGIONS = 6, 7
+
+
+def context(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the values of the template."""
+    scales = Scales.of(diagnosis)
+    chosen = samples(diagnosis.traces)
+    sections = (_first, _findings, _middle, _time, _end)
+    return {name: value for section in sections for name, value in section(diagnosis, scales, chosen).items()}
+
+
+def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
+    """Return the first screen."""
+    kind = words.verdict(diagnosis)
+    rows = parts(diagnosis, scales.speed.span)
+    return {
+        "heading": words.heading(diagnosis),
+        "mount": diagnosis.mount,
+        "identity": identity(diagnosis),
+        "lead": words.lead(diagnosis, scales),
+        "facts": unknown.facts(diagnosis, scales) if kind == "unknown" else None,
+        "limits": tables.limits(diagnosis) if kind == "none" else None,
+        "unseen": "" if kind == "none" else tables.unseen(diagnosis),
+        "proof": proof(diagnosis, rows, scales),
+        "parts_table": tables.parts(rows, scales),
+        "added": any(finding.answer == "found" for finding in diagnosis.findings),
+        "with_effects": _with_effects(diagnosis),
+        "box": _box(diagnosis, [row.label for row in rows if row.change == "worse"], scales),
+        "noun": "torque" if diagnosis.motion == "rotary" else "force",
+    }
+
+
+def identity(diagnosis: Diagnosis) -> list[dict[str, str]]:
+    """Return machine, recordings, model and version."""
+    made, many = diagnosis.provenance, len(diagnosis.traces)
+    seconds = sum(float(trace.t[-1] - trace.t[0]) for trace in diagnosis.traces if trace.t.size)
+    rates = [entry["rate_hz"] for entry in made.get("recordings", ()) if entry.get("rate_hz")]
+    rest = f", {seconds:.0f} s" + (f" at {_rate(rates[0])}" if rates else "")
+    told = [("", diagnosis.mount, ""), ("", f"{many} recording{'s' if many != 1 else ''}", rest)]
+    told.append(("Model", str(made.get("card", {}).get("name", "")), ""))
+    told.append(("cosim", str(made.get("version", "")), ""))
+    return [dict(zip(("label", "value", "rest"), part, strict=True)) for part in told if part[1]]
+
+
+def _rate(hertz: float) -> str:
+    return joined(number(hertz / 1000, 4), "kHz") if hertz >= 1000 else joined(number(hertz, 4), "Hz")
+
+
+def _with_effects(diagnosis: Diagnosis) -> str:
+    found = sum(finding.answer == "found" for finding in diagnosis.findings)
+    return {0: "after (nothing added)", 1: "with the effect"}.get(found, f"with the {words.count(found).lower()} effects")
+
+
+def _box(diagnosis: Diagnosis, worse: list[str], scales: Scales) -> dict[str, str] | None:
+    """Say where the improved model is proven and where to keep the old one."""
+    file = str(diagnosis.improved.get("fmu") or diagnosis.improved.get("card") or "")
+    if not file:
+        return None
+    proven = words.proven_range(diagnosis, scales)
+    text = f"is proven {proven}. Elsewhere, keep the delivered model." if proven else "is proven on the unseen runs only."
+    return {"file": file, "text": text + (f" It is worse here: {', '.join(worse)}." if worse else "")}
+
+
+def _findings(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
+    found = [one for one in words.blocks(diagnosis) if one.first.effect != "unknown"]
+    blocks = [block(one, diagnosis, scales, effect(one.first, chosen, scales)) for one in found]
+    return {"blocks": blocks, "experiment": _experiment(diagnosis, scales)}
+
+
+def _experiment(diagnosis: Diagnosis, scales: Scales) -> dict[str, Any] | None:
+    """Say what one more recording would tell, and how to take it."""
+    plan = diagnosis.next_experiment
+    if not plan:
+        return None
+    titles = {finding.effect: words.lowered(finding.title) for finding in diagnosis.findings}
+    names = [titles.get(str(name), str(name)) for name in plan.get("separates", ())]
+    said = [words.closed(str(plan.get("description", "")))]
+    said.append(f"It separates {' from '.join(names)}." if len(names) > 1 else "")
+    gap = plan.get("expected_difference")
+    said.append(f"They will then differ by {scales.torque.text(float(gap))}." if gap and len(names) > 1 else "")
+    command = plan.get("command") or (f"cosim run {plan['scenario']} --out next" if plan.get("scenario") else "")
+    return {"sentences": [text for text in said if text], "command": str(command)}
+
+
+def _middle(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
+    """Return everything looked for, what stays, proof, and where."""
+    return {
+        "looked": tables.looked(diagnosis),
+        "looked_picture": looked_for(diagnosis.findings, diagnosis.ambiguous_with),
+        "meanings": words.MEANINGS,
+        "unexplained": unexplained(diagnosis, scales),
+        "spans": tables.spans(diagnosis),
+        "proof_table": tables.proof(diagnosis, scales),
+        "proof_sentence": _proof_sentence(diagnosis, scales),
+        "places": list(_places(diagnosis, scales, chosen)),
+    }
+
+
+def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
+    """Say how much error is left above the noise, and what it goes with."""
+    held, unit = diagnosis.heldout, scales.torque
+    rest = float(np.sqrt(max(held.after_rms**2 - held.floor_rms**2, 0.0)))
+    if rest <= 0.5 * held.floor_rms:
+        left = f"Hardly anything: {unit.text(held.after_rms)} error on unseen runs, {unit.text(held.floor_rms)} of it noise."
+    else:
+        left = f"{unit.text(rest)} of error on unseen runs stays unexplained, beyond the noise."
+    goes = f"It goes with {', '.join(diagnosis.depends_on)}." if diagnosis.depends_on else ""
+    nothing = "" if goes or rest <= 0.5 * held.floor_rms else "It goes with nothing that was recorded."
+    return [text for text in (left, goes, nothing) if text]
+
+
+def _proof_sentence(diagnosis: Diagnosis, scales: Scales) -> str:
+    held, unit = diagnosis.heldout, scales.torque
+    low, high = held.confidence_interval
+    sure = "" if low > 0 else " That range includes zero: no clear change." if high >= 0 else " It is worse."
+    gain = f"The error falls by {unit.text(held.before_rms - held.after_rms)} (95 % range {unit.span(low, high)})."
+    return f"{held.name} was not used for fitting. {gain}{sure}"
+
+
+def _places(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> Iterator[Picture]:
+    after = {other.axis: other for other in diagnosis.regions_after}
+    for before in diagnosis.regions[:MOST_REGIONS]:
+        yield region(before, after.get(before.axis), scales)
+    if chosen.t.size > 200 and (top := strongest(chosen)) > 0:
+        yield plane("before", chosen, chosen.before, scales, top)
+        yield plane("after", chosen, chosen.after, scales, top)
+
+
+def _time(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
+    """Return when, and the worst seconds."""
+    traces = sorted((t for t in diagnosis.traces if t.t.size > 1), key=lambda trace: not trace.heldout)
+    shown, hidden = traces[:MOST_RECORDINGS], traces[MOST_RECORDINGS:]
+    most = max((_most(trace)[0] for trace in shown), default=1.0), max((_most(trace)[1] for trace in shown), default=1.0)
+    span = worst(traces[0], traces[0].tau - traces[0].after)
+    return {
+        "times": [recording(place, trace, scales, most) for place, trace in enumerate(shown)],
+        "hidden": f"{len(hidden)} more recordings are in the explorer below." if hidden else "",
+        "overlay": overlay(traces[0], span, scales, WIDE),
+        "overlay_small": overlay(traces[0], span, scales),
+        "worst": tables.worst(traces[0], scales),
+    }
+
+
+def _most(trace: Trace) -> tuple[float, float]:
+    """Return the heights that hold missing torque (but for single spikes) and RMS bars."""
+    tall = float(np.nanquantile(np.abs(trace.missing), 0.999))
+    return 1.15 * max(tall, float(np.nanmax(trace.band))), 1.05 * float(np.nanmax(bars(trace)[1:]))
+
+
+def _end(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
+    """Return parameters, quality, provenance, explorer."""
+    made, here = diagnosis.provenance, resources("cosim.diagnosis.report")
+    script = here.joinpath("explorer.js").read_text("utf-8")
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    told = [made.get("date", ""), f"cosim {made['version']}" if made.get("version") else ""]
+    told += [f"seed {made['seed']}" if "seed" in made else "", f"{diagnosis.seconds:.1f} s" if diagnosis.seconds else ""]
+    return {
+        "parameters": tables.parameters(diagnosis),
+        "parameters_sentence": "The base was refitted on the training recordings before any effect was tested.",
+        "law": _law(diagnosis),
+        "quality": diagnosis.data_quality,
+        "command": str(made.get("command", "")),
+        "files": tables.files(diagnosis),
+        "made": ", ".join(str(text) for text in told if text),
+        "data": payload(diagnosis, scales),
+        "script": script,
+        "script_hash": digest,
+        "css": here.joinpath("report.css").read_text("utf-8"),
+    }
+
+
+def _law(diagnosis: Diagnosis) -> str:
+    law = diagnosis.friction_law
+    if not law.get("proposed"):
+        return ""
+    gain = f"; it removes {100 * float(law['gain']):.0f} % of the error" if law.get("gain") else ""
+    return f"Friction law: {law['proposed']} fits better than {law.get('base', 'the base')}{gain}. This is no missing effect."

@@ -1,0 +1,127 @@
+"""A matplotlib figure whose unit is one CSS pixel, written as an SVG small enough to inline.
+
+matplotlib is imported on use only: the rest of the package must not wait for it.
+"""
+
+import io
+import re
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from markupsafe import Markup
+
+from cosim.diagnosis.result import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MEASURED, BEFORE, AFTER = "#1A1A1A", "#CC6A00", "#00558C"
+GREY, LINE, SHADE = "#5A6068", "#C9CED3", "#EEF0F1"
+COLUMN = 356
+"""Width of a figure: the width of a phone, and a third of a desk."""
+
+STYLE: dict[str, Any] = {
+    "svg.fonttype": "none",
+    "svg.hashsalt": "cosim",
+    "text.parse_math": False,
+    "axes.unicode_minus": True,
+    "font.size": 12.5,
+    "axes.titlesize": 12.5,
+    "axes.labelsize": 12.5,
+    "xtick.labelsize": 12.5,
+    "ytick.labelsize": 12.5,
+    "text.color": MEASURED,
+    "axes.labelcolor": GREY,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "axes.edgecolor": LINE,
+    "axes.linewidth": 1,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "xtick.major.size": 0,
+    "ytick.major.size": 0,
+    "xtick.major.pad": 5,
+    "axes.labelpad": 3,
+    "grid.color": "#E3E6E8",
+    "grid.linewidth": 1,
+    "lines.linewidth": 1.6,
+    "lines.dash_joinstyle": "round",
+    "hatch.linewidth": 0.7,
+    "hatch.color": "#A9B0B6",
+}
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A drawn figure and the sentence below it; `text` says in words what the picture shows."""
+
+    svg: Markup
+    caption: str
+    heading: str = ""
+
+
+class Sheet:
+    """A figure of fixed size; `name` makes the ids of its parts unique in the page."""
+
+    def __init__(self, name: str, height: int, width: int = COLUMN) -> None:
+        from matplotlib.figure import Figure
+
+        self.name, self.width, self.height = name, width, height
+        self.figure = Figure(figsize=(width / 72, height / 72), dpi=72)
+
+    def axes(self, *, left: int = 44, right: int = 10, top: int = 26, bottom: int = 42) -> "Axes":
+        """Add axes with these margins in pixels and a light horizontal grid."""
+        w, h = self.width, self.height
+        axes = self.figure.add_axes((left / w, bottom / h, (w - left - right) / w, (h - top - bottom) / h))
+        axes.grid(axis="y")
+        return axes
+
+    def picture(self, label: str, caption: str, heading: str = "") -> Picture:
+        """Return the finished figure; `label` is what a screen reader says."""
+        return Picture(self._svg(label), caption, heading)
+
+    def _svg(self, label: str) -> Markup:
+        buffer = io.StringIO()
+        nothing = dict.fromkeys(("Date", "Creator", "Format", "Type"))
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", message="Glyph")
+            self.figure.savefig(buffer, format="svg", metadata=nothing, transparent=True)
+        size = f'class="w{self.width}" width="{self.width}" height="{self.height}"'
+        head = f'<svg role="img" aria-label="{Markup.escape(label)}" {size} viewBox="0 0 {self.width} {self.height}">'
+        return Markup(head + small(buffer.getvalue(), self.name))
+
+
+def heading(axes: "Axes", text: str) -> None:
+    """Write the quantity of the vertical axis above it, where it can be read without turning the head."""
+    axes.annotate(text, (0, 1), (-34, 12), xycoords="axes fraction", textcoords="offset points", color=GREY)
+
+
+def thin(x: Array, y: Array, buckets: int) -> tuple[Array, Array]:
+    """Return at most two points a bucket, its smallest and largest value in the order they came."""
+    size = len(y) // buckets
+    if size < 3:
+        return x, y
+    rows = y[: size * buckets].reshape(buckets, size)
+    picks = np.sort(np.stack([rows.argmin(axis=1), rows.argmax(axis=1)], axis=1), axis=1)
+    index = (picks + np.arange(buckets)[:, None] * size).ravel()
+    return x[index], y[index]
+
+
+def small(svg: str, name: str) -> str:
+    """Strip an SVG of prolog, unused ids, fonts and digits nobody sees, and prefix the ids that stay."""
+    body = svg[svg.index("<svg") :]
+    body = re.sub(r"<style.*?</style>", "", body[body.index(">") + 1 :], flags=re.S)
+    body = re.sub(r'(?<= )(d|x|y|transform|width|height|points)="([^"]*)"', _rounded, body)
+    body = re.sub(r"font-family: [^\";]*;? ?", "", body).replace("xlink:href", "href")
+    used = set(re.findall(r'(?:url\(#|href="#)([\w.-]+)', body))
+    body = re.sub(r' id="([^"]*)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", body)
+    body = re.sub(r'(url\(#|href="#)', rf"\g<1>{name}-", body)
+    return re.sub(r">\s+<", "><", re.sub(r"\s*\n\s*", " ", body))
+
+
+def _rounded(match: "re.Match[str]") -> str:
+    value = re.sub(r"-?\d+\.\d+", lambda m: f"{float(m[0]):.1f}".removesuffix(".0"), match[2])
+    return f'{match[1]}="{value.strip()}"'

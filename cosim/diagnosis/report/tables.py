@@ -1,0 +1,130 @@
+"""The tables of the page, as rows of text."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.diagnosis.report.derive import Part, bars
+from cosim.diagnosis.report.equations import CONDITIONS
+from cosim.diagnosis.report.quantities import Scales, decimals, number
+from cosim.diagnosis.report.words import ANSWERS, lowered, shows_from
+from cosim.diagnosis.result import Diagnosis, Finding, Trace
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns and rows of text; the first cell of a row names it, `numeric` columns are set right."""
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    numeric: tuple[int, ...] = ()
+    style: str = "stack"
+
+
+def looked(diagnosis: Diagnosis) -> Table:
+    """List every effect with its answer and what it would have shown from, or why it cannot be tested."""
+    rows = tuple((f.title, ANSWERS.get(f.answer, f.answer), f.size, _from(f)) for f in diagnosis.findings)
+    return Table(("Effect", "Answer", "Size", "Would have shown from, or what is missing"), rows)
+
+
+def _from(finding: Finding) -> str:
+    if finding.answer != "not_testable":
+        return shows_from(finding) or finding.evidence
+    said = [finding.evidence, finding.action or CONDITIONS.get(finding.effect, "")]
+    return "; ".join(text.rstrip(".") for text in said if text)
+
+
+def limits(diagnosis: Diagnosis) -> Table:
+    """Group effects that were not seen or cannot be tested, for the first screen of "nothing is missing"."""
+    unseen = [finding for finding in diagnosis.findings if finding.answer == "not_seen"]
+    rows = [(ANSWERS["not_seen"], finding.title, shows_from(finding) or "–") for finding in unseen[:9]]
+    rows += [(ANSWERS["not_testable"], f.title, _from(f)) for f in diagnosis.findings if f.answer == "not_testable"][:4]
+    return Table(("Effect", "Answer", "Would have shown from"), tuple((name, answer, text) for answer, name, text in rows))
+
+
+def numbers(finding: Finding) -> Table:
+    """List the parameters of a finding with standard error and 95 % range."""
+    rows = []
+    for name, value in finding.parameters.items():
+        error, ends = finding.standard_errors.get(name), finding.ranges.get(name)
+        span = " to ".join(decimals(ends, 3)) if ends else ""
+        rows.append((name, number(value, 4), number(error) if error is not None else "", span, finding.units.get(name, "")))
+    return Table(("Parameter", "Value", "Standard error", "95 % range", "Unit"), tuple(rows), (1, 2, 3), "")
+
+
+def proof(diagnosis: Diagnosis, scales: Scales) -> Table:
+    """List the error of the recording that was not fitted: over all samples, in clear motion, of the position."""
+    held, unit = diagnosis.heldout, scales.torque
+    names = ("nominal_rms", "before_rms", "after_rms", "floor_rms")
+    whole = decimals(tuple(getattr(held, name) * unit.factor for name in names), 3)
+    rows = [(f"RMS, all samples [{unit.unit}]", *whole)]
+    if held.sliding:
+        cells = _cells(held.sliding, names, unit.factor)
+        rows.append((f"RMS, clear motion only [{unit.unit}]", *cells))
+    if held.position:
+        cells = _cells(held.position, names, scales.position.factor)
+        rows.append((f"Position, closed loop [{scales.position.unit}]", *cells))
+    return Table(("Held-out recording", "As delivered", "Refitted", "With the effects", "Noise"), tuple(rows), (1, 2, 3, 4))
+
+
+def _cells(found: dict[str, float], names: tuple[str, ...], factor: float) -> tuple[str, ...]:
+    short = [found.get(name, found.get(name.removesuffix("_rms"), float("nan"))) for name in names]
+    return decimals(tuple(value * factor for value in short), 3)
+
+
+def parts(rows: Sequence[Part], scales: Scales) -> Table:
+    """List the rows of the proof figure as numbers."""
+    unit = scales.torque
+    cells = [(row.label, *decimals((row.before * unit.factor, row.after * unit.factor), 3), row.change) for row in rows]
+    return Table(("Part", f"Before [{unit.unit}]", f"After [{unit.unit}]", "Change"), tuple(cells), (1, 2))
+
+
+def spans(diagnosis: Diagnosis) -> Table:
+    """List the flagged time spans, longest first."""
+    found = [(trace.name, low, high) for trace in diagnosis.traces for low, high in trace.intervals]
+    found.sort(key=lambda row: row[1] - row[2])
+    rows = tuple((name, f"{low:.2f}", f"{high:.2f}", f"{high - low:.2f}") for name, low, high in found[:40])
+    return Table(("Recording", "From [s]", "To [s]", "Length [s]"), rows, (1, 2, 3))
+
+
+def worst(trace: Trace, scales: Scales) -> Table:
+    """List the seconds of a recording with the largest error after."""
+    edges, before, after = bars(trace)
+    order = np.argsort(-np.nan_to_num(after))[:6]
+    factor = scales.torque.factor
+    rows = tuple(
+        (f"{edges[i]:.0f} to {edges[i + 1]:.0f} s", *decimals((before[i] * factor, after[i] * factor))) for i in order
+    )
+    return Table(("Worst seconds", "Before", f"After [{scales.torque.unit}]"), rows, (1, 2))
+
+
+def parameters(diagnosis: Diagnosis) -> Table:
+    """List the base parameters: as delivered, refitted, with the missing physics."""
+    rows = []
+    for name, (given, refitted, full) in diagnosis.base_parameters.items():
+        change = f"{100 * (full / given - 1):+.0f} %".replace("-", "−") if given else ""
+        rows.append((name, number(given, 4), number(refitted, 4), number(full, 4), change))
+    return Table(("Parameter", "As delivered", "Refitted", "With the effects", "Change"), tuple(rows), (1, 2, 3, 4))
+
+
+def files(diagnosis: Diagnosis) -> Table:
+    """List the recordings and the card with their hashes."""
+    rows = []
+    for entry in (*diagnosis.provenance.get("recordings", ()), {**diagnosis.provenance.get("card", {}), "role": "model card"}):
+        seconds, rate = entry.get("seconds"), entry.get("rate_hz")
+        size = f"{seconds:g} s at {rate:g} Hz" if seconds and rate else ""
+        if entry.get("name"):
+            rows.append((str(entry["name"]), str(entry.get("role", "")), size, str(entry.get("sha256", ""))))
+    return Table(("File", "Role", "Length", "SHA-256"), tuple(rows), (), "stack hash")
+
+
+def unseen(diagnosis: Diagnosis) -> str:
+    """Return the one line on what was not seen and what these recordings cannot show."""
+    said = []
+    for answer, start in (("not_seen", "Not seen"), ("not_testable", "These recordings cannot show")):
+        names = [lowered(finding.title) for finding in diagnosis.findings if finding.answer == answer]
+        rest = f" and {len(names) - 5} more" if len(names) > 6 else ""
+        if names:
+            said.append(f"{start}: {', '.join(names[:5] if rest else names)}{rest}.")
+    return " ".join(said)
