@@ -1,8 +1,8 @@
 """The command `cosim`: verbs that take files to files.
 
-A verb `x` is the function `x` in the module `cosim.cli_x`, or the typer `app` there if it has verbs of its own. Only the
-module of the verb that is called is imported, and it imports what is heavy inside its functions: so a run needs neither
-CasADi nor a compiler.
+A verb `x` is the function `x` in the module `cosim.cli_x`, or the typer `app` there if it has verbs of its own. Only
+the module of the verb that is called is imported, and it imports what is heavy inside its functions: so a run needs
+neither CasADi nor a compiler.
 
 Exit codes: 0 done, 1 only where a yes or no was asked, 2 wrong use or bad input (one sentence), 130 interrupted.
 """

@@ -55,5 +55,7 @@ def _tell(statistics: dict[str, Any]) -> None:
     )
     if statistics["unconnected"]:
         say(f"not connected, at their start values: {', '.join(map(str, statistics['unconnected']))}")
+    for note in statistics["notes"]:
+        say(note)
     if statistics["warnings"]:
         say(f"{statistics['warnings']:,} steps ended with a warning of their FMU")

@@ -4,17 +4,19 @@ FMI 2.0 and 3.0, co-simulation. Unpacked files live in a temporary directory tha
 """
 
 import ctypes
+import os
 import tempfile
 import zipfile
 from collections import deque
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
 from functools import cache
 from itertools import count
 from math import inf
 from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
+from xml.etree import ElementTree
 
 import numpy as np
 
@@ -45,14 +47,15 @@ def describe(path: Path) -> Any:
         raise FmuError(f"{path} does not exist.", culprit=str(path))
     if not zipfile.is_zipfile(path):
         raise FmuError(f"{path} is no FMU: it is not a zip archive.", culprit=str(path))
-    if "modelDescription.xml" not in zipfile.ZipFile(path).namelist():
+    if "modelDescription.xml" not in _names(path):
         raise FmuError(f"{path} is no FMU: the archive holds no modelDescription.xml.", culprit=str(path))
     try:
-        description = fmpy.read_model_description(str(path), validate=False)
-    except Exception as error:  # FMPy and lxml raise many kinds; each means the same to the user
+        version = _version(path)
+        description = fmpy.read_model_description(str(path), validate=False) if version[:2] in ("2.", "3.") else None
+    except Exception as error:  # FMPy and its XML parser raise many kinds; each means the same to the user
         raise FmuError(f"{path} has a modelDescription.xml that cannot be read: {_first(error)}.") from error
-    if not description.fmiVersion.startswith(("2.", "3.")):
-        raise FmuError(f"{path} is of FMI {description.fmiVersion}; this tool runs FMI 2.0 and 3.0.", culprit=str(path))
+    if description is None:
+        raise FmuError(f"{path} is of FMI {version}; this tool runs FMI 2.0 and 3.0.", culprit=str(path))
     if description.coSimulation is None:
         raise FmuError(f"{path} has no co-simulation interface; export it again with one.", culprit=str(path))
     return description
@@ -161,12 +164,13 @@ class FmuComponent:
         instance = f"{self.name}.{next(_NUMBERS)}"
         _LISTENERS[instance] = self
         try:
-            fmu = kind(
-                guid=description.guid if self._version == 2 else description.instantiationToken,
-                modelIdentifier=description.coSimulation.modelIdentifier,
-                unzipDirectory=self._directory.name,
-                instanceName=instance,
-            )
+            with _same_directory():
+                fmu = kind(
+                    guid=description.guid if self._version == 2 else description.instantiationToken,
+                    modelIdentifier=description.coSimulation.modelIdentifier,
+                    unzipDirectory=self._directory.name,
+                    instanceName=instance,
+                )
             self._begin(fmu)
         except Exception as error:
             raise FmuError(f"{self.path} cannot be instantiated: {self._reason(error)}.") from error
@@ -187,7 +191,7 @@ class FmuComponent:
 
         folder = fmpy.platform if self._version == 2 else fmpy.platform_tuple
         library = f"{self._description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
-        names = zipfile.ZipFile(self.path).namelist()
+        names = _names(self.path)
         if f"binaries/{folder}/{library}" not in names:
             folders = [name.split("/") for name in names if name.startswith("binaries/")]
             have = sorted({parts[1] for parts in folders if len(parts) > 2})
@@ -244,6 +248,26 @@ class FmuComponent:
     def _reason(self, error: Exception) -> str:
         said = f'; it said "{self._messages[-1]}"' if self._messages else ""
         return _first(error) + said
+
+
+def _names(path: Path) -> list[str]:
+    with zipfile.ZipFile(path) as archive:
+        return archive.namelist()
+
+
+def _version(path: Path) -> str:
+    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+        return ElementTree.parse(file).getroot().get("fmiVersion", "?")
+
+
+@contextmanager
+def _same_directory() -> Iterator[None]:
+    """Come back to the working directory, which FMPy leaves for good when a library does not load."""
+    here = os.getcwd()
+    try:
+        yield
+    finally:
+        os.chdir(here)
 
 
 def _port(variable: Any) -> Port:

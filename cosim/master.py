@@ -18,7 +18,7 @@ import cosim
 from cosim.component import STATUSES, Component
 from cosim.errors import ScenarioError, StepError, WiringError
 from cosim.fmu import FmuComponent
-from cosim.loop import CompiledLoop, InterpretedLoop, Plan, make_loop
+from cosim.loop import CompiledLoop, InterpretedLoop, Plan, make_loop, slow_because
 from cosim.recording import Recording
 from cosim.scenario import Scenario
 from cosim.signals import Samples, Signal
@@ -107,7 +107,8 @@ def simulate(
         work = _Work(wiring, plan, make_loop(plan, compiled), writer, ticks, progress)
         with closing(writer):
             work.execute()
-    recording = None if path else Recording(name, writer.table(), writer.units, writer.origin)
+    known = {key: unit for key, unit in units.items() if unit}
+    recording = None if path else Recording(name, writer.table(), known, writer.origin)
     return Run(work.statistics(), path, recording)
 
 
@@ -186,6 +187,7 @@ class _Work:
             "algorithm": "jacobi",
             "warnings": self.loop.warnings,
             "unconnected": list(self.wiring.unconnected()),
+            "notes": [] if self.loop.kind == "compiled" else [f"{slow_because(self.plan)}: the loop ran in Python."],
         }
 
     def _run_chunks(self) -> None:

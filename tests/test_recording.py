@@ -203,7 +203,6 @@ def test_nothing_is_overwritten_or_left_half_written(tmp_path: Path) -> None:
 def test_a_stream_is_a_complete_file_even_when_the_run_breaks(tmp_path: Path) -> None:
     table = columns()
 
-
     def interrupted() -> None:
         with StreamWriter(tmp_path / "run.parquet", {"t": "s", "tau": "", "q": "rad"}, {}) as file:
             file.write(table)

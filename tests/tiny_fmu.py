@@ -1,4 +1,4 @@
-"""Small FMUs for tests of the master: y' = k (a - b), or y = k (a - b) from the step before, that can fail on demand."""
+"""Small FMUs for tests of the master: y' = k (a - b), or y = k (a - b) a step later, that can fail on demand."""
 
 import subprocess
 import sys
@@ -6,6 +6,7 @@ import zipfile
 from pathlib import Path
 
 import fmpy
+import pytest
 
 SOURCE = r"""
 #include <math.h>
@@ -55,6 +56,14 @@ API int fmi3DoStep(M *m, double t, double h, bool p, bool *e, bool *x, bool *y, 
 API const char *fmi3GetVersion(void) { return "3.0"; }
 """
 
+
+@pytest.fixture(scope="session")
+def tiny(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
+    """The tiny FMU for FMI 2 and 3."""
+    directory = tmp_path_factory.mktemp("tiny")
+    return {version: build(directory, version) for version in (2, 3)}
+
+
 VARIABLES = [
     # name, causality, unit, start, limits
     ("a", "input", "rad", "0", ""),
@@ -83,30 +92,25 @@ def build(directory: Path, version: int) -> Path:
 
 def description(version: int) -> str:
     """Write the XML of one FMI version."""
+    head = {
+        2: '<fmiModelDescription fmiVersion="2.0" modelName="tiny" guid="t">',
+        3: '<fmiModelDescription fmiVersion="3.0" modelName="tiny" instantiationToken="t">',
+    }
+    outputs = {2: '<Outputs><Unknown index="7"/></Outputs>', 3: '<Output valueReference="6"/>'}
     units = "".join(f'<Unit name="{unit}"/>' for unit in ("rad", "1", "s"))
-    if version == 3:
-        rows = "".join(
-            f'<Float64 name="{name}" valueReference="{number}" causality="{causality}" unit="{unit}" {limits} '
-            f'variability="{"fixed" if causality == "parameter" else "continuous"}" {f"start={chr(34)}{start}{chr(34)}" if start else ""}/>'
-            for number, (name, causality, unit, start, limits) in enumerate(VARIABLES)
-        )
-        return (
-            '<fmiModelDescription fmiVersion="3.0" modelName="tiny" instantiationToken="t">'
-            f'<CoSimulation modelIdentifier="tiny"/><UnitDefinitions>{units}</UnitDefinitions>'
-            f'<ModelVariables>{rows}</ModelVariables><ModelStructure><Output valueReference="6"/></ModelStructure>'
-            "</fmiModelDescription>"
-        )
-    rows = "".join(
-        f'<ScalarVariable name="{name}" valueReference="{number}" causality="{causality}" '
-        f'variability="{"fixed" if causality == "parameter" else "continuous"}">'
-        f'<Real unit="{unit}" {limits} {f"start={chr(34)}{start}{chr(34)}" if start else ""}/></ScalarVariable>'
-        for number, (name, causality, unit, start, limits) in enumerate(VARIABLES)
-    )
+    rows = "".join(_variable(version, number, *row) for number, row in enumerate(VARIABLES))
     return (
-        '<fmiModelDescription fmiVersion="2.0" modelName="tiny" guid="t">'
-        f'<CoSimulation modelIdentifier="tiny"/><UnitDefinitions>{units}</UnitDefinitions>'
-        f"<ModelVariables>{rows}</ModelVariables>"
-        '<ModelStructure><Outputs><Unknown index="7"/></Outputs></ModelStructure></fmiModelDescription>'
+        f'{head[version]}<CoSimulation modelIdentifier="tiny"/><UnitDefinitions>{units}</UnitDefinitions>'
+        f"<ModelVariables>{rows}</ModelVariables><ModelStructure>{outputs[version]}</ModelStructure></fmiModelDescription>"
+    )
+
+
+def _variable(version: int, number: int, name: str, causality: str, unit: str, start: str, limits: str) -> str:
+    variability = "fixed" if causality == "parameter" else "continuous"
+    common = f'name="{name}" valueReference="{number}" causality="{causality}" variability="{variability}"'
+    value = f'unit="{unit}" {limits}' + (f' start="{start}"' if start else "")
+    return (
+        f"<Float64 {common} {value}/>" if version == 3 else f"<ScalarVariable {common}><Real {value}/></ScalarVariable>"
     )
 
 

@@ -9,7 +9,18 @@ from cosim.loop.compiled import CompiledLoop, load
 from cosim.loop.interpreted import InterpretedLoop
 from cosim.loop.plan import Column, Failure, Link, Part, Plan
 
-__all__ = ["Column", "CompiledLoop", "Failure", "InterpretedLoop", "Link", "Part", "Plan", "library", "make_loop"]
+__all__ = [
+    "Column",
+    "CompiledLoop",
+    "Failure",
+    "InterpretedLoop",
+    "Link",
+    "Part",
+    "Plan",
+    "library",
+    "make_loop",
+    "slow_because",
+]
 
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
@@ -22,6 +33,14 @@ def library() -> ctypes.CDLL | None:
         return load(str(path)) if path.exists() else None
     except OSError:
         return None
+
+
+def slow_because(plan: Plan) -> str:
+    """Say why a plan runs in Python."""
+    slow = [part.component.name for part in plan.parts if part.component.functions is None]
+    if slow:
+        return f"{slow[0]} can only be stepped by Python"
+    return "It was asked for" if library() else "The compiled loop is missing here (reinstall the package to build it)"
 
 
 def make_loop(plan: Plan, compiled: bool = True) -> CompiledLoop | InterpretedLoop:

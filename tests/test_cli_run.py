@@ -1,0 +1,231 @@
+"""The command line: data on stdout, messages on stderr, one sentence for a mistake, nothing overwritten unasked."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_scenario import TEXT
+from tiny_fmu import tiny
+
+import cosim.cli_cache
+from cosim.cli import main
+from cosim.recording import Recording
+
+__all__ = ["tiny"]
+
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(cosim.cli_cache.__file__).parents[1]), "NO_COLOR": "1"}
+
+
+@pytest.fixture
+def scenario(tiny: dict[int, Path], tmp_path: Path) -> Path:
+    path = tmp_path / "loop.toml"
+    path.write_text(TEXT.replace('"tiny', f'"{tiny[2].parent}/tiny'))
+    return path
+
+
+@pytest.fixture(autouse=True)
+def cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    home = tmp_path_factory.mktemp("cache")
+    monkeypatch.setattr(cosim.cli_cache, "_home", lambda: home)
+    return home
+
+
+def call(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as left:
+        main([str(argument) for argument in arguments])
+    return int(left.value.code or 0)
+
+
+def test_run_writes_a_recording_and_prints_its_path(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call("run", scenario, "--out", tmp_path / "out") == 0
+    said = capsys.readouterr()
+    assert said.out == f"{tmp_path / 'out' / 'recording.parquet'}\n"
+    assert "loop: 500 steps of 0.001 s\n500 steps in " in said.err
+    assert "not connected, at their start values: plant.b" in said.err
+    assert len(Recording.read(tmp_path / "out" / "recording.parquet")) == 250
+
+
+def test_run_as_json_prints_what_it_also_writes(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call("run", scenario, "--out", tmp_path / "out", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told == json.loads((tmp_path / "out" / "run.json").read_text())
+    assert told["steps"] == 500
+    assert told["recording"] == str(tmp_path / "out" / "recording.parquet")
+    np.testing.assert_allclose(told["ratio_to_real_time"], 0.5 / told["seconds"])
+
+
+def test_nothing_is_overwritten_without_force(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call("run", scenario, "--out", tmp_path / "out") == 0
+    capsys.readouterr()
+    assert call("run", scenario, "--out", tmp_path / "out") == 2
+    path = tmp_path / "out" / "recording.parquet"
+    assert capsys.readouterr() == ("", f"cosim: {path} exists already; give --force to overwrite it.\n")
+    assert call("run", scenario, "--out", tmp_path / "out", "--force", "--interpreted") == 0
+    assert "It was asked for: the loop ran in Python." in capsys.readouterr().err
+
+
+def test_a_mistake_is_one_sentence_and_exit_code_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("run", "none.toml", "--out", tmp_path / "out") == 2
+    said = capsys.readouterr()
+    assert said.err.startswith("cosim: none.toml: no such scenario; a scenario is a .toml file or one of: ")
+    assert said.err.count("\n") == 1
+    assert said.out == ""
+    assert not (tmp_path / "out").exists()
+
+
+def test_debug_shows_where_it_came_from(tmp_path: Path) -> None:
+    from cosim.errors import ScenarioError
+
+    with pytest.raises(ScenarioError):
+        main(["run", "none.toml", "--out", str(tmp_path), "--debug"])
+
+
+def test_a_failing_component_leaves_what_was_recorded(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scenario.write_text(scenario.read_text().replace("k = 5.0", "k = 5.0, fail_at = 0.3"))
+    assert call("run", scenario, "--out", tmp_path / "out") == 2
+    path = tmp_path / "out" / "recording.parquet"
+    note, sentence = capsys.readouterr().err.splitlines()[-2:]
+    assert note == f"what was recorded until then is in {path}"
+    assert sentence.startswith(
+        'cosim: controller returned an error at tick 300 (0.3 s); it said "the shaft broke"; its last'
+    )
+    assert len(Recording.read(path)) == 151
+
+
+def test_ctrl_c_leaves_a_complete_file_and_exit_code_130(scenario: Path, tmp_path: Path) -> None:
+    scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e6"))
+    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out")]
+    with subprocess.Popen(command, env=ENVIRONMENT, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        until = time.monotonic() + 60
+        while not list(tmp_path.glob("out/.*.partial")) and time.monotonic() < until:
+            time.sleep(0.05)
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert said.endswith("cosim: interrupted\n")
+    assert "Traceback" not in said
+    recording = Recording.read(tmp_path / "out" / "recording.parquet")
+    assert recording.origin["complete"] is False
+    assert [one.name for one in (tmp_path / "out").iterdir()] == ["recording.parquet"]
+
+
+def test_the_reference_of_the_paper_runs_from_its_card_and_builds_its_fmus_once(
+    tmp_path: Path, cache: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call("run", "sidereal", "--out", tmp_path / "a") == 0
+    assert "building the FMU of the plant of paper_mount" in capsys.readouterr().err
+    assert len(list(cache.iterdir())) == 2
+    assert call("run", "sidereal", "--out", tmp_path / "b") == 0
+    assert "building" not in capsys.readouterr().err
+    one, other = (Recording.read(tmp_path / name / "recording.parquet") for name in "ab")
+    error = (one["q_d"] - one["position"])[25_000:] * 648000 / np.pi
+    assert np.abs(error).max() < 0.1  # arcsec; matched compensation: the paper's C2a without its disturbances
+    for name in one:
+        np.testing.assert_array_equal(one[name], other[name])
+
+
+def test_a_card_that_is_not_there_is_met_with_those_that_are(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = scenario.read_text()
+    line = next(line for line in text.splitlines() if line.startswith("fmu"))
+    scenario.write_text(text.replace(line, 'card = "none"\npart = "plant"', 1))
+    assert call("run", scenario, "--out", tmp_path / "out") == 2
+    sentence = 'components.plant.card = "none": no such card; a card is a .toml file or one of: emps, paper_mount.'
+    assert sentence in capsys.readouterr().err
+
+
+def test_export_writes_plant_and_controller_for_both_versions(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call("export", "paper_mount", "--out", tmp_path, "--json") == 0
+    parts = [f"paper_mount_{part}_fmi{version}.fmu" for part in ("plant", "controller") for version in (2, 3)]
+    assert json.loads(capsys.readouterr().out) == {"fmus": [str(tmp_path / part) for part in parts]}
+    assert call("export", "paper_mount", "--out", tmp_path, "--fmi", "3") == 2
+    assert "exists already; give --force to overwrite it." in capsys.readouterr().err
+    assert call("export", "none", "--out", tmp_path) == 2
+
+
+@pytest.mark.parametrize(
+    ("what", "words"),
+    [
+        ("sidereal", ["scenario: sidereal", "controller.tau", "delay in steps", "15 s (150,000 steps)"]),
+        ("paper_mount", ["card: paper_mount", "friction.sigma0", "kg.m2", "controller: C2a"]),
+        ("loop.toml", ["scenario: loop", "x 2, quantum 1e-06, + n", "r.position"]),
+        ("tiny3.fmu", ["FMI: 3.0", "model: tiny", "output     rad"]),
+        ("run.csv", ["rows: 200", "rate: 1000 Hz", "least", "gaps: 0"]),
+    ],
+)
+def test_show_tells_what_a_file_is(
+    scenario: Path,
+    tiny: dict[int, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    what: str,
+    words: list[str],
+) -> None:
+    Recording("run", {"t": np.arange(200) * 1e-3, "q": np.arange(200.0)}).write(tmp_path / "run.csv")
+    files = {"loop.toml": scenario, "tiny3.fmu": tiny[3], "run.csv": tmp_path / "run.csv"}
+    assert call("show", files.get(what, what)) == 0
+    shown = capsys.readouterr().out
+    assert [word for word in words if word not in shown] == []
+    assert call("show", files.get(what, what), "--json") == 0
+    json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "sentence"),
+    [
+        ("none", None, "does not exist; shipped are: sidereal, emps, paper_mount."),
+        ("none.csv", None, "none.csv does not exist."),
+        ("odd.toml", "a = ", "is not valid TOML"),
+        ("odd", "x", "is nothing that can be shown: a recording, FMU, scenario or card."),
+        ("odd.xlsx", "x", "is of no known kind; known are: .csv, "),
+    ],
+)
+def test_show_says_what_it_cannot_show(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, text: str | None, sentence: str
+) -> None:
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    assert call("show", tmp_path / name) == 2
+    assert sentence in capsys.readouterr().err
+
+
+def test_wrong_use_is_exit_code_2_and_help_lists_the_verbs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("dance") == 2
+    assert call("run", "sidereal") == 2
+    capsys.readouterr()
+    assert call("--help") == 0
+    shown = capsys.readouterr().out
+    assert all(verb in shown for verb in ("export", "run", "show"))
+    assert call("--version") == 0
+    assert capsys.readouterr().out == f"mount-cosim {cosim.__version__}\n"
+
+
+def test_importing_the_package_is_quick_and_a_warm_run_needs_no_casadi(tmp_path: Path) -> None:
+    program = "import time; begun = time.perf_counter(); import cosim.cli; print(time.perf_counter() - begun)"
+    command = [sys.executable, "-c", program]
+    best = min(float(subprocess.check_output(command, env=ENVIRONMENT, cwd=tmp_path)) for _ in range(3))
+    assert best < 0.5
+    program = "import sys, cosim.cli\ntry: cosim.cli.main(sys.argv[1:])\nfinally: print(*sys.modules)"
+    command = [sys.executable, "-c", program, "run", "sidereal", "--out"]
+    environment = ENVIRONMENT | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    for name in ("cold", "warm"):
+        said = subprocess.check_output([*command, str(tmp_path / name)], env=environment, cwd=tmp_path, text=True)
+    assert not {"casadi", "ziglang", "matplotlib", "pandas"} & set(said.split())

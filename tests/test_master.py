@@ -1,0 +1,336 @@
+"""The master steps FMUs together: counted time, stated delays, the same bits in C and in Python, failures named."""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tiny_fmu import description, tiny
+
+import cosim.loop
+import cosim.master
+from cosim.errors import FmuError, SignalError, StepError, WiringError
+from cosim.fmu import FmuComponent
+from cosim.master import Run, simulate
+from cosim.recording import Recording
+from cosim.wiring import Record, Wire
+
+__all__ = ["tiny"]
+
+VERSIONS = pytest.mark.parametrize("version", [2, 3])
+CONTROL = {"controller": {"mode": 1.0, "k": 5.0}}
+Tiny = dict[int, Path]
+
+
+def control_loop(fmu: Path, ticks: int = 500, **changes: Any) -> Run:
+    """An integrator under proportional control, with a quantised noisy sensor."""
+    wires = [
+        ("controller.y", "plant.a"),
+        Wire("plant.y", "controller.b", quantum=1e-3, noise="n"),
+        ("r", "controller.a"),
+    ]
+    noise = 1e-4 * np.random.default_rng(1).standard_normal(ticks)
+    settings: dict[str, Any] = {
+        "record": {"q": "plant.y", "tau": Record("plant.a", "mean"), "r": "r", "sensor": "controller.b"},
+        "step": 1e-3,
+        "signals": {"r": 1.0, "n": noise},
+        "parameters": CONTROL,
+    }
+    return simulate({"plant": fmu, "controller": fmu}, wires, ticks=ticks, **(settings | changes))
+
+
+@VERSIONS
+def test_an_integrator_with_feedback_follows_its_closed_form(tiny: Tiny, version: int) -> None:
+    run = simulate(
+        {"one": tiny[version]},
+        [("r", "one.a"), ("one.y", "one.b")],
+        record={"y": "one.y"},
+        step=1e-3,
+        ticks=2000,
+        signals={"r": 1.0},
+        parameters={"one": {"k": 4.0}},
+    )
+    np.testing.assert_allclose(run.recording["y"], 1 - (1 - 4e-3) ** np.arange(2000), rtol=1e-12, atol=1e-15)
+
+
+@VERSIONS
+def test_an_impulse_takes_one_tick_through_each_component(tiny: Tiny, version: int) -> None:
+    impulse = np.zeros(20)
+    impulse[5] = 1.0
+    columns = {"r": "controller.a", "tau": "controller.y", "drive": "plant.a", "q": "plant.y"}
+    wires = [("r", "controller.a"), ("controller.y", "plant.a")]
+    two = {"plant": tiny[version], "controller": tiny[version]}
+    run = simulate(two, wires, record=columns, step=0.1, ticks=20, signals={"r": impulse}, parameters=CONTROL)
+    first = {name: int(np.flatnonzero(run.recording[name])[0]) for name in columns}
+    assert first == {"r": 5, "tau": 6, "drive": 6, "q": 7}
+
+
+@pytest.mark.parametrize("decimation", [1, 2, 3, 10])
+def test_fmi_2_and_3_and_the_loops_in_c_and_python_give_the_same_bits(tiny: Tiny, decimation: int) -> None:
+    assert cosim.loop.library() is not None, "run `python cosim/loop/build_hook.py` first"
+    cases = [(version, compiled) for version in (2, 3) for compiled in (True, False)]
+    runs = [control_loop(tiny[version], compiled=compiled, decimation=decimation) for version, compiled in cases]
+    assert [run.statistics["loop"] for run in runs] == ["compiled", "interpreted"] * 2
+    for run in runs[1:]:
+        for name in run.recording:
+            np.testing.assert_array_equal(run.recording[name], runs[0].recording[name])
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("decimation", [1, 2, 3, 4, 7])
+def test_a_mean_is_over_the_sample_interval_centred_at_the_row(tiny: Tiny, decimation: int, compiled: bool) -> None:
+    values = np.random.default_rng(2).standard_normal(100)
+    record = {"mean": Record("r", "mean"), "sample": Record("r")}
+    settings: dict[str, Any] = {"decimation": decimation, "signals": {"r": values}, "compiled": compiled}
+    run = simulate({"one": tiny[2]}, [("r", "one.a")], record=record, step=0.5, ticks=100, **settings)
+    halves, centres = np.repeat(values, 2), 2 * decimation * np.arange(len(run.recording))
+    windows = [halves[max(centre - decimation, 0) : centre + decimation] for centre in centres]
+    np.testing.assert_allclose(run.recording["mean"], [window.mean() for window in windows], rtol=1e-12, atol=1e-15)
+    np.testing.assert_array_equal(run.recording["sample"], values[::decimation])
+
+
+def test_time_is_counted_not_summed_and_chunks_do_not_matter(tiny: Tiny, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = control_loop(tiny[3], ticks=3000)
+    monkeypatch.setattr(cosim.master, "CHUNK", 16)
+    pieces = control_loop(tiny[3], ticks=3000)
+    np.testing.assert_array_equal(whole.recording.t, np.arange(3000) * 1e-3)
+    for name in whole.recording:
+        np.testing.assert_array_equal(whole.recording[name], pieces.recording[name])
+
+
+def test_progress_is_told_to_the_end(tiny: Tiny) -> None:
+    seen: list[tuple[int, int]] = []
+    control_loop(tiny[3], ticks=3000, progress=lambda done, of: seen.append((done, of)))
+    assert seen[-1] == (3000, 3000)
+    assert len(seen) > 1
+
+
+def test_a_streamed_recording_equals_the_one_in_memory_and_tells_its_origin(tiny: Tiny, tmp_path: Path) -> None:
+    memory, path = control_loop(tiny[2]).recording, tmp_path / "run.parquet"
+    file = control_loop(tiny[2], path=path).recording
+    assert file.units == memory.units == {"t": "s", "q": "rad", "tau": "rad", "sensor": "rad"}
+    assert file.origin["complete"] is True
+    assert len(file.origin["components"]["plant"]["sha256"]) == 64
+    assert file.origin["components"]["controller"]["parameters"] == CONTROL["controller"]
+    for name in memory:
+        np.testing.assert_array_equal(file[name], memory[name])
+    assert [one.name for one in tmp_path.iterdir()] == ["run.parquet"]
+
+
+@VERSIONS
+def test_a_component_can_be_used_again_and_starts_all_over(tiny: Tiny, version: int) -> None:
+    with FmuComponent(tiny[version], "plant") as plant:
+        wires = [("r", "plant.a")]
+        settings: dict[str, Any] = {"record": {"y": "plant.y"}, "step": 0.1, "ticks": 10, "signals": {"r": 1.0}}
+        first, second = (simulate({"plant": plant}, wires, **settings).recording["y"] for _ in range(2))
+    np.testing.assert_array_equal(first, second)
+
+
+def test_units_of_one_kind_are_converted(tiny: Tiny) -> None:
+    from cosim.signals import Samples
+
+    run = simulate(
+        {"one": tiny[3]},
+        [Wire("r", "one.a", gain=2.0), Wire("r", "one.b", gain=2.0, unit="arcsec")],
+        record={"a": "one.a", "b": "one.b"},
+        step=1.0,
+        ticks=2,
+        signals={"r": Samples(180.0, "deg")},
+    )
+    np.testing.assert_allclose(run.recording["a"], 2 * np.pi)
+    np.testing.assert_allclose(run.recording["b"], 360 * np.pi / 648000)
+
+
+def test_statistics_name_inputs_that_nothing_feeds(tiny: Tiny) -> None:
+    statistics = control_loop(tiny[3], ticks=100).statistics
+    assert statistics["unconnected"] == ["plant.b"]
+    assert (statistics["steps"], statistics["rows"], statistics["notes"]) == (100, 100, [])
+
+
+def test_without_the_compiled_loop_it_runs_in_python_and_says_so(tiny: Tiny, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cosim.loop, "library", lambda: None)
+    statistics = control_loop(tiny[3], ticks=50).statistics
+    assert statistics["loop"] == "interpreted"
+    assert statistics["notes"] == [
+        "The compiled loop is missing here (reinstall the package to build it): the loop ran in Python."
+    ]
+
+
+def test_a_loop_that_cannot_be_loaded_counts_as_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / f"_loop{cosim.loop.SUFFIX}").write_text("no library")
+    monkeypatch.setattr(cosim.loop, "__file__", str(tmp_path / "__init__.py"))
+    assert cosim.loop.library.__wrapped__() is None
+
+
+@VERSIONS
+@pytest.mark.parametrize("compiled", [True, False])
+def test_a_failure_names_component_tick_time_message_and_inputs(
+    tiny: Tiny, tmp_path: Path, version: int, compiled: bool
+) -> None:
+    parameters = CONTROL | {"plant": {"fail_at": 0.2}}
+    sentence = r'plant returned an error at tick 200 \(0.2 s\); it said "the shaft broke"; its last inputs: a = '
+    path = tmp_path / "run.parquet"
+    with pytest.raises(StepError, match=sentence) as caught:
+        control_loop(tiny[version], parameters=parameters, compiled=compiled, path=path)
+    assert (caught.value.component, caught.value.tick, list(caught.value.inputs)) == ("plant", 200, ["a"])
+    recording = Recording.read(path)
+    assert len(recording) == 201
+    assert recording.origin["complete"] is False
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_an_output_that_is_not_a_number_stops_the_run(tiny: Tiny, compiled: bool) -> None:
+    parameters = CONTROL | {"plant": {"nan_at": 0.2}}
+    with pytest.raises(StepError, match="plant gave an output that is not a finite number at tick 200"):
+        control_loop(tiny[3], parameters=parameters, compiled=compiled)
+
+
+def test_nothing_is_printed_and_nothing_is_left_behind(
+    tiny: Tiny, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    control_loop(tiny[2], ticks=100)
+    with pytest.raises(StepError):
+        control_loop(tiny[3], parameters={"plant": {"fail_at": 0.0}})
+    with pytest.raises(FmuError):
+        FmuComponent(packed(tmp_path / "broken.fmu", tiny, library=b"no library"))
+    (tmp_path / "broken.fmu").unlink()
+    assert list(tmp_path.iterdir()) == []
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize(
+    ("wires", "sentence"),
+    [
+        ([("r", "plnt.a")], '"plnt.a" cannot be fed: there is no component "plnt"; components are: plant, controller.'),
+        ([("r", "plant.c")], '"plant.c" cannot be fed: it does not exist; inputs of plant are: a, b.'),
+        ([("r", "plant.y")], '"plant.y" cannot be fed: it is an output; inputs of plant are: a, b.'),
+        ([("r", "plant.k")], '"plant.k" cannot be fed: it is a parameter; inputs of plant are: a, b.'),
+        (
+            [("controller.angel", "plant.a")],
+            '"plant.a" is fed by "controller.angel", which is not an output; outputs are: y',
+        ),
+        ([("plant.b", "plant.a")], '"plant.a" is fed by "plant.b", which is not an output; outputs are: y'),
+        ([("s", "plant.a")], '"s" names no component or signal "s"; there are: plant, controller, r.'),
+        ([("r", "plant.a"), ("controller.y", "plant.a")], '"plant.a" is fed twice, by "r" and by "controller.y".'),
+        ([("r.other", "plant.a")], '"plant.a" is fed by "r.other", which is not one output; outputs are: r.value'),
+        (
+            [Wire("r", "plant.a", noise="n")],
+            'The noise of "plant.a" needs the signal "n", which does not exist; signals are: r.',
+        ),
+        ([Wire("r", "plant.a", unit="V")], '"plant.a" [rad] is fed by "r" [V]: "V" cannot become "rad"'),
+        ([Wire("r", "plant.a", unit="zoll")], '"zoll" is no unit known here'),
+    ],
+)
+def test_a_wire_that_does_not_fit_is_refused_before_the_first_step(
+    tiny: Tiny, wires: list[tuple[str, str] | Wire], sentence: str
+) -> None:
+    two = {"plant": tiny[3], "controller": tiny[3]}
+    with pytest.raises(WiringError, match=re.escape(sentence)):
+        simulate(two, wires, record={"y": "plant.y"}, step=1.0, ticks=1, signals={"r": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("changes", "sentence"),
+    [
+        ({"record": {"t": "plant.y"}}, 'The column "t" is time and is always recorded'),
+        ({"record": {"q": "plant.x"}}, '"plant.x" cannot be recorded: it does not exist; plant has: a, b, k,'),
+        (
+            {"record": {"q": "plnt.x"}},
+            '"plnt.x" names no component or signal "plnt"; there are: plant, controller, r, n.',
+        ),
+        ({"signals": {"r": 1.0, "n": 0.0, "plant": 1.0}}, '"plant" names a component and a signal; names must differ.'),
+        (
+            {"parameters": {"mount": {}}},
+            'Parameters are given for "mount", which is no component; components are: plant,',
+        ),
+    ],
+)
+def test_names_that_do_not_fit_are_refused(tiny: Tiny, changes: dict[str, Any], sentence: str) -> None:
+    with pytest.raises(WiringError, match=re.escape(sentence)):
+        control_loop(tiny[3], **changes)
+
+
+def test_noise_in_another_unit_is_refused(tiny: Tiny) -> None:
+    from cosim.signals import Samples
+
+    with pytest.raises(WiringError, match='its noise "n" is not in rad'):
+        control_loop(tiny[3], signals={"r": 1.0, "n": Samples(0.0, "arcsec")})
+
+
+def test_arrays_that_do_not_fit_are_refused(tiny: Tiny) -> None:
+    with pytest.raises(SignalError, match='The signal "r" has 20 samples; the run needs 500'):
+        control_loop(tiny[3], signals={"r": np.zeros(20), "n": 0.0})
+    with pytest.raises(SignalError, match=r'The signal "r" has the shape \(2, 2\); it must be one value a tick'):
+        control_loop(tiny[3], signals={"r": np.zeros((2, 2)), "n": 0.0})
+
+
+@VERSIONS
+@pytest.mark.parametrize(
+    ("parameters", "sentence"),
+    [
+        ({"kp": 1.0}, '"plant.kp" does not exist; what can be set: a, b, k, mode, fail_at, nan_at.'),
+        ({"y": 1.0}, '"plant.y" cannot be set before the start; what can be set: a, b, k,'),
+        ({"k": -1.0}, '"plant.k" is -1; it must lie in 0 .. inf 1.'),
+    ],
+)
+def test_a_parameter_that_does_not_fit_is_named(
+    tiny: Tiny, version: int, parameters: dict[str, float], sentence: str
+) -> None:
+    with pytest.raises(FmuError, match=re.escape(sentence)):
+        control_loop(tiny[version], parameters={"plant": parameters})
+
+
+def packed(path: Path, tiny: Tiny, *, xml: str = "", library: bytes | None = None, platform: str = "") -> Path:
+    """Pack an FMU that is wrong in one way."""
+    with zipfile.ZipFile(tiny[2]) as good, zipfile.ZipFile(path, "w") as archive:
+        binary = next(name for name in good.namelist() if name.startswith("binaries/"))
+        folder = platform or binary.split("/")[1]
+        archive.writestr("modelDescription.xml", xml or description(2))
+        archive.writestr(f"binaries/{folder}/{Path(binary).name}", good.read(binary) if library is None else library)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"xml": "<fmi"}, "has a modelDescription.xml that cannot be read: "),
+        ({"xml": '<fmiModelDescription fmiVersion="1.0"/>'}, "is of FMI 1.0; this tool runs FMI 2.0 and 3.0."),
+        ({"xml": description(2).replace("CoSimulation", "ModelExchange")}, "has no co-simulation interface"),
+        ({"platform": "vax32"}, "binary; it has vax32. Export it again for this platform."),
+        ({"library": b"no library"}, "cannot be instantiated: Failed to load shared library"),
+    ],
+)
+def test_an_fmu_that_cannot_run_is_refused(tiny: Tiny, tmp_path: Path, wrong: dict[str, Any], sentence: str) -> None:
+    path = packed(tmp_path / "axis.fmu", tiny, **wrong)
+    with pytest.raises(FmuError, match=re.escape(sentence)) as caught:
+        FmuComponent(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path) -> None:
+    text, empty = tmp_path / "text.fmu", tmp_path / "empty.fmu"
+    text.write_text("hello")
+    zipfile.ZipFile(empty, "w").close()
+    sentences = {
+        tmp_path / "none.fmu": "does not exist.",
+        text: "is no FMU: it is not a zip archive.",
+        empty: "is no FMU: the archive holds no modelDescription.xml.",
+    }
+    for path, sentence in sentences.items():
+        with pytest.raises(FmuError, match=f"{path} {re.escape(sentence)}"):
+            FmuComponent(path)
+
+
+def test_a_run_imports_neither_casadi_nor_the_compiler_nor_pictures() -> None:
+    program = "import sys, cosim.master, cosim.scenario; print(*sys.modules)"
+    path = {"PYTHONPATH": str(Path(cosim.loop.__file__).parents[2])}
+    command = [sys.executable, "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | path)
+    assert not {"casadi", "ziglang", "matplotlib", "pyfmi_models", "pandas"} & set(done.stdout.split())

@@ -1,0 +1,170 @@
+"""A scenario file says everything about a run, and each mistake in it is one sentence."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_fmu import tiny
+
+from cosim.errors import RecordingError, ScenarioError, SignalError
+from cosim.master import run
+from cosim.scenario import parse_scenario, read_scenario, shipped_scenarios
+from cosim.wiring import Record, Wire
+
+__all__ = ["tiny"]
+
+TEXT = """
+name = "loop"
+step = 1e-3
+stop = 0.5
+[components.plant]
+fmu = "tiny3.fmu"
+[components.controller]
+fmu = "tiny2.fmu"
+parameters = { mode = 1.0, k = 5.0 }
+[signals.r]
+kind = "sine"
+frequency = 2.0
+amplitude = 0.1
+smooth_start = 0.1
+[signals.n]
+kind = "noise"
+rms = 1e-3
+seed = 7
+[[connections]]
+from = "controller.y"
+to = "plant.a"
+[[connections]]
+from = "plant.y"
+to = "controller.b"
+gain = 2.0
+quantum = 1e-6
+noise = "n"
+[[connections]]
+from = "r.position"
+to = "controller.a"
+[record]
+signals = { q = "plant.y", tau = { signal = "plant.a", mode = "mean" }, q_d = "r.position" }
+decimation = 2
+"""
+
+
+def test_a_scenario_is_read_as_written(tmp_path: Path) -> None:
+    (tmp_path / "loop.toml").write_text(TEXT)
+    scenario = read_scenario(tmp_path / "loop.toml")
+    assert (scenario.name, scenario.step, scenario.ticks, scenario.stop, scenario.decimation) == (
+        "loop",
+        1e-3,
+        500,
+        0.5,
+        2,
+    )
+    assert scenario.components["plant"].fmu == tmp_path / "tiny3.fmu"
+    assert scenario.wires[1] == Wire("plant.y", "controller.b", gain=2.0, quantum=1e-6, noise="n")
+    assert scenario.records["tau"] == Record("plant.a", "mean")
+
+
+def test_a_scenario_runs_and_its_text_is_in_the_recording(tiny: dict[int, Path], tmp_path: Path) -> None:
+    scenario = parse_scenario(TEXT, "loop.toml", tiny[2].parent)
+    first, second = (run(scenario, tmp_path / f"{number}.parquet") for number in (1, 2))
+    assert first.recording.columns == ("t", "q", "tau", "q_d")
+    assert len(first.recording) == 250
+    assert first.recording.origin["scenario"] == TEXT
+    for name in first.recording:
+        np.testing.assert_array_equal(first.recording[name], second.recording[name])
+
+
+def test_a_list_of_signals_names_its_own_columns() -> None:
+    text = re.sub(r"signals = \{ q.*", 'signals = ["plant.y", "r.velocity"]\nmode = "mean"', TEXT)
+    records = parse_scenario(text, "loop.toml", Path()).records
+    assert records == {"plant.y": Record("plant.y", "mean"), "r.velocity": Record("r.velocity", "mean")}
+
+
+def test_the_reference_of_the_paper_is_shipped() -> None:
+    assert "sidereal" in shipped_scenarios()
+    scenario = read_scenario("sidereal")
+    velocity = scenario.signals["reference"].stream(scenario.step)(np.arange(scenario.ticks))[1]
+    np.testing.assert_allclose(velocity[25_000:].max(), 5 * 7.268e-5, rtol=1e-6)
+    assert (scenario.ticks, scenario.step) == (150_000, 1e-4)
+    assert {one.part for one in scenario.components.values()} == {"plant", "controller"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (
+            "stop = 0.5",
+            "stop = 0.5\nstp = 1",
+            'loop.toml: "stp" is no key of a scenario; keys there are: name, description, step,',
+        ),
+        (
+            'fmu = "tiny3.fmu"',
+            'fmuu = "x"',
+            '"components.plant.fmuu" is no key of a scenario; keys there are: fmu, card, part,',
+        ),
+        (
+            "seed = 7",
+            "seed = 7\nrate = 1",
+            '"signals.n.noise.rate" is no key of a scenario; keys there are: unit, kind, rms, seed.',
+        ),
+        ("gain = 2.0", "gian = 2.0", '"connections.1.gian" is no key of a scenario; keys there are: from, to, gain,'),
+        (
+            "decimation = 2",
+            "decimate = 2",
+            '"record.decimate" is no key of a scenario; keys there are: signals, decimation,',
+        ),
+        ("stop = 0.5\n", "", 'loop.toml: "stop" is missing.'),
+        ("stop = 0.5", "stop = -0.5", "loop.toml: stop = -0.5 breaks a rule: input should be greater than 0."),
+        ("stop = 0.5", "stop = 0.50005", "loop.toml: stop = 0.50005 is not a whole number of steps of 0.001 s."),
+        (
+            "decimation = 2",
+            "decimation = 0",
+            "record.decimation = 0 breaks a rule: input should be greater than or equal to 1.",
+        ),
+        (
+            'fmu = "tiny3.fmu"',
+            'card = "x"',
+            'components.plant breaks a rule: give fmu = "...", or card = "..." with part = ',
+        ),
+        (
+            'kind = "noise"',
+            'kind = "nose"',
+            "signals.n breaks a rule: input tag 'nose' found using 'kind' does not match any of",
+        ),
+        ("amplitude = 0.1", "", "signals.r.sine breaks a rule: give either amplitude or max_velocity."),
+        ("step = 1e-3", "step = ", "loop.toml is not valid TOML: "),
+    ],
+)
+def test_a_mistake_in_a_scenario_is_one_sentence(old: str, new: str, sentence: str) -> None:
+    assert old in TEXT
+    with pytest.raises(ScenarioError, match=re.escape(sentence)):
+        parse_scenario(TEXT.replace(old, new), "loop.toml", Path())
+
+
+def test_a_scenario_that_is_not_there_is_met_with_those_that_are(tmp_path: Path) -> None:
+    with pytest.raises(
+        ScenarioError, match=r"none: no such scenario; a scenario is a .toml file or one of: .*sidereal"
+    ):
+        read_scenario("none")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
+    with pytest.raises(ScenarioError, match=r"binary.toml is no scenario: it is not UTF-8 text."):
+        read_scenario(tmp_path / "binary.toml")
+
+
+def test_a_component_made_from_a_card_needs_its_fmu_first() -> None:
+    with pytest.raises(ScenarioError, match='sidereal: the component "mount" has no FMU yet; `cosim run` builds it'):
+        run(read_scenario("sidereal"))
+
+
+def test_a_replayed_recording_is_found_beside_the_scenario(tiny: dict[int, Path], tmp_path: Path) -> None:
+    replay = TEXT.replace(
+        'kind = "noise"\nrms = 1e-3\nseed = 7', 'kind = "recorded"\nfile = "night.csv"\ncolumn = "load"'
+    )
+    (tmp_path / "loop.toml").write_text(replay.replace('"tiny', f'"{tiny[2].parent}/tiny'))
+    scenario = read_scenario(tmp_path / "loop.toml")
+    with pytest.raises(RecordingError, match=re.escape(f"{tmp_path / 'night.csv'} does not exist.")):
+        run(scenario)
+    (tmp_path / "night.csv").write_text("t,q\n0,1\n1,2\n")
+    with pytest.raises(SignalError, match=r'night.csv has no column "load" to replay; it has: t, q.'):
+        run(scenario)

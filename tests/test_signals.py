@@ -1,0 +1,119 @@
+"""Signals: motions whose parts belong together, noise that a seed repeats, recordings replayed by a stated rule."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import TypeAdapter, ValidationError
+
+from cosim.errors import RecordingError, SignalError
+from cosim.recording import Recording
+from cosim.signals import Chirp, Constant, Generator, Multisine, Noise, Recorded, Signal, Sine, Slews, Steps
+
+STEP = 1e-4
+SLEWS: dict[str, Any] = {"kind": "slews", "max_velocity": 0.5, "max_acceleration": 2.0, "max_jerk": 20.0}
+MOTIONS = [
+    Sine(kind="sine", frequency=0.7, amplitude=0.3, phase=0.4, smooth_start=0.8),
+    Sine(kind="sine", frequency=0.2, max_velocity=3.634e-4),
+    Multisine(kind="multisine", frequencies=[0.3, 1.1, 2.9], amplitudes=[1.0, 0.5, 0.1], seed=4, smooth_start=1.0),
+    Chirp(kind="chirp", start=0.1, stop=3.0, duration=4.0, amplitude=0.2),
+    Slews(positions=[0.0, 1.0, 0.99, -0.2], dwell=0.1, **SLEWS),
+]
+
+
+def values(signal: Signal, ticks: int = 30_000, chunk: int = 30_000) -> np.ndarray:
+    stream = signal.stream(STEP)
+    return np.concatenate([stream(np.arange(k, min(k + chunk, ticks))) for k in range(0, ticks, chunk)], axis=1)
+
+
+@pytest.mark.parametrize("signal", MOTIONS, ids=lambda signal: signal.kind)
+def test_velocity_and_acceleration_are_the_derivatives(signal: Signal) -> None:
+    position, velocity, acceleration = values(signal)
+    for whole, slope, allowed in ((position, velocity, 2e-5), (velocity, acceleration, 3e-3)):
+        difference = (whole[2:] - whole[:-2]) / (2 * STEP)
+        np.testing.assert_allclose(difference, slope[1:-1], atol=allowed * np.abs(slope).max())
+    assert list(signal.outputs.values()) == ["rad", "rad/s", "rad/s2"]
+
+
+def test_a_smooth_start_begins_at_rest_and_ends_in_the_sine() -> None:
+    whole = values(Sine(kind="sine", frequency=0.7, amplitude=0.3, phase=0.4, smooth_start=0.8))
+    plain = values(Sine(kind="sine", frequency=0.7, amplitude=0.3, phase=0.4))
+    np.testing.assert_array_equal(whole[:, 0], 0.0)
+    np.testing.assert_array_equal(whole[:, 8000:], plain[:, 8000:])
+
+
+def test_a_sine_reaches_its_greatest_velocity() -> None:
+    velocity = values(Sine(kind="sine", frequency=0.5, max_velocity=3.0))[1]
+    assert velocity.max() == 3.0
+
+
+@pytest.mark.parametrize("jerk", [2.0, 20.0, 1e4])
+@pytest.mark.parametrize("distance", [1e-3, 0.1, 1.0])
+def test_slews_keep_their_limits_and_arrive(jerk: float, distance: float) -> None:
+    limits = SLEWS | {"max_jerk": jerk}
+    q, v, a = values(Slews(positions=[0.2, 0.2 + distance, 0.2], dwell=0.3, **limits), ticks=120_000)
+    assert np.abs(v).max() <= 0.5 * (1 + 1e-9)
+    assert np.abs(a).max() <= 2.0 * (1 + 1e-9)
+    assert np.abs(np.diff(a)).max() <= jerk * STEP * (1 + 1e-6)
+    np.testing.assert_allclose((q.max(), q.min(), q[-1]), (0.2 + distance, 0.2, 0.2), atol=1e-12)
+    np.testing.assert_array_equal((v[-1], a[-1]), (0.0, 0.0))
+    at_rest = int(np.sum((v == 0) & (np.abs(q - 0.2 - distance) < 1e-12)))
+    assert abs(at_rest - 3000) <= 2
+
+
+def test_steps_act_from_the_tick_of_their_time() -> None:
+    signal = Steps(kind="steps", times=[0.0003, 0.0007], values=[1.0, -2.0], initial=0.5)
+    np.testing.assert_array_equal(values(signal, 9)[0], [0.5] * 3 + [1.0] * 4 + [-2.0] * 2)
+
+
+@pytest.mark.parametrize("signal", [*MOTIONS, Noise(kind="noise", rms=2.0, seed=3)], ids=lambda signal: signal.kind)
+def test_chunks_do_not_matter(signal: Signal) -> None:
+    np.testing.assert_array_equal(values(signal, 1000, 7), values(signal, 1000, 1000))
+
+
+def test_noise_is_white_of_its_size_and_repeats_by_its_seed() -> None:
+    one = values(Noise(kind="noise", rms=2.0, seed=3))[0]
+    np.testing.assert_array_equal(one, values(Noise(kind="noise", rms=2.0, seed=3))[0])
+    assert not np.array_equal(one, values(Noise(kind="noise", rms=2.0, seed=4))[0])
+    assert abs(one.std() - 2.0) < 0.05  # five standard deviations of the estimate
+    assert abs(np.corrcoef(one[1:], one[:-1])[0, 1]) < 0.03
+
+
+def test_a_recording_is_replayed_held_or_joined(tmp_path: Path) -> None:
+    table = {"t": 5.0 + np.arange(4) * 2e-4, "load": np.array([1.0, 3.0, 2.0, 2.0])}
+    path = Recording("run", table).write(tmp_path / "run.csv")
+    held = Recorded(kind="recorded", file=path, column="load", interpolation="hold")
+    joined = Recorded(kind="recorded", file=path, column="load")
+    np.testing.assert_array_equal(values(held, 9)[0], [1, 1, 3, 3, 2, 2, 2, 2, 2])
+    np.testing.assert_allclose(values(joined, 9)[0], [1, 2, 3, 2.5, 2, 2, 2, 2, 2])
+
+
+def test_a_recording_that_cannot_be_replayed_is_named(tmp_path: Path) -> None:
+    path = Recording("run", {"t": np.arange(4.0), "load": np.arange(4.0)}).write(tmp_path / "run.csv")
+    with pytest.raises(SignalError, match=r'run.csv has no column "tau" to replay; it has: t, load.'):
+        Recorded(kind="recorded", file=path, column="tau").stream(STEP)
+    with pytest.raises(RecordingError, match="does not exist"):
+        Recorded(kind="recorded", file=tmp_path / "none.csv", column="tau").stream(STEP)
+
+
+def test_a_constant_is_constant() -> None:
+    constant = Constant(kind="constant", value=2.5, unit="N.m")
+    np.testing.assert_array_equal(values(constant, 3), [[2.5] * 3])
+    assert constant.outputs == {"value": "N.m"}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "rule"),
+    [
+        ({"kind": "sine", "frequency": 1.0}, "give either amplitude or max_velocity"),
+        ({"kind": "sine", "frequency": -1.0, "amplitude": 1.0}, "greater than 0"),
+        ({"kind": "multisine", "frequencies": [1.0], "amplitudes": [1.0, 2.0]}, "2 amplitudes for 1 frequencies"),
+        ({"kind": "steps", "times": [1.0, 0.5], "values": [1.0, 2.0]}, "times must grow and be as many as values"),
+        ({"kind": "noise", "rms": 1.0}, "seed"),
+    ],
+)
+def test_what_makes_no_signal_is_refused(wrong: dict[str, Any], rule: str) -> None:
+    with pytest.raises(ValidationError, match=re.escape(rule)):
+        TypeAdapter(Generator).validate_python(wrong)
