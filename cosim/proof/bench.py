@@ -75,7 +75,7 @@ def draw_motions(rng: np.random.Generator, pace: Pace, tremble: float = 0.25) ->
 def draw_mount(rng: np.random.Generator, friction: str, motions: dict[str, Motion], pace: Pace) -> dict[str, Any]:
     """Masses, friction, controller; the Coulomb level is 4 to 35 % of the peak inertia torque."""
     inertia = log_uniform(rng, 1, 60)
-    peak = float(np.quantile(np.abs(motions["train_1"].a), 0.98))
+    peak = float(np.quantile(np.abs([motions[name].a for name in RECORDINGS[:2]]), 0.98))
     coulomb = log_uniform(rng, 0.04, 0.35) * inertia * peak
     return {
         "inertia": inertia,

@@ -10,8 +10,6 @@ import numpy as np
 
 from cosim.proof.truth import TICK, Array, ticks
 
-_SOFT_START = 2.0  # s
-
 
 class Motion(NamedTuple):
     """Position, speed and acceleration of the set point, one value a tick."""
@@ -40,12 +38,13 @@ class Pace(NamedTuple):
         return 2 * np.pi * self.hertz * self.amplitude
 
 
-def _soft(time: Array) -> Motion:
-    """A quintic step from 0 to 1 in the first two seconds, with its derivatives."""
-    x = np.minimum(time / _SOFT_START, 1)
+def _soft(pace: Pace) -> Motion:
+    """A quintic step from 0 to 1 over two fifths of a typical period, with its derivatives."""
+    takes = max(2.0, 0.4 / pace.hertz)
+    x = np.minimum(pace.time / takes, 1)
     q = x**3 * (10 - 15 * x + 6 * x**2)
-    v = 30 * x**2 * (1 - x) ** 2 / _SOFT_START
-    return Motion(q, v, 60 * x * (1 - x) * (1 - 2 * x) / _SOFT_START**2)
+    v = 30 * x**2 * (1 - x) ** 2 / takes
+    return Motion(q, v, 60 * x * (1 - x) * (1 - 2 * x) / takes**2)
 
 
 def _product(f: Motion, g: Motion) -> Motion:
@@ -54,7 +53,7 @@ def _product(f: Motion, g: Motion) -> Motion:
 
 def _placed(pace: Pace, wave: Motion) -> Motion:
     """`wave` started softly, scaled to the travel and set at home."""
-    soft = _product(_soft(pace.time), wave)
+    soft = _product(_soft(pace), wave)
     scale = pace.amplitude / float(np.max(np.abs(soft.q)))
     return Motion(pace.home + scale * soft.q, scale * soft.v, scale * soft.a)
 
@@ -90,8 +89,9 @@ def _next_move(pace: Pace, rng: np.random.Generator, here: float) -> tuple[float
         takes = float(rng.uniform(3, 8))
         reach = 0.03 * pace.speed * takes * float(rng.uniform(0.3, 2))
         return here - float(np.copysign(reach, here - pace.home)), takes
-    brisk = float(rng.uniform(0.5, 1.0))
-    return there, max(1.2, 1.9 * abs(there - here) / (pace.speed * brisk))
+    distance, brisk = abs(there - here), float(rng.uniform(0.5, 1.0))
+    hardest = 3 * pace.speed * 2 * np.pi * pace.hertz
+    return there, max(1.2, 1.9 * distance / (pace.speed * brisk), float(np.sqrt(5.8 * distance / hardest)))
 
 
 def _move(motion: Motion, start: float, takes: float, here: float, there: float) -> None:
