@@ -201,6 +201,18 @@ def test_the_archive_for_another_platform_is_refused_by_name(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_cache_that_cannot_be_written_is_named(tmp_path, monkeypatch):
+    (tmp_path / "file").write_text("no folder")
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "file"))
+    with pytest.raises(ExportError, match=r"cannot build in .*file.*set MOUNT_COSIM_CACHE"):
+        build_library(models.oscillator())
+
+
+def test_a_compiler_error_is_passed_on():
+    with pytest.raises(ExportError, match=r"the C compiler failed on broken\.so .*error: "):
+        compile_shared({"broken.c": b"int main(void) { return missing; }"}, "broken.so", PLATFORMS[host()].target)
+
+
 def test_a_page_of_ones_own_is_part_of_the_documentation(tmp_path):
     path = export_fmu(models.oscillator(), tmp_path / "a.fmu", description_html="<p>by <em>hand</em></p>")
     with zipfile.ZipFile(path) as file:

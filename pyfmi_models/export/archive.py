@@ -49,11 +49,13 @@ def _description(generated: Generated, fmi: int) -> dict[str, bytes]:
 
 
 def _binaries(generated: Generated, fmi: int, platforms: tuple[str, ...]) -> dict[str, bytes]:
-    found = {}
+    found: dict[str, bytes] = {}
     for name in platforms:
         library = library_of(generated, name)
-        folder = PLATFORMS[name].fmi2 if fmi == 2 else name
-        found[f"binaries/{folder}/{library.name}"] = library.read_bytes()
+        file = f"binaries/{PLATFORMS[name].fmi2 if fmi == 2 else name}/{library.name}"
+        if file in found:
+            raise ExportError(f"FMI {fmi} has one place, {file}, for two of the platforms {', '.join(platforms)}")
+        found[file] = library.read_bytes()
     return found
 
 

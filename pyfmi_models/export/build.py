@@ -7,7 +7,7 @@ import subprocess
 import sys
 import tempfile
 from dataclasses import dataclass
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
 
@@ -109,15 +109,29 @@ def compile_shared(sources: dict[str, bytes], name: str, target: str, flags: tup
     key = _key(sources, name, target, flags)
     library = cache_directory() / "libraries" / key / name
     if not library.exists():
-        library.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=library.parent) as folder:
-            built = _compile(sources, Path(folder), name, target, flags)
-            os.replace(built, library)
+        try:
+            _build(sources, library, target, flags)
+        except OSError as error:
+            raise ExportError(
+                f"cannot build in {library.parent}: {error}; set MOUNT_COSIM_CACHE to a folder"
+            ) from error
     return library
 
 
+def _build(sources: dict[str, bytes], library: Path, target: str, flags: tuple[str, ...]) -> None:
+    """Work in a folder of our own beside the library, so that it appears complete or not at all."""
+    library.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+        built = _compile(sources, Path(folder), library.name, target, flags)
+        os.replace(built, library)
+
+
 def _key(sources: dict[str, bytes], name: str, target: str, flags: tuple[str, ...]) -> str:
-    digest = hashlib.sha256(repr((name, target, flags, version("ziglang"))).encode())
+    try:
+        compiler = version("ziglang")
+    except PackageNotFoundError as error:
+        raise ExportError('there is no C compiler: install the Python package "ziglang"') from error
+    digest = hashlib.sha256(repr((name, target, flags, compiler)).encode())
     for file, content in sorted(sources.items()):
         digest.update(f"{file} {len(content)}\n".encode() + content)
     return digest.hexdigest()[:32]
