@@ -71,8 +71,8 @@ def _recording(path: Path) -> tuple[dict[str, Any], dict[str, list[dict[str, Any
 
 
 def _fmu(path: Path) -> tuple[dict[str, Any], dict[str, list[dict[str, Any]]]]:
-    from cosim.fmu import describe as read
-    from cosim.fmu import ports_of
+    from cosim.description import describe as read
+    from cosim.description import ports_of
 
     description = read(path)
     kinds = {"co-simulation": description.coSimulation, "model exchange": description.modelExchange}

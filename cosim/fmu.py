@@ -6,25 +6,21 @@ FMI 2.0 and 3.0, co-simulation. Unpacked files live in a temporary directory tha
 import ctypes
 import os
 import tempfile
-import zipfile
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
 from itertools import count
-from math import inf
 from pathlib import Path
 from typing import Any
 from weakref import WeakValueDictionary
-from xml.etree import ElementTree
 
 import numpy as np
 
-from cosim.component import Functions, Port
+from cosim.component import TERMINATED, Functions, Port
+from cosim.description import check_binary, describe, first_line, origin_of, ports_of
 from cosim.errors import CosimError, FmuError
-from cosim.files import sha256
 
-_REAL = ("Real", "Float64")
 _NUMBERS = count(1)
 _LISTENERS: WeakValueDictionary[str, "FmuComponent"] = WeakValueDictionary()
 """Who hears what an FMI 2.0 instance says, by instance name; FMPy's logger can serve only one callback a process."""
@@ -33,37 +29,6 @@ _VALUES2 = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctyp
 _VALUES3 = ctypes.CFUNCTYPE(
     ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_size_t
 )
-
-
-def describe(path: Path) -> Any:
-    """Read the model description (FMPy's) of an FMU that this tool can run.
-
-    Raises:
-        FmuError: the file is missing, no FMU, or of another FMI version or kind.
-    """
-    import fmpy
-
-    if not path.exists():
-        raise FmuError(f"{path} does not exist.", culprit=str(path))
-    if not zipfile.is_zipfile(path):
-        raise FmuError(f"{path} is no FMU: it is not a zip archive.", culprit=str(path))
-    if "modelDescription.xml" not in _names(path):
-        raise FmuError(f"{path} is no FMU: the archive holds no modelDescription.xml.", culprit=str(path))
-    try:
-        version = _version(path)
-        description = fmpy.read_model_description(str(path), validate=False) if version[:2] in ("2.", "3.") else None
-    except Exception as error:  # FMPy and its XML parser raise many kinds; each means the same to the user
-        raise FmuError(f"{path} has a modelDescription.xml that cannot be read: {_first(error)}.") from error
-    if description is None:
-        raise FmuError(f"{path} is of FMI {version}; this tool runs FMI 2.0 and 3.0.", culprit=str(path))
-    if description.coSimulation is None:
-        raise FmuError(f"{path} has no co-simulation interface; export it again with one.", culprit=str(path))
-    return description
-
-
-def ports_of(description: Any) -> dict[str, Port]:
-    """List the scalar variables of a model description by name."""
-    return {v.name: _port(v) for v in description.modelVariables if not v.dimensions}
 
 
 class FmuComponent:
@@ -82,7 +47,7 @@ class FmuComponent:
         self._description = describe(self.path)
         self.name = name or self._description.modelName
         self.ports: Mapping[str, Port] = ports_of(self._description)
-        self.origin: dict[str, Any] = _origin(self.path, self._description)
+        self.origin: dict[str, Any] = origin_of(self.path, self._description)
         self._messages: deque[str] = deque(maxlen=5)
         self._started = False
         self._directory = tempfile.TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True)
@@ -157,7 +122,7 @@ class FmuComponent:
         from fmpy.fmi2 import FMU2Slave
         from fmpy.fmi3 import FMU3Slave
 
-        self._check_binary()
+        check_binary(self.path, self._description)
         extract(str(self.path), self._directory.name, include=lambda name: name.startswith(("binaries/", "resources/")))
         kind = FMU2Slave if self._version == 2 else FMU3Slave
         description = self._description
@@ -186,19 +151,6 @@ class FmuComponent:
         """Keep what the FMU says."""
         self._messages.append((message or b"").decode("utf-8", "replace").strip())
 
-    def _check_binary(self) -> None:
-        import fmpy
-
-        folder = fmpy.platform if self._version == 2 else fmpy.platform_tuple
-        library = f"{self._description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
-        names = _names(self.path)
-        if f"binaries/{folder}/{library}" not in names:
-            folders = [name.split("/") for name in names if name.startswith("binaries/")]
-            have = sorted({parts[1] for parts in folders if len(parts) > 2})
-            has = ", ".join(have) or "none"
-            message = f"{self.path} has no {folder} binary; it has {has}. Export it again for this platform."
-            raise FmuError(message, culprit=str(self.path), value=folder, choices=tuple(have))
-
     def _functions(self) -> Functions:
         kind, real = ("fmi2", "Real") if self._version == 2 else ("fmi3", "Float64")
         addresses = [
@@ -216,8 +168,6 @@ class FmuComponent:
         return _VALUES3(functions.set), _VALUES3(functions.get), self._step3
 
     def _step3(self, time: float, size: float) -> int:
-        from cosim.component import TERMINATED
-
         flags = [ctypes.c_bool() for _ in range(3)]
         last = ctypes.c_double(time)
         function = self._fmu.dll.fmi3DoStep
@@ -243,21 +193,13 @@ class FmuComponent:
 
     def _set_start(self, variable: Any, value: Any) -> None:
         kind = {"Enumeration": "Integer" if self._version == 2 else "Int64"}.get(variable.type, variable.type)
+        if "Int" in kind and float(value).is_integer():
+            value = int(value)
         getattr(self._fmu, f"set{kind}")([variable.valueReference], [value])
 
     def _reason(self, error: Exception) -> str:
         said = f'; it said "{self._messages[-1]}"' if self._messages else ""
-        return _first(error) + said
-
-
-def _names(path: Path) -> list[str]:
-    with zipfile.ZipFile(path) as archive:
-        return archive.namelist()
-
-
-def _version(path: Path) -> str:
-    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
-        return ElementTree.parse(file).getroot().get("fmiVersion", "?")
+        return first_line(error) + said
 
 
 @contextmanager
@@ -268,41 +210,6 @@ def _same_directory() -> Iterator[None]:
         yield
     finally:
         os.chdir(here)
-
-
-def _port(variable: Any) -> Port:
-    real = variable.type in _REAL
-    kind = variable.declaredType
-    inherited = {key: getattr(variable, key) or (kind and getattr(kind, key)) for key in ("unit", "min", "max")}
-    exact = variable.initial in ("exact", "approx") or variable.causality in ("parameter", "input")
-    return Port(
-        name=variable.name,
-        reference=variable.valueReference,
-        causality=variable.causality or "local",
-        unit=inherited["unit"] or "",
-        description=variable.description or "",
-        start=_number(variable.start),
-        low=-inf if inherited["min"] is None else float(inherited["min"]),
-        high=inf if inherited["max"] is None else float(inherited["max"]),
-        settable=exact and variable.start is not None and variable.variability != "constant",
-        real=real,
-    )
-
-
-def _number(text: str | None) -> float | None:
-    with suppress(TypeError, ValueError):
-        return float(text)  # type: ignore[arg-type]
-    return None
-
-
-def _origin(path: Path, description: Any) -> dict[str, Any]:
-    return {
-        "file": path.name,
-        "sha256": sha256(path),
-        "model": description.modelName,
-        "fmi": description.fmiVersion,
-        "tool": description.generationTool or "",
-    }
 
 
 def _tell(_: Any, name: bytes | None, status: int, category: bytes, message: bytes | None) -> None:
@@ -324,8 +231,3 @@ def _callbacks2() -> Any:
     with suppress(Exception):  # without the proxy, messages come with their printf formats unfilled
         addLoggerProxy(ctypes.byref(callbacks))
     return callbacks
-
-
-def _first(error: Exception) -> str:
-    lines = str(error).splitlines()
-    return lines[0].rstrip(".") if lines else type(error).__name__

@@ -4,33 +4,24 @@ Jacobi coupling: at each tick all inputs are gathered from the outputs at that t
 computed in a step is seen by the others at its end, so each wire from component to component delays by one tick.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
-import numpy as np
-
 import cosim
-from cosim.component import STATUSES, Component
-from cosim.errors import ScenarioError, StepError, WiringError
+from cosim.component import Component
+from cosim.errors import ScenarioError, WiringError
+from cosim.execution import Execution, Progress
 from cosim.fmu import FmuComponent
-from cosim.loop import CompiledLoop, InterpretedLoop, Plan, make_loop, slow_because
+from cosim.loop import make_loop
 from cosim.recording import Recording
 from cosim.scenario import Scenario
 from cosim.signals import Samples, Signal
 from cosim.wiring import Record, Wire, Wiring
 from cosim.writer import MemoryWriter, StreamWriter
-
-Progress = Callable[[int, int], None]
-"""Called between chunks with ticks done and ticks in all."""
-
-CHUNK = 32_768
-"""Ticks between two looks at progress and Ctrl-C at most; fewer where steps are slow."""
-CHUNK_SECONDS = 0.1
 
 
 @dataclass(frozen=True)
@@ -104,7 +95,7 @@ def simulate(
         story = _story(wiring, settings, step, decimation) | dict(origin or {})
         units = {"t": "s"} | {key: wiring.unit(one) for key, one in wiring.records.items()}
         writer = StreamWriter(path, units, story, force) if path else MemoryWriter(units, story)
-        work = _Work(wiring, plan, make_loop(plan, compiled), writer, ticks, progress)
+        work = Execution(wiring, plan, make_loop(plan, compiled), writer, ticks, progress)
         with closing(writer):
             work.execute()
     known = {key: unit for key, unit in units.items() if unit}
@@ -147,92 +138,6 @@ def run(
         progress=progress,
         compiled=compiled,
     )
-
-
-@dataclass
-class _Work:
-    """A plan on its way: what the loop runs and where its rows go."""
-
-    wiring: Wiring
-    plan: Plan
-    loop: CompiledLoop | InterpretedLoop
-    writer: MemoryWriter
-    ticks: int
-    progress: Progress | None
-    seconds: float = 0.0
-
-    def execute(self) -> None:
-        """Run the loop to its end, writing row after row; the last row may be cut short."""
-        begun = perf_counter()
-        self.writer.origin["complete"] = False
-        try:
-            self._run_chunks()
-        finally:
-            self._write(self.loop.flush())
-            self.seconds = perf_counter() - begun
-        self.writer.origin["complete"] = True
-
-    def statistics(self) -> dict[str, Any]:
-        """Tell how it went, for people and programs."""
-        simulated = self.loop.tick * self.plan.step
-        return {
-            "steps": self.loop.tick,
-            "step": self.plan.step,
-            "simulated_seconds": simulated,
-            "seconds": self.seconds,
-            "ratio_to_real_time": simulated / self.seconds,
-            "microseconds_per_step": 1e6 * self.seconds / max(self.loop.tick, 1),
-            "rows": self.writer.rows,
-            "loop": self.loop.kind,
-            "algorithm": "jacobi",
-            "warnings": self.loop.warnings,
-            "unconnected": list(self.wiring.unconnected()),
-            "notes": [] if self.loop.kind == "compiled" else [f"{slow_because(self.plan)}: the loop ran in Python."],
-        }
-
-    def _run_chunks(self) -> None:
-        streams = [signal.stream(self.plan.step) for signal in self.wiring.signals.values()]
-        self.loop.start()
-        self._check()
-        for chunk in _chunks(self.ticks):
-            columns = [stream(chunk) for stream in streams]
-            rows = self.loop.run(len(chunk), np.concatenate(columns) if columns else np.empty((0, len(chunk))))
-            self._write(rows)
-            self._check()
-            if self.progress:
-                self.progress(self.loop.tick, self.ticks)
-
-    def _write(self, rows: np.ndarray) -> None:
-        first, count = self.writer.rows, rows.shape[1]
-        if count:
-            t = np.arange(first, first + count) * self.plan.decimation * self.plan.step
-            self.writer.write({"t": t} | dict(zip(self.wiring.records, rows, strict=True)))
-
-    def _check(self) -> None:
-        """Raise the failure of the loop, if there is one, as a sentence."""
-        failure = self.loop.failure
-        if failure is None:
-            return
-        name, component = list(self.wiring.components.items())[failure.part]
-        inputs = self.plan.inputs(failure.part)
-        what = STATUSES.get(failure.status, f"returned status {failure.status}")
-        last = ", ".join(f"{key} = {value:.9g}" for key, value in inputs.items()) or "none"
-        said = "".join(f'; it said "{text}"' for text in component.messages()[-1:])
-        when = f"at tick {failure.tick:,} ({failure.tick * self.plan.step:.9g} s)"
-        raise StepError(
-            f"{name} {what} {when}{said}; its last inputs: {last}.", component=name, tick=failure.tick, inputs=inputs
-        )
-
-
-def _chunks(ticks: int) -> Iterator[np.ndarray]:
-    """Yield all ticks in pieces that take about CHUNK_SECONDS each, as measured on the piece before."""
-    first, size = 0, 1024
-    while first < ticks:
-        begun = perf_counter()
-        last = min(first + size, ticks)
-        yield np.arange(first, last)
-        fitting = size * CHUNK_SECONDS / max(perf_counter() - begun, 1e-9)
-        first, size = last, int(max(16, min(CHUNK, 8 * size, fitting)))
 
 
 def _opened(stack: ExitStack, name: str, component: Component | Path | str) -> Component:

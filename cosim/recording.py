@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from cosim.errors import OutputError, RecordingError
+from cosim.checks import check_motion, check_names, check_time, chosen, numbers, renamed, renamed_units
+from cosim.errors import OutputError
 from cosim.files import replacing, sha256
 from cosim.formats import read_columns
 from cosim.units import unit
@@ -67,15 +68,15 @@ class Recording:
         """
         path = Path(path)
         found = read_columns(path)
-        values = _renamed(path, found.values, columns or {})
-        stated = _renamed_units(found.units, columns or {}) | dict(units or {})
+        values = renamed(path, found.values, columns or {})
+        stated = renamed_units(found.units, columns or {}) | dict(units or {})
         stated |= {"q_d": stated["q"]} if "q" in stated and "q_d" in values and "q_d" not in stated else {}
-        _check_names(path, values, required, stated)
-        table, notes = _numbers(path, values, ("t", *_chosen(values, required)))
+        check_names(path, values, required, stated)
+        table, notes = numbers(path, values, ("t", *chosen(values, required)))
         si = {name: unit(text) for name, text in stated.items() if name in table}
         table = {name: si[name].to_si(column) if name in si else column for name, column in table.items()}
-        _check_time(path, table["t"], MINIMUM_ROWS if required else 2)
-        _check_motion(path, table, _chosen(values, required))
+        check_time(path, table["t"], MINIMUM_ROWS if required else 2)
+        check_motion(path, table, chosen(values, required))
         origin = found.origin | {"file": {"name": path.name, "sha256": sha256(path)}}
         return cls(path.stem, table, {"t": "s"} | {name: one.si for name, one in si.items()}, origin, notes)
 
@@ -170,100 +171,3 @@ class Recording:
         import pandas as pd
 
         return pd.DataFrame(self.table)
-
-
-def _renamed(path: Path, values: dict[str, np.ndarray], columns: Mapping[str, str]) -> dict[str, np.ndarray]:
-    """Rename columns; one whose name is taken over by another is kept as `name_original`."""
-    for name, source in columns.items():
-        if source not in values:
-            have = ", ".join(values)
-            message = f'{path} has no column "{source}" to serve as {name}; it has: {have}.'
-            raise RecordingError(message, culprit=str(path), value=source, choices=tuple(values))
-    sources = {source: name for name, source in columns.items()}
-    taken = {name: f"{name}_original" for name in columns if name in values and name not in sources}
-    return {sources.get(name, taken.get(name, name)): column for name, column in values.items()}
-
-
-def _renamed_units(units: Mapping[str, str], columns: Mapping[str, str]) -> dict[str, str]:
-    sources = {source: name for name, source in columns.items()}
-    return {sources.get(name, name): text for name, text in units.items()}
-
-
-def _chosen(values: Mapping[str, np.ndarray], required: tuple[str, ...]) -> tuple[str, ...]:
-    """Resolve alternatives: of `q|v` the first that is there."""
-    options = [[name for name in rule.split("|") if name in values] for rule in required]
-    return tuple(names[0] for names in options if names)
-
-
-def _check_names(
-    path: Path, values: dict[str, np.ndarray], required: tuple[str, ...], units: Mapping[str, str]
-) -> None:
-    have = ", ".join(values)
-    for rule in ("t", *required):
-        if not any(name in values for name in rule.split("|")):
-            first = rule.split("|")[0]
-            message = (
-                f"{path} has no column {rule.replace('|', ' or ')}; it has: {have}. Name it with --columns {first}=..."
-            )
-            raise RecordingError(message, culprit=str(path), value=rule, choices=tuple(values))
-    for name in units:
-        if name not in values:
-            message = f'{path} has no column "{name}" to give a unit to; it has: {have}.'
-            raise RecordingError(message, culprit=str(path), value=name, choices=tuple(values))
-
-
-def _numbers(
-    path: Path, values: dict[str, np.ndarray], needed: tuple[str, ...]
-) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """Refuse needed columns that are not finite numbers, and leave out other such columns with a note."""
-    table, notes = {}, []
-    for name, column in values.items():
-        fault = _fault(column)
-        if fault is None:
-            table[name] = np.ascontiguousarray(column, dtype=np.float64)
-        elif name in needed:
-            raise RecordingError(f'{path}: column "{name}" holds {fault}.', culprit=str(path), value=name)
-        else:
-            notes.append(f'{path.stem}: column "{name}" was left out because it holds {fault}.')
-    return table, tuple(notes)
-
-
-def _fault(column: np.ndarray) -> str | None:
-    if column.dtype == object:
-        row, value = next((row, value) for row, value in enumerate(column) if not _is_number(value))
-        return f'"{value}" at row {row + 1:,}, which is not a number'
-    bad = np.flatnonzero(~np.isfinite(column))
-    if not len(bad):
-        return None
-    more = f" ({len(bad):,} such rows)" if len(bad) > 1 else ""
-    return f"{column[bad[0]]} at row {bad[0] + 1:,}, which is not a finite number{more}"
-
-
-def _is_number(value: Any) -> bool:
-    """Tell text that no number can be read from; a column of text is at fault where its first such value is."""
-    try:
-        float(value)
-    except (TypeError, ValueError):
-        return False
-    return True
-
-
-def _check_time(path: Path, t: np.ndarray, minimum: int) -> None:
-    if len(t) < minimum:
-        message = f"{path} has {len(t)} rows; at least {minimum} are needed."
-        raise RecordingError(message, culprit=str(path), value=len(t))
-    wrong = np.flatnonzero(np.diff(t) <= 0)
-    if len(wrong):
-        row, before, after = wrong[0] + 2, t[wrong[0]], t[wrong[0] + 1]
-        how = "runs backwards" if after < before else "stands still"
-        span = f"({before:.9g} s to {after:.9g} s)"
-        message = f"{path}: time {how} at row {row:,} {span}. Split the file there."
-        raise RecordingError(message, culprit=str(path), value=float(after))
-
-
-def _check_motion(path: Path, table: dict[str, np.ndarray], needed: tuple[str, ...]) -> None:
-    for name in needed:
-        if np.ptp(table[name]) == 0:
-            value = table[name][0]
-            message = f'{path}: column "{name}" is {value:.6g} in every row; a constant signal tells nothing.'
-            raise RecordingError(message, culprit=str(path), value=float(value))

@@ -13,7 +13,19 @@ FILES = {
     for path in (ROOT / package).rglob("*.py")
 }
 EXPORT_READS = ("pyfmi_models.model", "pyfmi_models.errors", "pyfmi_models.export")
-RUNNERS = ("component", "fmu", "master", "loop", "recording", "scenario", "signals", "hardware", "wiring", "writer")
+RUNNERS = (
+    "component",
+    "fmu",
+    "master",
+    "loop",
+    "recording",
+    "scenario",
+    "signals",
+    "hardware",
+    "wiring",
+    "execution",
+    "description",
+)
 MAKERS = ("cosim.diagnosis", "cosim.identify", "cosim.proof", "cosim.demo", "cosim.cli")
 
 

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from tiny_fmu import description, tiny
 
+import cosim.execution
 import cosim.loop
-import cosim.master
 from cosim.errors import FmuError, SignalError, StepError, WiringError
 from cosim.fmu import FmuComponent
 from cosim.master import Run, simulate
@@ -97,7 +97,7 @@ def test_a_mean_is_over_the_sample_interval_centred_at_the_row(tiny: Tiny, decim
 
 def test_time_is_counted_not_summed_and_chunks_do_not_matter(tiny: Tiny, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = control_loop(tiny[3], ticks=3000)
-    monkeypatch.setattr(cosim.master, "CHUNK", 16)
+    monkeypatch.setattr(cosim.execution, "CHUNK", 16)
     pieces = control_loop(tiny[3], ticks=3000)
     np.testing.assert_array_equal(whole.recording.t, np.arange(3000) * 1e-3)
     for name in whole.recording:
