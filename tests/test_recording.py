@@ -255,3 +255,24 @@ def test_a_measured_file_of_others_is_read() -> None:
     recording = Recording.read(path, {"tau": "force", "q_d": "q_ref"}, {"q": "m", "tau": "N"})
     assert (len(recording), recording.gaps, recording.quality()) == (24841, (), ())
     np.testing.assert_allclose(recording.sample_time, 1e-3, rtol=1e-3)
+
+
+def test_hdf5_is_read_whatever_its_groups(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["mass"] = 95.1
+        for name, column in columns().items():
+            file[f"log/{name}"] = column.reshape(-1, 1)
+    np.testing.assert_array_equal(Recording.read(tmp_path / "run.h5")["q"], columns()["q"])
+
+
+@pytest.mark.filterwarnings("default")
+def test_mdf4_is_read_with_its_units(tmp_path: Path) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    table, units = columns(), {"tau": "N.m", "q": "deg"}
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(table[name], table["t"], name=name, unit=unit) for name, unit in units.items()])
+        file.save(tmp_path / "run.mf4")
+    recording = Recording.read(tmp_path / "run.mf4")
+    np.testing.assert_allclose(recording["q"], table["q"] * np.pi / 180)
+    assert recording.units == {"t": "s", "tau": "N.m", "q": "rad"}
