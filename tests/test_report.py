@@ -1,10 +1,29 @@
 """The report: one file, no network, says the answer, survives hostile names."""
 
+import base64
+import io
+import os
+import re
+import shutil
+import subprocess
+import sys
+import time
+import zlib
 from dataclasses import replace
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
+from cosim.diagnosis.report import render, write_report
+from cosim.diagnosis.report.derive import part, samples
+from cosim.diagnosis.report.explorer import payload
+from cosim.diagnosis.report.figures_dynamic import VIEWS
+from cosim.diagnosis.report.figures_proof import relative
+from cosim.diagnosis.report.quantities import Scales, minus, number
+from cosim.diagnosis.report.sheet import thin
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Region, Trace, Where
 
 RATE, SECONDS = 1000, 60
@@ -28,7 +47,7 @@ def trace(name: str, seed: int, heldout: bool, missing: str, scale: float = 1.0)
     noise *= FLOOR / noise.std()
     base = 0.8 * np.gradient(v, t) + 1.1 * np.tanh(v / 0.01 / scale) + 0.2 * v / scale
     extra = {
-        "two": 0.42 * np.cos(24 * q + 0.4) + 0.13 * np.tanh(v / 0.01) + 0.1 * np.sin(q),
+        "two": 0.42 * np.cos(24 * q + 0.4) + 0.13 * np.abs(np.tanh(v / 0.01)) + 0.1 * np.sin(q),
         "none": np.zeros_like(t),
         "unknown": 0.9 * np.exp(-(((np.mod(q, 2 * np.pi) - 3.7) / 0.2) ** 2)) * (v > 0),
     }[missing]
@@ -41,7 +60,9 @@ def trace(name: str, seed: int, heldout: bool, missing: str, scale: float = 1.0)
 
 
 def region(axis: str, unit: str, traces: tuple[Trace, ...], after: bool) -> Region:
-    x = np.concatenate([np.sign(tr.v) if axis == "direction" else tr.q if axis == "position" else tr.v for tr in traces])
+    x = np.concatenate(
+        [np.sign(tr.v) if axis == "direction" else tr.q if axis == "position" else tr.v for tr in traces]
+    )
     y = np.concatenate([tr.tau - tr.after if after else tr.missing for tr in traces])
     edges = np.array([-1.5, 0, 1.5]) if axis == "direction" else np.linspace(x.min() - 0.2, x.max() + 0.2, 41)
     count, total = np.histogram(x, edges)[0].astype(float), np.histogram(x, edges, weights=y)[0]
@@ -54,7 +75,8 @@ def region(axis: str, unit: str, traces: tuple[Trace, ...], after: bool) -> Regi
 FOUND = (
     Finding(
         effect="cogging", title="Cogging", answer="found", probability=0.97, gain=0.62,
-        parameters={"cycles_per_rev": 24.0, "amplitude": 0.42, "phase": 0.4}, units={"amplitude": "N·m", "phase": "rad"},
+        parameters={"cycles_per_rev": 24.0, "amplitude": 0.42, "phase": 0.4},
+        units={"amplitude": "N·m", "phase": "rad"},
         standard_errors={"amplitude": 0.015, "phase": 0.03}, ranges={"amplitude": (0.39, 0.45), "phase": (0.34, 0.46)},
         size="0.42 N·m", size_range="0.39 to 0.45", visible_from=0.05,
         statement="The motor tugs 24 times per turn, 0.42 N·m; it has 24 slots, nothing needs repair",
@@ -83,20 +105,36 @@ RIVALS = (
         parameters={"amplitude_rad": 3e-5}, size="0.002 °", size_range="0.001 to 0.003", visible_from=0.0012,
     ),
 )  # fmt: skip
+
+
+def other(effect: str, title: str, answer: Any, **more: Any) -> Finding:
+    return Finding(effect=effect, title=title, answer=answer, probability=0.01, gain=0.0, **more)
+
+
+STRIBECK = {"size": "0.05 N·m", "size_range": "-0.01 to 0.11", "statement": "Starting takes a little more than turning"}
+WARMED = {"evidence": "the motor warmed only 0.3 K", "action": "record 20 min from cold"}
+STOPPED = {"evidence": "longest stop 0.3 s", "action": "stop for 1, 10 and 100 s"}
 REST = (
-    Finding(effect="delay", title="Delay", answer="not_seen", probability=0.01, gain=0.0, visible_from=0.4, units={"delay_ms": "ms"}),
-    Finding(effect="clock_skew", title="Clock skew", answer="not_seen", probability=0.0, gain=0.0, visible_from=3.0, units={"drift_ppm": "ppm"}),
-    Finding(effect="stribeck", title="Stribeck", answer="not_proven", probability=0.3, gain=0.02, size="0.05 N·m", size_range="-0.01 to 0.11", visible_from=0.04, statement="Starting takes a little more than turning"),
-    Finding(effect="thermal_viscosity", title="Thermal drift", answer="not_testable", probability=0.0, gain=0.0, evidence="the motor warmed only 0.3 K", action="record 20 min from cold"),
-    Finding(effect="dwell_breakaway", title="Dwell break-away", answer="not_testable", probability=0.0, gain=0.0, evidence="longest stop 0.3 s", action="stop for 1, 10 and 100 s"),
-)  # fmt: skip
+    other("delay", "Delay", "not_seen", visible_from=0.4, units={"delay_ms": "ms"}),
+    other("clock_skew", "Clock skew", "not_seen", visible_from=3.0, units={"drift_ppm": "ppm"}),
+    other("stribeck", "Stribeck", "not_proven", visible_from=0.04, **STRIBECK),
+    other("thermal_viscosity", "Thermal drift", "not_testable", **WARMED),
+    other("dwell_breakaway", "Dwell break-away", "not_testable", **STOPPED),
+)
 PROVENANCE: dict[str, Any] = {
-    "version": "0.1.0", "command": "cosim diagnose run1.parquet run2.parquet --heldout run3.parquet --card mount.toml --out result",
-    "date": "2026-11-18", "seed": 0, "card": {"name": "mount.toml", "sha256": "77a0" * 16},
-    "recordings": [{"name": f"run{i}.parquet", "sha256": f"4be{i}" * 16, "role": "held out" if i == 3 else "fitted", "seconds": 60.0, "rate_hz": 1000.0} for i in (1, 2, 3)],
-}  # fmt: skip
+    "version": "0.1.0",
+    "command": "cosim diagnose run1.parquet run2.parquet --heldout run3.parquet --card mount.toml --out result",
+    "date": "2026-11-18",
+    "seed": 0,
+    "card": {"name": "mount.toml", "sha256": "77a0" * 16},
+    "recordings": [
+        {"name": f"run{i}.parquet", "sha256": f"4be{i}" * 16, "role": role, "seconds": 60.0, "rate_hz": 1000.0}
+        for i, role in ((1, "fitted"), (2, "fitted"), (3, "held out"))
+    ],
+}
 
 
+@cache
 def diagnosis(kind: str = "two", motion: Any = "rotary", mount: str = "C1 rotary table") -> Diagnosis:
     linear = motion == "linear"
     scale = 0.05 if linear else 1.0
@@ -111,7 +149,8 @@ def diagnosis(kind: str = "two", motion: Any = "rotary", mount: str = "C1 rotary
         heldout=HeldOut(
             name="run3", nominal_rms=0.52, before_rms=rms[0], after_rms=rms[1], floor_rms=FLOOR,
             confidence_interval=(0.15, 0.22) if kind == "two" else (-0.01, 0.01),
-            sliding={"before_rms": 0.35, "after_rms": 0.17, "cutoff_hz": 30.0}, position={"before": 1e-4, "after": 4e-5},
+            sliding={"before_rms": 0.35, "after_rms": 0.17, "cutoff_hz": 30.0},
+            position={"before": 1e-4, "after": 4e-5},
         ),
         regions=tuple(region(axis, unit, traces, False) for axis, unit in axes),
         regions_after=tuple(region(axis, unit, traces, True) for axis, unit in axes),
@@ -129,4 +168,218 @@ def diagnosis(kind: str = "two", motion: Any = "rotary", mount: str = "C1 rotary
     )  # fmt: skip
 
 
-__all__ = ["replace"]
+@cache
+def page(kind: str = "two", motion: str = "rotary") -> str:
+    return render(diagnosis(kind, motion))
+
+
+CASES = [("two", "rotary"), ("none", "rotary"), ("unknown", "rotary"), ("two", "linear")]
+KINDS = pytest.mark.parametrize(("kind", "motion"), CASES)
+HEADINGS = """Findings|Next experiment|Everything that was looked for|What stays unexplained|When|Where|
+Proof on unseen runs|The worst seconds|Look at the recordings|Parameters of the base|How this was made"""
+SIGNALS = ("t", "q", "v", "tau", "before", "after", "missing", "band")
+BARE: dict[str, Any] = {name: {} for name in ("provenance", "improved", "base_parameters", "next_experiment")}
+
+
+@KINDS
+def test_page_is_one_small_file_that_asks_for_nothing(kind: str, motion: str) -> None:
+    html = page(kind, motion)
+    assert len(html.encode()) <= 1_000_000
+    assert not re.search(r"https?://|//cdn|@import|url\((?!#)", html)
+    assert not re.search(r"<(link|img|iframe|object|base)\b|\ssrc=", html)
+    assert all(target.startswith("#") for target in re.findall(r'href="([^"]*)"', html))
+    assert "default-src 'none'" in html
+
+
+@KINDS
+def test_ids_are_unique_and_every_reference_has_its_target(kind: str, motion: str) -> None:
+    html = page(kind, motion).split('<script type="application/json"')[0]
+    ids = re.findall(r'\sid="([^"]*)"', html)
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'(?:href="#|url\(#)([^")]+)', html)) <= set(ids)
+
+
+@KINDS
+def test_html_is_well_formed(kind: str, motion: str) -> None:
+    etree = pytest.importorskip("lxml.etree")
+    parser = etree.HTMLParser()
+    etree.fromstring(page(kind, motion), parser)
+    assert [e.message for e in parser.error_log if not re.search(r"Tag \w+ invalid", e.message)] == []
+
+
+def test_two_effects_are_told_on_the_first_screen() -> None:
+    first = re.sub(r"<[^>]+>", " ", page().split("<h2>Findings")[0].split("</style>")[1])
+    assert "Two effects are missing from the model" in first
+    assert "Turning forward takes 0.26 N·m more than backward." in first
+    for words in ("0.39 to 0.45", "Found", "Two possible causes", "Not proven", "mount_improved.fmu", "20 to 90°/s"):
+        assert words in first
+    assert "Not seen: delay, clock skew. These recordings cannot show: thermal drift, dwell break-away." in first
+
+
+def test_nothing_missing_has_its_own_first_screen() -> None:
+    html = page("none")
+    assert "<h1>Nothing missing that these recordings can show</h1>" in html
+    assert "0.4\N{NO-BREAK SPACE}ms" in html
+    assert "No improved model was written" in html
+    assert "Findings" not in re.sub(r"<style.*?</style>", "", html, flags=re.S)
+
+
+def test_unknown_says_where_to_look_and_names_no_effect() -> None:
+    html = page("unknown")
+    assert "<h1>Something is missing, and it is none of the effects cosim knows</h1>" in html
+    assert re.search(r"position .*20\d to 2\d\d°.*forward only", html)
+    assert "position, direction of motion" in html
+
+
+def test_linear_axis_has_forces_and_lengths() -> None:
+    html = page("two", "linear")
+    assert "RMS force error [N]" in html
+    assert "mm/s" in html
+    assert "°/s" not in re.sub("Record one turn at 2°/s", "", html)
+
+
+def test_every_section_and_answer_is_there() -> None:
+    for heading in HEADINGS.replace("\n", "").split("|"):
+        assert re.search(rf"<h2[^>]*>{heading}</h2>", page())
+    for finding in diagnosis().findings:
+        assert finding.title in page()
+    assert "4be1" * 16 in page()
+    assert "77a0" * 16 in page()
+
+
+def test_hostile_names_stay_text() -> None:
+    evil = "<script>alert(1)</script><b>\"'$x_1$"
+    base = diagnosis()
+    traces = tuple(replace(trace, name=f"{evil}{trace.name}", t=trace.t) for trace in base.traces)
+    findings = tuple(replace(finding, title=evil + finding.title, statement=evil) for finding in base.findings)
+    html = render(replace(base, mount=evil, traces=traces, findings=findings, data_quality=(evil,)))
+    assert html.count("<script") == 2
+    assert "&lt;script&gt;alert(1)" in html
+    assert "<b>&#34;" not in html
+
+
+def test_letters_of_any_script_raise_no_warning() -> None:
+    base = diagnosis("none")
+    traces = tuple(replace(trace, name="测量 ½") for trace in base.traces)
+    assert "测量" in render(replace(base, traces=traces, mount="台"))
+
+
+def test_report_is_reproducible_and_quick(tmp_path: Path) -> None:
+    start = time.process_time()
+    path = write_report(diagnosis(), tmp_path / "report.html")
+    assert time.process_time() - start <= 3.0
+    assert path.read_text("utf-8") == page()
+    assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
+
+
+@pytest.mark.parametrize("effect", [*sorted(VIEWS), "unheard_of"])
+def test_every_effect_has_a_figure(effect: str) -> None:
+    import matplotlib
+
+    from cosim.diagnosis.report.figures_dynamic import effect as draw
+    from cosim.diagnosis.report.sheet import STYLE
+
+    finding = replace(FOUND[0], effect=effect, parameters={"delay_ms": 3.0, "cycles_per_rev": 24.0})
+    with matplotlib.rc_context(STYLE):
+        picture = draw(finding, samples(diagnosis().traces), Scales.of(diagnosis()))
+    assert picture is not None
+    assert picture.caption
+    assert len(picture.svg) < 60_000
+
+
+def test_bare_and_short_diagnosis_still_makes_a_page() -> None:
+    base = diagnosis()
+    cut = tuple(replace(tr, **{name: getattr(tr, name)[:4000] for name in SIGNALS}) for tr in base.traces[2:])
+    html = render(replace(base, traces=cut, regions=(), regions_after=(), **BARE))
+    assert "Two effects are missing" in html
+
+
+def test_parts_that_got_worse_are_called_worse() -> None:
+    heldout = samples(diagnosis().traces[2:])
+    assert part("run3", heldout).change == "better"
+    assert part("run3", replace(heldout, before=heldout.after, after=heldout.before)).change == "worse"
+    assert part("run3", replace(heldout, after=-heldout.before)).change == "no clear change"
+
+
+def test_thinning_keeps_extremes_and_ends() -> None:
+    x = np.arange(10_007.0)
+    y = np.zeros(10_007)
+    y[[1234, 7777]] = 5.0, -3.0
+    thin_x, thin_y = thin(x, y, 100)
+    assert len(thin_x) <= 203
+    assert (thin_y.max(), thin_y.min()) == (5.0, -3.0)
+    assert thin_x[-1] == 10_006
+    assert np.all(np.diff(thin_x) >= 0)
+
+
+def test_explorer_data_comes_back_within_its_step() -> None:
+    recording = payload(diagnosis(), Scales.of(diagnosis()))["recordings"][0]
+    deltas = np.frombuffer(zlib.decompress(base64.b64decode(recording["data"])), "<u2").reshape(4, -1)
+    name, low, step = recording["signals"][0]
+    values = low + step * np.cumsum(deltas[0], dtype=np.uint16)
+    tau = diagnosis().traces[0].tau
+    assert name == "tau"
+    assert np.allclose((values.min(), values.max()), (tau.min(), tau.max()), atol=2 * step)
+
+
+def test_numbers_read_well() -> None:
+    assert [number(x) for x in (0.4203, 0.0, -12.34, 1234.0, float("nan"))] == ["0.42", "0", "−12", "1,200", "–"]
+    assert minus("-0.01 to 0.11, run-3") == "−0.01 to 0.11, run-3"
+    assert relative(FOUND[0]) == pytest.approx((8.4, 7.8, 9.0))
+
+
+@KINDS
+def test_terminal_summary_fits_80_columns(kind: str, motion: str) -> None:
+    from cosim.diagnosis.terminal import summary
+
+    text = summary(diagnosis(kind, motion))
+    assert max(map(len, text.splitlines())) <= 80
+    assert "not seen" in text
+    assert "\033" not in text
+    assert ("EITHER    gravity unbalance" in text) == (kind == "two")
+
+
+def test_terminal_is_bold_only_where_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
+    from cosim.diagnosis.terminal import print_summary, summary
+
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    for variable, value, bold in (("TERM", "xterm", True), ("TERM", "dumb", False), ("NO_COLOR", "1", False)):
+        monkeypatch.delenv("NO_COLOR", raising=False)
+        monkeypatch.setenv("TERM", "xterm")
+        monkeypatch.setenv(variable, value)
+        print_summary(diagnosis(), out := Terminal())
+        assert ("\033[1m" in out.getvalue()) == bold
+    assert "\033" not in summary(diagnosis(mount="\033[31mred"))
+
+
+def test_importing_the_report_does_not_load_matplotlib() -> None:
+    code = "import cosim.diagnosis.report, cosim.diagnosis.terminal, sys; sys.exit('matplotlib' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+PROBE = """<script>addEventListener("load", () => setTimeout(() => { const svg = [...document.querySelectorAll("svg")];
+document.body.dataset.probe = [document.documentElement.scrollWidth <= innerWidth, explorer.dataset.ready,
+Math.min(...svg.filter(s => s.clientWidth).map(s => 12.5 * s.clientWidth / s.viewBox.baseVal.width)) >= 12].join();
+}, 300))</script>"""
+FLAGS = """--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking
+--disable-component-update --disable-sync --enable-logging=stderr --virtual-time-budget=5000 --dump-dom"""
+
+
+@pytest.mark.parametrize("width", [390, 1280])
+@KINDS
+def test_browser_shows_it_without_complaint(kind: str, motion: str, width: int, tmp_path: Path) -> None:
+    chromium = shutil.which("chromium")
+    if chromium is None:
+        pytest.skip("chromium is not installed")
+    home = {**os.environ, "HOME": str(tmp_path)}
+    (tmp_path / "report.html").write_text(page(kind, motion), "utf-8")
+    (tmp_path / "probed.html").write_text(re.sub(r"<meta http-equiv.*", "", page(kind, motion)) + PROBE, "utf-8")
+    for name, expected in (("report", 'data-ready="yes"'), ("probed", 'data-probe="true,yes,true"')):
+        command = [chromium, *FLAGS.split(), f"--user-data-dir={tmp_path / name}", f"--window-size={width},844"]
+        command.append((tmp_path / f"{name}.html").as_uri())
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, env=home)
+        assert expected in done.stdout, re.findall(r'data-probe="[^"]*"', done.stdout)
+        assert "CONSOLE" not in done.stderr

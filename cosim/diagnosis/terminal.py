@@ -92,7 +92,9 @@ def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     before, after, noise = (unit.number(x) for x in (held.before_rms, held.after_rms, held.floor_rms))
     found = sum(finding.answer == "found" for finding in diagnosis.findings)
     improved = f" with the effect{'s' if found > 1 else ''} {after}," if found else ""
-    return _wrapped(f"Error on the recording not fitted, RMS [{unit.unit}]: refitted {before},{improved} noise {noise}", 0)
+    return _wrapped(
+        f"Error on the recording not fitted, RMS [{unit.unit}]: refitted {before},{improved} noise {noise}", 0
+    )
 
 
 def _next(diagnosis: Diagnosis) -> list[str]:

@@ -19,7 +19,7 @@ def render(diagnosis: Diagnosis) -> str:
 
     loader = PackageLoader("cosim.diagnosis.report", "")
     pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    with matplotlib.rc_context(STYLE):
+    with matplotlib.rc_context(rc=STYLE):
         values = context(diagnosis)
     values |= {name: Markup(values[name]) for name in ("css", "script")}
     return pages.get_template("report.html.j2").render(values).lstrip()

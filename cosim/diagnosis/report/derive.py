@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -108,7 +109,7 @@ def parts(diagnosis: Diagnosis, speed: Callable[[float, float], str]) -> tuple[P
     rows = [part(trace.name, samples((trace,))) for trace in heldout[:4]]
     masks = [("standing", np.abs(whole.v) <= slow(whole.v))]
     edges = speed_classes(whole.v)
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in pairwise(edges):
         masks.append((speed(float(low), float(high)), (np.abs(whole.v) > low) & (np.abs(whole.v) <= high)))
     masks += [("forward", whole.v > slow(whole.v)), ("backward", whole.v < -slow(whole.v))]
     chosen = [(label, whole.where(mask)) for label, mask in masks]
@@ -153,9 +154,12 @@ class Curve:
 
 
 def curve(x: Array, y: Array, edges: Array) -> Curve:
-    """Bin y over x; the half width takes neighbouring samples as dependent (one independent value in 30)."""
-    count = np.histogram(x, edges)[0].astype(float)
-    first, second = (np.histogram(x, edges, weights=y**power)[0] for power in (1, 2))
+    """Bin y over x in equal bins; the half width takes one sample in 30 as independent of its neighbours."""
+    bins = len(edges) - 1
+    place = np.floor((x - edges[0]) * (bins / (edges[-1] - edges[0]))).astype(int)
+    inside = (place >= 0) & (place < bins)
+    place, y = place[inside], y[inside]
+    count, first, second = (np.bincount(place, weights, bins) for weights in (np.ones_like(y), y, y**2))
     centres = 0.5 * (edges[1:] + edges[:-1])
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.where(count >= 5, first / count, np.nan)

@@ -78,7 +78,7 @@
     canvas.width = w * ratio; canvas.height = h * ratio;
     const g = canvas.getContext("2d");
     g.scale(ratio, ratio); g.font = getComputedStyle(canvas).font;
-    const left = 50, width = w - left - 4, free = h - 24 * 3 - 42;
+    const left = 50, width = w - left - 16, gap = 32, free = h - 24 - gap * 2 - 44;
     const heights = [free * 0.45, free * 0.32, free * 0.23];
     let top = 24, x;
     const sheets = [
@@ -88,14 +88,14 @@
     ];
     sheets.forEach(([lines, title], row) => {
       x = panel(g, { x: left, y: top, w: width, h: heights[row] }, lines, title);
-      top += heights[row] + 24;
+      top += heights[row] + gap;
     });
     const [marks, places] = ticks(view[0], view[1], width / 90);
     g.textAlign = "center"; g.fillStyle = ink.grey;
-    for (const mark of marks) g.fillText(mark.toFixed(places), x(mark), top - 24 + 18);
-    g.fillText("time [s]", left + width / 2, top - 24 + 38);
+    for (const mark of marks) g.fillText(mark.toFixed(places), x(mark), top - gap + 18);
+    g.fillText("time [s]", left + width / 2, top - gap + 38);
     if (drag && drag.to !== undefined) {
-      g.fillStyle = "rgba(0,85,140,.15)"; g.fillRect(Math.min(drag.from, drag.to), 24, Math.abs(drag.to - drag.from), top - 48);
+      g.fillStyle = "rgba(0,85,140,.15)"; g.fillRect(Math.min(drag.from, drag.to), 24, Math.abs(drag.to - drag.from), top - gap - 24);
     }
   }
 
@@ -111,7 +111,7 @@
     show(...(span || record.worst[1]));
   }
 
-  const time = (px) => view[0] + ((px - 50) / (canvas.clientWidth - 54)) * (view[1] - view[0]);
+  const time = (px) => view[0] + ((px - 50) / (canvas.clientWidth - 66)) * (view[1] - view[0]);
   canvas.addEventListener("pointerdown", (e) => { drag = { from: e.offsetX }; canvas.setPointerCapture(e.pointerId); });
   canvas.addEventListener("pointermove", (e) => { if (drag) { drag.to = e.offsetX; draw(); } });
   canvas.addEventListener("pointercancel", () => { drag = undefined; draw(); });

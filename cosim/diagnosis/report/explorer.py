@@ -5,11 +5,13 @@ import zlib
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from cosim.diagnosis.report.derive import worst
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.result import Array, Diagnosis, Trace
 
+Index = npt.NDArray[np.intp]
 BUCKETS = 10_000
 """Over all recordings; each gives a smallest and a largest value per signal."""
 LEVELS = 65_000
@@ -53,7 +55,7 @@ def _packed(trace: Trace, scales: Scales, seconds: float) -> dict[str, Any]:
     }
 
 
-def _signal(values: Array, edges: Array) -> tuple[Array, float, float]:
+def _signal(values: Array, edges: Index) -> tuple[npt.NDArray[np.uint16], float, float]:
     """Return uint16 deltas of two values a bucket, and the offset and step that give the values back."""
     pairs = _pairs(values, edges)
     low = float(np.nanmin(pairs)) if np.isfinite(pairs).any() else 0.0
@@ -63,7 +65,7 @@ def _signal(values: Array, edges: Array) -> tuple[Array, float, float]:
     return np.diff(levels, prepend=np.uint16(0)).astype("<u2"), low, step
 
 
-def _pairs(values: Array, edges: Array) -> Array:
+def _pairs(values: Array, edges: Index) -> Array:
     """Return smallest and largest value of every bucket in the order they came; NaN where it is empty."""
     pairs = np.full((len(edges) - 1, 2), np.nan)
     full = np.diff(edges) > 0
@@ -71,7 +73,7 @@ def _pairs(values: Array, edges: Array) -> Array:
     if not len(starts):
         return pairs.ravel()
     part = values[: edges[-1]]
-    low, high = np.fmin.reduceat(part, starts), np.fmax.reduceat(part, starts)
+    low, high = np.fmin.reduceat(part, starts.astype(np.intp)), np.fmax.reduceat(part, starts.astype(np.intp))
     rising = part[np.minimum(edges[1:][full], len(part)) - 1] >= part[starts]
     pairs[full] = np.where(rising[:, None], np.stack([low, high], 1), np.stack([high, low], 1))
     return pairs.ravel()

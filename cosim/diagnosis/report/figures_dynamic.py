@@ -1,6 +1,9 @@
 """Figures of findings that show in time or frequency: lag, clock, ripple in time, rest and reversal."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
+import numpy.typing as npt
 
 from cosim.diagnosis.report.derive import Samples, slow
 from cosim.diagnosis.report.figures_effect import (
@@ -18,6 +21,9 @@ from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import AFTER, BEFORE, GREY, MEASURED, Picture, heading
 from cosim.diagnosis.result import Array, Finding
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 TOP_HZ = 30.0
 """The residual protocol's filter: nothing above it is left to see."""
 
@@ -33,7 +39,9 @@ def spectra(chosen: Samples, *signals: Array) -> tuple[Array, list[Array]]:
     starts = range(0, len(chosen.t) - size + 1, max(size // 2, 1))
     window = np.hanning(size)
     out = [np.fft.rfft([window * (y[s : s + size] - y[s : s + size].mean()) for s in starts]) for y in signals]
-    return np.fft.rfftfreq(size, 1 / rate(chosen)), [np.asarray(rows) / (0.5 * window.sum()) for rows in out]
+    return np.asarray(np.fft.rfftfreq(size, 1 / rate(chosen)), dtype=float), [
+        np.asarray(rows) / (0.5 * window.sum()) for rows in out
+    ]
 
 
 def phase(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
@@ -57,9 +65,9 @@ def phase(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
 _DELAY = "Squares before, dots after. Dashed: a pure delay of the size found."
 
 
-def _pure_delay(finding: Finding, axes: "object", f: Array) -> None:
+def _pure_delay(finding: Finding, axes: "Axes", f: Array) -> None:
     delay = finding.parameters.get("delay_ms", finding.parameters.get("time_constant_ms", 0.0))
-    axes.plot(f, 0.36 * delay * f, color=MEASURED, dashes=(4, 2), lw=1.2)  # type: ignore[attr-defined]
+    axes.plot(f, 0.36 * delay * f, color=MEASURED, dashes=(4, 2), lw=1.2)
 
 
 def spectrum(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
@@ -140,7 +148,7 @@ def breakaway(finding: Finding, chosen: Samples, scales: Scales) -> Picture | No
     return sheet.picture(f"{finding.title}. {caption}", caption)
 
 
-def _starts(chosen: Samples) -> tuple[Array, Array]:
+def _starts(chosen: Samples) -> tuple[npt.NDArray[np.intp], Array]:
     still = np.r_[0, (np.abs(chosen.v) <= slow(chosen.v)).astype(int), 0]
     low, high = np.flatnonzero(np.diff(still) == 1), np.flatnonzero(np.diff(still) == -1)
     rest = (high - low) / rate(chosen)

@@ -1,13 +1,13 @@
 """One figure a finding: the view of the recordings in which that effect shows itself."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cosim.diagnosis.report.derive import Curve, Mask, Samples, curve, slow
 from cosim.diagnosis.report.quantities import Scale, Scales
-from cosim.diagnosis.report.sheet import AFTER, BEFORE, GREY, Picture, Sheet, heading
+from cosim.diagnosis.report.sheet import AFTER, BEFORE, GREY, Picture, Sheet, degrees, heading
 from cosim.diagnosis.result import Array, Finding
 
 if TYPE_CHECKING:
@@ -63,7 +63,8 @@ def folded(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
 def dots(axes: "Axes", x: Array, y: Array, most: int = 600) -> None:
     """Scatter evenly picked samples of the error before, and keep single ones from stretching the axis."""
     pick = np.linspace(0, len(x) - 1, min(most, len(x))).astype(int)
-    axes.plot(x[pick], y[pick], ".", ms=2.2, color=BEFORE, alpha=0.55, mew=0, zorder=1)
+    broken = [np.column_stack([side[pick], side[pick], np.full(len(pick), np.nan)]).ravel() for side in (x, y)]
+    axes.plot(*broken, lw=2.2, solid_capstyle="round", color=BEFORE, alpha=0.55, zorder=1)
     low, high = np.quantile(y, (0.005, 0.995))
     axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))
 
@@ -97,7 +98,15 @@ def _steady(chosen: Samples) -> Mask:
 
 def _side(axes: "Axes", side: Samples, sign: float, mark: tuple[str, str], edges: Array, scales: Scales) -> None:
     speed, unit = np.abs(side.v) * scales.speed.factor, scales.torque.factor * sign
-    style = {"ls": "", "marker": mark[0], "ms": 8, "mfc": mark[1], "color": AFTER, "elinewidth": 1.4, "zorder": 4}
+    style: dict[str, Any] = {
+        "ls": "",
+        "marker": mark[0],
+        "ms": 8,
+        "mfc": mark[1],
+        "color": AFTER,
+        "elinewidth": 1.4,
+        "zorder": 4,
+    }
     measured = curve(speed, side.tau * unit, edges)
     axes.errorbar(measured.x, measured.mean, yerr=measured.half, **style)
     for error, colour, dashes in ((side.before, BEFORE, (4, 2)), (side.after, AFTER, (None, None))):
@@ -108,20 +117,24 @@ def _side(axes: "Axes", side: Samples, sign: float, mark: tuple[str, str], edges
 def position(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
     """Draw the error over position, forward and backward apart: alike = torque, opposite = friction."""
     moving = np.abs(chosen.v) > slow(chosen.v)
-    groups = (("forward", chosen.v > 0, "-"), ("backward", chosen.v < 0, (0, (1, 1))))
+    groups: tuple[tuple[str, Mask, Any], ...] = (
+        ("forward", chosen.v > 0, "-"),
+        ("backward", chosen.v < 0, (0, (1, 1))),
+    )
     return _split(finding, chosen, scales, [(label, mask & moving, style) for label, mask, style in groups])
 
 
 def rest_and_motion(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
     """Draw the error over position in slow and fast motion: a load does not care, a false reading grows with v^2."""
     edge = float(np.median(np.abs(chosen.v)))
-    groups = [("slow", np.abs(chosen.v) <= edge, "-"), ("fast", np.abs(chosen.v) > edge, (0, (1, 1)))]
+    groups: list[tuple[str, Mask, Any]] = [
+        ("slow", np.abs(chosen.v) <= edge, "-"),
+        ("fast", np.abs(chosen.v) > edge, (0, (1, 1))),
+    ]
     return _split(finding, chosen, scales, groups)
 
 
-def _split(
-    finding: Finding, chosen: Samples, scales: Scales, groups: "list[tuple[str, Mask, object]]"
-) -> Picture | None:
+def _split(finding: Finding, chosen: Samples, scales: Scales, groups: list[tuple[str, Mask, Any]]) -> Picture | None:
     sheet = blank(finding)
     axes = sheet.axes()
     x = chosen.q * scales.position.factor
@@ -131,6 +144,7 @@ def _split(
             mean = curve(x[mask], residual[mask] * scales.torque.factor, edges)
             axes.plot(mean.x, mean.mean, color=colour, ls=style, lw=1.8)
     axes.axhline(0, color=GREY, lw=0.8, zorder=1)
+    degrees(axes, scales.position.unit)
     axes.set_xlabel(f"position [{scales.position.unit}]")
     axes.locator_params(axis="y", nbins=5)
     heading(axes, f"mean error [{scales.torque.unit}]")
@@ -141,7 +155,7 @@ def _split(
 def load(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
     """Draw the error over the torque itself: a drive that gives less, or friction that grows, bends this line."""
     x = chosen.tau * scales.torque.factor
-    edges = np.linspace(*np.quantile(x, (0.002, 0.998)), 31)
+    edges = np.linspace(float(np.quantile(x, 0.002)), float(np.quantile(x, 0.998)), 31)
     axis = f"measured, filtered [{scales.torque.unit}]"
     sheet, _ = error_over(finding, x, (chosen.before, chosen.after), edges, axis, scales)
     return sheet.picture(f"{finding.title}, error over load.", "Mean error over the commanded load, 95 % band.")

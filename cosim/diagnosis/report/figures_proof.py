@@ -1,7 +1,7 @@
 """The two figures that decide: the error on runs the fit never saw, and the size of everything looked for."""
 
 import re
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cosim.diagnosis.report.derive import Part
 from cosim.diagnosis.report.quantities import Scales
@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 ROW = 25
+WORD = 0.55
+"""Share of the axis that "no clear change" takes."""
 LEAST, MOST = 0.1, 30.0
 
 
@@ -23,29 +25,37 @@ def proof(diagnosis: Diagnosis, rows: tuple[Part, ...], scales: Scales) -> Pictu
     noise = diagnosis.heldout.floor_rms * factor
     axes.axvspan(0, noise, color=SHADE, lw=0)
     axes.annotate(f"noise {scales.torque.number(diagnosis.heldout.floor_rms)}", (noise, 1), (0, 5), **_OVER, ha="right")
+    axes.set_xlim(0, _right(rows, noise, factor))
     for place, row in enumerate(rows):
         _pair(axes, place, row, factor)
     _rows(axes, [_short(row.label) for row in rows])
-    most = max([row.before for row in rows] + [row.after for row in rows], default=1.0) * factor
-    axes.set_xlim(0, max(most * 1.12, noise * 1.2))
     axes.set_xlabel(f"RMS {_quantity(diagnosis)} error [{unit}]")
     return sheet.picture(proof_words(rows), proof_words(rows))
 
 
-_OVER = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "color": GREY}
+_OVER: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "color": GREY}
 
 
 def _pair(axes: "Axes", place: int, row: Part, factor: float) -> None:
     before, after = row.before * factor, row.after * factor
     axes.plot([before, after], [place, place], color=GREY, lw=1.2, zorder=2)
     axes.plot(before, place, "s", ms=8, mfc="white", mec=BEFORE, mew=1.8, zorder=3)
+    if before == after:
+        return
     axes.plot(after, place, "o", ms=8, color=AFTER, mew=0, zorder=4)
-    if row.change != "better" and before != after:
-        right = max(before, after)
-        crowded = right > 0.6 * axes.get_xlim()[1] or right > 0
-        at, align = (min(before, after), "right") if crowded else (right, "left")
-        offset = (-9, -4) if align == "right" else (9, -4)
-        axes.annotate(row.change, (at, place), offset, textcoords="offset points", ha=align, weight="bold")
+    if row.change != "better":
+        left = min(before, after) > WORD * axes.get_xlim()[1]
+        at, shift, align = (min(before, after), -9, "right") if left else (max(before, after), 9, "left")
+        axes.annotate(row.change, (at, place), (shift, -4), textcoords="offset points", ha=align, weight="bold")
+
+
+def _right(rows: tuple[Part, ...], noise: float, factor: float) -> float:
+    """Return the end of the axis: room for every mark, and for its word where there is none to the left."""
+    high = [max(row.before, row.after) * factor for row in rows]
+    end = max([1.12 * value for value in high] + [1.2 * noise], default=1.0)
+    low = [min(row.before, row.after) * factor for row in rows]
+    words = [b for a, b, row in zip(low, high, rows, strict=True) if row.change != "better" and a < WORD * end]
+    return max([end, *(value / (1 - WORD) for value in words if rows[0].before != rows[0].after)])
 
 
 def _rows(axes: "Axes", labels: list[str]) -> None:
@@ -67,7 +77,7 @@ def _quantity(diagnosis: Diagnosis) -> str:
 def proof_words(rows: tuple[Part, ...]) -> str:
     """Say in words which rows got better, which did not change and which got worse."""
     if all(row.before == row.after for row in rows):
-        return "One model only: nothing was added. Error on runs the fit never saw."
+        return "Nothing was added to the model. Grey: the noise."
     better = sum(row.change == "better" for row in rows)
     words = [f"Clearly better in {better} of {len(rows)} rows."]
     for change, text in (("no clear change", "No clear change: {}."), ("worse", "Worse: {}.")):
@@ -110,7 +120,7 @@ def _sized(axes: "Axes", place: int, finding: Finding) -> None:
     axes.plot(_inside(size), place, "o", ms=8, mfc=AFTER if found else "white", mec=AFTER if found else MEASURED)
 
 
-_PLATE = {"boxstyle": "square,pad=0.15", "fc": "white", "ec": "none"}
+_PLATE: dict[str, Any] = {"boxstyle": "square,pad=0.15", "fc": "white", "ec": "none"}
 
 
 def _inside(value: float) -> float:

@@ -1,6 +1,6 @@
 """When: missing torque and its band over time, RMS by the second, and the worst seconds as lines."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,8 +19,8 @@ WIDE = 738
 
 def recording(index: int, trace: Trace, scales: Scales, most: tuple[float, float]) -> Picture:
     """Draw missing torque with its 95 % band, then RMS bars before and after; `most` scales all recordings alike."""
-    sheet = Sheet(f"time{index}", 296)
-    top, middle, low = (sheet.axes(top=a, bottom=b) for a, b in ((24, 156), (172, 84), (222, 42)))
+    sheet = Sheet(f"time{index}", 304)
+    top, middle, low = (sheet.axes(top=a, bottom=b) for a, b in ((24, 166), (172, 92), (226, 42)))
     unit = scales.torque
     _missing(top, trace, unit.factor)
     top.set_ylim(-most[0] * unit.factor, most[0] * unit.factor)
@@ -50,7 +50,7 @@ def _times(strips: "tuple[Axes, ...]", trace: Trace) -> None:
     for axes in strips:
         axes.set_xlim(trace.t[0], trace.t[-1])
         axes.set_facecolor(SHADE if trace.heldout else "white")
-        axes.locator_params(axis="y", nbins=4 if axes is strips[0] else 2)
+        axes.locator_params(axis="y", nbins=4 if axes is strips[0] else 1)
         axes.tick_params(labelbottom=axes is strips[-1])
 
 
@@ -94,7 +94,7 @@ def overlay(trace: Trace, span: tuple[float, float], scales: Scales, width: int 
     return sheet.picture(words, words)
 
 
-_LINES: tuple[dict[str, object], ...] = (
+_LINES: tuple[dict[str, Any], ...] = (
     {"color": MEASURED, "lw": 1.4},
     {"color": BEFORE, "lw": 1.6, "dashes": (4, 2)},
     {"color": AFTER, "lw": 1.6},

@@ -1,12 +1,12 @@
 """Where: missing torque over position, speed, direction; and over angle and speed together."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cosim.diagnosis.report.derive import Samples, grid, slow
 from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.sheet import AFTER, BEFORE, GREY, LINE, MEASURED, Picture, Sheet, heading
+from cosim.diagnosis.report.sheet import AFTER, BEFORE, GREY, LINE, MEASURED, Picture, Sheet, degrees, heading
 from cosim.diagnosis.result import Array, Region
 
 if TYPE_CHECKING:
@@ -49,6 +49,7 @@ def _along(axes: "Axes", before: Region, after: Region | None, scales: Scales, n
         axes.fill_between(side.centres * unit.factor, mean - band, mean + band, color=colour, alpha=0.22, lw=0)
         axes.plot(side.centres * unit.factor, mean, color=colour, dashes=style)
     unseen = never(axes, x, np.isfinite(before.mean))
+    degrees(axes, unit.unit)
     axes.set_xlabel(f"{name} [{unit.unit}]" if unit.unit else name)
     return "Mean with its 95 % band." + (" Hatched: the machine never went there." if unseen else "")
 
@@ -76,7 +77,15 @@ def _sides(axes: "Axes", before: Region, after: Region | None, scales: Scales) -
         if side is None:
             continue
         fill = "white" if mark == "s" else colour
-        style = {"ms": 8, "mfc": fill, "mec": colour, "ecolor": colour, "elinewidth": 1.6, "lw": 0, "mew": 1.8}
+        style: dict[str, Any] = {
+            "ms": 8,
+            "mfc": fill,
+            "mec": colour,
+            "ecolor": colour,
+            "elinewidth": 1.6,
+            "lw": 0,
+            "mew": 1.8,
+        }
         place = np.arange(len(side.mean)) + shift
         axes.errorbar(place, side.mean * factor, yerr=side.band * factor, marker=mark, **style)
     axes.set_xticks(range(len(before.centres)), [_direction(value) for value in before.centres])
@@ -98,6 +107,7 @@ def plane(name: str, chosen: Samples, residual: Array, scales: Scales, most: flo
     top = most or float(np.nanmax(np.abs(mean)))
     _cells(axes, mean, q * scales.position.factor, v * scales.speed.factor, top, BEFORE if before else AFTER)
     axes.grid(visible=False)
+    degrees(axes, scales.position.unit)
     axes.set_xlabel(f"position [{scales.position.unit}]")
     heading(axes, f"speed [{scales.speed.unit}]")
     caption = f"Mean error, marked + and −; darkest {scales.torque.text(top)}. {_never(mean)}".strip()

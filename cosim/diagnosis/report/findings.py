@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from cosim.diagnosis.report import tables, words
 from cosim.diagnosis.report.equations import EQUATIONS
-from cosim.diagnosis.report.quantities import Scales
+from cosim.diagnosis.report.quantities import Scales, minus
 from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.result import Diagnosis, Finding
 
@@ -29,6 +29,8 @@ class Shown:
     numbers: tuple[Numbers, ...]
     picture: Picture | None
     do: str
+    size: str
+    size_range: str
 
 
 def block(one: words.Block, diagnosis: Diagnosis, scales: Scales, picture: Picture | None) -> Shown:
@@ -41,12 +43,20 @@ def block(one: words.Block, diagnosis: Diagnosis, scales: Scales, picture: Pictu
     rows += [("Ruled out", ", ".join(first.ruled_out)), ("Tell apart", _apart(one)), ("Do this", _do(one, diagnosis))]
     closed = tuple(_numbers(finding) for finding in one.findings)
     filled = tuple((name, text) for name, text in rows if text)
-    return Shown(one, tuple(filter(None, said)), filled, closed, picture, _do(one, diagnosis))
+    return Shown(
+        one,
+        tuple(filter(None, said)),
+        filled,
+        closed,
+        picture,
+        _do(one, diagnosis),
+        *map(minus, (first.size, first.size_range)),
+    )
 
 
 def _size(finding: Finding) -> str:
     span = f", 95 % range {finding.size_range}" if finding.size_range else ""
-    return f"{finding.size}{span}" if finding.size else ""
+    return minus(f"{finding.size}{span}") if finding.size else ""
 
 
 def where(finding: Finding, scales: Scales) -> str:
@@ -77,7 +87,9 @@ def _do(one: words.Block, diagnosis: Diagnosis) -> str:
 def _numbers(finding: Finding) -> Numbers:
     lines = [f"Share of the cross-validated training error it removes: {100 * finding.gain:.0f} %."]
     if finding.answer in ("found", "ambiguous"):
-        lines.append(f"Probability {finding.probability:.2f}, calibrated on concealed cases: cosim prove prints the score.")
+        lines.append(
+            f"Probability {finding.probability:.2f}, calibrated on concealed cases: cosim prove prints the score."
+        )
     limit = words.shows_from(finding)
     lines += [f"Would have shown from {limit}."] if limit else []
     lines.append("Ranges: block bootstrap, 95 %.")

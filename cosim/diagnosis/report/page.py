@@ -16,7 +16,7 @@ from cosim.diagnosis.report.figures_proof import looked_for, proof
 from cosim.diagnosis.report.figures_time import WIDE, overlay, recording
 from cosim.diagnosis.report.figures_where import plane, region, strongest
 from cosim.diagnosis.report.findings import block
-from cosim.diagnosis.report.quantities import Scales, joined, number
+from cosim.diagnosis.report.quantities import Scales, joined
 from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.result import Diagnosis, Trace
 
@@ -65,12 +65,14 @@ def identity(diagnosis: Diagnosis) -> list[dict[str, str]]:
 
 
 def _rate(hertz: float) -> str:
-    return joined(number(hertz / 1000, 4), "kHz") if hertz >= 1000 else joined(number(hertz, 4), "Hz")
+    return joined(f"{hertz / 1000:.4g}", "kHz") if hertz >= 1000 else joined(f"{hertz:.4g}", "Hz")
 
 
 def _with_effects(diagnosis: Diagnosis) -> str:
     found = sum(finding.answer == "found" for finding in diagnosis.findings)
-    return {0: "after (nothing added)", 1: "with the effect"}.get(found, f"with the {words.count(found).lower()} effects")
+    return {0: "after (nothing added)", 1: "with the effect"}.get(
+        found, f"with the {words.count(found).lower()} effects"
+    )
 
 
 def _box(diagnosis: Diagnosis, worse: list[str], scales: Scales) -> dict[str, str] | None:
@@ -79,7 +81,9 @@ def _box(diagnosis: Diagnosis, worse: list[str], scales: Scales) -> dict[str, st
     if not file:
         return None
     proven = words.proven_range(diagnosis, scales)
-    text = f"is proven {proven}. Elsewhere, keep the delivered model." if proven else "is proven on the unseen runs only."
+    text = (
+        f"is proven {proven}. Elsewhere, keep the delivered model." if proven else "is proven on the unseen runs only."
+    )
     return {"file": file, "text": text + (f" It is worse here: {', '.join(worse)}." if worse else "")}
 
 
@@ -123,7 +127,8 @@ def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     held, unit = diagnosis.heldout, scales.torque
     rest = float(np.sqrt(max(held.after_rms**2 - held.floor_rms**2, 0.0)))
     if rest <= 0.5 * held.floor_rms:
-        left = f"Hardly anything: {unit.text(held.after_rms)} error on unseen runs, {unit.text(held.floor_rms)} of it noise."
+        error, noise = unit.text(held.after_rms), unit.text(held.floor_rms)
+        left = f"Hardly anything: {error} of error on unseen runs against {noise} of noise."
     else:
         left = f"{unit.text(rest)} of error on unseen runs stays unexplained, beyond the noise."
     goes = f"It goes with {', '.join(diagnosis.depends_on)}." if diagnosis.depends_on else ""
@@ -152,7 +157,10 @@ def _time(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, An
     """Return when, and the worst seconds."""
     traces = sorted((t for t in diagnosis.traces if t.t.size > 1), key=lambda trace: not trace.heldout)
     shown, hidden = traces[:MOST_RECORDINGS], traces[MOST_RECORDINGS:]
-    most = max((_most(trace)[0] for trace in shown), default=1.0), max((_most(trace)[1] for trace in shown), default=1.0)
+    most = (
+        max((_most(trace)[0] for trace in shown), default=1.0),
+        max((_most(trace)[1] for trace in shown), default=1.0),
+    )
     span = worst(traces[0], traces[0].tau - traces[0].after)
     return {
         "times": [recording(place, trace, scales, most) for place, trace in enumerate(shown)],
@@ -175,7 +183,10 @@ def _end(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any
     script = here.joinpath("explorer.js").read_text("utf-8")
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
     told = [made.get("date", ""), f"cosim {made['version']}" if made.get("version") else ""]
-    told += [f"seed {made['seed']}" if "seed" in made else "", f"{diagnosis.seconds:.1f} s" if diagnosis.seconds else ""]
+    told += [
+        f"seed {made['seed']}" if "seed" in made else "",
+        f"{diagnosis.seconds:.1f} s" if diagnosis.seconds else "",
+    ]
     return {
         "parameters": tables.parameters(diagnosis),
         "parameters_sentence": "The base was refitted on the training recordings before any effect was tested.",
@@ -196,4 +207,5 @@ def _law(diagnosis: Diagnosis) -> str:
     if not law.get("proposed"):
         return ""
     gain = f"; it removes {100 * float(law['gain']):.0f} % of the error" if law.get("gain") else ""
-    return f"Friction law: {law['proposed']} fits better than {law.get('base', 'the base')}{gain}. This is no missing effect."
+    base = law.get("base", "the base")
+    return f"Friction law: {law['proposed']} fits better than {base}{gain}. This is no missing effect."

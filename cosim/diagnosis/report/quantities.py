@@ -1,5 +1,6 @@
 """Numbers as a mechanic reads them: SI inside, degrees and milli-units only on the page."""
 
+import re
 from dataclasses import dataclass
 from math import floor, isfinite, log10, pi
 
@@ -86,6 +87,16 @@ def number(value: float, digits: int = 2) -> str:
     if not -5 <= places <= 7:
         return f"{value:.{digits - 1}e}".replace("-", "−")
     return _fixed(round(value, places), max(places, 0))
+
+
+def trimmed(text: str) -> str:
+    """Return a number without zeros at its end: a limit is no measurement."""
+    return text.rstrip("0").rstrip(".") if "." in text and "e" not in text else text
+
+
+def minus(text: str) -> str:
+    """Return text whose negative numbers have a true minus sign."""
+    return re.sub(r"(?<![\w.])-(?=[\d.])", "−", text)
 
 
 def decimals(values: tuple[float, ...], digits: int = 2) -> tuple[str, ...]:

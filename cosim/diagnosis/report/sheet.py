@@ -1,4 +1,5 @@
-"""A matplotlib figure whose unit is one CSS pixel, written as an SVG small enough to inline.
+"""
+A matplotlib figure whose unit is one CSS pixel, written as an SVG small enough to inline.
 
 matplotlib is imported on use only: the rest of the package must not wait for it.
 """
@@ -22,7 +23,7 @@ GREY, LINE, SHADE = "#5A6068", "#C9CED3", "#EEF0F1"
 COLUMN = 356
 """Width of a figure: the width of a phone, and a third of a desk."""
 
-STYLE: dict[str, Any] = {
+STYLE: Any = {
     "svg.fonttype": "none",
     "svg.hashsalt": "cosim",
     "text.parse_math": False,
@@ -99,14 +100,25 @@ def heading(axes: "Axes", text: str) -> None:
     axes.annotate(text, (0, 1), (-34, 12), xycoords="axes fraction", textcoords="offset points", color=GREY)
 
 
+def degrees(axes: "Axes", unit: str) -> None:
+    """Set ticks of an angle at parts of a turn."""
+    from matplotlib.ticker import MultipleLocator
+
+    low, high = axes.get_xlim()
+    if unit == "°" and high - low > 100:
+        steps = (30, 45, 90, 180, 360, 720, 1800, 3600)
+        axes.xaxis.set_major_locator(MultipleLocator(next((s for s in steps if (high - low) / s <= 6), 36000)))
+
+
 def thin(x: Array, y: Array, buckets: int) -> tuple[Array, Array]:
-    """Return at most two points a bucket, its smallest and largest value in the order they came."""
-    size = len(y) // buckets
+    """Return the last point and, of each bucket, its smallest and largest value in the order they came."""
+    size = -(-len(y) // buckets)
     if size < 3:
         return x, y
-    rows = y[: size * buckets].reshape(buckets, size)
+    rows = np.pad(y, (0, -len(y) % size), mode="edge").reshape(-1, size)
     picks = np.sort(np.stack([rows.argmin(axis=1), rows.argmax(axis=1)], axis=1), axis=1)
-    index = (picks + np.arange(buckets)[:, None] * size).ravel()
+    index = np.minimum((picks + np.arange(len(rows))[:, None] * size).ravel(), len(y) - 1)
+    index = np.append(index, len(y) - 1)
     return x[index], y[index]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from cosim.diagnosis.report.derive import Part, bars
 from cosim.diagnosis.report.equations import CONDITIONS
-from cosim.diagnosis.report.quantities import Scales, decimals, number
+from cosim.diagnosis.report.quantities import Scales, decimals, minus, number
 from cosim.diagnosis.report.words import ANSWERS, lowered, shows_from
 from cosim.diagnosis.result import Diagnosis, Finding, Trace
 
@@ -24,8 +24,8 @@ class Table:
 
 def looked(diagnosis: Diagnosis) -> Table:
     """List every effect with its answer and what it would have shown from, or why it cannot be tested."""
-    rows = tuple((f.title, ANSWERS.get(f.answer, f.answer), f.size, _from(f)) for f in diagnosis.findings)
-    return Table(("Effect", "Answer", "Size", "Would have shown from, or what is missing"), rows)
+    rows = tuple((f.title, ANSWERS.get(f.answer, f.answer), minus(f.size), _from(f)) for f in diagnosis.findings)
+    return Table(("Effect", "Answer", "Size", "Would have shown from, or what is missing"), rows, (), "stack tight")
 
 
 def _from(finding: Finding) -> str:
@@ -40,7 +40,9 @@ def limits(diagnosis: Diagnosis) -> Table:
     unseen = [finding for finding in diagnosis.findings if finding.answer == "not_seen"]
     rows = [(ANSWERS["not_seen"], finding.title, shows_from(finding) or "–") for finding in unseen[:9]]
     rows += [(ANSWERS["not_testable"], f.title, _from(f)) for f in diagnosis.findings if f.answer == "not_testable"][:4]
-    return Table(("Effect", "Answer", "Would have shown from"), tuple((name, answer, text) for answer, name, text in rows))
+    return Table(
+        ("Effect", "Answer", "Would have shown from"), tuple((name, answer, text) for answer, name, text in rows)
+    )
 
 
 def numbers(finding: Finding) -> Table:
@@ -49,7 +51,9 @@ def numbers(finding: Finding) -> Table:
     for name, value in finding.parameters.items():
         error, ends = finding.standard_errors.get(name), finding.ranges.get(name)
         span = " to ".join(decimals(ends, 3)) if ends else ""
-        rows.append((name, number(value, 4), number(error) if error is not None else "", span, finding.units.get(name, "")))
+        rows.append(
+            (name, number(value, 4), number(error) if error is not None else "", span, finding.units.get(name, ""))
+        )
     return Table(("Parameter", "Value", "Standard error", "95 % range", "Unit"), tuple(rows), (1, 2, 3), "")
 
 
@@ -65,7 +69,9 @@ def proof(diagnosis: Diagnosis, scales: Scales) -> Table:
     if held.position:
         cells = _cells(held.position, names, scales.position.factor)
         rows.append((f"Position, closed loop [{scales.position.unit}]", *cells))
-    return Table(("Held-out recording", "As delivered", "Refitted", "With the effects", "Noise"), tuple(rows), (1, 2, 3, 4))
+    return Table(
+        ("Held-out recording", "As delivered", "Refitted", "With the effects", "Noise"), tuple(rows), (1, 2, 3, 4)
+    )
 
 
 def _cells(found: dict[str, float], names: tuple[str, ...], factor: float) -> tuple[str, ...]:
@@ -111,7 +117,10 @@ def parameters(diagnosis: Diagnosis) -> Table:
 def files(diagnosis: Diagnosis) -> Table:
     """List the recordings and the card with their hashes."""
     rows = []
-    for entry in (*diagnosis.provenance.get("recordings", ()), {**diagnosis.provenance.get("card", {}), "role": "model card"}):
+    for entry in (
+        *diagnosis.provenance.get("recordings", ()),
+        {**diagnosis.provenance.get("card", {}), "role": "model card"},
+    ):
         seconds, rate = entry.get("seconds"), entry.get("rate_hz")
         size = f"{seconds:g} s at {rate:g} Hz" if seconds and rate else ""
         if entry.get("name"):

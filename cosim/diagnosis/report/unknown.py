@@ -35,12 +35,14 @@ def place(region: Region, scales: Scales) -> str:
     """Say where the mean missing torque stands out of its band: beyond half of its peak."""
     size = np.abs(np.nan_to_num(region.mean))
     loud = (size > np.nan_to_num(region.band)) & (size > 0.5 * size.max())
+    if region.axis == "speed":
+        loud = np.convolve(loud, np.ones(5), "same") > 1
     if region.axis == "direction":
         return _direction(region, loud)
-    if not loud.any() or loud.sum() > 0.6 * np.isfinite(region.mean).sum():
-        return f"every {NAMES.get(region.axis, region.axis)}" if loud.any() else ""
+    if not loud.any() or len(runs(loud)) > 3 or loud.sum() > 0.6 * np.isfinite(region.mean).sum():
+        return f"every {NAMES.get(region.axis, region.axis)}" if loud.any() and region.axis == "speed" else ""
     unit, half = scales.of_unit(region.unit), 0.5 * float(np.median(np.diff(region.centres)))
-    spans = [unit.span(region.centres[low] - half, region.centres[high] + half) for low, high in runs(loud)[:3]]
+    spans = [unit.span(region.centres[low] - half, region.centres[high] + half) for low, high in runs(loud)]
     return f"{NAMES.get(region.axis, region.axis)} {' and '.join(spans)}"
 
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from cosim.diagnosis.report.quantities import Scales, joined, number
+from cosim.diagnosis.report.quantities import Scales, joined, number, trimmed
 from cosim.diagnosis.result import Diagnosis, Finding
 
 COUNTS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
@@ -170,7 +170,7 @@ def improvement(diagnosis: Diagnosis, scales: Scales) -> str:
 
 
 def proven_range(diagnosis: Diagnosis, scales: Scales) -> str:
-    """Return where the improved model is proven, for example "from 20 to 90 °/s and from 0 to 270°"; empty if unknown."""
+    """Return where the improved model is proven, for example "from 20 to 90°/s"; empty if unknown."""
     said = []
     for name, scale in (("speed", scales.speed), ("position", scales.position)):
         ends = diagnosis.improved.get(name)
@@ -183,7 +183,7 @@ def shows_from(finding: Finding) -> str:
     """Return the smallest size that would have shown, with the unit of the size."""
     if finding.visible_from is None:
         return ""
-    return joined(number(finding.visible_from), unit_of(finding))
+    return joined(trimmed(number(finding.visible_from)), unit_of(finding))
 
 
 def unit_of(finding: Finding) -> str:
