@@ -66,7 +66,7 @@ def draw_pace(rng: np.random.Generator, duration: float) -> Pace:
     return Pace(float(rng.uniform(-1, 1)), amplitude, hertz, duration)
 
 
-def draw_motions(rng: np.random.Generator, pace: Pace, tremble: float = 0.25) -> dict[str, Motion]:
+def draw_motions(rng: np.random.Generator, pace: Pace, tremble: float = 0.35) -> dict[str, Motion]:
     """Two kinds for training, a third held out; each with short bursts of tremble that excite the drive."""
     kinds = zip(RECORDINGS, ["wander", "slews", str(rng.choice(["swell", "chirp"]))], strict=True)
     return {name: shaken(MOTIONS[kind](pace, rng), rng, tremble) for name, kind in kinds}

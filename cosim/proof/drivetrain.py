@@ -68,10 +68,10 @@ def _expected_torque(bench: Bench, motion: Motion) -> Array:
 
 def torque_saturation(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """The drive gives less than asked for at high torque."""
-    mount, slope = bench.mount, float(rng.uniform(0.2, 0.5))
+    mount, slope = bench.mount, float(rng.uniform(0.3, 0.6))
     *train, heldout = (float(np.quantile(_expected_torque(bench, motion), 0.98)) for motion in bench.motions.values())
     peak = min(max(train), heldout)
-    mount |= {"knee": peak * (1 - min(0.7, size * float(rng.uniform(0.3, 0.45)))), "knee_slope": slope}
+    mount |= {"knee": peak * (1 - min(0.7, size * float(rng.uniform(0.15, 0.3)))), "knee_slope": slope}
     return {"knee_torque": mount["knee"], "slope": slope}
 
 

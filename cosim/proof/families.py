@@ -135,7 +135,7 @@ def dwell_breakaway(bench: Bench, rng: np.random.Generator, size: float) -> Para
 
 def quadratic_drag(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """Wind of its own making."""
-    bench.mount["quadratic"] = 1.3 * goal(bench, rng, size) / root_mean_square(bench.training.v**2)
+    bench.mount["quadratic"] = 2.5 * goal(bench, rng, size) / root_mean_square(bench.training.v**2)
     return {"coefficient": bench.mount["quadratic"]}
 
 
