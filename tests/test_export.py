@@ -61,7 +61,7 @@ CASES = {
     "reversal": (models.lugre, 0.5, {"drive": -4.0}, {"speed": 0.05}, (1e-2, 1e-1, 1e-5)),
     "presliding": (models.lugre, 0.5, {"drive": 1.0}, {}, (1e-5, 1e-4, 1e-5)),
     "stiff": (models.van_der_pol, 70.0, {}, {}, (1.0, 1e-2)),
-    "relaxation jumps": (models.van_der_pol, 30.0, {}, {"mu": 10.0}, (1.0, 1.0)),
+    "relaxation jumps": (models.van_der_pol, 12.0, {}, {"mu": 10.0}, (1.0, 1.0)),
     "explicit in time": (models.oscillator, 3.0, {"force": 0.3}, {}, (1.0, 1.0)),
 }
 

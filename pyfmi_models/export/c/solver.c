@@ -58,15 +58,16 @@ static int largest_in_column(int n, const double *m, int column) {
     return pivot;
 }
 
-/* LU with row exchange, in place, by columns. Returns 0 if the matrix is regular. */
+/* LU with row exchange, in place, by columns; the diagonal keeps reciprocals, for `solve` to multiply six times.
+ * Returns 0 if the matrix is regular. */
 static int factorise(int n, double *m, int *pivots) {
     for (int k = 0; k < n; k++) {
         int pivot = pivots[k] = largest_in_column(n, m, k);
         if (!(fabs(m[pivot + k * n]) > 0)) return 1;
         if (pivot != k)
             for (int j = 0; j < n; j++) swap(&m[k + j * n], &m[pivot + j * n]);
-        double reciprocal = 1 / m[k + k * n];
-        for (int i = k + 1; i < n; i++) m[i + k * n] *= reciprocal;
+        m[k + k * n] = 1 / m[k + k * n];
+        for (int i = k + 1; i < n; i++) m[i + k * n] *= m[k + k * n];
         for (int j = k + 1; j < n; j++)
             for (int i = k + 1; i < n; i++) m[i + j * n] -= m[i + k * n] * m[k + j * n];
     }
@@ -75,11 +76,15 @@ static int factorise(int n, double *m, int *pivots) {
 
 static void solve(int n, const double *m, const int *pivots, double *b) {
     for (int k = 0; k < n; k++) swap(&b[k], &b[pivots[k]]);
-    for (int k = 0; k < n; k++)
-        for (int i = k + 1; i < n; i++) b[i] -= m[i + k * n] * b[k];
+    for (int k = 0; k < n; k++) {
+        const double *column = m + k * n;
+        double known = b[k];
+        for (int i = k + 1; i < n; i++) b[i] -= column[i] * known;
+    }
     for (int k = n - 1; k >= 0; k--) {
-        b[k] /= m[k + k * n];
-        for (int i = 0; i < k; i++) b[i] -= m[i + k * n] * b[k];
+        const double *column = m + k * n;
+        double known = b[k] *= column[k];
+        for (int i = 0; i < k; i++) b[i] -= column[i] * known;
     }
 }
 
@@ -96,8 +101,9 @@ static SolverResult prepare(const Solver *solver, const Work *work, double time,
 static void combine(int n, int stages, const double *weights, const double *u, const double *base, double factor,
                     double *result) {
     for (int i = 0; i < n; i++) {
+        const double *entry = u + i;
         double total = 0;
-        for (int j = 0; j < stages; j++) total += weights[j] * u[i + j * n];
+        for (int j = 0; j < stages; j++, entry += n) total += weights[j] * *entry;
         result[i] = base[i] + factor * total;
     }
 }
