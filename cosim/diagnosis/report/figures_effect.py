@@ -63,7 +63,9 @@ def folded(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
 def dots(axes: "Axes", x: Array, y: Array, most: int = 600) -> None:
     """Scatter evenly picked samples of the error before, and keep single ones from stretching the axis."""
     pick = np.linspace(0, len(x) - 1, min(most, len(x))).astype(int)
-    broken = [np.column_stack([side[pick], side[pick], np.full(len(pick), np.nan)]).ravel() for side in (x, y)]
+    apart = 0.001 * float(np.ptp(x))
+    ends = ((x[pick], x[pick] + apart), (y[pick], y[pick]))
+    broken = [np.column_stack([*pair, np.full(len(pick), np.nan)]).ravel() for pair in ends]
     axes.plot(*broken, lw=2.2, solid_capstyle="round", color=BEFORE, alpha=0.55, zorder=1)
     low, high = np.quantile(y, (0.005, 0.995))
     axes.set_ylim(low - 0.05 * (high - low), high + 0.05 * (high - low))

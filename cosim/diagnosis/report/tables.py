@@ -19,13 +19,13 @@ class Table:
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     numeric: tuple[int, ...] = ()
-    style: str = "stack"
+    style: str = "stack named"
 
 
 def looked(diagnosis: Diagnosis) -> Table:
     """List every effect with its answer and what it would have shown from, or why it cannot be tested."""
     rows = tuple((f.title, ANSWERS.get(f.answer, f.answer), minus(f.size), _from(f)) for f in diagnosis.findings)
-    return Table(("Effect", "Answer", "Size", "Would have shown from, or what is missing"), rows, (), "stack tight")
+    return Table(("Effect", "Answer", "Size", "Shows from, or why not"), rows, (), "stack named tight")
 
 
 def _from(finding: Finding) -> str:
@@ -54,7 +54,15 @@ def numbers(finding: Finding) -> Table:
         rows.append(
             (name, number(value, 4), number(error) if error is not None else "", span, finding.units.get(name, ""))
         )
-    return Table(("Parameter", "Value", "Standard error", "95 % range", "Unit"), tuple(rows), (1, 2, 3), "")
+    return filled(Table(("Parameter", "Value", "Standard error", "95 % range", "Unit"), tuple(rows), (1, 2, 3), ""))
+
+
+def filled(table: Table) -> Table:
+    """Leave out the columns in which no row says anything."""
+    keep = [i for i, _ in enumerate(table.columns) if any(row[i] for row in table.rows)]
+    rows = tuple(tuple(row[i] for i in keep) for row in table.rows)
+    numeric = tuple(place for place, i in enumerate(keep) if i in table.numeric)
+    return Table(tuple(table.columns[i] for i in keep), rows, numeric, table.style)
 
 
 def proof(diagnosis: Diagnosis, scales: Scales) -> Table:
@@ -83,7 +91,7 @@ def parts(rows: Sequence[Part], scales: Scales) -> Table:
     """List the rows of the proof figure as numbers."""
     unit = scales.torque
     cells = [(row.label, *decimals((row.before * unit.factor, row.after * unit.factor), 3), row.change) for row in rows]
-    return Table(("Part", f"Before [{unit.unit}]", f"After [{unit.unit}]", "Change"), tuple(cells), (1, 2))
+    return Table(("Part", f"Before [{unit.unit}]", f"After [{unit.unit}]", "Change"), tuple(cells), (1, 2), "narrow")
 
 
 def spans(diagnosis: Diagnosis) -> Table:
@@ -91,7 +99,7 @@ def spans(diagnosis: Diagnosis) -> Table:
     found = [(trace.name, low, high) for trace in diagnosis.traces for low, high in trace.intervals]
     found.sort(key=lambda row: row[1] - row[2])
     rows = tuple((name, f"{low:.2f}", f"{high:.2f}", f"{high - low:.2f}") for name, low, high in found[:40])
-    return Table(("Recording", "From [s]", "To [s]", "Length [s]"), rows, (1, 2, 3))
+    return Table(("Recording", "From [s]", "To [s]", "Length [s]"), rows, (1, 2, 3), "narrow")
 
 
 def worst(trace: Trace, scales: Scales) -> Table:
@@ -102,7 +110,7 @@ def worst(trace: Trace, scales: Scales) -> Table:
     rows = tuple(
         (f"{edges[i]:.0f} to {edges[i + 1]:.0f} s", *decimals((before[i] * factor, after[i] * factor))) for i in order
     )
-    return Table(("Worst seconds", "Before", f"After [{scales.torque.unit}]"), rows, (1, 2))
+    return Table(("Worst seconds", "Before", f"After [{scales.torque.unit}]"), rows, (1, 2), "narrow")
 
 
 def parameters(diagnosis: Diagnosis) -> Table:
@@ -125,7 +133,7 @@ def files(diagnosis: Diagnosis) -> Table:
         size = f"{seconds:g} s at {rate:g} Hz" if seconds and rate else ""
         if entry.get("name"):
             rows.append((str(entry["name"]), str(entry.get("role", "")), size, str(entry.get("sha256", ""))))
-    return Table(("File", "Role", "Length", "SHA-256"), tuple(rows), (), "stack hash")
+    return Table(("File", "Role", "Length", "SHA-256"), tuple(rows), (), "stack named hash")
 
 
 def unseen(diagnosis: Diagnosis) -> str:
