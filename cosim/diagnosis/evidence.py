@@ -16,11 +16,13 @@ from scipy.linalg import solve_toeplitz
 from cosim.diagnosis.prepare import Array, Prepared
 
 BLOCK_SECONDS = 5.0
-AR_ORDER = 12
+AR_ORDER = 8
+SPEED_BINS = 16
 FOLDS = 4
 """Folds of a single training recording; with several, each recording is a fold."""
 
 Index = npt.NDArray[np.int64]
+Mask = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -49,37 +51,52 @@ class Blocks:
 
 @dataclass(frozen=True)
 class Whitening:
-    """One autoregressive prediction-error filter a recording: coefficients and innovation RMS."""
+    """How the noise looks: one autoregressive prediction-error filter a recording, and a scale that depends on speed.
+
+    Friction is least certain where the motion turns, so the innovations are larger at low speed; `scale` holds their
+    RMS at every row.
+    """
 
     filters: dict[int, tuple[Array, float]]
+    scale: Array
 
     @classmethod
-    def of(cls, residual: Array, blocks: Blocks, order: int = AR_ORDER) -> "Whitening":
-        """Estimate the filters from a residual at the kept rows (Yule-Walker)."""
-        filters = {}
-        for number in np.unique(blocks.recording):
-            rows = np.concatenate(
-                [r for r, owner in zip(blocks.rows, blocks.recording, strict=True) if owner == number]
-            )
-            filters[int(number)] = _yule_walker(residual[rows], order)
-        return cls(filters)
+    def of(cls, residual: Array, blocks: Blocks, speed: Array) -> "Whitening":
+        """Estimate the filters (Yule-Walker) and the scale from a residual at the kept rows moving at `speed`."""
+        owners = zip(blocks.rows, blocks.recording.tolist(), strict=True)
+        rows_of: dict[int, list[Index]] = {}
+        for rows, owner in owners:
+            rows_of.setdefault(owner, []).append(rows)
+        filters = {owner: _yule_walker(residual[np.concatenate(rows)]) for owner, rows in rows_of.items()}
+        plain = cls(filters, np.ones(len(residual)))
+        white = np.concatenate(plain.apply(residual[:, None], blocks))[:, 0]
+        used = np.concatenate([rows[AR_ORDER:] for rows in blocks.rows])
+        return cls(filters, _scale_by_speed(white, np.abs(speed[used]), np.abs(speed)))
 
     def apply(self, columns: Array, blocks: Blocks) -> list[Array]:
-        """Whiten columns (rows, n) block by block; each block loses its first `order` rows."""
+        """Whiten columns (rows, n) block by block; each block loses its first `AR_ORDER` rows."""
         return [
-            _filtered(columns[rows], *self.filters[int(owner)])
-            for rows, owner in zip(blocks.rows, blocks.recording, strict=True)
+            _filtered(columns[rows], *self.filters[owner]) / self.scale[rows[AR_ORDER:], None]
+            for rows, owner in zip(blocks.rows, blocks.recording.tolist(), strict=True)
         ]
 
 
-def _yule_walker(x: Array, order: int) -> tuple[Array, float]:
+def _scale_by_speed(white: Array, at: Array, speed: Array) -> Array:
+    """RMS of innovations in speed bins of equal count, joined by straight lines; at least a fifth of the median."""
+    parts = [part for part in np.array_split(np.argsort(at), SPEED_BINS) if len(part)]
+    centre = np.array([float(np.median(at[part])) for part in parts])
+    size = np.array([float(np.sqrt(np.mean(white[part] ** 2))) for part in parts])
+    return np.interp(speed, centre, np.maximum(size, 0.2 * np.median(size) + 1e-300))
+
+
+def _yule_walker(x: Array) -> tuple[Array, float]:
     x = x - x.mean()
-    length = len(x)
+    order, length = AR_ORDER, len(x)
     padded = np.fft.rfft(x, 2 * length)
     covariance = np.fft.irfft(np.abs(padded) ** 2)[: order + 1] / length
-    covariance[0] *= 1 + 1e-6
+    covariance[0] *= 1 + 1e-3
     if covariance[0] <= 0:
-        return np.array([1.0]), 1.0
+        return np.eye(1, order + 1)[0], 1.0
     predictor = solve_toeplitz(covariance[:order], covariance[1:])
     power = max(covariance[0] - predictor @ covariance[1:], 1e-12 * covariance[0])
     return np.concatenate([[1.0], -predictor]), float(np.sqrt(power))
@@ -95,23 +112,40 @@ def _filtered(columns: Array, taps: Array, scale: float) -> Array:
 
 @dataclass(frozen=True)
 class Score:
-    """What a group of columns earns: cross-validated energy per block without and with it, and its coefficients."""
+    """What an addition earns: cross-validated energy per block without and with it, and the rows of each block.
+
+    Gains are geometric means over blocks, as if each block had its own noise level: a few seconds in which no model is
+    any good must not decide.
+    """
 
     before: Array
     after: Array
-    coefficients: Array
+    rows: Array
+
+    @property
+    def _better(self) -> Array:
+        return self.rows * np.log(np.maximum(self.before, 1e-300) / np.maximum(self.after, 1e-300))
 
     @property
     def gain(self) -> float:
         """Share of the cross-validated energy removed."""
-        return float(1 - self.after.sum() / self.before.sum())
+        return float(1 - np.exp(-self._better.sum() / self.rows.sum()))
 
     @property
     def t(self) -> float:
         """Mean improvement over blocks in units of its standard error."""
-        better = self.before - self.after
-        error = better.std(ddof=1) / np.sqrt(len(better)) if len(better) > 1 else np.inf
-        return float(better.mean() / error) if error > 0 else 0.0
+        return t_value(self._better)
+
+    @property
+    def nats(self) -> float:
+        """Gain of cross-validated log-likelihood."""
+        return float(self._better.sum() / 2)
+
+
+def t_value(better: Array) -> float:
+    """Mean over standard error of the mean."""
+    error = better.std(ddof=1) / np.sqrt(len(better)) if len(better) > 1 else 0.0
+    return float(better.mean() / error) if error > 0 else 0.0
 
 
 class Grams:
@@ -123,39 +157,40 @@ class Grams:
             unit prior variance; they are integrated out.
         blocks: the blocks.
         prior: prior variance of the coefficient of each column but the target (inf: free), in whitened units.
+        nuisance: columns whose coefficients are random per fold: what they can explain of a fold counts neither for
+            nor against a structure.
     """
 
-    def __init__(self, columns: Sequence[Array], wander: Sequence[Array], blocks: Blocks, prior: Array) -> None:
-        self.fold, self.prior = blocks.fold, prior
+    def __init__(
+        self,
+        columns: Sequence[Array],
+        wander: Sequence[Array],
+        blocks: Blocks,
+        prior: Array,
+        nuisance: Sequence[int],
+    ) -> None:
+        self.fold, self.prior, self.nuisance = blocks.fold, prior, np.asarray(nuisance, int)
         self.gram = np.array([_marginal(x, w) for x, w in zip(columns, wander, strict=True)])
-        self.rows = np.array([len(x) for x in columns])
+        self.rows = np.array([float(len(x)) for x in columns])
+        self.folds = [self.fold == fold for fold in np.unique(self.fold)]
 
-    def score(self, base: Sequence[int], extra: Sequence[int], instead: Sequence[int] | None = None) -> Score:
-        """Compare `base + extra` with `instead` (default: base), each fold predicted from the others."""
-        before = self.energy(base if instead is None else instead)
-        after = self.energy([*base, *extra])
-        return Score(before, after, self.fit([*base, *extra])[len(base) :])
-
-    def energy(self, chosen: Sequence[int]) -> Array:
-        """Cross-validated energy of the target in each block."""
+    def energy(self, chosen: Sequence[int], nuisance: Sequence[int] | None = None) -> Array:
+        """Cross-validated energy of the target in each block, each fold predicted from the others."""
         energy = np.zeros(len(self.gram))
-        for fold in np.unique(self.fold):
-            test = self.fold == fold
-            beta = self.fit(chosen, ~test if not test.all() else test)
-            full = np.concatenate([[1.0], -beta])
-            index = np.concatenate([[0], np.asarray(chosen, int)])
-            energy[test] = np.einsum("i,bij,j->b", full, self.gram[test][:, index][:, :, index], full)
+        used = self.nuisance if nuisance is None else np.asarray(nuisance, int)
+        totals = [self.gram[fold].sum(0) for fold in self.folds]
+        reduced = [self._reduced(total, chosen, used) for total in totals]
+        for number, fold in enumerate(self.folds):
+            others = [one for other, one in enumerate(reduced) if other != number] or reduced
+            beta = self._solved(np.sum(others, axis=0), np.asarray(chosen, int))
+            energy[fold] = self._rest(fold, totals[number], chosen, used, beta)
         return energy
 
-    def fit(self, chosen: Sequence[int], blocks: npt.NDArray[np.bool_] | None = None) -> Array:
-        """Coefficients of the chosen columns from the given blocks."""
-        total = self.gram.sum(0) if blocks is None else self.gram[blocks].sum(0)
-        index = np.asarray(chosen, int)
-        normal = total[np.ix_(index, index)] + np.diag(1 / self.prior[index - 1])
-        scale = 1 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
-        scaled = normal * np.outer(scale, scale) + 1e-9 * np.eye(len(index))
-        solution: Array = scale * np.linalg.solve(scaled, scale * total[index, 0])
-        return solution
+    def fit(self, chosen: Sequence[int], nuisance: Sequence[int] | None = None) -> Array:
+        """Coefficients of the chosen columns from all blocks, nuisances fitted per fold."""
+        used = self.nuisance if nuisance is None else np.asarray(nuisance, int)
+        reduced = np.sum([self._reduced(self.gram[fold].sum(0), chosen, used) for fold in self.folds], axis=0)
+        return self._solved(reduced, np.asarray(chosen, int))
 
     def covariance(self, chosen: Sequence[int]) -> Array:
         """Block-robust (sandwich) covariance of the coefficients of the chosen columns."""
@@ -165,6 +200,36 @@ class Grams:
         bread = np.linalg.pinv(self.gram.sum(0)[np.ix_(index, index)] + np.diag(1 / self.prior[index - 1]))
         count = len(scores)
         return np.asarray(bread @ (scores.T @ scores) @ bread * count / max(count - 1, 1))
+
+    def _reduced(self, total: Array, chosen: Sequence[int], used: Index) -> Array:
+        """Gram matrix of target and chosen columns with the nuisances of one fold integrated out."""
+        index = np.concatenate([[0], np.asarray(chosen, int)]).astype(int)
+        kept = total[np.ix_(index, index)]
+        if not len(used):
+            return np.asarray(kept)
+        cross = total[np.ix_(used, index)]
+        return np.asarray(kept - cross.T @ self._solve(total[np.ix_(used, used)], used, cross))
+
+    def _solved(self, reduced: Array, index: Index) -> Array:
+        return self._solve(reduced[1:, 1:], index, reduced[1:, 0])
+
+    def _solve(self, normal: Array, index: Index, target: Array) -> Array:
+        normal = normal + np.diag(1 / self.prior[index - 1])
+        scale = 1 / np.sqrt(np.maximum(np.diag(normal), 1e-300))
+        scaled = normal * np.outer(scale, scale) + 1e-9 * np.eye(len(index))
+        right = (target.T * scale).T
+        return np.asarray((np.linalg.solve(scaled, right).T * scale).T)
+
+    def _rest(self, fold: Mask, total: Array, chosen: Sequence[int], used: Index, beta: Array) -> Array:
+        """Energy that is left in the blocks of a fold, its nuisances fitted to what beta leaves."""
+        full = np.zeros(total.shape[0])
+        full[0], full[np.asarray(chosen, int)] = 1.0, -beta
+        penalty = 0.0
+        if len(used):
+            gamma = self._solve(total[np.ix_(used, used)], used, total[used] @ full)
+            full[used] -= gamma
+            penalty = float(gamma**2 @ (1 / self.prior[used - 1])) / fold.sum()
+        return np.asarray(np.einsum("i,bij,j->b", full, self.gram[fold], full) + penalty)
 
 
 def _marginal(x: Array, w: Array) -> Array:

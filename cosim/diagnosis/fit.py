@@ -8,9 +8,10 @@ much as one standard deviation of the residual in one independent row.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import log
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from scipy.optimize import least_squares
 
 from cosim.diagnosis.inverse import Inverse, stacked
@@ -50,7 +51,14 @@ def free_parameters(mount: Mount, fixed: Sequence[str] = FIXED) -> tuple[str, ..
     return tuple(name for name in known if not name.endswith(tuple(fixed)))
 
 
-def fit(mount: Mount, pieces: Sequence[Piece], weight: Array, prior: Mount | None = None, evaluations: int = 25) -> Fit:
+def fit(
+    mount: Mount,
+    pieces: Sequence[Piece],
+    weight: Array,
+    prior: Mount | None = None,
+    evaluations: int = 25,
+    factor: float = PRIOR_FACTOR,
+) -> Fit:
     """Fit all free parameters of a mount, starting from its numbers.
 
     Args:
@@ -59,6 +67,7 @@ def fit(mount: Mount, pieces: Sequence[Piece], weight: Array, prior: Mount | Non
         weight: weight of each kept row, 0 leaves it out; shape (rows,).
         prior: mount whose numbers the weak prior pulls to (default: the start).
         evaluations: how many evaluations of the model may be spent.
+        factor: a parameter of the base this far from the prior costs one unit (see the module).
 
     Returns:
         The fit; residual = measured - model torque, N m.
@@ -68,21 +77,25 @@ def fit(mount: Mount, pieces: Sequence[Piece], weight: Array, prior: Mount | Non
     known = {variable.name: variable for variable in mount.parameters()}
     start = np.array([known[name].start for name in free])
     scale = np.array([_scale(known[name]) for name in free])
-    pull = _prior(prior or mount, free, float(np.sqrt(np.mean((weight * tau) ** 2))) * 1e-2)
+    pull = _prior(prior or mount, free, float(np.sqrt(np.mean((weight * tau) ** 2))) * 1e-2 / log(factor))
+    # Pieces without weight are only looked at once, at the end.
+    used = _weighted(pieces, weight)
     cache: dict[bytes, tuple[Array, Array]] = {}
 
     def evaluate(u: Array) -> tuple[Array, Array]:
         key = u.tobytes()
         if key not in cache:
             cache.clear()
-            cache[key] = stacked(inverse, pieces, u * scale)
+            cache[key] = stacked(inverse, [pieces[k] for k in used.pieces], u * scale)
         return cache[key]
 
+    tau_used, weight_used = tau[used.rows], weight[used.rows]
+
     def residuals(u: Array) -> Array:
-        return np.concatenate([weight * (tau - evaluate(u)[0]), pull(u * scale)[0]])
+        return np.concatenate([weight_used * (tau_used - evaluate(u)[0]), pull(u * scale)[0]])
 
     def jacobian(u: Array) -> Array:
-        return np.concatenate([-weight[:, None] * evaluate(u)[1] * scale, np.diag(pull(u * scale)[1] * scale)])
+        return np.concatenate([-weight_used[:, None] * evaluate(u)[1] * scale, np.diag(pull(u * scale)[1] * scale)])
 
     low = np.array([known[name].low for name in free]) / scale
     high = np.array([known[name].high for name in free]) / scale
@@ -90,9 +103,36 @@ def fit(mount: Mount, pieces: Sequence[Piece], weight: Array, prior: Mount | Non
     found = least_squares(
         residuals, inner, jacobian, bounds=(low, high), x_scale="jac", max_nfev=evaluations, ftol=1e-4, xtol=1e-5
     )
-    torque, slopes = evaluate(found.x)
     values = found.x * scale
+    torque, slopes = stacked(inverse, pieces, values)
     return Fit(with_values(mount, free, values), free, values, torque, slopes, tau - torque)
+
+
+class _Used(NamedTuple):
+    pieces: list[int]
+    rows: npt.NDArray[np.int64]
+
+
+def _weighted(pieces: Sequence[Piece], weight: Array) -> _Used:
+    edges = np.cumsum([0, *(len(piece.kept) for piece in pieces)])
+    spans = [np.arange(first, last) for first, last in zip(edges[:-1], edges[1:], strict=True)]
+    numbers = [k for k, rows in enumerate(spans) if np.any(weight[rows] > 0)]
+    return _Used(numbers, np.concatenate([spans[k] for k in numbers]))
+
+
+def evaluated(start: Fit, pieces: Sequence[Piece], values: Array) -> Fit:
+    """Return the fit's structure at other parameter values, kept inside their bounds."""
+    known = {variable.name: variable for variable in start.mount.parameters()}
+    bounds = [(known[name].low, known[name].high) for name in start.free]
+    inside = np.array([_inside(value, *edges) for value, edges in zip(values, bounds, strict=True)])
+    torque, slopes = stacked(Inverse(start.mount, start.free), pieces, inside)
+    mount = with_values(start.mount, start.free, inside)
+    return Fit(mount, start.free, inside, torque, slopes, start.residual + start.torque - torque)
+
+
+def _inside(value: float, low: float, high: float) -> float:
+    margin = 1e-6 * max(abs(low) if np.isfinite(low) else 0.0, 1e-3)
+    return float(np.clip(value, low + margin, high - margin if np.isfinite(high) else high))
 
 
 def with_values(mount: Mount, names: Sequence[str], values: Array) -> Mount:
@@ -132,8 +172,8 @@ def _prior(mount: Mount, free: Sequence[str], weight: float) -> Callable[[Array]
     def pull(values: Array) -> tuple[Array, Array]:
         safe = np.where(positive, np.maximum(values, 1e-3 * centre), 1.0)
         return (
-            np.where(positive, weight * np.log(safe / centre) / log(PRIOR_FACTOR), 0.0),
-            np.where(positive, weight / safe / log(PRIOR_FACTOR), 0.0),
+            np.where(positive, weight * np.log(safe / centre), 0.0),
+            np.where(positive, weight / safe , 0.0),
         )
 
     return pull

@@ -9,7 +9,7 @@ of 1.8 N, all of it artefact.
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from math import ceil
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +18,8 @@ from scipy.signal import butter, sosfiltfilt
 from cosim.recording import Recording
 
 Array = npt.NDArray[np.float64]
+CUTOFFS = (100.0, 70.0, 50.0, 40.0, 30.0, 24.0, 19.0, 15.0, 12.0, 10.0, 8.0)
+NOISE_SHARE = 0.003
 LEAST_SECONDS = 2.0
 """A contiguous piece shorter than this is left out."""
 
@@ -134,7 +136,7 @@ def _piece(recording: Recording, index: int, span: slice, cutoff: float) -> Piec
         inside=_inside(grid[::step], float(t[0]), float(t[-1])),
         dt=coarse,
         cutoff=cutoff,
-        stride=max(1, int(1 / (2.2 * cutoff * coarse))),
+        stride=max(1, ceil(1 / (1.4 * cutoff * coarse))),
         extras={n: c[::step] for n, c in table.items() if n not in ("t", "tau", "q", "v")},
     )
 
@@ -164,9 +166,30 @@ def _inside(t: Array, start: float, end: float) -> npt.NDArray[np.bool_]:
     return np.asarray((t >= start + lead) & (t <= end - tail))
 
 
-def noise_of(values: Any, dt: float, cutoff: float) -> float:
-    """RMS of white noise per sample, judged from what lies above six times the cutoff (0 if nothing does)."""
-    nyquist = 0.5 / dt
-    edge = min(6 * cutoff, 0.6 * nyquist)
-    high = sosfiltfilt(butter(4, edge, "highpass", fs=1 / dt, output="sos"), values)
-    return float(np.sqrt(np.mean(high**2) / (1 - edge / nyquist)))
+def choose_cutoff(recordings: Sequence[Recording], inertia: float) -> float:
+    """Widest band in which encoder noise, differentiated twice, is a small torque [Hz].
+
+    Differentiated noise in the model torque is not only error: the controller answers the same noise, and the two
+    together look like a delay. So the band ends where inertia times the noise of the acceleration reaches
+    `NOISE_SHARE` of the torque.
+    """
+    return min(_cutoff(recording, inertia) for recording in recordings)
+
+
+def _cutoff(recording: Recording, inertia: float) -> float:
+    dt, size = recording.sample_time, float(np.std(recording["tau"]))
+    name, power = ("q", 4) if "q" in recording else ("v", 2)
+    noise = noise_of(recording[name], dt)
+    for cutoff in CUTOFFS:
+        if cutoff < 0.3 / dt:
+            omega = 2 * np.pi * cutoff
+            share = 2 * cutoff * dt / (power + 1)
+            if inertia * noise * omega ** (power / 2) * np.sqrt(share) <= NOISE_SHARE * size:
+                return cutoff
+    return CUTOFFS[-1]
+
+
+def noise_of(values: Array, dt: float) -> float:
+    """RMS of white noise per sample, judged from the upper 40 % of the spectrum."""
+    high = sosfiltfilt(butter(4, 0.6 * 0.5 / dt, "highpass", fs=1 / dt, output="sos"), values - values[0])
+    return float(np.sqrt(np.mean(high[20:-20] ** 2) / 0.4))

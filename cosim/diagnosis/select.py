@@ -8,9 +8,7 @@ be trusted.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
-from cosim.diagnosis.evidence import Blocks
+from cosim.diagnosis.evidence import Blocks, Score
 from cosim.diagnosis.fit import Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.structure import Bench, nuisances, screen
@@ -22,6 +20,8 @@ LEAST_GAIN, LEAST_T = 0.03, 1.8
 SURE_GAIN = 0.05
 """... or the share that is enough with a t value of 1."""
 SCREEN_GAIN = 0.004
+SCREEN_SHARE = 0.3
+"""Least linear gain, alone and relative to the best effect's, that makes an effect worth a nonlinear fit."""
 REFINED = 4
 """How many effects are refined by a nonlinear fit in each stage."""
 MOST_EFFECTS = 4
@@ -31,27 +31,21 @@ TIE = 0.96
 
 @dataclass(frozen=True)
 class Trial:
-    """One effect added to (or exchanged in) a structure: the refitted structure and what it gained."""
+    """One effect added to (or exchanged in) a structure: the refitted structure and what it earned."""
 
     effect: str
     fit: Fit
-    before: Array
-    after: Array
+    score: Score
 
     @property
     def gain(self) -> float:
         """Share of the cross-validated energy removed."""
-        return float(1 - self.after.sum() / self.before.sum())
+        return self.score.gain
 
     @property
     def t(self) -> float:
         """Mean improvement over blocks in units of its standard error."""
-        return t_value(self.before - self.after)
-
-    @property
-    def nats(self) -> float:
-        """Gain of cross-validated log-likelihood."""
-        return float((self.before - self.after).sum() / 2)
+        return self.score.t
 
 
 @dataclass(frozen=True)
@@ -66,12 +60,6 @@ class Selection:
     """For each accepted effect, the rivals tried in its place."""
     looked_at: dict[str, Trial] = field(default_factory=dict)
     """The best trial of each effect that was not accepted."""
-
-
-def t_value(better: Array) -> float:
-    """Mean over standard error of the mean."""
-    error = better.std(ddof=1) / np.sqrt(len(better)) if len(better) > 1 else 0.0
-    return float(better.mean() / error) if error > 0 else 0.0
 
 
 def select(
@@ -94,13 +82,13 @@ def select(
         nuisance = nuisances(current, prepared, sample_time)
         screening = screen(current, prepared, blocks, nuisance)
         bench = screening.bench
-        before = bench.energy(current)
+        before = bench.energy(current, weight)
         tried = []
-        for candidate, score in screening.best[:REFINED]:
-            if score.gain < SCREEN_GAIN:
+        for candidate, score, coefficients in screening.best[:REFINED]:
+            if score.gain < max(SCREEN_GAIN, SCREEN_SHARE * screening.best[0][1].gain):
                 break
             say(candidate.effect)
-            width = candidate.start(score.coefficients)
+            width = candidate.start(coefficients)
             tried.append(_trial(current, candidate.effect, width, prepared, weight, bench, before, mount))
         looked_at |= {t.effect: t for t in tried if t.effect not in accepted}
         best = winner([t for t in tried if is_real(t, sample_time)])
@@ -128,7 +116,7 @@ def _trial(
 ) -> Trial:
     mount = replace(current.mount, effects=(*current.mount.effects, effect))
     found = fit(mount, prepared.pieces, weight, prior, evaluations=12)
-    return Trial(name, found, before, bench.energy(found))
+    return Trial(name, found, Score(before, bench.energy(found, weight), bench.rows))
 
 
 def winner(trials: Sequence[Trial]) -> Trial | None:

@@ -13,7 +13,7 @@ import numpy as np
 from cosim.diagnosis.bank import bank
 from cosim.diagnosis.candidates import Candidate, candidates, columns_of
 from cosim.diagnosis.evidence import Blocks, Grams, Score, Whitening
-from cosim.diagnosis.fit import Fit
+from cosim.diagnosis.fit import Fit, fit
 from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import Array, Prepared, derivative
 from pyfmi_models.effects import PeriodicFriction
@@ -48,40 +48,55 @@ class Bench:
     nuisances: Nuisances
     whitening: Whitening
 
-    def energy(self, fit: Fit, shapes: bool = True) -> Array:
-        """Cross-validated energy of a fitted structure in each block."""
-        grams, base = self._grams(fit, [], shapes)
-        return grams.energy(base)
+    def energy(self, found: Fit, weight: Array, shapes: bool = True) -> Array:
+        """Cross-validated energy of a structure in each block: refitted without a fold, judged on it.
 
-    def covariance(self, fit: Fit) -> Array:
-        """Block-robust covariance of the fitted parameters, nuisances integrated out."""
-        grams, base = self._grams(fit, [], True)
-        count = len(fit.free)
-        return grams.covariance(base)[:count, :count]
+        What the nuisances can explain of a fold is taken off; leave the speed shapes out of them (`shapes` False) when
+        they are what the structure itself adds.
+        """
+        residual = np.empty_like(found.residual)
+        folds = np.unique(self.blocks.fold)
+        for fold in folds:
+            rows = np.concatenate([r for r, f in zip(self.blocks.rows, self.blocks.fold, strict=True) if f == fold])
+            without = weight.copy()
+            without[rows] = 0.0
+            refit = fit(found.mount, self.prepared.pieces, without, found.mount, evaluations=5, factor=1.2)
+            residual[rows] = refit.residual[rows]
+        grams = self._grams(replace(found, residual=residual), [])
+        return grams.energy([], None if shapes else self._unshaped(found))
 
-    def screen(self, fit: Fit, groups: Sequence[Array], excluded: Sequence[bool]) -> list[Score]:
-        """Score groups of further columns, one at a time."""
-        grams, _ = self._grams(fit, groups, True)
-        count, width = len(fit.free), self.nuisances.columns.shape[1]
-        first, scores = 1 + count + width, []
-        for group, without_shapes in zip(groups, excluded, strict=True):
-            base = self._base(count, not without_shapes)
-            scores.append(grams.score(base, range(first, first + group.shape[1])))
+    def covariance(self, found: Fit) -> Array:
+        """Block-robust covariance of the fitted parameters."""
+        return self._grams(found, []).covariance(range(1, 1 + len(found.free)))
+
+    @property
+    def rows(self) -> Array:
+        """Rows of each block that count."""
+        return np.array([float(len(rows)) for rows in self.blocks.rows])
+
+    def screen(self, found: Fit, groups: Sequence[Array], excluded: Sequence[bool]) -> list[tuple[Score, Array]]:
+        """Score groups of further columns, one at a time; return scores and the coefficients of the group."""
+        grams, base = self._grams(found, groups), range(1, 1 + len(found.free))
+        before = {without: grams.energy(base, self._unshaped(found) if without else None) for without in (False, True)}
+        first, scores = 1 + len(found.free) + self.nuisances.columns.shape[1], []
+        for group, without in zip(groups, excluded, strict=True):
+            chosen, used = [*base, *range(first, first + group.shape[1])], self._unshaped(found) if without else None
+            score = Score(before[without], grams.energy(chosen, used), grams.rows)
+            scores.append((score, grams.fit(chosen, used)[len(base) :]))
             first += group.shape[1]
         return scores
 
-    def _base(self, count: int, shapes: bool) -> list[int]:
-        skipped = () if shapes else self.nuisances.speed_shapes
-        extra = [k for k in range(self.nuisances.columns.shape[1]) if k not in skipped]
-        return [*range(1, 1 + count), *(1 + count + k for k in extra)]
+    def _unshaped(self, found: Fit) -> list[int]:
+        width, first = self.nuisances.columns.shape[1], 1 + len(found.free)
+        return [first + k for k in range(width) if k not in self.nuisances.speed_shapes]
 
-    def _grams(self, fit: Fit, groups: Sequence[Array], shapes: bool) -> tuple[Grams, list[int]]:
-        columns = np.column_stack([fit.residual, fit.slopes, self.nuisances.columns, *groups])
-        prior = np.full(columns.shape[1] - 1, np.inf)
-        count = len(fit.free)
+    def _grams(self, found: Fit, groups: Sequence[Array]) -> Grams:
+        columns = np.column_stack([found.residual, found.slopes, self.nuisances.columns, *groups])
+        prior, count = np.full(columns.shape[1] - 1, np.inf), len(found.free)
+        prior[:count] = [_trust(name, value) ** 2 for name, value in zip(found.free, found.values, strict=True)]
         prior[count : count + len(self.nuisances.prior)] = self.nuisances.prior
-        white = self.whitening.apply(columns, self.blocks)
-        return Grams(white, self._wander, self.blocks, prior), self._base(count, shapes)
+        nuisance = range(1 + count, 1 + count + len(self.nuisances.prior))
+        return Grams(self.whitening.apply(columns, self.blocks), self._wander, self.blocks, prior, nuisance)
 
     @cached_property
     def _wander(self) -> list[Array]:
@@ -93,11 +108,18 @@ class Bench:
         return self.whitening.apply(shapes, self.blocks)
 
 
-def nuisances(fit: Fit, prepared: Prepared, sample_time: float) -> Nuisances:
+def _trust(name: str, value: float) -> float:
+    """How far a parameter may move from its fit before its tangent says nothing more (one standard deviation)."""
+    if name.endswith("phase"):
+        return 1.0
+    return (0.1 if name.startswith(("axis.", "friction.")) else 1.0) * max(abs(value), 1e-12)
+
+
+def nuisances(found: Fit, prepared: Prepared, sample_time: float) -> Nuisances:
     """Make the nuisance columns of a fitted base: stop operators, speed shapes, a fraction of a sample of time."""
-    level = friction_level(fit.mount, prepared)
+    level = friction_level(found.mount, prepared)
     stops, speeds = bank(prepared)
-    late = _time_slope(fit.mount, prepared)
+    late = _time_slope(found.mount, prepared)
     size = float(np.sqrt(np.mean(level**2)))
     friction = np.full(stops.shape[1] + speeds.shape[1], max((SHAPE_PRIOR * size) ** 2, 1e-30))
     timing = max(TIMING_SHARE * sample_time, 1e-4) ** 2
@@ -133,32 +155,32 @@ class Screening:
     """The best member of each effect, with its linear score, strongest first; and the bench they were scored on."""
 
     bench: Bench
-    best: tuple[tuple[Candidate, Score], ...]
+    best: tuple[tuple[Candidate, Score, Array], ...]
 
 
-def screen(fit: Fit, prepared: Prepared, blocks: Blocks, nuisance: Nuisances) -> Screening:
+def screen(found: Fit, prepared: Prepared, blocks: Blocks, nuisance: Nuisances) -> Screening:
     """Score every candidate beside a fitted structure.
 
     The whitening is estimated twice: the second time on what the structure plus the best member of *every* effect
     leaves, else the noise model would swallow slow effects.
     """
-    known = np.column_stack([fit.slopes, nuisance.columns])
-    rest = projected(fit.residual, known)
-    tried = candidates(fit.mount, prepared, rest, np.abs(nuisance.level))
-    groups = columns_of(fit.mount, tried, prepared, fit.values)
+    known, speed = np.column_stack([found.slopes, nuisance.columns]), prepared.stacked("v")
+    rest = projected(found.residual, known)
+    tried = candidates(found.mount, prepared, rest, np.abs(nuisance.level))
+    groups = columns_of(found.mount, tried, prepared, found.values)
     excluded = [candidate.shapes_excluded for candidate in tried]
-    bench = Bench(prepared, blocks, nuisance, Whitening.of(rest, blocks))
-    first = _best(tried, bench.screen(fit, groups, excluded))
+    bench = Bench(prepared, blocks, nuisance, Whitening.of(rest, blocks, speed))
+    first = _best(tried, bench.screen(found, groups, excluded))
     everything = np.column_stack([known, *(groups[index] for index in first.values())])
-    bench = replace(bench, whitening=Whitening.of(projected(fit.residual, everything), blocks))
-    scores = bench.screen(fit, groups, excluded)
-    best = sorted(_best(tried, scores).values(), key=lambda index: -scores[index].gain)
-    return Screening(bench, tuple((tried[index], scores[index]) for index in best))
+    bench = replace(bench, whitening=Whitening.of(projected(found.residual, everything), blocks, speed))
+    scores = bench.screen(found, groups, excluded)
+    best = sorted(_best(tried, scores).values(), key=lambda index: -scores[index][0].gain)
+    return Screening(bench, tuple((tried[index], *scores[index]) for index in best))
 
 
-def _best(tried: Sequence[Candidate], scores: Sequence[Score]) -> dict[str, int]:
+def _best(tried: Sequence[Candidate], scores: Sequence[tuple[Score, Array]]) -> dict[str, int]:
     best: dict[str, int] = {}
-    for index, (candidate, score) in enumerate(zip(tried, scores, strict=True)):
-        if candidate.effect not in best or score.gain > scores[best[candidate.effect]].gain:
+    for index, (candidate, (score, _)) in enumerate(zip(tried, scores, strict=True)):
+        if candidate.effect not in best or score.gain > scores[best[candidate.effect]][0].gain:
             best[candidate.effect] = index
     return best
