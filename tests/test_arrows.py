@@ -26,7 +26,7 @@ RUNNERS = (
     "execution",
     "description",
 )
-MAKERS = ("cosim.diagnosis", "cosim.identify", "cosim.proof", "cosim.demo", "cosim.cli")
+MAKERS = ("cosim.diagnosis", "cosim.identify", "cosim.proof", "cosim.demo", "cosim.stiffness", "cosim.cli")
 
 
 def imports(name: str, inside: bool = True) -> set[str]:
