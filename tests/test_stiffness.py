@@ -87,11 +87,9 @@ def test_the_truth_agrees_with_scipys_radau(law: LuGre, regime: Regime, asymmetr
     law = replace(law, **pairs) if asymmetric else law
     short = 3000 if regime.frequency == 2 else 1000  # ticks: 0.1 s from rest, or 0.3 s with a reversal at 0.25 s
 
-    def side(value: float | Pair) -> float:
-        return value.positive if isinstance(value, Pair) else value
-
     def rate(t: float, z: np.ndarray) -> np.ndarray:
-        v, sigma0, Fc, Fs = regime.speed(t), side(law.sigma0), side(law.Fc), side(law.Fs)
+        v = regime.speed(t)
+        sigma0, Fc, Fs = (x[int(v < 0)] if isinstance(x, Pair) else x for x in (law.sigma0, law.Fc, law.Fs))
         return sigma0 * (v - abs(v) * z / (Fc + (Fs - Fc) * np.exp(-((v / law.Vs) ** 2))))
 
     tight = solve_ivp(rate, (0, short * STEP), [0.0], method="Radau", rtol=1e-12, atol=1e-15).y[0, -1]
