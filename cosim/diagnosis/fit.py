@@ -21,6 +21,8 @@ from pyfmi_models.mount import Mount
 
 FIXED = ("axis.torque_limit", "friction.smoothing", "friction.delta", "cycles_per_rev")
 """Parameters that are not fitted here: limits, and numbers that candidates choose from a grid."""
+BRISTLES = ("friction.sigma0", "friction.sigma1")
+"""Parameters that only presliding tells: a recording that never dwells says nothing about them."""
 PRIOR_FACTOR = 2.0
 
 
@@ -58,6 +60,7 @@ def fit(
     prior: Mount | None = None,
     evaluations: int = 25,
     factor: float = PRIOR_FACTOR,
+    fixed: Sequence[str] = FIXED,
 ) -> Fit:
     """Fit all free parameters of a mount, starting from its numbers.
 
@@ -68,11 +71,12 @@ def fit(
         prior: mount whose numbers the weak prior pulls to (default: the start).
         evaluations: how many evaluations of the model may be spent.
         factor: a parameter of the base this far from the prior costs one unit (see the module).
+        fixed: endings of the names of parameters that stay.
 
     Returns:
         The fit; residual = measured - model torque, N m.
     """
-    free = free_parameters(mount)
+    free = free_parameters(mount, fixed)
     inverse, tau = Inverse(mount, free), np.concatenate([piece.tau[piece.kept] for piece in pieces])
     known = {variable.name: variable for variable in mount.parameters()}
     start = np.array([known[name].start for name in free])

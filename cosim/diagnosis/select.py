@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 from cosim.diagnosis.evidence import Blocks, Score
 from cosim.diagnosis.fit import Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared
-from cosim.diagnosis.structure import Bench, nuisances, screen
-from pyfmi_models.effects import Delay, Effect
+from cosim.diagnosis.structure import Bench, Screening, nuisances, screen
+from pyfmi_models.effects import ActuatorLag, Delay, Effect, StribeckEffect
 from pyfmi_models.mount import Mount
 
 LEAST_GAIN, LEAST_T = 0.03, 1.8
@@ -24,7 +24,11 @@ SCREEN_SHARE = 0.3
 """Least linear gain, alone and relative to the best effect's, that makes an effect worth a nonlinear fit."""
 REFINED = 4
 """How many effects are refined by a nonlinear fit in each stage."""
-MOST_EFFECTS = 4
+MOST_KINDS, MOST_EFFECTS = 4, 7
+"""Different effects, and effects counting each harmonic, that one diagnosis may add."""
+LEAST_VS = 0.005
+LEAST_PLAIN_GAIN = 0.02
+"""Share of the plain residual energy that an effect must remove as well: whitened evidence alone can be about nothing."""
 TIE = 0.96
 """A rival that reaches this share of the winner's gain is not excluded; a simpler one that does so wins."""
 
@@ -36,6 +40,13 @@ class Trial:
     effect: str
     fit: Fit
     score: Score
+    rms_before: float
+    top_speed: float = 0.0
+
+    @property
+    def plain_gain(self) -> float:
+        """Share of the energy of the plain residual removed."""
+        return float(1 - (self.fit.rms / self.rms_before) ** 2)
 
     @property
     def gain(self) -> float:
@@ -79,24 +90,38 @@ def select(
     accepted: dict[str, Trial] = {}
     looked_at: dict[str, Trial] = {}
     while True:
-        nuisance = nuisances(current, prepared, sample_time)
-        screening = screen(current, prepared, blocks, nuisance)
+        nuisance = nuisances(current, prepared)
+        screening = screen(current, prepared, blocks, nuisance, weight)
         bench = screening.bench
-        before = bench.energy(current, weight)
+        before = bench.energy(current)
         tried = []
-        for candidate, score, coefficients in screening.best[:REFINED]:
-            if score.gain < max(SCREEN_GAIN, SCREEN_SHARE * screening.best[0][1].gain):
-                break
-            say(candidate.effect)
-            width = candidate.start(coefficients)
-            tried.append(_trial(current, candidate.effect, width, prepared, weight, bench, before, mount))
+        for effect in starts(screening):
+            say(effect.title)
+            tried.append(_trial(current, effect.id, effect, prepared, weight, bench, before, mount))
         looked_at |= {t.effect: t for t in tried if t.effect not in accepted}
         best = winner([t for t in tried if is_real(t, sample_time)])
-        if best is None or len(accepted) >= MOST_EFFECTS:
+        if best is None or _full(best.effect, accepted):
             break
         accepted[_label(best.effect, accepted)] = best
         current = best.fit
     return Selection(base, current, bench, accepted, {}, looked_at)
+
+
+def starts(screening: Screening) -> list[Effect]:
+    """Effects worth a nonlinear fit, strongest first; delay and lag always come together, being alike at first order."""
+    least = max(SCREEN_GAIN, SCREEN_SHARE * screening.best[0][1].gain) if screening.best else 0.0
+    worth = [candidate.start(k) for candidate, score, k in screening.best[:REFINED] if score.gain >= least]
+    for effect in list(worth):
+        if isinstance(effect, Delay) and not any(isinstance(other, ActuatorLag) for other in worth):
+            worth.append(ActuatorLag(time_constant_ms=effect.delay_ms))
+        if isinstance(effect, ActuatorLag) and not any(isinstance(other, Delay) for other in worth):
+            worth.append(Delay(delay_ms=effect.time_constant_ms))
+    return worth
+
+
+def _full(effect: str, accepted: dict[str, Trial]) -> bool:
+    kinds = {name.rstrip("0123456789") for name in accepted} | {effect}
+    return len(kinds) > MOST_KINDS or len(accepted) >= MOST_EFFECTS
 
 
 def _label(effect: str, accepted: dict[str, Trial]) -> str:
@@ -116,7 +141,11 @@ def _trial(
 ) -> Trial:
     mount = replace(current.mount, effects=(*current.mount.effects, effect))
     found = fit(mount, prepared.pieces, weight, prior, evaluations=12)
-    return Trial(name, found, Score(before, bench.energy(found, weight), bench.rows))
+    return Trial(name, found, Score(before, bench.energy(found), bench.rows), current.rms, _top(prepared))
+
+
+def _top(prepared: Prepared) -> float:
+    return max(abs(edge) for edge in prepared.ranges["v"])
 
 
 def winner(trials: Sequence[Trial]) -> Trial | None:
@@ -133,4 +162,12 @@ def is_real(trial: Trial, sample_time: float) -> bool:
     added = trial.fit.mount.effects[-1]
     if isinstance(added, Delay) and added.delay_ms < 1e3 * max(0.3 * sample_time, 1.5e-4):
         return False
+    if trial.plain_gain < LEAST_PLAIN_GAIN or _degenerate(trial):
+        return False
     return (trial.gain > LEAST_GAIN and trial.t > LEAST_T) or (trial.gain > SURE_GAIN and trial.t > 1)
+
+
+def _degenerate(trial: Trial) -> bool:
+    """A Stribeck speed far below the speeds that were recorded is no Stribeck curve but a level."""
+    added = trial.fit.mount.effects[-1]
+    return isinstance(added, StribeckEffect) and added.Vs < LEAST_VS * trial.top_speed

@@ -12,10 +12,10 @@ import numpy as np
 
 from cosim.diagnosis.bank import bank
 from cosim.diagnosis.candidates import Candidate, candidates, columns_of
-from cosim.diagnosis.evidence import Blocks, Grams, Score, Whitening
-from cosim.diagnosis.fit import Fit, fit
+from cosim.diagnosis.evidence import AR_ORDER, Blocks, Grams, Score, Whitening
+from cosim.diagnosis.fit import BRISTLES, FIXED, Fit, fit
 from cosim.diagnosis.inverse import Inverse, stacked
-from cosim.diagnosis.prepare import Array, Prepared, derivative
+from cosim.diagnosis.prepare import Array, Prepared
 from pyfmi_models.effects import PeriodicFriction
 from pyfmi_models.mount import Mount
 
@@ -24,8 +24,6 @@ WANDER = 0.02
 WANDER_SHAPES = 4
 SHAPE_PRIOR = 0.3
 """Prior: a nuisance friction shape has this share of the friction level."""
-TIMING_SHARE = 0.2
-"""Prior: time stamps of torque and position agree within this share of a sample (and 0.1 ms)."""
 
 
 @dataclass(frozen=True)
@@ -47,8 +45,10 @@ class Bench:
     blocks: Blocks
     nuisances: Nuisances
     whitening: Whitening
+    weight: Array
+    """Weight of each kept row; rows of weight 0 do not count."""
 
-    def energy(self, found: Fit, weight: Array, shapes: bool = True) -> Array:
+    def energy(self, found: Fit, shapes: bool = True) -> Array:
         """Cross-validated energy of a structure in each block: refitted without a fold, judged on it.
 
         What the nuisances can explain of a fold is taken off; leave the speed shapes out of them (`shapes` False) when
@@ -58,9 +58,10 @@ class Bench:
         folds = np.unique(self.blocks.fold)
         for fold in folds:
             rows = np.concatenate([r for r, f in zip(self.blocks.rows, self.blocks.fold, strict=True) if f == fold])
-            without = weight.copy()
+            without = self.weight.copy()
             without[rows] = 0.0
-            refit = fit(found.mount, self.prepared.pieces, without, found.mount, evaluations=5, factor=1.2)
+            # The bristles stay: a fold that never dwells would send them anywhere, and the judgement with them.
+            refit = fit(found.mount, self.prepared.pieces, without, evaluations=5, fixed=(*FIXED, *BRISTLES))
             residual[rows] = refit.residual[rows]
         grams = self._grams(replace(found, residual=residual), [])
         return grams.energy([], None if shapes else self._unshaped(found))
@@ -96,7 +97,7 @@ class Bench:
         prior[:count] = [_trust(name, value) ** 2 for name, value in zip(found.free, found.values, strict=True)]
         prior[count : count + len(self.nuisances.prior)] = self.nuisances.prior
         nuisance = range(1 + count, 1 + count + len(self.nuisances.prior))
-        return Grams(self.whitening.apply(columns, self.blocks), self._wander, self.blocks, prior, nuisance)
+        return Grams(self._white(columns), self._wander, self.blocks, prior, nuisance)
 
     @cached_property
     def _wander(self) -> list[Array]:
@@ -105,7 +106,11 @@ class Bench:
             s = np.linspace(0, 1, len(rows))[:, None]
             waves = np.hstack([np.cos(np.pi * k * s) / (1 + k) for k in range(WANDER_SHAPES)])
             shapes[rows] = WANDER * self.nuisances.level[rows][:, None] * waves
-        return self.whitening.apply(shapes, self.blocks)
+        return self._white(shapes)
+
+    def _white(self, columns: Array) -> list[Array]:
+        white = self.whitening.apply(columns, self.blocks)
+        return [one * self.weight[r[AR_ORDER:], None] for one, r in zip(white, self.blocks.rows, strict=True)]
 
 
 def _trust(name: str, value: float) -> float:
@@ -115,16 +120,14 @@ def _trust(name: str, value: float) -> float:
     return (0.1 if name.startswith(("axis.", "friction.")) else 1.0) * max(abs(value), 1e-12)
 
 
-def nuisances(found: Fit, prepared: Prepared, sample_time: float) -> Nuisances:
-    """Make the nuisance columns of a fitted base: stop operators, speed shapes, a fraction of a sample of time."""
+def nuisances(found: Fit, prepared: Prepared) -> Nuisances:
+    """Make the nuisance columns of a fitted base: stop operators and speed shapes."""
     level = friction_level(found.mount, prepared)
     stops, speeds = bank(prepared)
-    late = _time_slope(found.mount, prepared)
     size = float(np.sqrt(np.mean(level**2)))
     friction = np.full(stops.shape[1] + speeds.shape[1], max((SHAPE_PRIOR * size) ** 2, 1e-30))
-    timing = max(TIMING_SHARE * sample_time, 1e-4) ** 2
     shapes = tuple(range(stops.shape[1], stops.shape[1] + speeds.shape[1]))
-    return Nuisances(np.column_stack([stops, speeds, late]), np.append(friction, timing), shapes, level)
+    return Nuisances(np.column_stack([stops, speeds]), friction, shapes, level)
 
 
 def friction_level(mount: Mount, prepared: Prepared) -> Array:
@@ -135,12 +138,6 @@ def friction_level(mount: Mount, prepared: Prepared) -> Array:
     extended = replace(mount, effects=(*mount.effects, scaled))
     name = f"{list(extended.components())[-1]}.relative_amplitude"
     return stacked(Inverse(extended, (name,)), prepared.pieces, np.zeros(1))[1][:, 0]
-
-
-def _time_slope(mount: Mount, prepared: Prepared) -> Array:
-    inverse, none = Inverse(mount, ()), np.zeros(0)
-    parts = [(piece, inverse.torque(piece, none)[0]) for piece in prepared.pieces]
-    return np.concatenate([derivative(torque, piece.dt)[piece.kept] for piece, torque in parts])
 
 
 def projected(target: Array, columns: Array) -> Array:
@@ -158,21 +155,22 @@ class Screening:
     best: tuple[tuple[Candidate, Score, Array], ...]
 
 
-def screen(found: Fit, prepared: Prepared, blocks: Blocks, nuisance: Nuisances) -> Screening:
+def screen(found: Fit, prepared: Prepared, blocks: Blocks, nuisance: Nuisances, weight: Array) -> Screening:
     """Score every candidate beside a fitted structure.
 
     The whitening is estimated twice: the second time on what the structure plus the best member of *every* effect
     leaves, else the noise model would swallow slow effects.
     """
     known, speed = np.column_stack([found.slopes, nuisance.columns]), prepared.stacked("v")
-    rest = projected(found.residual, known)
+    counted = weight[:, None] > 0
+    rest = projected(found.residual * weight, known * counted)
     tried = candidates(found.mount, prepared, rest, np.abs(nuisance.level))
     groups = columns_of(found.mount, tried, prepared, found.values)
     excluded = [candidate.shapes_excluded for candidate in tried]
-    bench = Bench(prepared, blocks, nuisance, Whitening.of(rest, blocks, speed))
+    bench = Bench(prepared, blocks, nuisance, Whitening.of(rest, blocks, speed), weight)
     first = _best(tried, bench.screen(found, groups, excluded))
     everything = np.column_stack([known, *(groups[index] for index in first.values())])
-    bench = replace(bench, whitening=Whitening.of(projected(found.residual, everything), blocks, speed))
+    bench = replace(bench, whitening=Whitening.of(projected(found.residual * weight, everything * counted), blocks, speed))
     scores = bench.screen(found, groups, excluded)
     best = sorted(_best(tried, scores).values(), key=lambda index: -scores[index][0].gain)
     return Screening(bench, tuple((tried[index], *scores[index]) for index in best))

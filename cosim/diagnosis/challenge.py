@@ -1,0 +1,150 @@
+"""Challenge what was accepted: does each effect still earn its place, and does a rival do as well in it?
+
+Each accepted effect is taken out and the rest refitted. If little is lost, it goes. Its rivals, and whatever the
+screening likes in its place, are tried there; a better one takes the place, one that comes close makes the answer a
+set.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cosim.diagnosis.evidence import Blocks, Score
+from cosim.diagnosis.fit import Fit, fit
+from cosim.diagnosis.prepare import Array, Prepared
+from cosim.diagnosis.select import LEAST_GAIN, TIE, Selection, Trial, is_real
+from cosim.diagnosis.structure import Bench, nuisances, screen
+from pyfmi_models.effects import Effect
+from pyfmi_models.mount import Mount
+
+ALIKE = 0.5
+"""A rival is refitted in an effect's place if its linear gain there reaches this share of the effect's."""
+TEMPERATURE = 60.0
+"""Divides log-likelihoods before they become probabilities: neighbouring samples are far from independent."""
+ROUNDS = 2
+
+
+@dataclass(frozen=True)
+class Place:
+    """One accepted effect: what it earns beside the others, and who else could stand in its place."""
+
+    effect: Effect
+    trial: Trial
+    rivals: tuple[Trial, ...]
+
+    @property
+    def ambiguous_with(self) -> tuple[str, ...]:
+        """Rivals that these recordings cannot exclude."""
+        return tuple(rival.effect for rival in self.rivals if _too_close(self.trial, rival))
+
+    @property
+    def probability(self) -> float:
+        """Tempered posterior of this effect among its rivals and "none", with equal priors."""
+        others = [0.0, *(rival.score.nats for rival in self.rivals)]
+        weights = np.exp(np.clip((np.array(others) - self.trial.score.nats) / TEMPERATURE, -50, 50))
+        return float(1 / (1 + weights.sum()))
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The structure that stands, its places, and the bench they were judged on."""
+
+    base: Fit
+    chosen: Fit
+    bench: Bench
+    places: tuple[Place, ...]
+    looked_at: dict[str, Trial]
+
+
+def _too_close(winner: Trial, rival: Trial) -> bool:
+    """Whether a rival's gain comes near the winner's; a rival with more parameters must be truly as good."""
+    more = len(rival.fit.free) > len(winner.fit.free)
+    return rival.gain >= winner.gain if more else rival.gain >= TIE * winner.gain
+
+
+def challenge(
+    selection: Selection,
+    mount: Mount,
+    prepared: Prepared,
+    weight: Array,
+    sample_time: float,
+    say: Callable[[str], None] = lambda _: None,
+) -> Verdict:
+    """Delete and swap until nothing changes (at most `ROUNDS` times); see `select` for the arguments."""
+    chosen, bench = selection.chosen, selection.bench
+    known = len(mount.effects)
+    places: list[Place] = []
+    for _ in range(ROUNDS):
+        added = chosen.mount.effects[known:]
+        before = chosen
+        places = []
+        for effect in added:
+            say(effect.title)
+            place = _place(effect, chosen, mount, prepared, weight, sample_time, bench)
+            places.append(place)
+            best = max((place.trial, *place.rivals), key=lambda trial: trial.gain)
+            if place.trial.gain < LEAST_GAIN and not is_real(best, sample_time):
+                chosen = _without(chosen, effect, mount, prepared, weight)
+                break
+            if best is not place.trial and not _simpler_wins(place.trial, best):
+                chosen = best.fit
+                break
+        if chosen is before:
+            break
+    else:
+        added = chosen.mount.effects[known:]
+        places = [_place(effect, chosen, mount, prepared, weight, sample_time, bench) for effect in added]
+    return Verdict(selection.base, chosen, bench, tuple(places), selection.looked_at)
+
+
+def _simpler_wins(holder: Trial, best: Trial) -> bool:
+    return len(holder.fit.free) <= len(best.fit.free) and holder.gain >= TIE * best.gain
+
+
+def _without(chosen: Fit, effect: Effect, mount: Mount, prepared: Prepared, weight: Array) -> Fit:
+    rest = tuple(other for other in chosen.mount.effects if other is not effect)
+    return fit(replace(chosen.mount, effects=rest), prepared.pieces, weight, mount, evaluations=15)
+
+
+def _place(
+    effect: Effect,
+    chosen: Fit,
+    mount: Mount,
+    prepared: Prepared,
+    weight: Array,
+    sample_time: float,
+    bench: Bench,
+) -> Place:
+    reduced = _without(chosen, effect, mount, prepared, weight)
+    blocks: Blocks = bench.blocks
+    screening = screen(reduced, prepared, blocks, nuisances(reduced, prepared), weight)
+    bench = screening.bench
+    before = bench.energy(reduced)
+    own = Trial(effect.id, chosen, Score(before, bench.energy(chosen), bench.rows), reduced.rms)
+    linear = {candidate.effect: score.gain for candidate, score, _ in screening.best}
+    least = ALIKE * max(linear.get(effect.id, 0.0), own.gain * ALIKE)
+    rivals = [
+        _tried(reduced, candidate.start(k), mount, prepared, weight, bench, before)
+        for candidate, score, k in screening.best
+        if candidate.effect != effect.id
+        and score.gain > LEAST_GAIN
+        and (score.gain > least or candidate.effect in effect.rivals)
+    ][:3]
+    return Place(effect, own, tuple(sorted(rivals, key=lambda trial: -trial.gain)))
+
+
+def _tried(
+    reduced: Fit, effect: Effect, mount: Mount, prepared: Prepared, weight: Array, bench: Bench, before: Array
+) -> Trial:
+    grown = replace(reduced.mount, effects=(*reduced.mount.effects, effect))
+    found = fit(grown, prepared.pieces, weight, mount, evaluations=12)
+    return Trial(effect.id, found, Score(before, bench.energy(found), bench.rows), reduced.rms)
+
+
+def merged(places: Sequence[Place]) -> dict[str, list[Place]]:
+    """Group places by effect: the harmonics of one ripple are one effect."""
+    groups: dict[str, list[Place]] = {}
+    for place in places:
+        groups.setdefault(place.effect.id, []).append(place)
+    return groups

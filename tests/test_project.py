@@ -1,0 +1,119 @@
+"""The project on paper is the project as it is: commands, card, version, requirements, files of the package."""
+
+import ast
+import re
+import sys
+import tomllib
+from importlib.metadata import PackageNotFoundError, packages_distributions, version
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+import cosim
+import pyfmi_models
+from pyfmi_models.card import read_card
+from pyfmi_models.effects import CATALOGUE
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text("utf-8")
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+START = "python3 -m venv .venv && .venv/bin/pip install . && .venv/bin/cosim demo"
+TEST = ".venv/bin/pip install '.[test]' && .venv/bin/pytest"
+PACKAGES = {"cosim": cosim, "pyfmi_models": pyfmi_models}
+SOURCES = [path for name in PACKAGES for path in (ROOT / name).rglob("*")]
+BUILT = {".so", ".dylib", ".dll", ".pyc"}
+
+
+def fenced(language: str) -> list[str]:
+    found = re.findall(rf"^( *)```{language}\n(.*?)^ *```", README, re.MULTILINE | re.DOTALL)
+    return [re.sub(rf"^{indent}", "", text, flags=re.MULTILINE) for indent, text in found]
+
+
+def test_readme_states_the_two_commands_and_ci_runs_the_second() -> None:
+    assert START in README
+    assert TEST in README
+    assert TEST.replace("install", "install --quiet") in (ROOT / ".ci" / "run").read_text("utf-8")
+    assert (ROOT / ".ci" / "run").stat().st_mode & 0o100
+
+
+def test_every_verb_that_readme_types_exists() -> None:
+    typed = set(re.findall(r"(?:^|/|\s|`)cosim ([a-z]+)\b", "\n".join(fenced("sh")), re.MULTILINE))
+    assert typed
+    missing = sorted(verb for verb in typed if find_spec(f"cosim.cli_{verb}") is None)
+    assert not missing, f"README types verbs that do not exist: {', '.join(missing)}"
+
+
+def test_the_card_in_readme_makes_a_plant(tmp_path: Path) -> None:
+    (card,) = fenced("toml")
+    path = tmp_path / "axis.toml"
+    path.write_text(card, "utf-8")
+    assert read_card(path).plant().model().parameters
+
+
+def test_readme_lists_the_effects_there_are() -> None:
+    limits = README.partition("## Limits")[2]
+    assert {name for name in re.findall(r"`([a-z_]+)`", limits) if name in CATALOGUE} == set(CATALOGUE)
+
+
+def test_links_of_the_documents_lead_somewhere() -> None:
+    for document in ROOT.glob("*.md"):
+        for target in re.findall(r"\]\(([^)#]+)\)", document.read_text("utf-8")):
+            assert target.startswith("https://") or (ROOT / target).exists(), f"{document.name}: {target}"
+
+
+def test_no_document_names_a_path_of_one_machine() -> None:
+    for document in [*ROOT.glob("*.md"), ROOT / ".ci" / "run", ROOT / "pyproject.toml"]:
+        assert not re.search(r"(?<![\w.])/(work|home|root|Users)/", document.read_text("utf-8")), document.name
+
+
+def test_the_version_is_stated_once_and_is_a_release_or_in_the_making() -> None:
+    assert "version" in PROJECT["dynamic"]
+    changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    assert "## [Unreleased]" in changelog
+    assert cosim.__version__ in changelog
+    try:
+        assert version(PROJECT["name"]) == cosim.__version__
+    except PackageNotFoundError:
+        pytest.skip("the package is not installed here")
+
+
+def test_every_file_of_the_packages_is_installed() -> None:
+    for path in SOURCES:
+        if path.is_file() and path.suffix not in BUILT and "partial" not in path.suffixes:
+            relative = path.relative_to(ROOT)
+            home = Path(str(PACKAGES[relative.parts[0]].__file__)).parent
+            assert (home / Path(*relative.parts[1:])).is_file(), f"{relative} is not in the installed package"
+
+
+@pytest.mark.parametrize("library", ["loop/_loop", "proof/_truth"])
+def test_the_compiled_libraries_are_installed(library: str) -> None:
+    path = Path(str(cosim.__file__)).parent / library
+    assert list(path.parent.glob(f"{path.name}.*")), f"{library} is missing: python cosim/loop/build_hook.py builds it"
+
+
+def test_what_is_imported_is_required() -> None:
+    """A package that only happens to be there, because another one brought it, is a missing install step."""
+    stated = [*PROJECT["dependencies"], *(one for extra in PROJECT["optional-dependencies"].values() for one in extra)]
+    required = {re.split(r"[^\w-]", one)[0].lower() for one in stated} | {"hatchling"}
+    providers = packages_distributions()
+    for module, path in sorted(imported().items()):
+        names = {one.lower() for one in providers.get(module, [module])}
+        assert names & required, f"{path} imports {module}, which pyproject.toml does not require"
+
+
+def imported() -> dict[str, Path]:
+    """Return the outside modules that the packages import, each with one file that does."""
+    found: dict[str, Path] = {}
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))) if path.suffix == ".py" else ():
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module] if isinstance(node, ast.ImportFrom) and node.module and not node.level else []
+            found |= {name.partition(".")[0]: path.relative_to(ROOT) for name in names}
+    return {name: path for name, path in found.items() if name not in {*sys.stdlib_module_names, *PACKAGES}}
+
+
+def test_every_result_is_told_how_it_is_rebuilt() -> None:
+    table = (ROOT / "results" / "README.md").read_text("utf-8")
+    untold = [one.name for one in (ROOT / "results").iterdir() if one.name != "README.md" and one.name not in table]
+    assert not untold, f"results/README.md does not say how these are rebuilt: {', '.join(untold)}"
