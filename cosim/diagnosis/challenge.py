@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cosim.diagnosis.evidence import Blocks, Score
+from cosim.diagnosis.evidence import Blocks, Score, t_value
 from cosim.diagnosis.fit import Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.select import LEAST_GAIN, TIE, Selection, Trial, is_real
@@ -23,6 +23,8 @@ ALIKE = 0.5
 TEMPERATURE = 60.0
 """Divides log-likelihoods before they become probabilities: neighbouring samples are far from independent."""
 ROUNDS = 2
+NEAR, CLEARLY = 0.9, 2.0
+"""A rival with this share of the winner's gain is excluded only if blocks disagree with it by this t value."""
 
 
 @dataclass(frozen=True)
@@ -58,9 +60,11 @@ class Verdict:
 
 
 def _too_close(winner: Trial, rival: Trial) -> bool:
-    """Whether a rival's gain comes near the winner's; a rival with more parameters must be truly as good."""
-    more = len(rival.fit.free) > len(winner.fit.free)
-    return rival.gain >= winner.gain if more else rival.gain >= TIE * winner.gain
+    """Whether a rival cannot be excluded: its gain comes near, and block by block it is not clearly worse."""
+    if len(rival.fit.free) > len(winner.fit.free):
+        return rival.gain >= winner.gain
+    worse = winner.score.rows * np.log(rival.score.after / winner.score.after)
+    return rival.gain >= NEAR * winner.gain and t_value(worse) < CLEARLY
 
 
 def challenge(
@@ -99,7 +103,7 @@ def challenge(
 
 
 def _simpler_wins(holder: Trial, best: Trial) -> bool:
-    return len(holder.fit.free) <= len(best.fit.free) and holder.gain >= TIE * best.gain
+    return len(holder.fit.free) < len(best.fit.free) and holder.gain >= TIE * best.gain
 
 
 def _without(chosen: Fit, effect: Effect, mount: Mount, prepared: Prepared, weight: Array) -> Fit:

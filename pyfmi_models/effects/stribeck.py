@@ -30,4 +30,4 @@ class StribeckEffect(FrictionEffect):
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         speed = "m/s" if unit == "N" else "rad/s"
-        return f"Friction rises to {self.Fs:.3g} {unit} when the axis goes slower than about {self.Vs:.2g} {speed}."
+        return f"Below about {self.Vs:.2g} {speed} friction changes with speed, to {self.Fs:.3g} {unit} near standstill."
