@@ -1,0 +1,280 @@
+"""Effects act where they say, resist, and are written with the ids and words of the contract."""
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from pyfmi_models.effects import (
+    CATALOGUE,
+    FORMS,
+    ActuatorLag,
+    Cogging,
+    Delay,
+    DriveEffect,
+    Effect,
+    FrictionAsymmetry,
+    FrictionEffect,
+    GravityUnbalance,
+    LoadEffect,
+    LocalFriction,
+    Motion,
+    PeriodicFriction,
+    StribeckEffect,
+    TorqueOffset,
+)
+from pyfmi_models.friction import Coulomb, LuGre
+from pyfmi_models.model import fields_of
+from pyfmi_models.mount import Axis, Mount
+
+CONTRACT = {
+    "friction_asymmetry": {"level_asymmetry", "viscous_asymmetry"},
+    "stribeck": {"Fs", "Vs"},
+    "cogging": {"cycles_per_rev", "amplitude", "phase"},  # a harmonic is one more [[effects]] table
+    "position_friction": {"cycles_per_rev", "q_center", "relative_amplitude", "width"},
+    "gravity_unbalance": {"mgl", "phase"},
+    "torque_offset": {"torque"},
+    "actuator_lag": {"time_constant_ms"},
+    "delay": {"delay_ms"},
+}
+OTHER_IDS = {"presliding", "dwell_breakaway", "encoder_eccentricity", "cable_wrap", "thermal_viscosity", "compliance"}
+EXAMPLES: tuple[Effect, ...] = (
+    FrictionAsymmetry(level_asymmetry=0.1, viscous_asymmetry=-0.2),
+    StribeckEffect(Fs=4.0, Vs=0.02),
+    Cogging(cycles_per_rev=24, amplitude=0.5, phase=0.3),
+    PeriodicFriction(cycles_per_rev=3, relative_amplitude=0.2, phase=0.4),
+    LocalFriction(q_center=1.0, width=0.05, relative_amplitude=0.3),
+    GravityUnbalance(mgl=1.5, phase=0.2),
+    TorqueOffset(torque=0.7),
+    ActuatorLag(time_constant_ms=4.0),
+    Delay(delay_ms=4.0),
+)
+DRIVES = pytest.mark.parametrize(
+    "drive", [one for one in EXAMPLES if isinstance(one, DriveEffect)], ids=lambda one: one.id
+)
+
+
+def motion(q: float = 0.0, v: float = 0.1, turn: float = 1.0) -> Motion:
+    return Motion(t=0.0, q=q, v=v, angle=turn * q)
+
+
+def acceleration(*effects: Effect, q: float = 0.0, v: float = 0.0, tau: float = 0.0, **changes: Any) -> float:
+    """Acceleration of a 2 kg m2 axis with Coulomb friction of 1 N m, from the plant's own equations."""
+    law = Coulomb(Fc=1.0, sigma2=3.0)
+    model = Mount(name="m", axis=Axis(inertia=2.0), friction=law, effects=effects, **changes).model()
+    state = [q, v, *[0.0] * (len(model.states) - 2)]
+    rates, _ = model.equations(0, state, [tau, 0], [parameter.start for parameter in model.parameters])
+    return float(rates[1])
+
+
+def state_space(drive: DriveEffect) -> tuple[np.ndarray, ...]:
+    """Matrices (A, B, C, D) from command to applied torque, from the effect's equations."""
+    x, u = ca.SX.sym("x", len(drive.states())), ca.SX.sym("u")
+    outputs = (drive.rate(x, u), drive.applied(x, u))
+    slopes = [ca.jacobian(ca.SX(output), variable) for output in outputs for variable in (x, u)]
+    return tuple(value.full() for value in ca.Function("slopes", [x, u], slopes)(0, 0))
+
+
+def frequency_response(drive: DriveEffect, omega: np.ndarray) -> np.ndarray:
+    A, B, C, D = state_space(drive)
+    return np.array([(C @ np.linalg.solve(1j * w * np.eye(len(A)) - A, B) + D).item() for w in omega])
+
+
+def test_ids_and_parameter_names_are_those_of_the_contract() -> None:
+    found = {key: {item.name for form in forms for item in fields(form)} for key, forms in CATALOGUE.items()}
+    assert {form for forms in CATALOGUE.values() for form in forms} == set(FORMS)
+    assert found == CONTRACT | {"position_friction": CONTRACT["position_friction"] | {"phase"}}  # where it is periodic
+
+
+def test_there_is_an_example_of_every_form() -> None:
+    assert [type(one) for one in sorted(EXAMPLES, key=lambda one: FORMS.index(type(one)))] == list(FORMS)
+
+
+@pytest.mark.parametrize("effect", EXAMPLES, ids=lambda one: type(one).__name__)
+@pytest.mark.parametrize("unit", ["N·m", "N"])
+def test_an_effect_says_what_it_is_and_what_tells_it_from_its_rivals(effect: Effect, unit: str) -> None:
+    statement = effect.statement(unit)
+    assert statement.endswith(".")
+    assert "\n" not in statement
+    assert "N·m" not in statement or unit == "N·m"
+    for text in (effect.title, effect.told_apart_by, effect.action):
+        assert text
+    assert effect.id not in effect.rivals
+    assert set(effect.rivals) <= set(CONTRACT) | OTHER_IDS
+
+
+@pytest.mark.parametrize("effect", EXAMPLES, ids=lambda one: type(one).__name__)
+def test_an_effect_acts_in_one_place(effect: Effect) -> None:
+    assert sum(isinstance(effect, kind) for kind in (DriveEffect, FrictionEffect, LoadEffect)) == 1
+
+
+# Loads
+
+
+@pytest.mark.parametrize("effect", [one for one in EXAMPLES if isinstance(one, LoadEffect)], ids=lambda one: one.id)
+@pytest.mark.parametrize("q", [-1.0, 0.0, 0.4])
+def test_a_load_resists_and_acts_at_standstill(effect: LoadEffect, q: float) -> None:
+    load = float(effect.load(motion(q, 0.0)))
+    assert load != 0
+    assert acceleration(effect, q=q) == pytest.approx(-load / 2.0, rel=1e-12)
+    assert acceleration(effect, q=q, tau=load) == pytest.approx(0, abs=1e-12)
+    assert float(effect.load(motion(q, 5.0))) == float(effect.load(motion(q, -5.0))) == load
+
+
+def test_a_positive_offset_pushes_backward() -> None:
+    assert acceleration(TorqueOffset(torque=0.7)) < 0
+    assert "backward" in TorqueOffset(torque=0.7).statement()
+    assert "forward" in TorqueOffset(torque=-0.7).statement()
+
+
+def test_cogging_has_its_cycles_amplitude_and_phase() -> None:
+    effect = Cogging(cycles_per_rev=24, amplitude=0.5, phase=0.3)
+    q = np.linspace(0, 2 * np.pi, 24 * 64 + 1)
+    torque = np.array([float(effect.load(motion(x))) for x in q])
+    np.testing.assert_allclose(torque, 0.5 * np.cos(24 * q + 0.3), atol=1e-12)
+    assert torque.max() - torque.min() == pytest.approx(2 * 0.5, rel=1e-2)  # half the peak-to-peak value
+    assert np.sum(np.diff(np.sign(torque)) > 0) == 24
+
+
+def test_cycles_of_a_linear_axis_are_per_metre() -> None:
+    effect = Cogging(cycles_per_rev=4, amplitude=1.0)
+    for q, load in ((0.0, 1.0), (0.125, -1.0), (0.25, 1.0), (1.0, 1.0)):
+        assert acceleration(effect, q=q, motion="linear") == pytest.approx(-load / 2.0, abs=1e-12)
+
+
+def test_unbalance_pulls_back_to_the_bottom() -> None:
+    effect = GravityUnbalance(mgl=1.5, phase=0.2)
+    assert acceleration(effect, q=-0.2) == pytest.approx(0, abs=1e-12)
+    assert acceleration(effect, q=-0.2 + 0.1) == pytest.approx(-1.5 * np.sin(0.1) / 2)
+    assert acceleration(effect, q=-0.2 - 0.1) == pytest.approx(1.5 * np.sin(0.1) / 2)
+
+
+# Friction
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_asymmetry_scales_level_and_viscous_torque_by_direction(direction: int) -> None:
+    effect, v = FrictionAsymmetry(level_asymmetry=0.1, viscous_asymmetry=-0.2), direction * 0.5
+    resisted = -2.0 * acceleration(effect, v=v)
+    assert resisted == pytest.approx(direction * (1.0 * (1 + 0.1 * direction) + 1.5 * (1 - 0.2 * direction)))
+
+
+def test_asymmetry_vanishes_at_standstill() -> None:
+    assert acceleration(FrictionAsymmetry(level_asymmetry=0.5)) == 0
+
+
+@pytest.mark.parametrize("v", [-0.3, 0.3])
+def test_periodic_friction_multiplies_the_level_and_follows_the_direction(v: float) -> None:
+    effect = PeriodicFriction(cycles_per_rev=3, relative_amplitude=0.2, phase=0.4)
+    for q in np.linspace(0, 2, 7):
+        expected = np.sign(v) * (1 + 0.2 * np.cos(3 * q + 0.4)) + 3 * v
+        assert -2.0 * acceleration(effect, q=float(q), v=v) == pytest.approx(expected, rel=1e-12)
+    assert -2.0 * acceleration(effect, q=-0.4 / 3, v=v) == pytest.approx(1.2 * np.sign(v) + 3 * v)
+
+
+@pytest.mark.parametrize("v", [-0.3, 0.3])
+def test_a_rough_spot_is_where_it_is_and_as_wide_as_it_is(v: float) -> None:
+    effect = LocalFriction(q_center=1.0, width=0.05, relative_amplitude=0.3)
+    for q, rise in ((1.0, 0.3), (1.05, 0.3 * np.exp(-0.5)), (0.95, 0.3 * np.exp(-0.5)), (2.0, 0.0), (1e6, 0.0)):
+        assert -2.0 * acceleration(effect, q=q, v=v) == pytest.approx(np.sign(v) * (1 + rise) + 3 * v, rel=1e-12)
+
+
+@pytest.mark.parametrize("effect", [one for one in EXAMPLES if isinstance(one, FrictionEffect)], ids=lambda one: one.id)
+def test_friction_that_is_not_there_cannot_be_multiplied(effect: FrictionEffect) -> None:
+    expected = pytest.approx(0, abs=1e-12)
+    assert isinstance(effect, StribeckEffect) or float(effect.level(0.0, motion(1.0))) == expected
+    assert float(effect.viscous(0.0, motion(1.0))) == expected
+
+
+def test_the_stribeck_effect_is_the_stribeck_term_of_the_law() -> None:
+    law = LuGre(sigma0=1e4, Fc=2.0, Fs=4.0, Vs=0.02, delta=2.0)
+    effect, plain = StribeckEffect(Fs=4.0, Vs=0.02), replace(law, Fs=None, Vs=None)
+    for v in (-0.5, -0.02, 0.0, 1e-4, 0.03, 9.0):
+        assert float(effect.level(plain.level(v), motion(v=v))) == pytest.approx(float(law.level(v)), rel=1e-14)
+
+
+def test_friction_effects_add_up_in_their_order() -> None:
+    both = (StribeckEffect(Fs=4.0, Vs=1e3), FrictionAsymmetry(level_asymmetry=0.1))
+    assert -2.0 * acceleration(*both, v=0.1) == pytest.approx(4.0 * 1.1 + 0.3, rel=1e-6)
+    assert -2.0 * acceleration(*reversed(both), v=0.1) == pytest.approx(4.0 + 0.3, rel=1e-6)
+
+
+# Drive
+
+
+@DRIVES
+def test_the_drive_passes_a_constant_command_whole(drive: DriveEffect) -> None:
+    A, B, C, D = state_space(drive)
+    assert (C @ np.linalg.solve(-A, B) + D).item() == pytest.approx(1.0, rel=1e-12)
+    assert np.all(np.linalg.eigvals(A).real < 0)
+    assert D.item() == 0  # a step in the command is no step in the torque
+
+
+def test_the_lags_response_is_that_of_its_own_state() -> None:
+    lag, omega = ActuatorLag(time_constant_ms=4.0), np.logspace(-1, 4, 50)
+    np.testing.assert_allclose(lag.response(omega), frequency_response(lag, omega), rtol=1e-12)
+    assert abs(lag.response(np.array([250.0]))[0]) == pytest.approx(np.sqrt(0.5))  # at omega T = 1
+
+
+def test_the_delays_states_follow_the_dead_time_over_a_controllers_band() -> None:
+    delay, turn = Delay(delay_ms=4.0), np.linspace(0.01, 1.3, 60)  # omega T
+    exact, ours = delay.response(turn / 4e-3), frequency_response(delay, turn / 4e-3)
+    np.testing.assert_allclose(exact, np.exp(-1j * turn), rtol=1e-12)
+    assert np.abs(np.angle(ours / exact)).max() < 1.5e-4  # what PADE_ORDER promises
+    assert np.abs(np.abs(ours) - 1).max() < 1e-2  # strictly proper: it must fall off, but not in the band
+
+
+@pytest.mark.parametrize("order", [0, 1, 2, 3, 4, 5])
+def test_the_delays_states_have_the_moments_of_a_dead_time(order: int) -> None:
+    """Pade [2/3] agrees with exp(-sT) in the terms s^0 .. s^5 of its Taylor series."""
+    A, B, C, _ = state_space(Delay(delay_ms=1000.0))
+    term = -C @ np.linalg.matrix_power(np.linalg.inv(A), order + 1) @ B
+    assert term.item() == pytest.approx((-1.0) ** order / float(np.prod(np.arange(1, order + 1))), rel=1e-9)
+
+
+def test_a_ramp_arrives_late_by_the_delay() -> None:
+    A, B, C, _ = state_space(Delay(delay_ms=4.0))
+    slope = np.linalg.solve(-A, B)  # states under a ramp of 1 N m/s: slope t + rest
+    rest = np.linalg.solve(A, slope)
+    assert (C @ rest).item() == pytest.approx(-4e-3, rel=1e-12)
+
+
+@DRIVES
+@pytest.mark.parametrize("scale", [0.1, 1.0, 10.0])
+def test_the_time_of_a_drive_effect_scales_its_frequencies(drive: DriveEffect, scale: float) -> None:
+    (name,) = fields_of(drive)
+    slower = replace(drive, **{name: scale * getattr(drive, name)})
+    omega = np.linspace(1, 300, 20)
+    np.testing.assert_allclose(slower.response(omega / scale), drive.response(omega), rtol=1e-12)
+    np.testing.assert_allclose(frequency_response(slower, omega / scale), frequency_response(drive, omega), rtol=1e-10)
+
+
+def test_the_plant_sends_the_command_through_its_drive_effects_in_series() -> None:
+    drives = (Delay(delay_ms=4.0), ActuatorLag(time_constant_ms=3.0))
+    model = Mount(name="m", axis=Axis(inertia=2.0), friction=Coulomb(Fc=0.0), effects=drives).model()
+    values = [parameter.start for parameter in model.parameters]
+    t, x, u = ca.SX.sym("t"), ca.SX.sym("x", len(model.states)), ca.SX.sym("u", 2)
+    rates, outputs = model.equations(t, x, u, values)
+    applied = [one.name for one in model.outputs].index("applied")
+    wanted = [ca.jacobian(part, of)[:, :] for part in (rates, outputs[applied]) for of in (x, u[0])]
+    A, B, C, D = (part.full() for part in ca.Function("slopes", [t, x, u], wanted)(0, 0, 0))
+    A, B, C = A[2:, 2:], B[2:], C[:, 2:]
+    for omega in (1.0, 40.0, 300.0):
+        found = (C @ np.linalg.solve(1j * omega * np.eye(len(A)) - A, B) + D).item()
+        alone = [frequency_response(drive, np.array([omega])).item() for drive in drives]
+        assert found == pytest.approx(alone[0] * alone[1], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kind", "call"),
+    [
+        (Effect, lambda effect: effect.statement()),
+        (LoadEffect, lambda effect: effect.load(motion())),
+    ],
+)
+def test_an_unfinished_effect_says_so(kind: type[Effect], call: Callable[[Any], Any]) -> None:
+    with pytest.raises(TypeError, match=f"{kind.__name__} has no"):
+        call(kind())
