@@ -33,7 +33,7 @@ def fenced(language: str) -> list[str]:
 def test_readme_states_the_two_commands_and_ci_runs_the_second() -> None:
     assert START in README
     assert TEST in README
-    assert TEST.replace("install", "install --quiet") in (ROOT / ".ci" / "run").read_text("utf-8")
+    assert TEST in (ROOT / ".ci" / "run").read_text("utf-8")
     assert (ROOT / ".ci" / "run").stat().st_mode & 0o100
 
 
