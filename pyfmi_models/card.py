@@ -5,9 +5,8 @@ everything and names file, key, value and rule; `Card.plant` and `Card.controlle
 """
 
 import tomllib
-from dataclasses import MISSING, dataclass, field, fields, replace
+from dataclasses import MISSING, dataclass, field, fields
 from importlib.resources import files
-from math import isfinite
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -22,10 +21,12 @@ from pyfmi_models.mount import Axis, Mount
 
 Part = TypeVar("Part")
 Table = dict[str, Any]
+LARGEST = 1e300
+"""Beyond this a number in a card is no number: it would overflow in the first product."""
 
 
 class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
 
 
 class MountSection(_Section):
@@ -147,12 +148,12 @@ def parse_card(text: str, path: str) -> Card:
         raise CardError(f"{path} is not valid TOML: {error}.") from None
     except ValidationError as error:
         raise CardError(f"{path}: {_sentence(error)}") from None
-    known = dict(raw.unbalance) if raw.unbalance else None
+    known = raw.unbalance
     return Card(
         path=path,
         mount=raw.mount,
         friction=_friction(dict(raw.friction), path),
-        unbalance=_build(GravityUnbalance, known, f"{path}: [unbalance]") if known else None,
+        unbalance=None if known is None else _build(GravityUnbalance, dict(known), f"{path}: [unbalance]"),
         effects=tuple(_effect(dict(table), path, index) for index, table in enumerate(raw.effects)),
         encoder=raw.encoder,
         controller=raw.controller,
@@ -169,26 +170,27 @@ def _sentence(error: ValidationError) -> str:
         return f"{where} is not a key of a card."
     if first["type"] == "missing":
         return f"{where} is missing."
-    return f"{where} = {first['input']!r} breaks the rule: {first['msg'].lower()}."
+    rule = first["msg"][:1].lower() + first["msg"][1:]
+    return f"{where} = {first['input']!r} breaks the rule: {rule}."
 
 
 def _friction(table: Table, path: str) -> FrictionLaw:
     key = table.pop("model", None)
-    if key not in LAWS:
+    if not isinstance(key, str) or key not in LAWS:
         raise CardError(f"{path}: [friction] model = {key!r} is unknown; models are: {', '.join(LAWS)}.")
-    law = _build(LAWS[key], table, f"{path}: [friction]")
     # A card says "no Stribeck term" by Fs = Fc; the law says it by having no Fs, so that a fit of Fc cannot make one.
-    return replace(law, Fs=None, Vs=None) if getattr(law, "Fs", None) == getattr(law, "Fc", 0) else law  # type: ignore[call-arg]
+    if "Fs" in _keys(LAWS[key]) and "Fs" in table and table["Fs"] == table.get("Fc"):
+        table = {name: value for name, value in table.items() if name not in ("Fs", "Vs")}
+    return _build(LAWS[key], table, f"{path}: [friction]")
 
 
 def _effect(table: Table, path: str, index: int) -> Effect:
     where = f"{path}: [[effects]] number {index + 1}"
     name = table.pop("effect", None)
-    if name not in CATALOGUE:
+    if not isinstance(name, str) or name not in CATALOGUE:
         raise CardError(f"{where}: effect = {name!r} is unknown; effects are: {', '.join(CATALOGUE)}.")
-    forms = CATALOGUE[name]
-    fitting = [form for form in forms if set(table) <= set(_keys(form))]
-    return _build(fitting[0] if fitting else forms[0], table, f"{where} ({name})")
+    form = max(CATALOGUE[name], key=lambda form: len(set(table) & set(_keys(form))))
+    return _build(form, table, f"{where} ({name})")
 
 
 def _keys(part: type[Any]) -> dict[str, tuple[Variable, Any]]:
@@ -200,7 +202,8 @@ def _build(part: type[Part], table: Table, where: str) -> Part:
     for key, value in table.items():
         if key not in keys:
             raise CardError(f'{where}: "{key}" is not a key here; keys are: {", ".join(keys)}.')
-        table[key] = _number(value, keys[key][0], f"{where}: {key}")
+        read = _number_or_pair if issubclass(part, FrictionLaw) else _number
+        table[key] = read(value, keys[key][0], f"{where}: {key}")
     if table.get("Fs") is not None and "Vs" in keys and table.get("Vs") is None:
         raise CardError(f"{where}: Fs needs Vs, the speed over which friction falls.")
     missing = [key for key, (_, default) in keys.items() if key not in table and default is MISSING]
@@ -209,11 +212,14 @@ def _build(part: type[Part], table: Table, where: str) -> Part:
     return part(**table)
 
 
-def _number(value: Any, variable: Variable, where: str) -> float | Pair:
+def _number_or_pair(value: Any, variable: Variable, where: str) -> float | Pair:
     if isinstance(value, dict) and set(value) == set(Pair._fields):
-        sides = [_number(value[side], variable, f"{where}.{side}") for side in Pair._fields]
-        return Pair(*sides)  # type: ignore[arg-type]
-    if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value):
+        return Pair(**{side: _number(value[side], variable, f"{where}.{side}") for side in Pair._fields})
+    return _number(value, variable, where)
+
+
+def _number(value: Any, variable: Variable, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < LARGEST:
         raise CardError(f"{where} = {value!r} is not a number.")
     if not variable.low <= value <= variable.high:
         raise CardError(f"{where} = {value:g} is outside {variable.low:g} .. {variable.high:g}.")

@@ -1,6 +1,7 @@
 """Cards as text: what a diagnosis writes, `read_card` reads back."""
 
 import json
+from datetime import date, time
 from typing import Any
 
 from pyfmi_models.card import Card
@@ -42,7 +43,7 @@ def _section(name: str, table: dict[str, Any]) -> list[str]:
 
 
 def _pairs(table: dict[str, Any]) -> list[str]:
-    return [f"{key} = {_value(value)}" for key, value in table.items() if value is not None]
+    return [f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None]
 
 
 def _value(value: Any) -> str:
@@ -53,7 +54,11 @@ def _value(value: Any) -> str:
     if isinstance(value, list | tuple):
         return "[" + ", ".join(_value(v) for v in value) + "]"
     if isinstance(value, bool | str):
-        return json.dumps(value, ensure_ascii=False)
+        return json.dumps(value, ensure_ascii=False).replace(
+            "\x7f", "\\u007f"
+        )  # the one character TOML escapes, JSON not
+    if isinstance(value, date | time):
+        return value.isoformat()
     return repr(value)
 
 

@@ -5,13 +5,14 @@ operators) and a level that varies with speed in another way. Offered to the fit
 they keep an imprecise friction law from being taken for a missing effect.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from cosim.diagnosis.prepare import Array, Piece, Prepared
 
 STOPS = 8
 SPEEDS = 3
-SUBSTEPS = 1
 
 
 def stop_distances(prepared: Prepared) -> Array:
@@ -39,6 +40,7 @@ def speed_shapes(piece: Piece, top: float) -> Array:
     return np.asarray(sign[:, None] * np.exp(-((piece.v[:, None] / scales) ** 2)))
 
 
+@lru_cache(maxsize=4)
 def bank(prepared: Prepared) -> tuple[Array, Array]:
     """Return the stop operators and the speed shapes at the kept rows, filtered: (rows, 8) and (rows, 3)."""
     distances = stop_distances(prepared)

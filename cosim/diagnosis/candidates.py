@@ -172,9 +172,9 @@ def _rough_spot(mount: Mount, span: Span) -> Iterator[Candidate]:
     if mount.friction.key == "none" or _has(mount, LocalFriction):
         return
     low, high = np.quantile(span.q, [0.01, 0.99])
-    for share in (0.02, 0.05, 0.1):
+    for share in (0.03, 0.08):
         width = share * (high - low)
-        for center in np.arange(low + width, high - width / 2, 1.5 * width):
+        for center in np.arange(low + width, high - width / 2, 1.7 * width):
             spot = LocalFriction(q_center=float(center), width=float(width), relative_amplitude=0.0)
             start = lambda c, spot=spot: replace(spot, relative_amplitude=float(np.clip(c[0], -0.9, 15)))  # noqa: E731
             yield Candidate("position_friction", (spot,), ("relative_amplitude",), start)

@@ -10,15 +10,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cosim.diagnosis.evidence import Blocks, Score, t_value
+from cosim.diagnosis.candidates import candidates, columns_of
+from cosim.diagnosis.evidence import Score, t_value
 from cosim.diagnosis.fit import Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.select import LEAST_GAIN, TIE, Selection, Trial, is_real
-from cosim.diagnosis.structure import Bench, nuisances, screen
-from pyfmi_models.effects import Effect
+from cosim.diagnosis.structure import Bench, projected
+from pyfmi_models.effects import ActuatorLag, Delay, Effect
 from pyfmi_models.mount import Mount
 
-ALIKE = 0.5
+ALIKE = 0.4
 """A rival is refitted in an effect's place if its linear gain there reaches this share of the effect's."""
 TEMPERATURE = 60.0
 """Divides log-likelihoods before they become probabilities: neighbouring samples are far from independent."""
@@ -85,7 +86,7 @@ def challenge(
         places = []
         for effect in added:
             say(effect.title)
-            place = _place(effect, chosen, mount, prepared, weight, sample_time, bench)
+            place = _place(effect, chosen, mount, prepared, weight, bench)
             places.append(place)
             best = max((place.trial, *place.rivals), key=lambda trial: trial.gain)
             if place.trial.gain < LEAST_GAIN and not is_real(best, sample_time):
@@ -98,7 +99,7 @@ def challenge(
             break
     else:
         added = chosen.mount.effects[known:]
-        places = [_place(effect, chosen, mount, prepared, weight, sample_time, bench) for effect in added]
+        places = [_place(effect, chosen, mount, prepared, weight, bench) for effect in added]
     return Verdict(selection.base, chosen, bench, tuple(places), selection.looked_at)
 
 
@@ -117,25 +118,40 @@ def _place(
     mount: Mount,
     prepared: Prepared,
     weight: Array,
-    sample_time: float,
     bench: Bench,
 ) -> Place:
     reduced = _without(chosen, effect, mount, prepared, weight)
-    blocks: Blocks = bench.blocks
-    screening = screen(reduced, prepared, blocks, nuisances(reduced, prepared), weight)
-    bench = screening.bench
     before = bench.energy(reduced)
     own = Trial(effect.id, chosen, Score(before, bench.energy(chosen), bench.rows), reduced.rms)
-    linear = {candidate.effect: score.gain for candidate, score, _ in screening.best}
-    least = ALIKE * max(linear.get(effect.id, 0.0), own.gain * ALIKE)
-    rivals = [
-        _tried(reduced, candidate.start(k), mount, prepared, weight, bench, before)
-        for candidate, score, k in screening.best
-        if candidate.effect != effect.id
-        and score.gain > LEAST_GAIN
-        and (score.gain > least or candidate.effect in effect.rivals)
-    ][:3]
+    starts = _rivals(effect, reduced, bench, own.gain)
+    rivals = [_tried(reduced, start, mount, prepared, weight, bench, before) for start in starts]
     return Place(effect, own, tuple(sorted(rivals, key=lambda trial: -trial.gain)))
+
+
+def _rivals(effect: Effect, reduced: Fit, bench: Bench, gain: float) -> list[Effect]:
+    """Starts of the effect's rivals that are worth a nonlinear fit in its place, best member of each."""
+    prepared, nuisance = bench.prepared, bench.nuisances
+    rest = projected(reduced.residual, np.column_stack([reduced.slopes, nuisance.columns]))
+    alike = [c for c in candidates(reduced.mount, prepared, rest, np.abs(nuisance.level)) if c.effect in effect.rivals]
+    if not alike:
+        return []
+    groups = columns_of(reduced.mount, alike, prepared, reduced.values)
+    scores = bench.screen(reduced, groups, [candidate.shapes_excluded for candidate in alike])
+    best: dict[str, tuple[float, Effect]] = {}
+    for candidate, (score, coefficients) in zip(alike, scores, strict=True):
+        if score.gain > max(ALIKE * gain, best.get(candidate.effect, (LEAST_GAIN,))[0]):
+            best[candidate.effect] = score.gain, candidate.start(coefficients)
+    found = [start for _, start in sorted(best.values(), key=lambda item: -item[0])]
+    return found + [twin for twin in _twins(effect) if twin.id not in best]
+
+
+def _twins(effect: Effect) -> list[Effect]:
+    """Delay and lag are alike at first order, so a linear score cannot send one of them away."""
+    if isinstance(effect, Delay):
+        return [ActuatorLag(time_constant_ms=effect.delay_ms)]
+    if isinstance(effect, ActuatorLag):
+        return [Delay(delay_ms=effect.time_constant_ms)]
+    return []
 
 
 def _tried(

@@ -24,7 +24,7 @@ LEAST_SECONDS = 2.0
 """A contiguous piece shorter than this is left out."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Piece:
     """A contiguous piece of a recording at the rate where the model is evaluated.
 
@@ -57,7 +57,7 @@ class Piece:
         return index[self.inside[index]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Prepared:
     """All pieces of a set of recordings, and what is known about them as a whole."""
 

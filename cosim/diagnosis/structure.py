@@ -61,7 +61,7 @@ class Bench:
             without = self.weight.copy()
             without[rows] = 0.0
             # The bristles stay: a fold that never dwells would send them anywhere, and the judgement with them.
-            refit = fit(found.mount, self.prepared.pieces, without, evaluations=5, fixed=(*FIXED, *BRISTLES))
+            refit = fit(found.mount, self.prepared.pieces, without, evaluations=4, fixed=(*FIXED, *BRISTLES))
             residual[rows] = refit.residual[rows]
         grams = self._grams(replace(found, residual=residual), [])
         return grams.energy([], None if shapes else self._unshaped(found))

@@ -1,0 +1,157 @@
+"""The whole way: recordings and a card in, a diagnosis and a better card out."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cosim.diagnosis.adequacy import Rest, rest_of
+from cosim.diagnosis.challenge import Place, Verdict, challenge, merged
+from cosim.diagnosis.evidence import Blocks
+from cosim.diagnosis.findings import accepted, not_found, rival_finding, standard_errors
+from cosim.diagnosis.fit import Fit, fit
+from cosim.diagnosis.locate import regions
+from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare
+from cosim.diagnosis.protocol import CLEAR_MOTION, Structures, heldout_rms, judge, traces
+from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
+from cosim.diagnosis.sanity import check_units
+from cosim.diagnosis.select import select
+from cosim.recording import Recording
+from pyfmi_models.card import Card
+from pyfmi_models.effects import Effect, GravityUnbalance
+from pyfmi_models.friction import MemorylessLaw
+from pyfmi_models.mount import Mount
+
+Say = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A diagnosis, and the card of the model it ends with (the refitted base if nothing is missing)."""
+
+    diagnosis: Diagnosis
+    card: Card
+
+
+def diagnose(train: Sequence[Recording], heldout: Recording, card: Card, say: Say = lambda _: None) -> Outcome:
+    """Find what physics a card lacks.
+
+    Args:
+        train: recordings that may be fitted.
+        heldout: recording that is only looked at to prove the result.
+        card: the model as delivered.
+        say: told, in a few words, what is being done.
+
+    Raises:
+        RecordingError: the recordings cannot belong to this card (units), or are too short.
+    """
+    started, mount = time.perf_counter(), card.plant()
+    check_units([*train, heldout], mount)
+    cutoff = choose_cutoff(train, card.mount.inertia)
+    prepared = prepare(train, cutoff)
+    weight = _weight(mount, prepared)
+    sample_time = max(recording.sample_time for recording in train)
+    say("refitting the base")
+    selection = select(mount, prepared, weight, sample_time, say)
+    verdict = challenge(selection, mount, prepared, weight, sample_time, say)
+    say("proving on the recording that was not fitted")
+    verdict, unproven = _proven(verdict, mount, prepared, weight, heldout)
+    rest = rest_of(verdict.chosen, prepared, verdict.bench)
+    models = Structures(mount, verdict.base.mount, verdict.chosen.mount)
+    signals = traces(train, heldout, models)
+    found = _findings(verdict, unproven, prepared, weight, signals)
+    diagnosis = Diagnosis(
+        verdict=_verdict(found, rest),
+        findings=tuple(found),
+        heldout=judge(heldout, models, cutoff),
+        traces=signals,
+        regions=regions(signals, False, mount.motion == "linear"),
+        regions_after=regions(signals, True, mount.motion == "linear"),
+        mount=card.mount.name,
+        motion=mount.motion,
+        ambiguous_with=tuple((p.effect.id, *p.ambiguous_with) for p in verdict.places if p.ambiguous_with),
+        depends_on=rest.depends_on,
+        data_quality=tuple(note for recording in (*train, heldout) for note in recording.quality()),
+        friction_law={"base": mount.friction.key, "proposed": mount.friction.key, "gain": 0.0},
+        base_parameters=_base_parameters(models),
+        seconds=time.perf_counter() - started,
+    )
+    return Outcome(diagnosis, _improved(card, verdict.chosen.mount))
+
+
+def _weight(mount: Mount, prepared: Prepared) -> Array:
+    """All rows count, but for laws without memory only clear motion: at rest they say nothing."""
+    v = np.abs(prepared.stacked("v"))
+    if not isinstance(mount.friction, MemorylessLaw) or mount.friction.key == "none":
+        return np.ones(len(v))
+    return (v > CLEAR_MOTION * v.max()).astype(float)
+
+
+def _proven(
+    verdict: Verdict, mount: Mount, prepared: Prepared, weight: Array, heldout: Recording
+) -> tuple[Verdict, tuple[Place, ...]]:
+    """Take out effects that do not help on the held-out recording; return what stands, and those taken out."""
+    chosen, out = verdict.chosen, []
+    for places in merged(verdict.places).values():
+        gone = {_key(place.effect) for place in places}
+        rest = tuple(effect for effect in chosen.mount.effects if _key(effect) not in gone)
+        without = fit(replace(chosen.mount, effects=rest), prepared.pieces, weight, mount, evaluations=10)
+        if heldout_rms(heldout, without.mount) <= heldout_rms(heldout, chosen.mount):
+            chosen, out = without, [*out, *places]
+    if not out:
+        return verdict, ()
+    kept = [place for place in verdict.places if place not in out]
+    renewed = tuple(replace(p, effect=_same(p, chosen)) for p in kept)
+    return replace(verdict, chosen=chosen, places=renewed), tuple(out)
+
+
+def _key(effect: Effect) -> tuple[str, float]:
+    """What stays of an effect when it is fitted again: its kind, and its place in a spectrum."""
+    return type(effect).__name__, getattr(effect, "cycles_per_rev", 0.0)
+
+
+def _same(place: Place, chosen: Fit) -> Effect:
+    return next(effect for effect in chosen.mount.effects if _key(effect) == _key(place.effect))
+
+
+def _findings(
+    verdict: Verdict, unproven: Sequence[Place], prepared: Prepared, weight: Array, signals: Sequence[Trace]
+) -> list[Finding]:
+    errors = standard_errors(verdict.chosen, Blocks.of(prepared), weight)
+    mount, found, rivals = verdict.chosen.mount, [], []
+    for places in merged(verdict.places).values():
+        main = max(places, key=lambda place: getattr(place.effect, "amplitude", 0.0))
+        others = [place for place in places if place is not main]
+        found.append(accepted(main, others, mount, errors, signals, proven=True))
+        rivals += [rival_finding(r, main, mount) for r in main.rivals if r.effect in main.ambiguous_with]
+    found.sort(key=lambda finding: -finding.gain)
+    named = {finding.effect for finding in found}
+    rivals = [finding for finding in rivals if finding.effect not in named]
+    lost = [replace(rival_finding(p.trial, p, mount), answer="not_proven") for p in unproven]
+    lost = [finding for finding in lost if finding.effect not in named]
+    named |= {finding.effect for finding in (*rivals, *lost)}
+    return [*found, *rivals, *lost, *not_found(verdict.chosen, prepared, weight, verdict.looked_at, sorted(named))]
+
+
+def _verdict(found: Sequence[Finding], rest: Rest) -> tuple[str, ...]:
+    named = tuple(f.effect for f in found if f.answer in ("found", "ambiguous") and f.where is not None)
+    return named or (("unknown",) if rest.depends_on else ())
+
+
+def _base_parameters(models: Structures) -> dict[str, tuple[float, float, float]]:
+    tables = [{v.name: v.start for v in m.parameters()} for m in (models.nominal, models.before, models.after)]
+    names = [name for name in tables[0] if name.startswith(("axis.", "friction.")) and name in tables[2]]
+    kept = [name for name in names if not name.endswith(("torque_limit", "smoothing"))]
+    return {name: (tables[0][name], tables[1][name], tables[2][name]) for name in kept}
+
+
+def _improved(card: Card, mount: Mount) -> Card:
+    """Write the fitted numbers and the added effects into a card; a known load stays in its own section."""
+    load = mount.effects[0] if card.unbalance and isinstance(mount.effects[0], GravityUnbalance) else None
+    effects = mount.effects[1:] if load else mount.effects
+    section = card.mount.model_copy(update={"inertia": float(mount.axis.inertia)})
+    return replace(card, mount=section, friction=mount.friction, unbalance=load, effects=tuple(effects))
+
+
+__all__ = ["HeldOut", "Outcome", "diagnose"]

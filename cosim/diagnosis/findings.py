@@ -1,0 +1,196 @@
+"""From structures to sentences: one finding for every effect that was looked for."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import sqrt
+from typing import Any
+
+import numpy as np
+
+from cosim.diagnosis.candidates import candidates, columns_of
+from cosim.diagnosis.challenge import Place
+from cosim.diagnosis.evidence import Blocks
+from cosim.diagnosis.fit import Fit
+from cosim.diagnosis.locate import where
+from cosim.diagnosis.prepare import Array, Prepared
+from cosim.diagnosis.result import Finding, Trace
+from cosim.diagnosis.select import LEAST_GAIN, Trial
+from cosim.diagnosis.structure import nuisances, projected
+from pyfmi_models.effects import CATALOGUE, Effect, GravityUnbalance
+from pyfmi_models.model import parameters_of
+from pyfmi_models.mount import LINEAR_UNITS, Mount
+
+Z95 = 1.96
+MAIN = {
+    "friction_asymmetry": ("level_asymmetry", 200.0, "%"),
+    "torque_offset": ("torque", 1.0, "N.m"),
+    "delay": ("delay_ms", 1.0, "ms"),
+    "actuator_lag": ("time_constant_ms", 1.0, "ms"),
+    "cogging": ("amplitude", 1.0, "N.m"),
+    "stribeck": ("Fs", 1.0, "N.m"),
+    "gravity_unbalance": ("mgl", 1.0, "N.m"),
+    "position_friction": ("relative_amplitude", 100.0, "%"),
+}
+"""The number that says how large an effect is: parameter, factor and unit of the text."""
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Parameters of one effect, and what the recordings say of their precision."""
+
+    values: dict[str, float]
+    errors: dict[str, float]
+
+
+def standard_errors(chosen: Fit, blocks: Blocks, weight: Array) -> dict[str, float]:
+    """Block-robust standard errors of all fitted parameters (sandwich with blocks as clusters)."""
+    slopes = chosen.slopes * weight[:, None]
+    scale = np.sqrt((slopes**2).sum(0)) + 1e-300
+    scaled, residual = slopes / scale, chosen.residual * weight
+    bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-10)
+    scores = np.array([scaled[rows].T @ residual[rows] for rows in blocks.rows])
+    covariance = bread @ (scores.T @ scores) @ bread * len(scores) / max(len(scores) - 1, 1)
+    return dict(zip(chosen.free, (np.sqrt(np.maximum(np.diag(covariance), 0)) / scale).tolist(), strict=True))
+
+
+def numbers_of(effect: Effect, mount: Mount, errors: Mapping[str, float]) -> Numbers:
+    """Parameters of an effect of a fitted mount with their standard errors, by the effect's own names."""
+    prefix = next(name for name, part in mount.components().items() if part is effect)
+    values = {variable.name: float(variable.start) for variable in parameters_of(effect)}
+    return Numbers(values, {name: errors[f"{prefix}.{name}"] for name in values if f"{prefix}.{name}" in errors})
+
+
+def accepted(
+    place: Place,
+    harmonics: Sequence[Place],
+    mount: Mount,
+    errors: Mapping[str, float],
+    traces: Sequence[Trace],
+    proven: bool,
+) -> Finding:
+    """Describe an effect that stands; its further harmonics are told with it."""
+    numbers, effect = numbers_of(place.effect, mount, errors), place.effect
+    rivals = place.ambiguous_with
+    answer = "not_proven" if not proven else "ambiguous" if rivals else "found"
+    parameters: dict[str, Any] = dict(numbers.values)
+    if harmonics:
+        parameters["harmonics"] = [numbers_of(other.effect, mount, errors).values for other in harmonics]
+    ranges = {n: (v - Z95 * numbers.errors[n], v + Z95 * numbers.errors[n]) for n, v in numbers.values.items() if n in numbers.errors}
+    size, size_range = _size(effect, numbers, mount)
+    excluded = [rival for rival in place.rivals if rival.effect not in rivals]
+    return Finding(
+        effect=effect.id,
+        title=effect.title,
+        answer=answer,  # type: ignore[arg-type]
+        probability=place.probability,
+        gain=place.trial.gain,
+        parameters=parameters,
+        standard_errors=numbers.errors,
+        ranges=ranges,
+        units=_units(effect, mount),
+        size=size,
+        size_range=size_range,
+        statement=effect.statement("N" if mount.motion == "linear" else "N·m"),
+        where=where(effect, traces),
+        ruled_out=tuple(f"{_title(rival.effect)}: explains {rival.gain:.0%}, this {place.trial.gain:.0%}" for rival in excluded),
+        told_apart_by=effect.told_apart_by,
+        action=effect.action,
+        evidence=f"removes {place.trial.gain:.0%} of the error energy on runs left out of the fit (t = {place.trial.t:.1f} over blocks)",
+    )
+
+
+def rival_finding(rival: Trial, place: Place, mount: Mount) -> Finding:
+    """Describe a rival that could not be excluded."""
+    effect = rival.fit.mount.effects[-1]
+    values = {variable.name: float(variable.start) for variable in parameters_of(effect)}
+    size, _ = _size(effect, Numbers(values, {}), mount)
+    return Finding(
+        effect=effect.id,
+        title=effect.title,
+        answer="ambiguous",
+        probability=max(0.0, (1 - place.probability) / max(len(place.ambiguous_with), 1)),
+        gain=rival.gain,
+        parameters=values,
+        units=_units(effect, mount),
+        size=size,
+        statement=effect.statement("N" if mount.motion == "linear" else "N·m"),
+        told_apart_by=effect.told_apart_by,
+        action=effect.action,
+    )
+
+
+def not_found(
+    chosen: Fit, prepared: Prepared, weight: Array, looked_at: Mapping[str, Trial], named: Sequence[str]
+) -> list[Finding]:
+    """One finding for each effect of the catalogue that is not named: not seen from which size, or not testable."""
+    nuisance = nuisances(chosen, prepared)
+    tried = candidates(chosen.mount, prepared, chosen.residual, np.abs(nuisance.level))
+    columns = columns_of(chosen.mount, tried, prepared, chosen.values)
+    known = np.column_stack([chosen.slopes, nuisance.columns]) * weight[:, None]
+    smallest: dict[str, float] = {}
+    for candidate, column in zip(tried, columns, strict=True):
+        size = _smallest(chosen, column[:, 0] * weight, known)
+        if candidate.effect in ("delay", "actuator_lag"):
+            size *= getattr(candidate.instances[0], MAIN[candidate.effect][0])
+        smallest[candidate.effect] = min(size, smallest.get(candidate.effect, np.inf))
+    rest = [name for name in CATALOGUE if name not in named]
+    return [_absent(name, smallest.get(name), looked_at.get(name), chosen.mount, prepared) for name in rest]
+
+
+def _smallest(chosen: Fit, column: Array, known: Array) -> float:
+    """Size whose column would hold `LEAST_GAIN` of the residual energy beyond what the structure can imitate."""
+    own = float(np.sum(projected(column, known) ** 2))
+    rest = float(np.sum(chosen.residual**2))
+    return sqrt(LEAST_GAIN / (1 - LEAST_GAIN) * rest / own) if own > 0 else float("inf")
+
+
+def _absent(name: str, smallest: float | None, trial: Trial | None, mount: Mount, prepared: Prepared) -> Finding:
+    form = CATALOGUE[name][0]
+    _, factor, unit = MAIN[name]
+    testable = smallest is not None and np.isfinite(smallest)
+    reason = "" if testable else _why_not(name, mount, prepared)
+    return Finding(
+        effect=name,
+        title=form.title,
+        answer="not_seen" if testable else "not_testable",
+        probability=0.0,
+        gain=max(0.0, trial.gain) if trial else 0.0,
+        units={MAIN[name][0]: _unit(unit, mount)},
+        visible_from=factor * smallest if testable and smallest is not None else None,
+        evidence=reason,
+        action=reason,
+    )
+
+
+def _why_not(name: str, mount: Mount, prepared: Prepared) -> str:
+    if name == "gravity_unbalance" and mount.motion == "linear":
+        return "a linear axis has no unbalance"
+    if name == "gravity_unbalance" and any(isinstance(effect, GravityUnbalance) for effect in mount.effects):
+        return "the card has it already"
+    if name == "stribeck" and getattr(mount.friction, "Fs", None) is not None:
+        return "the card's friction law has it already"
+    if not prepared.has_position and name in ("cogging", "position_friction", "gravity_unbalance"):
+        return "no position was recorded; record q"
+    return "the model has it already, or these recordings do not excite it"
+
+
+def _size(effect: Effect, numbers: Numbers, mount: Mount) -> tuple[str, str]:
+    name, factor, unit = MAIN[effect.id]
+    if effect.id == "friction_asymmetry" and abs(numbers.values["viscous_asymmetry"]) > abs(numbers.values[name]):
+        name, unit = "viscous_asymmetry", "% viscous"
+    value, error = factor * numbers.values[name], factor * numbers.errors.get(name, float("nan"))
+    text = f"{abs(value):.3g} {_unit(unit, mount)}"
+    ends = sorted((abs(value) - Z95 * error, abs(value) + Z95 * error))
+    return text, f"{ends[0]:.3g} to {ends[1]:.3g}" if np.isfinite(error) else ""
+
+
+def _units(effect: Effect, mount: Mount) -> dict[str, str]:
+    return {v.name: mount.in_axis_units(v).unit for v in parameters_of(effect)}
+
+
+def _unit(unit: str, mount: Mount) -> str:
+    return (LINEAR_UNITS.get(unit, unit) if mount.motion == "linear" else unit).replace("N.m", "N·m")
+
+
+def _title(name: str) -> str:
+    return CATALOGUE[name][0].title

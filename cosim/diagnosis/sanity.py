@@ -1,0 +1,69 @@
+"""Can these recordings belong to this card? Units that cannot be right are refused before anything is fitted."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cosim.diagnosis.prepare import lowpass, prepare
+from cosim.errors import RecordingError
+from cosim.recording import Recording
+from pyfmi_models.mount import Mount
+
+LEAST_SECONDS = 8.0
+RATIOS = {"deg": 57.2958, "arcmin": 3437.75, "arcsec": 206264.8, "mrad": 1000.0, "rev": 1 / 6.28319}
+LINEAR_RATIOS = {"mm": 1e3, "um": 1e6}
+SPREAD = 2.2
+"""An inertia within this factor of the card's, once a unit is undone, gives the unit away."""
+
+
+def check_units(recordings: Sequence[Recording], mount: Mount) -> None:
+    """Refuse recordings that are too short, or whose position is in a unit that the torque contradicts.
+
+    The inertia that torque and acceleration imply is compared with the card's: a position in degrees makes it 57.3
+    times too small. Raises RecordingError with the unit to state.
+    """
+    for recording in recordings:
+        if recording.duration < LEAST_SECONDS:
+            text = f"{recording.name}: only {recording.duration:.3g} s of recording; fitting needs {LEAST_SECONDS:g} s."
+            raise RecordingError(text, culprit=recording.name, value=recording.duration)
+        _check_motion(recording)
+        _check_ratio(recording, mount)
+
+
+def _check_motion(recording: Recording) -> None:
+    name = "q" if "q" in recording else "v"
+    dt = recording.sample_time
+    slow = lowpass(recording[name], dt, min(10.0, 0.2 / dt))
+    moves = np.abs(np.diff(slow)).sum() if name == "q" else np.abs(slow).max()
+    if moves <= 0:
+        raise RecordingError(f"{recording.name}: {name} never moves, so there is nothing to diagnose.", culprit=name)
+
+
+def _check_ratio(recording: Recording, mount: Mount) -> None:
+    implied = _implied_inertia(recording)
+    ratios = LINEAR_RATIOS if mount.motion == "linear" else RATIOS
+    expected = float(mount.axis.inertia)
+    off = expected / implied if implied > 0 else np.inf
+    if 1 / 5 < off < 5:
+        return
+    for unit, ratio in ratios.items():
+        if ratio / SPREAD < off < ratio * SPREAD:
+            name = "q" if "q" in recording else "v"
+            stated = unit if name == "q" else f"{unit}/s"
+            text = (
+                f'{recording.name}: "{name}" looks like {unit} (the torque implies an inertia {off:.3g} times smaller '
+                f"than the card's {expected:g}). Use --units {name}={stated}."
+            )
+            raise RecordingError(text, culprit=name, value=off)
+
+
+def _implied_inertia(recording: Recording) -> float:
+    """Inertia from least squares of torque on acceleration, direction and speed."""
+    prepared = prepare([recording], min(10.0, 0.2 / recording.sample_time))
+    top = max(abs(edge) for edge in prepared.ranges["v"]) + 1e-300
+    a, v, tau = (prepared.stacked(name) for name in ("a", "v", "tau"))
+    columns = np.column_stack([a, np.tanh(v / (0.02 * top)), v, np.ones_like(v)])
+    scale = np.sqrt((columns**2).sum(0)) + 1e-300
+    return float((np.linalg.lstsq(columns / scale, tau, rcond=None)[0] / scale)[0])
+
+
