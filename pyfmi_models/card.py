@@ -41,9 +41,9 @@ class MountSection(_Section):
 class EncoderSection(_Section):
     """`[encoder]`: counts per turn (0: no quantisation), white noise RMS [rad], encoder turns per axis turn."""
 
-    counts_per_rev: float = Field(default=0, ge=0)
-    noise_rms: float = Field(default=0, ge=0)
-    ratio: float = Field(default=1, gt=0)
+    counts_per_rev: float = Field(default=0.0, ge=0)
+    noise_rms: float = Field(default=0.0, ge=0)
+    ratio: float = Field(default=1.0, gt=0)
 
 
 class ControllerSection(_Section):
@@ -52,9 +52,9 @@ class ControllerSection(_Section):
     type: Literal["adrc"] = "adrc"
     kp: float = Field(gt=0)
     kd: float = Field(gt=0)
-    loop_hz: float = Field(default=10_000, gt=0)
-    record_hz: float = Field(default=1_000, gt=0)
-    observer_bandwidth: float = Field(default=220, gt=0)
+    loop_hz: float = Field(default=10_000.0, gt=0)
+    record_hz: float = Field(default=1_000.0, gt=0)
+    observer_bandwidth: float = Field(default=220.0, gt=0)
     compensation: Literal["C1", "C2a", "C2b", "C3a", "C3b"] = "C1"
 
 
@@ -78,7 +78,7 @@ class Card:
     friction: FrictionLaw
     unbalance: GravityUnbalance | None = None
     effects: tuple[Effect, ...] = ()
-    encoder: EncoderSection = EncoderSection()
+    encoder: EncoderSection = field(default_factory=EncoderSection)
     controller: ControllerSection | None = None
     columns: dict[str, str] = field(default_factory=dict)
     origin: Table = field(default_factory=dict)
@@ -121,7 +121,7 @@ class Card:
 
 
 def read_card(source: str | Path) -> Card:
-    """Read a card from a file, or by the name of a shipped one; raise `CardError` with one sentence if it is not good."""
+    """Read a card from a file, or by the name of a shipped one; raise `CardError` with one sentence if it is bad."""
     path = Path(source)
     shipped = files("pyfmi_models") / "cards" / f"{source}.toml"
     try:

@@ -1,0 +1,284 @@
+"""Cards come back as they were written, and every mistake in one is named by file, key, value and rule."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from pyfmi_models.card import Card, parse_card, read_card, shipped_cards
+from pyfmi_models.card_writer import card_text
+from pyfmi_models.effects import CATALOGUE, Cogging, GravityUnbalance, LocalFriction, PeriodicFriction
+from pyfmi_models.errors import CardError
+from pyfmi_models.friction import LAWS, Coulomb, LuGre
+from pyfmi_models.model import Pair
+
+SMALL = '[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\n'
+FULL = r"""
+[mount]
+name = "north \"axis\" 3°"
+motion = "rotary"
+inertia = 31.5
+torque_limit = 50
+
+[friction]
+model = "lugre"
+sigma0 = { positive = 9.85e4, negative = 8.61e4 }
+sigma1 = 497
+Fc = { positive = 2.1, negative = 2.4 }
+Fs = 3.3
+Vs = 0.04
+delta = 1.292
+
+[unbalance]
+mgl = 1.5
+phase = -0.2
+
+[encoder]
+counts_per_rev = 4294967296
+noise_rms = 1e-9
+ratio = 3
+
+[controller]
+kp = 225
+kd = 30
+compensation = "C3a"
+
+[columns]
+tau = "force"
+"motor temperature" = "T_m"
+
+[[effects]]
+effect = "cogging"
+cycles_per_rev = 24
+amplitude = 0.5
+
+[[effects]]
+effect = "position_friction"
+q_center = 1.0
+width = 0.05
+relative_amplitude = 0.3
+
+[[effects]]
+effect = "position_friction"
+cycles_per_rev = 3
+relative_amplitude = 0.2
+phase = 0.1
+
+[origin]
+version = "0.1.0"
+date = 2026-11-20
+time = 2026-11-20T20:00:00Z
+odd = "a\u007f\\\"\n\té"
+recordings = [{ name = "train 1.csv", sha256 = "ab" }, { name = "b", sha256 = "cd" }]
+evidence = { "held out" = { gain = 0.25, proven = true } }
+"""
+
+
+def full() -> Card:
+    return parse_card(FULL, "full.toml")
+
+
+def test_a_card_says_what_was_written() -> None:
+    card = full()
+    assert card.mount.name == 'north "axis" 3°'
+    assert card.friction == LuGre(
+        sigma0=Pair(9.85e4, 8.61e4), sigma1=497.0, Fc=Pair(2.1, 2.4), Fs=3.3, Vs=0.04, delta=1.292
+    )
+    assert card.unbalance == GravityUnbalance(mgl=1.5, phase=-0.2)
+    assert card.effects == (
+        Cogging(cycles_per_rev=24, amplitude=0.5),
+        LocalFriction(q_center=1.0, width=0.05, relative_amplitude=0.3),
+        PeriodicFriction(cycles_per_rev=3, relative_amplitude=0.2, phase=0.1),
+    )
+    assert card.controller is not None
+    assert (card.controller.compensation, card.controller.loop_hz) == ("C3a", 10_000)
+    assert card.columns == {"tau": "force", "motor temperature": "T_m"}
+
+
+def test_a_card_comes_back_from_its_text() -> None:
+    card = full()
+    text = card_text(card, "What this is.\n\nAnd why.")
+    assert text.startswith("# What this is.\n#\n# And why.\n")
+    assert parse_card(text, "full.toml") == card
+    assert card_text(parse_card(text, "full.toml")) == card_text(card)
+
+
+@pytest.mark.parametrize("name", shipped_cards())
+def test_a_shipped_card_comes_back_and_makes_a_plant(name: str) -> None:
+    card = read_card(name)
+    assert parse_card(card_text(card), name) == card
+    assert card.plant().model().name.endswith("_plant")
+
+
+@pytest.mark.parametrize("key", CATALOGUE)
+def test_every_effect_can_be_written_and_read(key: str) -> None:
+    example = {"stribeck": "Fs = 4.0\nVs = 0.1", "delay": "delay_ms = 2.0", "torque_offset": "torque = -0.5"}
+    example |= {"friction_asymmetry": "level_asymmetry = 0.1", "cogging": "cycles_per_rev = 4.0\namplitude = 1.0"}
+    example |= {"actuator_lag": "time_constant_ms = 2.0", "gravity_unbalance": "mgl = 1.0"}
+    example |= {"position_friction": "q_center = 1.0\nwidth = 0.1\nrelative_amplitude = 0.1"}
+    card = parse_card(f'{SMALL}[[effects]]\neffect = "{key}"\n{example[key]}\n', "c")
+    assert [effect.id for effect in card.effects] == [key]
+    assert parse_card(card_text(card), "c") == card
+    assert len(card.plant().effects) == 1
+
+
+def test_the_known_load_comes_before_the_effects() -> None:
+    assert [effect.id for effect in full().plant().effects] == [
+        "gravity_unbalance",
+        "cogging",
+        "position_friction",
+        "position_friction",
+    ]
+
+
+def test_defaults_are_those_that_the_contract_states() -> None:
+    card = parse_card(SMALL, "c")
+    assert card.friction == Coulomb(Fc=1.0, sigma2=0.0)
+    assert (card.mount.motion, card.controller, card.unbalance, card.effects) == ("rotary", None, None, ())
+    assert (card.encoder.counts_per_rev, card.encoder.noise_rms, card.encoder.ratio) == (0, 0, 1)
+
+
+@pytest.mark.parametrize("Vs", ["", "Vs = 0.04\n"])
+@pytest.mark.parametrize("pair", [False, True])
+def test_equal_break_away_and_coulomb_levels_mean_no_stribeck_term(Vs: str, pair: bool) -> None:
+    level = "{ positive = 2.0, negative = 3.0 }" if pair else "2.0"
+    text = f'[mount]\ninertia = 2\n[friction]\nmodel = "lugre"\nsigma0 = 1e4\nFc = {level}\nFs = {level}\n{Vs}'
+    law = parse_card(text, "c").friction
+    assert isinstance(law, LuGre)
+    assert (law.Fs, law.Vs) == (None, None)
+
+
+def test_the_name_of_a_mount_becomes_an_identifier() -> None:
+    assert full().plant().name == "north__axis__3_"
+    assert replace(full(), mount=full().mount.model_copy(update={"name": "3"})).plant().name == "_3"
+    assert replace(full(), mount=full().mount.model_copy(update={"name": ""})).plant().name == "mount"
+
+
+LAW = "bad.toml: [friction]"
+EFFECT = "bad.toml: [[effects]] number 1"
+POSITION = 'effect = "position_friction"\nrelative_amplitude = 0.1\nq_center = 1.0\n'
+MISTAKES = {
+    "no TOML": ("[mount", "bad.toml is not valid TOML: Expected ']'"),
+    "key twice": (SMALL + "Fc = 2\n", "bad.toml is not valid TOML: Cannot overwrite a value"),
+    "unknown section": (SMALL + "[fricton]\n", "bad.toml: [fricton] is not a key of a card."),
+    "unknown key": (SMALL + "[encoder]\ncounts = 3\n", "bad.toml: [encoder] counts is not a key of a card."),
+    "no friction": ("[mount]\ninertia = 2\n", "bad.toml: [friction] is missing."),
+    "no inertia": (SMALL.replace("inertia = 2.0", ""), "bad.toml: [mount] inertia is missing."),
+    "negative inertia": (
+        SMALL.replace("2.0", "-2.0"),
+        "bad.toml: [mount] inertia = -2.0 breaks the rule: input should be greater than 0.",
+    ),
+    "infinite inertia": (
+        SMALL.replace("2.0", "inf"),
+        "bad.toml: [mount] inertia = inf breaks the rule: input should be a finite number.",
+    ),
+    "inertia in quotes": (
+        SMALL.replace("2.0", '"2.0"'),
+        "bad.toml: [mount] inertia = '2.0' breaks the rule: input should be a valid number.",
+    ),
+    "wrong word": (
+        SMALL + '[controller]\nkp = 1\nkd = 1\ncompensation = "C9"\n',
+        "[controller] compensation = 'C9' breaks the rule: input should be 'C1', 'C2a', 'C2b', 'C3a' or 'C3b'.",
+    ),
+    "friction without a law": (SMALL.replace("model", "#"), f"{LAW} model = None is unknown; models are: "),
+    "unknown law": (
+        SMALL.replace("coulomb", "lugr"),
+        f"{LAW} model = 'lugr' is unknown; models are: {', '.join(LAWS)}",
+    ),
+    "law as a list": (SMALL.replace('"coulomb"', '["coulomb"]'), f"{LAW} model = ['coulomb'] is unknown"),
+    "key of another law": (SMALL + "Fs = 2\n", f'{LAW}: "Fs" is not a key here; keys are: smoothing, Fc, sigma2.'),
+    "missing level": (SMALL.replace("Fc = 1.0", ""), f"{LAW}: Fc is missing."),
+    "level out of bounds": (SMALL.replace("1.0", "-1.0"), f"{LAW}: Fc = -1 is outside 0 .. inf."),
+    "side out of bounds": (
+        SMALL.replace("1.0", "{ positive = 1, negative = -2 }"),
+        f"{LAW}: Fc.negative = -2 is outside 0 .. inf.",
+    ),
+    "half a pair": (SMALL.replace("1.0", "{ positive = 1 }"), f"{LAW}: Fc = {{'positive': 1}} is not a number."),
+    "pair in a pair": (
+        SMALL.replace("1.0", "{ positive = 1, negative = { positive = 1, negative = 2 } }"),
+        f"{LAW}: Fc.negative = {{'positive': 1, 'negative': 2}} is not a number.",
+    ),
+    "level in quotes": (SMALL.replace("1.0", '"1"'), f"{LAW}: Fc = '1' is not a number."),
+    "level as truth": (SMALL.replace("1.0", "true"), f"{LAW}: Fc = True is not a number."),
+    "level nan": (SMALL.replace("1.0", "nan"), f"{LAW}: Fc = nan is not a number."),
+    "level too long": (SMALL.replace("1.0", "1" + "0" * 400), f"{LAW}: Fc = 1000"),
+    "Stribeck without its speed": (
+        SMALL.replace("coulomb", "static") + "Fs = 2.0\n",
+        f"{LAW}: Fs needs Vs, the speed over which friction falls.",
+    ),
+    "empty unbalance": (SMALL + "[unbalance]\n", "bad.toml: [unbalance]: mgl is missing."),
+    "effect without a name": (SMALL + "[[effects]]\namplitude = 1\n", f"{EFFECT}: effect = None is unknown"),
+    "effect as a list": (SMALL + '[[effects]]\neffect = ["x"]\n', f"{EFFECT}: effect = ['x'] is unknown"),
+    "unknown effect": (
+        SMALL + '[[effects]]\neffect = "coging"\n',
+        f"{EFFECT}: effect = 'coging' is unknown; effects are: {', '.join(CATALOGUE)}.",
+    ),
+    "effects as one table": (SMALL + '[effects]\neffect = "x"\n', "breaks the rule: input should be a valid list."),
+    "missing amplitude": (
+        SMALL + '[[effects]]\neffect = "cogging"\ncycles_per_rev = 3\n',
+        f"{EFFECT} (cogging): amplitude is missing.",
+    ),
+    "typing error in one form of an effect": (
+        f"{SMALL}[[effects]]\n{POSITION}widht = 0.1\n",
+        f'{EFFECT} (position_friction): "widht" is not a key here; keys are: q_center, width, relative_amplitude.',
+    ),
+    "two forms of an effect at once": (
+        f"{SMALL}[[effects]]\n{POSITION}width = 0.1\ncycles_per_rev = 3\n",
+        f'{EFFECT} (position_friction): "cycles_per_rev" is not a key here',
+    ),
+    "effect by direction": (
+        SMALL + '[[effects]]\neffect = "delay"\ndelay_ms = { positive = 1, negative = 2 }\n',
+        f"{EFFECT} (delay): delay_ms = {{'positive': 1, 'negative': 2}} is not a number.",
+    ),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_a_card_is_named_in_one_sentence(mistake: str, tmp_path: Path) -> None:
+    text, message = MISTAKES[mistake]
+    with pytest.raises(CardError) as caught:
+        parse_card(text, "bad.toml")
+    assert message in str(caught.value)
+    assert str(caught.value).startswith("bad.toml")
+    assert "\n" not in str(caught.value)
+    path = tmp_path / "bad.toml"
+    path.write_text(text, "utf-8")
+    with pytest.raises(CardError) as caught:
+        read_card(path)
+    assert str(path) in str(caught.value)
+
+
+def test_a_card_that_is_not_there_lists_those_that_are() -> None:
+    with pytest.raises(CardError) as caught:
+        read_card("paper_mont")
+    assert str(caught.value) == "paper_mont: no such card. Shipped cards are: emps, paper_mount."
+
+
+def test_a_folder_is_no_card(tmp_path: Path) -> None:
+    with pytest.raises(CardError) as caught:
+        read_card(tmp_path)
+    assert str(caught.value) == f"{tmp_path} is a folder, not a card."
+
+
+def test_bytes_are_no_card(tmp_path: Path) -> None:
+    path = tmp_path / "c.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(CardError) as caught:
+        read_card(path)
+    assert str(caught.value) == f"{path} is not a card: it is not UTF-8 text."
+
+
+def test_a_controller_must_be_on_the_card() -> None:
+    with pytest.raises(CardError) as caught:
+        parse_card(SMALL, "c.toml").controller_model()
+    assert str(caught.value) == "c.toml: there is no [controller] section, so there is no controller to export."
+
+
+def test_compensation_needs_bristles() -> None:
+    text = SMALL + '[controller]\nkp = 225\nkd = 30\ncompensation = "C3a"\n'
+    with pytest.raises(CardError) as caught:
+        parse_card(text, "c.toml").controller_model()
+    assert str(caught.value) == (
+        'c.toml: [controller] compensation = "C3a" needs [friction] model = "lugre"; it is "coulomb".'
+    )
+    assert parse_card(text.replace("C3a", "C1"), "c.toml").controller_model().period == 1e-4
