@@ -21,6 +21,8 @@ from cosim.errors import CosimError
 from cosim.terminal import put, say
 from pyfmi_models.errors import ModelError
 
+SEVERAL = ("--columns", "--units")
+"""Options that may be followed by several name=value pairs."""
 VERBS = ("demo", "export", "run", "identify", "diagnose", "prove", "paper", "sweep", "hardware", "show")
 
 
@@ -28,8 +30,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given
-    rest = [argument for argument in given if argument != "--debug"]
+    rest = repeated([argument for argument in given if argument != "--debug"])
     application(rest, debug)(rest, prog_name="cosim")
+
+
+def repeated(arguments: Sequence[str]) -> list[str]:
+    """Let `--columns a=b c=d` (and `--units`) take several values: repeat the option before each further one."""
+    out: list[str] = []
+    option = ""
+    for argument in arguments:
+        if argument.startswith("-"):
+            option = argument if argument in SEVERAL else ""
+        elif option and out[-1] != option:
+            if "=" in argument:
+                out.append(option)
+            else:
+                option = ""
+        out.append(argument)
+    return out
 
 
 def application(arguments: Sequence[str], debug: bool = False) -> typer.Typer:

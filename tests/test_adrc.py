@@ -1,0 +1,189 @@
+"""The controller's observer knows what acted; its friction compensation is worth what theory says."""
+
+from dataclasses import replace
+from functools import cache
+from math import exp
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cosim.master import simulate
+from cosim.signals import Sine
+from cosim.wiring import Record
+from pyfmi_models.adrc import Adrc, Gains, compensation_case
+from pyfmi_models.card import Card, read_card
+from pyfmi_models.export import export_fmu
+from pyfmi_models.friction import LuGre
+from pyfmi_models.model import Model
+
+J, H, LIMIT = 30.0, 1e-4, 50.0
+GAINS = Gains(inertia=J, kp=225.0, kd=30.0, observer_bandwidth=220.0, torque_limit=LIMIT)
+LUGRE = LuGre(sigma0=9.23e4, sigma1=497.0, sigma2=32.77, Fc=2.322, Fs=3.322, Vs=0.04129)
+CASES = ("C1", "C2a", "C2b", "C3a", "C3b")
+ARCSEC = np.pi / 180 / 3600
+
+
+def controller(case: str = "C1", **gains: float) -> Model:
+    law = compensation_case(case, LUGRE)
+    return Adrc(name="m", gains=replace(GAINS, **gains), period=H, compensation=law).model()
+
+
+def run(model: Model, ticks: int, **motion: Any) -> dict[str, np.ndarray]:
+    """Close the loop around an exact double integrator; a command of tick k acts from tick k+1 to tick k+2.
+
+    Args:
+        model: the controller.
+        ticks: how many.
+        motion: reference(t) -> (q_d, v_d, a_d), resist(t) -> torque [N m], lag: ticks between command and action.
+    """
+    reference = motion.get("reference", lambda t: (0.0, 0.0, 0.0))
+    resist, lag = motion.get("resist", lambda t: 0.0), motion.get("lag", 1)
+    values = [variable.start for variable in model.parameters]
+    memory, (q, v) = [state.start for state in model.states], motion.get("start", (0.0, 0.0))
+    names = [variable.name for variable in model.outputs]
+    pending, rows = [0.0] * lag, []
+    for k in range(ticks):
+        t = k * H
+        memory, outputs = model.equations(t, memory, [q, *reference(t)], values)
+        row = dict(zip(names, outputs.full().ravel().tolist(), strict=True))
+        rows.append(row | {"q": q, "v": v, "q_d": reference(t)[0]})
+        pending.append(row["tau"])
+        push = (pending.pop(0) - resist(t)) / J
+        q, v = q + H * v + H * H / 2 * push, v + H * push
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+def kick(t: float) -> tuple[float, float, float]:
+    """A set point that asks for one impulse of torque at tick 10, then for nothing."""
+    return (0.0, 0.0, 1.0 if round(t / H) == 10 else 0.0)
+
+
+def test_the_command_is_the_control_law() -> None:
+    """Equation (7) with a fresh observer: zeta2 = zeta3 = 0."""
+    model = controller()
+    values = [variable.start for variable in model.parameters]
+    _, outputs = model.equations(0, [0] * len(model.states), [0.01, 0.03, 0.2, 0.5], values)
+    expected = J * (0.5 + 225 * 0.02 + 30 * 0.2)
+    assert float(
+        controller(torque_limit=1e6).equations(0, [0] * 8, [0.01, 0.03, 0.2, 0.5], [*values[:-1], 1e6])[1][0]
+    ) == (pytest.approx(expected))
+    assert float(outputs[0]) == LIMIT < expected
+
+
+def test_the_observer_starts_at_the_measured_position() -> None:
+    found = run(controller(), 3, start=(1.234, 0.0), reference=lambda t: (1.234, 0.0, 0.0))
+    assert np.all(found["zeta1"] == 1.234)
+    assert not np.any(found["zeta2"])
+    assert not np.any(found["tau"])
+
+
+def test_the_observer_is_fed_the_command_that_acted() -> None:
+    """An impulse of tick 10 acts from tick 11: an observer fed with it at that moment is never surprised."""
+    found = run(controller(), 200, reference=kick)
+    assert found["tau"][10] == pytest.approx(J)
+    assert found["q"][11] == 0
+    assert found["q"][12] == pytest.approx(H**2 / 2)
+    np.testing.assert_allclose(found["zeta1"], found["q"], rtol=0, atol=1e-20)
+    np.testing.assert_allclose(found["zeta2"], found["v"], rtol=0, atol=1e-15)
+    # What rounding of q (5e-9 rad, 1e-24) leaves in zeta3 is multiplied by (1 - pole)^3 / H^2 = 1e3.
+    assert np.abs(found["zeta3"]).max() < 1e-12
+
+
+@pytest.mark.parametrize("lag", [0, 2])
+def test_a_tick_more_or_less_between_command_and_action_is_a_surprise(lag: int) -> None:
+    found = run(controller(), 200, reference=kick, lag=lag)
+    assert np.abs(found["zeta3"]).max() > 1e-4  # rad/s2, of an impulse of 1 rad/s2
+
+
+@pytest.mark.parametrize("torque", [-0.7, 2.0])
+def test_the_observer_finds_a_constant_torque(torque: float) -> None:
+    found = run(controller(), 3000, resist=lambda t: torque)
+    assert -J * found["zeta3"][-1] == pytest.approx(torque, rel=1e-6)  # zeta3 J is the negative residual torque
+    assert found["zeta1"][-1] == pytest.approx(found["q"][-1], abs=1e-12)
+    assert found["zeta2"][-1] == pytest.approx(found["v"][-1], abs=1e-9)
+
+
+def test_the_observers_poles_are_where_its_bandwidth_says() -> None:
+    """Without a command, surprises die as exp(-bandwidth t) (1, k, k^2): the characteristic polynomial is (z - p)^3."""
+    model = controller(kp=0.0, kd=0.0)
+    values = [variable.start for variable in model.parameters]
+
+    def following(zeta: np.ndarray) -> np.ndarray:
+        return model.equations(0, [1, *zeta, 0, 0, 0, 0], [0] * 4, values)[0].full().ravel()[1:4]
+
+    poles = np.linalg.eigvals(np.array([following(row) for row in np.eye(3)]).T)
+    np.testing.assert_allclose(poles, exp(-220 * H), atol=1e-4)  # a triple pole: rounding to the power of 1/3
+
+
+def test_the_closed_loop_has_the_bandwidth_and_damping_of_its_gains() -> None:
+    """kp = 15^2 and kd = 2 15: the error of a step in the set point is (1 + 15 t) exp(-15 t)."""
+    found = run(controller(torque_limit=1e6), 4000, reference=lambda t: (1e-3, 0.0, 0.0))
+    t = H * np.arange(4000)
+    error = (found["q_d"] - found["q"]) / 1e-3
+    # A command acts 1 to 2 ticks late: the error is that of the closed form 1.5 ticks ago, at most 15 / e x 1.5e-4.
+    np.testing.assert_allclose(error, (1 + 15 * t) * np.exp(-15 * t), atol=2e-3)
+
+
+def test_the_command_stays_within_its_limit_and_the_observer_knows() -> None:
+    found = run(controller(torque_limit=2.0), 2000, reference=lambda t: (0.05, 0.0, 0.0))
+    assert np.abs(found["tau"]).max() == 2.0
+    assert np.abs(found["zeta3"]).max() < 1e-9  # nothing is missing: the observer was told 2 N m, not what was wanted
+
+
+def test_only_static_compensation_has_no_memory() -> None:
+    extra = {case: len(controller(case).states) - len(controller("C1").states) for case in CASES}
+    assert extra == {"C1": 0, "C2a": 1, "C2b": 0, "C3a": 1, "C3b": 0}
+    assert compensation_case("C1", LUGRE) is None
+
+
+@pytest.mark.parametrize("case", ["C3a", "C3b"])
+def test_compensation_by_the_reference_is_the_friction_of_that_motion(case: str) -> None:
+    """At constant set-point speed the estimate is steady sliding friction, whatever the axis does."""
+    found = run(controller(case), 3000, reference=lambda t: (0.05 * t, 0.05, 0.0))
+    expected = float(LUGRE.level(0.05)) + LUGRE.sigma2 * 0.05
+    assert found["friction_estimate"][-1] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def paper(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    """The paper's experiment by case: statistics of 15 s at 0.1 ms with matched parameters and no noise, as FMUs."""
+    folder, card = tmp_path_factory.mktemp("adrc"), read_card("paper_mount")
+    plant = export_fmu(card.plant().model(), folder / "plant.fmu")
+    reference = Sine(kind="sine", frequency=0.2, max_velocity=5 * 7.268e-5, smooth_start=2.5)
+
+    @cache
+    def error(case: str) -> np.ndarray:
+        fmu = export_fmu(_with(card, case).controller_model(), folder / f"{case}.fmu")
+        wires = [("controller.tau", "plant.tau"), ("plant.q", "controller.q"), ("r.position", "controller.q_d")]
+        wires += [("r.velocity", "controller.v_d"), ("r.acceleration", "controller.a_d")]
+        record = {"q": Record("plant.q"), "q_d": Record("r.position")}
+        components, signals = {"plant": plant, "controller": fmu}, {"r": reference}
+        done = simulate(components, wires, record=record, step=H, ticks=150_000, signals=signals).recording
+        return (np.asarray(done["q_d"]) - np.asarray(done["q"])) / ARCSEC
+
+    return error
+
+
+def _with(card: Card, case: str) -> Card:
+    assert card.controller is not None
+    return replace(card, controller=card.controller.model_copy(update={"compensation": case}))
+
+
+def ise(error: np.ndarray) -> float:
+    return float(np.sum(error**2) * H)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_every_case_tracks_the_stars(paper: Any, case: str) -> None:
+    assert np.abs(paper(case)).max() < 10  # arcsec; the amplitude of the reference is 60
+
+
+def test_friction_costs_what_the_errata_found(paper: Any) -> None:
+    """ISE in arcsec^2 s, ideal conditions of ERRATA: C1 78 to 93; ratios C2a, C3a < .001, C2b .44-.48, C3b .83-.88."""
+    found = {case: ise(paper(case)) for case in CASES}
+    assert 60 < found["C1"] < 120
+    ratio = {case: found[case] / found["C1"] for case in CASES}
+    assert max(ratio["C2a"], ratio["C3a"]) < 2e-3
+    assert 0.35 < ratio["C2b"] < 0.55
+    assert 0.75 < ratio["C3b"] < 0.95
