@@ -117,7 +117,7 @@ def test_the_observers_poles_are_where_its_bandwidth_says() -> None:
 
 
 def test_the_closed_loop_has_the_bandwidth_and_damping_of_its_gains() -> None:
-    """kp = 15^2 and kd = 2 15: the error of a step in the set point is (1 + 15 t) exp(-15 t)."""
+    """With kp = 15^2 and kd = 2 15: the error of a step in the set point is (1 + 15 t) exp(-15 t)."""
     found = run(controller(torque_limit=1e6), 4000, reference=lambda t: (1e-3, 0.0, 0.0))
     t = H * np.arange(4000)
     error = (found["q_d"] - found["q"]) / 1e-3
@@ -147,7 +147,7 @@ def test_compensation_by_the_reference_is_the_friction_of_that_motion(case: str)
 
 @pytest.fixture(scope="module")
 def paper(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """The paper's experiment by case: statistics of 15 s at 0.1 ms with matched parameters and no noise, as FMUs."""
+    """The paper's experiment by case: tracking error [arcsec] over 17.5 s at 0.1 ms with matched parameters and no noise, as FMUs."""
     folder, card = tmp_path_factory.mktemp("adrc"), read_card("paper_mount")
     plant = export_fmu(card.plant().model(), folder / "plant.fmu")
     reference = Sine(kind="sine", frequency=0.2, max_velocity=5 * 7.268e-5, smooth_start=2.5)
@@ -159,7 +159,7 @@ def paper(tmp_path_factory: pytest.TempPathFactory) -> Any:
         wires += [("r.velocity", "controller.v_d"), ("r.acceleration", "controller.a_d")]
         record = {"q": Record("plant.q"), "q_d": Record("r.position")}
         components, signals = {"plant": plant, "controller": fmu}, {"r": reference}
-        done = simulate(components, wires, record=record, step=H, ticks=150_000, signals=signals).recording
+        done = simulate(components, wires, record=record, step=H, ticks=175_000, signals=signals).recording
         return (np.asarray(done["q_d"]) - np.asarray(done["q"])) / ARCSEC
 
     return error
@@ -171,7 +171,8 @@ def _with(card: Card, case: str) -> Card:
 
 
 def ise(error: np.ndarray) -> float:
-    return float(np.sum(error**2) * H)
+    """Integral of the squared error [arcsec^2 s] over the 15 s after the smooth start."""
+    return float(np.sum(error[25_000:] ** 2) * H)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -182,8 +183,9 @@ def test_every_case_tracks_the_stars(paper: Any, case: str) -> None:
 def test_friction_costs_what_the_errata_found(paper: Any) -> None:
     """ISE in arcsec^2 s, ideal conditions of ERRATA: C1 78 to 93; ratios C2a, C3a < .001, C2b .44-.48, C3b .83-.88."""
     found = {case: ise(paper(case)) for case in CASES}
-    assert 60 < found["C1"] < 120
+    assert 70 < found["C1"] < 100
     ratio = {case: found[case] / found["C1"] for case in CASES}
-    assert max(ratio["C2a"], ratio["C3a"]) < 2e-3
-    assert 0.35 < ratio["C2b"] < 0.55
-    assert 0.75 < ratio["C3b"] < 0.95
+    assert max(ratio["C2a"], ratio["C3a"]) < 1e-3
+    # The static map's sign is smooth below 1e-5 rad/s, 3 % of the largest speed: this is worth 0.08 of C2b, 0.04 of C3b.
+    assert 0.44 - 0.08 < ratio["C2b"] < 0.48 + 0.08
+    assert 0.83 - 0.06 < ratio["C3b"] < 0.88 + 0.04
