@@ -9,6 +9,10 @@ from pyfmi_models.effects import Effect
 from pyfmi_models.model import Pair, parameters_of
 
 
+_NUMERICAL = (("smoothing", 1e-5),)
+"""Numbers of the solver, not of the machine: left out of a card while they have their default."""
+
+
 def card_text(card: Card, comment: str = "") -> str:
     """Write a card as TOML; defaults that were never set are written too, so that a card says all it means."""
     lines = [f"# {line}".rstrip() for line in comment.splitlines()]
@@ -35,7 +39,8 @@ def effect_table(effect: Effect) -> dict[str, Any]:
 
 def _numbers(part: Any) -> dict[str, Any]:
     names = [variable.name.split(".")[0] for variable in parameters_of(part)]
-    return {name: getattr(part, name) for name in dict.fromkeys(names)}
+    shown = [name for name in dict.fromkeys(names) if (name, getattr(part, name)) not in _NUMERICAL]
+    return {name: getattr(part, name) for name in shown}
 
 
 def _section(name: str, table: dict[str, Any]) -> list[str]:

@@ -50,6 +50,17 @@ def test_a_card_has_a_word_for_each_law() -> None:
     assert {key: law.key for key, law in LAWS.items()} == {key: key for key in ("none", "coulomb", "static", "lugre")}
 
 
+@pytest.mark.parametrize("v", [-0.3, -0.002, 5e-5, 0.04])
+@pytest.mark.parametrize("z", [-2.0, 0.0, 3.0])
+def test_bristle_friction_is_the_equations_of_the_contract(v: float, z: float) -> None:
+    """Written out by hand, with z as the torque sigma0 z."""
+    g = 2.322 + (3.322 - 2.322) * np.exp(-((abs(v) / 0.04129) ** 1.292))
+    rate = v - abs(v) * z / g
+    assert float(LUGRE.level(v)) == pytest.approx(g, rel=1e-9)
+    assert evaluate(torque(LUGRE), z, v)[0] == pytest.approx(z + 497.0 * rate + 32.77 * v, rel=1e-9)
+    assert evaluate(lambda x, w: LUGRE.rate(x, w, LUGRE.level(w)), z, v)[0] == pytest.approx(9.23e4 * rate, rel=1e-9)
+
+
 @EACH
 def test_friction_is_odd_in_the_direction_of_motion(law: FrictionLaw) -> None:
     state = np.linspace(-3, 3, 5)[:, None]

@@ -14,7 +14,7 @@ from cosim.diagnosis.candidates import candidates, columns_of
 from cosim.diagnosis.evidence import Score, t_value
 from cosim.diagnosis.fit import Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared
-from cosim.diagnosis.select import LEAST_GAIN, TIE, Selection, Trial, is_real
+from cosim.diagnosis.select import LEAST_GAIN, TIE, Selection, Trial, is_real, tuned
 from cosim.diagnosis.structure import Bench, projected
 from pyfmi_models.effects import ActuatorLag, Delay, Effect
 from pyfmi_models.mount import Mount
@@ -158,7 +158,7 @@ def _tried(
     reduced: Fit, effect: Effect, mount: Mount, prepared: Prepared, weight: Array, bench: Bench, before: Array
 ) -> Trial:
     grown = replace(reduced.mount, effects=(*reduced.mount.effects, effect))
-    found = fit(grown, prepared.pieces, weight, mount, evaluations=12)
+    found = tuned(fit(grown, prepared.pieces, weight, mount, evaluations=12), prepared, weight, mount)
     return Trial(effect.id, found, Score(before, bench.energy(found), bench.rows), reduced.rms)
 
 

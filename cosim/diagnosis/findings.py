@@ -1,7 +1,7 @@
 """From structures to sentences: one finding for every effect that was looked for."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from math import sqrt
 from typing import Any
 
@@ -16,8 +16,8 @@ from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.result import Finding, Trace
 from cosim.diagnosis.select import LEAST_GAIN, Trial
 from cosim.diagnosis.structure import nuisances, projected
-from pyfmi_models.effects import CATALOGUE, Effect, GravityUnbalance
-from pyfmi_models.model import parameters_of
+from pyfmi_models.effects import CATALOGUE, DriveEffect, Effect, GravityUnbalance
+from pyfmi_models.model import Variable, parameters_of
 from pyfmi_models.mount import LINEAR_UNITS, Mount
 
 Z95 = 1.96
@@ -75,7 +75,7 @@ def accepted(
     parameters: dict[str, Any] = dict(numbers.values)
     if harmonics:
         parameters["harmonics"] = [numbers_of(other.effect, mount, errors).values for other in harmonics]
-    ranges = {n: (v - Z95 * numbers.errors[n], v + Z95 * numbers.errors[n]) for n, v in numbers.values.items() if n in numbers.errors}
+    ranges = {n: (numbers.values[n] - Z95 * e, numbers.values[n] + Z95 * e) for n, e in numbers.errors.items()}
     size, size_range = _size(effect, numbers, mount)
     excluded = [rival for rival in place.rivals if rival.effect not in rivals]
     return Finding(
@@ -92,11 +92,22 @@ def accepted(
         size_range=size_range,
         statement=effect.statement("N" if mount.motion == "linear" else "N·m"),
         where=where(effect, traces),
-        ruled_out=tuple(f"{_title(rival.effect)}: explains {rival.gain:.0%}, this {place.trial.gain:.0%}" for rival in excluded),
+        ruled_out=tuple(
+            f"{_title(rival.effect)}: removes {rival.gain:.1%} of the error energy, this {place.trial.gain:.1%}"
+            for rival in excluded
+        ),
         told_apart_by=effect.told_apart_by,
         action=effect.action,
-        evidence=f"removes {place.trial.gain:.0%} of the error energy on runs left out of the fit (t = {place.trial.t:.1f} over blocks)",
+        evidence=f"removes {place.trial.gain:.0%} of the error energy on data left out of the fit "
+        f"(t = {place.trial.t:.1f} over blocks)",
+        visible_from=_visible_from(effect, numbers),
     )
+
+
+def _visible_from(effect: Effect, numbers: Numbers) -> float | None:
+    """Size that would still stand out three standard errors from nothing."""
+    name, factor, _ = MAIN[effect.id]
+    return 3 * factor * numbers.errors[name] if name in numbers.errors else None
 
 
 def rival_finding(rival: Trial, place: Place, mount: Mount) -> Finding:
@@ -147,7 +158,8 @@ def _smallest(chosen: Fit, column: Array, known: Array) -> float:
 def _absent(name: str, smallest: float | None, trial: Trial | None, mount: Mount, prepared: Prepared) -> Finding:
     form = CATALOGUE[name][0]
     _, factor, unit = MAIN[name]
-    testable = smallest is not None and np.isfinite(smallest)
+    high = next(v.high for v in _parameters(form) if v.name == MAIN[name][0])
+    testable = smallest is not None and smallest < min(high, 1e12)
     reason = "" if testable else _why_not(name, mount, prepared)
     return Finding(
         effect=name,
@@ -162,6 +174,10 @@ def _absent(name: str, smallest: float | None, trial: Trial | None, mount: Mount
     )
 
 
+def _parameters(form: type[Effect]) -> list[Variable]:
+    return [replace(f.metadata["variable"], name=f.name) for f in fields(form) if "variable" in f.metadata]
+
+
 def _why_not(name: str, mount: Mount, prepared: Prepared) -> str:
     if name == "gravity_unbalance" and mount.motion == "linear":
         return "a linear axis has no unbalance"
@@ -171,6 +187,8 @@ def _why_not(name: str, mount: Mount, prepared: Prepared) -> str:
         return "the card's friction law has it already"
     if not prepared.has_position and name in ("cogging", "position_friction", "gravity_unbalance"):
         return "no position was recorded; record q"
+    if name in ("delay", "actuator_lag") and any(isinstance(effect, DriveEffect) for effect in mount.effects):
+        return "alike to what was found in the drive; record faster reversals to tell them apart"
     return "the model has it already, or these recordings do not excite it"
 
 

@@ -120,7 +120,9 @@ def traces(recordings: Sequence[Recording], heldout: Recording, models: Structur
 
 
 def _trace(recording: Recording, held: bool, prepared: Prepared, before: Array, after: Array) -> Trace:
-    t, q, v, tau = (np.concatenate([getattr(p, name) for p in prepared.pieces]) for name in ("t", "q", "v", "tau"))
+    inside = np.concatenate([piece.inside for piece in prepared.pieces])
+    signals = [np.concatenate([getattr(p, name) for p in prepared.pieces])[inside] for name in ("t", "q", "v", "tau")]
+    (t, q, v, tau), before, after = signals, before[inside], after[inside]
     band = _band(after, v)
     return Trace(
         name=recording.name,

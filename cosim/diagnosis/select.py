@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 from cosim.diagnosis.evidence import Blocks, Score
-from cosim.diagnosis.fit import Fit, fit
+from cosim.diagnosis.fit import FIXED, Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.structure import Bench, Screening, nuisances, screen
 from pyfmi_models.effects import ActuatorLag, Delay, Effect, StribeckEffect
@@ -29,6 +29,8 @@ MOST_KINDS, MOST_EFFECTS = 4, 7
 LEAST_VS = 0.005
 LEAST_PLAIN_GAIN = 0.02
 """Share of the plain residual energy that an effect must remove as well: whitened evidence alone can be about nothing."""
+WHOLE = 0.01
+"""A whole number of cycles is taken if the residual grows by no more than this share."""
 TIE = 0.96
 """A rival that reaches this share of the winner's gain is not excluded; a simpler one that does so wins."""
 
@@ -140,8 +142,28 @@ def _trial(
     prior: Mount,
 ) -> Trial:
     mount = replace(current.mount, effects=(*current.mount.effects, effect))
-    found = fit(mount, prepared.pieces, weight, prior, evaluations=12)
+    found = tuned(fit(mount, prepared.pieces, weight, prior, evaluations=12), prepared, weight, prior)
     return Trial(name, found, Score(before, bench.energy(found), bench.rows), current.rms, _top(prepared))
+
+
+def tuned(found: Fit, prepared: Prepared, weight: Array, prior: Mount) -> Fit:
+    """Fit the cycles of a periodic effect that was added last, which the grid knows only roughly.
+
+    Slots, teeth and rolling elements come in whole numbers: one that fits as well is taken.
+    """
+    if getattr(found.mount.effects[-1], "cycles_per_rev", 0.0) <= 0:
+        return found
+    others = tuple(name for name in FIXED if name != "cycles_per_rev")
+    free = fit(found.mount, prepared.pieces, weight, prior, evaluations=10, fixed=others)
+    whole = max(1.0, float(round(free.mount.effects[-1].cycles_per_rev)))
+    best = min((found, free), key=lambda one: one.rms)
+    for cycles in (whole, best.mount.effects[-1].cycles_per_rev):
+        effect = replace(best.mount.effects[-1], cycles_per_rev=cycles)
+        mount = replace(best.mount, effects=(*best.mount.effects[:-1], effect))
+        settled = fit(mount, prepared.pieces, weight, prior, evaluations=8)
+        if settled.rms < best.rms * (1 + WHOLE):
+            return settled
+    return found
 
 
 def _top(prepared: Prepared) -> float:

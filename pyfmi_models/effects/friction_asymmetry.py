@@ -33,5 +33,13 @@ class FrictionAsymmetry(FrictionEffect):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        harder, easier = ("forward", "backward") if self.level_asymmetry > 0 else ("backward", "forward")
-        return f"Friction is {200 * abs(self.level_asymmetry):.0f} % higher turning {harder} than {easier}."
+        sliding = _percent("sliding friction", self.level_asymmetry)
+        viscous = _percent("viscous friction", self.viscous_asymmetry)
+        larger, smaller = sorted((sliding, viscous), key=lambda item: -item[0])
+        return f"{larger[1]}." if smaller[0] < 0.1 * larger[0] else f"{larger[1]}, {smaller[1].lower()}."
+
+
+def _percent(name: str, asymmetry: float) -> tuple[float, str]:
+    harder, easier = ("forward", "backward") if asymmetry > 0 else ("backward", "forward")
+    size = 200 * abs(asymmetry)
+    return size, f"{name.capitalize()} is {size:.2g} % higher moving {harder} than {easier}"

@@ -1,0 +1,68 @@
+"""The whole chain on an embedded example: card -> FMU -> co-simulation -> recording -> diagnosis -> better FMU.
+
+The recording comes from `cosim.proof`: a simulation of its own, which shares no equation with the models, of a mount
+whose card lacks two effects.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from cosim.diagnosis.closed_loop import LoopError, close_loop, compare
+from cosim.diagnosis.deliver import deliver
+from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.result import Diagnosis
+from cosim.files import directory
+from cosim.proof.demo import demo_case
+from cosim.proof.generator import write_case
+from cosim.recording import Recording
+from cosim.stiffness import compare as compare_integration
+from cosim.stiffness import table_text
+from pyfmi_models.card import Card, read_card
+from pyfmi_models.export import export_fmu
+
+SEED = 7
+
+
+@dataclass(frozen=True)
+class Demo:
+    """What the demo made: the integration table, loop errors before and after, and the diagnosis."""
+
+    table: str
+    before: LoopError
+    after: LoopError
+    diagnosis: Diagnosis
+
+
+def run_demo(out: Path, command: str, say: Callable[[str], None]) -> Demo:
+    """Run the chain and leave its files in `out`."""
+    directory(out)
+    say("recording a mount with concealed physics")
+    write_case(demo_case(SEED), out / "night")
+    card = read_card(out / "night" / "card.toml")
+    train = [Recording.read(out / "night" / f"train_{k}.parquet") for k in (1, 2)]
+    heldout = Recording.read(out / "night" / "heldout.parquet")
+    say("building FMUs of plant and controller")
+    plant, controller = export_pair(card, out / "fmus")
+    say("co-simulating plant and controller at 0.1 ms")
+    simulated = close_loop(plant, controller, card, heldout, "simulated")
+    simulated.write(out / "simulated.parquet", force=True)
+    say("checking the stiff integration")
+    table = table_text(compare_integration(card))
+    outcome = diagnose(train, heldout, card, say)
+    found = deliver(outcome, train, heldout, card, out / "diagnosis", command, say)
+    better = out / "diagnosis" / found.improved["fmu"] if "fmu" in found.improved else plant
+    improved = close_loop(better, controller, card, heldout, "improved")
+    improved.write(out / "improved.parquet", force=True)
+    return Demo(table, compare(simulated, heldout), compare(improved, heldout), found)
+
+
+def export_pair(card: Card, folder: Path) -> tuple[Path, Path]:
+    """Export plant and controller in both FMI versions; return the paths of the FMI 3 archives."""
+    directory(folder)
+    paths = []
+    for part, model in (("plant", card.plant().model()), ("controller", card.controller_model())):
+        named = replace(model, name=part)
+        export_fmu(named, folder / f"{part}_fmi2.fmu", fmi=2, force=True)
+        paths.append(export_fmu(named, folder / f"{part}.fmu", fmi=3, force=True))
+    return paths[0], paths[1]
