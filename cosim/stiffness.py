@@ -25,10 +25,11 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 
 import cosim
-from cosim.errors import InputError
+from cosim.errors import CosimError, InputError
 from cosim.files import replacing
 from cosim.master import simulate
 from pyfmi_models.card import Card, read_card
+from pyfmi_models.errors import ModelError
 from pyfmi_models.export import export_fmu
 from pyfmi_models.friction import LuGre
 from pyfmi_models.model import Model, Variable, parameters_of, symbols_of, with_symbols
@@ -212,12 +213,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, required=True, help="directory for stiffness.csv, .json and .txt")
     parser.add_argument("--force", action="store_true", help="overwrite what is there")
     given = parser.parse_args(arguments)
-    card = read_card(given.card)
+    try:
+        _report(read_card(given.card), given.out, given.force)
+    except (CosimError, ModelError) as error:
+        parser.exit(2, f"{error}\n")
+
+
+def _report(card: Card, directory: Path, force: bool) -> None:
     rows = compare(card)
     print(table_text(rows), end="")
     limits = (f"{name} {degrees(stability_limit(_law(card), bound)):.3g} deg/s" for name, bound in EXPLICIT.items())
     print(f"stable at {1e3 * STEP:g} ms up to a steady speed of: {', '.join(limits)}")
-    for path in write(rows, given.out, given.force):
+    for path in write(rows, directory, force):
         print(path)
 
 

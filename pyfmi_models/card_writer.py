@@ -8,7 +8,6 @@ from pyfmi_models.card import Card
 from pyfmi_models.effects import Effect
 from pyfmi_models.model import Pair, parameters_of
 
-
 _NUMERICAL = (("smoothing", 1e-5),)
 """Numbers of the solver, not of the machine: left out of a card while they have their default."""
 

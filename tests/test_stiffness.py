@@ -135,3 +135,14 @@ def test_the_committed_results_are_those_of_this_code(rows: dict[tuple[str, str]
 def test_a_law_without_bristles_is_refused() -> None:
     with pytest.raises(InputError, match=r'emps: \[friction\] model is "coulomb"; only "lugre" has a stiff state'):
         compare(read_card("emps"))
+
+
+@pytest.mark.parametrize(("card", "message"), [("nope", "nope: no such card."), ("emps", 'only "lugre" has')])
+def test_the_command_ends_with_one_sentence(
+    card: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as caught:
+        stiffness.main(["--card", card, "--out", str(tmp_path / "out")])
+    assert caught.value.code == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

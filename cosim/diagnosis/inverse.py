@@ -40,6 +40,13 @@ class Inverse:
         """Present values of all parameters."""
         return np.array([variable.start for variable in self.mount.parameters()])
 
+    @cached_property
+    def _equations(self) -> "Equations":
+        key = (self.mount.motion, self.names, self.free, *(type(part) for part in self.mount.components().values()))
+        if key not in _KNOWN:
+            _KNOWN[key] = Equations(self.mount, self.free)
+        return _KNOWN[key]
+
     def torque(self, piece: Piece, values: Array) -> tuple[Array, Array]:
         """Return needed torque (rows,) and its derivatives (rows, free) at all rows of a piece, filtered once more."""
         full = self._with(values)
@@ -57,7 +64,7 @@ class Inverse:
     def _undriven(self, piece: Piece, full: Array) -> tuple[Array, Array]:
         motion = np.vstack([piece.t, piece.q, piece.v, piece.a])
         state, slopes = self._bristles(piece, full)
-        out = self._torque(np.vstack([motion, state]), full)
+        out = self._equations.torque(np.vstack([motion, state]), full)
         torque, by_state, by_free = out[0], out[1 : 1 + len(state)], out[1 + len(state) :]
         for row, slope in zip(by_state, slopes, strict=True):
             by_free = by_free + row * slope
@@ -70,45 +77,11 @@ class Inverse:
             return np.zeros((0, rows)), []
         middle = [(x[1:] + x[:-1]) / 2 for x in (piece.t, piece.q, piece.v)]
         steps = np.vstack([*middle, np.full(rows - 1, piece.dt)])
-        decay, drift = self._step(steps, full)
+        decay, drift = self._equations.step(steps, full)
         state = _recurrence(decay, drift[:, None])[:, 0]
         known = np.vstack([steps, state[:-1]])
-        slopes = _recurrence(decay, self._step_slopes(known, full).T)
+        slopes = _recurrence(decay, self._equations.step_slopes(known, full).T)
         return state[None, :], [slopes.T]
-
-    @cached_property
-    def _symbolic(self) -> tuple[Any, ...]:
-        t, q, v, a, dt = (ca.SX.sym(name) for name in ("t", "q", "v", "a", "dt"))
-        p, symbols = symbols_of(self.mount.parameters())
-        this = self.mount.with_symbols(symbols, v)
-        free = ca.vertcat(*[symbols[name] for name in self.free])
-        return t, q, v, a, dt, p, free, this, this.at(t, q, v)
-
-    @cached_property
-    def _torque(self) -> Rowwise:
-        t, q, v, a, _, p, free, this, motion = self._symbolic
-        state = ca.SX.sym("state", len(self.mount.friction.states()))
-        contact = this.friction.contact(state, v, this.level(motion))
-        torque = this.axis.inertia * a + contact + this.viscous(motion) + this.loads(motion)
-        rows = ca.vertcat(torque, ca.jacobian(torque, state).T, ca.jacobian(torque, free).T)
-        return Rowwise(ca.vertcat(t, q, v, a, state), p, rows)
-
-    @cached_property
-    def _step(self) -> Rowwise:
-        """Decay and drift of the bristle step: state+ = decay state + drift (the closed form is affine in the state)."""
-        t, q, v, _, dt, p, _, this, motion = self._symbolic
-        state = ca.SX.sym("state")
-        following = this.friction.advance(state, v, this.level(motion), dt)
-        decay = ca.jacobian(following, state)
-        drift = ca.substitute(following, state, 0)
-        return Rowwise(ca.vertcat(t, q, v, dt), p, ca.vertcat(decay, drift))
-
-    @cached_property
-    def _step_slopes(self) -> Rowwise:
-        t, q, v, _, dt, p, free, this, motion = self._symbolic
-        state = ca.SX.sym("state")
-        following = this.friction.advance(state, v, this.level(motion), dt)
-        return Rowwise(ca.vertcat(t, q, v, dt, state), p, ca.jacobian(following, free).T)
 
     def _undo_drive(self, columns: Array, full: Array, dt: float) -> tuple[Array, Array]:
         """Undo the drive effects on all columns; return them and the torque's derivatives by the drive parameters."""
@@ -127,6 +100,53 @@ class Inverse:
                 ratio = ratio / _set(drives[prefix], bumped, prefix).response(spectrum.omega)
                 slopes[:, column] = spectrum.times(inverse * (ratio - 1) / (1e-3 * values[name]))[:, 0]
         return spectrum.times(inverse), slopes
+
+
+class Equations:
+    """Compiled expressions of a structure; numbers are parameters, so one serves all fits of the structure."""
+
+    def __init__(self, mount: Mount, free: tuple[str, ...]) -> None:
+        self._mount, self._free = mount, free
+
+    @cached_property
+    def _symbolic(self) -> tuple[Any, ...]:
+        t, q, v, a, dt = (ca.SX.sym(name) for name in ("t", "q", "v", "a", "dt"))
+        p, symbols = symbols_of(self._mount.parameters())
+        this = self._mount.with_symbols(symbols, v)
+        free = ca.vertcat(*[symbols[name] for name in self._free])
+        return t, q, v, a, dt, p, free, this, this.at(t, q, v)
+
+    @cached_property
+    def torque(self) -> Rowwise:
+        """Torque and its derivatives by state and free parameters, from (t, q, v, a, state)."""
+        t, q, v, a, _, p, free, this, motion = self._symbolic
+        state = ca.SX.sym("state", len(self._mount.friction.states()))
+        contact = this.friction.contact(state, v, this.level(motion))
+        torque = this.axis.inertia * a + contact + this.viscous(motion) + this.loads(motion)
+        rows = ca.vertcat(torque, ca.jacobian(torque, state).T, ca.jacobian(torque, free).T)
+        return Rowwise(ca.vertcat(t, q, v, a, state), p, rows)
+
+    @cached_property
+    def step(self) -> Rowwise:
+        """Decay and drift of the bristle step: state+ = decay state + drift (the closed form is affine in the state)."""
+        t, q, v, _, dt, p, _, this, motion = self._symbolic
+        state = ca.SX.sym("state")
+        following = this.friction.advance(state, v, this.level(motion), dt)
+        decay = ca.jacobian(following, state)
+        drift = ca.substitute(following, state, 0)
+        return Rowwise(ca.vertcat(t, q, v, dt), p, ca.vertcat(decay, drift))
+
+    @cached_property
+    def step_slopes(self) -> Rowwise:
+        """Derivatives of the bristle step by the free parameters, from (t, q, v, dt, state)."""
+        t, q, v, _, dt, p, free, this, motion = self._symbolic
+        state = ca.SX.sym("state")
+        following = this.friction.advance(state, v, this.level(motion), dt)
+        return Rowwise(ca.vertcat(t, q, v, dt, state), p, ca.jacobian(following, free).T)
+
+
+_KNOWN: dict[tuple[Any, ...], Equations] = {}
+"""Equations by structure: building them costs more than evaluating them."""
 
 
 class Spectrum:

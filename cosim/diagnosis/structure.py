@@ -143,8 +143,8 @@ def friction_level(mount: Mount, prepared: Prepared) -> Array:
 def projected(target: Array, columns: Array) -> Array:
     """Return what ordinary least squares on the columns leaves of a target."""
     scale = np.sqrt((columns**2).sum(0)) + 1e-300
-    beta: Array = np.linalg.lstsq(columns / scale, target, rcond=1e-8)[0]
-    return np.asarray(target - (columns / scale) @ beta)
+    normal = (columns.T @ columns) / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
+    return np.asarray(target - columns @ (np.linalg.solve(normal, columns.T @ target / scale) / scale))
 
 
 @dataclass(frozen=True)
