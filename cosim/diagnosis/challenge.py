@@ -11,10 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cosim.diagnosis.candidates import candidates, columns_of
-from cosim.diagnosis.evidence import Score, t_value
 from cosim.diagnosis.fit import Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared
-from cosim.diagnosis.select import LEAST_GAIN, TIE, Selection, Trial, is_real, tuned
+from cosim.diagnosis.select import LEAST_GAIN, TIE, Selection, Trial, clearly_worse, is_real, judged, tuned
 from cosim.diagnosis.structure import Bench, projected
 from pyfmi_models.effects import ActuatorLag, Delay, Effect
 from pyfmi_models.mount import Mount
@@ -24,8 +23,8 @@ ALIKE = 0.4
 TEMPERATURE = 60.0
 """Divides log-likelihoods before they become probabilities: neighbouring samples are far from independent."""
 ROUNDS = 2
-NEAR, CLEARLY = 0.9, 2.0
-"""A rival with this share of the winner's gain is excluded only if blocks disagree with it by this t value."""
+NEAR = 0.9
+"""A rival with this share of the winner's gain is excluded only if it is clearly worse block by block."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +63,7 @@ def _too_close(winner: Trial, rival: Trial) -> bool:
     """Whether a rival cannot be excluded: its gain comes near, and block by block it is not clearly worse."""
     if len(rival.fit.free) > len(winner.fit.free):
         return rival.gain >= winner.gain
-    worse = winner.score.rows * np.log(rival.score.after / winner.score.after)
-    return rival.gain >= NEAR * winner.gain and t_value(worse) < CLEARLY
+    return rival.gain >= NEAR * winner.gain and not clearly_worse(rival, winner)
 
 
 def challenge(
@@ -104,7 +102,8 @@ def challenge(
 
 
 def _simpler_wins(holder: Trial, best: Trial) -> bool:
-    return len(holder.fit.free) < len(best.fit.free) and holder.gain >= TIE * best.gain
+    close = holder.gain >= TIE * best.gain and not clearly_worse(holder, best)
+    return close and len(holder.fit.free) < len(best.fit.free)
 
 
 def _without(chosen: Fit, effect: Effect, mount: Mount, prepared: Prepared, weight: Array) -> Fit:
@@ -122,7 +121,7 @@ def _place(
 ) -> Place:
     reduced = _without(chosen, effect, mount, prepared, weight)
     before = bench.energy(reduced)
-    own = Trial(effect.id, chosen, Score(before, bench.energy(chosen), bench.rows), reduced.rms)
+    own = judged(effect.id, chosen, reduced, before, bench)
     starts = _rivals(effect, reduced, bench, own.gain)
     rivals = [_tried(reduced, start, mount, prepared, weight, bench, before) for start in starts]
     return Place(effect, own, tuple(sorted(rivals, key=lambda trial: -trial.gain)))
@@ -159,7 +158,7 @@ def _tried(
 ) -> Trial:
     grown = replace(reduced.mount, effects=(*reduced.mount.effects, effect))
     found = tuned(fit(grown, prepared.pieces, weight, mount, evaluations=12), prepared, weight, mount)
-    return Trial(effect.id, found, Score(before, bench.energy(found), bench.rows), reduced.rms)
+    return judged(effect.id, found, reduced, before, bench)
 
 
 def merged(places: Sequence[Place]) -> dict[str, list[Place]]:

@@ -8,11 +8,13 @@ be trusted.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from cosim.diagnosis.evidence import Blocks, Score
+import numpy as np
+
+from cosim.diagnosis.evidence import Blocks, Score, t_value
 from cosim.diagnosis.fit import FIXED, Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.structure import Bench, Screening, nuisances, screen
-from pyfmi_models.effects import ActuatorLag, Delay, Effect, StribeckEffect
+from pyfmi_models.effects import ActuatorLag, Cogging, Delay, Effect, StribeckEffect
 from pyfmi_models.mount import Mount
 
 LEAST_GAIN, LEAST_T = 0.03, 1.8
@@ -26,11 +28,12 @@ REFINED = 4
 """How many effects are refined by a nonlinear fit in each stage."""
 MOST_KINDS, MOST_EFFECTS = 4, 7
 """Different effects, and effects counting each harmonic, that one diagnosis may add."""
-LEAST_VS = 0.005
+LEAST_VS, LEAST_CYCLES = 0.005, 1.5
 LEAST_PLAIN_GAIN = 0.02
 """Share of the plain residual energy that an effect must remove as well: whitened evidence alone can be about nothing."""
 WHOLE = 0.01
 """A whole number of cycles is taken if the residual grows by no more than this share."""
+CLEARLY = 2.0
 TIE = 0.96
 """A rival that reaches this share of the winner's gain is not excluded; a simpler one that does so wins."""
 
@@ -42,13 +45,9 @@ class Trial:
     effect: str
     fit: Fit
     score: Score
-    rms_before: float
-    top_speed: float = 0.0
-
-    @property
-    def plain_gain(self) -> float:
-        """Share of the energy of the plain residual removed."""
-        return float(1 - (self.fit.rms / self.rms_before) ** 2)
+    plain_gain: float
+    """Share of the energy of the plain residual removed."""
+    top_speed: float
 
     @property
     def gain(self) -> float:
@@ -143,7 +142,14 @@ def _trial(
 ) -> Trial:
     mount = replace(current.mount, effects=(*current.mount.effects, effect))
     found = tuned(fit(mount, prepared.pieces, weight, prior, evaluations=12), prepared, weight, prior)
-    return Trial(name, found, Score(before, bench.energy(found), bench.rows), current.rms, _top(prepared))
+    return judged(name, found, current, before, bench)
+
+
+def judged(name: str, found: Fit, without: Fit, before: Array, bench: Bench) -> Trial:
+    """Judge a structure against the one without an effect, whose energies are `before`."""
+    plain = [float(np.sum((bench.weight * one.residual) ** 2)) for one in (found, without)]
+    score = Score(before, bench.energy(found), bench.rows)
+    return Trial(name, found, score, 1 - plain[0] / plain[1], _top(bench.prepared))
 
 
 def tuned(found: Fit, prepared: Prepared, weight: Array, prior: Mount) -> Fit:
@@ -175,8 +181,13 @@ def winner(trials: Sequence[Trial]) -> Trial | None:
     if not trials:
         return None
     best = max(trials, key=lambda trial: trial.gain)
-    near = [trial for trial in trials if trial.gain >= TIE * best.gain]
+    near = [trial for trial in trials if trial.gain >= TIE * best.gain and not clearly_worse(trial, best)]
     return min(near, key=lambda trial: (len(trial.fit.free), -trial.gain))
+
+
+def clearly_worse(trial: Trial, best: Trial) -> bool:
+    """Whether block by block a trial explains less than the best one, by `CLEARLY` standard errors."""
+    return t_value(trial.score.rows * np.log(trial.score.after / best.score.after)) > CLEARLY
 
 
 def is_real(trial: Trial, sample_time: float) -> bool:
@@ -190,6 +201,8 @@ def is_real(trial: Trial, sample_time: float) -> bool:
 
 
 def _degenerate(trial: Trial) -> bool:
-    """A Stribeck speed far below the speeds that were recorded is no Stribeck curve but a level."""
-    added = trial.fit.mount.effects[-1]
+    """Whether an effect is really another: a Stribeck speed near zero is a level, a ripple once a turn an unbalance."""
+    mount, added = trial.fit.mount, trial.fit.mount.effects[-1]
+    if isinstance(added, Cogging) and mount.motion == "rotary":
+        return added.cycles_per_rev < LEAST_CYCLES
     return isinstance(added, StribeckEffect) and added.Vs < LEAST_VS * trial.top_speed

@@ -142,9 +142,10 @@ def friction_level(mount: Mount, prepared: Prepared) -> Array:
 
 def projected(target: Array, columns: Array) -> Array:
     """Return what ordinary least squares on the columns leaves of a target."""
-    scale = np.sqrt((columns**2).sum(0)) + 1e-300
-    normal = (columns.T @ columns) / np.outer(scale, scale) + 1e-9 * np.eye(len(scale))
-    return np.asarray(target - columns @ (np.linalg.solve(normal, columns.T @ target / scale) / scale))
+    scale = np.sqrt((columns**2).sum(0))
+    unit = columns / np.where(scale > 0, scale, 1.0)
+    normal = unit.T @ unit + 1e-9 * np.eye(len(scale))
+    return np.asarray(target - unit @ np.linalg.solve(normal, unit.T @ target))
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,218 @@
+"""Proof of the diagnosis, rebuilt by one command each.
+
+    python tests/benchmarks/diagnosis.py emps --data FOLDER --out results/emps     measured recordings (not in the project)
+    python tests/benchmarks/diagnosis.py null --cases 10 --out results/null        the card's own physics, numbers 15 % off
+    python tests/benchmarks/diagnosis.py concealed --cases 3 --out results/concealed   one hidden effect each, all eight
+
+Each writes table.csv and README.md with version, seeds and inputs.
+"""
+
+import argparse
+import csv
+import platform
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import cosim
+from cosim.diagnosis.closed_loop import close_loop
+from cosim.diagnosis.deliver import deliver
+from cosim.diagnosis.diagnose import diagnose
+from cosim.files import sha256
+from cosim.proof.generator import make_case, to_toml, write_case
+from cosim.recording import Recording
+from pyfmi_models.card import Card, parse_card, read_card
+from pyfmi_models.export import export_fmu
+
+EFFECTS = (
+    "friction_asymmetry",
+    "torque_offset",
+    "delay",
+    "actuator_lag",
+    "cogging",
+    "stribeck",
+    "gravity_unbalance",
+    "position_friction",
+)
+ROWS = 1000
+"""Rows a second of the simulated recordings."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("what", choices=("emps", "null", "concealed"))
+    parser.add_argument("--data", type=Path, default=None, help="folder of the measured recordings")
+    parser.add_argument("--cases", type=int, default=3)
+    parser.add_argument("--seed", type=int, default=1000)
+    parser.add_argument("--out", type=Path, required=True)
+    given = parser.parse_args()
+    makers = {"emps": emps, "null": null, "concealed": concealed}
+    started = time.perf_counter()
+    rows = list(makers[given.what](given))
+    write(given, rows, time.perf_counter() - started)
+
+
+def write(given: argparse.Namespace, rows: list[dict[str, Any]], seconds: float) -> None:
+    given.out.mkdir(parents=True, exist_ok=True)
+    with (given.out / "table.csv").open("w", newline="") as file:
+        table = csv.DictWriter(file, list(rows[0]))
+        table.writeheader()
+        table.writerows(rows)
+    head, body = list(rows[0]), ["| " + " | ".join(str(value) for value in row.values()) + " |" for row in rows]
+    seeds = "" if given.what == "emps" else f" --cases {given.cases} --seed {given.seed}"
+    data = " --data FOLDER" if given.what == "emps" else ""
+    text = [
+        f"# {TITLES[given.what]}",
+        "",
+        f"    python tests/benchmarks/diagnosis.py {given.what}{data}{seeds} --out results/{given.what}",
+        "",
+        f"Made by mount-cosim {cosim.__version__} on Python {platform.python_version()} in {seconds:.0f} s.",
+        "",
+        "| " + " | ".join(head) + " |",
+        "|" + " --- |" * len(head),
+        *body,
+        "",
+        NOTES[given.what],
+    ]
+    (given.out / "README.md").write_text("\n".join(text) + "\n", "utf-8")
+    print("\n".join(text))
+
+
+TITLES = {
+    "emps": "EMPS: a measured ball-screw axis whose standard model lacks direction-dependent friction and a delay",
+    "null": "Null: recordings made by exactly the card's physics, its numbers 15 % off",
+    "concealed": "One concealed effect in a mount that shares no equations with the candidates",
+}
+NOTES = {
+    "emps": "Card `emps` (linear, symmetric Coulomb + viscous); trained on estimation.parquet, held out "
+    "validation_pulses.parquet. RMS in N. `clear` is clear motion only, |v| > 2 mm/s, 100 Hz on both sides, as in the "
+    "recording's README; the other two follow the protocol of 30 Hz over all samples. Nothing in the tool is special to "
+    "this axis. An end of the recorder's hold interval as time stamp would read as half a sample (0.5 ms) of delay: the "
+    "recording's documentation does not exclude it.",
+    "null": "Plant and controller FMUs of the paper's card; inertia and friction drawn within 15 %, encoder noise as "
+    "stated, three set points. The right answer is none.",
+    "concealed": "`cosim.proof.generator`, size 1; the truth is drawn from the seed. RMS in N m, held out.",
+}
+
+
+def emps(given: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    from cosim.diagnosis.inverse import Inverse
+    from cosim.diagnosis.prepare import prepare
+
+    card = read_card("emps")
+    train, held = (
+        Recording.read(given.data / f"{name}.parquet", card.columns) for name in ("estimation", "validation_pulses")
+    )
+    outcome = diagnose([train], held, card)
+    with tempfile.TemporaryDirectory() as folder:
+        deliver(outcome, [train], held, card, Path(folder), "cosim diagnose")
+        report = (Path(folder) / "report.html").read_bytes()
+    given.out.mkdir(parents=True, exist_ok=True)
+    (given.out / "report.html").write_bytes(report)
+    prepared = prepare([held], 100.0)
+    found = outcome.diagnosis
+    delay = next((f for f in found.findings if f.effect == "delay" and f.parameters), None)
+
+    def clear(mount: Any) -> float:
+        left = [p.tau - Inverse(mount, ()).torque(p, np.zeros(0))[0] for p in prepared.pieces]
+        moving = [p.inside & (np.abs(p.v) > 2e-3) for p in prepared.pieces]
+        return float(np.sqrt(np.mean(np.concatenate([r[m] for r, m in zip(left, moving, strict=True)]) ** 2)))
+
+    base = _refitted(found, card)
+    yield {
+        "recordings": f"{sha256(given.data / 'estimation.parquet')[:8]} / {held.sha256[:8]}",
+        "verdict": " + ".join(found.verdict),
+        "delay [ms]": f"{delay.parameters['delay_ms']:.3f}" if delay else "-",
+        "refitted": f"{found.heldout.before_rms:.2f}",
+        "with effects": f"{found.heldout.after_rms:.2f}",
+        "clear refitted": f"{clear(base.plant()):.2f}",
+        "clear with effects": f"{clear(outcome.card.plant()):.2f}",
+        "seconds": f"{found.seconds:.0f}",
+    }
+
+
+def _refitted(found: Any, card: Card) -> Card:
+    numbers = {name.split(".")[1]: values[1] for name, values in found.base_parameters.items()}
+    inertia = numbers.pop("inertia")
+    section = card.mount.model_copy(update={"inertia": inertia})
+    return replace(card, mount=section, friction=replace(card.friction, **numbers))
+
+
+def null(given: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    for seed in range(given.seed, given.seed + given.cases):
+        noise = 0.0 if seed % 2 else 3e-7
+        found = null_case(seed, noise)
+        held = found.heldout
+        yield {
+            "seed": seed,
+            "encoder noise [rad]": noise,
+            "verdict": " + ".join(found.verdict) or "none",
+            "refitted [N.m]": f"{held.before_rms:.4g}",
+            "as delivered [N.m]": f"{held.nominal_rms:.4g}",
+            "seconds": f"{found.seconds:.1f}",
+        }
+
+
+def null_case(seed: int, noise: float, seconds: float = 30.0) -> Any:
+    """Diagnose recordings made by the paper's card with numbers 15 % off; noise is white encoder noise [rad rms]."""
+    rng = np.random.default_rng(seed)
+    card = read_card("paper_mount")
+    truth = perturbed(card, rng)
+    with tempfile.TemporaryDirectory() as folder:
+        plant = export_fmu(truth.plant().model(), Path(folder) / "plant.fmu")
+        controller = export_fmu(card.controller_model(), Path(folder) / "controller.fmu")
+        made = [simulated(plant, controller, card, rng, noise, seconds, kind) for kind in range(3)]
+    return diagnose(made[:2], made[2], card).diagnosis
+
+
+def perturbed(card: Card, rng: np.random.Generator, by: float = 0.15) -> Card:
+    law = card.friction
+    names = ("sigma0", "sigma1", "sigma2", "Fc", "Fs", "Vs")
+    changed = replace(law, **{name: getattr(law, name) * (1 + rng.uniform(-by, by)) for name in names})
+    section = card.mount.model_copy(update={"inertia": card.mount.inertia * (1 + rng.uniform(-by, by))})
+    return replace(card, mount=section, friction=changed)
+
+
+def simulated(
+    plant: Path, controller: Path, card: Card, rng: np.random.Generator, noise: float, seconds: float, kind: int
+) -> Recording:
+    t = np.arange(int(seconds * ROWS)) / ROWS
+    tones = rng.uniform(0.03, 0.5, 4 + kind)
+    sizes = rng.uniform(0.3, 1, 4 + kind) / tones * 0.01
+    start = np.clip(t / 2.5, 0, 1) ** 3 * (10 - 15 * np.clip(t / 2.5, 0, 1) + 6 * np.clip(t / 2.5, 0, 1) ** 2)
+    waves = (a * np.sin(2 * np.pi * f * t + p) for a, f, p in zip(sizes, tones, rng.uniform(0, 6, 9), strict=False))
+    wanted = Recording(f"set_point_{kind}", {"t": t, "q": start, "q_d": start * sum(waves)})
+    made = close_loop(plant, controller, card, wanted, f"recording_{kind}")
+    table = dict(made.table)
+    table["q"] = table["q"] + noise * rng.standard_normal(len(table["q"]))
+    return Recording(made.name, table, made.units)
+
+
+def concealed(given: argparse.Namespace) -> Iterator[dict[str, Any]]:
+    for effect in EFFECTS:
+        for seed in range(given.seed, given.seed + given.cases):
+            case = make_case(seed, [effect])
+            with tempfile.TemporaryDirectory() as folder:
+                write_case(case, Path(folder))
+                names = ("train_1", "train_2", "heldout")
+                *train, held = (Recording.read(Path(folder) / f"{name}.parquet") for name in names)
+            found = diagnose(train, held, parse_card(to_toml(case.card), "card.toml")).diagnosis
+            yield {
+                "concealed": effect,
+                "seed": seed,
+                "verdict": " + ".join(found.verdict) or "none",
+                "right": "yes" if list(found.verdict) == [effect] else "no",
+                "refitted": f"{found.heldout.before_rms:.4g}",
+                "with effects": f"{found.heldout.after_rms:.4g}",
+                "floor": f"{found.heldout.floor_rms:.4g}",
+                "seconds": f"{found.seconds:.1f}",
+            }
+
+
+if __name__ == "__main__":
+    main()

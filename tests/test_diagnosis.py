@@ -1,0 +1,252 @@
+"""The diagnosis names what is missing, says "none" when nothing is, and proves it on data it never saw."""
+
+import json
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from benchmarks.diagnosis import null_case
+
+from cosim.cli import main
+from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.evidence import Blocks, Score
+from cosim.diagnosis.fit import fit
+from cosim.diagnosis.inverse import Inverse, stacked
+from cosim.diagnosis.prepare import choose_cutoff, derivative, noise_of, prepare
+from cosim.proof.demo import demo_case
+from cosim.proof.generator import make_case, to_toml, write_case
+from cosim.recording import Recording
+from pyfmi_models.card import Card, parse_card, read_card
+from pyfmi_models.effects import ActuatorLag, Delay, FrictionAsymmetry
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+
+def axis(inertia: float = 5.0, Fc: float = 2.0, effects: tuple = ()) -> Mount:
+    return Mount(name="axis", axis=Axis(inertia=inertia), friction=Coulomb(Fc=Fc, sigma2=1.0), effects=effects)
+
+
+def wander(seconds: float = 20.0, rate: float = 500.0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Position and its exact derivatives of a smooth multisine."""
+    t = np.arange(int(seconds * rate)) / rate
+    tones = [(0.2, 0.11, 0.0), (0.1, 0.37, 1.0), (0.03, 0.9, 2.0)]
+    q = sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in tones)
+    v = sum(a * 2 * np.pi * f * np.cos(2 * np.pi * f * t + p) for a, f, p in tones)
+    acc = sum(-a * (2 * np.pi * f) ** 2 * np.sin(2 * np.pi * f * t + p) for a, f, p in tones)
+    return t, q, v, acc
+
+
+def recorded(tau: np.ndarray, t: np.ndarray, q: np.ndarray, name: str = "run") -> Recording:
+    return Recording(name, {"t": t, "tau": tau, "q": q})
+
+
+def loaded(case: object, folder: Path) -> tuple[list[Recording], Recording, Card]:
+    write_case(case, folder)
+    train = [Recording.read(folder / f"train_{k}.parquet") for k in (1, 2)]
+    return train, Recording.read(folder / "heldout.parquet"), parse_card(to_toml(case.card), "card.toml")
+
+
+class TestPreparation:
+    def test_differences_have_fourth_order(self) -> None:
+        errors = []
+        for count in (100, 200):
+            x = np.linspace(0, 1, count + 1)
+            errors.append(np.abs(derivative(np.sin(6 * x), 1 / count) - 6 * np.cos(6 * x))[3:-3].max())
+        assert np.log2(errors[0] / errors[1]) > 3.8
+
+    def test_linear_terms_leave_no_residual_at_any_band(self) -> None:
+        t, q, v, a = wander()
+        tau = 7.0 * a + 3.0 * v
+        mount = Mount(name="m", axis=Axis(inertia=7.0), friction=Coulomb(Fc=0.0, sigma2=3.0))
+        for cutoff in (20.0, 40.0):
+            piece = prepare([recorded(tau, t, q)], cutoff).pieces[0]
+            left = piece.tau - Inverse(mount, ()).torque(piece, np.zeros(0))[0]
+            # What is left is the filters' memory of the ends of the record, half a second away.
+            assert np.abs(left[piece.inside]).max() < 1e-5 * np.abs(tau).max()
+
+    def test_a_noisy_encoder_narrows_the_band(self) -> None:
+        t, q, v, a = wander()
+        rng = np.random.default_rng(1)
+        tau = 5 * a + np.sign(v)
+        bands = [
+            choose_cutoff([recorded(tau, t, q + noise * rng.standard_normal(len(q)))], 5.0)
+            for noise in (0.0, 1e-6, 1e-4)
+        ]
+        assert bands[0] > bands[1] > bands[2]
+
+    def test_white_noise_is_measured_beside_a_smooth_motion(self) -> None:
+        t, q, _, _ = wander()
+        noise = 1e-4 * np.random.default_rng(2).standard_normal(len(q))
+        assert noise_of(q + noise, t[1] - t[0]) == pytest.approx(1e-4, rel=0.05)
+
+    def test_a_gap_cuts_a_recording_in_two_and_nothing_is_filled_in(self) -> None:
+        t, q, _v, a = wander()
+        keep = (t < 8) | (t > 10)
+        pieces = prepare([recorded((5 * a)[keep], t[keep], q[keep])], 30.0).pieces
+        assert [float(round(piece.t[0])) for piece in pieces] == [0.0, 10.0]
+
+
+class TestInverse:
+    @pytest.mark.parametrize("card", ["paper_mount", "emps"])
+    def test_derivatives_equal_finite_differences(self, card: str) -> None:
+        t, q, _v, a = wander()
+        mount = read_card(card).plant()
+        extra = (FrictionAsymmetry(level_asymmetry=0.1, viscous_asymmetry=0.1), Delay(delay_ms=2.0))
+        mount = replace(mount, effects=(*extra, ActuatorLag(time_constant_ms=3.0)))
+        free = tuple(v.name for v in mount.parameters() if not v.name.endswith(("limit", "smoothing", "delta")))
+        inverse = Inverse(mount, free)
+        pieces = prepare([recorded(a, t, q)], 20.0).pieces
+        values = np.array([dict(zip(inverse.names, inverse.start, strict=True))[name] for name in free])
+        _, slopes = stacked(inverse, pieces, values)
+        for column in range(len(free)):
+            step = np.zeros_like(values)
+            step[column] = 1e-5 * abs(values[column])
+            up, down = (stacked(inverse, pieces, values + s * step)[0] for s in (1, -1))
+            numeric = (up - down) / (2 * step[column])
+            assert np.abs(numeric - slopes[:, column]).max() < 2e-4 * np.abs(numeric).max() + 1e-9, free[column]
+
+    def test_a_fit_recovers_what_made_the_torque(self) -> None:
+        t, q, v, a = wander()
+        tau = 6.2 * a + 2.4 * np.sign(v) + 0.7 * v
+        prepared = prepare([recorded(tau, t, q)], 30.0)
+        moving = (np.abs(prepared.stacked("v")) > 0.05).astype(float)
+        found = fit(axis(), prepared.pieces, moving).parameters()
+        assert found["axis.inertia"] == pytest.approx(6.2, rel=2e-3)
+        assert found["friction.Fc"] == pytest.approx(2.4, rel=2e-2)
+        assert found["friction.sigma2"] == pytest.approx(0.7, rel=0.1)
+
+
+class TestEvidence:
+    def test_gain_is_a_geometric_mean_over_blocks(self) -> None:
+        score = Score(np.array([10.0, 10.0]), np.array([10.0, 2.5]), np.array([5.0, 5.0]))
+        assert score.gain == pytest.approx(0.5)
+
+    def test_with_one_recording_contiguous_quarters_are_the_folds(self) -> None:
+        t, q, _v, a = wander(60.0)
+        blocks = Blocks.of(prepare([recorded(a, t, q)], 30.0))
+        assert np.all(np.diff(blocks.fold) >= 0)
+        assert set(blocks.fold) == {0, 1, 2, 3}
+
+
+class TestAnswers:
+    @pytest.mark.parametrize(("seed", "noise"), [(1, 0.0), (2, 3e-7)])
+    def test_the_cards_own_physics_with_other_numbers_is_nothing_missing(self, seed: int, noise: float) -> None:
+        assert null_case(seed, noise).verdict == ()
+
+    def test_a_null_of_a_foreign_friction_law_is_nothing_missing(self, tmp_path: Path) -> None:
+        train, held, card = loaded(make_case(203, []), tmp_path)
+        assert diagnose(train, held, card).diagnosis.verdict == ()
+
+    @pytest.mark.parametrize(("effect", "seed"), [("torque_offset", 200), ("delay", 103), ("gravity_unbalance", 103)])
+    def test_a_concealed_effect_is_named_and_proven(self, effect: str, seed: int, tmp_path: Path) -> None:
+        case = make_case(seed, [effect])
+        train, held, card = loaded(case, tmp_path)
+        found = diagnose(train, held, card).diagnosis
+        assert found.verdict == (effect,)
+        assert found.heldout.after_rms < 0.5 * found.heldout.before_rms
+        assert found.heldout.confidence_interval[0] > 0
+
+
+DATA = Path(__file__).resolve().parents[2] / "shared" / "recordings" / "emps"
+
+
+@pytest.mark.skipif(not DATA.exists(), reason="the measured recordings are not beside this checkout")
+def test_a_measured_axis_has_direction_dependent_friction_and_a_delay() -> None:
+    card = read_card("emps")
+    train, held = (Recording.read(DATA / f"{n}.parquet", card.columns) for n in ("estimation", "validation_pulses"))
+    found = diagnose([train], held, card).diagnosis
+    delay = next(finding for finding in found.findings if finding.effect == "delay")
+    assert {"friction_asymmetry", "delay"} <= set(found.verdict)
+    assert 0.4 <= delay.parameters["delay_ms"] <= 0.9
+    assert found.heldout.sliding["after_rms"] < 2.3 < 4.2 < found.heldout.sliding["before_rms"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("night")
+    write_case(demo_case(), folder)
+    return folder
+
+
+class TestCommand:
+    def arguments(self, folder: Path, out: Path, *more: str) -> list[str]:
+        train = [str(folder / "train_1.parquet"), str(folder / "train_2.parquet")]
+        held = ["--heldout", str(folder / "heldout.parquet")]
+        return ["diagnose", *train, *held, "--card", str(folder / "card.toml"), "--out", str(out), *more]
+
+    def run(self, arguments: list[str]) -> int:
+        with pytest.raises(SystemExit) as left:
+            main(arguments)
+        return int(left.value.code or 0)
+
+    def test_files_json_and_improved_card(
+        self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        out = tmp_path / "out"
+        assert self.run(self.arguments(folder, out, "--json")) == 0
+        printed = json.loads(capsys.readouterr().out)
+        assert printed == json.loads((out / "diagnosis.json").read_text())
+        assert sorted(printed["verdict"]) == ["cogging", "friction_asymmetry"]
+        assert printed["heldout"]["after_rms"] < 0.3 * printed["heldout"]["before_rms"]
+        first = printed["effects"][0]
+        assert first["answer"] == "found"
+        assert first["standard_errors"]
+        assert first["where"]["axis"]
+        improved = read_card(out / "card.toml")
+        assert {effect.id for effect in improved.effects} == {"cogging", "friction_asymmetry"}
+        assert improved.origin["recordings"][0]["sha256"]
+        rows = pq.read_table(out / "missing_torque.parquet")
+        assert rows.num_rows == sum(pq.read_table(folder / f).num_rows for f in ("train_1.parquet", "train_2.parquet", "heldout.parquet"))
+        assert "<html" in (out / "report.html").read_text()
+        assert len(list(out.glob("*.fmu"))) == 2
+        assert self.run(self.arguments(folder, out)) == 2
+        assert "exists already" in capsys.readouterr().err
+
+    def spoiled(self, folder: Path, tmp_path: Path, column: str, change: object) -> list[str]:
+        import pandas as pd
+
+        frame = pd.read_parquet(folder / "train_1.parquet")
+        frame[column] = change(frame[column].to_numpy().copy())  # type: ignore[operator]
+        frame.to_parquet(tmp_path / "spoiled.parquet")
+        arguments = self.arguments(folder, tmp_path / "out")
+        arguments[1] = str(tmp_path / "spoiled.parquet")
+        return arguments
+
+    @pytest.mark.parametrize(
+        ("column", "change", "said"),
+        [
+            ("tau", lambda x: np.where(np.arange(len(x)) == 5, np.nan, x), "tau"),
+            ("q", lambda x: np.zeros_like(x), "q"),
+            ("t", lambda x: x[::-1], "backwards"),
+            ("q", np.degrees, "--units q=deg"),
+        ],
+    )
+    def test_bad_recordings_get_one_sentence_and_leave_nothing(
+        self, folder: Path, tmp_path: Path, column: str, change: object, said: str, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert self.run(self.spoiled(folder, tmp_path, column, change)) == 2
+        error = capsys.readouterr().err.strip()
+        assert said in error
+        assert "Traceback" not in error
+        assert not (tmp_path / "out").exists()
+
+    def test_several_columns_may_follow_one_option(self, folder: Path, tmp_path: Path) -> None:
+        given = self.arguments(folder, tmp_path / "out", "--columns", "tau=torque", "q=angle")
+        assert self.run(given) == 2  # the file has no such columns, which is what the sentence is about
+
+    def test_the_held_out_recording_must_not_be_fitted(
+        self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        given = self.arguments(folder, tmp_path / "out")
+        given[2] = str(folder / "heldout.parquet")
+        assert self.run(given) == 2
+        assert "held out" in capsys.readouterr().err
+
+
+def test_diagnosis_is_not_imported_by_a_run() -> None:
+    code = "import sys, cosim.cli, cosim.master; assert not {'casadi', 'matplotlib', 'cosim.diagnosis'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)
