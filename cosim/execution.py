@@ -9,6 +9,7 @@ import numpy as np
 
 from cosim.component import STATUSES
 from cosim.errors import StepError
+from cosim.interrupts import uninterrupted
 from cosim.loop import CompiledLoop, InterpretedLoop, Plan, slow_because
 from cosim.wiring import Wiring
 from cosim.writer import MemoryWriter
@@ -40,7 +41,8 @@ class Execution:
         try:
             self._run_chunks()
         finally:
-            self._write(self.loop.flush())
+            with uninterrupted():
+                self._write(self.loop.flush())
             self.seconds = perf_counter() - begun
         self.writer.origin["complete"] = True
 
@@ -68,8 +70,9 @@ class Execution:
         self._check()
         for chunk in chunks(self.ticks):
             columns = [stream(chunk) for stream in streams]
-            rows = self.loop.run(len(chunk), np.concatenate(columns) if columns else np.empty((0, len(chunk))))
-            self._write(rows)
+            given = np.concatenate(columns) if columns else np.empty((0, len(chunk)))
+            with uninterrupted():
+                self._write(self.loop.run(len(chunk), given))
             self._check()
             if self.progress:
                 self.progress(self.loop.tick, self.ticks)

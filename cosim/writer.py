@@ -13,6 +13,7 @@ from pyarrow import csv, parquet
 
 from cosim.files import check_free, directory
 from cosim.formats import ORIGIN_KEY, UNIT_KEY
+from cosim.interrupts import uninterrupted
 
 Table = Mapping[str, np.ndarray]
 GROUP = 65_536
@@ -68,10 +69,11 @@ class StreamWriter(MemoryWriter):
 
     def close(self) -> None:
         """Complete the file."""
-        self._flush()
-        self._file.add_key_value_metadata({ORIGIN_KEY: json.dumps(self.origin).encode()})
-        self._file.close()
-        os.replace(self._partial, self.path)
+        with uninterrupted():
+            self._flush()
+            self._file.add_key_value_metadata({ORIGIN_KEY: json.dumps(self.origin).encode()})
+            self._file.close()
+            os.replace(self._partial, self.path)
 
     def __enter__(self) -> "StreamWriter":
         return self

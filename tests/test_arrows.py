@@ -24,6 +24,7 @@ RUNNERS = (
     "hardware",
     "wiring",
     "execution",
+    "interrupts",
     "description",
 )
 MAKERS = ("cosim.diagnosis", "cosim.identify", "cosim.proof", "cosim.demo", "cosim.stiffness", "cosim.cli")
