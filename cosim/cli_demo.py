@@ -10,7 +10,9 @@ from cosim.terminal import put, say, stage
 
 
 def demo(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for everything the demo makes.")] = Path("cosim_demo"),
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for everything the demo makes.")] = Path(
+        "cosim_demo"
+    ),
     force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier demo.")] = False,
 ) -> None:
     """Export, co-simulate, meet a recording with concealed physics, find it, prove it, write the better FMU."""

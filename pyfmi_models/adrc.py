@@ -93,7 +93,9 @@ OUTPUTS = (
     Variable(name="friction_estimate", unit="N.m", description="Friction torque the controller expects"),
     Variable(name="zeta1", unit="rad", description="Observed position"),
     Variable(name="zeta2", unit="rad/s", description="Observed speed"),
-    Variable(name="zeta3", unit="rad/s2", description="Observed residual acceleration; -J zeta3 is the residual torque"),
+    Variable(
+        name="zeta3", unit="rad/s2", description="Observed residual acceleration; -J zeta3 is the residual torque"
+    ),
 )
 
 

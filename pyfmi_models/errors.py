@@ -1,8 +1,8 @@
 """What can go wrong with a model.
 
-    ModelError
-    ├── CardError      a model card is missing, unreadable or breaks a rule
-    └── ExportError    the equations could not be turned into C, a binary or an archive
+ModelError
+├── CardError      a model card is missing, unreadable or breaks a rule
+└── ExportError    the equations could not be turned into C, a binary or an archive
 """
 
 

@@ -200,7 +200,9 @@ class TestCommand:
         assert {effect.id for effect in improved.effects} == {"cogging", "friction_asymmetry"}
         assert improved.origin["recordings"][0]["sha256"]
         rows = pq.read_table(out / "missing_torque.parquet")
-        assert rows.num_rows == sum(pq.read_table(folder / f).num_rows for f in ("train_1.parquet", "train_2.parquet", "heldout.parquet"))
+        assert rows.num_rows == sum(
+            pq.read_table(folder / f).num_rows for f in ("train_1.parquet", "train_2.parquet", "heldout.parquet")
+        )
         assert "<html" in (out / "report.html").read_text()
         assert len(list(out.glob("*.fmu"))) == 2
         assert self.run(self.arguments(folder, out)) == 2
@@ -248,5 +250,7 @@ class TestCommand:
 
 
 def test_diagnosis_is_not_imported_by_a_run() -> None:
-    code = "import sys, cosim.cli, cosim.master; assert not {'casadi', 'matplotlib', 'cosim.diagnosis'} & set(sys.modules)"
+    code = (
+        "import sys, cosim.cli, cosim.master; assert not {'casadi', 'matplotlib', 'cosim.diagnosis'} & set(sys.modules)"
+    )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -52,7 +52,12 @@ def close_loop(plant: Path, controller: Path, card: Card, recording: Recording, 
     run = simulate(
         {"plant": plant, "controller": controller},
         [("controller.tau", "plant.tau"), ("plant.q", "controller.q"), *((n, f"controller.{n}") for n in signals)],
-        record={"tau": Record("plant.tau", "mean"), "q": Record("plant.q"), "q_d": Record("q_d"), "v": Record("plant.v")},
+        record={
+            "tau": Record("plant.tau", "mean"),
+            "q": Record("plant.q"),
+            "q_d": Record("q_d"),
+            "v": Record("plant.v"),
+        },
         step=step,
         ticks=len(signals["q_d"]),
         signals=signals,

@@ -222,7 +222,7 @@ def _prior(mount: Mount, free: Sequence[str], weight: float) -> Callable[[Array]
         safe = np.where(positive, np.maximum(values, 1e-3 * centre), 1.0)
         return (
             np.where(positive, weight * np.log(safe / centre), 0.0),
-            np.where(positive, weight / safe , 0.0),
+            np.where(positive, weight / safe, 0.0),
         )
 
     return pull

@@ -65,5 +65,3 @@ def _implied_inertia(recording: Recording) -> float:
     columns = np.column_stack([a, np.tanh(v / (0.02 * top)), v, np.ones_like(v)])
     scale = np.sqrt((columns**2).sum(0)) + 1e-300
     return float((np.linalg.lstsq(columns / scale, tau, rcond=None)[0] / scale)[0])
-
-

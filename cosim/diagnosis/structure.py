@@ -171,7 +171,9 @@ def screen(found: Fit, prepared: Prepared, blocks: Blocks, nuisance: Nuisances, 
     bench = Bench(prepared, blocks, nuisance, Whitening.of(rest, blocks, speed), weight)
     first = _best(tried, bench.screen(found, groups, excluded))
     everything = np.column_stack([known, *(groups[index] for index in first.values())])
-    bench = replace(bench, whitening=Whitening.of(projected(found.residual * weight, everything * counted), blocks, speed))
+    bench = replace(
+        bench, whitening=Whitening.of(projected(found.residual * weight, everything * counted), blocks, speed)
+    )
     scores = bench.screen(found, groups, excluded)
     best = sorted(_best(tried, scores).values(), key=lambda index: -scores[index][0].gain)
     return Screening(bench, tuple((tried[index], *scores[index]) for index in best))

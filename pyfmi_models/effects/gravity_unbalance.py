@@ -16,7 +16,9 @@ class GravityUnbalance(LoadEffect):
     id: ClassVar[str] = "gravity_unbalance"
     title: ClassVar[str] = "Gravity unbalance"
     rivals: ClassVar[tuple[str, ...]] = ("torque_offset", "encoder_eccentricity", "cable_wrap", "cogging")
-    told_apart_by: ClassVar[str] = "an off-centre load needs holding torque at standstill; an off-centre encoder does not"
+    told_apart_by: ClassVar[str] = (
+        "an off-centre load needs holding torque at standstill; an off-centre encoder does not"
+    )
     action: ClassVar[str] = "Move the counterweight until the axis stays where it is left."
     mgl: Scalar = parameter("N.m", "Weight times lever arm", low=0)
     phase: Scalar = parameter("rad", "Phase at position zero", default=0.0)

@@ -30,4 +30,6 @@ class StribeckEffect(FrictionEffect):
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         speed = "m/s" if unit == "N" else "rad/s"
-        return f"Below about {self.Vs:.2g} {speed} friction changes with speed, to {self.Fs:.3g} {unit} near standstill."
+        return (
+            f"Below about {self.Vs:.2g} {speed} friction changes with speed, to {self.Fs:.3g} {unit} near standstill."
+        )
