@@ -1,12 +1,14 @@
 """`cosim diagnose`: recordings and a card to what the card lacks, and a better card and FMU."""
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from cosim.errors import InputError
+from cosim.recording import Recording
 from cosim.terminal import put, put_json, say, stage
 
 
@@ -26,7 +28,6 @@ def diagnose(
     from cosim.diagnosis.deliver import check_out, deliver
     from cosim.diagnosis.diagnose import diagnose as find
     from cosim.diagnosis.terminal import summary
-    from cosim.recording import Recording
     from pyfmi_models.card import read_card
 
     check_out(out, force)
@@ -35,6 +36,7 @@ def diagnose(
     stated = _pairs("--units", units)
     recordings = [Recording.read(path, names, stated) for path in (*train, heldout)]
     _check_split(recordings[:-1], recordings[-1])
+    _check_kind(recordings, believed.mount.motion)
     seconds = sum(recording.duration for recording in recordings)
     say(f"Read {len(recordings)} recordings, {seconds:.0f} s; card {believed.mount.name}")
     with stage("looking for what the model lacks") as progress:
@@ -69,7 +71,18 @@ def _pairs(option: str, given: list[str] | None) -> dict[str, str]:
     return {name: value for name, _, value in pairs}
 
 
-def _check_split(train: list[object], heldout: object) -> None:
+def _check_kind(recordings: Sequence[Recording], motion: str) -> None:
+    """Units stated for q or v must be those of the card's kind of axis."""
+    fitting = {"q": "m", "v": "m/s"} if motion == "linear" else {"q": "rad", "v": "rad/s"}
+    for recording in recordings:
+        for name, unit in fitting.items():
+            stated = recording.units.get(name, unit) if name in recording else unit
+            if stated not in (unit, "1"):
+                rule = f"{name} of a {motion} axis is in {unit} or a unit that becomes it"
+                raise InputError(f'{recording.name}: the unit of "{name}" becomes {stated}; {rule}.', culprit=name)
+
+
+def _check_split(train: Sequence[object], heldout: object) -> None:
     hashes = [getattr(recording, "sha256", "") for recording in train]
     if getattr(heldout, "sha256", None) in hashes:
         name = getattr(heldout, "name", "the held-out recording")

@@ -125,7 +125,7 @@ def read_card(source: str | Path) -> Card:
     path = Path(source)
     shipped = files("pyfmi_models") / "cards" / f"{source}.toml"
     try:
-        text = path.read_text("utf-8") if path.exists() or not shipped.is_file() else shipped.read_text("utf-8")
+        text = path.read_text("utf-8") if path.is_file() or not shipped.is_file() else shipped.read_text("utf-8")
     except IsADirectoryError:
         raise CardError(f"{source} is a folder, not a card.") from None
     except OSError:

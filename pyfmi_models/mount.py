@@ -48,7 +48,7 @@ class Mount:
     motion: MotionKind = "rotary"
 
     def components(self) -> dict[str, Any]:
-        """Return the parts that carry parameters, by the prefix of their parameter names; a repeated effect counts up."""
+        """Return the parts that carry parameters, by the prefix of their names; a repeated effect counts up."""
         parts: dict[str, Any] = {"axis": self.axis, "friction": self.friction}
         for effect in self.effects:
             count = sum(name.rstrip("0123456789") == effect.id for name in parts)

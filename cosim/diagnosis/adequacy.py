@@ -7,6 +7,7 @@ attached.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -78,15 +79,17 @@ def _dictionary(prepared: Prepared) -> dict[str, Array]:
 def _others(prepared: Prepared) -> dict[str, Callable[[Piece], list[Array]]]:
     """User columns, offered as causes: alone, with the direction, with the speed."""
     common = set.intersection(*(set(piece.extras) for piece in prepared.pieces)) - {"q_d", "v"}
-    return {
-        name: lambda p, name=name: [_centred(p, name), _centred(p, name) * np.sign(p.v), _centred(p, name) * p.v]
-        for name in sorted(common)
-    }
+    return {name: partial(_user_columns, name) for name in sorted(common)}
+
+
+def _user_columns(name: str, piece: Piece) -> list[Array]:
+    column = _centred(piece, name)
+    return [column, column * np.sign(piece.v), column * piece.v]
 
 
 def _centred(piece: Piece, name: str) -> Array:
     column = piece.extras[name]
-    return (column - column.mean()) / (column.std() + 1e-300)
+    return np.asarray((column - column.mean()) / (column.std() + 1e-300))
 
 
 def _waves(x: Array, count: int = 8) -> list[Array]:
@@ -96,4 +99,4 @@ def _waves(x: Array, count: int = 8) -> list[Array]:
 def _columns(prepared: Prepared, make: Callable[[Piece], list[Array]]) -> Array:
     parts = [piece.lowpass(np.column_stack(make(piece)))[piece.kept] for piece in prepared.pieces]
     columns = np.concatenate(parts)
-    return columns / (columns.std(0) + 1e-300)
+    return np.asarray(columns / (columns.std(0) + 1e-300))

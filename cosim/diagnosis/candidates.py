@@ -36,7 +36,7 @@ PEAKS = 3
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect to try: zero-size instances, which of their numbers are fitted linearly, and how to start from them."""
+    """One effect to try: zero-size instances, their linear numbers, and how to start from those."""
 
     effect: str
     instances: tuple[Effect, ...]
@@ -176,7 +176,10 @@ def _rough_spot(mount: Mount, span: Span) -> Iterator[Candidate]:
         width = share * (high - low)
         for center in np.arange(low + width, high - width / 2, 1.7 * width):
             spot = LocalFriction(q_center=float(center), width=float(width), relative_amplitude=0.0)
-            start = lambda c, spot=spot: replace(spot, relative_amplitude=float(np.clip(c[0], -0.9, 15)))  # noqa: E731
+
+            def start(c: Array, spot: LocalFriction = spot) -> Effect:
+                return replace(spot, relative_amplitude=float(np.clip(c[0], -0.9, 15)))
+
             yield Candidate("position_friction", (spot,), ("relative_amplitude",), start)
 
 
@@ -199,7 +202,11 @@ def _timing(mount: Mount, span: Span) -> Iterator[Candidate]:
     for ms in (0.3, 1.0, 3.0, 8.0):
         for effect in (Delay(delay_ms=ms), ActuatorLag(time_constant_ms=ms)):
             if not _has(mount, type(effect)):
-                yield Candidate(effect.id, (effect,), ("",), lambda c, e=effect, T=ms: _timed(e, T * float(c[0])))
+
+                def start(c: Array, effect: Effect = effect, ms: float = ms) -> Effect:
+                    return _timed(effect, ms * float(c[0]))
+
+                yield Candidate(effect.id, (effect,), ("",), start)
 
 
 def _timed(effect: Effect, ms: float) -> Effect:

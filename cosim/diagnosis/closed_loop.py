@@ -14,8 +14,9 @@ from scipy.interpolate import make_interp_spline
 
 from cosim.diagnosis.prepare import Array, lowpass
 from cosim.diagnosis.protocol import CUTOFF
-from cosim.master import Record, simulate
+from cosim.master import simulate
 from cosim.recording import Recording
+from cosim.wiring import Record
 from pyfmi_models.card import Card
 from pyfmi_models.export import export_fmu
 

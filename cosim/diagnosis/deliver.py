@@ -182,7 +182,7 @@ def _fmus(card: Card, found: Diagnosis, out: Path) -> dict[str, str]:
 
 
 def _missing_torque(found: Diagnosis, recordings: Sequence[Recording], path: Path) -> None:
-    """One row a row of each recording: what the refitted base leaves, its 95 % half band, and what the effects leave."""
+    """For each row of each recording: what the refitted base leaves, its 95 % band, what the effects leave."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

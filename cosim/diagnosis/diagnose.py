@@ -85,14 +85,15 @@ def _weight(mount: Mount, prepared: Prepared) -> Array:
     v = np.abs(prepared.stacked("v"))
     if not isinstance(mount.friction, MemorylessLaw) or mount.friction.key == "none":
         return np.ones(len(v))
-    return (v > CLEAR_MOTION * v.max()).astype(float)
+    return np.asarray(v > CLEAR_MOTION * v.max(), float)
 
 
 def _proven(
     verdict: Verdict, mount: Mount, prepared: Prepared, weight: Array, heldout: Recording
 ) -> tuple[Verdict, tuple[Place, ...]]:
     """Take out effects that do not help on the held-out recording; return what stands, and those taken out."""
-    chosen, out = verdict.chosen, []
+    chosen = verdict.chosen
+    out: list[Place] = []
     for places in merged(verdict.places).values():
         gone = {_key(place.effect) for place in places}
         rest = tuple(effect for effect in chosen.mount.effects if _key(effect) not in gone)

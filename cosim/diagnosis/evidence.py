@@ -86,7 +86,7 @@ def _scale_by_speed(white: Array, at: Array, speed: Array) -> Array:
     parts = [part for part in np.array_split(np.argsort(at), SPEED_BINS) if len(part)]
     centre = np.array([float(np.median(at[part])) for part in parts])
     size = np.array([float(np.sqrt(np.mean(white[part] ** 2))) for part in parts])
-    return np.interp(speed, centre, np.maximum(size, 0.2 * np.median(size) + 1e-300))
+    return np.asarray(np.interp(speed, centre, np.maximum(size, 0.2 * np.median(size) + 1e-300)))
 
 
 def _yule_walker(x: Array) -> tuple[Array, float]:

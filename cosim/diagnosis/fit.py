@@ -7,6 +7,7 @@ much as one standard deviation of the residual in one independent row.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from math import log
 from typing import Any, NamedTuple
 
@@ -164,7 +165,7 @@ class _Used(NamedTuple):
 
 def _weighted(pieces: Sequence[Piece], weight: Array) -> _Used:
     edges = np.cumsum([0, *(len(piece.kept) for piece in pieces)])
-    spans = [np.arange(first, last) for first, last in zip(edges[:-1], edges[1:], strict=True)]
+    spans = [np.arange(first, last) for first, last in pairwise(edges)]
     numbers = [k for k, rows in enumerate(spans) if np.any(weight[rows] > 0)]
     return _Used(numbers, np.concatenate([spans[k] for k in numbers]))
 

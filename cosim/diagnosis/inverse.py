@@ -128,7 +128,7 @@ class Equations:
 
     @cached_property
     def step(self) -> Rowwise:
-        """Decay and drift of the bristle step: state+ = decay state + drift (the closed form is affine in the state)."""
+        """Decay and drift of the bristle step, whose closed form is affine: state+ = decay state + drift."""
         t, q, v, _, dt, p, _, this, motion = self._symbolic
         state = ca.SX.sym("state")
         following = this.friction.advance(state, v, this.level(motion), dt)

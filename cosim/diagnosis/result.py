@@ -91,7 +91,7 @@ class Trace:
 
 @dataclass(frozen=True, kw_only=True)
 class Region:
-    """Mean missing torque over one coordinate: centres, mean, 95 % band half width, samples; NaN where never visited."""
+    """Mean missing torque over one coordinate: centres, mean, half 95 % band, samples; NaN where never visited."""
 
     axis: str
     unit: str
@@ -126,5 +126,5 @@ class Diagnosis:
     provenance: dict[str, Any] = field(default_factory=dict)
     """version, command, date, recordings [{name, sha256, role, seconds, rate_hz}], card {name, sha256}."""
     improved: dict[str, Any] = field(default_factory=dict)
-    """card and FMU file names, and the range they are proven in: {"card", "fmu", "speed": [lo, hi], "position": ...}."""
+    """File names, and the range they are proven in: {"card", "fmu", "speed": [lo, hi], "position": [lo, hi]}."""
     seconds: float = 0.0

@@ -22,9 +22,9 @@ class Rowwise:
         self._given = np.zeros((CHUNK, function.size1_in(0)))
         self._parameters = np.zeros(function.size1_in(1))
         self._out = np.zeros((CHUNK, function.size1_out(0)))
-        self._buffer.set_arg(0, memoryview(self._given))  # type: ignore[arg-type]
-        self._buffer.set_arg(1, memoryview(self._parameters))  # type: ignore[arg-type]
-        self._buffer.set_res(0, memoryview(self._out))  # type: ignore[arg-type]
+        self._buffer.set_arg(0, memoryview(self._given))  # type: ignore[call-arg, arg-type]
+        self._buffer.set_arg(1, memoryview(self._parameters))  # type: ignore[call-arg, arg-type]
+        self._buffer.set_res(0, memoryview(self._out))  # type: ignore[call-arg, arg-type]
 
     def __call__(self, columns: Array, parameters: Array) -> Array:
         """Evaluate: (inputs, rows) and (parameters,) -> (outputs, rows)."""

@@ -7,6 +7,7 @@ be trusted.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -30,7 +31,7 @@ MOST_KINDS, MOST_EFFECTS = 4, 7
 """Different effects, and effects counting each harmonic, that one diagnosis may add."""
 LEAST_VS, LEAST_CYCLES = 0.005, 1.5
 LEAST_PLAIN_GAIN = 0.02
-"""Share of the plain residual energy that an effect must remove as well: whitened evidence alone can be about nothing."""
+"""Share of the plain residual energy an effect must remove too: whitened evidence alone can be about nothing."""
 WHOLE = 0.01
 """A whole number of cycles is taken if the residual grows by no more than this share."""
 CLEARLY = 2.0
@@ -109,7 +110,7 @@ def select(
 
 
 def starts(screening: Screening) -> list[Effect]:
-    """Effects worth a nonlinear fit, strongest first; delay and lag always come together, being alike at first order."""
+    """Effects worth a nonlinear fit, strongest first; delay and lag, alike at first order, always come together."""
     least = max(SCREEN_GAIN, SCREEN_SHARE * screening.best[0][1].gain) if screening.best else 0.0
     worth = [candidate.start(k) for candidate, score, k in screening.best[:REFINED] if score.gain >= least]
     for effect in list(worth):
@@ -161,10 +162,11 @@ def tuned(found: Fit, prepared: Prepared, weight: Array, prior: Mount) -> Fit:
         return found
     others = tuple(name for name in FIXED if name != "cycles_per_rev")
     free = fit(found.mount, prepared.pieces, weight, prior, evaluations=10, fixed=others)
-    whole = max(1.0, float(round(free.mount.effects[-1].cycles_per_rev)))
     best = min((found, free), key=lambda one: one.rms)
-    for cycles in (whole, best.mount.effects[-1].cycles_per_rev):
-        effect = replace(best.mount.effects[-1], cycles_per_rev=cycles)
+    ripple: Any = best.mount.effects[-1]
+    whole = max(1.0, float(round(ripple.cycles_per_rev)))
+    for cycles in (whole, ripple.cycles_per_rev):
+        effect = replace(ripple, cycles_per_rev=cycles)
         mount = replace(best.mount, effects=(*best.mount.effects[:-1], effect))
         settled = fit(mount, prepared.pieces, weight, prior, evaluations=8)
         if settled.rms < best.rms * (1 + WHOLE):
@@ -204,5 +206,5 @@ def _degenerate(trial: Trial) -> bool:
     """Whether an effect is really another: a Stribeck speed near zero is a level, a ripple once a turn an unbalance."""
     mount, added = trial.fit.mount, trial.fit.mount.effects[-1]
     if isinstance(added, Cogging) and mount.motion == "rotary":
-        return added.cycles_per_rev < LEAST_CYCLES
-    return isinstance(added, StribeckEffect) and added.Vs < LEAST_VS * trial.top_speed
+        return bool(added.cycles_per_rev < LEAST_CYCLES)
+    return isinstance(added, StribeckEffect) and bool(added.Vs < LEAST_VS * trial.top_speed)

@@ -55,4 +55,5 @@ class LocalFriction(_PositionFriction):
         """Say it to a mechanic."""
         where = "m" if unit == "N" else "rad"
         size = 100 * self.relative_amplitude
-        return f"Around {self.q_center:.4g} {where} friction is {size:+.0f} % off, over about {4 * self.width:.2g} {where}."
+        span = f"over about {4 * self.width:.2g} {where}"
+        return f"Around {self.q_center:.4g} {where} friction is {size:+.0f} % off, {span}."

@@ -1,8 +1,8 @@
 """Proof of the diagnosis, rebuilt by one command each.
 
-    python tests/benchmarks/diagnosis.py emps --data FOLDER --out results/emps     measured recordings (not in the project)
-    python tests/benchmarks/diagnosis.py null --cases 10 --out results/null        the card's own physics, numbers 15 % off
-    python tests/benchmarks/diagnosis.py concealed --cases 3 --out results/concealed   one hidden effect each, all eight
+    python tests/benchmarks/diagnosis.py emps --data FOLDER --out results/emps        measured, not in the project
+    python tests/benchmarks/diagnosis.py null --cases 10 --out results/null           the card's own physics, 15 % off
+    python tests/benchmarks/diagnosis.py concealed --cases 3 --out results/concealed  one hidden effect, all eight
 
 Each writes table.csv and README.md with version, seeds and inputs.
 """
@@ -91,9 +91,9 @@ TITLES = {
 NOTES = {
     "emps": "Card `emps` (linear, symmetric Coulomb + viscous); trained on estimation.parquet, held out "
     "validation_pulses.parquet. RMS in N. `clear` is clear motion only, |v| > 2 mm/s, 100 Hz on both sides, as in the "
-    "recording's README; the other two follow the protocol of 30 Hz over all samples. Nothing in the tool is special to "
-    "this axis. An end of the recorder's hold interval as time stamp would read as half a sample (0.5 ms) of delay: the "
-    "recording's documentation does not exclude it.",
+    "recording's README; the other two follow the protocol of 30 Hz over all samples. Nothing in the tool is "
+    "special to this axis. Commands stamped at the start of their hold interval would read as half a sample (0.5 ms) of "
+    "delay; the recording's documentation does not exclude that.",
     "null": "Plant and controller FMUs of the paper's card; inertia and friction drawn within 15 %, encoder noise as "
     "stated, three set points. The right answer is none.",
     "concealed": "`cosim.proof.generator`, size 1; the truth is drawn from the seed. RMS in N m, held out.",
