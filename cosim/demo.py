@@ -21,7 +21,7 @@ from cosim.stiffness import table_text
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.export import export_fmu
 
-SEED = 7
+SEED, SECONDS = 7, 30.0
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def run_demo(out: Path, command: str, say: Callable[[str], None]) -> Demo:
     """Run the chain and leave its files in `out`."""
     directory(out)
     say("recording a mount with concealed physics")
-    write_case(demo_case(SEED), out / "night")
+    write_case(demo_case(SEED, SECONDS), out / "night")
     card = read_card(out / "night" / "card.toml")
     train = [Recording.read(out / "night" / f"train_{k}.parquet") for k in (1, 2)]
     heldout = Recording.read(out / "night" / "heldout.parquet")

@@ -5,7 +5,7 @@ periodogram; its linear numbers start at zero, so its columns are the exact deri
 `start` turns fitted coefficients into an effect from which a joint nonlinear fit goes on.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import atan2, hypot, pi
 from typing import Any
@@ -15,6 +15,7 @@ import numpy as np
 from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import Array, Prepared
 from pyfmi_models.effects import (
+    CATALOGUE,
     ActuatorLag,
     Cogging,
     Delay,
@@ -63,15 +64,16 @@ class Span:
         return float(np.abs(self.v).max())
 
 
-def candidates(mount: Mount, prepared: Prepared, residual: Array, level: Array) -> list[Candidate]:
-    """List what is worth trying on a mount whose torque residual at the kept rows is `residual`."""
+def candidates(
+    mount: Mount, prepared: Prepared, residual: Array, level: Array, only: Collection[str] = tuple(CATALOGUE)
+) -> list[Candidate]:
+    """List what is worth trying of `only` these effects, given the torque residual at the kept rows."""
     q, v = prepared.stacked("q"), prepared.stacked("v")
     angle = np.asarray(mount.at(0.0, q, v).angle)
     span = Span(angle, q, v, level, residual, prepared.cutoff)
-    makers: list[Callable[[Mount, Span], Iterator[Candidate]]] = [_asymmetry, _offset, _stribeck, _timing]
-    if prepared.has_position:
-        makers += [_unbalance, _cogging, _periodic_friction, _rough_spot]
-    return [candidate for maker in makers for candidate in maker(mount, span)]
+    makers = [(ids, maker) for ids, maker in _MAKERS if prepared.has_position or maker in _WITHOUT_POSITION]
+    found = [c for ids, maker in makers if set(ids) & set(only) for c in maker(mount, span)]
+    return [candidate for candidate in found if candidate.effect in only]
 
 
 def columns_of(mount: Mount, found: Sequence[Candidate], prepared: Prepared, values: Array) -> list[Array]:
@@ -219,7 +221,7 @@ def _peaks(span: Span, signal: Array, lowest: float = 1.0) -> list[float]:
     reach = float(np.ptp(span.angle))
     if reach <= 0:
         return []
-    step, speed = 0.25 * 2 * pi / reach, float(np.median(np.abs(span.v)[np.abs(span.v) > 0.02 * span.top]))
+    step, speed = 0.35 * 2 * pi / reach, float(np.median(np.abs(span.v)[np.abs(span.v) > 0.02 * span.top]))
     ratio = float(np.ptp(span.angle) / max(np.ptp(span.q), 1e-300))
     top = min(2 * pi * span.cutoff / max(speed * ratio, 1e-12), 3000 * step)
     cycles = np.arange(max(2 * pi / reach * lowest, step), max(top, 10 * step), step)
@@ -249,3 +251,17 @@ def _sharpened(span: Span, signal: Array, cycles: float, step: float, ratio: flo
     # Slots, teeth and rolling elements come in whole numbers: prefer one that the data cannot tell from the best.
     close = near > 0 and abs(near - best) < 0.6 * step
     return near if close and _power(span, signal, near, ratio) > 0.9 * _power(span, signal, best, ratio) else best
+
+
+_Maker = Callable[[Mount, Span], Iterator[Candidate]]
+_MAKERS: tuple[tuple[tuple[str, ...], _Maker], ...] = (
+    (("friction_asymmetry",), _asymmetry),
+    (("torque_offset",), _offset),
+    (("stribeck",), _stribeck),
+    (("delay", "actuator_lag"), _timing),
+    (("gravity_unbalance",), _unbalance),
+    (("cogging",), _cogging),
+    (("position_friction",), _periodic_friction),
+    (("position_friction",), _rough_spot),
+)
+_WITHOUT_POSITION = (_asymmetry, _offset, _stribeck, _timing)

@@ -131,7 +131,7 @@ def _rivals(effect: Effect, reduced: Fit, bench: Bench, gain: float) -> list[Eff
     """Starts of the effect's rivals that are worth a nonlinear fit in its place, best member of each."""
     prepared, nuisance = bench.prepared, bench.nuisances
     rest = projected(reduced.residual, np.column_stack([reduced.slopes, nuisance.columns]))
-    alike = [c for c in candidates(reduced.mount, prepared, rest, np.abs(nuisance.level)) if c.effect in effect.rivals]
+    alike = candidates(reduced.mount, prepared, rest, np.abs(nuisance.level), effect.rivals)
     if not alike:
         return []
     groups = columns_of(reduced.mount, alike, prepared, reduced.values)

@@ -7,7 +7,7 @@ import numpy as np
 
 from cosim.diagnosis.prepare import Array
 
-CHUNK = 4096
+CHUNK = 512
 """Rows evaluated at once: keeps memory flat, and one mapped function serves every length."""
 
 

@@ -92,7 +92,7 @@ NOTES = {
     "emps": "Card `emps` (linear, symmetric Coulomb + viscous); trained on estimation.parquet, held out "
     "validation_pulses.parquet. RMS in N. `clear` is clear motion only, |v| > 2 mm/s, 100 Hz on both sides, as in the "
     "recording's README; the other two follow the protocol of 30 Hz over all samples. Nothing in the tool is "
-    "special to this axis. Commands stamped at the start of their hold interval would read as half a sample (0.5 ms) of "
+    "special to this axis. Commands stamped at the start of their hold would read as half a sample (0.5 ms) of "
     "delay; the recording's documentation does not exclude that.",
     "null": "Plant and controller FMUs of the paper's card; inertia and friction drawn within 15 %, encoder noise as "
     "stated, three set points. The right answer is none.",
