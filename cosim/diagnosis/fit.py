@@ -21,8 +21,10 @@ from pyfmi_models.mount import Mount
 
 FIXED = ("axis.torque_limit", "friction.smoothing", "friction.delta", "cycles_per_rev")
 """Parameters that are not fitted here: limits, and numbers that candidates choose from a grid."""
-BRISTLES = ("friction.sigma0", "friction.sigma1")
-"""Parameters that only presliding tells: a recording that never dwells says nothing about them."""
+BRISTLES = ("friction.sigma0", "friction.sigma1", "friction.Fs", "friction.Vs")
+"""Parameters that only the slowest motion tells: a recording that never dwells says nothing about them."""
+LEAST_VS, MOST_FS = 0.005, 5.0
+"""Stribeck curves narrower than this share of the top speed, or higher than this times their start, are not fitted."""
 ENOUGH = 1e-5
 """A fit ends when a step lowers the sum of squares by less than this share."""
 PRIOR_FACTOR = 2.0
@@ -103,8 +105,8 @@ def fit(
     def jacobian(u: Array) -> Array:
         return np.concatenate([-weight_used[:, None] * evaluate(u)[1] * scale, np.diag(pull(u * scale)[1] * scale)])
 
-    low = np.array([known[name].low for name in free]) / scale
-    high = np.array([known[name].high for name in free]) / scale
+    top = max(float(np.abs(piece.v).max()) for piece in pieces)
+    low, high = (np.array(edges) / scale for edges in zip(*(_bounds(known[name], top) for name in free), strict=True))
     inner = np.clip(start / scale, np.nextafter(low, 0) + 1e-9, np.nextafter(high, 0) - 1e-9)
     found = least_squares(residuals, jacobian, inner, (low, high), evaluations)
     values = found * scale
@@ -201,6 +203,15 @@ def _filled(part: Any, prefix: str, numbers: dict[str, float]) -> Any:
         sides = [numbers.get(f"{full}.{side}") for side in Pair._fields]
         changes[name] = numbers[full] if full in numbers else Pair(*sides)  # type: ignore[arg-type]
     return replace(part, **changes)
+
+
+def _bounds(variable: Variable, top: float) -> tuple[float, float]:
+    """Bounds of a parameter in a fit: its own, and for a Stribeck curve what recorded speeds can tell from a level."""
+    if variable.name.endswith(".Vs"):
+        return min(LEAST_VS * top, variable.start), top
+    if variable.name.endswith(".Fs"):
+        return variable.low, max(MOST_FS * variable.start, variable.low)
+    return variable.low, variable.high
 
 
 def _scale(variable: Variable) -> float:
