@@ -13,7 +13,7 @@ import numpy as np
 from cosim.diagnosis.candidates import candidates, columns_of
 from cosim.diagnosis.fit import Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared
-from cosim.diagnosis.select import LEAST_GAIN, TIE, Selection, Trial, clearly_worse, is_real, judged, tuned
+from cosim.diagnosis.select import LEAST_GAIN, TIE, Selection, Trial, clearly_worse, degenerate, is_real, judged, tuned
 from cosim.diagnosis.structure import Bench, projected
 from pyfmi_models.effects import ActuatorLag, Delay, Effect
 from pyfmi_models.mount import Mount
@@ -124,7 +124,8 @@ def _place(
     own = judged(effect.id, chosen, reduced, before, bench)
     starts = _rivals(effect, reduced, bench, own.gain)
     rivals = [_tried(reduced, start, mount, prepared, weight, bench, before) for start in starts]
-    return Place(effect, own, tuple(sorted(rivals, key=lambda trial: -trial.gain)))
+    real = [rival for rival in rivals if not degenerate(rival)]
+    return Place(effect, own, tuple(sorted(real, key=lambda trial: -trial.gain)))
 
 
 def _rivals(effect: Effect, reduced: Fit, bench: Bench, gain: float) -> list[Effect]:

@@ -159,7 +159,9 @@ def _absent(name: str, smallest: float | None, trial: Trial | None, mount: Mount
     form = CATALOGUE[name][0]
     _, factor, unit = MAIN[name]
     high = next(v.high for v in _parameters(form) if v.name == MAIN[name][0])
-    testable = smallest is not None and smallest < min(high, 1e12)
+    torque = float(np.abs(prepared.stacked("tau")).max())
+    most = min(high, 10 * torque if unit == "N.m" else np.inf)
+    testable = smallest is not None and smallest < most
     reason = "" if testable else _why_not(name, mount, prepared)
     return Finding(
         effect=name,

@@ -197,12 +197,12 @@ def is_real(trial: Trial, sample_time: float) -> bool:
     added = trial.fit.mount.effects[-1]
     if isinstance(added, Delay) and added.delay_ms < 1e3 * max(0.3 * sample_time, 1.5e-4):
         return False
-    if trial.plain_gain < LEAST_PLAIN_GAIN or _degenerate(trial):
+    if trial.plain_gain < LEAST_PLAIN_GAIN or degenerate(trial):
         return False
     return (trial.gain > LEAST_GAIN and trial.t > LEAST_T) or (trial.gain > SURE_GAIN and trial.t > 1)
 
 
-def _degenerate(trial: Trial) -> bool:
+def degenerate(trial: Trial) -> bool:
     """Whether an effect is really another: a Stribeck speed near zero is a level, a ripple once a turn an unbalance."""
     mount, added = trial.fit.mount, trial.fit.mount.effects[-1]
     if isinstance(added, Cogging) and mount.motion == "rotary":
