@@ -108,7 +108,11 @@ def test_a_failing_component_leaves_what_was_recorded(
 
 def test_ctrl_c_leaves_a_complete_file_and_exit_code_130(scenario: Path, tmp_path: Path) -> None:
     scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e6"))
-    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out")]
+    # A shell's background jobs ignore SIGINT, and so do their children: make it count however the tests started.
+    start = (
+        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from cosim.cli import main; main()"
+    )
+    command = [sys.executable, "-c", start, "run", str(scenario), "--out", str(tmp_path / "out")]
     with subprocess.Popen(command, env=ENVIRONMENT, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
         until = time.monotonic() + 60
         while not list(tmp_path.glob("out/.*.partial")) and time.monotonic() < until:
