@@ -4,8 +4,10 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from importlib.resources import files
 from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -190,6 +192,8 @@ class TestCommand:
         assert self.run(self.arguments(folder, out, "--json")) == 0
         printed = json.loads(capsys.readouterr().out)
         assert printed == json.loads((out / "diagnosis.json").read_text())
+        schema = json.loads((files("cosim") / "diagnosis" / "schema.json").read_text())
+        jsonschema.Draft202012Validator(schema).validate(printed)
         assert sorted(printed["verdict"]) == ["cogging", "friction_asymmetry"]
         assert printed["heldout"]["after_rms"] < 0.3 * printed["heldout"]["before_rms"]
         first = printed["effects"][0]

@@ -62,7 +62,7 @@ def deliver(
 
 
 def as_json(found: Diagnosis) -> dict[str, Any]:
-    """Return the diagnosis as the documented JSON object."""
+    """Return the diagnosis as the JSON object that `schema.json` beside this file describes."""
     held = found.heldout
     return {
         "verdict": list(found.verdict),
