@@ -12,7 +12,6 @@ import numpy as np
 from cosim.diagnosis.prepare import Array, Piece, Prepared
 
 STOPS = 8
-SPEEDS = 3
 
 
 def stop_distances(prepared: Prepared) -> Array:

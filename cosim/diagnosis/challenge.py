@@ -1,8 +1,7 @@
 """Challenge what was accepted: does each effect still earn its place, and does a rival do as well in it?
 
-Each accepted effect is taken out and the rest refitted. If little is lost, it goes. Its rivals, and whatever the
-screening likes in its place, are tried there; a better one takes the place, one that comes close makes the answer a
-set.
+Each accepted effect is taken out and the rest refitted. If little is lost, it goes. Its rivals are tried in its place;
+a better one takes it, one that comes close makes the answer a set.
 """
 
 from collections.abc import Callable, Sequence
@@ -11,12 +10,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cosim.diagnosis.candidates import candidates, columns_of
-from cosim.diagnosis.fit import Fit, fit
-from cosim.diagnosis.prepare import Array, Prepared
-from cosim.diagnosis.select import LEAST_GAIN, TIE, Selection, Trial, clearly_worse, degenerate, is_real, judged, tuned
+from cosim.diagnosis.fit import Fit
+from cosim.diagnosis.select import Selection
 from cosim.diagnosis.structure import Bench, projected
-from pyfmi_models.effects import ActuatorLag, Delay, Effect
-from pyfmi_models.mount import Mount
+from cosim.diagnosis.trial import (
+    LEAST_GAIN,
+    TIE,
+    Problem,
+    Trial,
+    clearly_worse,
+    is_another,
+    is_real,
+    judged,
+    tried,
+    twins,
+)
+from pyfmi_models.effects import Effect
 
 ALIKE = 0.4
 """A rival is refitted in an effect's place if its linear gain there reaches this share of the effect's."""
@@ -38,7 +47,7 @@ class Place:
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
         """Rivals that these recordings cannot exclude."""
-        return tuple(rival.effect for rival in self.rivals if _too_close(self.trial, rival))
+        return tuple(rival.effect.id for rival in self.rivals if _too_close(self.trial, rival))
 
     @property
     def probability(self) -> float:
@@ -59,6 +68,38 @@ class Verdict:
     looked_at: dict[str, Trial]
 
 
+def challenge(problem: Problem, selection: Selection, say: Callable[[str], None] = lambda _: None) -> Verdict:
+    """Delete and swap until nothing changes, at most `ROUNDS` times; `say` is told which effect is challenged."""
+    chosen, bench = selection.chosen, selection.bench
+    for _ in range(ROUNDS):
+        places, after = _round(problem, chosen, bench, say)
+        if after is None:
+            break
+        chosen = after
+    else:
+        places = [_place(problem, effect, chosen, bench) for effect in _added(problem, chosen)]
+    return Verdict(selection.base, chosen, bench, tuple(places), selection.looked_at)
+
+
+def _round(problem: Problem, chosen: Fit, bench: Bench, say: Callable[[str], None]) -> tuple[list[Place], Fit | None]:
+    """Challenge each effect; return the places, or the structure after the first change."""
+    places = []
+    for effect in _added(problem, chosen):
+        say(effect.title)
+        place = _place(problem, effect, chosen, bench)
+        best = max((place.trial, *place.rivals), key=lambda trial: trial.gain)
+        if place.trial.gain < LEAST_GAIN and not is_real(problem, best):
+            return [], _without(problem, chosen, effect)
+        if best is not place.trial and not _simpler_wins(place.trial, best):
+            return [], best.fit
+        places.append(place)
+    return places, None
+
+
+def _added(problem: Problem, chosen: Fit) -> tuple[Effect, ...]:
+    return chosen.mount.effects[len(problem.mount.effects) :]
+
+
 def _too_close(winner: Trial, rival: Trial) -> bool:
     """Whether a rival cannot be excluded: its gain comes near, and block by block it is not clearly worse."""
     if len(rival.fit.free) > len(winner.fit.free):
@@ -66,65 +107,22 @@ def _too_close(winner: Trial, rival: Trial) -> bool:
     return rival.gain >= NEAR * winner.gain and not clearly_worse(rival, winner)
 
 
-def challenge(
-    selection: Selection,
-    mount: Mount,
-    prepared: Prepared,
-    weight: Array,
-    sample_time: float,
-    say: Callable[[str], None] = lambda _: None,
-) -> Verdict:
-    """Delete and swap until nothing changes (at most `ROUNDS` times); see `select` for the arguments."""
-    chosen, bench = selection.chosen, selection.bench
-    known = len(mount.effects)
-    places: list[Place] = []
-    for _ in range(ROUNDS):
-        added = chosen.mount.effects[known:]
-        before = chosen
-        places = []
-        for effect in added:
-            say(effect.title)
-            place = _place(effect, chosen, mount, prepared, weight, bench)
-            places.append(place)
-            best = max((place.trial, *place.rivals), key=lambda trial: trial.gain)
-            if place.trial.gain < LEAST_GAIN and not is_real(best, sample_time):
-                chosen = _without(chosen, effect, mount, prepared, weight)
-                break
-            if best is not place.trial and not _simpler_wins(place.trial, best):
-                chosen = best.fit
-                break
-        if chosen is before:
-            break
-    else:
-        added = chosen.mount.effects[known:]
-        places = [_place(effect, chosen, mount, prepared, weight, bench) for effect in added]
-    return Verdict(selection.base, chosen, bench, tuple(places), selection.looked_at)
-
-
 def _simpler_wins(holder: Trial, best: Trial) -> bool:
     close = holder.gain >= TIE * best.gain and not clearly_worse(holder, best)
     return close and len(holder.fit.free) < len(best.fit.free)
 
 
-def _without(chosen: Fit, effect: Effect, mount: Mount, prepared: Prepared, weight: Array) -> Fit:
+def _without(problem: Problem, chosen: Fit, effect: Effect) -> Fit:
     rest = tuple(other for other in chosen.mount.effects if other is not effect)
-    return fit(replace(chosen.mount, effects=rest), prepared.pieces, weight, mount, evaluations=15)
+    return problem.fit(replace(chosen.mount, effects=rest), 15)
 
 
-def _place(
-    effect: Effect,
-    chosen: Fit,
-    mount: Mount,
-    prepared: Prepared,
-    weight: Array,
-    bench: Bench,
-) -> Place:
-    reduced = _without(chosen, effect, mount, prepared, weight)
+def _place(problem: Problem, effect: Effect, chosen: Fit, bench: Bench) -> Place:
+    reduced = _without(problem, chosen, effect)
     before = bench.energy(reduced)
-    own = judged(effect.id, chosen, reduced, before, bench)
-    starts = _rivals(effect, reduced, bench, own.gain)
-    rivals = [_tried(reduced, start, mount, prepared, weight, bench, before) for start in starts]
-    real = [rival for rival in rivals if not degenerate(rival)]
+    own = judged(effect, chosen, reduced, before, bench)
+    rivals = [tried(problem, reduced, start, before, bench) for start in _rivals(effect, reduced, bench, own.gain)]
+    real = [rival for rival in rivals if not is_another(problem, rival.effect)]
     return Place(effect, own, tuple(sorted(real, key=lambda trial: -trial.gain)))
 
 
@@ -142,24 +140,7 @@ def _rivals(effect: Effect, reduced: Fit, bench: Bench, gain: float) -> list[Eff
         if score.gain > max(ALIKE * gain, best.get(candidate.effect, (LEAST_GAIN,))[0]):
             best[candidate.effect] = score.gain, candidate.start(coefficients)
     found = [start for _, start in sorted(best.values(), key=lambda item: -item[0])]
-    return found + [twin for twin in _twins(effect) if twin.id not in best]
-
-
-def _twins(effect: Effect) -> list[Effect]:
-    """Delay and lag are alike at first order, so a linear score cannot send one of them away."""
-    if isinstance(effect, Delay):
-        return [ActuatorLag(time_constant_ms=effect.delay_ms)]
-    if isinstance(effect, ActuatorLag):
-        return [Delay(delay_ms=effect.time_constant_ms)]
-    return []
-
-
-def _tried(
-    reduced: Fit, effect: Effect, mount: Mount, prepared: Prepared, weight: Array, bench: Bench, before: Array
-) -> Trial:
-    grown = replace(reduced.mount, effects=(*reduced.mount.effects, effect))
-    found = tuned(fit(grown, prepared.pieces, weight, mount, evaluations=12), prepared, weight, mount)
-    return judged(effect.id, found, reduced, before, bench)
+    return found + [twin for twin in twins(effect) if twin.id not in best]
 
 
 def merged(places: Sequence[Place]) -> dict[str, list[Place]]:

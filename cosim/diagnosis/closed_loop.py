@@ -4,10 +4,8 @@ Replaying a recorded torque diverges; a loop does not, and it is how the machine
 controller and a recording with a set point.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
@@ -18,7 +16,6 @@ from cosim.master import simulate
 from cosim.recording import Recording
 from cosim.wiring import Record
 from pyfmi_models.card import Card
-from pyfmi_models.export import export_fmu
 
 LEAD, TAIL = 3.0, 0.5
 
@@ -29,11 +26,6 @@ class LoopError:
 
     torque: float
     position: float
-
-
-def can_close(card: Card, recording: Recording) -> bool:
-    """Whether the loop can be closed: controller known, set point recorded without gaps."""
-    return card.controller is not None and {"q", "q_d"} <= set(recording.columns) and not recording.gaps
 
 
 def set_point(recording: Recording, step: float) -> dict[str, Array]:
@@ -76,18 +68,3 @@ def compare(simulated: Recording, recording: Recording) -> LoopError:
     inside = slice(int(LEAD / dt), count - int(TAIL / dt))
     both = {n: lowpass(simulated[n][:count] - recording[n][:count], dt, CUTOFF)[inside] for n in ("tau", "q")}
     return LoopError(*(float(np.sqrt(np.mean(both[name] ** 2))) for name in ("tau", "q")))
-
-
-def loop_errors(
-    cards: dict[str, Card], recording: Recording, say: Callable[[str], None] = lambda _: None
-) -> dict[str, LoopError]:
-    """Close the loop with the plant of each card (FMUs are built as needed), the controller always the first card's."""
-    first = next(iter(cards.values()))
-    with TemporaryDirectory() as folder:
-        controller = export_fmu(first.controller_model(), Path(folder) / "controller.fmu", fmi=3)
-        found = {}
-        for name, card in cards.items():
-            say(f"closing the loop: {name}")
-            plant = export_fmu(card.plant().model(), Path(folder) / f"{name}.fmu", fmi=3)
-            found[name] = compare(close_loop(plant, controller, first, recording), recording)
-    return found

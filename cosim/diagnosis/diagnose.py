@@ -10,13 +10,14 @@ from cosim.diagnosis.adequacy import Rest, rest_of
 from cosim.diagnosis.challenge import Place, Verdict, challenge, merged
 from cosim.diagnosis.evidence import Blocks
 from cosim.diagnosis.findings import accepted, not_found, rival_finding, standard_errors
-from cosim.diagnosis.fit import Fit, fit
+from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.locate import regions
 from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare
 from cosim.diagnosis.protocol import CLEAR_MOTION, Structures, heldout_rms, judge, traces
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
 from cosim.diagnosis.sanity import check_units
 from cosim.diagnosis.select import select
+from cosim.diagnosis.trial import Problem
 from cosim.recording import Recording
 from pyfmi_models.card import Card
 from pyfmi_models.effects import Effect, GravityUnbalance
@@ -51,12 +52,11 @@ def diagnose(train: Sequence[Recording], heldout: Recording, card: Card, say: Sa
     cutoff = choose_cutoff(train, card.mount.inertia)
     prepared = prepare(train, cutoff)
     weight = _weight(mount, prepared)
-    sample_time = max(recording.sample_time for recording in train)
+    problem = Problem(mount, prepared, weight, max(recording.sample_time for recording in train))
     say("refitting the base")
-    selection = select(mount, prepared, weight, sample_time, say)
-    verdict = challenge(selection, mount, prepared, weight, sample_time, say)
+    verdict = challenge(problem, select(problem, say), say)
     say("proving on the recording that was not fitted")
-    verdict, unproven = _proven(verdict, mount, prepared, weight, heldout)
+    verdict, unproven = _proven(problem, verdict, heldout)
     rest = rest_of(verdict.chosen, prepared, verdict.bench)
     models = Structures(mount, verdict.base.mount, verdict.chosen.mount)
     signals = traces(train, heldout, models)
@@ -88,16 +88,14 @@ def _weight(mount: Mount, prepared: Prepared) -> Array:
     return np.asarray(v > CLEAR_MOTION * v.max(), float)
 
 
-def _proven(
-    verdict: Verdict, mount: Mount, prepared: Prepared, weight: Array, heldout: Recording
-) -> tuple[Verdict, tuple[Place, ...]]:
+def _proven(problem: Problem, verdict: Verdict, heldout: Recording) -> tuple[Verdict, tuple[Place, ...]]:
     """Take out effects that do not help on the held-out recording; return what stands, and those taken out."""
     chosen = verdict.chosen
     out: list[Place] = []
     for places in merged(verdict.places).values():
         gone = {_key(place.effect) for place in places}
         rest = tuple(effect for effect in chosen.mount.effects if _key(effect) not in gone)
-        without = fit(replace(chosen.mount, effects=rest), prepared.pieces, weight, mount, evaluations=10)
+        without = problem.fit(replace(chosen.mount, effects=rest), 10)
         if heldout_rms(heldout, without.mount) <= heldout_rms(heldout, chosen.mount):
             chosen, out = without, [*out, *places]
     if not out:
@@ -125,7 +123,7 @@ def _findings(
         main = max(places, key=lambda place: getattr(place.effect, "amplitude", 0.0))
         others = [place for place in places if place is not main]
         found.append(accepted(main, others, mount, errors, signals, proven=True))
-        rivals += [rival_finding(r, main, mount) for r in main.rivals if r.effect in main.ambiguous_with]
+        rivals += [rival_finding(r, main, mount) for r in main.rivals if r.effect.id in main.ambiguous_with]
     found.sort(key=lambda finding: -finding.gain)
     named = {finding.effect for finding in found}
     rivals = [finding for finding in rivals if finding.effect not in named]

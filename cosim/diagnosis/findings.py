@@ -14,8 +14,8 @@ from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.locate import where
 from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.result import Finding, Trace
-from cosim.diagnosis.select import LEAST_GAIN, Trial
 from cosim.diagnosis.structure import nuisances, projected
+from cosim.diagnosis.trial import LEAST_GAIN, Trial
 from pyfmi_models.effects import CATALOGUE, DriveEffect, Effect, GravityUnbalance
 from pyfmi_models.model import Variable, parameters_of
 from pyfmi_models.mount import LINEAR_UNITS, Mount
@@ -77,7 +77,7 @@ def accepted(
         parameters["harmonics"] = [numbers_of(other.effect, mount, errors).values for other in harmonics]
     ranges = {n: (numbers.values[n] - Z95 * e, numbers.values[n] + Z95 * e) for n, e in numbers.errors.items()}
     size, size_range = _size(effect, numbers, mount)
-    excluded = [rival for rival in place.rivals if rival.effect not in rivals]
+    excluded = [rival for rival in place.rivals if rival.effect.id not in rivals]
     return Finding(
         effect=effect.id,
         title=effect.title,
@@ -93,7 +93,7 @@ def accepted(
         statement=effect.statement("N" if mount.motion == "linear" else "N·m"),
         where=where(effect, traces),
         ruled_out=tuple(
-            f"{_title(rival.effect)}: removes {rival.gain:.1%} of the error energy, this {place.trial.gain:.1%}"
+            f"{rival.effect.title}: removes {rival.gain:.1%} of the error energy, this {place.trial.gain:.1%}"
             for rival in excluded
         ),
         told_apart_by=effect.told_apart_by,
@@ -112,7 +112,7 @@ def _visible_from(effect: Effect, numbers: Numbers) -> float | None:
 
 def rival_finding(rival: Trial, place: Place, mount: Mount) -> Finding:
     """Describe a rival that could not be excluded."""
-    effect = rival.fit.mount.effects[-1]
+    effect = rival.effect
     values = {variable.name: float(variable.start) for variable in parameters_of(effect)}
     size, _ = _size(effect, Numbers(values, {}), mount)
     return Finding(
@@ -210,7 +210,3 @@ def _units(effect: Effect, mount: Mount) -> dict[str, str]:
 
 def _unit(unit: str, mount: Mount) -> str:
     return (LINEAR_UNITS.get(unit, unit) if mount.motion == "linear" else unit).replace("N.m", "N·m")
-
-
-def _title(name: str) -> str:
-    return CATALOGUE[name][0].title

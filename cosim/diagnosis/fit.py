@@ -172,21 +172,6 @@ def _weighted(pieces: Sequence[Piece], weight: Array) -> _Used:
     return _Used(numbers, np.concatenate([spans[k] for k in numbers]))
 
 
-def evaluated(start: Fit, pieces: Sequence[Piece], values: Array) -> Fit:
-    """Return the fit's structure at other parameter values, kept inside their bounds."""
-    known = {variable.name: variable for variable in start.mount.parameters()}
-    bounds = [(known[name].low, known[name].high) for name in start.free]
-    inside = np.array([_inside(value, *edges) for value, edges in zip(values, bounds, strict=True)])
-    torque, slopes = stacked(Inverse(start.mount, start.free), pieces, inside)
-    mount = with_values(start.mount, start.free, inside)
-    return Fit(mount, start.free, inside, torque, slopes, start.residual + start.torque - torque)
-
-
-def _inside(value: float, low: float, high: float) -> float:
-    margin = 1e-6 * max(abs(low) if np.isfinite(low) else 0.0, 1e-3)
-    return float(np.clip(value, low + margin, high - margin if np.isfinite(high) else high))
-
-
 def with_values(mount: Mount, names: Sequence[str], values: Array) -> Mount:
     """Return the mount with new numbers for the named parameters."""
     numbers = {variable.name: variable.start for variable in mount.parameters()}

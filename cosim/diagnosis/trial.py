@@ -1,0 +1,144 @@
+"""One effect on trial: fitted together with everything else, and judged on data its fit did not use.
+
+An effect must be significant *and* large enough: lower the cross-validated energy in most blocks and by more than a few
+per cent, remove some of the plain residual too, and mean what its name says.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from cosim.diagnosis.evidence import Score, t_value
+from cosim.diagnosis.fit import FIXED, LEAST_VS, Fit, fit
+from cosim.diagnosis.prepare import Array, Prepared
+from cosim.diagnosis.structure import Bench
+from pyfmi_models.effects import ActuatorLag, Cogging, Delay, Effect, StribeckEffect
+from pyfmi_models.mount import Mount
+
+LEAST_GAIN, LEAST_T = 0.03, 1.8
+"""Share of the cross-validated energy, and block t value, that an effect must reach together ..."""
+SURE_GAIN = 0.05
+"""... or the share that is enough with a t value of 1."""
+LEAST_PLAIN_GAIN = 0.02
+"""Share of the plain residual energy an effect must remove too: whitened evidence alone can be about nothing."""
+LEAST_DELAY_SAMPLES, LEAST_DELAY = 0.3, 1.5e-4
+"""A delay shorter than this many samples, or seconds, is what time stamps cannot be trusted for."""
+LEAST_CYCLES = 1.5
+"""A ripple with fewer cycles a turn is an unbalance."""
+WHOLE = 0.01
+"""A whole number of cycles is taken if the residual grows by no more than this share."""
+CLEARLY = 2.0
+TIE = 0.96
+"""A simpler effect wins if it reaches this share of the best gain and is not worse by `CLEARLY` standard errors."""
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What all fits of a diagnosis share: the base as in the card, the training data, the weight of each kept row."""
+
+    mount: Mount
+    prepared: Prepared
+    weight: Array
+    sample_time: float
+
+    @property
+    def top_speed(self) -> float:
+        """Highest speed that was recorded."""
+        return max(abs(edge) for edge in self.prepared.ranges["v"])
+
+    def fit(self, mount: Mount, evaluations: int, fixed: Sequence[str] = FIXED) -> Fit:
+        """Fit a structure, its base held weakly to the card."""
+        return fit(mount, self.prepared.pieces, self.weight, self.mount, evaluations, fixed=fixed)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A structure with one effect more: its fit, and what the effect earned."""
+
+    effect: Effect
+    fit: Fit
+    score: Score
+    plain_gain: float
+    """Share of the energy of the plain residual removed."""
+
+    @property
+    def gain(self) -> float:
+        """Share of the cross-validated energy removed."""
+        return self.score.gain
+
+    @property
+    def t(self) -> float:
+        """Mean improvement over blocks in units of its standard error."""
+        return self.score.t
+
+
+def tried(problem: Problem, without: Fit, effect: Effect, before: Array, bench: Bench) -> Trial:
+    """Add an effect to a fitted structure whose energies are `before`, refit everything, and judge it."""
+    grown = replace(without.mount, effects=(*without.mount.effects, effect))
+    found = _tuned(problem, problem.fit(grown, 12))
+    return judged(found.mount.effects[-1], found, without, before, bench)
+
+
+def judged(effect: Effect, found: Fit, without: Fit, before: Array, bench: Bench) -> Trial:
+    """Judge an effect of a fitted structure against the structure without it, whose energies are `before`."""
+    plain = [float(np.sum((bench.weight * one.residual) ** 2)) for one in (found, without)]
+    return Trial(effect, found, Score(before, bench.energy(found), bench.rows), 1 - plain[0] / plain[1])
+
+
+def _tuned(problem: Problem, found: Fit) -> Fit:
+    """Fit the cycles of a periodic effect that was added last, which its grid knows only roughly.
+
+    Slots, teeth and rolling elements come in whole numbers: one that fits as well is taken.
+    """
+    if getattr(found.mount.effects[-1], "cycles_per_rev", 0.0) <= 0:
+        return found
+    free = problem.fit(found.mount, 10, [name for name in FIXED if name != "cycles_per_rev"])
+    best = min((found, free), key=lambda one: one.rms)
+    ripple: Any = best.mount.effects[-1]
+    for cycles in (max(1.0, float(round(ripple.cycles_per_rev))), ripple.cycles_per_rev):
+        effects = (*best.mount.effects[:-1], replace(ripple, cycles_per_rev=cycles))
+        settled = problem.fit(replace(best.mount, effects=effects), 8)
+        if settled.rms < best.rms * (1 + WHOLE):
+            return settled
+    return found
+
+
+def is_real(problem: Problem, trial: Trial) -> bool:
+    """Whether an effect is significant, large enough, and what its name says."""
+    if trial.plain_gain < LEAST_PLAIN_GAIN or is_another(problem, trial.effect):
+        return False
+    return (trial.gain > LEAST_GAIN and trial.t > LEAST_T) or (trial.gain > SURE_GAIN and trial.t > 1)
+
+
+def is_another(problem: Problem, effect: Effect) -> bool:
+    """Whether an effect is really something else: a time-stamp convention, a level, an unbalance."""
+    if isinstance(effect, Delay):
+        return bool(effect.delay_ms < 1e3 * max(LEAST_DELAY_SAMPLES * problem.sample_time, LEAST_DELAY))
+    if isinstance(effect, Cogging) and problem.mount.motion == "rotary":
+        return bool(effect.cycles_per_rev < LEAST_CYCLES)
+    return isinstance(effect, StribeckEffect) and bool(effect.Vs < LEAST_VS * problem.top_speed)
+
+
+def winner(trials: Sequence[Trial]) -> Trial | None:
+    """The trial with the largest gain, or a simpler one that nearly reaches it."""
+    if not trials:
+        return None
+    best = max(trials, key=lambda trial: trial.gain)
+    near = [trial for trial in trials if trial.gain >= TIE * best.gain and not clearly_worse(trial, best)]
+    return min(near, key=lambda trial: (len(trial.fit.free), -trial.gain))
+
+
+def clearly_worse(trial: Trial, best: Trial) -> bool:
+    """Whether block by block a trial explains less than the best one, by `CLEARLY` standard errors."""
+    return t_value(trial.score.rows * np.log(trial.score.after / best.score.after)) > CLEARLY
+
+
+def twins(effect: Effect) -> list[Effect]:
+    """Delay and lag are alike at first order: where one is tried, the other must be, whatever a linear score says."""
+    if isinstance(effect, Delay):
+        return [ActuatorLag(time_constant_ms=effect.delay_ms)]
+    if isinstance(effect, ActuatorLag):
+        return [Delay(delay_ms=effect.time_constant_ms)]
+    return []
