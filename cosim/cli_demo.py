@@ -23,20 +23,13 @@ def demo(
     check_free(out, force)
     started = time.perf_counter()
     with stage("cosim demo") as progress:
-        steps = 0
-
-        def told(text: str) -> None:
-            nonlocal steps
-            steps += 1
-            progress(steps, max(25, steps + 1))
-
-        done = run_demo(out, f"cosim demo --out {out}", told)
+        done = run_demo(out, f"cosim demo --out {out}", progress.tell)
     put("The stiff bristle state inside the FMU, beside the paper's analytic update, at 0.1 ms\n")
     put(done.table)
     put("\nA night's recordings of a mount that has physics its card does not know\n")
     put(summary(done.diagnosis))
     put(
-        f"\nIn closed loop on the held-out set point, simulated against recorded torque, RMS [N.m]: "
+        f"\nIn closed loop on the held-out set point, simulated against recorded torque, RMS [N.m]:\n"
         f"{done.before.torque:.3g} with the card's FMU, {done.after.torque:.3g} with the improved one"
     )
     put(f"\nOpen {out / 'diagnosis' / 'report.html'}")

@@ -40,27 +40,15 @@ def diagnose(
     seconds = sum(recording.duration for recording in recordings)
     say(f"Read {len(recordings)} recordings, {seconds:.0f} s; card {believed.mount.name}")
     with stage("looking for what the model lacks") as progress:
-        told = _Told(progress)
-        outcome = find(recordings[:-1], recordings[-1], believed, told)
+        outcome = find(recordings[:-1], recordings[-1], believed, progress.tell)
         command = f"cosim diagnose {' '.join(map(str, train))} --heldout {heldout} --card {card} --out {out}"
-        done = deliver(outcome, recordings[:-1], recordings[-1], believed, out, command, told)
+        done = deliver(outcome, recordings[:-1], recordings[-1], believed, out, command, progress.tell)
     if as_json:
         put_json(to_json(done))
     else:
         put(summary(done))
     if check and done.verdict:
         sys.exit(1)
-
-
-class _Told:
-    """Passes what is being tried on to the progress display."""
-
-    def __init__(self, progress: object) -> None:
-        self._progress, self._done = progress, 0
-
-    def __call__(self, text: str) -> None:
-        self._done += 1
-        self._progress(self._done, max(30, self._done + 2))  # type: ignore[operator]
 
 
 def _pairs(option: str, given: list[str] | None) -> dict[str, str]:

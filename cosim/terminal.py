@@ -11,7 +11,8 @@ from typing import Any
 
 from rich.console import Console
 
-Progress = Callable[[int, int], None]
+USUAL = 25
+"""Steps told in words that a stage usually has: where the bar is full."""
 
 
 def messages() -> Console:
@@ -34,16 +35,32 @@ def put_json(data: Any) -> None:
     sys.stdout.write(json.dumps(data, indent=2) + "\n")
 
 
+class Stage:
+    """A stage under way: call it with (done, of), or `tell` it in words what is being done; silent off a terminal."""
+
+    def __init__(self, show: Callable[..., None] = lambda **_: None) -> None:
+        self._show, self._told = show, 0
+
+    def __call__(self, done: int, of: int) -> None:
+        """Show how much is done."""
+        self._show(completed=done, total=of)
+
+    def tell(self, text: str) -> None:
+        """Show what is being done, and that one thing more has been done."""
+        self._told += 1
+        self._show(description=text, completed=self._told, total=max(USUAL, self._told + 1))
+
+
 @contextmanager
-def stage(title: str) -> Iterator[Progress]:
-    """Show that a stage is under way; call what this yields with (done, of) as it goes on."""
+def stage(title: str) -> Iterator[Stage]:
+    """Show that a stage is under way; what this yields shows how it goes on."""
     console = messages()
     if not console.is_terminal or console.is_dumb_terminal:
         console.print(title, markup=False)
-        yield lambda done, of: None
+        yield Stage()
         return
     from rich.progress import Progress as Bar
 
     with Bar(console=console, transient=True) as bar:
         task = bar.add_task(title, total=None)
-        yield lambda done, of: bar.update(task, completed=done, total=of)
+        yield Stage(lambda **changes: bar.update(task, **changes))
