@@ -21,7 +21,6 @@ import numpy as np
 
 import cosim
 from cosim.diagnosis.closed_loop import close_loop
-from cosim.diagnosis.deliver import deliver
 from cosim.diagnosis.diagnose import diagnose
 from cosim.files import sha256
 from cosim.proof.generator import make_case, to_toml, write_case
@@ -109,11 +108,6 @@ def emps(given: argparse.Namespace) -> Iterator[dict[str, Any]]:
         Recording.read(given.data / f"{name}.parquet", card.columns) for name in ("estimation", "validation_pulses")
     )
     outcome = diagnose([train], held, card)
-    with tempfile.TemporaryDirectory() as folder:
-        deliver(outcome, [train], held, card, Path(folder), "cosim diagnose")
-        report = (Path(folder) / "report.html").read_bytes()
-    given.out.mkdir(parents=True, exist_ok=True)
-    (given.out / "report.html").write_bytes(report)
     prepared = prepare([held], 100.0)
     found = outcome.diagnosis
     delay = next((f for f in found.findings if f.effect == "delay" and f.parameters), None)
