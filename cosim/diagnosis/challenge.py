@@ -102,8 +102,6 @@ def _added(problem: Problem, chosen: Fit) -> tuple[Effect, ...]:
 
 def _too_close(winner: Trial, rival: Trial) -> bool:
     """Whether a rival cannot be excluded: its gain comes near, and block by block it is not clearly worse."""
-    if len(rival.fit.free) > len(winner.fit.free):
-        return rival.gain >= winner.gain
     return rival.gain >= NEAR * winner.gain and not clearly_worse(rival, winner)
 
 

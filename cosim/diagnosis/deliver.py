@@ -122,7 +122,7 @@ def _heldout(held: HeldOut) -> dict[str, Any]:
 
 
 def _names_effects(found: Diagnosis) -> bool:
-    return bool(found.verdict) and found.verdict != ("unknown",)
+    return any(finding.answer == "found" for finding in found.findings)
 
 
 def _provenance(train: Sequence[Recording], heldout: Recording, card: Card, command: str) -> dict[str, Any]:
@@ -161,7 +161,7 @@ def _origin(found: Diagnosis, provenance: dict[str, Any]) -> dict[str, Any]:
 def _comment(found: Diagnosis) -> str:
     if not _names_effects(found):
         return "The base with its parameters refitted; no physics was added."
-    named = ", ".join(finding.title.lower() for finding in found.findings if finding.effect in found.verdict)
+    named = ", ".join(finding.title.lower() for finding in found.findings if finding.answer == "found")
     return f"Improved by a diagnosis: {named}.\nThe base is refitted; [origin] names the recordings that justify it."
 
 

@@ -77,7 +77,15 @@ def diagnose(train: Sequence[Recording], heldout: Recording, card: Card, say: Sa
         base_parameters=_base_parameters(models),
         seconds=time.perf_counter() - started,
     )
-    return Outcome(diagnosis, _improved(card, verdict.chosen.mount))
+    return Outcome(diagnosis, _improved(card, _certain(problem, verdict)))
+
+
+def _certain(problem: Problem, verdict: Verdict) -> Mount:
+    """The structure without effects that have a rival: neither of two possible causes goes into a model."""
+    open_keys = {_key(place.effect) for place in verdict.places if place.ambiguous_with}
+    mount = verdict.chosen.mount
+    rest = tuple(effect for effect in mount.effects if _key(effect) not in open_keys)
+    return mount if len(rest) == len(mount.effects) else problem.fit(replace(mount, effects=rest), 15).mount
 
 
 def _weight(mount: Mount, prepared: Prepared) -> Array:
