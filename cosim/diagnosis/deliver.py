@@ -46,11 +46,9 @@ def deliver(
     better = replace(outcome.card, origin=_origin(found, provenance))
     with replacing(out / "card.toml", True) as partial:
         partial.write_text(card_text(better, _comment(found)), "utf-8")
-    improved: dict[str, Any] = {"card": "card.toml"}
     if _names_effects(found):
         say("building the improved FMU")
-        improved |= _fmus(better, found, out)
-    found = replace(found, improved=improved | _proven_range(found))
+        found = replace(found, improved={"card": "card.toml", **_fmus(better, found, out), **_proven_range(found)})
     _missing_torque(found, [*train, heldout], out / "missing_torque.parquet")
     with replacing(out / "diagnosis.json", True) as partial:
         partial.write_text(json.dumps(as_json(found), indent=2, allow_nan=False) + "\n", "utf-8")
