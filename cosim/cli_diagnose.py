@@ -14,7 +14,9 @@ from cosim.terminal import put, put_json, say, stage
 
 def diagnose(
     train: Annotated[list[Path], typer.Argument(help="Recordings that may be fitted.", metavar="TRAIN...")],
-    heldout: Annotated[Path, typer.Option("--heldout", help="Recording that only proves the result.")],
+    heldout: Annotated[
+        Path, typer.Option("--heldout", help="Recording that proves the result, and may veto an effect.")
+    ],
     card: Annotated[str, typer.Option("--card", help="Model card (.toml), or the name of a shipped one.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
     columns: Annotated[list[str] | None, typer.Option("--columns", help="Our name = the file's: tau=force ...")] = None,

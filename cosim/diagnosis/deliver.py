@@ -113,6 +113,7 @@ def _heldout(held: HeldOut) -> dict[str, Any]:
         "before_rms": held.before_rms,
         "after_rms": held.after_rms,
         "floor_rms": held.floor_rms,
+        "unvetoed_rms": held.unvetoed_rms,
         "confidence_interval": list(held.confidence_interval),
         "clear_motion": held.sliding,
         "position": held.position,

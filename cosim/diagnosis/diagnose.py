@@ -12,7 +12,7 @@ from cosim.diagnosis.evidence import Blocks
 from cosim.diagnosis.findings import accepted, not_found, rival_finding, standard_errors
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.locate import regions
-from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare
+from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare, quality
 from cosim.diagnosis.protocol import CLEAR_MOTION, Structures, heldout_rms, judge, traces
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
 from cosim.diagnosis.sanity import check_units
@@ -29,10 +29,11 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """A diagnosis, and the card of the model it ends with (the refitted base if nothing is missing)."""
+    """A diagnosis, the card of the model it ends with, and the card that training alone, without veto, would give."""
 
     diagnosis: Diagnosis
     card: Card
+    proposed: Card
 
 
 def diagnose(train: Sequence[Recording], heldout: Recording, card: Card, say: Say = lambda _: None) -> Outcome:
@@ -40,7 +41,9 @@ def diagnose(train: Sequence[Recording], heldout: Recording, card: Card, say: Sa
 
     Args:
         train: recordings that may be fitted.
-        heldout: recording that is only looked at to prove the result.
+        heldout: recording that nothing is fitted to. It proves the result, and it has a veto: an effect that does not
+            lower its error is taken out as not proven. So its error after the veto is a little optimistic;
+            `HeldOut.unvetoed_rms` is the error of what training alone proposed.
         card: the model as delivered.
         say: told, in a few words, what is being done.
 
@@ -56,6 +59,7 @@ def diagnose(train: Sequence[Recording], heldout: Recording, card: Card, say: Sa
     say("refitting the base")
     verdict = challenge(problem, select(problem, say), say)
     say("proving on the recording that was not fitted")
+    proposed = verdict.chosen.mount
     verdict, unproven = _proven(problem, verdict, heldout)
     rest = rest_of(verdict.chosen, prepared, verdict.bench)
     models = Structures(mount, verdict.base.mount, verdict.chosen.mount)
@@ -64,7 +68,7 @@ def diagnose(train: Sequence[Recording], heldout: Recording, card: Card, say: Sa
     diagnosis = Diagnosis(
         verdict=_verdict(found, rest),
         findings=tuple(found),
-        heldout=judge(heldout, models, cutoff),
+        heldout=replace(judge(heldout, models, cutoff), unvetoed_rms=heldout_rms(heldout, proposed)),
         traces=signals,
         regions=regions(signals, False, mount.motion == "linear"),
         regions_after=regions(signals, True, mount.motion == "linear"),
@@ -72,12 +76,12 @@ def diagnose(train: Sequence[Recording], heldout: Recording, card: Card, say: Sa
         motion=mount.motion,
         ambiguous_with=tuple((p.effect.id, *p.ambiguous_with) for p in verdict.places if p.ambiguous_with),
         depends_on=rest.depends_on,
-        data_quality=tuple(note for recording in (*train, heldout) for note in recording.quality()),
+        data_quality=tuple(note for recording in (*train, heldout) for note in quality(recording)),
         friction_law={"base": mount.friction.key, "proposed": mount.friction.key, "gain": 0.0},
         base_parameters=_base_parameters(models),
         seconds=time.perf_counter() - started,
     )
-    return Outcome(diagnosis, _improved(card, _certain(problem, verdict)))
+    return Outcome(diagnosis, _improved(card, _certain(problem, verdict)), _improved(card, proposed))
 
 
 def _certain(problem: Problem, verdict: Verdict) -> Mount:

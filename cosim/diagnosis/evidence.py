@@ -192,15 +192,6 @@ class Grams:
         reduced = np.sum([self._reduced(self.gram[fold].sum(0), chosen, used) for fold in self.folds], axis=0)
         return self._solved(reduced, np.asarray(chosen, int))
 
-    def covariance(self, chosen: Sequence[int]) -> Array:
-        """Block-robust (sandwich) covariance of the coefficients of the chosen columns."""
-        index = np.asarray(chosen, int)
-        beta = self.fit(chosen)
-        scores = self.gram[:, index, 0] - self.gram[:, index][:, :, index] @ beta
-        bread = np.linalg.pinv(self.gram.sum(0)[np.ix_(index, index)] + np.diag(1 / self.prior[index - 1]))
-        count = len(scores)
-        return np.asarray(bread @ (scores.T @ scores) @ bread * count / max(count - 1, 1))
-
     def _reduced(self, total: Array, chosen: Sequence[int], used: Index) -> Array:
         """Gram matrix of target and chosen columns with the nuisances of one fold integrated out."""
         index = np.concatenate([[0], np.asarray(chosen, int)]).astype(int)

@@ -20,6 +20,8 @@ from cosim.recording import Recording
 Array = npt.NDArray[np.float64]
 CUTOFFS = (100.0, 70.0, 50.0, 40.0, 30.0, 24.0, 19.0, 15.0, 12.0, 10.0, 8.0)
 NOISE_SHARE = 0.003
+JITTER = 1e-3
+"""RMS jitter, relative to the sample time, above which samples are interpolated to an even grid."""
 LEAST_SECONDS = 2.0
 """A contiguous piece shorter than this is left out."""
 
@@ -65,7 +67,6 @@ class Prepared:
     pieces: tuple[Piece, ...]
     cutoff: float
     has_position: bool
-    notes: tuple[str, ...] = ()
 
     def stacked(self, name: str) -> Array:
         """One signal of all pieces at the kept rows, one after the other."""
@@ -101,9 +102,14 @@ def prepare(recordings: Sequence[Recording], cutoff: float) -> Prepared:
     slowest = max(recording.sample_time for recording in recordings)
     cutoff = min(cutoff, 0.3 / slowest)
     pieces = [piece for index, one in enumerate(recordings) for piece in _pieces(one, index, cutoff)]
-    notes = tuple(note for recording in recordings for note in recording.quality())
     has_position = all("q" in recording for recording in recordings)
-    return Prepared(tuple(r.name for r in recordings), tuple(pieces), cutoff, has_position, notes)
+    return Prepared(tuple(r.name for r in recordings), tuple(pieces), cutoff, has_position)
+
+
+def quality(recording: Recording) -> tuple[str, ...]:
+    """Say what is odd about a recording, and what was done about it here."""
+    rule = f"{recording.name}: interpolated to an even grid, as its time steps vary by {recording.jitter:.2%} rms."
+    return (*recording.quality(), rule) if recording.jitter > JITTER else recording.quality()
 
 
 def _pieces(recording: Recording, index: int, cutoff: float) -> list[Piece]:
@@ -142,10 +148,10 @@ def _piece(recording: Recording, index: int, span: slice, cutoff: float) -> Piec
 
 
 def _on_grid(recording: Recording, span: slice) -> tuple[Array, dict[str, Array]]:
-    """Return the samples of a span; where time jitters, interpolated to an even grid (the quality notes say so)."""
+    """Return the samples of a span; where time jitters, interpolated to an even grid (see `quality`)."""
     t = recording.t[span]
     table = {name: recording[name][span] for name in recording.columns if name != "t"}
-    if recording.jitter < 1e-3:
+    if recording.jitter <= JITTER:
         return t, table
     grid = np.linspace(t[0], t[-1], len(t))
     return grid, {name: np.interp(grid, t, column) for name, column in table.items()}

@@ -64,6 +64,8 @@ class HeldOut:
     """95 % range of before_rms - after_rms from a block bootstrap."""
     sliding: dict[str, float] = field(default_factory=dict)
     """The same RMS values over samples in clear motion only, with the cutoff and the least speed used."""
+    unvetoed_rms: float | None = None
+    """RMS with all effects that training alone proposed, before this recording's veto."""
     position: dict[str, float] = field(default_factory=dict)
     """Closed-loop position error RMS (set point driven), where the controller is known."""
 

@@ -48,11 +48,10 @@ class Bench:
     weight: Array
     """Weight of each kept row; rows of weight 0 do not count."""
 
-    def energy(self, found: Fit, shapes: bool = True) -> Array:
+    def energy(self, found: Fit) -> Array:
         """Cross-validated energy of a structure in each block: refitted without a fold, judged on it.
 
-        What the nuisances can explain of a fold is taken off; leave the speed shapes out of them (`shapes` False) when
-        they are what the structure itself adds.
+        What the nuisances can explain of a fold is taken off.
         """
         residual = np.empty_like(found.residual)
         folds = np.unique(self.blocks.fold)
@@ -64,11 +63,7 @@ class Bench:
             refit = fit(found.mount, self.prepared.pieces, without, evaluations=4, fixed=(*FIXED, *BRISTLES))
             residual[rows] = refit.residual[rows]
         grams = self._grams(replace(found, residual=residual), [])
-        return grams.energy([], None if shapes else self._unshaped(found))
-
-    def covariance(self, found: Fit) -> Array:
-        """Block-robust covariance of the fitted parameters."""
-        return self._grams(found, []).covariance(range(1, 1 + len(found.free)))
+        return grams.energy([])
 
     @property
     def rows(self) -> Array:
