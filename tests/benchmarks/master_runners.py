@@ -1,0 +1,157 @@
+"""Who steps the loop of two FMUs in master_step.py: a plain C loop, cosim, and what others give Python users.
+
+Each runner takes the folder with plant.fmu and controller.fmu, the FMI version and the number of steps, and returns the
+seconds that stepping took, start-up not counted. The same work for all: the controller holds a constant speed (kp = 0).
+Run in a process of its own, because libraries of others may crash: python master_runners.py RUNNER FOLDER FMI STEPS
+"""
+
+import ctypes
+import os
+import sys
+import tempfile
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from time import perf_counter
+
+STEP = 1e-4
+START = {"controller": {"kp": 0.0, "v_d": 0.01}, "plant": {"speed": 0.01}}
+WIRES = {"plant": ("tau", "q"), "controller": ("q", "tau")}
+"""The input that is fed and the output that feeds the other one."""
+RECORD = {name: f"plant.{name}" for name in ("q", "v", "friction", "applied")}
+RECORD |= {"tau": "controller.tau", "measured": "controller.q"}
+
+
+class Side(ctypes.Structure):
+    """One FMU as plain_loop.c wants it."""
+
+    _fields_ = (
+        *((name, ctypes.c_void_p) for name in ("instance", "set", "get", "step")),
+        *((name, ctypes.c_uint32) for name in ("input", "output")),
+    )
+
+
+def c(folder: Path, fmi: int, steps: int) -> float:
+    from cosim.fmu import FmuComponent
+    from pyfmi_models.export.build import FLAGS, PLATFORMS, compile_shared, host
+
+    source = Path(__file__).with_name("plain_loop.c").read_bytes()
+    platform = PLATFORMS[host()]
+    library = ctypes.CDLL(str(compile_shared({"plain.c": source}, f"plain{platform.suffix}", platform.target, FLAGS)))
+    with ExitStack() as stack:
+        sides = []
+        for name, ports in WIRES.items():
+            component = stack.enter_context(FmuComponent(folder / f"{name}.fmu"))
+            component.start(START[name])
+            functions, references = component.functions, [component.ports[port].reference for port in ports]
+            sides.append(Side(functions.instance, functions.set, functions.get, functions.step, *references))
+        run = getattr(library, f"plain{fmi}")
+        run.argtypes = [ctypes.POINTER(Side), ctypes.POINTER(Side), ctypes.c_double, ctypes.c_int64]
+        begun = perf_counter()
+        status = run(*sides, STEP, steps)
+        seconds = perf_counter() - begun
+    assert status <= 1, status
+    return seconds
+
+
+def cosim(folder: Path, fmi: int, steps: int, compiled: bool = True) -> float:
+    """All of `simulate` with six signals streamed to Parquet, file closed; minus the same for one step."""
+    from cosim.fmu import FmuComponent
+    from cosim.master import simulate
+
+    wires = [("controller.tau", "plant.tau"), ("plant.q", "controller.q")]
+    seconds = []
+    with tempfile.TemporaryDirectory() as out, ExitStack() as stack:
+        components = {name: stack.enter_context(FmuComponent(folder / f"{name}.fmu")) for name in WIRES}
+        for ticks in (1, steps):
+            begun = perf_counter()
+            path = Path(out) / f"{ticks}.parquet"
+            options = {"step": STEP, "parameters": START, "compiled": compiled}
+            simulate(components, wires, record=RECORD, ticks=ticks, path=path, **options)
+            seconds.append(perf_counter() - begun)
+    return seconds[1] - seconds[0]
+
+
+def interpreted(folder: Path, fmi: int, steps: int) -> float:
+    return cosim(folder, fmi, steps, compiled=False)
+
+
+def fmpy(folder: Path, fmi: int, steps: int) -> float:
+    """The loop that FMPy's users write: get, set and doStep of its slaves."""
+    from cosim.fmu import FmuComponent
+
+    with ExitStack() as stack:
+        plant, controller = (stack.enter_context(FmuComponent(folder / f"{name}.fmu")) for name in WIRES)
+        for one, name in ((plant, "plant"), (controller, "controller")):
+            one.start(START[name])
+        p, c = plant._fmu, controller._fmu
+        (tau_in, q_out), (q_in, tau_out) = (
+            [[one.ports[port].reference] for port in WIRES[name]]
+            for one, name in ((plant, "plant"), (controller, "controller"))
+        )
+        get, put = ("getReal", "setReal") if fmi == 2 else ("getFloat64", "setFloat64")
+        p_get, p_set, c_get, c_set = getattr(p, get), getattr(p, put), getattr(c, get), getattr(c, put)
+        begun = perf_counter()
+        for k in range(steps):
+            q, tau = p_get(q_out), c_get(tau_out)
+            p_set(tau_in, tau)
+            c_set(q_in, q)
+            p.doStep(k * STEP, STEP)
+            c.doStep(k * STEP, STEP)
+        return perf_counter() - begun
+
+
+def ecospy(folder: Path, fmi: int, steps: int) -> float:
+    """`step(N)`, which records nothing."""
+    from ecospy import EcosSimulation, EcosSimulationStructure
+
+    with EcosSimulationStructure() as structure:
+        for name in WIRES:
+            structure.add_model(name, str(folder / f"{name}.fmu"))
+        structure.make_real_connection("controller::tau", "plant::tau")
+        structure.make_real_connection("plant::q", "controller::q")
+        values = {f"{name}::{key}": value for name, start in START.items() for key, value in start.items()}
+        structure.add_parameter_set("start", values)
+        with EcosSimulation(structure=structure, step_size=STEP) as simulation:
+            simulation.init(parameter_set="start")
+            begun = perf_counter()
+            simulation.step(steps)
+            return perf_counter() - begun
+
+
+def libcosimpy(folder: Path, fmi: int, steps: int) -> float:
+    """`step(N)` of the fixed-step algorithm, which records nothing."""
+    from libcosimpy.CosimExecution import CosimExecution
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
+    from libcosimpy.CosimSlave import CosimLocalSlave
+
+    from cosim.description import describe, ports_of
+
+    log_output_level(CosimLogLevel.ERROR)
+    execution = CosimExecution.from_step_size(STEP * 1e9)
+    references: dict[str, dict[str, int]] = {}
+    index = {}
+    for name in WIRES:
+        path = folder / f"{name}.fmu"
+        references[name] = {port.name: port.reference for port in ports_of(describe(path)).values()}
+        execution.add_local_slave(CosimLocalSlave(str(path), name))
+        index[name] = execution.slave_index_from_instance_name(name)
+        for key, value in START[name].items():
+            execution.real_initial_value(index[name], references[name][key], value)
+    for source, target in (("controller", "plant"), ("plant", "controller")):
+        ends = references[source][WIRES[source][1]], references[target][WIRES[target][0]]
+        execution.connect_real_variables(index[source], ends[0], index[target], ends[1])
+    execution.step(1)
+    begun = perf_counter()
+    execution.step(steps)
+    return perf_counter() - begun
+
+
+RUNNERS: dict[str, Callable[[Path, int, int], float]] = {
+    one.__name__: one for one in (c, cosim, interpreted, fmpy, ecospy, libcosimpy)
+}
+
+if __name__ == "__main__":
+    runner, place, version, count = sys.argv[1:]
+    print("seconds", RUNNERS[runner](Path(place), int(version), int(count)), flush=True)
+    os._exit(0)  # some libraries of others crash when they are unloaded; the number is out
