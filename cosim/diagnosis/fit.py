@@ -19,8 +19,12 @@ from cosim.diagnosis.prepare import Array, Piece
 from pyfmi_models.model import Pair, Variable, fields_of
 from pyfmi_models.mount import Mount
 
-FIXED = ("axis.torque_limit", "friction.smoothing", "friction.delta", "cycles_per_rev")
-"""Parameters that are not fitted here: limits, and numbers that candidates choose from a grid."""
+FIXED = (
+    "axis.torque_limit",
+    *(f"friction.{name}" for name in ("smoothing", "delta", "n", "spread", "attraction")),
+    "cycles_per_rev",
+)
+"""Parameters that are not fitted here: limits, shapes of laws, and numbers that candidates choose from a grid."""
 BRISTLES = ("friction.sigma0", "friction.sigma1", "friction.Fs", "friction.Vs")
 """Parameters that only the slowest motion tells: a recording that never dwells says nothing about them."""
 LEAST_VS, MOST_FS = 0.005, 5.0

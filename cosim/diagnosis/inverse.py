@@ -17,7 +17,7 @@ import numpy.typing as npt
 from scipy.linalg import solve_banded
 
 from cosim.diagnosis.prepare import Array, Piece
-from cosim.diagnosis.rowwise import Rowwise
+from cosim.diagnosis.rowwise import Rowwise, Stepwise
 from pyfmi_models.effects import DriveEffect
 from pyfmi_models.model import symbols_of, with_symbols
 from pyfmi_models.mount import Mount
@@ -77,11 +77,11 @@ class Inverse:
             return np.zeros((0, rows)), []
         middle = [(x[1:] + x[:-1]) / 2 for x in (piece.t, piece.q, piece.v)]
         steps = np.vstack([*middle, np.full(rows - 1, piece.dt)])
-        decay, drift = self._equations.step(steps, full)
-        state = _recurrence(decay, drift[:, None])[:, 0]
-        known = np.vstack([steps, state[:-1]])
-        slopes = _recurrence(decay, self._equations.step_slopes(known, full).T)
-        return state[None, :], [slopes.T]
+        state = self._equations.step(steps, full)
+        out = self._equations.step_slopes(np.vstack([steps, state[:, :-1]]), full)
+        own, by_free = out[:count], out[count:].reshape(count, len(self.free), rows - 1)
+        slopes = [_recurrence(decay, drift.T).T for decay, drift in zip(own, by_free, strict=True)]
+        return state, slopes
 
     def _undo_drive(self, columns: Array, full: Array, dt: float) -> tuple[Array, Array]:
         """Undo the drive effects on all columns; return them and the torque's derivatives by the drive parameters."""
@@ -127,22 +127,25 @@ class Equations:
         return Rowwise(ca.vertcat(t, q, v, a, state), p, rows)
 
     @cached_property
-    def step(self) -> Rowwise:
-        """Decay and drift of the bristle step, whose closed form is affine: state+ = decay state + drift."""
-        t, q, v, _, dt, p, _, this, motion = self._symbolic
-        state = ca.SX.sym("state")
+    def _step(self) -> tuple[Any, ...]:
+        t, q, v, _, dt, p, free, this, motion = self._symbolic
+        state = ca.SX.sym("state", len(self._mount.friction.states()))
         following = this.friction.advance(state, v, this.level(motion), dt)
-        decay = ca.jacobian(following, state)
-        drift = ca.substitute(following, state, 0)
-        return Rowwise(ca.vertcat(t, q, v, dt), p, ca.vertcat(decay, drift))
+        return ca.vertcat(t, q, v, dt), state, p, free, following
+
+    @cached_property
+    def step(self) -> Stepwise:
+        """Friction states along the rows, from (t, q, v, dt), by the law's own closed form."""
+        column, state, p, _, following = self._step
+        return Stepwise(state, column, p, following)
 
     @cached_property
     def step_slopes(self) -> Rowwise:
-        """Derivatives of the bristle step by the free parameters, from (t, q, v, dt, state)."""
-        t, q, v, _, dt, p, free, this, motion = self._symbolic
-        state = ca.SX.sym("state")
-        following = this.friction.advance(state, v, this.level(motion), dt)
-        return Rowwise(ca.vertcat(t, q, v, dt, state), p, ca.jacobian(following, free).T)
+        """Derivatives of each friction state's step by itself and by the free parameters, from (t, q, v, dt, state)."""
+        column, state, p, free, following = self._step
+        own = ca.diag(ca.jacobian(following, state))
+        by_free = ca.vec(ca.jacobian(following, free).T)
+        return Rowwise(ca.vertcat(column, state), p, ca.vertcat(own, by_free))
 
 
 _KNOWN: dict[tuple[Any, ...], Equations] = {}

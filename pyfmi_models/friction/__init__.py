@@ -2,9 +2,23 @@
 
 from pyfmi_models.friction.base import FrictionLaw, MemorylessLaw
 from pyfmi_models.friction.coulomb import Coulomb, Frictionless
+from pyfmi_models.friction.dahl import Dahl
 from pyfmi_models.friction.lugre import LuGre
+from pyfmi_models.friction.maxwell_slip import MaxwellSlip
 from pyfmi_models.friction.stribeck import Stribeck
 
-LAWS: dict[str, type[FrictionLaw]] = {law.key: law for law in (Frictionless, Coulomb, Stribeck, LuGre)}
+LAWS: dict[str, type[FrictionLaw]] = {
+    law.key: law for law in (Frictionless, Coulomb, Stribeck, Dahl, LuGre, MaxwellSlip)
+}
 
-__all__ = ["LAWS", "Coulomb", "FrictionLaw", "Frictionless", "LuGre", "MemorylessLaw", "Stribeck"]
+__all__ = [
+    "LAWS",
+    "Coulomb",
+    "Dahl",
+    "FrictionLaw",
+    "Frictionless",
+    "LuGre",
+    "MaxwellSlip",
+    "MemorylessLaw",
+    "Stribeck",
+]

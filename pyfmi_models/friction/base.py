@@ -35,16 +35,20 @@ class FrictionLaw:
         raise TypeError(f"{type(self).__name__} has no viscous part")
 
     def rate(self, state: Any, v: Scalar, level: Scalar) -> Any:
-        """Time derivative of the states at speed v and level g(v), a column."""
+        """Time derivative of the states at speed v and level g(v), a column; each depends on its own state only."""
         return ca.SX(0, 1)
 
     def advance(self, state: Any, v: Scalar, level: Scalar, dt: Scalar) -> Any:
-        """States after dt seconds at constant speed v, in closed form."""
+        """States after dt seconds at constant speed v, in closed form; each depends on its own state only."""
         return state
 
     def contact(self, state: Any, v: Scalar, level: Scalar) -> Scalar:
         """Contact torque [N m]."""
         raise TypeError(f"{type(self).__name__} has no contact torque")
+
+    def steady(self) -> "MemorylessLaw":
+        """Return the law's own static map: its torque in steady sliding."""
+        raise TypeError(f"{type(self).__name__} has no static map")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +62,10 @@ class MemorylessLaw(FrictionLaw):
     def contact(self, state: Any, v: Scalar, level: Scalar) -> Scalar:
         """`level tanh(v / smoothing)`."""
         return level * ca.tanh(v / self.smoothing)
+
+    def steady(self) -> "MemorylessLaw":
+        """Return the law itself."""
+        return self
 
 
 def stribeck_decay(v: Scalar, Vs: Scalar, delta: Scalar) -> Scalar:
