@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import pytest
 from friction_laws import EXAMPLES, Array, numeric
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -49,6 +49,7 @@ def test_lugre_is_the_equations_of_the_contract(v: float, z: float) -> None:
 
 
 @given(v=speeds, share=st.floats(-1, 1))
+@settings(max_examples=50, deadline=None)
 def test_lugre_without_damping_and_peak_is_dahl_with_exponent_one(v: float, share: float) -> None:
     """ERRATA 4: the reduction needs sigma1 = 0 and Fs = Fc; Dahl's equation carries the sign of the speed."""
     plain = numeric(replace(LUGRE, sigma1=0.0, Fs=None, Vs=None))
