@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Literal
 
 from cosim.errors import ScenarioError
-from cosim.files import directory
+from cosim.files import cache_home, directory
 from cosim.scenario import ComponentSection, Scenario
 
 FMI: Literal[3] = 3
@@ -82,6 +82,4 @@ def _package() -> Path:
 
 
 def _home() -> Path:
-    from platformdirs import user_cache_path
-
-    return Path(user_cache_path("mount-cosim")) / "fmus"
+    return cache_home() / "fmus"

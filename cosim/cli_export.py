@@ -1,12 +1,16 @@
 """`cosim export`: a card to FMUs."""
 
+from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
 from cosim.terminal import put, put_json, stage
+
+if TYPE_CHECKING:
+    from pyfmi_models.card import Card
 
 
 class Fmi(StrEnum):
@@ -25,6 +29,7 @@ def export(
     out: Annotated[Path, typer.Option("--out", "-o", help="Directory for the FMUs.")],
     fmi: Annotated[Fmi, typer.Option("--fmi", help="FMI version.")] = Fmi.both,
     platform: Annotated[str, typer.Option("--platform", help="host, or a platform's name.")] = "host",
+    ssp: Annotated[bool, typer.Option("--ssp", help="Also wire plant, controller and a set point: NAME.ssp.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the paths as JSON.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
 ) -> None:
@@ -42,14 +47,26 @@ def export(
     wanted = {
         directory(out) / f"{stem}_{part}_fmi{v}.fmu": (model, v) for part, model in models.items() for v in versions
     }
-    for path in wanted:
-        check_free(path, force)
     platforms = () if platform == "host" else tuple(platform.split(","))
+    systems = {out / f"{stem}.ssp": system_writer(read, versions[0], platforms)} if ssp else {}
+    for path in (*wanted, *systems):
+        check_free(path, force)
     with stage(f"{stem}: {len(wanted)} FMUs") as progress:
         for done, (path, (model, version)) in enumerate(wanted.items()):
             progress(done, len(wanted))
             export_fmu(model, path, fmi=version, force=force, platforms=platforms)
+    for path, write in systems.items():
+        write(path, force)
     if as_json:
-        put_json({"fmus": [str(path) for path in wanted]})
+        put_json({"fmus": [str(path) for path in wanted]} | {path.suffix[1:]: str(path) for path in systems})
     else:
-        put("\n".join(map(str, wanted)))
+        put("\n".join(map(str, (*wanted, *systems))))
+
+
+def system_writer(card: "Card", fmi: Literal[2, 3], platforms: tuple[str, ...]) -> Callable[[Path, bool], object]:
+    """Return what writes the SSP of a card to a path, by force or not; refuse a card that cannot have one."""
+    from cosim.cli_system import system_of
+    from pyfmi_models.export.ssp import export_ssp
+
+    system = system_of(card)
+    return lambda path, force: export_ssp(system, path, fmi=fmi, force=force, platforms=platforms)

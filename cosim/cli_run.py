@@ -10,7 +10,9 @@ from cosim.terminal import put, put_json, say, stage
 
 
 def run(
-    scenario: Annotated[str, typer.Argument(help="A scenario file (.toml), or the name of a shipped one: sidereal.")],
+    scenario: Annotated[
+        str, typer.Argument(help="A scenario (.toml), an SSP, or the name of a shipped one: sidereal.")
+    ],
     out: Annotated[Path, typer.Option("--out", "-o", help="Directory for the recording.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print the statistics as JSON.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
@@ -29,6 +31,8 @@ def run(
     path, report = out / "recording.parquet", out / "run.json"
     for one in (path, report):
         check_free(one, force)
+    if Path(scenario).suffix == ".ssp":
+        say(wanted.description)
     ready = with_fmus(wanted, say)
     command = f"cosim run {scenario} --out {out}"
     title = f"{wanted.name}: {wanted.ticks:,} steps of {wanted.step:g} s"

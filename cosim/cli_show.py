@@ -13,7 +13,7 @@ from cosim.terminal import put_json
 
 
 def show(
-    file: Annotated[str, typer.Argument(help="A recording, FMU, scenario or card, or the name of a shipped one.")],
+    file: Annotated[str, typer.Argument(help="A recording, FMU, SSP, scenario or card, or the name of a shipped one.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print it as JSON.")] = False,
 ) -> None:
     """Show a recording, an FMU, a scenario or a card."""
@@ -37,6 +37,8 @@ def describe(file: str) -> tuple[dict[str, Any], dict[str, list[dict[str, Any]]]
     path = Path(file)
     if path.suffix == ".fmu":
         return _fmu(path)
+    if path.suffix == ".ssp":
+        return _scenario(file)
     if path.suffix in {".toml", ""}:
         return _toml(file)
     return _recording(path)

@@ -15,6 +15,13 @@ def sha256(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
+def cache_home() -> Path:
+    """Return the folder for what can be made again: $MOUNT_COSIM_CACHE or the user's cache directory."""
+    from platformdirs import user_cache_path
+
+    return Path(os.environ.get("MOUNT_COSIM_CACHE") or user_cache_path("mount-cosim"))
+
+
 def check_free(path: Path, force: bool) -> None:
     """Refuse a path that is taken.
 

@@ -20,6 +20,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from cosim.errors import ScenarioError
 from cosim.signals import Generator, Recorded, Signal
+from cosim.ssp import read_ssp
 from cosim.wiring import Record, Wire
 
 
@@ -117,9 +118,12 @@ def read_scenario(source: str | Path) -> Scenario:
     shipped = files("cosim") / "scenarios" / f"{source}.toml"
     if not path.exists() and shipped.is_file():
         return parse_scenario(shipped.read_text("utf-8"), str(source), Path())
+    if path.suffix == ".ssp":
+        text, folder = read_ssp(path)
+        return parse_scenario(text, str(source), folder)
     if path.suffix != ".toml" or not path.is_file():
         choices = shipped_scenarios()
-        rule = f"a scenario is a .toml file or one of: {', '.join(choices)}."
+        rule = f"a scenario is a .toml or .ssp file or one of: {', '.join(choices)}."
         raise ScenarioError(f"{source}: no such scenario; {rule}", culprit=str(source), choices=choices)
     try:
         return parse_scenario(path.read_text("utf-8"), str(source), path.parent)

@@ -20,6 +20,7 @@ RUNNERS = (
     "loop",
     "recording",
     "scenario",
+    "ssp",
     "signals",
     "hardware",
     "wiring",

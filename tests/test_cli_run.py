@@ -79,7 +79,7 @@ def test_nothing_is_overwritten_without_force(
 def test_a_mistake_is_one_sentence_and_exit_code_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert call("run", "none.toml", "--out", tmp_path / "out") == 2
     said = capsys.readouterr()
-    assert said.err.startswith("cosim: none.toml: no such scenario; a scenario is a .toml file or one of: ")
+    assert said.err.startswith("cosim: none.toml: no such scenario; a scenario is a .toml or .ssp file or one of: ")
     assert said.err.count("\n") == 1
     assert said.out == ""
     assert not (tmp_path / "out").exists()

@@ -144,7 +144,7 @@ def test_a_mistake_in_a_scenario_is_one_sentence(old: str, new: str, sentence: s
 
 def test_a_scenario_that_is_not_there_is_met_with_those_that_are(tmp_path: Path) -> None:
     with pytest.raises(
-        ScenarioError, match=r"none: no such scenario; a scenario is a .toml file or one of: .*sidereal"
+        ScenarioError, match=r"none: no such scenario; a scenario is a .toml or .ssp file or one of: .*sidereal"
     ):
         read_scenario("none")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")

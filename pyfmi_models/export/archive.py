@@ -38,7 +38,7 @@ def export_fmu(
     generated = generate(model)
     files = _description(generated, fmi) | _binaries(generated, fmi, platforms or (host(),)) | _sources(generated, fmi)
     files["documentation/index.html"] = documentation_page(generated.layout, description_html).encode()
-    _write_zip(path, files)
+    write_zip(path, files)
     return path
 
 
@@ -77,7 +77,8 @@ def _build_description(generated: Generated, units: list[str]) -> bytes:
     return xml_text(root)
 
 
-def _write_zip(path: Path, files: dict[str, bytes]) -> None:
+def write_zip(path: Path, files: dict[str, bytes]) -> None:
+    """Write the files, name to content, as a zip that appears complete or not at all; equal files, equal bytes."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:

@@ -1,0 +1,283 @@
+"""Any team's SSP runs here, and what cannot be read is one sentence with culprit, rule and choices."""
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_fmu import tiny
+
+from cosim.cli import main
+from cosim.errors import ScenarioError
+from cosim.master import run
+from cosim.recording import Recording
+from cosim.scenario import read_scenario
+
+__all__ = ["tiny"]
+
+NAMES = {"ssd": "Description", "ssc": "Common", "ssv": "ParameterValues", "ssm": "ParameterMapping"}
+SPACES = (
+    " ".join(f'xmlns:{key}="http://ssp-standard.org/SSP1/SystemStructure{name}"' for key, name in NAMES.items())
+    + ' xmlns:osp="http://opensimulationplatform.com/SSP/OSPAnnotations"'
+)
+CONNECTORS = "".join(
+    f'<ssd:Connector name="{name}" kind="{kind}"><ssc:Real/></ssd:Connector>'
+    for name, kind in {"a": "input", "b": "input", "y": "output"}.items()
+)
+EXPERIMENT = """<ssd:DefaultExperiment stopTime="0.01"><ssd:Annotations>
+<ssc:Annotation type="com.opensimulationplatform"><osp:Algorithm><osp:FixedStepAlgorithm baseStepSize="0.001"/>
+</osp:Algorithm></ssc:Annotation></ssd:Annotations></ssd:DefaultExperiment>"""
+
+
+def component(name: str, bindings: str = "", source: str = "resources/tiny%202.fmu", kind: str = "") -> str:
+    return (
+        f'<ssd:Component name="{name}" source="{source}" {kind}><ssd:Connectors>{CONNECTORS}</ssd:Connectors>'
+        f"<ssd:ParameterBindings>{bindings}</ssd:ParameterBindings></ssd:Component>"
+    )
+
+
+def values(inside: str, attributes: str = "") -> str:
+    """A binding with values inline."""
+    return (
+        f"<ssd:ParameterBinding {attributes}><ssd:ParameterValues>{parameter_set(inside)}</ssd:ParameterValues>"
+        "</ssd:ParameterBinding>"
+    )
+
+
+def parameter_set(inside: str) -> str:
+    parameters = f"<ssv:Parameters>{inside}</ssv:Parameters>"
+    return f'<ssv:ParameterSet {SPACES} version="1.0" name="s">{parameters}</ssv:ParameterSet>'
+
+
+def real(name: str, value: object, unit: str = "") -> str:
+    unit = f'unit="{unit}"' if unit else ""
+    return f'<ssv:Parameter name="{name}"><ssv:Real value="{value}" {unit}/></ssv:Parameter>'
+
+
+def wire(start: str, end: str, inside: str = "", attributes: str = "") -> str:
+    """A connection; an end without a dot is a connector of the system itself."""
+    said = attributes
+    for side, one in (("start", start), ("end", end)):
+        element, _, connector = one.rpartition(".")
+        said += (f' {side}Element="{element}"' if element else "") + f' {side}Connector="{connector}"'
+    return f"<ssd:Connection {said}>{inside}</ssd:Connection>"
+
+
+def system(elements: str, wires: str = "", name: str = "s", connectors: str = "", bindings: str = "") -> str:
+    return (
+        f'<ssd:System name="{name}"><ssd:Connectors>{connectors}</ssd:Connectors>'
+        f"<ssd:ParameterBindings>{bindings}</ssd:ParameterBindings>"
+        f"<ssd:Elements>{elements}</ssd:Elements><ssd:Connections>{wires}</ssd:Connections></ssd:System>"
+    )
+
+
+def connector(name: str, kind: str) -> str:
+    return f'<ssd:Connector name="{name}" kind="{kind}"><ssc:Real/></ssd:Connector>'
+
+
+def pack(
+    path: Path, fmu: Path, inside: str, *, experiment: str = EXPERIMENT, version: str = "1.0", **files: str
+) -> Path:
+    root = "ssd:SystemStructureDescription"
+    text = f'<{root} {SPACES} version="{version}" name="t">{inside}{experiment}</{root}>'
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("SystemStructure.ssd", text)
+        archive.write(fmu, "resources/tiny 2.fmu")
+        for name, content in files.items():
+            archive.writestr(f"resources/{name.replace('_', '.')}", content)
+    return path
+
+
+DRIVEN = values(real("mode", 1) + real("a", 0.5))
+"""Settings that make y = 0.5 at the end of each step."""
+
+
+@pytest.fixture
+def read(tiny: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
+
+    def reader(inside: str, **more: str):
+        return read_scenario(pack(tmp_path / "t.ssp", tiny[2], inside, **more))
+
+    return reader
+
+
+def test_transformations_parameters_and_the_experiment_are_those_of_the_archive(read) -> None:
+    transformed = wire("one.y", "two.a", '<ssc:LinearTransformation factor="2" offset="0.25"/>')
+    file = '<ssd:ParameterBinding source="resources/two.ssv"/>'
+    elements = component("one", DRIVEN) + component("two", file)
+    scenario = read(system(elements, transformed), two_ssv=parameter_set(real("mode", 1) + real("k", 3)))
+    assert (scenario.step, scenario.stop, scenario.name) == (1e-3, 0.01, "t")
+    recording = run(scenario).recording
+    assert list(recording) == ["t", "one.y", "two.y"]
+    np.testing.assert_array_equal(recording["one.y"], [0] + [0.5] * 9)
+    np.testing.assert_allclose(recording["two.y"], [0] + [3 * 0.25] + [3 * 1.25] * 8)
+
+
+def test_nested_systems_are_flat_and_their_transformations_chain(read) -> None:
+    inner = system(
+        component("one"),
+        wire("in", "one.a", '<ssc:LinearTransformation factor="2"/>') + wire("one.y", "out"),
+        name="sub",
+        connectors=connector("in", "input") + connector("out", "output"),
+        bindings=values(real("one.mode", 1)),
+    )
+    outer = system(
+        component("drive", DRIVEN) + inner + component("last", values(real("mode", 1))),
+        wire("drive.y", "sub.in", '<ssc:LinearTransformation offset="0.1"/>')
+        + wire("sub.out", "last.a")
+        + wire("last.y", "result")
+        + wire("outside", "last.b"),
+        connectors=connector("result", "output") + connector("outside", "input"),
+        bindings=values(real("sub.one.k", 10)),
+    )
+    recording = run(read(outer)).recording
+    np.testing.assert_allclose(recording["sub/one.y"][2:], 10 * 2 * (0.5 + 0.1))
+    np.testing.assert_allclose(recording["last.y"][3:], 12.0)  # its input from outside stays at its start value
+    np.testing.assert_array_equal(recording["result"], recording["last.y"])
+
+
+def test_outer_and_later_bindings_win_and_prefixes_and_mappings_rename(read) -> None:
+    scaled = '<ssc:LinearTransformation factor="2" offset="1"/>'
+    entry = f'<ssm:MappingEntry source="gain" target="k">{scaled}</ssm:MappingEntry>'
+    inline = f'<ssm:ParameterMapping {SPACES} version="1.0">{entry}</ssm:ParameterMapping>'
+    mapping = f"<ssd:ParameterMapping>{inline}</ssd:ParameterMapping>"
+    mapped = values(real("gain", 3)).replace("</ssd:ParameterValues>", "</ssd:ParameterValues>" + mapping)
+    one = component("one", values(real("k", 1)) + mapped)
+    two = component("two", values(real("k", 1)))
+    outer = values(real("k", 4) + real("b", 5), 'prefix="two."')
+    scenario = read(system(one + two, bindings=outer))
+    assert scenario.components["one"].parameters == {"k": 7.0}
+    assert scenario.components["two"].parameters == {"k": 4.0, "b": 5.0}
+
+
+def test_units_of_parameters_and_connectors_are_converted(read) -> None:
+    in_degrees = component("one", values(real("a", 180, "deg"))).replace(
+        '"y" kind="output"><ssc:Real/>', '"y" kind="output"><ssc:Real unit="rad"/>'
+    )
+    scenario = read(system(in_degrees + component("two"), wire("one.y", "two.a")))
+    np.testing.assert_allclose(scenario.components["one"].parameters["a"], np.pi)
+    with pytest.raises(ScenarioError, match=r'"one.a" is given in kg: "kg" cannot become "rad"'):
+        read(system(component("one", values(real("a", 1, "kg")))))
+
+
+def test_a_connection_written_from_its_end_is_understood(read) -> None:
+    (found,) = read(system(component("one") + component("two"), wire("two.a", "one.y"))).wires
+    assert (found.source, found.target) == ("one.y", "two.a")
+
+
+def test_parameters_that_no_fmu_has_and_what_is_assumed_are_told(read) -> None:
+    scenario = read(system(component("one", values(real("kk", 1)))), experiment="")
+    assert "Not set, because their FMUs do not have them: one.kk" in scenario.description
+    assert "It says no stop and step, which is assumed" in scenario.description
+    assert (scenario.stop, scenario.ticks) == (1.0, 1000)
+
+
+def test_run_and_show_take_an_ssp(
+    tiny: dict[int, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
+    path = pack(tmp_path / "a b.ssp", tiny[2], system(component("one", DRIVEN + values(real("kk", 1)))))
+    for command in (["show", str(path)], ["run", str(path), "--out", str(tmp_path / "out")]):
+        with pytest.raises(SystemExit) as left:
+            main(command)
+        assert not left.value.code
+    said = capsys.readouterr()
+    assert "one.y" in said.out
+    assert "one.kk" in said.err
+    assert len(Recording.read(tmp_path / "out" / "recording.parquet", required=())) == 10
+
+
+TWO = component("one") + component("two")
+
+
+def alone(bindings: str = "", **more: str) -> str:
+    return system(component("one", bindings, **more))
+
+
+def joined(*wires: str) -> str:
+    return system(TWO, "".join(wires))
+
+
+def circle() -> str:
+    through = system("", wire("in", "out"), "sub", connector("in", "input") + connector("out", "output"))
+    return system(through + component("one"), wire("sub.out", "sub.in") + wire("sub.out", "one.a"))
+
+
+WRONG = {
+    'etc/passwd" lies outside the archive': alone(source="../../etc/passwd"),
+    '"/etc/passwd" lies outside the archive': alone(source="/etc/passwd"),
+    'a.fmu" lies outside the archive': alone(source="https://example.org/a.fmu"),
+    '"resources/b.fmu" is missing; there are: resources/tiny 2.fmu': alone(source="resources/b.fmu"),
+    '"one" .*: .* is no FMU: it is not a zip archive': alone(source="SystemStructure.ssd"),
+    '"one" is of the kind application/x-ssp-package': alone(kind='type="application/x-ssp-package"'),
+    "it has no component": system(""),
+    'two elements are called "one"': system(component("one") * 2),
+    'names "three", which does not exist; there are: one, two': joined(wire("three.y", "one.a")),
+    '"one.x" is no connector; there are: a, b, y': joined(wire("one.x", "two.a")),
+    '"one.a" is joined to "two.a", and a connection goes from': joined(wire("one.a", "two.a")),
+    '"two.a" is fed twice, by "one.y" and by "two.y"': joined(wire("one.y", "two.a"), wire("two.y", "two.a")),
+    "through a Boolean mapping": joined(wire("one.y", "two.a", "<ssc:BooleanMappingTransformation/>")),
+    'factor = "2,5" is no finite': joined(wire("one.y", "two.a", '<ssc:LinearTransformation factor="2,5"/>')),
+    'the parameter "k" = "much" is no Real': alone(values(real("k", "much"))),
+    '"s.ssv" is missing': alone('<ssd:ParameterBinding source="s.ssv"/>'),
+    '"s.ssv" lies inside a component': alone('<ssd:ParameterBinding source="s.ssv" sourceBase="component"/>'),
+    "neither a source nor a ssv:ParameterSet": alone("<ssd:ParameterBinding/>"),
+    '"one.a" is fed by a circle': circle(),
+}
+
+
+@pytest.mark.parametrize("said", WRONG)
+def test_what_cannot_be_read_is_one_sentence(said: str, read) -> None:
+    with pytest.raises(ScenarioError, match=said) as raised:
+        read(WRONG[said])
+    assert "\n" not in str(raised.value)
+    assert "t.ssp is an SSP that cannot run: " in str(raised.value)
+
+
+def test_other_versions_and_late_starts_are_refused(read) -> None:
+    with pytest.raises(ScenarioError, match=r'its version is "2.0", and only SSP 1 is read'):
+        read(system(TWO), version="2.0")
+    with pytest.raises(ScenarioError, match="it starts at 5 s, and runs here start at 0"):
+        read(system(TWO), experiment='<ssd:DefaultExperiment startTime="5"/>')
+
+
+def test_damaged_archives_are_refused(tiny: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
+    path = tmp_path / "t.ssp"
+    with pytest.raises(ScenarioError, match="does not exist"):
+        read_scenario(path)
+    good = pack(path, tiny[2], system(TWO)).read_bytes()
+    path.write_bytes(good[: len(good) // 2])
+    with pytest.raises(ScenarioError, match="it is no zip archive"):
+        read_scenario(path)
+    middle = len(good) // 2
+    path.write_bytes(good[:middle] + bytes(byte ^ 255 for byte in good[middle : middle + 40]) + good[middle + 40 :])
+    with pytest.raises(ScenarioError, match=r'"resources/tiny 2.fmu" is damaged or encrypted'):
+        read_scenario(path)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("SystemStructure.ssd", "<a>")
+    with pytest.raises(ScenarioError, match="is not valid XML"):
+        read_scenario(path)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("notes.txt", "")
+    with pytest.raises(ScenarioError, match=r'"SystemStructure.ssd" is missing'):
+        read_scenario(path)
+    assert not (tmp_path / "cache").exists() or not list((tmp_path / "cache").rglob("*.partial"))
+
+
+def test_members_that_would_escape_are_never_unpacked(read, tiny: dict[int, Path], tmp_path: Path) -> None:
+    path = pack(tmp_path / "u.ssp", tiny[2], system(component("one")))
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("../escaped.txt", "out")
+        archive.writestr("/tmp/escaped.txt", "out")
+    assert read_scenario(path).ticks == 10
+    assert not [one for one in tmp_path.rglob("*") if one.name == "escaped.txt"]
+
+
+def test_entities_that_explode_are_refused(read, tiny: dict[int, Path], tmp_path: Path) -> None:
+    laughs = "".join(f'<!ENTITY a{n} "{f"&a{n - 1};" * 10 if n else "ha" * 10}">' for n in range(10))
+    with zipfile.ZipFile(tmp_path / "l.ssp", "w") as archive:
+        archive.writestr("SystemStructure.ssd", f"<!DOCTYPE a [{laughs}]><a>&a9;</a>")
+    with pytest.raises(ScenarioError, match="is not valid XML"):
+        read_scenario(tmp_path / "l.ssp")
