@@ -5,7 +5,9 @@ everything and names file, key, value and rule; `Card.plant` and `Card.controlle
 """
 
 import tomllib
+from collections.abc import Collection
 from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import Field as Declared
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -175,9 +177,7 @@ def _sentence(error: ValidationError) -> str:
 
 
 def _friction(table: Table, path: str) -> FrictionLaw:
-    key = table.pop("model", None)
-    if not isinstance(key, str) or key not in LAWS:
-        raise CardError(f"{path}: [friction] model = {key!r} is unknown; models are: {', '.join(LAWS)}.")
+    key = _word(table, "model", LAWS, f"{path}: [friction]")
     # A card says "no Stribeck term" by Fs = Fc; the law says it by having no Fs, so that a fit of Fc cannot make one.
     if "Fs" in _keys(LAWS[key]) and "Fs" in table and table["Fs"] == table.get("Fc"):
         table = {name: value for name, value in table.items() if name not in ("Fs", "Vs")}
@@ -186,15 +186,26 @@ def _friction(table: Table, path: str) -> FrictionLaw:
 
 def _effect(table: Table, path: str, index: int) -> Effect:
     where = f"{path}: [[effects]] number {index + 1}"
-    name = table.pop("effect", None)
-    if not isinstance(name, str) or name not in CATALOGUE:
-        raise CardError(f"{where}: effect = {name!r} is unknown; effects are: {', '.join(CATALOGUE)}.")
+    name = _word(table, "effect", CATALOGUE, f"{where}:")
     form = max(CATALOGUE[name], key=lambda form: len(set(table) & set(_keys(form))))
-    return _build(form, table, f"{where} ({name})")
+    effect = _build(form, table, f"{where} ({name})")
+    if effect.broken_rule():
+        raise CardError(f"{where} ({name}): {effect.broken_rule()}.")
+    return effect
 
 
-def _keys(part: type[Any]) -> dict[str, tuple[Variable, Any]]:
-    return {f.name: (f.metadata["variable"], f.default) for f in fields(part) if "variable" in f.metadata}
+def _word(table: Table, key: str, choices: Collection[str], where: str) -> str:
+    """Take the word that says which law or effect a table is."""
+    word, listed = table.pop(key, None), ", ".join(choices)
+    if word is None:
+        raise CardError(f"{where} {key} is missing; {key}s are: {listed}.")
+    if not isinstance(word, str) or word not in choices:
+        raise CardError(f"{where} {key} = {word!r} is unknown; {key}s are: {listed}.")
+    return word
+
+
+def _keys(part: type[Any]) -> dict[str, Declared[Any]]:
+    return {item.name: item for item in fields(part) if item.metadata}
 
 
 def _build(part: type[Part], table: Table, where: str) -> Part:
@@ -202,14 +213,23 @@ def _build(part: type[Part], table: Table, where: str) -> Part:
     for key, value in table.items():
         if key not in keys:
             raise CardError(f'{where}: "{key}" is not a key here; keys are: {", ".join(keys)}.')
-        read = _number_or_pair if issubclass(part, FrictionLaw) else _number
-        table[key] = read(value, keys[key][0], f"{where}: {key}")
-    if table.get("Fs") is not None and "Vs" in keys and table.get("Vs") is None:
-        raise CardError(f"{where}: Fs needs Vs, the speed over which friction falls.")
-    missing = [key for key, (_, default) in keys.items() if key not in table and default is MISSING]
+        table[key] = _value(value, keys[key], issubclass(part, FrictionLaw), f"{where}: {key}")
+    for one, other, meaning in (("Fs", "Vs", "speed over which friction falls"), ("Vs", "Fs", "level at rest")):
+        if one in table and other in keys and other not in table:
+            raise CardError(f"{where}: {one} needs {other}, the {meaning}.")
+    missing = [key for key, item in keys.items() if key not in table and item.default is MISSING]
     if missing:
         raise CardError(f"{where}: {missing[0]} is missing.")
     return part(**table)
+
+
+def _value(value: Any, item: Declared[Any], by_direction: bool, where: str) -> Any:
+    """Check one value: a list of numbers that shape the equations, a pair by direction, or a number."""
+    if "structure" in item.metadata:
+        if not isinstance(value, list):
+            raise CardError(f"{where} = {value!r} is not a list of numbers.")
+        return tuple(_number(one, item.metadata["structure"], f"{where}[{k}]") for k, one in enumerate(value, 1))
+    return (_number_or_pair if by_direction else _number)(value, item.metadata["variable"], where)
 
 
 def _number_or_pair(value: Any, variable: Variable, where: str) -> float | Pair:

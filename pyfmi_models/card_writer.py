@@ -6,7 +6,7 @@ from typing import Any
 
 from pyfmi_models.card import Card
 from pyfmi_models.effects import Effect
-from pyfmi_models.model import Pair, parameters_of
+from pyfmi_models.model import Pair, parameters_of, structure_of
 
 _NUMERICAL = (("smoothing", 1e-5),)
 """Numbers of the solver, not of the machine: left out of a card while they have their default."""
@@ -39,7 +39,8 @@ def effect_table(effect: Effect) -> dict[str, Any]:
 def _numbers(part: Any) -> dict[str, Any]:
     names = [variable.name.split(".")[0] for variable in parameters_of(part)]
     shown = [name for name in dict.fromkeys(names) if (name, getattr(part, name)) not in _NUMERICAL]
-    return {name: getattr(part, name) for name in shown}
+    shaping = {name: numbers for name, numbers in structure_of(part).items() if numbers}
+    return {name: getattr(part, name) for name in shown} | shaping
 
 
 def _section(name: str, table: dict[str, Any]) -> list[str]:

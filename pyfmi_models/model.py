@@ -72,6 +72,12 @@ def parameter(
     return field(default=default, metadata={"variable": variable})
 
 
+def structure(unit: str, description: str, *, low: float = -inf, high: float = inf) -> Any:
+    """Declare a tuple of numbers that shapes the equations themselves: a card key, but no FMU variable and no fit."""
+    variable = Variable(name="", unit=unit, description=description, low=low, high=high)
+    return field(default=(), metadata={"structure": variable})
+
+
 def parameters_of(component: Any, prefix: str = "") -> tuple[Variable, ...]:
     """List the parameters of a component with their present values as start values.
 
@@ -111,6 +117,11 @@ def symbols_of(variables: tuple[Variable, ...]) -> tuple[Any, dict[str, Any]]:
 def _declared(component: Any) -> list[tuple[str, Variable, Any]]:
     declared = [(item.name, item.metadata.get("variable"), getattr(component, item.name)) for item in fields(component)]
     return [(name, variable, value) for name, variable, value in declared if variable is not None and value is not None]
+
+
+def structure_of(component: Any) -> dict[str, tuple[float, ...]]:
+    """Numbers of a component that shape its equations, by field; see `structure`."""
+    return {item.name: getattr(component, item.name) for item in fields(component) if "structure" in item.metadata}
 
 
 def fields_of(component: Any) -> tuple[str, ...]:

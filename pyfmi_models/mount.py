@@ -1,21 +1,35 @@
-"""The plant: torque path -> mechanics -> encoder.
+"""The mount: what acts on the axis, place by place.
 
     J q'' = applied(tau) - tau_f(v, bristle, q) - loads(t, q, v) - disturbance
 
 `tau` is the commanded torque, limited to +-torque_limit; drive effects make `applied` of it; friction effects change
-level and viscous torque of the friction law; load effects resist beside it.
+contact, level and viscous torque of the friction law; load effects resist beside it; couplings split the inertia;
+sensor effects make the reading of the position. `plant.py` puts the equations together.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import pi
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import casadi as ca
 
-from pyfmi_models.effects import DriveEffect, Effect, FrictionEffect, LoadEffect, Motion
+from pyfmi_models.effects.base import (
+    NOTHING,
+    ClockEffect,
+    DriveEffect,
+    Effect,
+    FrictionEffect,
+    InertiaEffect,
+    LoadEffect,
+    Motion,
+    MotionEffect,
+    PayloadEffect,
+    SensorEffect,
+)
 from pyfmi_models.friction import FrictionLaw
-from pyfmi_models.model import Model, Scalar, Variable, parameter, parameters_of, symbols_of, with_symbols
+from pyfmi_models.model import Model, Scalar, Variable, parameter, parameters_of, with_symbols
+from pyfmi_models.plant import plant
 
 MotionKind = Literal["rotary", "linear"]
 LINEAR_UNITS = {
@@ -26,7 +40,11 @@ LINEAR_UNITS = {
     "kg.m2": "kg",
     "N.m/rad": "N/m",
     "N.m.s/rad": "N.s/m",
+    "N.m.s2/rad2": "N.s2/m2",
+    "1/rad2": "1/m2",
 }
+Kind = TypeVar("Kind", bound=Effect)
+Seen = TypeVar("Seen", bound=MotionEffect)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +57,11 @@ class Axis:
 
 @dataclass(frozen=True, kw_only=True)
 class Mount:
-    """One axis: its inertia, one friction law and any effects, in the order in which they act."""
+    """One axis: its inertia, one friction law and any effects, in the order in which they act.
+
+    Methods that take `states` want the states of each effect by the prefix of its parameters; effects that are not in
+    it are at their start.
+    """
 
     name: str
     axis: Axis
@@ -60,6 +82,10 @@ class Mount:
         found = [v for prefix, part in self.components().items() for v in parameters_of(part, prefix)]
         return tuple(self.in_axis_units(variable) for variable in found)
 
+    def inputs(self) -> tuple[Variable, ...]:
+        """List the inputs that effects read, each once."""
+        return tuple({one.name: one for effect in self.effects for one in effect.inputs()}.values())
+
     def in_axis_units(self, variable: Variable) -> Variable:
         """Turn rotary units into those of a linear axis where that is what this is; phases stay angles."""
         if self.motion == "rotary" or variable.name.endswith("phase"):
@@ -72,96 +98,78 @@ class Mount:
         axis, friction, *effects = parts.values()
         return replace(self, axis=axis, friction=friction, effects=tuple(effects))
 
-    def at(self, t: Scalar, q: Scalar, v: Scalar) -> Motion:
-        """Describe the motion; a linear axis turns its angle once per metre."""
-        return Motion(t, q, v, q if self.motion == "rotary" else 2 * pi * q)
+    def of_kind(self, kind: type[Kind]) -> Iterator[tuple[str, Kind]]:
+        """Yield the effects that act in one place, in order, with their prefixes."""
+        return ((name, part) for name, part in self.components().items() if isinstance(part, kind))
 
-    def level(self, motion: Motion) -> Scalar:
+    def at(self, t: Scalar, q: Scalar, v: Scalar, inputs: Mapping[str, Scalar] = NOTHING) -> Motion:
+        """Describe the motion; a linear axis turns its angle once per metre; inputs not given are at their start."""
+        starts = {variable.name: variable.start for variable in self.inputs()}
+        return Motion(t, q, v, q if self.motion == "rotary" else 2 * pi * q, {**starts, **inputs})
+
+    def seeing(
+        self, kind: type[Seen], motion: Motion, states: Mapping[str, Any] = NOTHING
+    ) -> Iterator[tuple[Seen, Motion]]:
+        """Yield the effects of a kind, each with the motion as it sees it: its own states beside."""
+        for name, effect in self.of_kind(kind):
+            start = [variable.start for variable in effect.states()]
+            yield effect, motion._replace(state=states.get(name, start))
+
+    def applied(self, command: Scalar, states: Mapping[str, Any] = NOTHING) -> tuple[Scalar, dict[str, Any]]:
+        """Torque path: limit, then the drive effects in series. Return the applied torque and the rates of states."""
+        rates, torque = {}, ca.fmax(-self.axis.torque_limit, ca.fmin(self.axis.torque_limit, command))
+        for name, effect in self.of_kind(DriveEffect):
+            rates[name] = effect.rate(states[name], torque)
+            torque = effect.applied(states[name], torque)
+        return torque, rates
+
+    @property
+    def law(self) -> FrictionLaw:
+        """The friction law after effects that replace its contact."""
+        law = self.friction
+        for _, effect in self.of_kind(FrictionEffect):
+            law = effect.law(law)
+        return law
+
+    def level(self, motion: Motion, states: Mapping[str, Any] = NOTHING) -> Scalar:
         """Friction level [N m] after all friction effects; never below zero."""
-        level = self.friction.level(motion.v)
-        for effect in self.of_kind(FrictionEffect):
-            level = effect.level(level, motion)
+        level, motion = self.law.level(motion.v), motion._replace(payload=self.payload(motion, states))
+        for effect, seen in self.seeing(FrictionEffect, motion, states):
+            level = effect.level(level, seen)
         return level
 
-    def viscous(self, motion: Motion) -> Scalar:
+    def viscous(self, motion: Motion, states: Mapping[str, Any] = NOTHING) -> Scalar:
         """Viscous torque [N m] after all friction effects."""
-        viscous = self.friction.viscous(motion.v)
-        for effect in self.of_kind(FrictionEffect):
-            viscous = effect.viscous(viscous, motion)
+        viscous = self.law.viscous(motion.v)
+        for effect, seen in self.seeing(FrictionEffect, motion, states):
+            viscous = effect.viscous(viscous, seen)
         return viscous
 
-    def loads(self, motion: Motion) -> Scalar:
+    def loads(self, motion: Motion, states: Mapping[str, Any] = NOTHING) -> Scalar:
         """Sum of the load effects [N m], resisting."""
-        return sum((effect.load(motion) for effect in self.of_kind(LoadEffect)), start=0 * motion.q)
+        return sum((e.load(seen) for e, seen in self.seeing(LoadEffect, motion, states)), start=0 * motion.q)
 
-    def of_kind(self, kind: type[Any]) -> Sequence[Any]:
-        """Return the effects that act in one place, in order."""
-        return [effect for effect in self.effects if isinstance(effect, kind)]
+    def payload(self, motion: Motion, states: Mapping[str, Any] = NOTHING) -> Scalar:
+        """Torque of the weights on the axis [N m]."""
+        return sum((e.load(seen) for e, seen in self.seeing(PayloadEffect, motion, states)), start=0 * motion.q)
+
+    def inertia(self, inertia: Scalar, motion: Motion, states: Mapping[str, Any] = NOTHING) -> Scalar:
+        """Inertia of the near side after the effects that change it with position [kg m2]."""
+        for effect, seen in self.seeing(InertiaEffect, motion, states):
+            inertia = effect.inertia(inertia, seen)
+        return inertia
+
+    def reading(self, motion: Motion, states: Mapping[str, Any] = NOTHING) -> Scalar:
+        """Sensor path: what the encoder reads [rad or m]."""
+        reading = motion.q
+        for effect, seen in self.seeing(SensorEffect, motion, states):
+            reading = effect.reading(reading, seen)
+        return reading
+
+    def ahead(self, motion: Motion, states: Mapping[str, Any] = NOTHING) -> Scalar:
+        """Seconds by which a recording's readings run ahead of its torques."""
+        return sum((e.ahead(seen) for e, seen in self.seeing(ClockEffect, motion, states)), start=0 * motion.t)
 
     def model(self) -> Model:
-        """Write the plant as a `Model`: input tau, outputs q and v (and the torques), continuous."""
-        return _plant(self)
-
-
-def _states(mount: Mount) -> list[Variable]:
-    axis = [
-        Variable(name="position", unit="rad", description="Position of the axis"),
-        Variable(name="speed", unit="rad/s", description="Speed of the axis", nominal=0.01),
-    ]
-    friction = [replace(s, name=f"friction.{s.name}") for s in mount.friction.states()]
-    named = [(name, part) for name, part in mount.components().items() if isinstance(part, DriveEffect)]
-    drive = [replace(s, name=f"{name}.{s.name}") for name, part in named for s in part.states()]
-    return [mount.in_axis_units(state) for state in (*axis, *friction, *drive)]
-
-
-def _inputs(mount: Mount) -> list[Variable]:
-    tau = Variable(name="tau", unit="N.m", description="Commanded torque, drives")
-    disturbance = Variable(name="disturbance", unit="N.m", description="External torque, resists")
-    return [mount.in_axis_units(variable) for variable in (tau, disturbance)]
-
-
-def _outputs(mount: Mount) -> list[Variable]:
-    found = [
-        Variable(name="q", unit="rad", description="Position"),
-        Variable(name="v", unit="rad/s", description="Speed"),
-        Variable(name="friction", unit="N.m", description="Friction torque, resists"),
-        Variable(name="applied", unit="N.m", description="Torque applied to the axis by the drive"),
-    ]
-    return [mount.in_axis_units(variable) for variable in found]
-
-
-def _drive(mount: Mount, command: Scalar, take: Callable[[int], Any]) -> tuple[Scalar, list[Any]]:
-    """Send the command through the drive effects; `take(n)` hands out the next n states."""
-    rates = []
-    for effect in mount.of_kind(DriveEffect):
-        state = take(len(effect.states()))
-        rates.append(effect.rate(state, command))
-        command = effect.applied(state, command)
-    return command, rates
-
-
-def _plant(mount: Mount) -> Model:
-    states, inputs, parameters = _states(mount), _inputs(mount), mount.parameters()
-    t, x, u = ca.SX.sym("t"), ca.SX.sym("x", len(states)), ca.SX.sym("u", len(inputs))
-    p, symbols = symbols_of(parameters)
-    q, v = x[0], x[1]
-    this = mount.with_symbols(symbols, v)
-    motion, bristle = this.at(t, q, v), x[2 : 2 + len(mount.friction.states())]
-    rest = iter(range(2 + bristle.numel(), len(states)))
-    limit = this.axis.torque_limit
-    command = ca.fmax(-limit, ca.fmin(limit, u[0]))
-    applied, drive_rates = _drive(this, command, lambda n: x[[next(rest) for _ in range(n)]])
-    level = this.level(motion)
-    friction = this.friction.contact(bristle, v, level) + this.viscous(motion)
-    acceleration = (applied - friction - this.loads(motion) - u[1]) / this.axis.inertia
-    rates = ca.vertcat(v, acceleration, this.friction.rate(bristle, v, level), *drive_rates)
-    outputs = ca.vertcat(q, v, friction, applied)
-    return Model(
-        name=f"{mount.name}_plant",
-        description=f"{mount.name}: one axis with {mount.friction.key} friction",
-        inputs=tuple(inputs),
-        parameters=parameters,
-        states=tuple(states),
-        outputs=tuple(_outputs(mount)),
-        equations=ca.Function("equations", [t, x, u, p], [rates, outputs], ["t", "x", "u", "p"], ["next", "y"]),
-    )
+        """Write the plant as a `Model`: inputs tau and disturbance, output q and more, continuous."""
+        return plant(self)

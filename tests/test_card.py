@@ -4,10 +4,12 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from effect_examples import EXAMPLES
 
 from pyfmi_models.card import Card, parse_card, read_card, shipped_cards
 from pyfmi_models.card_writer import card_text
-from pyfmi_models.effects import CATALOGUE, Cogging, GravityUnbalance, LocalFriction, PeriodicFriction
+from pyfmi_models.effects import CATALOGUE, Cogging, Effect, GravityUnbalance, LocalFriction, PeriodicFriction
+from pyfmi_models.effects.thermal_viscosity import ThermalViscosity, WarmingViscosity
 from pyfmi_models.errors import CardError
 from pyfmi_models.friction import LAWS, Coulomb, LuGre
 from pyfmi_models.model import Pair
@@ -110,16 +112,25 @@ def test_a_shipped_card_comes_back_and_makes_a_plant(name: str) -> None:
     assert card.plant().model().name.endswith("_plant")
 
 
-@pytest.mark.parametrize("key", CATALOGUE)
-def test_every_effect_can_be_written_and_read(key: str) -> None:
-    example = {"stribeck": "Fs = 4.0\nVs = 0.1", "delay": "delay_ms = 2.0", "torque_offset": "torque = -0.5"}
-    example |= {"friction_asymmetry": "level_asymmetry = 0.1", "cogging": "cycles_per_rev = 4.0\namplitude = 1.0"}
-    example |= {"actuator_lag": "time_constant_ms = 2.0", "gravity_unbalance": "mgl = 1.0"}
-    example |= {"position_friction": "q_center = 1.0\nwidth = 0.1\nrelative_amplitude = 0.1"}
-    card = parse_card(f'{SMALL}[[effects]]\neffect = "{key}"\n{example[key]}\n', "c")
-    assert [effect.id for effect in card.effects] == [key]
-    assert parse_card(card_text(card), "c") == card
-    assert len(card.plant().effects) == 1
+@pytest.mark.parametrize("effect", EXAMPLES, ids=lambda one: type(one).__name__)
+def test_every_effect_can_be_written_and_read(effect: Effect) -> None:
+    card = replace(parse_card(SMALL, "c"), effects=(effect,))
+    again = parse_card(card_text(card), "c")
+    assert again == card
+    assert again.plant().model().parameters == card.plant().model().parameters
+
+
+def test_all_effects_together_can_be_written_and_read_and_make_a_plant() -> None:
+    card = replace(full(), effects=EXAMPLES)
+    assert parse_card(card_text(card), "full.toml") == card
+    assert len(card.plant().effects) == 1 + len(EXAMPLES)
+    assert card.plant().model().states
+
+
+@pytest.mark.parametrize(("numbers", "form"), [("", ThermalViscosity), ("warm_up_degC = 9.0\n", WarmingViscosity)])
+def test_a_form_is_found_by_its_parameters(numbers: str, form: type[Effect]) -> None:
+    text = f'{SMALL}[[effects]]\neffect = "thermal_viscosity"\nviscous_per_degC = -0.03\n{numbers}'
+    assert [type(one) for one in parse_card(text, "c").effects] == [form]
 
 
 def test_the_known_load_comes_before_the_effects() -> None:
@@ -157,6 +168,7 @@ def test_the_name_of_a_mount_becomes_an_identifier() -> None:
 LAW = "bad.toml: [friction]"
 EFFECT = "bad.toml: [[effects]] number 1"
 POSITION = 'effect = "position_friction"\nrelative_amplitude = 0.1\nq_center = 1.0\n'
+COGGING = 'effect = "cogging"\ncycles_per_rev = 3\namplitude = 0.1\n'
 MISTAKES = {
     "no TOML": ("[mount", "bad.toml is not valid TOML: Expected ']'"),
     "key twice": (SMALL + "Fc = 2\n", "bad.toml is not valid TOML: Cannot overwrite a value"),
@@ -180,7 +192,7 @@ MISTAKES = {
         SMALL + '[controller]\nkp = 1\nkd = 1\ncompensation = "C9"\n',
         "[controller] compensation = 'C9' breaks the rule: input should be 'C1', 'C2a', 'C2b', 'C3a' or 'C3b'.",
     ),
-    "friction without a law": (SMALL.replace("model", "#"), f"{LAW} model = None is unknown; models are: "),
+    "friction without a law": (SMALL.replace("model", "#"), f"{LAW} model is missing; models are: "),
     "unknown law": (
         SMALL.replace("coulomb", "lugr"),
         f"{LAW} model = 'lugr' is unknown; models are: {', '.join(LAWS)}",
@@ -206,8 +218,12 @@ MISTAKES = {
         SMALL.replace("coulomb", "static") + "Fs = 2.0\n",
         f"{LAW}: Fs needs Vs, the speed over which friction falls.",
     ),
+    "Stribeck speed without its level": (
+        SMALL.replace("coulomb", "static") + "Vs = 0.04\n",
+        f"{LAW}: Vs needs Fs, the level at rest.",
+    ),
     "empty unbalance": (SMALL + "[unbalance]\n", "bad.toml: [unbalance]: mgl is missing."),
-    "effect without a name": (SMALL + "[[effects]]\namplitude = 1\n", f"{EFFECT}: effect = None is unknown"),
+    "effect without a name": (SMALL + "[[effects]]\namplitude = 1\n", f"{EFFECT}: effect is missing; effects are: "),
     "effect as a list": (SMALL + '[[effects]]\neffect = ["x"]\n', f"{EFFECT}: effect = ['x'] is unknown"),
     "unknown effect": (
         SMALL + '[[effects]]\neffect = "coging"\n',
@@ -225,6 +241,18 @@ MISTAKES = {
     "two forms of an effect at once": (
         f"{SMALL}[[effects]]\n{POSITION}width = 0.1\ncycles_per_rev = 3\n",
         f'{EFFECT} (position_friction): "cycles_per_rev" is not a key here',
+    ),
+    "resonance below antiresonance": (
+        SMALL + '[[effects]]\neffect = "compliance"\nantiresonance_hz = 30\nresonance_hz = 20\n',
+        f"{EFFECT} (compliance): resonance_hz must be above antiresonance_hz.",
+    ),
+    "one harmonic without brackets": (
+        f"{SMALL}[[effects]]\n{COGGING}harmonics = 0.3\n",
+        f"{EFFECT} (cogging): harmonics = 0.3 is not a list of numbers.",
+    ),
+    "harmonic in quotes": (
+        f'{SMALL}[[effects]]\n{COGGING}harmonics = [0.3, "0.1"]\n',
+        f"{EFFECT} (cogging): harmonics[2] = '0.1' is not a number.",
     ),
     "effect by direction": (
         SMALL + '[[effects]]\neffect = "delay"\ndelay_ms = { positive = 1, negative = 2 }\n',

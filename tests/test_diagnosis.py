@@ -20,6 +20,7 @@ from cosim.diagnosis.evidence import Blocks, Score
 from cosim.diagnosis.fit import fit
 from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import choose_cutoff, derivative, noise_of, prepare
+from cosim.errors import InputError
 from cosim.proof.demo import demo_case
 from cosim.proof.generator import make_case, to_toml, write_case
 from cosim.recording import Recording
@@ -262,6 +263,18 @@ class TestCommand:
         given[2] = str(folder / "heldout.parquet")
         assert self.run(given) == 2
         assert "held out" in capsys.readouterr().err
+
+
+def test_a_card_with_physics_that_the_inverse_model_lacks_is_refused() -> None:
+    card = parse_card(
+        '[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\n'
+        '[[effects]]\neffect = "quadratic_drag"\ncoefficient = 1.0\n[[effects]]\neffect = "backlash"\ngap_rad = 1e-3\n',
+        "card.toml",
+    )
+    t, q, _, a = wander()
+    with pytest.raises(InputError) as caught:
+        diagnose([recorded(2 * a, t, q)], recorded(2 * a, t, q, "other"), card)
+    assert "The card holds backlash, which a diagnosis cannot take into account yet" in str(caught.value)
 
 
 def test_diagnosis_is_not_imported_by_a_run() -> None:

@@ -15,7 +15,6 @@ import numpy as np
 from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import Array, Prepared
 from pyfmi_models.effects import (
-    CATALOGUE,
     ActuatorLag,
     Cogging,
     Delay,
@@ -31,6 +30,11 @@ from pyfmi_models.effects import (
 from pyfmi_models.model import Pair
 from pyfmi_models.mount import Mount
 
+TRIED = (
+    *("stribeck", "friction_asymmetry", "position_friction", "cogging", "gravity_unbalance", "torque_offset"),
+    *("actuator_lag", "delay"),
+)
+"""Effects that a diagnosis can name; the catalogue holds more, for cards and FMUs."""
 PEAKS = 3
 """Periodogram peaks that become candidates, for each periodic effect."""
 
@@ -65,7 +69,7 @@ class Span:
 
 
 def candidates(
-    mount: Mount, prepared: Prepared, residual: Array, level: Array, only: Collection[str] = tuple(CATALOGUE)
+    mount: Mount, prepared: Prepared, residual: Array, level: Array, only: Collection[str] = TRIED
 ) -> list[Candidate]:
     """List what is worth trying of `only` these effects, given the torque residual at the kept rows."""
     q, v = prepared.stacked("q"), prepared.stacked("v")

@@ -15,7 +15,7 @@ from cosim.diagnosis.locate import regions
 from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare, quality
 from cosim.diagnosis.protocol import CLEAR_MOTION, Structures, heldout_rms, judge, traces
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
-from cosim.diagnosis.sanity import check_units
+from cosim.diagnosis.sanity import check_effects, check_units
 from cosim.diagnosis.select import select
 from cosim.diagnosis.trial import Problem
 from cosim.recording import Recording
@@ -48,9 +48,11 @@ def diagnose(train: Sequence[Recording], heldout: Recording, card: Card, say: Sa
         say: told, in a few words, what is being done.
 
     Raises:
+        InputError: the card holds an effect that a diagnosis cannot take into account yet.
         RecordingError: the recordings cannot belong to this card (units), or are too short.
     """
     started, mount = time.perf_counter(), card.plant()
+    check_effects(mount)
     check_units([*train, heldout], mount)
     cutoff = choose_cutoff(train, card.mount.inertia)
     prepared = prepare(train, cutoff)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.diagnosis.candidates import candidates, columns_of
+from cosim.diagnosis.candidates import TRIED, candidates, columns_of
 from cosim.diagnosis.challenge import Place
 from cosim.diagnosis.evidence import Blocks
 from cosim.diagnosis.fit import Fit
@@ -133,7 +133,7 @@ def rival_finding(rival: Trial, place: Place, mount: Mount) -> Finding:
 def not_found(
     chosen: Fit, prepared: Prepared, weight: Array, looked_at: Mapping[str, Trial], named: Sequence[str]
 ) -> list[Finding]:
-    """One finding for each effect of the catalogue that is not named: not seen from which size, or not testable."""
+    """One finding for each effect that is tried and not named: not seen from which size, or not testable."""
     nuisance = nuisances(chosen, prepared)
     tried = candidates(chosen.mount, prepared, chosen.residual, np.abs(nuisance.level))
     columns = columns_of(chosen.mount, tried, prepared, chosen.values)
@@ -144,7 +144,7 @@ def not_found(
         if candidate.effect in ("delay", "actuator_lag"):
             size *= getattr(candidate.instances[0], MAIN[candidate.effect][0])
         smallest[candidate.effect] = min(size, smallest.get(candidate.effect, np.inf))
-    rest = [name for name in CATALOGUE if name not in named]
+    rest = [name for name in TRIED if name not in named]
     return [_absent(name, smallest.get(name), looked_at.get(name), chosen.mount, prepared) for name in rest]
 
 

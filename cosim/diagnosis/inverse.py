@@ -19,7 +19,7 @@ from scipy.linalg import solve_banded
 from cosim.diagnosis.prepare import Array, Piece
 from cosim.diagnosis.rowwise import Rowwise, Stepwise
 from pyfmi_models.effects import DriveEffect
-from pyfmi_models.model import symbols_of, with_symbols
+from pyfmi_models.model import structure_of, symbols_of, with_symbols
 from pyfmi_models.mount import Mount
 
 
@@ -42,7 +42,8 @@ class Inverse:
 
     @cached_property
     def _equations(self) -> "Equations":
-        key = (self.mount.motion, self.names, self.free, *(type(part) for part in self.mount.components().values()))
+        parts = [(type(part), *structure_of(part).values()) for part in self.mount.components().values()]
+        key = (self.mount.motion, self.names, self.free, *parts)
         if key not in _KNOWN:
             _KNOWN[key] = Equations(self.mount, self.free)
         return _KNOWN[key]

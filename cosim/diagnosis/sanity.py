@@ -1,12 +1,14 @@
-"""Can these recordings belong to this card? Units that cannot be right are refused before anything is fitted."""
+"""Can these recordings be held against this card? What cannot be right is refused before anything is fitted."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from cosim.diagnosis.prepare import lowpass, prepare
-from cosim.errors import RecordingError
+from cosim.errors import InputError, RecordingError
 from cosim.recording import Recording
+from pyfmi_models.effects import ActuatorLag, Delay, Effect, FrictionEffect, LoadEffect
+from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.mount import Mount
 
 LEAST_SECONDS = 8.0
@@ -14,6 +16,22 @@ RATIOS = {"deg": 57.2958, "arcmin": 3437.75, "arcsec": 206264.8, "mrad": 1000.0,
 LINEAR_RATIOS = {"mm": 1e3, "um": 1e6}
 SPREAD = 2.2
 """An inertia within this factor of the card's, once a unit is undone, gives the unit away."""
+
+
+def check_effects(mount: Mount) -> None:
+    """Refuse a card with an effect that the torque needed for a recorded motion does not hold yet (InputError)."""
+    for effect in mount.effects:
+        if not _is_held(effect):
+            text = (
+                f"The card holds {effect.id}, which a diagnosis cannot take into account yet; take it out of the card."
+            )
+            raise InputError(text, culprit=effect.id)
+
+
+def _is_held(effect: Effect) -> bool:
+    """Whether `Inverse` holds an effect: linear drives, and what follows from the motion of this moment alone."""
+    momentary = isinstance(effect, LoadEffect | FrictionEffect) and not isinstance(effect, Presliding)
+    return isinstance(effect, ActuatorLag | Delay) or (momentary and not effect.states() and not effect.inputs())
 
 
 def check_units(recordings: Sequence[Recording], mount: Mount) -> None:

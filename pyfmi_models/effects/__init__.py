@@ -1,11 +1,24 @@
-"""Kinds of physics a model may lack, one a file.
+"""Kinds of physics a model may lack, one a file; every file of this folder is found by itself.
 
 `CATALOGUE` maps the id used in cards and answers to the forms of that effect: usually one class, several where the
 same physics has more than one shape (a rough spot, a periodic rise). A form is found by the names of its parameters.
 """
 
+from pyfmi_models.discovery import classes_in
 from pyfmi_models.effects.actuator_lag import ActuatorLag
-from pyfmi_models.effects.base import DriveEffect, Effect, FrictionEffect, LoadEffect, Motion
+from pyfmi_models.effects.base import (
+    ClockEffect,
+    Coupling,
+    DriveEffect,
+    Effect,
+    FrictionEffect,
+    InertiaEffect,
+    LoadEffect,
+    Motion,
+    MotionEffect,
+    PayloadEffect,
+    SensorEffect,
+)
 from pyfmi_models.effects.cogging import Cogging
 from pyfmi_models.effects.delay import Delay
 from pyfmi_models.effects.friction_asymmetry import FrictionAsymmetry
@@ -14,37 +27,34 @@ from pyfmi_models.effects.position_friction import LocalFriction, PeriodicFricti
 from pyfmi_models.effects.stribeck import StribeckEffect
 from pyfmi_models.effects.torque_offset import TorqueOffset
 
-FORMS: tuple[type[Effect], ...] = (
-    StribeckEffect,
-    FrictionAsymmetry,
-    PeriodicFriction,
-    LocalFriction,
-    Cogging,
-    GravityUnbalance,
-    TorqueOffset,
-    ActuatorLag,
-    Delay,
-)
+FORMS: tuple[type[Effect], ...] = classes_in(__name__, __path__, Effect, "id")
 
 CATALOGUE: dict[str, tuple[type[Effect], ...]] = {}
 for _form in FORMS:
     CATALOGUE[_form.id] = (*CATALOGUE.get(_form.id, ()), _form)
 
+# The contract, and the effects that other rooms name; a new effect needs no line here.
 __all__ = [
     "CATALOGUE",
     "FORMS",
     "ActuatorLag",
+    "ClockEffect",
     "Cogging",
+    "Coupling",
     "Delay",
     "DriveEffect",
     "Effect",
     "FrictionAsymmetry",
     "FrictionEffect",
     "GravityUnbalance",
+    "InertiaEffect",
     "LoadEffect",
     "LocalFriction",
     "Motion",
+    "MotionEffect",
+    "PayloadEffect",
     "PeriodicFriction",
+    "SensorEffect",
     "StribeckEffect",
     "TorqueOffset",
 ]

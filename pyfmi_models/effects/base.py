@@ -1,32 +1,50 @@
 """The contract of an effect: one kind of physics that a model may lack.
 
-An effect is written once and used twice: the mount adds its equations to the plant, and the diagnosis asks how the
-torque a recording needs would change with it. It acts in one of three places:
+An effect is written once and used everywhere: the mount adds its equations to the plant, and the diagnosis asks how the
+torque a recording needs would change with it. It acts in one of these places, in the order in which torque becomes
+a reading:
 
-    DriveEffect     between commanded and applied torque
-    FrictionEffect  on the level or the viscous part of friction
-    LoadEffect      a torque that resists, beside friction
+    DriveEffect      torque path: between commanded and applied torque
+    FrictionEffect   on the contact, the level or the viscous part of friction
+    LoadEffect       a torque that resists, beside friction; a PayloadEffect also presses on the bearings
+    InertiaEffect    on the inertia
+    Coupling         splits the inertia in two, with something between that is not rigid
+    SensorEffect     sensor path: between true position and encoder reading
+    ClockEffect      on the time stamps of a recording
 
-Signs: an effect torque resists, J q'' = tau - tau_f - loads - effects.
+Signs: an effect torque resists, J q'' = tau - tau_f - loads - effects. Effects of one place act in the card's order.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
+from pyfmi_models.friction.base import FrictionLaw
 from pyfmi_models.model import Scalar, Variable
+
+NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 class Motion(NamedTuple):
-    """Where the axis is: time [s], position [rad or m], speed, and position as an angle that repeats once per turn."""
+    """Where the axis is, and whatever else the effect that is asked may look at.
+
+    Time [s], position [rad or m], speed, and position as an angle that repeats once per turn of a rotary axis and once
+    per metre of a linear one; values of the inputs that effects declare, by name; torque of the weights on the axis
+    [N m]; the states of the effect that is asked, a column in the order of its `states()`.
+    """
 
     t: Scalar
     q: Scalar
     v: Scalar
     angle: Scalar
+    inputs: Mapping[str, Scalar] = NOTHING
+    payload: Scalar = 0.0
+    state: Any = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,23 +57,56 @@ class Effect:
     told_apart_by: ClassVar[str] = ""
     action: ClassVar[str] = ""
 
+    def states(self) -> tuple[Variable, ...]:
+        """Name the effect's own states."""
+        return ()
+
+    def inputs(self) -> tuple[Variable, ...]:
+        """Name the plant inputs that the effect reads; effects that name the same input share it."""
+        return ()
+
+    def broken_rule(self) -> str:
+        """Say which rule between the parameters these numbers break; empty if none."""
+        return ""
+
     def statement(self, unit: str = "N·m") -> str:
         """Say what the effect with these numbers is, in one plain sentence; `unit` is the torque or force unit."""
         raise TypeError(f"{type(self).__name__} has no statement")
 
 
 @dataclass(frozen=True, kw_only=True)
-class LoadEffect(Effect):
-    """A torque beside friction that resists."""
+class DriveEffect(Effect):
+    """Dynamics or limits between the commanded and the applied torque."""
 
-    def load(self, motion: Motion) -> Scalar:
-        """Resisting torque [N m]."""
-        raise TypeError(f"{type(self).__name__} has no load")
+    def rate(self, state: Any, command: Scalar) -> Any:
+        """Time derivative of the states under a command [N m], a column."""
+        return ca.SX(0, 1)
+
+    def applied(self, state: Any, command: Scalar) -> Scalar:
+        """Torque applied to the axis [N m]."""
+        return command
+
+    def response(self, omega: npt.NDArray[np.float64]) -> npt.NDArray[np.complex128]:
+        """Frequency response from a small command to applied torque at angular frequencies omega [rad/s]."""
+        return np.ones_like(omega, dtype=np.complex128)
 
 
 @dataclass(frozen=True, kw_only=True)
-class FrictionEffect(Effect):
-    """A change of the friction level or of the viscous torque."""
+class MotionEffect(Effect):
+    """An effect that depends on the motion of the axis, and may remember it in states of its own."""
+
+    def rate(self, motion: Motion) -> Any:
+        """Time derivative of the states, a column."""
+        return ca.SX(0, 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionEffect(MotionEffect):
+    """A change of the contact, of the friction level or of the viscous torque."""
+
+    def law(self, law: FrictionLaw) -> FrictionLaw:
+        """Return the law that replaces `law`."""
+        return law
 
     def level(self, level: Scalar, motion: Motion) -> Scalar:
         """Return the friction level [N m] that replaces `level`."""
@@ -67,21 +118,69 @@ class FrictionEffect(Effect):
 
 
 @dataclass(frozen=True, kw_only=True)
-class DriveEffect(Effect):
-    """Dynamics between the commanded and the applied torque."""
+class LoadEffect(MotionEffect):
+    """A torque beside friction that resists."""
+
+    def load(self, motion: Motion) -> Scalar:
+        """Resisting torque [N m]."""
+        raise TypeError(f"{type(self).__name__} has no load")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PayloadEffect(LoadEffect):
+    """A weight on the axis: beside its torque it presses on the bearings, which friction may feel."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class InertiaEffect(MotionEffect):
+    """An inertia that changes with the position, on the side of the encoder."""
+
+    def inertia(self, inertia: Scalar, motion: Motion) -> Scalar:
+        """Return the inertia [kg m2] that replaces `inertia`; its slope over position is the mount's business."""
+        return inertia
+
+
+@dataclass(frozen=True, kw_only=True)
+class Coupling(Effect):
+    """A place where the axis is not rigid: part of the inertia hangs behind a spring or a play.
+
+    Drive torque, friction, loads and encoder stay on the near side. Several couplings stand in a row, each splitting
+    what is behind the one before. The twist is near minus far position; its start is 0, so both sides start together.
+    """
 
     def states(self) -> tuple[Variable, ...]:
-        """Name the states of the drive dynamics."""
-        return ()
+        """Twist and its rate."""
+        return (
+            Variable(name="twist", unit="rad", description="Near side minus far side", nominal=1e-3),
+            Variable(name="twist_rate", unit="rad/s", description="Rate of the twist", nominal=0.01),
+        )
 
-    def rate(self, state: Any, command: Scalar) -> Any:
-        """Time derivative of the states under a command [N m], a column."""
-        return ca.SX(0, 1)
+    def share(self) -> Scalar:
+        """Share of the inertia it carries that is on the far side, between 0 and 1."""
+        raise TypeError(f"{type(self).__name__} has no share")
 
-    def applied(self, state: Any, command: Scalar) -> Scalar:
-        """Torque applied to the axis [N m]."""
-        return command
+    def torque(self, twist: Scalar, rate: Scalar, far: Scalar) -> Scalar:
+        """Torque passed on to the far side [N m], whose inertia is `far` [kg m2]."""
+        raise TypeError(f"{type(self).__name__} has no torque")
 
-    def response(self, omega: npt.NDArray[np.float64]) -> npt.NDArray[np.complex128]:
-        """Frequency response from command to applied torque at angular frequencies omega [rad/s]."""
-        return np.ones_like(omega, dtype=np.complex128)
+    def drag(self, speed: Scalar) -> Scalar:
+        """Friction torque on the far side [N m] at its speed, resists."""
+        return 0 * speed
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensorEffect(MotionEffect):
+    """An error between the true position and what the encoder reads."""
+
+    def reading(self, reading: Scalar, motion: Motion) -> Scalar:
+        """Return the reading [rad or m] that replaces `reading`."""
+        return reading
+
+
+@dataclass(frozen=True, kw_only=True)
+class ClockEffect(MotionEffect):
+    """Two clocks: the reading in a row of a recording was taken later or earlier than its torque."""
+
+    def ahead(self, motion: Motion) -> Scalar:
+        """Seconds by which the reading runs ahead of the torque beside it."""
+        return 0 * motion.t

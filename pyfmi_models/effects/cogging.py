@@ -1,22 +1,27 @@
 """Torque ripple locked to position."""
 
 from dataclasses import dataclass
+from functools import cache
+from math import pi
 from typing import ClassVar
 
 import casadi as ca
+import numpy as np
 
 from pyfmi_models.effects.base import LoadEffect, Motion
-from pyfmi_models.model import Scalar, parameter
+from pyfmi_models.model import Scalar, parameter, structure
 
 
 @dataclass(frozen=True, kw_only=True)
 class Cogging(LoadEffect):
     """Torque periodic in position, the same in both directions and at every speed.
 
-        torque = amplitude cos(cycles angle + phase)
+        torque = amplitude w(a) / half,   w(a) = sin(a) + h2 sin(2 a) + h3 sin(3 a) + ...,
+        a = cycles angle + phase + pi/2
 
-    The angle repeats once per turn of a rotary axis and once per metre of a linear one. A further harmonic is a
-    further effect of the same kind.
+    so without harmonics amplitude cos(cycles angle + phase). `half` is half the peak-to-peak value of w, which leaves
+    that of the torque at `amplitude`. The angle repeats once per turn of a rotary axis and once per metre of a linear
+    one. A ripple whose harmonics have phases of their own is several effects of this kind.
     """
 
     id: ClassVar[str] = "cogging"
@@ -27,12 +32,28 @@ class Cogging(LoadEffect):
     cycles_per_rev: Scalar = parameter("1", "Ripple cycles per turn (per metre of a linear axis)", low=0)
     amplitude: Scalar = parameter("N.m", "Half the peak-to-peak torque", low=0)
     phase: Scalar = parameter("rad", "Phase at position zero", default=0.0)
+    harmonics: tuple[float, ...] = structure(
+        "1", "Second, third, ... harmonic, relative to the first", low=-100, high=100
+    )
 
     def load(self, motion: Motion) -> Scalar:
-        """`amplitude cos(cycles angle + phase)`."""
-        return self.amplitude * ca.cos(self.cycles_per_rev * motion.angle + self.phase)
+        """The equation above."""
+        turn = self.cycles_per_rev * motion.angle + self.phase
+        return self.amplitude / _half(self.harmonics) * _wave(turn, self.harmonics)
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         per = "metre" if unit == "N" else "turn"
         return f"The motor tugs {self.cycles_per_rev:.5g} times per {per}, {self.amplitude:.3g} {unit} each way."
+
+
+def _wave(turn: Scalar, harmonics: tuple[float, ...]) -> Scalar:
+    overtones = (share * ca.sin(k * (turn + pi / 2)) for k, share in enumerate(harmonics, 2))
+    return ca.cos(turn) + sum(overtones)
+
+
+@cache
+def _half(harmonics: tuple[float, ...]) -> float:
+    """Half the peak-to-peak value of the wave."""
+    turns = np.linspace(0, 2 * pi, 1024 * (len(harmonics) + 1), endpoint=False)
+    return float(np.ptp(ca.DM(_wave(turns, harmonics)).full())) / 2 if harmonics else 1.0

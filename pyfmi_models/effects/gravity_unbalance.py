@@ -5,12 +5,12 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import LoadEffect, Motion
+from pyfmi_models.effects.base import Motion, PayloadEffect
 from pyfmi_models.model import Scalar, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class GravityUnbalance(LoadEffect):
+class GravityUnbalance(PayloadEffect):
     """Weight of a load off the axis: torque = mgl sin(angle + phase), resisting."""
 
     id: ClassVar[str] = "gravity_unbalance"

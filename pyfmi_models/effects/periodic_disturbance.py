@@ -1,0 +1,32 @@
+"""A torque that comes and goes with time."""
+
+from dataclasses import dataclass
+from math import pi
+from typing import ClassVar
+
+import casadi as ca
+
+from pyfmi_models.effects.base import LoadEffect, Motion
+from pyfmi_models.model import Scalar, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class PeriodicDisturbance(LoadEffect):
+    """External torque periodic in time: torque = amplitude sin(2 pi f t + phase), t the time of the simulation."""
+
+    id: ClassVar[str] = "periodic_disturbance"
+    title: ClassVar[str] = "Periodic disturbance"
+    rivals: ClassVar[tuple[str, ...]] = ("cogging", "compliance")
+    told_apart_by: ClassVar[str] = "its frequency stays when the speed changes; that of cogging follows the speed"
+    action: ClassVar[str] = "Look for fans, pumps or a machine next door that runs at this frequency."
+    frequency_hz: Scalar = parameter("Hz", "Frequency", low=1e-4, high=1e4)
+    amplitude: Scalar = parameter("N.m", "Half the peak-to-peak torque", low=0)
+    phase: Scalar = parameter("rad", "Phase at time zero", default=0.0)
+
+    def load(self, motion: Motion) -> Scalar:
+        """`amplitude sin(2 pi f t + phase)`."""
+        return self.amplitude * ca.sin(2 * pi * self.frequency_hz * motion.t + self.phase)
+
+    def statement(self, unit: str = "N·m") -> str:
+        """Say it to a mechanic."""
+        return f"Something shakes the axis {self.frequency_hz:.3g} times a second with {self.amplitude:.3g} {unit}."

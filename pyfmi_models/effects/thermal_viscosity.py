@@ -1,0 +1,83 @@
+"""Friction that drifts with temperature."""
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import casadi as ca
+
+from pyfmi_models.effects.base import FrictionEffect, Motion
+from pyfmi_models.model import Scalar, Variable, parameter
+
+REFERENCE = 20.0
+"""Temperature [degC] at which the card's friction holds."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ThermalViscosity(FrictionEffect):
+    """Viscous torque times exp(kv (T - 20 degC)), friction level times exp(kc (T - 20 degC)).
+
+    T is the plant's input `temperature`. To first order the exponents are the relative change per degree at 20 degC.
+    Reference: exponential viscosity law of Reynolds, Phil. Trans. R. Soc. 177 (1886) 157.
+    """
+
+    id: ClassVar[str] = "thermal_viscosity"
+    title: ClassVar[str] = "Thermal friction"
+    rivals: ClassVar[tuple[str, ...]] = ("quadratic_drag",)
+    told_apart_by: ClassVar[str] = "the same fast move differs early and late, cold and warm; drag does not"
+    action: ClassVar[str] = "Warm the axis up before identification, or record the temperature with it."
+    viscous_per_degC: Scalar = parameter("1/K", "Relative change of viscous friction per degree", low=-1, high=1)
+    coulomb_per_degC: Scalar = parameter(
+        "1/K", "Relative change of the friction level per degree", default=0.0, low=-1, high=1
+    )
+
+    def inputs(self) -> tuple[Variable, ...]:
+        """The temperature."""
+        return (Variable(name="temperature", unit="degC", description="Temperature of the bearing", start=REFERENCE),)
+
+    def warmth(self, motion: Motion) -> Scalar:
+        """`T - 20 degC`."""
+        return motion.inputs["temperature"] - REFERENCE
+
+    def level(self, level: Scalar, motion: Motion) -> Scalar:
+        """`level exp(kc (T - 20))`."""
+        return level * ca.exp(self.coulomb_per_degC * self.warmth(motion))
+
+    def viscous(self, viscous: Scalar, motion: Motion) -> Scalar:
+        """`viscous exp(kv (T - 20))`."""
+        return viscous * ca.exp(self.viscous_per_degC * self.warmth(motion))
+
+    def statement(self, unit: str = "N·m") -> str:
+        """Say it to a mechanic."""
+        parts = {"Viscous friction": self.viscous_per_degC, "Sliding friction": self.coulomb_per_degC}
+        said = [f"{name} {_change(value)} per degree" for name, value in parts.items() if value]
+        return " and ".join([*said[:1], *(text.lower() for text in said[1:])] or ["Friction keeps its size"]) + "."
+
+
+@dataclass(frozen=True, kw_only=True)
+class WarmingViscosity(ThermalViscosity):
+    """The same where friction heats the bearing above its surroundings: T = `temperature` + rise.
+
+        rise' = (warm_up_degC - rise) / warm_up_s
+
+    `rise` starts cold, at 0; set its start to begin warm. The rise follows time, not friction power: the bearing is
+    taken to be in use all the while.
+    """
+
+    warm_up_degC: Scalar = parameter("K", "Rise of temperature once warm", low=0, high=200)
+    warm_up_s: Scalar = parameter("s", "Time constant of warming up", default=600.0, low=1e-3)
+
+    def states(self) -> tuple[Variable, ...]:
+        """One state: how much warmer than `temperature` the bearing is."""
+        return (Variable(name="rise", unit="K", description="Rise of temperature in use"),)
+
+    def rate(self, motion: Motion) -> Any:
+        """`(warm_up_degC - rise) / warm_up_s`."""
+        return (self.warm_up_degC - motion.state[0]) / self.warm_up_s
+
+    def warmth(self, motion: Motion) -> Scalar:
+        """`temperature + rise - 20 degC`."""
+        return super().warmth(motion) + motion.state[0]
+
+
+def _change(per_degree: float) -> str:
+    return f"{'grows' if per_degree > 0 else 'falls'} by {100 * abs(per_degree):.2g} %"

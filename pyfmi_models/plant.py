@@ -1,0 +1,130 @@
+"""The plant: a mount as a continuous `Model`, from torque path over mechanics to sensor path.
+
+Bodies stand in a row: the axis, on which drive, friction, loads and encoder act, and behind each coupling one more. All
+positions but that of the axis are kept as twists, which start at zero wherever the axis starts.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+
+from pyfmi_models.effects.base import ClockEffect, Coupling, Effect, Motion, MotionEffect, SensorEffect
+from pyfmi_models.friction.base import FrictionLaw
+from pyfmi_models.model import Model, Scalar, Variable, symbols_of
+
+if TYPE_CHECKING:
+    from pyfmi_models.mount import Mount
+
+States = dict[str, tuple[Variable, ...]]
+
+
+def plant(mount: "Mount") -> Model:
+    """Write the equations of a mount; `q_true`, `q_load`, `q_recorded` are outputs where they differ from `q`."""
+    states, inputs, parameters = _states(mount), _inputs(mount), mount.parameters()
+    t, x, u = ca.SX.sym("t"), ca.SX.sym("x", sum(map(len, states.values()))), ca.SX.sym("u", len(inputs))
+    p, symbols = symbols_of(parameters)
+    given = {variable.name: u[k] for k, variable in enumerate(inputs)}
+    own = _shared_out(x, states)
+    q, v = own["axis"][0], own["axis"][1]
+
+    this = mount.with_symbols(symbols, v)
+    motion = this.at(t, q, v, given)
+    applied, rates = this.applied(given["tau"], own)
+    level = this.level(motion, own)
+    friction = this.law.contact(own["friction"], v, level) + this.viscous(motion, own)
+    push = applied - friction - this.loads(motion, own) - given["disturbance"]
+    acceleration, twisting = _accelerations(this, motion, push, own)
+
+    rates |= {name: effect.rate(motion._replace(state=own[name])) for name, effect in this.of_kind(MotionEffect)}
+    rates |= {"axis": ca.vertcat(v, acceleration), "friction": this.law.rate(own["friction"], v, level), **twisting}
+    shown = {"q": this.reading(motion, own), "v": v, "friction": friction, "applied": applied}
+    shown |= _further(this, motion, acceleration, own)
+    following = ca.vertcat(*(rates[name] for name in states))
+    return Model(
+        name=f"{mount.name}_plant",
+        description=f"{mount.name}: one axis with {mount.friction.key} friction",
+        inputs=inputs,
+        parameters=parameters,
+        states=tuple(variable for part in states.values() for variable in part),
+        outputs=tuple(mount.in_axis_units(_OUTPUTS[name]) for name in shown),
+        equations=ca.Function(
+            "equations", [t, x, u, p], [following, ca.vertcat(*shown.values())], ["t", "x", "u", "p"], ["next", "y"]
+        ),
+    )
+
+
+def _accelerations(
+    this: "Mount", motion: Motion, push: Scalar, own: Mapping[str, Any]
+) -> tuple[Scalar, dict[str, Any]]:
+    """Newton for each body in the row: acceleration of the axis, and the rates of the couplings' states."""
+    inertia, speed, bodies = this.axis.inertia, motion.v, []
+    for name, coupling in this.of_kind(Coupling):
+        twist, rate = own[name][0], own[name][1]
+        far = inertia * coupling.share()
+        passed = coupling.torque(twist, rate, far)
+        bodies.append((inertia - far, push - passed))
+        speed = speed - rate
+        inertia, push = far, passed - coupling.drag(speed)
+    bodies.append((inertia, push))
+    near = this.inertia(bodies[0][0], motion, own)
+    bodies[0] = (near, bodies[0][1] - ca.jacobian(near, motion.q) * motion.v**2 / 2)
+    found = [torque / inertia for inertia, torque in bodies]
+    names = [name for name, _ in this.of_kind(Coupling)]
+    return found[0], {name: ca.vertcat(own[name][1], found[k] - found[k + 1]) for k, name in enumerate(names)}
+
+
+def _further(this: "Mount", motion: Motion, acceleration: Scalar, own: Mapping[str, Any]) -> dict[str, Scalar]:
+    """Positions that are not the reading, where effects part them."""
+    found = {}
+    if any(this.of_kind(SensorEffect)):
+        found["q_true"] = motion.q
+    if any(this.of_kind(Coupling)):
+        found["q_load"] = motion.q - sum(own[name][0] for name, _ in this.of_kind(Coupling))
+    if any(this.of_kind(ClockEffect)):
+        ahead = this.ahead(motion, own)
+        later = motion.q + ahead * motion.v + ahead**2 / 2 * acceleration
+        found["q_recorded"] = this.reading(this.at(motion.t, later, motion.v, motion.inputs), own)
+    return found
+
+
+def _states(mount: "Mount") -> States:
+    """States by owner: the axis, the friction law, then the effects in their order."""
+    axis = (
+        Variable(name="position", unit="rad", description="Position of the axis"),
+        Variable(name="speed", unit="rad/s", description="Speed of the axis", nominal=0.01),
+    )
+    owners: dict[str, FrictionLaw | Effect] = {"friction": mount.law, **dict(mount.of_kind(Effect))}
+    named = {name: tuple(replace(s, name=f"{name}.{s.name}") for s in part.states()) for name, part in owners.items()}
+    found = {"axis": axis, **named}
+    return {name: tuple(mount.in_axis_units(state) for state in states) for name, states in found.items()}
+
+
+def _inputs(mount: "Mount") -> tuple[Variable, ...]:
+    tau = Variable(name="tau", unit="N.m", description="Commanded torque, drives")
+    disturbance = Variable(name="disturbance", unit="N.m", description="External torque, resists")
+    return tuple(mount.in_axis_units(variable) for variable in (tau, disturbance, *mount.inputs()))
+
+
+_OUTPUTS = {
+    variable.name: variable
+    for variable in (
+        Variable(name="q", unit="rad", description="Position"),
+        Variable(name="v", unit="rad/s", description="Speed"),
+        Variable(name="friction", unit="N.m", description="Friction torque, resists"),
+        Variable(name="applied", unit="N.m", description="Torque applied to the axis by the drive"),
+        Variable(name="q_true", unit="rad", description="Position of the axis, without the errors of the encoder"),
+        Variable(name="q_load", unit="rad", description="Position of the far side of the drive"),
+        Variable(name="q_recorded", unit="rad", description="Reading as recorded beside this moment's torque"),
+    )
+}
+
+
+def _shared_out(x: Any, states: States) -> dict[str, Any]:
+    """Parts of the column of all states, by owner."""
+    ends, parts = 0, {}
+    for name, variables in states.items():
+        parts[name] = x[ends : ends + len(variables)]
+        ends += len(variables)
+    return parts

@@ -1,0 +1,107 @@
+"""Every form of effect of the catalogue with numbers, and small tools to ask a plant with it.
+
+A new effect is met by all property tests at once: what `NUMBERS` does not say is taken from inside its bounds.
+"""
+
+from dataclasses import MISSING, fields
+from itertools import pairwise
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from pyfmi_models.effects import FORMS, Effect
+from pyfmi_models.friction import Coulomb, FrictionLaw
+from pyfmi_models.model import Model, Variable
+from pyfmi_models.mount import Axis, Mount
+
+NUMBERS: dict[str, dict[str, Any]] = {
+    "FrictionAsymmetry": {"level_asymmetry": 0.1, "viscous_asymmetry": -0.2},
+    "StribeckEffect": {"Fs": 4.0, "Vs": 0.02},
+    "Presliding": {"sigma0": 2e4, "sigma1": 90.0},
+    "Cogging": {"cycles_per_rev": 24, "amplitude": 0.5, "phase": 0.3, "harmonics": (0.4, -0.2)},
+    "PeriodicFriction": {"cycles_per_rev": 3, "relative_amplitude": 0.2, "phase": 0.4},
+    "LocalFriction": {"q_center": 1.0, "width": 0.05, "relative_amplitude": 0.3},
+    "GravityUnbalance": {"mgl": 1.5, "phase": 0.2},
+    "TorqueOffset": {"torque": 0.7},
+    "ThermalViscosity": {"viscous_per_degC": -0.04, "coulomb_per_degC": -0.02},
+    "WarmingViscosity": {"viscous_per_degC": -0.04, "warm_up_degC": 15.0, "warm_up_s": 30.0},
+    "DwellBreakaway": {"torque_per_efold": 0.3},
+    "Compliance": {"antiresonance_hz": 20.0, "resonance_hz": 25.0},
+    "ActuatorLag": {"time_constant_ms": 4.0},
+    "Delay": {"delay_ms": 4.0},
+    "Backlash": {"gap_rad": 1e-2, "load_friction": 0.1},
+    "EncoderEccentricity": {"cycles_per_rev": 8, "amplitude_rad": 1e-3, "phase": 0.3, "second": 0.2},
+    "QuadraticDrag": {"coefficient": 2.0},
+    "CableWrap": {"stiffness": 3.0, "home": 0.2, "hardening": 0.5},
+    "InertiaVariation": {"relative_amplitude": 0.3, "cycles_per_rev": 2, "phase": 0.4},
+    "LoadDependentFriction": {"coulomb_per_Nm": 0.2},
+    "TorqueSaturation": {"knee_torque": 5.0, "slope": 0.4},
+    "PeriodicDisturbance": {"frequency_hz": 3.0, "amplitude": 0.6, "phase": 0.2},
+    "ClockSkew": {"drift_ppm": 100.0, "offset_ms": 4.0},
+}
+LAW = Coulomb(Fc=1.0, sigma2=3.0)
+INERTIA = 2.0
+
+
+def inside(variable: Variable) -> float:
+    """A number that a parameter may have: its nominal, or the middle of its bounds."""
+    fits = variable.low < variable.nominal < variable.high
+    return variable.nominal if fits else (variable.low + variable.high) / 2
+
+
+def example(form: type[Effect]) -> Effect:
+    """Return an effect with the numbers above where there are any."""
+    required = {item.name: item for item in fields(form) if item.default is MISSING}
+    guessed = {name: inside(item.metadata["variable"]) for name, item in required.items()}
+    return form(**(guessed | NUMBERS.get(form.__name__, {})))
+
+
+EXAMPLES: tuple[Effect, ...] = tuple(example(form) for form in FORMS)
+
+
+def of_kind(*kinds: type[Effect]) -> list[Effect]:
+    return [one for one in EXAMPLES if isinstance(one, kinds)]
+
+
+def mount(*effects: Effect, friction: FrictionLaw = LAW, **changes: Any) -> Mount:
+    """An axis of 2 kg m2 with Coulomb friction of 1 N m and 3 N m s/rad."""
+    return Mount(**({"name": "m", "axis": Axis(inertia=INERTIA), "friction": friction, "effects": effects} | changes))
+
+
+def evaluate(model: Model, t: float = 0.0, **values: float) -> dict[str, float]:
+    """Rates `der(state)` and outputs at values of states, inputs and parameters; others are at their start."""
+    columns = [model.states, model.inputs, model.parameters]
+    unknown = set(values) - {variable.name for column in columns for variable in column}
+    assert not unknown, unknown
+    x, u, p = ([values.get(variable.name, variable.start) for variable in column] for column in columns)
+    rates, outputs = (part.full().ravel().tolist() for part in model.equations(t, x, u, p))
+    names = [f"der({state.name})" for state in model.states]
+    return dict(zip(names, rates, strict=True)) | dict(zip((o.name for o in model.outputs), outputs, strict=True))
+
+
+def slopes(model: Model) -> ca.Function:
+    """Rates and outputs, and their derivatives by (t, x, u, p), from one column of all of these."""
+    sizes = [1, len(model.states), len(model.inputs), len(model.parameters)]
+    z = ca.SX.sym("z", sum(sizes))
+    ends = np.cumsum([0, *sizes])
+    parts = [z[first:last] for first, last in pairwise(ends)]
+    values = ca.densify(ca.vertcat(*model.equations(*parts)))
+    return ca.Function("slopes", [z], [values, ca.densify(ca.jacobian(values, z))])
+
+
+def linear(model: Model, output: str = "q", **at: float) -> tuple[np.ndarray, ...]:
+    """Matrices (A, B, C, D) from tau to an output around a point, from the exact derivatives."""
+    states, inputs = [s.name for s in model.states], [u.name for u in model.inputs]
+    variables = (*model.states, *model.inputs, *model.parameters)
+    z = [0.0, *(at.get(variable.name, variable.start) for variable in variables)]
+    jacobian = slopes(model)(z)[1].full()
+    n, tau = len(states), 1 + len(states) + inputs.index("tau")
+    row = n + [o.name for o in model.outputs].index(output)
+    return jacobian[:n, 1 : 1 + n], jacobian[:n, tau], jacobian[row, 1 : 1 + n], jacobian[row, tau]
+
+
+def response(model: Model, hertz: float, output: str = "q", **at: float) -> complex:
+    """Frequency response from tau to an output."""
+    A, B, C, D = linear(model, output, **at)
+    return complex(C @ np.linalg.solve(2j * np.pi * hertz * np.eye(len(A)) - A, B) + D)

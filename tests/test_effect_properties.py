@@ -1,0 +1,164 @@
+"""What holds for every effect of the catalogue; a new one is met here by itself."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from effect_examples import EXAMPLES, INERTIA, LAW, NUMBERS, evaluate, mount, of_kind, slopes
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pyfmi_models.effects import (
+    CATALOGUE,
+    FORMS,
+    Coupling,
+    Effect,
+    FrictionEffect,
+    GravityUnbalance,
+    InertiaEffect,
+    LoadEffect,
+    SensorEffect,
+)
+from pyfmi_models.friction import Frictionless, LuGre
+from pyfmi_models.model import Model
+
+LUGRE = LuGre(sigma0=1e4, sigma1=200.0, sigma2=3.0, Fc=1.0, Fs=1.5, Vs=0.02)
+EACH = pytest.mark.parametrize("effect", EXAMPLES, ids=lambda one: type(one).__name__)
+WEIGHT = GravityUnbalance(mgl=2.0)
+"""On the axis everywhere, so that what depends on a load has one."""
+NEUTRAL = {
+    "FrictionAsymmetry": {"level_asymmetry": 0.0, "viscous_asymmetry": 0.0},
+    "Cogging": {"amplitude": 0.0},
+    "PeriodicFriction": {"relative_amplitude": 0.0},
+    "LocalFriction": {"relative_amplitude": 0.0},
+    "GravityUnbalance": {"mgl": 0.0},
+    "TorqueOffset": {"torque": 0.0},
+    "ThermalViscosity": {"viscous_per_degC": 0.0, "coulomb_per_degC": 0.0},
+    "WarmingViscosity": {"viscous_per_degC": 0.0},
+    "DwellBreakaway": {"torque_per_efold": 0.0},
+    "EncoderEccentricity": {"amplitude_rad": 0.0},
+    "QuadraticDrag": {"coefficient": 0.0},
+    "CableWrap": {"stiffness": 0.0},
+    "InertiaVariation": {"relative_amplitude": 0.0},
+    "LoadDependentFriction": {"coulomb_per_Nm": 0.0},
+    "TorqueSaturation": {"slope": 1.0},
+    "PeriodicDisturbance": {"amplitude": 0.0},
+    "ClockSkew": {"drift_ppm": 0.0, "offset_ms": 0.0},
+}
+"""Numbers that make an effect none; the others have no such numbers."""
+
+
+def points(model: Model, count: int, seed: int = 0) -> np.ndarray:
+    """Columns of (t, x, u, p): times from 0 to hours, speeds from rest to fast, states and inputs of all sizes."""
+    rng = np.random.default_rng(seed)
+    found = np.zeros((1 + len(model.states) + len(model.inputs) + len(model.parameters), count))
+    found[0] = rng.choice([0.0, 1.0, 1e4], count) * rng.random(count)
+    for row, variable in enumerate((*model.states, *model.inputs, *model.parameters), 1):
+        if row > len(model.states) + len(model.inputs):
+            found[row] = variable.start
+        else:
+            size = variable.nominal * rng.choice([0.0, 1e-6, 1.0, 30.0], count)
+            found[row] = np.clip(variable.start + size * rng.standard_normal(count), variable.low, variable.high)
+    found[2, ::4] = 0.0  # at rest
+    return found
+
+
+@EACH
+@pytest.mark.parametrize("law", [LAW, LUGRE, Frictionless()], ids=lambda law: law.key)
+def test_equations_and_derivatives_are_finite_also_at_rest(effect: Effect, law) -> None:
+    model = mount(effect, WEIGHT, friction=law).model()
+    function = slopes(model)
+    for z in points(model, 40).T:
+        assert all(np.all(np.isfinite(part.full())) for part in function(z)), z
+
+
+@EACH
+def test_derivatives_are_finite_differences(effect: Effect) -> None:
+    model = mount(effect, WEIGHT, friction=LUGRE).model()
+    function, rng = slopes(model), np.random.default_rng(1)
+    sizes = np.array([1.0, *(v.nominal if v.start == 0 else abs(v.start) for v in _all(model))])
+    starts = np.array([1.0, *(v.start for v in _all(model))])
+    for _ in range(10):
+        z = starts + 0.3 * sizes * rng.standard_normal(len(sizes)) * (rng.random(len(sizes)) < 0.7)
+        z[2] = 0.3 * sizes[2] * rng.standard_normal()  # away from rest, where friction has its kink
+        way, h = sizes * rng.standard_normal(len(sizes)), 1e-6
+        jacobian = function(z)[1].full()
+        difference = (function(z + h * way)[0] - function(z - h * way)[0]).full().ravel() / (2 * h)
+        scale = np.abs(jacobian) @ np.abs(way) + 1e-9
+        np.testing.assert_allclose(difference / scale, jacobian @ way / scale, atol=1e-5)
+
+
+def _all(model: Model):
+    return (*model.states, *model.inputs, *model.parameters)
+
+
+@pytest.mark.parametrize("name", NEUTRAL)
+def test_an_effect_of_no_size_is_none(name: str) -> None:
+    effect = replace(next(one for one in EXAMPLES if type(one).__name__ == name), **NEUTRAL[name])
+    with_it, without = mount(effect, WEIGHT).model(), mount(WEIGHT).model()
+    for q, v, tau in ((0.3, 0.2, 9.0), (-1.0, -0.01, -3.0), (0.0, 0.0, 1.0)):
+        values = {"position": q, "speed": v, "tau": tau}
+        expected = evaluate(without, 5.0, **values)
+        found = evaluate(with_it, 5.0, **values)
+        assert {key: found[key] for key in expected} == pytest.approx(expected, rel=1e-12, abs=1e-12)
+        assert all(found[one] == found["q"] for one in ("q_true", "q_recorded") if one in found)
+
+
+def test_every_form_has_its_numbers_and_there_are_all_of_the_contract() -> None:
+    assert set(NUMBERS) == {form.__name__ for form in FORMS}
+    assert set(NEUTRAL) <= set(NUMBERS)
+    assert {type(one) for one in EXAMPLES} == {form for forms in CATALOGUE.values() for form in forms}
+
+
+momentary = [one for one in of_kind(FrictionEffect) if one.id != "presliding"]
+
+
+@pytest.mark.parametrize("effect", momentary, ids=lambda one: type(one).__name__)
+@settings(max_examples=30, deadline=None)
+@given(q=st.floats(-4, 4), v=st.floats(-2, 2), age=st.floats(0, 1e3), degrees=st.floats(-20, 60))
+def test_friction_never_drives(effect: FrictionEffect, q: float, v: float, age: float, degrees: float) -> None:
+    here = mount(effect, WEIGHT)
+    motion = here.at(0.0, q, v, {"temperature": degrees} if here.inputs() else {})
+    states = {effect.id: [age] * len(effect.states())}
+    level = here.level(motion, states)
+    torque = here.law.contact((), v, level) + here.viscous(motion, states)
+    assert level >= 0
+    assert float(torque) * v >= 0
+
+
+@pytest.mark.parametrize("effect", of_kind(LoadEffect), ids=lambda one: type(one).__name__)
+def test_a_load_resists_and_is_the_same_for_the_equation_of_motion(effect: LoadEffect) -> None:
+    model, plain = mount(effect).model(), mount().model()
+    for q, v in ((0.4, 0.0), (-1.0, 0.3), (0.1, -0.3)):
+        load = float(effect.load(mount(effect).at(0.7, q, v)))
+        here, there = (evaluate(one, 0.7, position=q, speed=v)["der(speed)"] for one in (model, plain))
+        assert load != 0 or v == 0
+        assert (there - here) * INERTIA == pytest.approx(load, rel=1e-9)
+
+
+@pytest.mark.parametrize("effect", of_kind(LoadEffect), ids=lambda one: type(one).__name__)
+def test_a_load_gives_back_over_a_round_trip_what_it_took_or_less(effect: LoadEffect) -> None:
+    """Work over a closed path at one moment: zero for a potential, positive for drag, never negative."""
+    turn = np.linspace(0, 2 * np.pi, 2001)
+    q, v = 0.8 * np.sin(turn), 0.8 * np.cos(turn)
+    here = mount(effect)
+    loads = np.array([float(effect.load(here.at(0.3, *one))) for one in zip(q, v, strict=True)])
+    work = float(np.trapezoid(loads * v, turn))
+    assert work > 0.1 if effect.id == "quadratic_drag" else abs(work) < 1e-6
+
+
+@pytest.mark.parametrize("effect", of_kind(SensorEffect), ids=lambda one: type(one).__name__)
+def test_a_sensor_effect_changes_what_is_read_and_nothing_else(effect: SensorEffect) -> None:
+    model, plain = mount(effect).model(), mount().model()
+    here, there = (evaluate(one, position=0.4, speed=0.2, tau=3.0) for one in (model, plain))
+    assert here["q"] != there["q"]
+    assert here["q_true"] == there["q"] == 0.4
+    assert here["der(speed)"] == there["der(speed)"]
+
+
+@pytest.mark.parametrize("effect", of_kind(Coupling, InertiaEffect), ids=lambda one: type(one).__name__)
+def test_at_rest_a_torque_accelerates_no_less_than_a_rigid_axis_would_be(effect: Effect) -> None:
+    """What is behind a coupling is not felt at once, and what is in front is never more than all."""
+    found = evaluate(mount(effect, friction=Frictionless()).model(), position=-0.2, tau=3.0)["der(speed)"]
+    inertia = 3.0 / found
+    assert 0 < inertia < INERTIA if isinstance(effect, Coupling) else inertia == pytest.approx(INERTIA * 1.3)
