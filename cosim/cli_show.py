@@ -11,6 +11,9 @@ from rich.table import Table
 from cosim.errors import InputError
 from cosim.terminal import put_json
 
+WIRES = "wires"
+"""The table that is drawn on the screen."""
+
 
 def show(
     file: Annotated[str, typer.Argument(help="A recording, FMU, SSP, scenario or card, or the name of a shipped one.")],
@@ -25,7 +28,18 @@ def show(
     for name, value in facts.items():
         console.print(f"{name}: {value}", markup=False)
     for name, table in rows.items():
-        console.print(_table(name, table))
+        if name == WIRES:
+            console.print("\n".join(["", *drawing(file), ""]), markup=False, soft_wrap=True)
+        else:
+            console.print(_table(name, table))
+
+
+def drawing(file: str) -> list[str]:
+    """Return the wiring of a scenario as lines of text, with the delay of each wire."""
+    from cosim.diagram import draw
+    from cosim.scenario import read_scenario
+
+    return draw(read_scenario(file))
 
 
 def describe(file: str) -> tuple[dict[str, Any], dict[str, list[dict[str, Any]]]]:
@@ -126,38 +140,34 @@ def _toml(file: str) -> tuple[dict[str, Any], dict[str, list[dict[str, Any]]]]:
 
 
 def _scenario(file: str) -> tuple[dict[str, Any], dict[str, list[dict[str, Any]]]]:
+    from cosim.diagram import in_short, on_the_way, origin, wire_delays
     from cosim.scenario import read_scenario
 
     scenario = read_scenario(file)
+    stated = wire_delays(scenario)
     facts = {
         "scenario": scenario.name,
         "description": scenario.description,
         "step": f"{scenario.step:g} s",
         "stop": f"{scenario.stop:g} s ({scenario.ticks:,} steps)",
-        "algorithm": "Jacobi: a wire from component to component delays by one step, one from a signal by none",
+        "algorithm": in_short(scenario),
         "rows": f"one in {scenario.decimation} steps",
     }
     components = [
-        {"component": name, "from": str(one.fmu) if one.fmu else f"the {one.part} of {one.card}"}
+        {"component": name, "from": origin(one), "steps every": f"{scenario.every.get(name, 1) * scenario.step:g} s"}
         for name, one in scenario.components.items()
     ]
     wires = [
         {
             "from": wire.source,
             "to": wire.target,
-            "delay in steps": int(wire.source.partition(".")[0] in scenario.components),
-            "on the way": _on_the_way(wire),
+            "delay in ticks": str(stated[wire.target]),
+            "on the way": on_the_way(wire).removeprefix("; "),
         }
         for wire in scenario.wires
     ]
     records = [{"column": name, "signal": one.signal, "mode": one.mode} for name, one in scenario.records.items()]
-    return facts, {"components": components, "wires": wires, "recorded": records}
-
-
-def _on_the_way(wire: Any) -> str:
-    parts = {"x": wire.gain if wire.gain != 1 else 0, "+": wire.offset, "quantum": wire.quantum}
-    told = [f"{name} {value:.6g}" for name, value in parts.items() if value]
-    return ", ".join(told + ([f"+ {wire.noise}"] if wire.noise else []))
+    return facts, {"components": components, WIRES: wires, "recorded": records}
 
 
 def _card(file: str) -> tuple[dict[str, Any], dict[str, list[dict[str, Any]]]]:

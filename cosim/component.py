@@ -4,8 +4,10 @@ Call sequence, once each unless said otherwise:
 
     1. `ports`                      names, references, causality and units, before anything runs
     2. `start(parameters)`          sets parameters and start values, initialises at t = 0
-    3. `get`, `set`, `step`         in every tick, or their addresses in `functions`, called by the C loop
-    4. `close()`                    frees everything, whatever happened before
+    3. `get`, `set`, `step`         in every tick, or their addresses in `functions`, called by the C loop;
+       `save`, `restore`            around steps that are taken back, where `rewinds` says that it can
+    4. `failed(status)`             after a call that returned a status above 1; then nothing more is called but close
+    5. `close()`                    frees everything, whatever happened before
 
 Statuses are those of FMI: 0 OK, 1 warning, 2 discard, 3 error, 4 fatal; above 1 a component must not be stepped again.
 """
@@ -17,15 +19,16 @@ from typing import Any, Protocol
 
 import numpy as np
 
-OK, WARNING = 0, 1
-NOT_FINITE, TERMINATED = 100, 101
+OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+NOT_FINITE, TERMINATED, NOT_AGREED = 100, 101, 102
 STATUSES = {
-    2: "discarded the step",
-    3: "returned an error",
-    4: "failed for good",
+    DISCARD: "discarded the step",
+    ERROR: "returned an error",
+    FATAL: "failed for good",
     5: "left the step pending",
     NOT_FINITE: "gave an output that is not a finite number",
     TERMINATED: "asked to end the simulation",
+    NOT_AGREED: "and those coupled with it did not agree within the iterations allowed",
 }
 
 
@@ -47,13 +50,19 @@ class Port:
 
 @dataclass(frozen=True)
 class Functions:
-    """Addresses that the compiled loop calls: set, get and step of reals in FMI `version` 2 or 3."""
+    """Addresses that the compiled loop calls: set, get and step of reals in FMI `version` 2 or 3.
+
+    `save` and `restore` are those of the FMU's state, 0 where it cannot be taken back; `state` is where it is kept.
+    """
 
     version: int
     instance: int
     set: int
     get: int
     step: int
+    save: int = 0
+    restore: int = 0
+    state: int = 0
 
 
 class Component(Protocol):
@@ -65,6 +74,14 @@ class Component(Protocol):
     @property
     def ports(self) -> Mapping[str, Port]:
         """Variables by name."""
+
+    @property
+    def feedthrough(self) -> Mapping[str, frozenset[str] | None]:
+        """The inputs that each output follows at once, without a step; None where nothing is said about it."""
+
+    @property
+    def rewinds(self) -> bool:
+        """Whether `save` and `restore` work."""
 
     @property
     def functions(self) -> Functions | None:
@@ -79,8 +96,17 @@ class Component(Protocol):
     def get(self, references: np.ndarray, values: np.ndarray) -> int:
         """Write the values of real variables into `values`."""
 
-    def step(self, time: float, size: float) -> int:
-        """Go from `time` to `time + size`, both in s."""
+    def step(self, time: float, size: float, final: bool = True) -> int:
+        """Go from `time` to `time + size`, both in s; `final` False: the step may be taken back."""
+
+    def save(self) -> int:
+        """Keep the state as it is now, in the place of the one kept before."""
+
+    def restore(self) -> int:
+        """Go back to the state kept."""
+
+    def failed(self, status: int) -> None:
+        """Hear that a call returned this status, so that `close` calls only what is still allowed."""
 
     def messages(self) -> tuple[str, ...]:
         """What the component said last, newest at the end."""

@@ -45,6 +45,19 @@ def ports_of(description: Any) -> dict[str, Port]:
     return {v.name: _port(v) for v in description.modelVariables if not v.dimensions}
 
 
+def feedthrough_of(description: Any) -> dict[str, frozenset[str] | None]:
+    """List the inputs that each output follows at once; None where the model description does not say.
+
+    A discrete output changes only when the model steps.
+    """
+    found: dict[str, frozenset[str] | None] = {}
+    for unknown in description.outputs:
+        known = unknown.dependencies
+        inputs = None if known is None else frozenset(one.name for one in known if one.causality == "input")
+        found[unknown.variable.name] = frozenset() if unknown.variable.variability == "discrete" else inputs
+    return found
+
+
 def check_binary(path: Path, description: Any) -> None:
     """Refuse an FMU that has no binary for this platform.
 

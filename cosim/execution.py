@@ -1,7 +1,7 @@
 """A plan on its way: the loop runs it chunk by chunk, and its rows go to a writer."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from time import perf_counter
 from typing import Any
 
@@ -58,11 +58,23 @@ class Execution:
             "microseconds_per_step": 1e6 * self.seconds / max(self.loop.tick, 1),
             "rows": self.writer.rows,
             "loop": self.loop.kind,
-            "algorithm": "jacobi",
+            "algorithm": self.wiring.algorithm.kind,
+            "coupling": [asdict(effort) for effort in self.loop.efforts],
             "warnings": self.loop.warnings,
             "unconnected": list(self.wiring.unconnected()),
-            "notes": [] if self.loop.kind == "compiled" else [f"{slow_because(self.plan)}: the loop ran in Python."],
+            "notes": self._notes(),
         }
+
+    def _notes(self) -> list[str]:
+        notes = list(self.wiring.doubts())
+        for effort in self.loop.efforts:
+            if effort.at_limit:
+                some = f"{effort.at_limit:,} of {effort.rounds:,} pieces of steps"
+                reason = "lost more energy than tolerated though they were the smallest allowed"
+                notes.append(f"{some} {reason}: raise algorithm.max_pieces or make the step smaller.")
+        if self.loop.kind != "compiled":
+            notes.append(f"{slow_because(self.plan)}: the loop ran in Python.")
+        return notes
 
     def _run_chunks(self) -> None:
         streams = [signal.stream(self.plan.step) for signal in self.wiring.signals.values()]
@@ -88,7 +100,9 @@ class Execution:
         failure = self.loop.failure
         if failure is None:
             return
-        name, component = list(self.wiring.components.items())[failure.part]
+        part = self.plan.parts[failure.part]
+        name, component = part.name, part.component
+        component.failed(failure.status)
         inputs = self.plan.inputs(failure.part)
         what = STATUSES.get(failure.status, f"returned status {failure.status}")
         last = ", ".join(f"{key} = {value:.9g}" for key, value in inputs.items()) or "none"

@@ -9,6 +9,7 @@ import tempfile
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import cache
 from itertools import count
 from pathlib import Path
@@ -17,8 +18,8 @@ from weakref import WeakValueDictionary
 
 import numpy as np
 
-from cosim.component import TERMINATED, Functions, Port
-from cosim.description import check_binary, describe, first_line, origin_of, ports_of
+from cosim.component import ERROR, FATAL, TERMINATED, Functions, Port
+from cosim.description import check_binary, describe, feedthrough_of, first_line, origin_of, ports_of
 from cosim.errors import CosimError, FmuError
 
 _NUMBERS = count(1)
@@ -26,6 +27,7 @@ _LISTENERS: WeakValueDictionary[str, "FmuComponent"] = WeakValueDictionary()
 """Who hears what an FMI 2.0 instance says, by instance name; FMPy's logger can serve only one callback a process."""
 _STEP2 = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
 _VALUES2 = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
+_SAVE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
 _VALUES3 = ctypes.CFUNCTYPE(
     ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_size_t
 )
@@ -47,9 +49,12 @@ class FmuComponent:
         self._description = describe(self.path)
         self.name = name or self._description.modelName
         self.ports: Mapping[str, Port] = ports_of(self._description)
+        self.feedthrough = feedthrough_of(self._description)
         self.origin: dict[str, Any] = origin_of(self.path, self._description)
         self._messages: deque[str] = deque(maxlen=5)
         self._started = False
+        self._worst = 0
+        self._state = ctypes.c_void_p()
         self._directory = tempfile.TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True)
         try:
             self._fmu = self._instantiate()
@@ -89,29 +94,56 @@ class FmuComponent:
         """Write the values of real variables into `values`."""
         return int(self._get(self._fmu.component, *self._arrays(references, values)))
 
-    def step(self, time: float, size: float) -> int:
-        """Go from `time` to `time + size`, both in s."""
-        return int(self._step(time, size))
+    def step(self, time: float, size: float, final: bool = True) -> int:
+        """Go from `time` to `time + size`, both in s; `final` False: the step may be taken back."""
+        return int(self._step(time, size, final))
+
+    def save(self) -> int:
+        """Keep the state as it is now, in the place of the one kept before."""
+        assert self.functions is not None
+        return int(_SAVE(self.functions.save)(self._fmu.component, ctypes.addressof(self._state)))
+
+    def restore(self) -> int:
+        """Go back to the state kept."""
+        assert self.functions is not None
+        return int(_SAVE(self.functions.restore)(self._fmu.component, self._state.value))
 
     def messages(self) -> tuple[str, ...]:
         """What the FMU said last, newest at the end."""
         return tuple(self._messages)
 
+    def failed(self, status: int) -> None:
+        """Hear that a call returned this status: after an error only freeing is allowed, after a fatal one nothing."""
+        self._worst = max(self._worst, status)
+
     def close(self) -> None:
-        """Free instance, library and unpacked files; may be called twice."""
+        """Free instance, library and unpacked files as far as FMI allows it; may be called twice."""
         fmu, self._fmu = self._fmu, None
-        if fmu is not None:
-            with suppress(Exception):  # an FMU that failed may refuse to be terminated; it is freed all the same
-                fmu.terminate()
+        if fmu is not None and self._worst != FATAL:
+            self._forget(fmu)
+            with suppress(Exception):  # an FMU may refuse to be terminated; it is freed all the same
+                if self._worst < ERROR:
+                    fmu.terminate()
             with suppress(Exception):
                 fmu.freeInstance()
         self._directory.cleanup()
+
+    def _forget(self, fmu: Any) -> None:
+        """Free the state kept."""
+        if self._state.value and self._worst < ERROR:
+            name = "fmi2FreeFMUstate" if self._version == 2 else "fmi3FreeFMUState"
+            _SAVE((name, fmu.dll))(fmu.component, ctypes.addressof(self._state))
 
     def __enter__(self) -> "FmuComponent":
         return self
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    @property
+    def rewinds(self) -> bool:
+        """Whether the FMU can save and restore its state."""
+        return bool(self._description.coSimulation.canGetAndSetFMUstate)
 
     @property
     def _version(self) -> int:
@@ -152,26 +184,26 @@ class FmuComponent:
         self._messages.append((message or b"").decode("utf-8", "replace").strip())
 
     def _functions(self) -> Functions:
-        kind, real = ("fmi2", "Real") if self._version == 2 else ("fmi3", "Float64")
-        addresses = [
-            ctypes.cast(getattr(self._fmu.dll, f"{kind}{name}"), ctypes.c_void_p).value
-            for name in (f"Set{real}", f"Get{real}", "DoStep")
-        ]
+        kind, real, state = ("fmi2", "Real", "FMUstate") if self._version == 2 else ("fmi3", "Float64", "FMUState")
+        names = [f"Set{real}", f"Get{real}", "DoStep", *((f"Get{state}", f"Set{state}") if self.rewinds else ())]
+        addresses = [ctypes.cast(getattr(self._fmu.dll, kind + name), ctypes.c_void_p).value or 0 for name in names]
         instance = self._fmu.component
-        return Functions(self._version, getattr(instance, "value", instance), *(address or 0 for address in addresses))
+        functions = Functions(self._version, getattr(instance, "value", instance), *addresses)
+        return replace(functions, state=ctypes.addressof(self._state))
 
     def _callables(self) -> tuple[Any, Any, Any]:
         functions: Any = self.functions
         if self._version == 2:
             do_step = _STEP2(functions.step)
-            return _VALUES2(functions.set), _VALUES2(functions.get), lambda t, h: do_step(self._fmu.component, t, h, 1)
+            set_, get = _VALUES2(functions.set), _VALUES2(functions.get)
+            return set_, get, lambda t, h, final: do_step(self._fmu.component, t, h, final)
         return _VALUES3(functions.set), _VALUES3(functions.get), self._step3
 
-    def _step3(self, time: float, size: float) -> int:
+    def _step3(self, time: float, size: float, final: bool) -> int:
         flags = [ctypes.c_bool() for _ in range(3)]
         last = ctypes.c_double(time)
         function = self._fmu.dll.fmi3DoStep
-        status = int(function(self._fmu.component, time, size, True, *map(ctypes.byref, flags), ctypes.byref(last)))
+        status = int(function(self._fmu.component, time, size, final, *map(ctypes.byref, flags), ctypes.byref(last)))
         return TERMINATED if status <= 1 and flags[1].value else status
 
     def _arrays(self, references: np.ndarray, values: np.ndarray) -> tuple[Any, ...]:

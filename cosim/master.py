@@ -1,7 +1,7 @@
 """The master: checks the wiring, starts the components, runs the loop in chunks, and streams what is recorded.
 
-Jacobi coupling: at each tick all inputs are gathered from the outputs at that tick, then every component steps. A value
-computed in a step is seen by the others at its end, so each wire from component to component delays by one tick.
+Time is counted in ticks. How a value gets from one component to another in a tick, and so how long each wire delays, is
+the algorithm's (`algorithm`); Jacobi where nothing else is said.
 """
 
 from collections.abc import Mapping, Sequence
@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import cosim
+from cosim.algorithm import JACOBI, Algorithm
 from cosim.component import Component
 from cosim.errors import ScenarioError, WiringError
 from cosim.execution import Execution, Progress
@@ -50,6 +51,8 @@ def simulate(
     ticks: int,
     signals: Mapping[str, Any] | None = None,
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
+    algorithm: Algorithm | None = None,
+    every: Mapping[str, int] | None = None,
     decimation: int = 1,
     path: Path | None = None,
     force: bool = False,
@@ -68,6 +71,8 @@ def simulate(
         ticks: how many; the recording has rows at ticks 0, decimation, 2 decimation, ...
         signals: generators (see `signals`), arrays with one value a tick, or numbers.
         parameters: by component, parameters and start values by name.
+        algorithm: how components are coupled; Jacobi where not given.
+        every: by component, the ticks of its step where they are not one.
         decimation: ticks for each row.
         path: Parquet file to stream to; None keeps the recording in memory.
         force: overwrite the file.
@@ -87,6 +92,8 @@ def simulate(
             signals={key: _signal(key, one, ticks) for key, one in (signals or {}).items()},
             wires=[wire if isinstance(wire, Wire) else Wire(*wire) for wire in wires],
             records={key: one if isinstance(one, Record) else Record(one) for key, one in record.items()},
+            algorithm=algorithm or JACOBI,
+            every=dict(every or {}),
         )
         plan = wiring.plan(step, decimation)
         settings = _settings(opened, parameters or {})
@@ -130,6 +137,8 @@ def run(
         ticks=scenario.ticks,
         signals=scenario.signals,
         parameters={name: component.parameters for name, component in scenario.components.items()},
+        algorithm=scenario.algorithm,
+        every=scenario.every,
         decimation=scenario.decimation,
         path=path,
         force=force,
@@ -171,7 +180,8 @@ def _story(wiring: Wiring, settings: Mapping[str, Any], step: float, decimation:
         "version": f"mount-cosim {cosim.__version__}",
         "step": step,
         "decimation": decimation,
-        "algorithm": "jacobi",
+        "algorithm": wiring.algorithm.model_dump(),
+        "every": dict(wiring.every),
         "components": {name: one.origin | {"parameters": settings[name]} for name, one in wiring.components.items()},
         "wires": [asdict(wire) for wire in wiring.wires],
         "record": {name: asdict(record) for name, record in wiring.records.items()},

@@ -1,9 +1,11 @@
 """Scenarios: a TOML file that names components, wires, inputs, the step and what to record.
 
     name, step [s], stop [s]
-    [components.NAME]   fmu = "file.fmu", or card = "CARD" with part = "plant" | "controller"; parameters = { ... }
+    [algorithm]         kind = "jacobi" | "gauss-seidel" | "iterated" | "energy" and its options, see `algorithm`
+    [components.NAME]   fmu = "file.fmu", or card = "CARD" with part = "plant" | "controller"; parameters = { ... };
+                        every = ticks of a step of this component, or step = s, a whole multiple of the scenario's
     [signals.NAME]      kind = "sine" | "constant" | "steps" | "multisine" | "chirp" | "slews" | "recorded" | "noise"
-    [[connections]]     from, to; gain, offset, quantum, noise, unit where wanted
+    [[connections]]     from, to; gain, offset, quantum, noise, unit, breaks_loop where wanted
     [record]            signals = { column = "component.variable", ... } or a list of them; decimation; mode
 
 Files are relative to the scenario. A name without .toml is a shipped scenario.
@@ -11,14 +13,15 @@ Files are relative to the scenario. A name without .toml is a shipped scenario.
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from cosim.errors import ScenarioError
+from cosim.algorithm import JACOBI, Algorithm
+from cosim.errors import ScenarioError, WiringError
 from cosim.signals import Generator, Recorded, Signal
 from cosim.ssp import read_ssp
 from cosim.wiring import Record, Wire
@@ -35,11 +38,15 @@ class ComponentSection(_Section):
     card: str | None = None
     part: Literal["plant", "controller"] | None = None
     parameters: dict[str, float | bool | str] = {}
+    every: int | None = Field(default=None, ge=1)
+    step: float | None = Field(default=None, gt=0)
 
     @model_validator(mode="after")
     def _one_source(self) -> "ComponentSection":
         if (self.fmu is None) == (self.card is None) or (self.card is None) != (self.part is None):
             raise ValueError('give fmu = "...", or card = "..." with part = "plant" or "controller"')
+        if self.every is not None and self.step is not None:
+            raise ValueError("give either every or step")
         return self
 
 
@@ -53,6 +60,7 @@ class ConnectionSection(_Section):
     quantum: float = Field(default=0.0, ge=0)
     noise: str = ""
     unit: str = ""
+    breaks_loop: bool = False
 
 
 class RecordSection(_Section):
@@ -75,6 +83,7 @@ class _File(_Section):
     description: str = ""
     step: float = Field(default=1e-4, gt=0)
     stop: float = Field(gt=0)
+    algorithm: Algorithm = JACOBI
     components: dict[str, ComponentSection] = Field(min_length=1)
     signals: dict[str, Generator] = {}
     connections: list[ConnectionSection] = []
@@ -96,6 +105,8 @@ class Scenario:
     wires: tuple[Wire, ...]
     records: Mapping[str, Record]
     decimation: int
+    algorithm: Algorithm = JACOBI
+    every: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def stop(self) -> float:
@@ -144,6 +155,7 @@ def parse_scenario(text: str, path: str, directory: Path) -> Scenario:
         raise ScenarioError(f"{path} is not valid TOML: {error}.", culprit=path) from error
     except ValidationError as error:
         raise _sentence(error, path) from error
+    _check_algorithm(raw, path)
     return Scenario(
         path=path,
         text=text,
@@ -156,14 +168,43 @@ def parse_scenario(text: str, path: str, directory: Path) -> Scenario:
         wires=tuple(Wire(**one.model_dump()) for one in raw.connections),
         records=_records(raw.record),
         decimation=raw.record.decimation,
+        algorithm=raw.algorithm,
+        every=_every(raw, path),
     )
 
 
+def _check_algorithm(raw: _File, path: str) -> None:
+    try:
+        raw.algorithm.acts(tuple(raw.components))
+    except WiringError as error:
+        raise ScenarioError(f"{path}: {error}", culprit=error.culprit, choices=error.choices) from error
+
+
 def _ticks(raw: _File, path: str) -> int:
-    ticks = round(raw.stop / raw.step)
-    if ticks < 1 or abs(raw.stop / raw.step - ticks) > 1e-6 * ticks:
-        message = f"{path}: stop = {raw.stop} is not a whole number of steps of {raw.step} s."
-        raise ScenarioError(message, culprit="stop", value=raw.stop)
+    return _whole(raw.stop, raw.step, path, "stop")
+
+
+def _every(raw: _File, path: str) -> dict[str, int]:
+    """Return the ticks of a step of the components that do not step at each."""
+    found = {}
+    for name, one in raw.components.items():
+        ticks = one.every or (_whole(one.step, raw.step, path, f"components.{name}.step") if one.step else 1)
+        if ticks > 1:
+            found[name] = ticks
+    return found
+
+
+def _whole(time: float, step: float, path: str, key: str) -> int:
+    """Return how many steps a time is, to a millionth.
+
+    Raises:
+        ScenarioError: it is no whole number of them.
+    """
+    ticks = round(time / step)
+    if ticks < 1 or abs(time / step - ticks) > 1e-6 * ticks:
+        raise ScenarioError(
+            f"{path}: {key} = {time} is not a whole number of steps of {step} s.", culprit=key, value=time
+        )
     return ticks
 
 
@@ -209,10 +250,17 @@ def _generators() -> dict[str, Any]:
     return {get_args(one.model_fields["kind"].annotation)[0]: one for one in classes}
 
 
+def _algorithms() -> dict[str, Any]:
+    """Map the kinds of algorithms to their classes."""
+    return {get_args(one.model_fields["kind"].annotation)[0]: one for one in get_args(get_args(Algorithm)[0])}
+
+
 def _keys(location: tuple[int | str, ...]) -> tuple[str, ...]:
     """List the legal keys beside the one at `location`."""
     sections = {"components": ComponentSection, "connections": ConnectionSection, "record": RecordingSection}
     section: Any = _File
-    if len(location) > 1:
+    if len(location) > 1 and location[0] == "algorithm":
+        section = _algorithms()[str(location[1])]
+    elif len(location) > 1:
         section = sections.get(str(location[0])) or _generators()[str(location[2])]
     return tuple(field.alias or name for name, field in section.model_fields.items())

@@ -5,14 +5,16 @@ others refused.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 
+from cosim.algorithm import JACOBI, Algorithm
 from cosim.component import Component, Port
 from cosim.errors import UnitError, WiringError
 from cosim.loop import Column, Link, Part, Plan
+from cosim.schedule import check_loops, order_of, turns
 from cosim.signals import Signal
 from cosim.units import conversion
 
@@ -22,7 +24,7 @@ class Wire:
     """y = quantise(gain * x + offset) + noise, from an output or signal to an input.
 
     `quantum` is the step of the quantiser (0: none), `noise` a signal that is added, `unit` that of gain * x + offset
-    (the source's where not given).
+    (the source's where not given). `breaks_loop` accepts that the wire's delay breaks an algebraic loop.
     """
 
     source: str
@@ -32,6 +34,7 @@ class Wire:
     quantum: float = 0.0
     noise: str = ""
     unit: str = ""
+    breaks_loop: bool = False
 
 
 @dataclass(frozen=True)
@@ -44,12 +47,14 @@ class Record:
 
 @dataclass(frozen=True)
 class Wiring:
-    """Components, signals, wires and records, by name."""
+    """Components, signals, wires and records, by name; `every` gives the ticks of a step where they are not one."""
 
     components: Mapping[str, Component]
     signals: Mapping[str, Signal]
     wires: Sequence[Wire]
     records: Mapping[str, Record]
+    algorithm: Algorithm = JACOBI
+    every: Mapping[str, int] = field(default_factory=dict)
 
     def check(self) -> None:
         """Check every name, causality and unit.
@@ -71,6 +76,15 @@ class Wiring:
             self._gain(wire)
         for record in self.records.values():
             self.unit(record)
+        self._check_every()
+
+    def doubts(self) -> tuple[str, ...]:
+        """Return algebraic loops that cannot be excluded, as sentences.
+
+        Raises:
+            WiringError: there is one, and the algorithm does not solve it.
+        """
+        return check_loops(self.algorithm, self.wires, self.components)
 
     def unconnected(self) -> tuple[str, ...]:
         """List the inputs that no wire feeds; they keep their start values."""
@@ -98,31 +112,59 @@ class Wiring:
         return port.unit
 
     def plan(self, step: float, decimation: int) -> Plan:
-        """Turn checked names into places on a bus."""
+        """Turn checked names into places on a bus.
+
+        Raises:
+            WiringError: a name, unit or the algorithm does not fit.
+        """
         self.check()
-        places, parts = self._places()
+        self.doubts()
+        order = order_of(self.algorithm.acts(tuple(self.components)))
+        places = self._places(order)
         signal = len(places)
         for name, one in self.signals.items():
             for output in one.outputs:
                 places[f"{name}.{output}"] = len(places)
-        links = tuple(self._link(wire, places) for wire in self.wires)
-        columns = tuple(Column(places[self._full(r.signal)], r.mode == "mean") for r in self.records.values())
-        bus = np.zeros(len(places))
-        return Plan(parts, links, columns, signal, len(places) - signal, bus, step, decimation)
+        return Plan(
+            parts=tuple(self._part(name, places) for name in order),
+            turns=turns(self.algorithm, self.wires, self.components, self.every),
+            columns=tuple(self._column(record, places) for record in self.records.values()),
+            signal=signal,
+            signals=len(places) - signal,
+            bus=np.zeros(len(places)),
+            step=step,
+            decimation=decimation,
+        )
 
-    def _places(self) -> tuple[dict[str, int], tuple[Part, ...]]:
-        places: dict[str, int] = {}
-        parts = []
-        for name, component in self.components.items():
-            inputs = [wire.target for wire in self.wires if wire.target.partition(".")[0] == name]
-            wanted = [wire.source for wire in self.wires] + [record.signal for record in self.records.values()]
-            outputs = [one for one in dict.fromkeys(wanted) if one.partition(".")[0] == name and one not in inputs]
-            output, input_ = len(places), len(places) + len(outputs)
-            places |= {full: output + index for index, full in enumerate(outputs + inputs)}
-            names = tuple(full.partition(".")[2] for full in inputs)
-            refer = _references(component, inputs), _references(component, outputs)
-            parts.append(Part(component, *refer, input_, output, names))
-        return places, tuple(parts)
+    def _places(self, order: Sequence[str]) -> dict[str, int]:
+        """Number what is used of each component: its outputs, then its inputs."""
+        names = [full for name in order for full in (*self._outputs(name), *self._inputs(name))]
+        return {full: index for index, full in enumerate(names)}
+
+    def _inputs(self, name: str) -> list[str]:
+        return [wire.target for wire in self.wires if wire.target.partition(".")[0] == name]
+
+    def _outputs(self, name: str) -> list[str]:
+        wanted = [wire.source for wire in self.wires] + [record.signal for record in self.records.values()]
+        return [one for one in dict.fromkeys(wanted) if one.partition(".")[0] == name and one not in self._inputs(name)]
+
+    def _part(self, name: str, places: Mapping[str, int]) -> Part:
+        component, inputs, outputs = self.components[name], self._inputs(name), self._outputs(name)
+        return Part(
+            name=name,
+            component=component,
+            input_references=_references(component, inputs),
+            output_references=_references(component, outputs),
+            input=places[inputs[0]] if inputs else 0,
+            output=places[outputs[0]] if outputs else 0,
+            input_names=tuple(full.partition(".")[2] for full in inputs),
+            links=tuple(self._link(wire, places) for wire in self.wires if wire.target in inputs),
+            every=self.every.get(name, 1),
+        )
+
+    def _column(self, record: Record, places: Mapping[str, int]) -> Column:
+        fed = any(wire.target == record.signal for wire in self.wires)
+        return Column(places[self._full(record.signal)], record.mode == "mean", late=fed)
 
     def _link(self, wire: Wire, places: Mapping[str, int]) -> Link:
         gain, offset = self._gain(wire)
@@ -163,6 +205,16 @@ class Wiring:
             raise WiringError(
                 'The column "t" is time and is always recorded; give the record another name.', culprit="t"
             )
+
+    def _check_every(self) -> None:
+        for name, ticks in self.every.items():
+            if name not in self.components:
+                choices = tuple(self.components)
+                message = f'"{name}" is given a step, but is no component; components are: {", ".join(choices)}.'
+                raise WiringError(message, culprit=name, choices=choices)
+            if ticks < 1:
+                message = f'"{name}" shall step every {ticks} ticks; that must be a whole number from 1 on.'
+                raise WiringError(message, culprit=name, value=ticks)
 
     def _input(self, wire: Wire) -> Port:
         owner, _, name = wire.target.partition(".")

@@ -168,9 +168,17 @@ def test_export_writes_plant_and_controller_for_both_versions(
 @pytest.mark.parametrize(
     ("what", "words"),
     [
-        ("sidereal", ["scenario: sidereal", "controller.tau", "delay in steps", "15 s (150,000 steps)"]),
+        (
+            "sidereal",
+            [
+                "scenario: sidereal",
+                "─ tau ───────────▶ mount.tau       1 tick, 0.1 ms",
+                "15 s (150,000 steps)",
+                "→ mount: 2 ticks, 0.2 ms",
+            ],
+        ),
         ("paper_mount", ["card: paper_mount", "friction.sigma0", "kg.m2", "controller: C2a"]),
-        ("loop.toml", ["scenario: loop", "x 2, quantum 1e-06, + n", "r.position"]),
+        ("loop.toml", ["scenario: loop", "x 2; quantum 1e-06; + n", "r.position"]),
         ("tiny3.fmu", ["FMI: 3.0", "model: tiny", "output     rad"]),
         ("run.csv", ["rows: 200", "rate: 1000 Hz", "least", "gaps: 0"]),
     ],

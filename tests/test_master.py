@@ -275,7 +275,7 @@ def test_arrays_that_do_not_fit_are_refused(tiny: Tiny) -> None:
 @pytest.mark.parametrize(
     ("parameters", "sentence"),
     [
-        ({"kp": 1.0}, '"plant.kp" does not exist; what can be set: a, b, k, mode, fail_at, nan_at.'),
+        ({"kp": 1.0}, '"plant.kp" does not exist; what can be set: a, b, k, mode, fail_at, nan_at, status.'),
         ({"y": 1.0}, '"plant.y" cannot be set before the start; what can be set: a, b, k,'),
         ({"k": -1.0}, '"plant.k" is -1; it must lie in 0 .. inf 1.'),
     ],

@@ -81,6 +81,47 @@ def test_a_list_of_signals_names_its_own_columns() -> None:
     assert records == {"plant.y": Record("plant.y", "mean"), "r.velocity": Record("r.velocity", "mean")}
 
 
+RATES = TEXT.replace("k = 5.0 }", "k = 5.0 }\nstep = 0.01").replace(
+    "[components.plant]", '[algorithm]\nkind = "gauss-seidel"\norder = ["controller", "plant"]\n[components.plant]'
+)
+
+
+def test_algorithm_and_steps_are_read_and_kept_in_the_recording(tiny: dict[int, Path], tmp_path: Path) -> None:
+    scenario = parse_scenario(RATES, "loop.toml", tiny[2].parent)
+    assert (scenario.every, scenario.algorithm.kind) == ({"controller": 10}, "gauss-seidel")
+    assert parse_scenario(RATES.replace("step = 0.01", "every = 10"), "loop.toml", Path()).every == {"controller": 10}
+    done = run(scenario, tmp_path / "run.parquet")
+    assert done.recording.origin["algorithm"] == {"kind": "gauss-seidel", "order": ["controller", "plant"]}
+    assert done.recording.origin["every"] == {"controller": 10}
+    assert len(set(done.recording["q"])) > 200  # the plant goes on between the commands
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("step = 0.01", "step = 0.0105", "components.controller.step = 0.0105 is not a whole number of steps of 0.001"),
+        ("step = 0.01", "step = 0.01\nevery = 10", "components.controller breaks a rule: give either every or step."),
+        ("step = 0.01", "every = 0", "components.controller.every = 0 breaks a rule: input should be greater than or"),
+        ('"gauss-seidel"', '"gauss"', "algorithm breaks a rule: input tag 'gauss' found using 'kind' does not match"),
+        ("order =", "ordre =", '"algorithm.gauss-seidel.ordre" is no key of a scenario; keys there are: kind, order.'),
+        ('["controller", "plant"]', '["plant"]', "loop.toml: The Gauss-Seidel order names plant; it must name each"),
+    ],
+)
+def test_a_mistake_in_algorithm_or_step_is_one_sentence(old: str, new: str, sentence: str) -> None:
+    assert old in RATES
+    with pytest.raises(ScenarioError, match=re.escape(sentence)):
+        parse_scenario(RATES.replace(old, new), "loop.toml", Path())
+
+
+def test_the_wiring_is_drawn_with_its_delays() -> None:
+    from cosim.diagram import draw
+
+    lines = draw(parse_scenario(RATES, "loop.toml", Path()))
+    assert "└─ y ─────────▶ plant.a       9 to 18 ticks, 9 to 18 ms" in lines
+    assert "└─ y ─────────▶ controller.b  1 tick, 1 ms; x 2; quantum 1e-06; + n" in lines
+    assert lines[-1] == "round plant → controller → plant: 10 to 19 ticks, 10 to 19 ms"
+
+
 def test_the_reference_of_the_paper_is_shipped() -> None:
     assert "sidereal" in shipped_scenarios()
     scenario = read_scenario("sidereal")

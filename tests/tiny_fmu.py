@@ -1,4 +1,7 @@
-"""Small FMUs for tests of the master: y' = k (a - b), or y = k (a - b) a step later, that can fail on demand."""
+"""Small FMUs for tests of the master, that can fail on demand.
+
+mode 0: y' = k (a - b); mode 1: y = k (a - b) a step later; mode 2: y = k (a - b) at once.
+"""
 
 import subprocess
 import sys
@@ -14,18 +17,27 @@ SOURCE = r"""
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, COUNT };
+enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, STATUS, COUNT };
 typedef struct { double v[COUNT]; char name[99]; void *log; } M;
 typedef void Log2(void *, const char *, int, const char *, const char *, ...);
 typedef void Log3(void *, int, const char *, const char *);
-static M *make(void) { M *m = calloc(1, sizeof(M)); m->v[K] = 1; m->v[FAIL_AT] = m->v[NAN_AT] = 1e9; return m; }
+static M *make(void) {
+  M *m = calloc(1, sizeof(M));
+  m->v[K] = 1; m->v[STATUS] = 3; m->v[FAIL_AT] = m->v[NAN_AT] = 1e9;
+  return m;
+}
 static int set(M *m, const unsigned *r, size_t n, const double *x) { while (n--) m->v[r[n]] = x[n]; return 0; }
-static int get(M *m, const unsigned *r, size_t n, double *x) { while (n--) x[n] = m->v[r[n]]; return 0; }
+static int get(M *m, const unsigned *r, size_t n, double *x) {
+  if (m->v[MODE] > 1) m->v[Y] = m->v[K] * (m->v[A] - m->v[B]);
+  while (n--) x[n] = m->v[r[n]];
+  return 0;
+}
+static int save(M *m, M **s) { if (!*s) *s = make(); **s = *m; return 0; }
 static int step(M *m, double t, double h) {
   double e = m->v[K] * (m->v[A] - m->v[B]);
   m->v[Y] = m->v[MODE] > 0 ? e : m->v[Y] + h * e;
   if (t + h / 2 > m->v[NAN_AT]) m->v[Y] = NAN;
-  return t + h / 2 > m->v[FAIL_AT] ? 3 : 0;
+  return t + h / 2 > m->v[FAIL_AT] ? (int)m->v[STATUS] : 0;
 }
 #define API __attribute__((visibility("default")))
 #define NONE(name) API int name(void *m) { (void)m; return 0; }
@@ -37,6 +49,12 @@ API int fmi2SetupExperiment(void *m, int a, double b, double c, int d, double e)
 NONE(fmi2EnterInitializationMode) NONE(fmi2ExitInitializationMode) NONE(fmi2Terminate)
 API int fmi2Reset(M *m) { M *n = make(); n->log = m->log; strcpy(n->name, m->name); *m = *n; free(n); return 0; }
 API void fmi2FreeInstance(void *m) { free(m); }
+API int fmi2GetFMUstate(M *m, M **s) { return save(m, s); }
+API int fmi2SetFMUstate(M *m, M *s) { *m = *s; return 0; }
+API int fmi2FreeFMUstate(M *m, M **s) { free(*s); *s = NULL; return 0; }
+API int fmi3GetFMUState(M *m, M **s) { return save(m, s); }
+API int fmi3SetFMUState(M *m, M *s) { *m = *s; return 0; }
+API int fmi3FreeFMUState(M *m, M **s) { free(*s); *s = NULL; return 0; }
 API int fmi2SetReal(M *m, const unsigned *r, size_t n, const double *x) { return set(m, r, n, x); }
 API int fmi2GetReal(M *m, const unsigned *r, size_t n, double *x) { return get(m, r, n, x); }
 API int fmi2DoStep(M *m, double t, double h, int p) {
@@ -73,6 +91,7 @@ VARIABLES = [
     ("fail_at", "parameter", "s", "1e9", ""),
     ("nan_at", "parameter", "s", "1e9", ""),
     ("y", "output", "rad", "", ""),
+    ("status", "parameter", "1", "3", ""),
 ]
 
 
@@ -90,17 +109,31 @@ def build(directory: Path, version: int) -> Path:
     return path
 
 
-def description(version: int) -> str:
-    """Write the XML of one FMI version."""
+def described(fmu: Path, path: Path, xml: str) -> Path:
+    """Pack the binary of a tiny FMU with another description."""
+    with zipfile.ZipFile(fmu) as good, zipfile.ZipFile(path, "w") as archive:
+        binary = next(name for name in good.namelist() if name.startswith("binaries/"))
+        archive.writestr("modelDescription.xml", xml)
+        archive.writestr(binary, good.read(binary))
+    return path
+
+
+def description(version: int, *, direct: bool = False, state: bool = True) -> str:
+    """Write the XML of one FMI version; `direct`: y follows a and b at once; `state`: it can be saved."""
     head = {
         2: '<fmiModelDescription fmiVersion="2.0" modelName="tiny" guid="t">',
         3: '<fmiModelDescription fmiVersion="3.0" modelName="tiny" instantiationToken="t">',
     }
-    outputs = {2: '<Outputs><Unknown index="7"/></Outputs>', 3: '<Output valueReference="6"/>'}
+    known = {2: "1 2", 3: "0 1"}[version] if direct else ""
+    outputs = {
+        2: f'<Outputs><Unknown index="7" dependencies="{known}"/></Outputs>',
+        3: f'<Output valueReference="6" dependencies="{known}"/>',
+    }
+    saves = f'canGetAndSetFMU{"s" if version == 2 else "S"}tate="{str(state).lower()}"'
     units = "".join(f'<Unit name="{unit}"/>' for unit in ("rad", "1", "s"))
     rows = "".join(_variable(version, number, *row) for number, row in enumerate(VARIABLES))
     return (
-        f'{head[version]}<CoSimulation modelIdentifier="tiny"/><UnitDefinitions>{units}</UnitDefinitions>'
+        f'{head[version]}<CoSimulation modelIdentifier="tiny" {saves}/><UnitDefinitions>{units}</UnitDefinitions>'
         f"<ModelVariables>{rows}</ModelVariables><ModelStructure>{outputs[version]}</ModelStructure></fmiModelDescription>"
     )
 

@@ -7,16 +7,38 @@ from pathlib import Path
 
 from cosim.loop.compiled import CompiledLoop, load
 from cosim.loop.interpreted import InterpretedLoop
-from cosim.loop.plan import Column, Failure, Link, Part, Plan
+from cosim.loop.plan import (
+    Balance,
+    Column,
+    Effort,
+    Failure,
+    Fault,
+    Gather,
+    Inner,
+    Iterate,
+    Link,
+    Part,
+    Plan,
+    Step,
+    Turn,
+)
 
 __all__ = [
+    "Balance",
     "Column",
     "CompiledLoop",
+    "Effort",
     "Failure",
+    "Fault",
+    "Gather",
+    "Inner",
     "InterpretedLoop",
+    "Iterate",
     "Link",
     "Part",
     "Plan",
+    "Step",
+    "Turn",
     "library",
     "make_loop",
     "slow_because",

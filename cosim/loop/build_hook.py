@@ -15,7 +15,10 @@ from typing import Any
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 ROOT = Path(__file__).resolve().parents[2]
-LIBRARIES = {"cosim/loop/loop.c": "cosim/loop/_loop", "cosim/proof/truth.c": "cosim/proof/_truth"}
+LIBRARIES = {
+    "cosim/loop/_loop": ("cosim/loop/loop.c", "cosim/loop/coupling.c"),
+    "cosim/proof/_truth": ("cosim/proof/truth.c",),
+}
 FLAGS = ["-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra"]
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 GLIBC = "2.17"
@@ -32,24 +35,27 @@ class CustomBuildHook(BuildHookInterface):  # type: ignore[misc]
 
 
 def build(root: Path) -> list[str]:
-    """Compile every library whose source is there; returns their paths relative to `root`."""
-    present = {source: target + SUFFIX for source, target in LIBRARIES.items() if (root / source).exists()}
-    for source, target in present.items():
-        compile_library(root / source, root / target)
-    return list(present.values())
+    """Compile every library whose sources are there; returns their paths relative to `root`."""
+    made = []
+    for target, sources in LIBRARIES.items():
+        if all((root / source).exists() for source in sources):
+            compile_library([root / source for source in sources], root / (target + SUFFIX))
+            made.append(target + SUFFIX)
+    return made
 
 
-def compile_library(source: Path, target: Path) -> None:
-    """Compile one C file into one shared library, which appears complete or not at all."""
+def compile_library(sources: list[Path], target: Path) -> None:
+    """Compile C files into one shared library, which appears complete or not at all."""
     with tempfile.TemporaryDirectory() as directory:
         local = Path(directory) / target.name
-        command = [sys.executable, "-m", "ziglang", "cc", *FLAGS, *_target(), "-shared", "-o", str(local), str(source)]
+        command = [sys.executable, "-m", "ziglang", "cc", *FLAGS, *_target(), "-shared", "-o", str(local)]
+        command += map(str, sources)
         if sys.platform != "win32":
-            command += ["-fPIC", "-lm"]
+            command += ["-fPIC", "-fvisibility=hidden", "-lm"]
         environment = os.environ | {"ZIG_LOCAL_CACHE_DIR": directory}
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
         if done.returncode:
-            raise RuntimeError(f"{source} does not compile:\n{done.stderr}")
+            raise RuntimeError(f"{target.name} does not compile:\n{done.stderr}")
         partial = target.with_suffix(f".{os.getpid()}.partial")
         partial.write_bytes(local.read_bytes())
         os.replace(partial, target)

@@ -1,77 +1,30 @@
 """The loop in C, called through ctypes, which lets other threads run meanwhile."""
 
 import ctypes
-from ctypes import POINTER, Structure, c_double, c_int64, c_void_p
+from ctypes import POINTER, c_int64, c_void_p
 from typing import Any
 
 import numpy as np
 
 from cosim.component import Functions
-from cosim.loop.plan import Failure, Part, Plan
+from cosim.loop.plan import Balance, Effort, Failure, Gather, Iterate, Link, Part, Plan, Step, Turn
+from cosim.loop.structures import LAYOUT, CBond, CColumn, CFault, CInner, CLoop, CPart, CTurn, CWire
 
-
-class _Part(Structure):
-    _fields_ = [
-        ("version", c_int64),
-        ("instance", c_void_p),
-        ("set", c_void_p),
-        ("get", c_void_p),
-        ("step", c_void_p),
-        ("inputs", c_int64),
-        ("outputs", c_int64),
-        ("input_references", c_void_p),
-        ("output_references", c_void_p),
-        ("input", c_void_p),
-        ("output", c_void_p),
-    ]
-
-
-class _Wire(Structure):
-    _fields_ = [
-        ("source", c_int64),
-        ("target", c_int64),
-        ("noise", c_int64),
-        ("gain", c_double),
-        ("offset", c_double),
-        ("quantum", c_double),
-    ]
-
-
-class _Column(Structure):
-    _fields_ = [("source", c_int64), ("mean", c_int64), ("sample", c_double), ("sum", c_double)]
-
-
-class _Loop(Structure):
-    _fields_ = [
-        ("parts", c_int64),
-        ("wires", c_int64),
-        ("signals", c_int64),
-        ("columns", c_int64),
-        ("means", c_int64),
-        ("part", POINTER(_Part)),
-        ("wire", POINTER(_Wire)),
-        ("column", POINTER(_Column)),
-        ("bus", c_void_p),
-        ("signal", c_void_p),
-        ("step", c_double),
-        ("decimation", c_int64),
-        ("tick", c_int64),
-        ("warnings", c_int64),
-        ("half", c_int64),
-        ("edge", c_int64),
-        ("halves", c_int64),
-        ("sampled", c_int64),
-        ("failed", c_int64),
-        ("status", c_int64),
-    ]
+_KINDS = {Gather: 0, Step: 1, Iterate: 2, Balance: 3}
 
 
 def load(path: str) -> ctypes.CDLL:
-    """Load the compiled loop and declare its functions."""
+    """Load the compiled loop and declare its functions.
+
+    Raises:
+        OSError: it cannot be loaded, or was built from another version of its C.
+    """
     library = ctypes.CDLL(path)
-    library.loop_start.argtypes = [POINTER(_Loop)]
-    library.loop_run.argtypes = [POINTER(_Loop), c_int64, c_void_p, c_void_p, c_int64]
-    library.loop_flush.argtypes = [POINTER(_Loop), c_void_p, c_int64]
+    if not hasattr(library, "loop_layout") or library.loop_layout() != LAYOUT:
+        raise OSError(f"{path} was built from another version")
+    library.loop_start.argtypes = [POINTER(CLoop)]
+    library.loop_run.argtypes = [POINTER(CLoop), c_int64, c_void_p, c_void_p, c_int64]
+    library.loop_flush.argtypes = [POINTER(CLoop), c_void_p, c_int64]
     for function in (library.loop_start, library.loop_run, library.loop_flush):
         function.restype = c_int64
     return library
@@ -83,16 +36,21 @@ class CompiledLoop:
     kind = "compiled"
 
     def __init__(self, plan: Plan, library: ctypes.CDLL) -> None:
-        self._plan, self._library = plan, library
-        self._loop = _Loop(
+        self.plan, self._library = plan, library
+        first = [sum(len(part.links) for part in plan.parts[:index]) for index in range(len(plan.parts))]
+        links = [link for part in plan.parts for link in part.links]
+        turns = [_turn(turn, first) for turn in plan.turns]
+        self._loop = CLoop(
             parts=len(plan.parts),
-            wires=len(plan.links),
+            wires=len(links),
+            turns=len(turns),
             signals=plan.signals,
             columns=len(plan.columns),
             means=sum(column.mean for column in plan.columns),
-            part=(_Part * len(plan.parts))(*(_part(part, plan.bus) for part in plan.parts)),
-            wire=(_Wire * len(plan.links))(*(_Wire(**vars(link)) for link in plan.links)),
-            column=(_Column * len(plan.columns))(*(_Column(column.source, column.mean) for column in plan.columns)),
+            part=_array(CPart, [_part(part, start, plan.bus) for part, start in zip(plan.parts, first, strict=True)]),
+            wire=_array(CWire, [_wire(link) for link in links]),
+            turn=_array(CTurn, turns),
+            column=_array(CColumn, [CColumn(one.source, one.mean, one.late) for one in plan.columns]),
             bus=_address(plan.bus, 0),
             signal=_address(plan.bus, plan.signal),
             step=plan.step,
@@ -115,7 +73,13 @@ class CompiledLoop:
     def failure(self) -> Failure | None:
         """What failed, if anything did."""
         loop = self._loop
-        return Failure(loop.failed, loop.tick, loop.status) if loop.failed >= 0 else None
+        return Failure(loop.failed, loop.since, loop.status) if loop.failed >= 0 else None
+
+    @property
+    def efforts(self) -> list[Effort]:
+        """What the coupled turns took."""
+        coupled = [one for one in self._loop.turn[: self._loop.turns] if one.kind in (_KINDS[Iterate], _KINDS[Balance])]
+        return [Effort(one.rounds, one.greatest, one.at_limit) for one in coupled]
 
     def start(self) -> None:
         """Read all outputs before the first tick."""
@@ -123,33 +87,62 @@ class CompiledLoop:
 
     def run(self, ticks: int, signals: np.ndarray) -> np.ndarray:
         """Run ticks with signals of shape (signals, ticks); returns rows of shape (columns, rows)."""
-        rows = np.empty((len(self._plan.columns), ticks // self._plan.decimation + 2))
+        rows = np.empty((len(self.plan.columns), ticks // self.plan.decimation + 2))
         signals = np.ascontiguousarray(signals, dtype=np.float64)
         written = self._library.loop_run(self._loop, ticks, signals.ctypes.data, rows.ctypes.data, rows.shape[1])
         return rows[:, :written]
 
     def flush(self) -> np.ndarray:
         """Return the row cut short by the end of the run, if there is one, shape (columns, 0 or 1)."""
-        rows = np.empty((len(self._plan.columns), 1))
+        rows = np.empty((len(self.plan.columns), 1))
         return rows[:, : self._library.loop_flush(self._loop, rows.ctypes.data, 1)]
 
 
-def _part(part: Part, bus: np.ndarray) -> _Part:
+def _part(part: Part, wire: int, bus: np.ndarray) -> CPart:
     functions: Any = part.component.functions
     assert isinstance(functions, Functions)  # the factory chose this loop because all offer them
-    return _Part(
+    return CPart(
         version=functions.version,
         instance=functions.instance,
         set=functions.set,
         get=functions.get,
         step=functions.step,
+        save=functions.save,
+        restore=functions.restore,
         inputs=len(part.input_references),
         outputs=len(part.output_references),
         input_references=part.input_references.ctypes.data,
         output_references=part.output_references.ctypes.data,
         input=_address(bus, part.input),
         output=_address(bus, part.output),
+        wire=wire,
+        wires=len(part.links),
+        every=part.every,
+        state=functions.state,
     )
+
+
+def _wire(link: Link) -> CWire:
+    faults = [CFault(f.first, f.last, f.noise, f.freeze, f.gain, f.offset) for f in link.faults]
+    return CWire(
+        link.source, link.target, link.noise, link.gain, link.offset, link.quantum, len(faults), _array(CFault, faults)
+    )
+
+
+def _turn(turn: Turn, first: list[int]) -> CTurn:
+    made = CTurn(kind=_KINDS[type(turn)], part=turn.part, parts=turn.parts, relaxation=1.0, size=1.0)
+    if isinstance(turn, Iterate | Balance):
+        inner = [CInner(wire=first[one.part] + one.link, back=one.back) for one in turn.inner]
+        bonds = [CBond(*bond) for bond in turn.bonds] if isinstance(turn, Balance) else []
+        made.inners, made.inner = len(inner), _array(CInner, inner)
+        made.bonds, made.bond = len(bonds), _array(CBond, bonds)
+        made.tolerance, made.most = turn.tolerance, turn.most
+        made.theta = turn.theta if isinstance(turn, Iterate) else 0.0
+    return made
+
+
+def _array(kind: Any, items: list[Any]) -> Any:
+    return (kind * len(items))(*items)
 
 
 def _address(bus: np.ndarray, place: int) -> int:

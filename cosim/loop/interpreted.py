@@ -3,32 +3,43 @@
 Does what loop.c does, in the same order, bit for bit; see there for the meaning of each part.
 """
 
+from collections.abc import Callable
 from math import floor, isfinite
 
 import numpy as np
 
 from cosim.component import NOT_FINITE, OK, WARNING
-from cosim.loop.plan import Failure, Link, Part, Plan
+from cosim.loop.coupling import Balancing, Coupled, Iterating
+from cosim.loop.plan import Effort, Failure, Gather, Iterate, Link, Part, Plan, Step, Turn
 
 
 class InterpretedLoop:
-    """A plan executed by Python, some hundred times slower than by the compiled loop."""
+    """A plan executed by Python, some twenty times slower than by the compiled loop."""
 
     kind = "interpreted"
 
     def __init__(self, plan: Plan) -> None:
-        self._plan = plan
+        self.plan = plan
         self.tick, self.warnings = 0, 0
         self.failure: Failure | None = None
+        self._frozen: dict[tuple[int, int], float] = {}
+        self._coupled: list[Coupled] = []
+        self._turns = [self._taker(turn) for turn in plan.turns]
+        self._value = [0.0] * len(plan.columns)
         self._sample = [0.0] * len(plan.columns)
         self._sum = [0.0] * len(plan.columns)
         self._half, self._edge, self._halves, self._sampled = 0, plan.decimation, 0, False
         self._means = any(column.mean for column in plan.columns)
 
+    @property
+    def efforts(self) -> list[Effort]:
+        """What the coupled turns took."""
+        return [one.effort for one in self._coupled]
+
     def start(self) -> None:
         """Read all outputs before the first tick."""
-        for index, part in enumerate(self._plan.parts):
-            status = self._get(part)
+        for index in range(len(self.plan.parts)):
+            status = self.get(index)
             if status > WARNING:
                 self.failure = Failure(index, 0, status)
                 return
@@ -36,10 +47,14 @@ class InterpretedLoop:
     def run(self, ticks: int, signals: np.ndarray) -> np.ndarray:
         """Run ticks with signals of shape (signals, ticks); returns rows of shape (columns, rows)."""
         rows: list[list[float]] = []
+        bus, plan = self.plan.bus, self.plan
         for k in range(ticks):
-            self._gather(signals[:, k])
+            bus[plan.signal : plan.signal + plan.signals] = signals[:, k]
+            self._note(late=False)
+            failed = any(take() for take in self._turns)
+            self._note(late=True)
             self._record(rows)
-            if not self._advance_all():
+            if failed:
                 break
             self.tick += 1
         return self._array(rows)
@@ -51,44 +66,85 @@ class InterpretedLoop:
             self._emit(rows)
         return self._array(rows)
 
-    def _gather(self, signals: np.ndarray) -> None:
-        bus, plan = self._plan.bus, self._plan
-        bus[plan.signal : plan.signal + plan.signals] = signals
-        for link in plan.links:
-            bus[link.target] = _carry(link, bus)
+    def carry(self, link: Link) -> float:
+        """Return what a wire gives now."""
+        bus = self.plan.bus
+        value = link.gain * float(bus[link.source]) + link.offset
+        if link.quantum > 0.0:
+            value = link.quantum * float(floor(value / link.quantum + 0.5))
+        value = value if link.noise < 0 else value + float(bus[link.noise])
+        for number, fault in enumerate(link.faults):
+            if fault.first <= self.tick < fault.last:
+                if fault.freeze:
+                    value = self._frozen.setdefault((link.target, number), value)
+                else:
+                    value = fault.gain * value + fault.offset
+                    value = value if fault.noise < 0 else value + float(bus[fault.noise])
+        return value
 
-    def _advance_all(self) -> bool:
-        time = float(self.tick) * self._plan.step
-        for index, part in enumerate(self._plan.parts):
-            status = self._advance(part, time)
-            self.warnings += status == WARNING
-            if status > WARNING:
-                self.failure = Failure(index, self.tick, status)
-                return False
-        return True
-
-    def _advance(self, part: Part, time: float) -> int:
-        status = self._set(part)
-        if status <= WARNING:
-            status = max(status, part.component.step(time, self._plan.step))
-        if status <= WARNING:
-            status = max(status, self._get(part))
-        outputs = self._plan.bus[part.output : part.output + len(part.output_references)]
-        return NOT_FINITE if status <= WARNING and not all(map(isfinite, outputs)) else status
-
-    def _set(self, part: Part) -> int:
+    def set(self, index: int) -> int:
+        """Set the inputs of a part from the bus; returns the status."""
+        part = self.plan.parts[index]
         count = len(part.input_references)
-        values = self._plan.bus[part.input : part.input + count]
+        values = self.plan.bus[part.input : part.input + count]
         return part.component.set(part.input_references, values) if count else OK
 
-    def _get(self, part: Part) -> int:
+    def get(self, index: int) -> int:
+        """Get the outputs of a part to the bus; returns the status."""
+        part = self.plan.parts[index]
         count = len(part.output_references)
-        values = self._plan.bus[part.output : part.output + count]
+        values = self.plan.bus[part.output : part.output + count]
         return part.component.get(part.output_references, values) if count else OK
 
+    def finite(self, index: int, status: int) -> int:
+        """Return the status, or NOT_FINITE where an output of a part is not a finite number."""
+        part = self.plan.parts[index]
+        outputs = self.plan.bus[part.output : part.output + len(part.output_references)]
+        return NOT_FINITE if status <= WARNING and not all(map(isfinite, outputs)) else status
+
+    def judge(self, index: int, status: int, since: int | None = None) -> bool:
+        """Count a warning and note a failure; returns whether it is one."""
+        self.warnings += status == WARNING
+        if status > WARNING:
+            self.failure = Failure(index, self.tick if since is None else since, status)
+        return status > WARNING
+
+    def _taker(self, turn: Turn) -> Callable[[], bool]:
+        """Return what takes a turn and tells whether a component failed."""
+        members = range(turn.part, turn.part + turn.parts)
+        if isinstance(turn, Gather):
+            return lambda: any(self._gather(self.plan.parts[index]) for index in members)
+        if isinstance(turn, Step):
+            return lambda: any(self._advance(index) for index in members)
+        self._coupled.append(Iterating(self, turn) if isinstance(turn, Iterate) else Balancing(self, turn))
+        return self._coupled[-1].take
+
+    def _gather(self, part: Part) -> bool:
+        if self.tick % part.every == 0:
+            for link in part.links:
+                self.plan.bus[link.target] = self.carry(link)
+        return False
+
+    def _advance(self, index: int) -> bool:
+        part = self.plan.parts[index]
+        since = self.tick - self.tick % part.every
+        status = self.set(index) if since == self.tick else OK
+        if status <= WARNING and (self.tick + 1) % part.every == 0:
+            time = float(self.tick + 1 - part.every) * self.plan.step
+            status = max(status, part.component.step(time, float(part.every) * self.plan.step))
+            if status <= WARNING:
+                status = max(status, self.get(index))
+            status = self.finite(index, status)
+        return self.judge(index, status, since)
+
+    def _note(self, late: bool) -> None:
+        for number, column in enumerate(self.plan.columns):
+            if column.late == late:
+                self._value[number] = float(self.plan.bus[column.source])
+
     def _record(self, rows: list[list[float]]) -> None:
-        if self.tick % self._plan.decimation == 0:
-            self._sample = [float(self._plan.bus[column.source]) for column in self._plan.columns]
+        if self.tick % self.plan.decimation == 0:
+            self._sample = list(self._value)
             self._sampled = True
             if not self._means:
                 self._emit(rows)
@@ -99,24 +155,16 @@ class InterpretedLoop:
     def _add_half(self, rows: list[list[float]]) -> None:
         if self._half == self._edge:
             self._emit(rows)
-            self._edge += 2 * self._plan.decimation
-        bus = self._plan.bus
-        self._sum = [total + float(bus[c.source]) for total, c in zip(self._sum, self._plan.columns, strict=True)]
+            self._edge += 2 * self.plan.decimation
+        self._sum = [total + value for total, value in zip(self._sum, self._value, strict=True)]
         self._halves += 1
         self._half += 1
 
     def _emit(self, rows: list[list[float]]) -> None:
-        pairs = zip(self._plan.columns, self._sum, self._sample, strict=True)
+        pairs = zip(self.plan.columns, self._sum, self._sample, strict=True)
         rows.append([total / self._halves if column.mean else sample for column, total, sample in pairs])
-        self._sum = [0.0] * len(self._plan.columns)
+        self._sum = [0.0] * len(self.plan.columns)
         self._halves, self._sampled = 0, False
 
     def _array(self, rows: list[list[float]]) -> np.ndarray:
-        return np.array(rows, dtype=np.float64).reshape(len(rows), len(self._plan.columns)).T
-
-
-def _carry(link: Link, bus: np.ndarray) -> float:
-    value = link.gain * float(bus[link.source]) + link.offset
-    if link.quantum > 0.0:
-        value = link.quantum * float(floor(value / link.quantum + 0.5))
-    return value if link.noise < 0 else value + float(bus[link.noise])
+        return np.array(rows, dtype=np.float64).reshape(len(rows), len(self.plan.columns)).T

@@ -1,24 +1,14 @@
-/* The stepping loop: gathers, sets, steps, gets and records for every component, one tick after the other.
- *
- * All values live on one bus: outputs and inputs of each component, then the signals of the tick. At tick k, t = k * step:
+/* The stepping loop. At tick k, t = k * step:
  *   1. the signals of the tick are put on the bus;
- *   2. every wire carries  y = quantise(gain * x + offset) + noise  from outputs and signals to inputs;
- *   3. the bus is recorded: row k holds outputs at t_k and the inputs that act from t_k to t_(k+1);
- *   4. every component is set, stepped to t_(k+1) and read (all inputs were gathered before: Jacobi).
- * interpreted.py does the same in Python, bit for bit. Nothing is allocated here. */
+ *   2. outputs and signals are noted for the recording;
+ *   3. the turns of the tick are taken: wires carry  y = quantise(gain * x + offset) + noise  to inputs, components step;
+ *   4. the row is recorded: outputs at t_k and the inputs that act from t_k to t_(k+1).
+ * A component that steps every n ticks takes its inputs at ticks 0, n, 2n, ... and is stepped at the end of the last
+ * tick before the next of them, so nobody sees its outputs early. interpreted.py does the same in Python, bit for bit.
+ * Nothing is allocated here. */
+#include "loop.h"
 
 #include <math.h>
-#include <stdbool.h>
-#include <stddef.h>
-#include <stdint.h>
-
-#ifdef _WIN32
-#define EXPORT __declspec(dllexport)
-#else
-#define EXPORT __attribute__((visibility("default")))
-#endif
-
-enum { FMI_WARNING = 1, NOT_FINITE = 100, TERMINATED = 101 };
 
 typedef int Set2(void *, const uint32_t *, size_t, const double *);
 typedef int Get2(void *, const uint32_t *, size_t, double *);
@@ -27,48 +17,35 @@ typedef int Set3(void *, const uint32_t *, size_t, const double *, size_t);
 typedef int Get3(void *, const uint32_t *, size_t, double *, size_t);
 typedef int Step3(void *, double, double, bool, bool *, bool *, bool *, double *);
 
-typedef struct {
-    int64_t version; /* of FMI: 2 or 3 */
-    void *instance;
-    void (*set)(void), (*get)(void), (*step)(void);
-    int64_t inputs, outputs; /* how many */
-    const uint32_t *input_references, *output_references;
-    double *input, *output; /* their places on the bus */
-} Part;
-
-typedef struct {
-    int64_t source, target, noise; /* places on the bus; noise < 0: none */
-    double gain, offset, quantum;  /* quantum 0: not quantised */
-} Wire;
-
-typedef struct {
-    int64_t source; /* place on the bus */
-    int64_t mean;   /* 0: the sample at the row's tick; 1: mean over the sample interval centred there */
-    double sample, sum;
-} Column;
-
-typedef struct {
-    int64_t parts, wires, signals, columns, means;
-    const Part *part;
-    const Wire *wire;
-    Column *column;
-    double *bus, *signal; /* `signal` is the place of the first signal on the bus */
-    double step;
-    int64_t decimation, tick, warnings;
-    int64_t half, edge, halves, sampled; /* of the running mean: time in half ticks, end of the window, length, row begun */
-    int64_t failed, status;              /* part that failed (-1: none) and why */
-} Loop;
-
-static double carry(const Wire *wire, const double *bus)
+static double broken(Fault *fault, int64_t tick, const double *bus, double value)
 {
+    if (tick < fault->first || tick >= fault->last) {
+        return value;
+    }
+    if (fault->freeze) {
+        fault->held = fault->holds ? fault->held : value;
+        fault->holds = 1;
+        return fault->held;
+    }
+    value = fault->gain * value + fault->offset;
+    return fault->noise < 0 ? value : value + bus[fault->noise];
+}
+
+double carry(const Loop *loop, const Wire *wire)
+{
+    const double *bus = loop->bus;
     double value = wire->gain * bus[wire->source] + wire->offset;
     if (wire->quantum > 0.0) {
         value = wire->quantum * floor(value / wire->quantum + 0.5);
     }
-    return wire->noise < 0 ? value : value + bus[wire->noise];
+    value = wire->noise < 0 ? value : value + bus[wire->noise];
+    for (int64_t i = 0; i < wire->faults; i++) {
+        value = broken(&wire->fault[i], loop->tick, bus, value);
+    }
+    return value;
 }
 
-static int set_inputs(const Part *part)
+int set_inputs(const Part *part)
 {
     if (part->inputs == 0) {
         return 0;
@@ -80,7 +57,7 @@ static int set_inputs(const Part *part)
                                (size_t)part->inputs);
 }
 
-static int get_outputs(const Part *part)
+int get_outputs(const Part *part)
 {
     if (part->outputs == 0) {
         return 0;
@@ -92,38 +69,103 @@ static int get_outputs(const Part *part)
                                (size_t)part->outputs);
 }
 
-static int do_step(const Part *part, double time, double step)
+/* `final`: the component will not be taken back to before this step. */
+int do_step(const Part *part, double time, double size, bool final)
 {
     if (part->version == 2) {
-        return ((Step2 *)part->step)(part->instance, time, step, 1);
+        return ((Step2 *)part->step)(part->instance, time, size, final);
     }
     bool event = false, terminate = false, early = false;
     double last = time;
-    int status = ((Step3 *)part->step)(part->instance, time, step, true, &event, &terminate, &early, &last);
+    int status = ((Step3 *)part->step)(part->instance, time, size, final, &event, &terminate, &early, &last);
     return status <= FMI_WARNING && terminate ? TERMINATED : status;
 }
 
-static int worse(int one, int other)
+int worse(int one, int other)
 {
     return one > other ? one : other;
 }
 
-/* Takes one component from `time` over one step; returns the worst status of its calls. */
-static int advance(const Part *part, double time, double step)
+int finite_outputs(const Part *part, int status)
 {
-    int status = set_inputs(part);
-    if (status <= FMI_WARNING) {
-        status = worse(status, do_step(part, time, step));
-    }
-    if (status <= FMI_WARNING) {
-        status = worse(status, get_outputs(part));
-    }
     for (int64_t i = 0; status <= FMI_WARNING && i < part->outputs; i++) {
         if (!isfinite(part->output[i])) {
             status = NOT_FINITE;
         }
     }
     return status;
+}
+
+int fail(Loop *loop, int64_t part, int status, int64_t since)
+{
+    loop->failed = part;
+    loop->status = status;
+    loop->since = since;
+    return 1;
+}
+
+static bool begins(const Part *part, int64_t tick)
+{
+    return part->every == 1 || tick % part->every == 0;
+}
+
+static bool ends(const Part *part, int64_t tick)
+{
+    return part->every == 1 || (tick + 1) % part->every == 0;
+}
+
+static void gather(const Loop *loop, const Part *part)
+{
+    if (begins(part, loop->tick)) {
+        for (int64_t i = part->wire; i < part->wire + part->wires; i++) {
+            loop->bus[loop->wire[i].target] = carry(loop, &loop->wire[i]);
+        }
+    }
+}
+
+/* Takes one component over its step, as far as it falls into this tick; returns the worst status of its calls. */
+static int advance(const Loop *loop, const Part *part)
+{
+    int status = begins(part, loop->tick) ? set_inputs(part) : 0;
+    if (status > FMI_WARNING || !ends(part, loop->tick)) {
+        return status;
+    }
+    double time = (double)(loop->tick + 1 - part->every) * loop->step;
+    status = worse(status, do_step(part, time, (double)part->every * loop->step, true));
+    if (status <= FMI_WARNING) {
+        status = worse(status, get_outputs(part));
+    }
+    return finite_outputs(part, status);
+}
+
+static int step_all(Loop *loop, const Turn *turn)
+{
+    for (int64_t i = turn->part; i < turn->part + turn->parts; i++) {
+        const Part *part = &loop->part[i];
+        int status = advance(loop, part);
+        loop->warnings += status == FMI_WARNING;
+        if (status > FMI_WARNING) {
+            return fail(loop, i, status, loop->tick - loop->tick % part->every);
+        }
+    }
+    return 0;
+}
+
+static int take(Loop *loop, Turn *turn)
+{
+    switch (turn->kind) {
+    case GATHER:
+        for (int64_t i = turn->part; i < turn->part + turn->parts; i++) {
+            gather(loop, &loop->part[i]);
+        }
+        return 0;
+    case STEP:
+        return step_all(loop, turn);
+    case ITERATE:
+        return iterate(loop, turn);
+    default:
+        return balance(loop, turn);
+    }
 }
 
 /* Writes the row begun at the last multiple of `decimation`; rows are stored column by column, `capacity` apart. */
@@ -148,7 +190,7 @@ static int64_t add_half(Loop *loop, double *row, int64_t capacity)
     }
     for (int64_t i = 0; i < loop->columns; i++) {
         if (loop->column[i].mean) {
-            loop->column[i].sum += loop->bus[loop->column[i].source];
+            loop->column[i].sum += loop->column[i].value;
         }
     }
     loop->halves++;
@@ -160,7 +202,7 @@ static int64_t record(Loop *loop, double *row, int64_t capacity)
 {
     if (loop->tick % loop->decimation == 0) {
         for (int64_t i = 0; i < loop->columns; i++) {
-            loop->column[i].sample = loop->bus[loop->column[i].source];
+            loop->column[i].sample = loop->column[i].value;
         }
         loop->sampled = 1;
         if (loop->means == 0) {
@@ -175,14 +217,20 @@ static int64_t record(Loop *loop, double *row, int64_t capacity)
     return ended + add_half(loop, row + ended, capacity);
 }
 
-static void gather(Loop *loop, const double *signals, int64_t ticks)
+static void note(Loop *loop, int64_t late)
 {
-    for (int64_t i = 0; i < loop->signals; i++) {
-        loop->signal[i] = signals[i * ticks];
+    for (int64_t i = 0; i < loop->columns; i++) {
+        if (loop->column[i].late == late) {
+            loop->column[i].value = loop->bus[loop->column[i].source];
+        }
     }
-    for (int64_t i = 0; i < loop->wires; i++) {
-        loop->bus[loop->wire[i].target] = carry(&loop->wire[i], loop->bus);
-    }
+}
+
+/* Tells how its data is laid out, so that a library of another version is not trusted. */
+EXPORT int64_t loop_layout(void)
+{
+    return (int64_t)(sizeof(Loop) + 3 * sizeof(Part) + 5 * sizeof(Wire) + 7 * sizeof(Turn) + 11 * sizeof(Column) +
+                     13 * sizeof(Inner) + 17 * sizeof(Bond) + 19 * sizeof(Fault));
 }
 
 /* Reads all outputs once, before the first tick. */
@@ -191,8 +239,7 @@ EXPORT int64_t loop_start(Loop *loop)
     for (int64_t i = 0; i < loop->parts; i++) {
         int status = get_outputs(&loop->part[i]);
         if (status > FMI_WARNING) {
-            loop->failed = i;
-            loop->status = status;
+            fail(loop, i, status, 0);
             return 0;
         }
     }
@@ -205,17 +252,18 @@ EXPORT int64_t loop_run(Loop *loop, int64_t ticks, const double *signals, double
 {
     int64_t written = 0;
     for (int64_t k = 0; k < ticks; k++) {
-        gather(loop, signals + k, ticks);
+        for (int64_t i = 0; i < loop->signals; i++) {
+            loop->signal[i] = signals[i * ticks + k];
+        }
+        note(loop, 0);
+        int failed = 0;
+        for (int64_t i = 0; i < loop->turns && !failed; i++) {
+            failed = take(loop, &loop->turn[i]);
+        }
+        note(loop, 1);
         written += record(loop, rows + written, capacity);
-        double time = (double)loop->tick * loop->step;
-        for (int64_t i = 0; i < loop->parts; i++) {
-            int status = advance(&loop->part[i], time, loop->step);
-            loop->warnings += status == FMI_WARNING;
-            if (status > FMI_WARNING) {
-                loop->failed = i;
-                loop->status = status;
-                return written;
-            }
+        if (failed) {
+            return written;
         }
         loop->tick++;
     }

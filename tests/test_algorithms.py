@@ -1,0 +1,336 @@
+"""Algorithms keep their closed forms and their stated delays, in C and in Python with the same bits."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from tiny_fmu import described, description, tiny
+
+from cosim.algorithm import Energy, GaussSeidel, Iterated, Jacobi
+from cosim.errors import StepError, WiringError
+from cosim.master import Run, simulate
+from cosim.schedule import delays
+from cosim.wiring import Wire
+
+__all__ = ["tiny"]
+
+Tiny = dict[int, Path]
+BOTH = pytest.mark.parametrize("compiled", [True, False])
+VERSIONS = pytest.mark.parametrize("version", [2, 3])
+BOND = (("mass.y", "spring.y"),)
+H = 0.05
+
+
+@pytest.fixture(scope="module")
+def plain(tiny: Tiny, tmp_path_factory: pytest.TempPathFactory) -> Tiny:
+    """The tiny FMU without units, so that a bond may be anything."""
+    folder = tmp_path_factory.mktemp("plain")
+    texts = {version: re.sub(r' unit="\w+"', "", description(version)) for version in tiny}
+    return {version: described(tiny[version], folder / f"plain{version}.fmu", texts[version]) for version in tiny}
+
+
+def oscillator(fmu: Path, algorithm: Any, ticks: int = 400, step: float = H, **options: Any) -> Run:
+    """Simulate v' = 1 - x and x' = v, from rest, as two FMUs: x = 1 - cos t."""
+    return simulate(
+        {"mass": fmu, "spring": fmu},
+        [("r", "mass.a"), ("spring.y", "mass.b"), ("mass.y", "spring.a")],
+        record={"v": "mass.y", "x": "spring.y", "held": "spring.a"},
+        step=step,
+        ticks=ticks,
+        signals={"r": 1.0},
+        algorithm=algorithm,
+        **options,
+    )
+
+
+def recursion(advance: Any, ticks: int) -> tuple[np.ndarray, np.ndarray]:
+    v, x, rows = 0.0, 0.0, []
+    for _ in range(ticks):
+        rows.append((v, x))
+        v, x = advance(v, x)
+    return tuple(np.array(rows).T)  # type: ignore[return-value]
+
+
+def trapezoid(v: float, x: float) -> tuple[float, float]:
+    next_v = ((1 - H * H / 4) * v + H * (1 - x)) / (1 + H * H / 4)
+    return next_v, x + H * (v + next_v) / 2
+
+
+CLOSED = {
+    "jacobi": (Jacobi(), lambda v, x: (v + H * (1 - x), x + H * v)),
+    "mass first": (
+        GaussSeidel(kind="gauss-seidel", order=("mass", "spring")),
+        lambda v, x: (v + H * (1 - x), x + H * (v + H * (1 - x))),
+    ),
+    "spring first": (
+        GaussSeidel(kind="gauss-seidel", order=("spring", "mass")),
+        lambda v, x: (v + H * (1 - x - H * v), x + H * v),
+    ),
+    "trapezoid": (Iterated(kind="iterated"), trapezoid),
+}
+
+
+@BOTH
+@VERSIONS
+@pytest.mark.parametrize("case", CLOSED)
+def test_each_algorithm_is_the_method_it_says(tiny: Tiny, case: str, version: int, compiled: bool) -> None:
+    algorithm, advance = CLOSED[case]
+    run = oscillator(tiny[version], algorithm, compiled=compiled)
+    v, x = recursion(advance, 400)
+    np.testing.assert_allclose(run.recording["v"], v, rtol=0, atol=2e-8)
+    np.testing.assert_allclose(run.recording["x"], x, rtol=0, atol=2e-8)
+
+
+def test_the_trapezoid_keeps_the_energy_that_jacobi_makes_up(tiny: Tiny) -> None:
+    def energy(algorithm: Any) -> np.ndarray:
+        recording = oscillator(tiny[3], algorithm, ticks=4000).recording
+        total: np.ndarray = recording["v"] ** 2 + (1 - recording["x"]) ** 2
+        return total
+
+    assert energy(Jacobi())[-1] > 1e4
+    np.testing.assert_allclose(energy(Iterated(kind="iterated")), 1, atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "order"),
+    [(Jacobi(), 1), (Iterated(kind="iterated", theta=1.0), 1), (Iterated(kind="iterated"), 2)],
+)
+def test_the_error_falls_with_the_order_of_the_method(tiny: Tiny, algorithm: Any, order: int) -> None:
+    errors = []
+    for ticks in (200, 400):
+        run = oscillator(tiny[3], algorithm, ticks=ticks, step=5 / ticks)
+        errors.append(np.abs(run.recording["x"] - (1 - np.cos(run.recording.t))).max())
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.1)
+
+
+def test_the_energy_method_is_of_second_order_in_its_pieces_and_needs_no_rollback(plain: Tiny) -> None:
+    errors = []
+    for pieces in (2, 4):
+        algorithm = Energy(kind="energy", bonds=BOND, tolerance=1e-12, max_pieces=pieces)
+        run = oscillator(plain[3], algorithm, ticks=100)
+        errors.append(np.abs(run.recording["x"] - (1 - np.cos(run.recording.t))).max())
+        assert run.statistics["coupling"][0]["greatest"] == pieces
+        assert "lost more energy than tolerated" in run.statistics["notes"][0]
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(2, abs=0.2)
+
+
+def test_pieces_follow_the_energy_lost(plain: Tiny) -> None:
+    def pieces(tolerance: float) -> int:
+        run = oscillator(plain[2], Energy(kind="energy", bonds=BOND, tolerance=tolerance, max_pieces=256))
+        effort = run.statistics["coupling"][0]
+        assert (
+            effort["at_limit"] < 0.02 * effort["rounds"]
+        )  # at the start, where the greatest power so far is next to nothing
+        return int(effort["rounds"])
+
+    counts = [pieces(tolerance) for tolerance in (1e-2, 1e-4, 1e-6)]
+    assert 400 <= counts[0] < counts[1] / 1.5 < counts[2] / 3
+
+
+@pytest.mark.parametrize(
+    "algorithm",
+    [
+        GaussSeidel(kind="gauss-seidel"),
+        Iterated(kind="iterated", theta=0.7, tolerance=1e-12),
+        Energy(kind="energy", bonds=BOND, tolerance=1e-6),
+    ],
+)
+def test_the_loops_in_c_and_python_give_the_same_bits(plain: Tiny, algorithm: Any) -> None:
+    cases = [(version, compiled) for version in (2, 3) for compiled in (True, False)]
+    runs = [oscillator(plain[version], algorithm, compiled=compiled, decimation=2) for version, compiled in cases]
+    assert [run.statistics["loop"] for run in runs] == ["compiled", "interpreted"] * 2
+    for run in runs[1:]:
+        assert run.statistics["coupling"] == runs[0].statistics["coupling"]
+        for name in run.recording:
+            np.testing.assert_array_equal(run.recording[name], runs[0].recording[name])
+
+
+CHAIN = [Wire("r", "one.a"), Wire("one.y", "two.a"), Wire("two.y", "three.a")]
+SLOW = {"two": 10}
+CAMERA = {"two": 2, "three": 6}
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("algorithm", "every", "expected"),
+    [
+        (Jacobi(), {}, [0, 1, 1]),
+        (GaussSeidel(kind="gauss-seidel"), {}, [0, 0, 0]),
+        (GaussSeidel(kind="gauss-seidel", order=("two", "one", "three")), {}, [0, 1, 0]),
+        (Iterated(kind="iterated", components=("one", "three")), {}, [0, 1, 1]),
+        (Jacobi(), SLOW, [0, 1, (10, 19)]),
+        (GaussSeidel(kind="gauss-seidel"), SLOW, [0, 0, (9, 18)]),
+        (Jacobi(), CAMERA, [0, 1, 2]),
+        (GaussSeidel(kind="gauss-seidel"), CAMERA, [0, 0, 2]),
+    ],
+)
+def test_an_impulse_takes_as_many_ticks_as_the_delays_say(
+    tiny: Tiny, algorithm: Any, every: Mapping[str, int], expected: list[Any], compiled: bool
+) -> None:
+    names = ("one", "two", "three")
+    stated = delays(algorithm, CHAIN, names, every)
+    told = [(one.least, one.most) for one in stated.values()]
+    assert told == [one if isinstance(one, tuple) else (one, one) for one in expected]
+    # a tick at which the last one looks at what the one before it saw
+    looks = next(k for k in range(60, 90) if k % every.get("three", 1) == (k - told[2][0]) % every.get("two", 1) == 0)
+    impulse = np.zeros(200)
+    impulse[looks - told[2][0] - told[1][0]] = 1.0
+    seen = simulate(
+        dict.fromkeys(names, tiny[3]),
+        CHAIN,
+        record={name: f"{name}.a" for name in names},
+        step=1e-3,
+        ticks=200,
+        signals={"r": impulse},
+        parameters={name: {"mode": 1.0} for name in names},
+        algorithm=algorithm,
+        every=every,
+        compiled=compiled,
+    ).recording
+    ticks = {name: np.flatnonzero(seen[name]) for name in names}
+    for before, after, (least, most) in zip(names, names[1:], told[1:], strict=False):
+        assert ticks[after][0] - ticks[before][0] == least
+        assert ticks[after][-1] - ticks[before][0] <= most + every.get(after, 1) - 1
+
+
+def test_a_slow_component_sees_its_inputs_at_its_ticks_and_shows_its_outputs_after_its_step(tiny: Tiny) -> None:
+    ramp = np.arange(40.0)
+    run = simulate(
+        {"camera": tiny[2]},
+        [("r", "camera.a")],
+        record={"seen": "camera.a", "shown": "camera.y"},
+        step=0.01,
+        ticks=40,
+        signals={"r": ramp},
+        parameters={"camera": {"mode": 1.0}},
+        every={"camera": 5},
+    )
+    held = ramp - ramp % 5
+    np.testing.assert_array_equal(run.recording["seen"], held)
+    np.testing.assert_array_equal(run.recording["shown"], np.concatenate([np.zeros(5), held[:-5]]))
+
+
+def test_a_slow_component_integrates_over_its_own_step(tiny: Tiny) -> None:
+    run = simulate(
+        {"slow": tiny[3]},
+        [("r", "slow.a"), ("slow.y", "slow.b")],
+        record={"y": "slow.y"},
+        step=1e-3,
+        ticks=105,
+        signals={"r": 1.0},
+        every={"slow": 10},
+    )
+    np.testing.assert_allclose(run.recording["y"], 1 - 0.99 ** (np.arange(105) // 10), rtol=1e-12)
+
+
+def test_a_failure_of_a_slow_component_names_the_tick_where_its_step_began(tiny: Tiny) -> None:
+    for compiled in (True, False):
+        with pytest.raises(StepError, match=r"slow returned an error at tick 20 \(0.02 s\)"):
+            simulate(
+                {"slow": tiny[3]},
+                [("r", "slow.a")],
+                record={"y": "slow.y"},
+                step=1e-3,
+                ticks=100,
+                signals={"r": 1.0},
+                every={"slow": 10},
+                parameters={"slow": {"fail_at": 0.021}},
+                compiled=compiled,
+            )
+
+
+@pytest.fixture(scope="module")
+def direct(tiny: Tiny, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A tiny FMU that says that its output follows its inputs at once."""
+    return described(tiny[3], tmp_path_factory.mktemp("direct") / "direct.fmu", description(3, direct=True))
+
+
+def amplifiers(fmu: Path, algorithm: Any, **options: Any) -> Run:
+    """y1 = 4 (1 - y2), y2 = 3 y1, both at once: y1 = 4/13."""
+    wires = [Wire("r", "one.a"), Wire("two.y", "one.b", **options.pop("wire", {})), Wire("one.y", "two.a")]
+    parameters = {"one": {"mode": 2.0, "k": 4.0}, "two": {"mode": 2.0, "k": 3.0}}
+    settings: dict[str, Any] = {"record": {"y": "one.y"}, "step": 0.1, "ticks": 5, "parameters": parameters}
+    return simulate({"one": fmu, "two": fmu}, wires, signals={"r": 1.0}, algorithm=algorithm, **(settings | options))
+
+
+@pytest.mark.parametrize("algorithm", [Jacobi(), GaussSeidel(kind="gauss-seidel")])
+def test_an_algebraic_loop_is_named_before_the_first_step(direct: Path, algorithm: Any) -> None:
+    sentence = f"each follows the one before at once, and {algorithm.kind} cannot solve that. Choose the algorithm"
+    with pytest.raises(WiringError, match=sentence) as caught:
+        amplifiers(direct, algorithm)
+    assert set(caught.value.value) == {"one.y", "two.a", "two.y", "one.b"}
+
+
+@BOTH
+def test_iteration_solves_an_algebraic_loop(direct: Path, compiled: bool) -> None:
+    run = amplifiers(direct, Iterated(kind="iterated"), compiled=compiled)
+    np.testing.assert_allclose(run.recording["y"][1:], 4 / 13, rtol=1e-8)
+
+
+def test_a_loop_may_be_broken_knowingly_and_a_doubtful_one_is_told(direct: Path, tiny: Tiny, tmp_path: Path) -> None:
+    run = amplifiers(direct, Jacobi(), wire={"breaks_loop": True})
+    np.testing.assert_allclose(run.recording["y"][:4], [0, 4, 4, 4 * (1 - 12)])
+    silent = description(3).replace(' dependencies=""', "")
+    note = amplifiers(described(tiny[3], tmp_path / "silent.fmu", silent), Jacobi()).statistics["notes"][0]
+    assert note.startswith("An algebraic loop cannot be excluded, because ")
+    assert "do not say what their outputs depend on" in note
+
+
+@BOTH
+def test_components_that_do_not_agree_are_named(direct: Path, compiled: bool) -> None:
+    algorithm = Iterated(kind="iterated", max_iterations=2)
+    with pytest.raises(StepError, match="one and those coupled with it did not agree within the iterations allowed"):
+        amplifiers(direct, algorithm, compiled=compiled)
+
+
+MISTAKES: list[tuple[Any, Mapping[str, int], str]] = [
+    (GaussSeidel(kind="gauss-seidel", order=("mass",)), {}, "it must name each component once: mass, spring."),
+    (
+        Iterated(kind="iterated", components=("mas",)),
+        {},
+        'algorithm.components names "mas", which is no component; components are: mass, spring.',
+    ),
+    (Iterated(kind="iterated"), {"mass": 2}, '"mass" steps every 2 ticks; components that are coupled must step at'),
+    (Jacobi(), {"mas": 2}, '"mas" is given a step, but is no component; components are: mass, spring.'),
+    (Jacobi(), {"mass": 0}, '"mass" shall step every 0 ticks; that must be a whole number from 1 on.'),
+    (
+        Energy(kind="energy", bonds=BOND),
+        {},
+        'The bond of "mass.y" [rad] and "spring.y" [rad] is no power; their product must be in W.',
+    ),
+    (
+        Energy(kind="energy", bonds=(("mass.y", "mass.y"),)),
+        {},
+        'The bond of "mass.y" and "mass.y" needs a wire from each of them to the component of the other.',
+    ),
+]
+
+
+@pytest.mark.parametrize(("algorithm", "every", "sentence"), MISTAKES)
+def test_an_algorithm_that_does_not_fit_is_refused(
+    tiny: Tiny, algorithm: Any, every: Mapping[str, int], sentence: str
+) -> None:
+    with pytest.raises(WiringError, match=re.escape(sentence)):
+        oscillator(tiny[3], algorithm, every=every)
+
+
+def test_iteration_needs_components_that_can_be_taken_back(tiny: Tiny, tmp_path: Path) -> None:
+    fmu = described(tiny[2], tmp_path / "forward.fmu", description(2, state=False))
+    with pytest.raises(WiringError, match='"mass" cannot save and restore its state, which the iterated algorithm'):
+        oscillator(fmu, Iterated(kind="iterated"))
+
+
+def test_a_quantised_wire_is_not_iterated(tiny: Tiny) -> None:
+    wires = [Wire("one.y", "two.a", quantum=0.1), Wire("two.y", "one.a")]
+    with pytest.raises(WiringError, match=r'The wire to "two.a" is quantised; values that are iterated must be smooth'):
+        simulate(
+            {"one": tiny[3], "two": tiny[3]},
+            wires,
+            record={"y": "one.y"},
+            step=1.0,
+            ticks=1,
+            algorithm=Iterated(kind="iterated"),
+        )
