@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from cosim.errors import InputError
-from cosim.recording import Recording
+from cosim.reading import read_recordings
 from cosim.terminal import put, put_json, say, stage
 
 
@@ -34,11 +34,8 @@ def diagnose(
 
     check_out(out, force)
     believed = read_card(card)
-    names = believed.columns | _pairs("--columns", columns)
-    stated = _pairs("--units", units)
-    recordings = [Recording.read(path, names, stated) for path in (*train, heldout)]
+    recordings = read_recordings((*train, heldout), believed.columns, columns, units, believed.mount.motion)
     _check_split(recordings[:-1], recordings[-1])
-    _check_kind(recordings, believed.mount.motion)
     seconds = sum(recording.duration for recording in recordings)
     say(f"Read {len(recordings)} recordings, {seconds:.0f} s; card {believed.mount.name}")
     with stage("looking for what the model lacks") as progress:
@@ -51,25 +48,6 @@ def diagnose(
         put(summary(done))
     if check and done.verdict:
         sys.exit(1)
-
-
-def _pairs(option: str, given: list[str] | None) -> dict[str, str]:
-    pairs = [item.partition("=") for item in given or []]
-    for name, equals, value in pairs:
-        if not (name and equals and value):
-            raise InputError(f'{option} {name}{equals}{value}: write it as name=value, for example "tau=force".')
-    return {name: value for name, _, value in pairs}
-
-
-def _check_kind(recordings: Sequence[Recording], motion: str) -> None:
-    """Units stated for q or v must be those of the card's kind of axis."""
-    fitting = {"q": "m", "v": "m/s"} if motion == "linear" else {"q": "rad", "v": "rad/s"}
-    for recording in recordings:
-        for name, unit in fitting.items():
-            stated = recording.units.get(name, unit) if name in recording else unit
-            if stated not in (unit, "1"):
-                rule = f"{name} of a {motion} axis is in {unit} or a unit that becomes it"
-                raise InputError(f'{recording.name}: the unit of "{name}" becomes {stated}; {rule}.', culprit=name)
 
 
 def _check_split(train: Sequence[object], heldout: object) -> None:

@@ -1,0 +1,52 @@
+"""`cosim identify`: recordings and a card to the same card with identified numbers."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cosim.terminal import put, put_json, say, stage
+
+
+def identify(
+    recordings: Annotated[list[Path], typer.Argument(help="Recordings of the axis.", metavar="RECORDING...")],
+    card: Annotated[str, typer.Option("--card", help="Model card (.toml), or the name of a shipped one.")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
+    free: Annotated[
+        list[str] | None, typer.Option("--free", help="A parameter to identify: sigma0, Fc, inertia ... [all]")
+    ] = None,
+    cut: Annotated[
+        float | None, typer.Option("--cut", help="Slowest speed of the friction map [rad/s or m/s].")
+    ] = None,
+    keep_inertia: Annotated[
+        bool, typer.Option("--keep-inertia/--drop-inertia", help="Friction map: tau - J q'', or tau alone.")
+    ] = True,
+    starts: Annotated[int, typer.Option("--starts", min=1, help="Starts of the output-error fit.")] = 4,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random starts.")] = 0,
+    columns: Annotated[list[str] | None, typer.Option("--columns", help="Our name = the file's: tau=force ...")] = None,
+    units: Annotated[list[str] | None, typer.Option("--units", help="Units in the files: q=deg ...")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print identify.json instead of the summary.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+) -> None:
+    """Identify a card's numbers: friction map, presliding steps, output error in closed loop."""
+    from cosim.identify import deliver
+    from cosim.identify.identify import Options
+    from cosim.identify.identify import identify as find
+    from cosim.reading import read_recordings
+    from pyfmi_models.card import read_card
+
+    deliver.check_out(out, force)
+    believed, started = read_card(card), time.perf_counter()
+    read = read_recordings(recordings, believed.columns, columns, units, believed.mount.motion)
+    say(f"Read {len(read)} recordings, {sum(one.duration for one in read):.0f} s; card {believed.mount.name}")
+    with stage("identifying") as progress:
+        options = Options(tuple(free or ()), cut, keep_inertia, starts, seed)
+        found = find(read, believed, options, progress.tell)
+        progress.tell("drawing")
+        done = deliver.deliver(found, read, believed, out, time.perf_counter() - started)
+    if as_json:
+        put_json(deliver.as_json(done, believed))
+    else:
+        put(deliver.summary(done, believed))
+        say(f"Wrote {out / 'card.toml'}, identify.json and the figures")

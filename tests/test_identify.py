@@ -1,0 +1,160 @@
+"""Identification gives back the numbers a machine was simulated with, says how sure it is, and shows known biases."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.cli import main
+from cosim.errors import InputError
+from cosim.identify.estimate import Outputs, estimate
+from cosim.identify.friction_map import friction_map
+from cosim.identify.identify import Options, free_names, identify, with_numbers
+from cosim.identify.machine import Machine
+from cosim.identify.presliding import presliding
+from cosim.recording import Recording
+from pyfmi_models.card import Card, read_card
+from tests.benchmarks.identification import POSITIVE, moved, multisine, step_response, the_card
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    """Ten seconds in closed loop, 1e-7 rad of encoder noise."""
+    return moved(the_card(), multisine(10.0), 1e-7, 3)
+
+
+@pytest.fixture(scope="module")
+def step() -> Recording:
+    """A torque step of 1 N m that friction holds."""
+    return step_response(the_card(**POSITIVE), 1.0, 1e-7, 3)
+
+
+def half(card: Card, *names: str) -> Card:
+    """The card with some numbers of its friction law at half their size."""
+    return replace(card, friction=replace(card.friction, **{n: getattr(card.friction, n) / 2 for n in names}))
+
+
+def test_derivatives_of_a_simulation_are_those_of_finite_differences() -> None:
+    card = the_card()
+    free = ("friction.sigma0", "friction.Fs", "axis.inertia")
+    machine = Machine(card.plant().model(), card.controller_model(), free, 1e-4)
+    t = np.arange(8000)[:, None] * 1e-4
+    reference = 1e-3 * np.hstack([1 - np.cos(6 * t), 6 * np.sin(6 * t), 36 * np.cos(6 * t)])
+    at = machine.numbers[machine.places]
+    slopes = machine.run(at, reference, {})[1]
+    for column, step_size in enumerate(1e-6 * at):
+        shift = np.eye(3)[column] * step_size
+        moved_by = machine.run(at + shift, reference, {})[0] - machine.run(at - shift, reference, {})[0]
+        size = np.abs(slopes[:, :, column]).max(0)
+        np.testing.assert_allclose(moved_by / (2 * step_size) / size, slopes[:, :, column] / size, atol=1e-3)
+
+
+def test_output_error_recovers_the_bristles_within_one_per_cent_from_starts_a_factor_of_two_off(
+    recording: Recording,
+) -> None:
+    true = the_card().friction
+    wrong = half(the_card(), "sigma0", "sigma1", "Fc", "Fs")
+    found = identify([recording], wrong, Options(free=("sigma0", "sigma1", "sigma2", "Fc", "Fs", "Vs"), starts=1))
+    assert found.best is not None
+    assert found.card.friction.sigma0 == pytest.approx(true.sigma0, rel=0.01)  # type: ignore[attr-defined]
+    assert found.card.friction.sigma1 == pytest.approx(true.sigma1, rel=0.01)  # type: ignore[attr-defined]
+    truth = np.array([getattr(true, name.split(".")[1]) for name in found.best.names])
+    assert np.all(np.abs(found.best.values - truth) < 5 * found.best.standard_errors)
+
+
+def test_what_a_recording_does_not_excite_is_said_to_be_unknown() -> None:
+    rate = 2 * np.pi * 0.2
+    tracking = moved(the_card(), 3.6e-4 / rate * (1 - np.cos(rate * np.arange(6000) / 1000)), 1e-7, 3)
+    found = identify([tracking], the_card(), Options(free=("sigma0", "Vs", "delta", "Fc"), starts=1))
+    assert found.best is not None
+    assert any("Vs" in warning for warning in found.best.warnings)
+    assert not any("sigma0" in warning for warning in found.best.warnings)
+
+
+def test_the_linear_presliding_fit_is_biased_as_published_and_the_direct_one_is_not(step: Recording) -> None:
+    wrong = half(the_card(**POSITIVE), "sigma0", "sigma1")
+    found = presliding(wrong, step)
+    assert found.linear.values / [POSITIVE["sigma0"], POSITIVE["sigma1"]] == pytest.approx([0.56, 3.5], rel=0.02)
+    assert found.direct.values[:2] / [POSITIVE["sigma0"], POSITIVE["sigma1"]] == pytest.approx([1, 1], rel=0.003)
+
+
+def test_the_bias_of_the_linear_fit_vanishes_far_below_break_away() -> None:
+    card = the_card(**POSITIVE)
+    found = presliding(card, step_response(card, 0.02, 0.0, 0))
+    assert found.linear.values / [POSITIVE["sigma0"], POSITIVE["sigma1"]] == pytest.approx([1, 1], rel=0.02)
+
+
+@pytest.fixture(scope="module")
+def quasi_static() -> Recording:
+    """One period of the paper's quasi-static sine: 0.04 Hz, peak 0.056 rad/s."""
+    rate = 2 * np.pi * 0.04
+    return moved(the_card(**POSITIVE), 0.056 / rate * (1 - np.cos(rate * np.arange(25_000) / 1000)), 0.0, 0)
+
+
+def test_the_friction_map_is_right_with_inertia_kept_and_wrong_without(quasi_static: Recording) -> None:
+    v = np.linspace(4e-3, 0.055, 50)
+    fall = np.exp(-((v / POSITIVE["Vs"]) ** POSITIVE["delta"]))
+    true = POSITIVE["Fc"] + (POSITIVE["Fs"] - POSITIVE["Fc"]) * fall + POSITIVE["sigma2"] * v
+    kept = friction_map([quasi_static], 30.0, 4e-3)
+    dropped = friction_map([quasi_static], 30.0, 4e-3, keep_inertia=False)
+    for direction in kept.fits:
+        assert np.abs(kept.curve(direction, v)[0] - true).max() < 0.05
+    assert np.abs(dropped.curve("positive", v)[0] - true).max() > 0.1
+
+
+def test_directions_are_told_apart(quasi_static: Recording) -> None:
+    q, tau = quasi_static["q"], quasi_static["tau"]
+    harder = np.where(np.gradient(q) < 0, 1.5, 1.0) * tau
+    fits = friction_map([replace(quasi_static, table={**quasi_static.table, "tau": harder})], 0.0, 4e-3).fits
+    assert fits["negative"].values[0] > 1.3 * fits["positive"].values[0]
+
+
+def test_standard_errors_are_those_of_least_squares() -> None:
+    rng, x = np.random.default_rng(0), np.linspace(1, 2, 5000)
+
+    def model(values: np.ndarray) -> Outputs:
+        return Outputs((y - values[0] * x)[:, None], x[:, None, None])
+
+    estimates = []
+    for _ in range(40):
+        y = 3 * x + 0.1 * rng.standard_normal(5000)
+        estimates.append(estimate(("slope",), np.array([1.0]), model))
+    spread = np.std([fit.values[0] for fit in estimates])
+    assert np.mean([fit.standard_errors[0] for fit in estimates]) == pytest.approx(spread, rel=0.3)
+
+
+def test_names_may_leave_out_their_prefix_and_unknown_ones_are_refused() -> None:
+    card = read_card("paper_mount")
+    assert free_names(card, ("Fc", "inertia")) == ("friction.Fc", "axis.inertia")
+    with pytest.raises(InputError, match=r'"Fd" is no parameter .* friction\.Fc'):
+        free_names(card, ("Fd",))
+
+
+def test_numbers_that_a_structure_lacks_are_left_out() -> None:
+    card = read_card("paper_mount")
+    assert with_numbers(card, {"friction.Fc": 2.0, "friction.Fc.positive": 3.0}).friction.Fc == 2.0  # type: ignore[attr-defined]
+
+
+def test_the_verb_writes_card_numbers_and_pictures(recording: Recording, step: Recording, tmp_path: Path) -> None:
+    paths = [one.write(tmp_path / f"{name}.parquet") for name, one in (("loop", recording), ("step", step))]
+    plain = read_card("paper_mount")
+    assert plain.controller is not None
+    from pyfmi_models.card_writer import card_text
+
+    card = tmp_path / "axis.toml"
+    card.write_text(card_text(the_card()), "utf-8")
+    out = tmp_path / "out"
+    arguments = ["identify", *map(str, paths), "--card", str(card), "--out", str(out), "--starts", "1"]
+    with pytest.raises(SystemExit) as done:
+        main([*arguments, "--free", "sigma0", "--free", "sigma1"])
+    assert done.value.code == 0
+    found = json.loads((out / "identify.json").read_text("utf-8"))
+    assert found["output_error"][0]["standard_errors"]["friction.sigma0"] > 0
+    assert set(found["presliding"]) == {"step"}
+    assert read_card(out / "card.toml").origin["recordings"][0]["name"] == "loop"
+    assert {"friction_map.svg", "presliding.svg", "output_error.svg"} <= {path.name for path in out.iterdir()}
+    with pytest.raises(SystemExit) as again:
+        main(arguments)
+    assert again.value.code == 2
