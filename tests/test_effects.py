@@ -18,19 +18,16 @@ from pyfmi_models.effects import (
     Delay,
     DriveEffect,
     Effect,
-    FrictionAsymmetry,
     FrictionEffect,
     GravityUnbalance,
     InertiaEffect,
     LoadEffect,
-    LocalFriction,
     Motion,
-    PeriodicFriction,
     SensorEffect,
     StribeckEffect,
     TorqueOffset,
 )
-from pyfmi_models.friction import Coulomb, LuGre
+from pyfmi_models.friction import Coulomb
 from pyfmi_models.model import fields_of
 from pyfmi_models.mount import Axis, Mount
 
@@ -164,52 +161,12 @@ def test_unbalance_pulls_back_to_the_bottom() -> None:
 # Friction
 
 
-@pytest.mark.parametrize("direction", [1, -1])
-def test_asymmetry_scales_level_and_viscous_torque_by_direction(direction: int) -> None:
-    effect, v = FrictionAsymmetry(level_asymmetry=0.1, viscous_asymmetry=-0.2), direction * 0.5
-    resisted = -2.0 * acceleration(effect, v=v)
-    assert resisted == pytest.approx(direction * (1.0 * (1 + 0.1 * direction) + 1.5 * (1 - 0.2 * direction)))
-
-
-def test_asymmetry_vanishes_at_standstill() -> None:
-    assert acceleration(FrictionAsymmetry(level_asymmetry=0.5)) == 0
-
-
-@pytest.mark.parametrize("v", [-0.3, 0.3])
-def test_periodic_friction_multiplies_the_level_and_follows_the_direction(v: float) -> None:
-    effect = PeriodicFriction(cycles_per_rev=3, relative_amplitude=0.2, phase=0.4)
-    for q in np.linspace(0, 2, 7):
-        expected = np.sign(v) * (1 + 0.2 * np.cos(3 * q + 0.4)) + 3 * v
-        assert -2.0 * acceleration(effect, q=float(q), v=v) == pytest.approx(expected, rel=1e-12)
-    assert -2.0 * acceleration(effect, q=-0.4 / 3, v=v) == pytest.approx(1.2 * np.sign(v) + 3 * v)
-
-
-@pytest.mark.parametrize("v", [-0.3, 0.3])
-def test_a_rough_spot_is_where_it_is_and_as_wide_as_it_is(v: float) -> None:
-    effect = LocalFriction(q_center=1.0, width=0.05, relative_amplitude=0.3)
-    for q, rise in ((1.0, 0.3), (1.05, 0.3 * np.exp(-0.5)), (0.95, 0.3 * np.exp(-0.5)), (2.0, 0.0), (1e6, 0.0)):
-        assert -2.0 * acceleration(effect, q=q, v=v) == pytest.approx(np.sign(v) * (1 + rise) + 3 * v, rel=1e-12)
-
-
 @pytest.mark.parametrize("effect", MULTIPLIERS, ids=lambda one: one.id)
 def test_friction_that_is_not_there_cannot_be_multiplied(effect: FrictionEffect) -> None:
     expected = pytest.approx(0, abs=1e-12)
     warm = motion(1.0)._replace(inputs={"temperature": 35.0})
     assert isinstance(effect, StribeckEffect) or float(effect.level(0.0, warm)) == expected
     assert float(effect.viscous(0.0, warm)) == expected
-
-
-def test_the_stribeck_effect_is_the_stribeck_term_of_the_law() -> None:
-    law = LuGre(sigma0=1e4, Fc=2.0, Fs=4.0, Vs=0.02, delta=2.0)
-    effect, plain = StribeckEffect(Fs=4.0, Vs=0.02), replace(law, Fs=None, Vs=None)
-    for v in (-0.5, -0.02, 0.0, 1e-4, 0.03, 9.0):
-        assert float(effect.level(plain.level(v), motion(v=v))) == pytest.approx(float(law.level(v)), rel=1e-14)
-
-
-def test_friction_effects_add_up_in_their_order() -> None:
-    both = (StribeckEffect(Fs=4.0, Vs=1e3), FrictionAsymmetry(level_asymmetry=0.1))
-    assert -2.0 * acceleration(*both, v=0.1) == pytest.approx(4.0 * 1.1 + 0.3, rel=1e-6)
-    assert -2.0 * acceleration(*reversed(both), v=0.1) == pytest.approx(4.0 + 0.3, rel=1e-6)
 
 
 # Drive

@@ -22,7 +22,7 @@ class Backlash(Coupling):
         depth = max(|twist| - gap/2, 0),   k = J_far (2 pi fc)^2,   d = 2 zeta J_far 2 pi fc (1 - exp(-depth/depth0))
         torque = sign(twist) max(k depth + d depth', 0)
 
-    The defaults make the contact land without bouncing. Drive, friction, loads and encoder act on the near (motor)
+    With the defaults it rebounds at a seventh of the speed. Drive, friction, loads and encoder act on the near (motor)
     mass; `load_friction` is what the far mass, output `q_load`, rubs by itself. It starts in the middle of the gap.
     Reference: Nordin and Gutman, Automatica 38 (2002) 1633, dead-zone model with a damped shaft.
     """

@@ -47,6 +47,11 @@ class Motion(NamedTuple):
     state: Any = ()
 
 
+def times(count: float) -> str:
+    """How often, in words: "once", "24 times"."""
+    return "once" if count == 1 else f"{count:.4g} times"
+
+
 @dataclass(frozen=True, kw_only=True)
 class Effect:
     """One kind of missing physics: what a mechanic would call it, and what tells it from its rivals."""

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import InertiaEffect, Motion
+from pyfmi_models.effects.base import InertiaEffect, Motion, times
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -34,4 +34,4 @@ class InertiaVariation(InertiaEffect):
         """Say it to a mechanic."""
         name, per = ("moving mass", "metre") if unit == "N" else ("inertia", "turn")
         size = 100 * self.relative_amplitude
-        return f"The {name} rises and falls by {size:.2g} % {self.cycles_per_rev:.3g} times per {per}."
+        return f"The {name} rises and falls by {size:.2g} % {times(self.cycles_per_rev)} per {per}."

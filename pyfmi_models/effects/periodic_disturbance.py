@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import LoadEffect, Motion
+from pyfmi_models.effects.base import LoadEffect, Motion, times
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -29,4 +29,4 @@ class PeriodicDisturbance(LoadEffect):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        return f"Something shakes the axis {self.frequency_hz:.3g} times a second with {self.amplitude:.3g} {unit}."
+        return f"Something shakes the axis {times(self.frequency_hz)} a second with {self.amplitude:.3g} {unit}."

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Motion
+from pyfmi_models.effects.base import FrictionEffect, Motion, times
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -34,7 +34,7 @@ class PeriodicFriction(_PositionFriction):
         """Say it to a mechanic."""
         per = "metre" if unit == "N" else "turn"
         size = 100 * self.relative_amplitude
-        return f"Friction rises and falls by {size:.0f} % {self.cycles_per_rev:.4g} times per {per}."
+        return f"Friction rises and falls by {size:.0f} % {times(self.cycles_per_rev)} per {per}."
 
 
 @dataclass(frozen=True, kw_only=True)
