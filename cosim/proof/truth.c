@@ -12,6 +12,12 @@
 #include <math.h>
 #include <stddef.h>
 
+#if defined(_WIN32)
+#define EXPORT __declspec(dllexport)
+#else
+#define EXPORT __attribute__((visibility("default")))
+#endif
+
 enum { BLOCKS = 10, SUBSTEPS = 10 };
 
 /* Order and types are mirrored in truth.py; `truth_size` guards it. */
@@ -69,7 +75,7 @@ struct observer {
     double position, speed, disturbance;
 };
 
-size_t truth_size(void) { return sizeof(struct mount); }
+EXPORT size_t truth_size(void) { return sizeof(struct mount); }
 
 static double sign(double x) { return (x > 0) - (x < 0); }
 
@@ -253,7 +259,7 @@ static void physics(const struct mount *m, struct motion *s, struct contact *c, 
 }
 
 /* Simulate n ticks of the closed loop from rest at target[0]; temperature starts at `temperature`. */
-void truth_run(const struct mount *m, long n, double temperature, const struct inputs *in, struct outputs *out) {
+EXPORT void truth_run(const struct mount *m, long n, double temperature, const struct inputs *in, struct outputs *out) {
     struct motion s = {.q = in->target[0], .load_q = in->target[0], .temperature = temperature,
                        .extreme = in->target[0], .direction = 1, .since_reversal = 1e3};
     struct contact c = {.age = m->dwell_time};
@@ -275,7 +281,7 @@ void truth_run(const struct mount *m, long n, double temperature, const struct i
 }
 
 /* Friction alone under a prescribed path: angle[n] at steps of h, friction torque out. */
-void truth_rub(const struct mount *m, long n, double h, double degrees, const double *angle, double *torque) {
+EXPORT void truth_rub(const struct mount *m, long n, double h, double degrees, const double *angle, double *torque) {
     struct contact c = {.age = m->dwell_time};
     torque[0] = 0;
     for (long i = 1; i < n; i++) {
