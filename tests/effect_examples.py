@@ -46,9 +46,10 @@ INERTIA = 2.0
 
 
 def inside(variable: Variable) -> float:
-    """A number that a parameter may have: its nominal, or the middle of its bounds."""
-    fits = variable.low < variable.nominal < variable.high
-    return variable.nominal if fits else (variable.low + variable.high) / 2
+    """A number that a parameter may have: its nominal, or one between its bounds."""
+    if variable.low < variable.nominal < variable.high:
+        return variable.nominal
+    return (variable.low + variable.high) / 2 if np.isfinite(variable.high) else variable.low + variable.nominal
 
 
 def example(form: type[Effect]) -> Effect:

@@ -1,6 +1,7 @@
 """Every friction law of `LAWS` with numbers of the telescope mount, and its formulas as functions of numbers.
 
-A new law is met by all property tests at once; a required parameter whose name is not in `NUMBERS` needs a line there.
+A new law is met by all property tests at once; a required parameter that `NUMBERS` does not name is taken from inside
+its bounds.
 """
 
 from dataclasses import MISSING, fields, replace
@@ -9,6 +10,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from effect_examples import inside
 
 from pyfmi_models.friction import LAWS, FrictionLaw
 from pyfmi_models.model import Pair, parameters_of, symbols_of, with_symbols
@@ -21,9 +23,9 @@ Array = Any
 def example(kind: type[FrictionLaw]) -> FrictionLaw:
     """Return a law with the mount's numbers where it has them, and its defaults elsewhere."""
     known = {item.name: item for item in fields(kind)}
-    missing = [name for name, item in known.items() if item.default is MISSING and name not in NUMBERS]
-    assert not missing, f"{kind.__name__} needs {missing[0]}: give it a number in tests/friction_laws.py"
-    return kind(**{name: value for name, value in NUMBERS.items() if name in known})
+    required = {name: item.metadata["variable"] for name, item in known.items() if item.default is MISSING}
+    guessed = {name: inside(variable) for name, variable in required.items()}
+    return kind(**(guessed | {name: value for name, value in NUMBERS.items() if name in known}))
 
 
 EXAMPLES = {key: example(kind) for key, kind in LAWS.items()}
