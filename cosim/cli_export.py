@@ -28,7 +28,7 @@ def export(
     card: Annotated[str, typer.Argument(help="A model card (.toml), or the name of a shipped one: paper_mount.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Directory for the FMUs.")],
     fmi: Annotated[Fmi, typer.Option("--fmi", help="FMI version.")] = Fmi.both,
-    platform: Annotated[str, typer.Option("--platform", help="host, or a platform's name.")] = "host",
+    platform: Annotated[str, typer.Option("--platform", help="host, all, or names with commas between.")] = "host",
     ssp: Annotated[bool, typer.Option("--ssp", help="Also wire plant, controller and a set point: NAME.ssp.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the paths as JSON.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
@@ -37,30 +37,41 @@ def export(
     from cosim.files import check_free, directory
     from pyfmi_models.card import read_card
     from pyfmi_models.export import export_fmu
+    from pyfmi_models.export.platforms import platforms_of
 
+    platforms = platforms_of(platform)
     read = read_card(card)
     models = {"plant": read.plant().model()}
     if read.controller is not None:
         models["controller"] = read.controller_model()
-    versions = VERSIONS[fmi]
-    stem = Path(card).stem
-    wanted = {
-        directory(out) / f"{stem}_{part}_fmi{v}.fmu": (model, v) for part, model in models.items() for v in versions
-    }
-    platforms = () if platform == "host" else tuple(platform.split(","))
+    versions, stem = VERSIONS[fmi], Path(card).stem
+    wanted = [
+        (out / folder / f"{stem}_{part}_fmi{version}.fmu", model, version, machines)
+        for part, model in models.items()
+        for version in versions
+        for folder, machines in _folders(version, platforms).items()
+    ]
     systems = {out / f"{stem}.ssp": system_writer(read, versions[0], platforms)} if ssp else {}
-    for path in (*wanted, *systems):
+    paths = [path for path, *_ in wanted]
+    for path in (*paths, *systems):
         check_free(path, force)
     with stage(f"{stem}: {len(wanted)} FMUs") as progress:
-        for done, (path, (model, version)) in enumerate(wanted.items()):
+        for done, (path, model, version, machines) in enumerate(wanted):
             progress(done, len(wanted))
-            export_fmu(model, path, fmi=version, force=force, platforms=platforms)
+            directory(path.parent)
+            export_fmu(model, path, fmi=version, force=force, platforms=machines)
     for path, write in systems.items():
         write(path, force)
     if as_json:
-        put_json({"fmus": [str(path) for path in wanted]} | {path.suffix[1:]: str(path) for path in systems})
+        put_json({"fmus": list(map(str, paths))} | {path.suffix[1:]: str(path) for path in systems})
     else:
-        put("\n".join(map(str, (*wanted, *systems))))
+        put("\n".join(map(str, (*paths, *systems))))
+
+
+def _folders(version: Literal[2, 3], platforms: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+    """Subfolders for archives and the machines of each: FMI 2 has one place for two kinds of Linux."""
+    both = {"x86_64-linux", "aarch64-linux"} <= set(platforms)
+    return {"": platforms} | ({"aarch64-linux": ("aarch64-linux",)} if version == 2 and both else {})
 
 
 def system_writer(card: "Card", fmi: Literal[2, 3], platforms: tuple[str, ...]) -> Callable[[Path, bool], object]:

@@ -8,8 +8,9 @@ import mpmath
 import numpy as np
 import pytest
 
-from pyfmi_models.export.build import PLATFORMS, compile_shared, host
+from pyfmi_models.export.build import compile_shared
 from pyfmi_models.export.codegen import SHIM
+from pyfmi_models.export.platforms import PLATFORMS, host
 
 COUNT = 1500
 

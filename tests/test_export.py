@@ -20,8 +20,9 @@ from scipy.integrate import solve_ivp
 
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export import build_library, export_fmu
-from pyfmi_models.export.build import PLATFORMS, compile_shared, fmi_headers, host, sources_of
+from pyfmi_models.export.build import compile_shared, fmi_headers, sources_of
 from pyfmi_models.export.codegen import SHIM, generate
+from pyfmi_models.export.platforms import PLATFORMS, host
 from pyfmi_models.export.units import BASE, parse_unit
 
 ALL = (models.lugre, models.van_der_pol, models.oscillator, models.controller)

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from pyfmi_models.export import build_library
-from pyfmi_models.export.build import PLATFORMS, compile_shared, host
+from pyfmi_models.export.build import compile_shared
 from pyfmi_models.export.codegen import SHIM
+from pyfmi_models.export.platforms import PLATFORMS, host
 
 library = cache(lambda make: build_library(make()))
 pytestmark = pytest.mark.parametrize("fmi", [2, 3])

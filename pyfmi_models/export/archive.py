@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Literal
 
 from pyfmi_models.errors import ExportError
-from pyfmi_models.export.build import FLAGS, PLATFORMS, host, library_of, sources_of, units_of
+from pyfmi_models.export.build import FLAGS, libraries_of, sources_of, units_of
 from pyfmi_models.export.codegen import Generated, generate
 from pyfmi_models.export.description import fmi2_description, fmi3_description, xml_text
 from pyfmi_models.export.documentation import documentation_page
+from pyfmi_models.export.platforms import PLATFORMS, host
+from pyfmi_models.export.universal import universal_binary
 from pyfmi_models.model import Model
 
 
@@ -26,9 +28,10 @@ def export_fmu(
 ) -> Path:
     """Write the model as an FMU for model exchange and co-simulation, and return its path.
 
-    The archive holds the binary for each of the platforms (default: the host), its sources and a page of documentation,
-    into which `description_html` is put before the tables. Equal models give equal bytes. The file appears complete or
-    not at all. Raises ExportError if the file exists and `force` is not given, or the model cannot be exported.
+    The archive holds the binary for each of the platforms (names of `PLATFORMS`; default: the host), its sources and a
+    page of documentation, into which `description_html` is put before the tables. Equal models give equal bytes. The
+    file appears complete or not at all.
+    Raises ExportError if the file exists and `force` is not given, or the model cannot be exported.
     """
     path = Path(path)
     if path.exists() and not force:
@@ -49,13 +52,26 @@ def _description(generated: Generated, fmi: int) -> dict[str, bytes]:
 
 
 def _binaries(generated: Generated, fmi: int, platforms: tuple[str, ...]) -> dict[str, bytes]:
-    found: dict[str, bytes] = {}
-    for name in platforms:
-        library = library_of(generated, name)
-        file = f"binaries/{PLATFORMS[name].fmi2 if fmi == 2 else name}/{library.name}"
-        if file in found:
-            raise ExportError(f"FMI {fmi} has one place, {file}, for two of the platforms {', '.join(platforms)}")
-        found[file] = library.read_bytes()
+    libraries = {name: path.read_bytes() for name, path in libraries_of(generated, platforms).items()}
+    folders = libraries if fmi == 3 else _fmi2_folders(libraries)
+    suffixes = {folder: platform.suffix for platform in PLATFORMS.values() for folder in (platform.name, platform.fmi2)}
+    return {f"binaries/{f}/{generated.layout.identifier}{suffixes[f]}": content for f, content in folders.items()}
+
+
+def _fmi2_folders(libraries: dict[str, bytes]) -> dict[str, bytes]:
+    """Folders of FMI 2.0.5: its own names mean x86; what they do not cover lies under FMI 3's platform tuple.
+
+    macOS has files for several processors, so `darwin64` holds all there are. Linux has none: `linux64` is x86-64
+    where that is wanted, and else aarch64, because importers on aarch64 (FMPy among them) look there all the same.
+    """
+    groups: dict[str, list[bytes]] = {}
+    for name in [name for name in PLATFORMS if name in libraries]:
+        groups.setdefault(PLATFORMS[name].fmi2, []).append(libraries[name])
+    found = {folder: group[0] for folder, group in groups.items()}
+    if len(groups.get("darwin64", [])) > 1:
+        found["darwin64"] = universal_binary(groups["darwin64"])
+    if "aarch64-linux" in libraries:
+        found["aarch64-linux"] = libraries["aarch64-linux"]
     return found
 
 

@@ -2,11 +2,11 @@
 
 import hashlib
 import os
-import platform as host_platform
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from pathlib import Path
@@ -15,6 +15,7 @@ from platformdirs import user_cache_dir
 
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export.codegen import SHIM, Generated, generate
+from pyfmi_models.export.platforms import host, known
 from pyfmi_models.model import Model
 
 FLAGS = (
@@ -29,34 +30,6 @@ FLAGS = (
     "-fPIC",
 )
 """No contraction: one rounding an operation on every machine. Without errno sqrt is an instruction, no call of libm."""
-
-
-@dataclass(frozen=True)
-class Platform:
-    """A machine that FMUs are built for; `name` is FMI 3's platform tuple, `fmi2` the folder that FMI 2 gives it."""
-
-    name: str
-    target: str
-    fmi2: str
-    suffix: str
-
-
-PLATFORMS = {
-    platform.name: platform
-    for platform in (
-        Platform("x86_64-linux", "x86_64-linux-gnu.2.17", "linux64", ".so"),
-        Platform("aarch64-linux", "aarch64-linux-gnu.2.17", "linux64", ".so"),
-        Platform("x86_64-windows", "x86_64-windows-gnu", "win64", ".dll"),
-        Platform("x86_64-darwin", "x86_64-macos", "darwin64", ".dylib"),
-        Platform("aarch64-darwin", "aarch64-macos", "darwin64", ".dylib"),
-    )
-}
-
-
-def host() -> str:
-    """Name of the platform that this process runs on, as FMI 3 spells it."""
-    machine = {"amd64": "x86_64", "arm64": "aarch64"}.get(host_platform.machine().lower(), host_platform.machine())
-    return f"{machine}-{host_platform.system().lower()}"
 
 
 def cache_directory() -> Path:
@@ -96,12 +69,20 @@ def build_library(model: Model, platform: str | None = None) -> Path:
     return library_of(generate(model), platform or host())
 
 
-def library_of(generated: Generated, platform: str) -> Path:
-    """As `build_library`, for code that is already generated."""
-    if platform not in PLATFORMS:
-        raise ExportError(f'platform "{platform}" is unknown; there are: {", ".join(PLATFORMS)}')
-    name = generated.layout.identifier + PLATFORMS[platform].suffix
-    return compile_shared(sources_of(generated), name, PLATFORMS[platform].target)
+def library_of(generated: Generated, name: str) -> Path:
+    """As `build_library` on the platform `name`, for code that is already generated."""
+    platform = known(name)
+    sources = sources_of(generated) | {path.name: path.read_bytes() for path in platform.extra}
+    library = generated.layout.identifier + platform.suffix
+    return compile_shared(sources, library, platform.target, (*FLAGS, *platform.flags))
+
+
+def libraries_of(generated: Generated, names: tuple[str, ...]) -> dict[str, Path]:
+    """The libraries for several platforms: the first one first, then the others side by side."""
+    first, *others = names
+    found = {first: library_of(generated, first)}
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return found | dict(zip(others, pool.map(partial(library_of, generated), others), strict=True))
 
 
 def compile_shared(sources: dict[str, bytes], name: str, target: str, flags: tuple[str, ...] = FLAGS) -> Path:
@@ -140,7 +121,8 @@ def _key(sources: dict[str, bytes], name: str, target: str, flags: tuple[str, ..
 def _compile(sources: dict[str, bytes], folder: Path, name: str, target: str, flags: tuple[str, ...]) -> Path:
     for file, content in sources.items():
         (folder / file).write_bytes(content)
-    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *flags, *units_of(sources), "-o", name]
+    here = [flag.format(zig=files("ziglang")) for flag in flags]
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", target, *here, *units_of(sources), "-o", name]
     zig = cache_directory() / "zig"
     environment = {**os.environ, "ZIG_GLOBAL_CACHE_DIR": str(zig), "ZIG_LOCAL_CACHE_DIR": str(zig)}
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)

@@ -1,0 +1,330 @@
+"""Five platforms from one machine: right formats, old enough systems, and the same bits on every processor."""
+
+import os
+import re
+import shutil
+import struct
+import subprocess
+import zipfile
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import export_models as models
+import pytest
+
+from cosim.cli import main
+from pyfmi_models.card import parse_card, read_card
+from pyfmi_models.errors import ExportError
+from pyfmi_models.export import build_library, export_fmu
+from pyfmi_models.export.build import FLAGS, compile_shared, sources_of
+from pyfmi_models.export.codegen import generate
+from pyfmi_models.export.platforms import PLATFORMS, host, platforms_of
+from pyfmi_models.export.universal import universal_binary
+
+content = cache(lambda platform: build_library(models.lugre(), platform).read_bytes())
+
+
+def elf_machine(file):
+    assert file[:5] == b"\x7fELF\x02"
+    return struct.unpack_from("<H", file, 18)[0]
+
+
+def pe_machine(file):
+    header = struct.unpack_from("<I", file, 60)[0]
+    assert file[header : header + 4] == b"PE\0\0"
+    return struct.unpack_from("<H", file, header + 4)[0]
+
+
+def mach_machine(file):
+    magic, machine = struct.unpack_from("<2I", file)
+    assert magic == 0xFEEDFACF
+    return machine
+
+
+KIND = {
+    "x86_64-linux": (elf_machine, 62),
+    "aarch64-linux": (elf_machine, 183),
+    "x86_64-windows": (pe_machine, 0x8664),
+    "x86_64-darwin": (mach_machine, 0x01000007),
+    "aarch64-darwin": (mach_machine, 0x0100000C),
+}
+
+
+@pytest.mark.parametrize("platform", PLATFORMS)
+def test_each_platform_gets_a_library_of_its_own_kind(platform):
+    machine, expected = KIND[platform]
+    assert machine(content(platform)) == expected
+    for name in (b"fmi2DoStep", b"fmi3DoStep"):
+        assert name in content(platform)
+
+
+@pytest.mark.parametrize("platform", ["x86_64-linux", "aarch64-linux"])
+def test_linux_libraries_run_with_glibc_2_17(platform):
+    versions = {tuple(map(int, found)) for found in re.findall(rb"GLIBC_(\d+)\.(\d+)", content(platform))}
+    assert versions
+    assert max(versions) <= (2, 17)
+
+
+def test_windows_libraries_need_nothing_but_windows():
+    wanted = {name.decode() for name in re.findall(rb"[\w-]+\.dll", content("x86_64-windows"))}
+    assert wanted - {"lugre.dll"}
+    assert all(name.startswith("api-ms-win-crt-") for name in wanted - {"lugre.dll"})
+
+
+def commands_of(file):
+    """Load commands of a 64-bit Mach-O file: kind -> the bytes after kind and size."""
+    found, offset = {}, 32
+    for _ in range(struct.unpack_from("<I", file, 16)[0]):
+        kind, size = struct.unpack_from("<2I", file, offset)
+        found[kind] = file[offset + 8 : offset + size]
+        offset += size
+    return found
+
+
+@pytest.mark.parametrize("platform", ["x86_64-darwin", "aarch64-darwin"])
+def test_macos_libraries_run_from_macos_11_on_and_carry_the_signature_that_arm_wants(platform):
+    commands = commands_of(content(platform))
+    build_version, code_signature = commands[0x32], commands.get(0x1D)
+    assert struct.unpack_from("<2I", build_version) == (1, 11 << 16)
+    assert code_signature or platform == "x86_64-darwin"
+
+
+def slices_of(file):
+    magic, count = struct.unpack_from(">2I", file)
+    assert magic == 0xCAFEBABE
+    rows = [struct.unpack_from(">5I", file, 8 + 20 * i) for i in range(count)]
+    assert all(offset % 2**alignment == 0 for _, _, offset, _, alignment in rows)
+    return {processor: file[offset : offset + size] for processor, _, offset, size, _ in rows}
+
+
+def test_a_universal_file_holds_both_processors_untouched():
+    thin = [content("x86_64-darwin"), content("aarch64-darwin")]
+    assert slices_of(universal_binary(thin)) == {0x01000007: thin[0], 0x0100000C: thin[1]}
+    with pytest.raises(ValueError, match="no 64-bit Mach-O file: it starts with 7f454c46"):
+        universal_binary([content("x86_64-linux")])
+
+
+@pytest.fixture(scope="module")
+def everywhere(tmp_path_factory):
+    """Binaries in the archives for all platforms: version -> name -> content."""
+    found = {}
+    for fmi in (2, 3):
+        path = export_fmu(models.lugre(), tmp_path_factory.mktemp("all") / "a.fmu", fmi=fmi, platforms=tuple(PLATFORMS))
+        with zipfile.ZipFile(path) as archive:
+            names = [name for name in archive.namelist() if name.startswith("binaries/")]
+            found[fmi] = {name.removeprefix("binaries/"): archive.read(name) for name in names}
+    return found
+
+
+def test_fmi_3_has_a_folder_for_each_platform(everywhere):
+    assert everywhere[3] == {f"{name}/lugre{p.suffix}": content(name) for name, p in PLATFORMS.items()}
+
+
+def test_fmi_2_has_one_universal_folder_for_macos_and_keeps_linux64_for_x86(everywhere):
+    binaries = everywhere[2]
+    assert {name.split("/")[0] for name in binaries} == {"linux64", "aarch64-linux", "win64", "darwin64"}
+    assert binaries["linux64/lugre.so"] == content("x86_64-linux")
+    assert binaries["aarch64-linux/lugre.so"] == content("aarch64-linux")
+    assert binaries["win64/lugre.dll"] == content("x86_64-windows")
+    assert set(slices_of(binaries["darwin64/lugre.dylib"]).values()) == {
+        content("x86_64-darwin"),
+        content("aarch64-darwin"),
+    }
+
+
+def test_fmi_2_for_aarch64_linux_alone_lies_where_importers_there_look(tmp_path):
+    path = export_fmu(models.lugre(), tmp_path / "a.fmu", fmi=2, platforms=("aarch64-linux",))
+    with zipfile.ZipFile(path) as archive:
+        for folder in ("linux64", "aarch64-linux"):
+            assert archive.read(f"binaries/{folder}/lugre.so") == content("aarch64-linux")
+
+
+def test_the_command_gives_aarch64_linux_an_fmi_2_archive_of_its_own(tmp_path):
+    with pytest.raises(SystemExit) as left:
+        main(["export", "emps", "--fmi", "2", "--platform", "x86_64-linux,aarch64-linux", "--out", str(tmp_path)])
+    assert left.value.code in (0, None)
+    plants = [tmp_path / "emps_plant_fmi2.fmu", tmp_path / "aarch64-linux" / "emps_plant_fmi2.fmu"]
+    found = [elf_machine(zipfile.ZipFile(path).read("binaries/linux64/EMPS_plant.so")) for path in plants]
+    assert found == [62, 183]
+
+
+def test_an_unknown_platform_leaves_nothing_behind(tmp_path):
+    with pytest.raises(SystemExit) as left:
+        main(["export", "emps", "--platform", "vax", "--out", str(tmp_path / "out")])
+    assert left.value.code == 2
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_platforms_are_named_in_words_and_the_host_comes_first():
+    assert platforms_of("host") == (host(),)
+    assert set(platforms_of("all")) == set(PLATFORMS)
+    assert platforms_of("all")[0] == host()
+    assert platforms_of("x86_64-windows,aarch64-linux") == ("aarch64-linux", "x86_64-windows")
+    with pytest.raises(ExportError, match='platform "vax" is unknown; there are: x86_64-linux, aarch64-linux'):
+        platforms_of("host,vax")
+
+
+# The same bits everywhere.
+
+EVERYTHING = """
+[mount]
+inertia = 30.0
+torque_limit = 50.0
+[friction]
+model = "lugre"
+sigma0 = { positive = 9.2e4, negative = 9.4e4 }
+sigma1 = 497.0
+sigma2 = 32.77
+Fc = { positive = 2.3, negative = 2.5 }
+Fs = 3.322
+Vs = 0.04129
+delta = 1.9
+[unbalance]
+mgl = 4.0
+phase = 0.3
+"""
+EFFECTS = {
+    "cogging": {"cycles_per_rev": 20, "amplitude": 0.5, "phase": 0.1},
+    "position_friction": {"cycles_per_rev": 3, "relative_amplitude": 0.2, "phase": 0.4},
+    "friction_asymmetry": {"level_asymmetry": 0.1, "viscous_asymmetry": 0.05},
+    "torque_offset": {"torque": 0.2},
+    "actuator_lag": {"time_constant_ms": 1.5},
+    "delay": {"delay_ms": 2.0},
+}
+
+
+def plant():
+    tables = [f'[[effects]]\neffect = "{effect}"' for effect in EFFECTS]
+    rows = ["\n".join(f"{key} = {value}" for key, value in numbers.items()) for numbers in EFFECTS.values()]
+    parts = [part for pair in zip(tables, rows, strict=True) for part in pair]
+    return parse_card("\n".join([EVERYTHING, *parts]), "everything.toml").plant().model()
+
+
+def controller():
+    return read_card("paper_mount").controller_model()
+
+
+@dataclass(frozen=True)
+class Machine:
+    target: str
+    flags: tuple[str, ...] = ("-static",)
+    runner: str = ""
+    options: tuple[str, ...] = ()
+    package: str = "qemu-user"
+
+
+HOST = Machine(PLATFORMS[host()].target, ())
+CONSOLE = ("-lkernel32", "-mconsole", "-Wl,-e,mainCRTStartup")
+MACHINES = {
+    "Cortex-A9": Machine("arm-linux-musleabihf", ("-static", "-mcpu=cortex_a9"), "qemu-arm", ("-cpu", "cortex-a9")),
+    "aarch64": Machine("aarch64-linux-musl", runner="qemu-aarch64"),
+    "Windows": Machine(
+        PLATFORMS["x86_64-windows"].target, (*PLATFORMS["x86_64-windows"].flags, *CONSOLE), "wine64", package="wine64"
+    ),
+}
+# steps and amplitudes of the inputs
+SCENARIOS = {plant: (6_000, (40.0, 3.0)), controller: (25_000, (0.01, 0.01, 0.05, 0.1))}
+
+
+@cache
+def sources(make):
+    """The sources of an FMU and of the driver that hashes at least 100 000 states, rates and outputs of it."""
+    generated, (steps, amplitudes) = generate(make()), SCENARIOS[make]
+    assert steps * len(generated.layout.of("state", "rate", "output")) >= 100_000
+    values = {
+        "SIZE": len(generated.layout.rows),
+        "COUNT": steps,
+        "LENGTH": 1e-4,
+        "AMPLITUDES": ", ".join(map(str, amplitudes)),
+    }
+    scenario = "".join(f"#define {name} {value}\n" for name, value in values.items())
+    driver = (Path(__file__).parent / "exact_driver.c").read_bytes()
+    return sources_of(generated) | {"scenario.h": scenario.encode(), "driver.c": driver}
+
+
+def runner_of(machine):
+    """The program that runs the machine's code here, as the start of a command."""
+    if not machine.runner:
+        return []
+    found = shutil.which(machine.runner) or shutil.which(machine.runner, path="/usr/lib/wine")
+    if not found:
+        pytest.skip(f"{machine.runner} is not installed (apt-get install {machine.package})")
+    return [found, *machine.options]
+
+
+@pytest.fixture(scope="module")
+def wine(tmp_path_factory):
+    """Environment with a home of its own for Wine, which fills it with 700 MB."""
+    folder = tmp_path_factory.mktemp("wine")
+    environment = os.environ | {"WINEPREFIX": str(folder), "WINEDEBUG": "-all"}
+    yield environment
+    if (folder / "system.reg").exists():
+        server = shutil.which("wineserver", path=f"/usr/lib/wine:{os.defpath}")
+        subprocess.run([str(server), "-k"], env=environment, check=False)
+        subprocess.run([str(server), "-w"], env=environment, check=False)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+def bits(make, machine, environment=None):
+    """Hash of the bits that the FMU answers in the scenario, run as the machine would run it."""
+    runner = runner_of(machine)
+    flags = tuple(flag for flag in FLAGS if flag not in ("-shared", "-fPIC"))
+    extra = {path.name: path.read_bytes() for path in PLATFORMS["x86_64-windows"].extra if machine.runner == "wine64"}
+    program = compile_shared(sources(make) | extra, "driver.exe", machine.target, (*flags, *machine.flags))
+    command = [*runner, str(program)]
+    return subprocess.run(command, capture_output=True, text=True, check=True, env=environment).stdout.strip()
+
+
+native = cache(lambda make: bits(make, HOST))
+
+
+@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize("make", SCENARIOS)
+def test_every_machine_computes_the_same_bits(make, machine, wine):
+    assert re.fullmatch(r"[0-9a-f]{16}", native(make))
+    assert bits(make, MACHINES[machine], wine) == native(make)
+
+
+def gcc_bits(make, folder, *flags):
+    compiler = shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("gcc is not installed")
+    files = sources(make)
+    for name, text in files.items():
+        (folder / name).write_bytes(text)
+    units = [name for name in files if name.endswith(".c") and name != "equations.c"]
+    subprocess.run([compiler, "-std=c11", *flags, *units, "-o", "driver", "-lm"], cwd=folder, check=True)
+    return subprocess.run([folder / "driver"], capture_output=True, text=True, check=True).stdout.strip()
+
+
+@pytest.mark.parametrize("level", ["-O0", "-O3"])
+@pytest.mark.parametrize("make", SCENARIOS)
+def test_another_compiler_computes_the_same_bits(make, level, tmp_path):
+    assert gcc_bits(make, tmp_path, level, "-ffp-contract=off") == native(make)
+
+
+def test_the_hash_notices_a_multiplication_and_addition_in_one_rounding(tmp_path):
+    if "fma" not in Path("/proc/cpuinfo").read_text().split():
+        pytest.skip("this processor has no fused multiply-add")
+    assert gcc_bits(plant, tmp_path, "-O2", "-mfma", "-ffp-contract=fast") != native(plant)
+
+
+LOADER = b"""
+__declspec(dllimport) void *LoadLibraryA(const char *name);
+__declspec(dllimport) void *GetProcAddress(void *library, const char *name);
+__declspec(dllimport) void ExitProcess(unsigned code);
+void mainCRTStartup(void) {
+    void *library = LoadLibraryA("lugre.dll");
+    const char *(*version)(void) = library ? (const char *(*)(void))GetProcAddress(library, "fmi3GetVersion") : 0;
+    ExitProcess(version ? (unsigned)(version()[0] - '0') : 99);
+}
+"""
+
+
+def test_the_windows_library_loads(wine):
+    library = build_library(models.lugre(), "x86_64-windows")
+    flags = ("-O2", "-nostdlib", *CONSOLE)
+    program = compile_shared({"loader.c": LOADER}, "loader.exe", MACHINES["Windows"].target, flags)
+    command = [*runner_of(MACHINES["Windows"]), str(program)]
+    assert subprocess.run(command, cwd=library.parent, env=wine, check=False).returncode == 3
