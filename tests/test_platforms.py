@@ -145,8 +145,9 @@ def test_the_command_gives_aarch64_linux_an_fmi_2_archive_of_its_own(tmp_path):
         main(["export", "emps", "--fmi", "2", "--platform", "x86_64-linux,aarch64-linux", "--out", str(tmp_path)])
     assert left.value.code in (0, None)
     plants = [tmp_path / "emps_plant_fmi2.fmu", tmp_path / "aarch64-linux" / "emps_plant_fmi2.fmu"]
-    found = [elf_machine(zipfile.ZipFile(path).read("binaries/linux64/EMPS_plant.so")) for path in plants]
-    assert found == [62, 183]
+    for path, machine in zip(plants, (62, 183), strict=True):
+        with zipfile.ZipFile(path) as archive:
+            assert elf_machine(archive.read("binaries/linux64/emps_plant.so")) == machine
 
 
 def test_an_unknown_platform_leaves_nothing_behind(tmp_path):
