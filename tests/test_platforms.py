@@ -201,7 +201,7 @@ MACHINES = {
         PLATFORMS["x86_64-windows"].target, (*PLATFORMS["x86_64-windows"].flags, *CONSOLE), "wine64", package="wine64"
     ),
 }
-STEPS = {plant: 3_000, controller: 25_000}
+STEPS = {plant: 4_000, controller: 25_000}
 AMPLITUDES = {"tau": 9.0, "disturbance": 1.0, "temperature": 20.0, "q": 0.01, "q_d": 0.01, "v_d": 0.05, "a_d": 0.1}
 
 
