@@ -18,7 +18,8 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from pyfmi_models.export.build import FLAGS, PLATFORMS, compile_shared, host
+from pyfmi_models.export.build import FLAGS, compile_shared
+from pyfmi_models.export.platforms import PLATFORMS, host
 from pyfmi_models.model import Model
 
 Array = npt.NDArray[np.float64]
