@@ -11,6 +11,7 @@ from cosim.component import STATUSES
 from cosim.errors import StepError
 from cosim.interrupts import uninterrupted
 from cosim.loop import CompiledLoop, InterpretedLoop, Plan, slow_because
+from cosim.planning import make_streams
 from cosim.wiring import Wiring
 from cosim.writer import MemoryWriter
 
@@ -77,7 +78,7 @@ class Execution:
         return notes
 
     def _run_chunks(self) -> None:
-        streams = [signal.stream(self.plan.step) for signal in self.wiring.signals.values()]
+        streams = make_streams(self.wiring, self.plan.step)
         self.loop.start()
         self._check()
         for chunk in chunks(self.ticks):

@@ -16,8 +16,10 @@ from cosim.algorithm import JACOBI, Algorithm
 from cosim.component import Component
 from cosim.errors import ScenarioError, WiringError
 from cosim.execution import Execution, Progress
+from cosim.faults import Fault
 from cosim.fmu import FmuComponent
 from cosim.loop import make_loop
+from cosim.planning import make_plan
 from cosim.recording import Recording
 from cosim.scenario import Scenario
 from cosim.signals import Samples, Signal
@@ -53,6 +55,7 @@ def simulate(
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
     algorithm: Algorithm | None = None,
     every: Mapping[str, int] | None = None,
+    faults: Sequence[Fault] = (),
     decimation: int = 1,
     path: Path | None = None,
     force: bool = False,
@@ -73,6 +76,7 @@ def simulate(
         parameters: by component, parameters and start values by name.
         algorithm: how components are coupled; Jacobi where not given.
         every: by component, the ticks of its step where they are not one.
+        faults: what breaks on wires and signals, and when (see `faults`).
         decimation: ticks for each row.
         path: Parquet file to stream to; None keeps the recording in memory.
         force: overwrite the file.
@@ -94,8 +98,9 @@ def simulate(
             records={key: one if isinstance(one, Record) else Record(one) for key, one in record.items()},
             algorithm=algorithm or JACOBI,
             every=dict(every or {}),
+            faults=faults,
         )
-        plan = wiring.plan(step, decimation)
+        plan = make_plan(wiring, step, decimation)
         settings = _settings(opened, parameters or {})
         for key, component in opened.items():
             component.start(settings[key])
@@ -139,6 +144,7 @@ def run(
         parameters={name: component.parameters for name, component in scenario.components.items()},
         algorithm=scenario.algorithm,
         every=scenario.every,
+        faults=scenario.faults,
         decimation=scenario.decimation,
         path=path,
         force=force,
@@ -182,6 +188,7 @@ def _story(wiring: Wiring, settings: Mapping[str, Any], step: float, decimation:
         "decimation": decimation,
         "algorithm": wiring.algorithm.model_dump(),
         "every": dict(wiring.every),
+        "faults": [fault.model_dump() for fault in wiring.faults],
         "components": {name: one.origin | {"parameters": settings[name]} for name, one in wiring.components.items()},
         "wires": [asdict(wire) for wire in wiring.wires],
         "record": {name: asdict(record) for name, record in wiring.records.items()},

@@ -24,14 +24,14 @@ def envelope(motion: Motion, t: np.ndarray, rise: float) -> Motion:
     return s * q, ds * q + s * v, dds * q + 2 * ds * v + s * a
 
 
-def slews(t: np.ndarray, positions: list[float], dwell: float, limits: tuple[float, float, float]) -> Motion:
-    """Go through positions with limited velocity, acceleration and jerk, resting `dwell` seconds at each."""
+def slews(t: np.ndarray, positions: list[float], dwells: list[float], limits: tuple[float, float, float]) -> Motion:
+    """Go through positions with limited velocity, acceleration and jerk, resting `dwells[i]` seconds at each."""
     pieces: list[tuple[float, ...]] = []  # start, position, velocity, acceleration, jerk
-    start = dwell
-    for here, there in pairwise(positions):
-        pieces.append((start - dwell, here, 0.0, 0.0, 0.0))
-        start = _slew(pieces, start, here, there, limits) + dwell
-    pieces.append((start - dwell, positions[-1], 0.0, 0.0, 0.0))
+    start = 0.0
+    for dwell, (here, there) in zip(dwells, pairwise(positions), strict=False):
+        pieces.append((start, here, 0.0, 0.0, 0.0))
+        start = _slew(pieces, start + dwell, here, there, limits)
+    pieces.append((start, positions[-1], 0.0, 0.0, 0.0))
     return _cubic(t, np.array(pieces))
 
 

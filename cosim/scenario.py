@@ -4,8 +4,10 @@
     [algorithm]         kind = "jacobi" | "gauss-seidel" | "iterated" | "energy" and its options, see `algorithm`
     [components.NAME]   fmu = "file.fmu", or card = "CARD" with part = "plant" | "controller"; parameters = { ... };
                         every = ticks of a step of this component, or step = s, a whole multiple of the scenario's
-    [signals.NAME]      kind = "sine" | "constant" | "steps" | "multisine" | "chirp" | "slews" | "recorded" | "noise"
+    [signals.NAME]      kind = "sine" | "ramp" | "sidereal" | "constant" | "steps" | "multisine" | "chirp" | "slews"
+                        | "recorded" | "noise" and what the kind needs, see `signals`
     [[connections]]     from, to; gain, offset, quantum, noise, unit, breaks_loop where wanted
+    [[faults]]          on, kind, from, until and what the kind needs, see `faults`
     [record]            signals = { column = "component.variable", ... } or a list of them; decimation; mode
 
 Files are relative to the scenario. A name without .toml is a shipped scenario.
@@ -22,6 +24,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 
 from cosim.algorithm import JACOBI, Algorithm
 from cosim.errors import ScenarioError, WiringError
+from cosim.faults import Fault
 from cosim.signals import Generator, Recorded, Signal
 from cosim.ssp import read_ssp
 from cosim.wiring import Record, Wire
@@ -87,6 +90,7 @@ class _File(_Section):
     components: dict[str, ComponentSection] = Field(min_length=1)
     signals: dict[str, Generator] = {}
     connections: list[ConnectionSection] = []
+    faults: list[Fault] = []
     record: RecordingSection
 
 
@@ -107,6 +111,7 @@ class Scenario:
     decimation: int
     algorithm: Algorithm = JACOBI
     every: Mapping[str, int] = field(default_factory=dict)
+    faults: tuple[Fault, ...] = ()
 
     @property
     def stop(self) -> float:
@@ -170,6 +175,7 @@ def parse_scenario(text: str, path: str, directory: Path) -> Scenario:
         decimation=raw.record.decimation,
         algorithm=raw.algorithm,
         every=_every(raw, path),
+        faults=tuple(raw.faults),
     )
 
 
@@ -244,15 +250,9 @@ def _sentence(error: ValidationError, path: str) -> ScenarioError:
     return ScenarioError(f"{path}: {where}{shown} breaks a rule: {message}.", culprit=where, value=value)
 
 
-def _generators() -> dict[str, Any]:
-    """Map the kinds of signals to their classes."""
-    classes = get_args(get_args(Generator)[0])
-    return {get_args(one.model_fields["kind"].annotation)[0]: one for one in classes}
-
-
-def _algorithms() -> dict[str, Any]:
-    """Map the kinds of algorithms to their classes."""
-    return {get_args(one.model_fields["kind"].annotation)[0]: one for one in get_args(get_args(Algorithm)[0])}
+def _kinds(union: Any) -> dict[str, Any]:
+    """Map the kinds of signals, algorithms or faults to their classes."""
+    return {get_args(one.model_fields["kind"].annotation)[0]: one for one in get_args(get_args(union)[0])}
 
 
 def _keys(location: tuple[int | str, ...]) -> tuple[str, ...]:
@@ -260,7 +260,8 @@ def _keys(location: tuple[int | str, ...]) -> tuple[str, ...]:
     sections = {"components": ComponentSection, "connections": ConnectionSection, "record": RecordingSection}
     section: Any = _File
     if len(location) > 1 and location[0] == "algorithm":
-        section = _algorithms()[str(location[1])]
+        section = _kinds(Algorithm)[str(location[1])]
     elif len(location) > 1:
-        section = sections.get(str(location[0])) or _generators()[str(location[2])]
+        kinds = _kinds(Fault if location[0] == "faults" else Generator)
+        section = sections.get(str(location[0])) or kinds[str(location[2])]
     return tuple(field.alias or name for name, field in section.model_fields.items())

@@ -19,6 +19,9 @@ from cosim.profile import Motion, envelope, slews
 
 Stream = Callable[[np.ndarray], np.ndarray]
 Positive = Annotated[float, Field(gt=0)]
+Dwell = Annotated[float, Field(ge=0)]
+SIDEREAL_RATE = 7.292115e-5
+"""Speed of the stars in rad/s: a turn in a mean sidereal day of 86 164.1 s."""
 
 
 class Signal(Protocol):
@@ -96,6 +99,30 @@ class Sine(_SetPoint):
         return _sum_of_sines(t, [rate], [size], [self.phase])
 
 
+class Ramp(_SetPoint):
+    """A constant velocity: position = start + velocity t; a smooth start begins at rest at `start`."""
+
+    kind: Literal["ramp"]
+    velocity: float
+    start: float = 0.0
+
+    def motion(self, t: np.ndarray) -> Motion:
+        """Return the way from `start`; its acceleration is zero."""
+        return self.velocity * t, np.full_like(t, self.velocity), np.zeros_like(t)
+
+    def stream(self, step: float) -> Stream:
+        """Make a stream of the motion."""
+        way = super().stream(step)
+        return lambda ticks: way(ticks) + np.array([[self.start], [0.0], [0.0]])
+
+
+class Sidereal(Ramp):
+    """The stars' own speed, or that of another object where `velocity` says so."""
+
+    kind: Literal["sidereal"]  # type: ignore[assignment]
+    velocity: float = SIDEREAL_RATE
+
+
 class Multisine(_SetPoint):
     """A sum of sines with random phases from `seed`: many frequencies in one run."""
 
@@ -139,18 +166,28 @@ class Chirp(_SetPoint):
 
 
 class Slews(_SetPoint):
-    """From position to position with limited velocity, acceleration and jerk, resting `dwell` seconds at each."""
+    """From position to position with limited velocity, acceleration and jerk, resting `dwell` seconds at each.
+
+    A list of dwells, one a position, makes a programme in which friction rests for different times.
+    """
 
     kind: Literal["slews"]
     positions: list[float] = Field(min_length=2)
-    dwell: float = Field(default=0.0, ge=0)
+    dwell: Dwell | list[Dwell] = 0.0
     max_velocity: Positive
     max_acceleration: Positive
     max_jerk: Positive
 
+    @model_validator(mode="after")
+    def _as_many(self) -> "Slews":
+        if isinstance(self.dwell, list) and len(self.dwell) != len(self.positions):
+            raise ValueError(f"{len(self.dwell)} dwells for {len(self.positions)} positions")
+        return self
+
     def motion(self, t: np.ndarray) -> Motion:
         """Return the programme at t; it rests at the last position."""
-        return slews(t, self.positions, self.dwell, (self.max_velocity, self.max_acceleration, self.max_jerk))
+        dwells = self.dwell if isinstance(self.dwell, list) else [self.dwell] * len(self.positions)
+        return slews(t, self.positions, dwells, (self.max_velocity, self.max_acceleration, self.max_jerk))
 
 
 class Steps(_Generator):
@@ -244,7 +281,8 @@ class Samples:
 
 
 Generator = Annotated[
-    Constant | Sine | Multisine | Chirp | Slews | Steps | Noise | Recorded, Field(discriminator="kind")
+    Constant | Sine | Ramp | Sidereal | Multisine | Chirp | Slews | Steps | Noise | Recorded,
+    Field(discriminator="kind"),
 ]
 
 

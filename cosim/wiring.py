@@ -1,4 +1,4 @@
-"""Wires by name, checked against the components and turned into a plan for the loop, before anything runs.
+"""Wires by name, checked against the components before anything runs.
 
 A source is `component.output`, `signal.output`, or `signal` where it has only one. Units of one kind are converted,
 others refused.
@@ -6,15 +6,13 @@ others refused.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
-
-import numpy as np
+from typing import Literal
 
 from cosim.algorithm import JACOBI, Algorithm
 from cosim.component import Component, Port
 from cosim.errors import UnitError, WiringError
-from cosim.loop import Column, Link, Part, Plan
-from cosim.schedule import check_loops, order_of, turns
+from cosim.faults import Fault
+from cosim.schedule import check_loops
 from cosim.signals import Signal
 from cosim.units import conversion
 
@@ -55,6 +53,7 @@ class Wiring:
     records: Mapping[str, Record]
     algorithm: Algorithm = JACOBI
     every: Mapping[str, int] = field(default_factory=dict)
+    faults: Sequence[Fault] = ()
 
     def check(self) -> None:
         """Check every name, causality and unit.
@@ -73,10 +72,11 @@ class Wiring:
                 )
             fed[wire.target] = wire.source
             self._unit_of_source(wire)
-            self._gain(wire)
+            self.gain(wire)
         for record in self.records.values():
             self.unit(record)
         self._check_every()
+        self._check_faults(fed)
 
     def doubts(self) -> tuple[str, ...]:
         """Return algebraic loops that cannot be excluded, as sentences.
@@ -111,79 +111,26 @@ class Wiring:
             raise WiringError(message, culprit=record.signal, choices=choices)
         return port.unit
 
-    def plan(self, step: float, decimation: int) -> Plan:
-        """Turn checked names into places on a bus.
+    def sources(self) -> dict[str, Signal]:
+        """Return the signals, and the noise that faults on wires add, each under a name of its own."""
+        wires = {number: fault.noise() for number, fault in enumerate(self.faults) if not self.is_signal(fault.on)}
+        return {**self.signals, **{f"fault {number}": noise for number, noise in wires.items() if noise}}
 
-        Raises:
-            WiringError: a name, unit or the algorithm does not fit.
-        """
-        self.check()
-        self.doubts()
-        order = order_of(self.algorithm.acts(tuple(self.components)))
-        places = self._places(order)
-        signal = len(places)
-        for name, one in self.signals.items():
-            for output in one.outputs:
-                places[f"{name}.{output}"] = len(places)
-        return Plan(
-            parts=tuple(self._part(name, places) for name in order),
-            turns=turns(self.algorithm, self.wires, self.components, self.every),
-            columns=tuple(self._column(record, places) for record in self.records.values()),
-            signal=signal,
-            signals=len(places) - signal,
-            bus=np.zeros(len(places)),
-            step=step,
-            decimation=decimation,
-        )
+    def is_signal(self, name: str) -> bool:
+        """Tell a signal from an input."""
+        return name.partition(".")[0] in self.signals
 
-    def _places(self, order: Sequence[str]) -> dict[str, int]:
-        """Number what is used of each component: its outputs, then its inputs."""
-        names = [full for name in order for full in (*self._outputs(name), *self._inputs(name))]
-        return {full: index for index, full in enumerate(names)}
-
-    def _inputs(self, name: str) -> list[str]:
-        return [wire.target for wire in self.wires if wire.target.partition(".")[0] == name]
-
-    def _outputs(self, name: str) -> list[str]:
-        wanted = [wire.source for wire in self.wires] + [record.signal for record in self.records.values()]
-        return [one for one in dict.fromkeys(wanted) if one.partition(".")[0] == name and one not in self._inputs(name)]
-
-    def _part(self, name: str, places: Mapping[str, int]) -> Part:
-        component, inputs, outputs = self.components[name], self._inputs(name), self._outputs(name)
-        return Part(
-            name=name,
-            component=component,
-            input_references=_references(component, inputs),
-            output_references=_references(component, outputs),
-            input=places[inputs[0]] if inputs else 0,
-            output=places[outputs[0]] if outputs else 0,
-            input_names=tuple(full.partition(".")[2] for full in inputs),
-            links=tuple(self._link(wire, places) for wire in self.wires if wire.target in inputs),
-            every=self.every.get(name, 1),
-        )
-
-    def _column(self, record: Record, places: Mapping[str, int]) -> Column:
-        fed = any(wire.target == record.signal for wire in self.wires)
-        return Column(places[self._full(record.signal)], record.mode == "mean", late=fed)
-
-    def _link(self, wire: Wire, places: Mapping[str, int]) -> Link:
-        gain, offset = self._gain(wire)
-        return Link(
-            source=places[self._full(wire.source)],
-            target=places[wire.target],
-            noise=places[self._full(wire.noise)] if wire.noise else -1,
-            gain=gain * wire.gain,
-            offset=gain * wire.offset + offset,
-            quantum=gain * wire.quantum,
-        )
-
-    def _full(self, source: str) -> str:
+    def full(self, source: str) -> str:
         """Complete the name of a signal that has only one output."""
         owner, dot, _ = source.partition(".")
         return source if dot or owner not in self.signals else f"{source}.{next(iter(self.signals[owner].outputs))}"
 
-    def _gain(self, wire: Wire) -> tuple[float, float]:
-        """Return gain and offset that convert the wire's unit to the target's."""
+    def gain(self, wire: Wire) -> tuple[float, float]:
+        """Return gain and offset that convert the wire's unit to the target's.
+
+        Raises:
+            WiringError: the units are of different kinds.
+        """
         target = self._input(wire)
         unit = wire.unit or self._unit_of_source(wire)
         try:
@@ -215,6 +162,15 @@ class Wiring:
             if ticks < 1:
                 message = f'"{name}" shall step every {ticks} ticks; that must be a whole number from 1 on.'
                 raise WiringError(message, culprit=name, value=ticks)
+
+    def _check_faults(self, fed: Mapping[str, str]) -> None:
+        for fault in self.faults:
+            if self.is_signal(fault.on):
+                self._signal(fault.on, "A fault")
+            elif fault.on not in fed:
+                choices = (*fed, *self.signals)
+                message = f'A fault is on "{fault.on}", which is no signal and no input that a wire feeds; there are: '
+                raise WiringError(message + ", ".join(choices) + ".", culprit=fault.on, choices=choices)
 
     def _input(self, wire: Wire) -> Port:
         owner, _, name = wire.target.partition(".")
@@ -274,8 +230,3 @@ def _of(component: Component, causality: str) -> list[Port]:
 def _kind(port: Port) -> str:
     article = "an" if port.causality[0] in "aeiou" else "a"
     return f"is {article} {port.causality}" if port.real else "is not a real number"
-
-
-def _references(component: Component, names: list[str]) -> Any:
-    ports = [component.ports[name.partition(".")[2]] for name in names]
-    return np.array([port.reference for port in ports], dtype=np.uint32)

@@ -26,6 +26,8 @@ RUNNERS = (
     "wiring",
     "algorithm",
     "schedule",
+    "planning",
+    "faults",
     "diagram",
     "execution",
     "interrupts",

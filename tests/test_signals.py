@@ -10,7 +10,21 @@ from pydantic import TypeAdapter, ValidationError
 
 from cosim.errors import RecordingError, SignalError
 from cosim.recording import Recording
-from cosim.signals import Chirp, Constant, Generator, Multisine, Noise, Recorded, Signal, Sine, Slews, Steps
+from cosim.signals import (
+    SIDEREAL_RATE,
+    Chirp,
+    Constant,
+    Generator,
+    Multisine,
+    Noise,
+    Ramp,
+    Recorded,
+    Sidereal,
+    Signal,
+    Sine,
+    Slews,
+    Steps,
+)
 
 STEP = 1e-4
 SLEWS: dict[str, Any] = {"kind": "slews", "max_velocity": 0.5, "max_acceleration": 2.0, "max_jerk": 20.0}
@@ -20,6 +34,7 @@ MOTIONS = [
     Multisine(kind="multisine", frequencies=[0.3, 1.1, 2.9], amplitudes=[1.0, 0.5, 0.1], seed=4, smooth_start=1.0),
     Chirp(kind="chirp", start=0.1, stop=3.0, duration=4.0, amplitude=0.2),
     Slews(positions=[0.0, 1.0, 0.99, -0.2], dwell=0.1, **SLEWS),
+    Ramp(kind="ramp", velocity=0.4, start=1.0, smooth_start=0.5),
 ]
 
 
@@ -61,6 +76,22 @@ def test_slews_keep_their_limits_and_arrive(jerk: float, distance: float) -> Non
     np.testing.assert_array_equal((v[-1], a[-1]), (0.0, 0.0))
     at_rest = int(np.sum((v == 0) & (np.abs(q - 0.2 - distance) < 1e-12)))
     assert abs(at_rest - 3000) <= 2
+
+
+def test_a_dwell_programme_rests_as_long_as_it_says() -> None:
+    q, v, _ = values(Slews(positions=[0.0, 0.1, 0.2], dwell=[0.2, 1.0, 0.0], **SLEWS), ticks=60_000)
+    for position, seconds in ((0.0, 0.2), (0.1, 1.0)):
+        at_rest = int(np.sum((v == 0) & (np.abs(q - position) < 1e-12)))
+        assert abs(at_rest * STEP - seconds) <= 2 * STEP
+
+
+def test_the_stars_turn_once_in_a_sidereal_day_and_a_ramp_begins_where_it_says() -> None:
+    position, velocity, acceleration = values(Sidereal(kind="sidereal", start=0.5))
+    np.testing.assert_array_equal((velocity[-1], acceleration[-1]), (SIDEREAL_RATE, 0.0))
+    np.testing.assert_allclose(2 * np.pi / SIDEREAL_RATE, 86164.1, atol=0.05)
+    np.testing.assert_allclose(position, 0.5 + SIDEREAL_RATE * STEP * np.arange(30_000), atol=1e-15)
+    smooth = values(Sidereal(kind="sidereal", start=0.5, smooth_start=1.0))
+    np.testing.assert_array_equal(smooth[:, 0], [0.5, 0.0, 0.0])
 
 
 def test_steps_act_from_the_tick_of_their_time() -> None:
