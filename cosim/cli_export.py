@@ -30,6 +30,7 @@ def export(
     fmi: Annotated[Fmi, typer.Option("--fmi", help="FMI version.")] = Fmi.both,
     platform: Annotated[str, typer.Option("--platform", help="host, all, or names with commas between.")] = "host",
     ssp: Annotated[bool, typer.Option("--ssp", help="Also wire plant, controller and a set point: NAME.ssp.")] = False,
+    modelica: Annotated[bool, typer.Option("--modelica", help="Also write the plant as Modelica text.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the paths as JSON.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
 ) -> None:
@@ -51,21 +52,22 @@ def export(
         for version in versions
         for folder, machines in _folders(version, platforms).items()
     ]
-    systems = {out / f"{stem}.ssp": system_writer(read, versions[0], platforms)} if ssp else {}
+    others = {out / f"{stem}.ssp": system_writer(read, versions[0], platforms)} if ssp else {}
+    others |= modelica_writer(read, out, stem) if modelica else {}
     paths = [path for path, *_ in wanted]
-    for path in (*paths, *systems):
+    for path in (*paths, *others):
         check_free(path, force)
     with stage(f"{stem}: {len(wanted)} FMUs") as progress:
         for done, (path, model, version, machines) in enumerate(wanted):
             progress(done, len(wanted))
             directory(path.parent)
             export_fmu(model, path, fmi=version, force=force, platforms=machines)
-    for path, write in systems.items():
+    for path, write in others.items():
         write(path, force)
     if as_json:
-        put_json({"fmus": list(map(str, paths))} | {path.suffix[1:]: str(path) for path in systems})
+        put_json({"fmus": list(map(str, paths))} | {path.suffix[1:]: str(path) for path in others})
     else:
-        put("\n".join(map(str, (*paths, *systems))))
+        put("\n".join(map(str, (*paths, *others))))
 
 
 def _folders(version: Literal[2, 3], platforms: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
@@ -81,3 +83,13 @@ def system_writer(card: "Card", fmi: Literal[2, 3], platforms: tuple[str, ...]) 
 
     system = system_of(card)
     return lambda path, force: export_ssp(system, path, fmi=fmi, force=force, platforms=platforms)
+
+
+def modelica_writer(card: "Card", out: Path, stem: str) -> dict[Path, Callable[[Path, bool], object]]:
+    """Return the path of the Modelica package of a card's plant and what writes it."""
+    from pyfmi_models.derivation import derivation_of
+    from pyfmi_models.export.modelica import export_modelica, package_name
+
+    plant = card.plant()
+    path = out / f"{package_name(stem)}.mo"
+    return {path: lambda path, force: export_modelica(plant.model(), path, derivation_of(plant), force=force)}

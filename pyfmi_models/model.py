@@ -5,6 +5,7 @@ never touches it. A component (friction law, effect, mount) is a frozen dataclas
 *are* its documentation, its FMU variables, its bounds in a fit and its keys in a card.
 """
 
+from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
 from math import inf
 from typing import Any, NamedTuple, TypeVar
@@ -53,6 +54,29 @@ class Model:
     outputs: tuple[Variable, ...]
     equations: ca.Function
     period: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chapter:
+    """What a person should know of the part of a model whose variables are called `prefix.name`."""
+
+    prefix: str
+    name: str
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Derivation:
+    """How the equations of a model come about, for a reader: quantities on the way, and the parts they belong to.
+
+    `symbols` are short names by which parts know variables of the whole. `equations` maps as those of the model, to
+    (next, outputs, quantities), and shares the quantities' expressions.
+    """
+
+    chapters: tuple[Chapter, ...]
+    quantities: tuple[Variable, ...]
+    symbols: Mapping[str, str]
+    equations: ca.Function
 
 
 Component = TypeVar("Component")

@@ -21,10 +21,25 @@ States = dict[str, tuple[Variable, ...]]
 
 
 def plant(mount: "Mount") -> Model:
-    """Write the equations of a mount; `q_true`, `q_load`, `q_recorded` are outputs where they differ from `q`."""
-    states, inputs, parameters = _states(mount), _inputs(mount), mount.parameters()
+    """Write a mount as a model; `q_true`, `q_load`, `q_recorded` are outputs where they differ from `q`."""
+    point, following, shown = written(mount)
+    results = [following, ca.vertcat(*shown.values())]
+    return Model(
+        name=f"{mount.name}_plant",
+        description=f"{mount.name}: one axis with {mount.friction.key} friction",
+        inputs=_inputs(mount),
+        parameters=mount.parameters(),
+        states=tuple(variable for part in _states(mount).values() for variable in part),
+        outputs=tuple(mount.in_axis_units(_OUTPUTS[name]) for name in shown),
+        equations=ca.Function("equations", point, results, ["t", "x", "u", "p"], ["next", "y"]),
+    )
+
+
+def written(mount: "Mount") -> tuple[list[Any], Any, dict[str, Any]]:
+    """Write the equations: the symbols t, x, u, p, the rates of all states, and the outputs by name."""
+    states, inputs = _states(mount), _inputs(mount)
     t, x, u = ca.SX.sym("t"), ca.SX.sym("x", sum(map(len, states.values()))), ca.SX.sym("u", len(inputs))
-    p, symbols = symbols_of(parameters)
+    p, symbols = symbols_of(mount.parameters())
     given = {variable.name: u[k] for k, variable in enumerate(inputs)}
     own = _shared_out(x, states)
     q, v = own["axis"][0], own["axis"][1]
@@ -41,18 +56,7 @@ def plant(mount: "Mount") -> Model:
     rates |= {"axis": ca.vertcat(v, acceleration), "friction": this.law.rate(own["friction"], v, level), **twisting}
     shown = {"q": this.reading(motion, own), "v": v, "friction": friction, "applied": applied}
     shown |= _further(this, motion, acceleration, own)
-    following = ca.vertcat(*(rates[name] for name in states))
-    return Model(
-        name=f"{mount.name}_plant",
-        description=f"{mount.name}: one axis with {mount.friction.key} friction",
-        inputs=inputs,
-        parameters=parameters,
-        states=tuple(variable for part in states.values() for variable in part),
-        outputs=tuple(mount.in_axis_units(_OUTPUTS[name]) for name in shown),
-        equations=ca.Function(
-            "equations", [t, x, u, p], [following, ca.vertcat(*shown.values())], ["t", "x", "u", "p"], ["next", "y"]
-        ),
-    )
+    return [t, x, u, p], ca.vertcat(*(rates[name] for name in states)), shown
 
 
 def _accelerations(

@@ -1,0 +1,116 @@
+"""How a plant's equations come about, overheard while the mount writes them.
+
+Each part of the mount, and the mount itself, is replaced by a listening copy, which notes what its methods return:
+`friction.level`, `cogging.load`, `loads`. So a reader gets the quantities of the one source, in its order.
+"""
+
+from collections.abc import Callable
+from dataclasses import fields, replace
+from functools import wraps
+from inspect import cleandoc
+from typing import Any
+
+import casadi as ca
+
+from pyfmi_models.friction import FrictionLaw
+from pyfmi_models.model import Chapter, Derivation, Pair, Scalar, Variable
+from pyfmi_models.mount import Mount
+from pyfmi_models.plant import written
+
+_WORDS = (
+    Variable(name="applied", unit="N.m", description="Torque that comes out"),
+    Variable(name="stiffness", unit="N.m/rad", description="Stiffness of an element"),
+    Variable(name="level", unit="N.m", description="Friction level"),
+    Variable(name="viscous", unit="N.m", description="Viscous torque"),
+    Variable(name="contact", unit="N.m", description="Contact torque of the friction law"),
+    Variable(name="load", unit="N.m", description="Torque, resists"),
+    Variable(name="loads", unit="N.m", description="Sum of the loads beside friction, resists"),
+    Variable(name="payload", unit="N.m", description="Torque of the weights on the axis"),
+    Variable(name="share", unit="1", description="Share of the inertia on the far side"),
+    Variable(name="torque", unit="N.m", description="Torque passed on to the far side"),
+    Variable(name="drag", unit="N.m", description="Friction torque on the far side, resists"),
+    Variable(name="inertia", unit="kg.m2", description="Inertia"),
+    Variable(name="reading", unit="rad", description="Reading"),
+    Variable(name="ahead", unit="s", description="Time by which the reading is ahead of the torque"),
+)
+"""Methods whose results a reader wants to see by name."""
+_OF_MOUNT = ("level", "viscous", "loads", "payload", "inertia")
+"""Those of the mount itself that are more than a call of its parts."""
+
+_SYMBOLS = {"position": "q", "speed": "v", "der(speed)": "a", "tau": "command", "temperature": "T"}
+"""What textbooks call the motion of the axis."""
+
+Hear = Callable[[str, Variable, Scalar], None]
+
+
+def derivation_of(mount: Mount) -> Derivation:
+    """Return the derivation of `mount.model()`: its quantities in the order of writing, a chapter for each part."""
+    heard: dict[str, tuple[Variable, Any]] = {}
+    point, following, shown = written(_listening_mount(mount, lambda *told: _note(heard, *told)))
+    told = ca.vertcat(ca.SX(0, 1), *(value for _, value in heard.values()))
+    results = [following, ca.vertcat(*shown.values()), told]
+    return Derivation(
+        chapters=tuple(_chapter(prefix, part) for prefix, part in mount.components().items()),
+        quantities=tuple(mount.in_axis_units(variable) for variable, _ in heard.values()),
+        symbols=_SYMBOLS,
+        equations=ca.Function("derivation", point, results, ["t", "x", "u", "p"], ["next", "y", "quantities"]),
+    )
+
+
+def _note(heard: dict[str, tuple[Variable, Any]], name: str, variable: Variable, value: Scalar) -> None:
+    """Keep a value under its name, each entry of a column under its number, a further one of the same name too."""
+    entries = ca.vertsplit(ca.SX(value))
+    for index, entry in enumerate(entries):
+        full = f"{name}_{index + 1}" if len(entries) > 1 else name
+        again = sum(one == full or one.startswith(f"{full}_again") for one in heard)
+        full = f"{full}_again{again if again > 1 else ''}" if again else full
+        heard[full] = (replace(variable, name=full), entry)
+
+
+def _chapter(prefix: str, part: Any) -> Chapter:
+    return Chapter(prefix=prefix, name=type(part).__name__, text=cleandoc(type(part).__doc__ or ""))
+
+
+def _listening_mount(mount: Mount, hear: Hear) -> Mount:
+    class Listening(Mount):
+        def with_symbols(self, symbols: dict[str, Any], v: Scalar) -> Mount:
+            this = super().with_symbols(symbols, v)
+            _hear_pairs(mount, this, hear)
+            axis, *rest = (_listening(part, f"{prefix}.", hear) for prefix, part in this.components().items())
+            return replace(this, axis=axis, friction=rest[0], effects=tuple(rest[1:]))
+
+        @property
+        def law(self) -> FrictionLaw:
+            law: FrictionLaw = super().law
+            return law if law is self.friction else _listening(law, "friction.", hear)
+
+    copy: Mount = _listening(mount, "", hear, Listening, _OF_MOUNT)
+    return copy
+
+
+def _hear_pairs(mount: Mount, this: Mount, hear: Hear) -> None:
+    """Name what a number that differs by direction is now."""
+    for (prefix, part), symbolic in zip(mount.components().items(), this.components().values(), strict=True):
+        for one in fields(part):
+            if isinstance(getattr(part, one.name), Pair):
+                hear(f"{prefix}.{one.name}", one.metadata["variable"], getattr(symbolic, one.name))
+
+
+def _listening(
+    part: Any, prefix: str, hear: Hear, base: type[Any] | None = None, names: tuple[str, ...] | None = None
+) -> Any:
+    """Copy a part into a class whose methods tell `hear` what they return."""
+    base = base or type(part)
+    wanted = [word for word in _WORDS if hasattr(base, word.name) and (names is None or word.name in names)]
+    methods = {word.name: _overheard(getattr(base, word.name), prefix, word, hear) for word in wanted}
+    return type(base.__name__, (base,), methods)(**{one.name: getattr(part, one.name) for one in fields(part)})
+
+
+def _overheard(method: Callable[..., Any], prefix: str, word: Variable, hear: Hear) -> Callable[..., Any]:
+    @wraps(method)
+    def tell(*arguments: Any) -> Any:
+        value = method(*arguments)
+        hear(prefix + word.name, word, value)
+        return value
+
+    return tell
