@@ -17,10 +17,11 @@ from pyfmi_models.friction import FrictionLaw
 from pyfmi_models.model import Model
 from pyfmi_models.mount import Axis, Mount
 
-TORQUE, SPEED, TIMES = 4.0, -0.01, (0.02, 0.05, 0.06, 0.15)
-"""Pushed back from a slow motion: sliding, about to stop, just turned and bending the other way, sliding again."""
+PUSHED, TIMES = (4.0, -0.01), (0.02, 0.05, 0.06, 0.1)
+"""Pushed back (torque, speed) from a slow motion: sliding, about to stop, just turned and bending, sliding again."""
 EACH = pytest.mark.parametrize("law", EXAMPLES.values(), ids=EXAMPLES.keys())
 Archive = Callable[[FrictionLaw], Path]
+Times = tuple[float, ...]
 
 
 @cache
@@ -35,13 +36,13 @@ def archive(tmp_path_factory: pytest.TempPathFactory) -> Archive:
 
 
 @cache
-def tight(law: FrictionLaw) -> np.ndarray:
-    """States at `TIMES`, a row each."""
+def tight(law: FrictionLaw, tau: float, speed: float, times: Times) -> np.ndarray:
+    """States at some times, a row each."""
     model, (t, x, u, p) = plant(law), plant(law).equations.sx_in()
     slopes = ca.Function("slopes", [t, x, u, p], [ca.jacobian(model.equations(t, x, u, p)[0], x)])
-    held = [TORQUE, 0.0], [variable.start for variable in model.parameters]
-    found = [np.array([SPEED if state.name == "speed" else 0.0 for state in model.states])]
-    for ends in pairwise((0.0, *TIMES)):
+    held = [tau, 0.0], [variable.start for variable in model.parameters]
+    found = [np.array([speed if state.name == "speed" else 0.0 for state in model.states])]
+    for ends in pairwise((0.0, *times)):
         solution = solve_ivp(
             lambda t, x: model.equations(t, x, *held)[0].full().ravel(), ends, found[-1], "Radau",
             rtol=1e-12, atol=1e-14, jac=lambda t, x: slopes(t, x, *held).full(),
@@ -50,14 +51,14 @@ def tight(law: FrictionLaw) -> np.ndarray:
     return np.array(found[1:])
 
 
-def moved(path: Path, law: FrictionLaw, kind: str) -> np.ndarray:
-    """States of the FMU at `TIMES`, a row each."""
+def moved(path: Path, law: FrictionLaw, kind: str, step: float, start: tuple[float, float], times: Times) -> np.ndarray:
+    """States of the FMU at some times, a row each."""
     names = [state.name for state in plant(law).states]
     result = simulate_fmu(
-        str(path), fmi_type=kind, stop_time=TIMES[-1], output_interval=1e-4, output=names,
-        start_values={"tau": TORQUE, "speed": SPEED}, relative_tolerance=1e-9,
+        str(path), fmi_type=kind, stop_time=times[-1], output_interval=step, output=names,
+        start_values={"tau": start[0], "speed": start[1]}, relative_tolerance=1e-9,
     )  # fmt: skip
-    rows = np.searchsorted(result["time"], np.array(TIMES) - 1e-9)
+    rows = np.searchsorted(result["time"], np.array(times) - 1e-9)
     return np.column_stack([result[name][rows] for name in names])
 
 
@@ -67,9 +68,17 @@ def test_the_plant_of_every_law_moves_as_a_tight_solver_says(
     archive: Archive, law: FrictionLaw, kind: str, tolerance: float
 ) -> None:
     """Both ask for 1e-9 a step, relative to the state and 0.01 of its nominal; CVode lets its errors add up."""
-    exact, nominals = tight(law), np.array([state.nominal for state in plant(law).states])
+    exact, nominals = tight(law, *PUSHED, TIMES), np.array([state.nominal for state in plant(law).states])
     size = np.abs(exact).max(axis=0) + 0.01 * nominals
-    assert (np.abs(moved(archive(law), law, kind) - exact) / size).max() < tolerance
+    assert (np.abs(moved(archive(law), law, kind, 1e-4, PUSHED, TIMES) - exact) / size).max() < tolerance
+
+
+@EACH
+def test_every_law_coasts_from_3_rad_a_second_in_steps_of_1_ms(archive: Archive, law: FrictionLaw) -> None:
+    """Where Runge-Kutta 4 is unstable from 0.07 rad/s on."""
+    exact = tight(law, 0.0, 3.0, (0.3,))
+    found = moved(archive(law), law, "CoSimulation", 1e-3, (0.0, 3.0), (0.3,))
+    np.testing.assert_allclose(found, exact, rtol=1e-8)
 
 
 @pytest.mark.parametrize("motion", ["rotary", "linear"])
