@@ -27,7 +27,7 @@ def with_fmus(scenario: Scenario, say: Callable[[str], None] = lambda text: None
     """
     made = {}
     for name, component in scenario.components.items():
-        if component.fmu is None:
+        if component.card is not None and component.fmu is None:
             made[name] = _fmu(component, f"{scenario.path}: components.{name}.card", say)
     return scenario.with_fmus(made)
 

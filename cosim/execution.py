@@ -73,6 +73,9 @@ class Execution:
                 some = f"{effort.at_limit:,} of {effort.rounds:,} pieces of steps"
                 reason = "lost more energy than tolerated though they were the smallest allowed"
                 notes.append(f"{some} {reason}: raise algorithm.max_pieces or make the step smaller.")
+        for part in self.plan.parts:
+            if "function" in part.component.origin:
+                notes.append(f"{part.name} is a Python function: each of its steps costs microseconds.")
         if self.loop.kind != "compiled":
             notes.append(f"{slow_because(self.plan)}: the loop ran in Python.")
         return notes

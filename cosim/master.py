@@ -18,10 +18,11 @@ from cosim.errors import ScenarioError, WiringError
 from cosim.execution import Execution, Progress
 from cosim.faults import Fault
 from cosim.fmu import FmuComponent
+from cosim.function import FunctionComponent, load_function
 from cosim.loop import make_loop
 from cosim.planning import make_plan
 from cosim.recording import Recording
-from cosim.scenario import Scenario
+from cosim.scenario import ComponentSection, Scenario
 from cosim.signals import Samples, Signal
 from cosim.wiring import Record, Wire, Wiring
 from cosim.writer import MemoryWriter, StreamWriter
@@ -130,12 +131,12 @@ def run(
         ScenarioError: a component is made from a card and has no FMU yet.
     """
     for name, component in scenario.components.items():
-        if component.fmu is None:
+        if component.card is not None and component.fmu is None:
             message = f'{scenario.path}: the component "{name}" has no FMU yet; `cosim run` builds it from its card.'
             raise ScenarioError(message, culprit=name)
     told = {"scenario": scenario.text, "command": command}
     return simulate(
-        {name: component.fmu for name, component in scenario.components.items() if component.fmu},
+        {name: _made(name, component, scenario.path) for name, component in scenario.components.items()},
         scenario.wires,
         record=scenario.records,
         step=scenario.step,
@@ -153,6 +154,15 @@ def run(
         progress=progress,
         compiled=compiled,
     )
+
+
+def _made(name: str, section: ComponentSection, path: str) -> Component | Path:
+    """Return what a section of a scenario means: an FMU, or a Python function."""
+    if section.python is None:
+        assert section.fmu is not None  # the section has one source, and a card's FMU was asked for above
+        return section.fmu
+    function, origin = load_function(section.python, path, name)
+    return FunctionComponent(function, section.inputs, section.outputs, name, origin)
 
 
 def _opened(stack: ExitStack, name: str, component: Component | Path | str) -> Component:

@@ -3,6 +3,7 @@
     name, step [s], stop [s]
     [algorithm]         kind = "jacobi" | "gauss-seidel" | "iterated" | "energy" and its options, see `algorithm`
     [components.NAME]   fmu = "file.fmu", or card = "CARD" with part = "plant" | "controller"; parameters = { ... };
+                        or python = "file.py:function" with inputs and outputs, see `function`
                         every = ticks of a step of this component, or step = s, a whole multiple of the scenario's
     [signals.NAME]      kind = "sine" | "ramp" | "sidereal" | "constant" | "steps" | "multisine" | "chirp" | "slews"
                         | "recorded" | "noise" and what the kind needs, see `signals`
@@ -35,19 +36,27 @@ class _Section(BaseModel):
 
 
 class ComponentSection(_Section):
-    """`[components.NAME]`: an FMU, or a part of a card from which one is built."""
+    """`[components.NAME]`: an FMU, a part of a card from which one is built, or a Python function."""
 
     fmu: Path | None = None
     card: str | None = None
     part: Literal["plant", "controller"] | None = None
+    python: str | None = None
+    inputs: dict[str, str] = {}
+    outputs: dict[str, str] = {}
     parameters: dict[str, float | bool | str] = {}
     every: int | None = Field(default=None, ge=1)
     step: float | None = Field(default=None, gt=0)
 
     @model_validator(mode="after")
     def _one_source(self) -> "ComponentSection":
-        if (self.fmu is None) == (self.card is None) or (self.card is None) != (self.part is None):
-            raise ValueError('give fmu = "...", or card = "..." with part = "plant" or "controller"')
+        sources = [one for one in (self.fmu, self.card, self.python) if one is not None]
+        named = self.python is not None and bool(self.outputs)
+        if len(sources) != 1 or (self.card is None) != (self.part is None) or named != bool(self.inputs | self.outputs):
+            raise ValueError(
+                'give fmu = "...", or card = "..." with part = "plant" or "controller", or python = "file.py:function" '
+                "with inputs and outputs"
+            )
         if self.every is not None and self.step is not None:
             raise ValueError("give either every or step")
         return self
@@ -217,10 +226,11 @@ def _whole(time: float, step: float, path: str, key: str) -> int:
 def _located(component: ComponentSection, directory: Path) -> ComponentSection:
     """Make paths relative to the scenario; the name of a shipped card stays as it is."""
     fmu = None if component.fmu is None else directory / component.fmu
+    python = None if component.python is None else str(directory / component.python)
     card = component.card
     if card is not None and (directory / card).is_file():
         card = str(directory / card)
-    return component.model_copy(update={"fmu": fmu, "card": card})
+    return component.model_copy(update={"fmu": fmu, "card": card, "python": python})
 
 
 def _located_signal(signal: Any, directory: Path) -> Any:

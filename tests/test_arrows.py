@@ -28,6 +28,7 @@ RUNNERS = (
     "schedule",
     "planning",
     "faults",
+    "function",
     "diagram",
     "execution",
     "interrupts",
