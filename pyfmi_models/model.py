@@ -18,7 +18,10 @@ Scalar = Any
 
 @dataclass(frozen=True, kw_only=True)
 class Variable:
-    """A named quantity with its unit, bounds and start value (SI; "1" means dimensionless)."""
+    """A named quantity with its unit, bounds and start value (SI; "1" means dimensionless).
+
+    A parameter that is not `tunable` keeps its value from the start of a run to its end.
+    """
 
     name: str
     unit: str
@@ -27,6 +30,7 @@ class Variable:
     low: float = -inf
     high: float = inf
     nominal: float = 1.0
+    tunable: bool = True
 
 
 class Pair(NamedTuple):
@@ -90,9 +94,14 @@ def parameter(
     low: float = -inf,
     high: float = inf,
     nominal: float = 1.0,
+    tunable: bool = True,
 ) -> Any:
-    """Declare a physical parameter of a component: unit, meaning and the bounds every user of it respects."""
-    variable = Variable(name="", unit=unit, description=description, low=low, high=high, nominal=nominal)
+    """Declare a physical parameter of a component: unit, meaning and the bounds every user of it respects.
+
+    Say `tunable=False` where a change in a run would change what the states mean, and so make torque out of nothing.
+    """
+    numbers = {"low": low, "high": high, "nominal": nominal}
+    variable = Variable(name="", unit=unit, description=description, tunable=tunable, **numbers)
     return field(default=default, metadata={"variable": variable})
 
 

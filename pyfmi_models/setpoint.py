@@ -19,10 +19,12 @@ class Sine:
 
     name: str
     unit: str = "rad"
-    frequency: Scalar = parameter("Hz", "Frequency of the sine", low=1e-9)
-    amplitude: Scalar = parameter("rad", "Amplitude of the sine")
-    phase: Scalar = parameter("rad", "Phase at time zero", default=0.0)
-    smooth_start: Scalar = parameter("s", "Time over which the motion grows to its full size", default=0.0, low=0)
+    frequency: Scalar = parameter("Hz", "Frequency of the sine", low=1e-9, tunable=False)
+    amplitude: Scalar = parameter("rad", "Amplitude of the sine", tunable=False)
+    phase: Scalar = parameter("rad", "Phase at time zero", default=0.0, tunable=False)
+    smooth_start: Scalar = parameter(
+        "s", "Time over which the motion grows to its full size", default=0.0, low=0, tunable=False
+    )
 
     def position(self, t: Scalar) -> Scalar:
         """Desired position at t [s]."""

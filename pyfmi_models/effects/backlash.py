@@ -32,9 +32,13 @@ class Backlash(Coupling):
     rivals: ClassVar[tuple[str, ...]] = ("compliance", "presliding", "friction_asymmetry")
     told_apart_by: ClassVar[str] = "after each reversal the motor runs free over the same distance, at any speed"
     action: ClassVar[str] = "Preload the gear or the nut; check the key and the coupling."
-    gap_rad: Scalar = parameter("rad", "Width of the play", low=0, nominal=1e-3)
-    load_share: Scalar = parameter("1", "Share of the inertia behind the play", default=0.5, low=0.01, high=0.99)
-    contact_hz: Scalar = parameter("Hz", "Frequency of the far mass on the contact", default=50.0, low=1, high=1e4)
+    gap_rad: Scalar = parameter("rad", "Width of the play", low=0, nominal=1e-3, tunable=False)
+    load_share: Scalar = parameter(
+        "1", "Share of the inertia behind the play", default=0.5, low=0.01, high=0.99, tunable=False
+    )
+    contact_hz: Scalar = parameter(
+        "Hz", "Frequency of the far mass on the contact", default=50.0, low=1, high=1e4, tunable=False
+    )
     damping_ratio: Scalar = parameter("1", "Damping of the contact", default=0.75, low=0, high=5)
     load_friction: Scalar = parameter("N.m", "Friction level of the far mass itself", default=0.0, low=0)
 

@@ -24,8 +24,12 @@ class Compliance(Coupling):
     rivals: ClassVar[tuple[str, ...]] = ("delay", "actuator_lag", "backlash")
     told_apart_by: ClassVar[str] = "it resonates at one frequency and scales with acceleration; lag and delay do not"
     action: ClassVar[str] = "Stiffen couplings, pinion and pier; keep the controller well below the resonance."
-    antiresonance_hz: Scalar = parameter("Hz", "Frequency of the far mass against a held motor", low=0.1, high=1e4)
-    resonance_hz: Scalar = parameter("Hz", "Frequency of both masses against each other", low=0.1, high=1e4)
+    antiresonance_hz: Scalar = parameter(
+        "Hz", "Frequency of the far mass against a held motor", low=0.1, high=1e4, tunable=False
+    )
+    resonance_hz: Scalar = parameter(
+        "Hz", "Frequency of both masses against each other", low=0.1, high=1e4, tunable=False
+    )
     damping_ratio: Scalar = parameter("1", "Damping of the antiresonance", default=0.02, low=0, high=2)
 
     def broken_rule(self) -> str:

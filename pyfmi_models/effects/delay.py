@@ -30,7 +30,9 @@ class Delay(DriveEffect):
     rivals: ClassVar[tuple[str, ...]] = ("actuator_lag",)
     told_apart_by: ClassVar[str] = "a delay turns phase only; a lag also takes amplitude away at high frequency"
     action: ClassVar[str] = "Nothing mechanical. Shorten the bus cycle, or use the improved model for tuning."
-    delay_ms: Scalar = parameter("ms", "Dead time between commanded and applied torque", low=0.02, high=50)
+    delay_ms: Scalar = parameter(
+        "ms", "Dead time between commanded and applied torque", low=0.02, high=50, tunable=False
+    )
 
     def states(self) -> tuple[Variable, ...]:
         """Three states of the rational approximation."""

@@ -123,7 +123,8 @@ const Model model = {{
 def _row(row: Row) -> str:
     variable = row.variable
     numbers = ", ".join(_number(value) for value in (variable.start, variable.low, variable.high))
-    return f"    {{{json.dumps(variable.name)}, {row.kind.upper()}, {numbers}}}"
+    fixed = "" if variable.tunable else ", .fixed = 1"
+    return f"    {{{json.dumps(variable.name)}, {row.kind.upper()}, {numbers}{fixed}}}"
 
 
 def _code(role: str, function: ca.Function | None) -> str:

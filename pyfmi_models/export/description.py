@@ -3,14 +3,12 @@
 import math
 import re
 import xml.etree.ElementTree as ET
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
 from importlib.metadata import PackageNotFoundError, version
-
-import casadi as ca
 
 from pyfmi_models.export.codegen import TOLERANCE, Generated
 from pyfmi_models.export.layout import Layout, Row
+from pyfmi_models.export.structure import unknowns_of
 from pyfmi_models.export.units import BASE, parse_unit
 
 TICK_RULE = (
@@ -23,41 +21,6 @@ LOG_CATEGORIES = {
     "logEvents": "Changes of mode",
 }
 _NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
-
-
-@dataclass(frozen=True)
-class Unknown:
-    """A calculated variable and what it depends on: among time, inputs and states; `initial` adds the parameters."""
-
-    row: Row
-    dependencies: tuple[int, ...]
-    initial: tuple[int, ...]
-
-
-def unknowns_of(layout: Layout) -> list[Unknown]:
-    """Rates and outputs with their true dependencies (value references), from CasADi's sparsity."""
-    equations = layout.model.equations
-    calculated = [(0, row) for row in layout.of("rate")], [(1, row) for row in layout.of("output")]
-    return [
-        Unknown(
-            row,
-            _known(layout, equations, part, i, ("time", "state", "input")),
-            _known(layout, equations, part, i, ("time", "state", "input", "parameter")),
-        )
-        for group in calculated
-        for i, (part, row) in enumerate(group)
-    ]
-
-
-def _known(layout: Layout, equations: ca.Function, part: int, entry: int, kinds: tuple[str, ...]) -> tuple[int, ...]:
-    found: list[int] = []
-    for argument, kind in enumerate(("time", "state", "input", "parameter")):
-        # A state of a sampled model is no known of FMI: its past value is hidden in the tick.
-        if kind not in kinds or (kind == "state" and layout.model.period):
-            continue
-        columns = equations.jac_sparsity(part, argument)
-        found += [row.reference for i, row in enumerate(layout.of(kind)) if columns.has_nz(entry, i)]  # type: ignore[arg-type]
-    return tuple(sorted(found))
 
 
 def description_text(model_description: str, period: float | None) -> str:
@@ -145,7 +108,8 @@ def _units(root: ET.Element, layout: Layout) -> None:
         base |= {"offset": repr(unit.offset)} if unit.offset else {}
         ET.SubElement(element, "BaseUnit", base)
         for display, factor in unit.display.items():
-            ET.SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
+            if display != name:
+                ET.SubElement(element, "DisplayUnit", name=display, factor=repr(factor))
 
 
 def _log_categories(root: ET.Element) -> None:
@@ -162,10 +126,11 @@ def _default_experiment(root: ET.Element, layout: Layout) -> None:
 def _role(row: Row, layout: Layout) -> dict[str, str]:
     """Causality, variability and initial. Outputs of a sampled model hold their start value until the first tick."""
     changing = "discrete" if layout.model.period else "continuous"
+    setting = "tunable" if row.variable.tunable else "fixed"
     return {
         "time": {"causality": "independent", "variability": "continuous"},
         "input": {"causality": "input", "variability": "continuous"},
-        "parameter": {"causality": "parameter", "variability": "tunable", "initial": "exact"},
+        "parameter": {"causality": "parameter", "variability": setting, "initial": "exact"},
         "state": {"causality": "local", "variability": changing, "initial": "exact"},
         "rate": {"causality": "local", "variability": "continuous", "initial": "calculated"},
         "output": {"causality": "output", "variability": changing, "initial": _initial_of_output(layout)},
@@ -179,6 +144,8 @@ def _initial_of_output(layout: Layout) -> str:
 def _numbers(row: Row, role: dict[str, str]) -> dict[str, str]:
     variable = row.variable
     found = {"unit": variable.unit}
+    display = parse_unit(variable.unit).display_for(_size(row))
+    found |= {"displayUnit": display} if display not in (None, variable.unit) else {}
     if row.kind != "time":
         found |= {"min": repr(float(variable.low))} if math.isfinite(variable.low) else {}
         found |= {"max": repr(float(variable.high))} if math.isfinite(variable.high) else {}
@@ -186,6 +153,11 @@ def _numbers(row: Row, role: dict[str, str]) -> dict[str, str]:
     if row.kind == "input" or role.get("initial") == "exact":
         found["start"] = repr(float(variable.start))
     return found
+
+
+def _size(row: Row) -> float:
+    """How large the numbers are that a person will read: a parameter's own, else the nominal value."""
+    return abs(row.variable.start) or row.variable.nominal if row.kind == "parameter" else row.variable.nominal
 
 
 def _variable2(parent: ET.Element, row: Row, layout: Layout) -> None:
@@ -205,36 +177,31 @@ def _variable3(parent: ET.Element, row: Row, layout: Layout) -> None:
     ET.SubElement(parent, "Float64", {**head, **role, **_numbers(row, role), **state})
 
 
-def _structure2(root: ET.Element, layout: Layout) -> None:
-    structure = ET.SubElement(root, "ModelStructure")
+def _structure(layout: Layout) -> dict[str, list[tuple[Row, Mapping[int, str]]]]:
+    """Outputs, rates, and what is calculated at the start: what each depends on, and how."""
     unknowns = unknowns_of(layout)
-    for group, kind in (("Outputs", "output"), ("Derivatives", "rate")):
-        chosen = [(u.row, u.dependencies) for u in unknowns if u.row.kind == kind]
-        _unknowns2(structure, group, chosen)
-    initial = [] if layout.model.period else [(u.row, u.initial) for u in unknowns]
-    _unknowns2(structure, "InitialUnknowns", initial)
+    running = {kind: [(u.row, u.dependencies) for u in unknowns if u.row.kind == kind] for kind in ("output", "rate")}
+    return running | {"initial": [] if layout.model.period else [(u.row, u.initial) for u in unknowns]}
 
 
-def _unknowns2(structure: ET.Element, group: str, unknowns: list[tuple[Row, tuple[int, ...]]]) -> None:
-    if not unknowns:
-        return
-    parent = ET.SubElement(structure, group)
-    for row, dependencies in unknowns:
-        indices = " ".join(str(reference + 1) for reference in dependencies)
-        ET.SubElement(parent, "Unknown", index=str(row.reference + 1), dependencies=indices)
+def _structure2(root: ET.Element, layout: Layout) -> None:
+    structure, found = ET.SubElement(root, "ModelStructure"), _structure(layout)
+    for group, kind in (("Outputs", "output"), ("Derivatives", "rate"), ("InitialUnknowns", "initial")):
+        parent = ET.SubElement(structure, group) if found[kind] else structure
+        for row, known in found[kind]:
+            ET.SubElement(parent, "Unknown", {"index": str(row.reference + 1)} | _dependencies(known, 1))
 
 
 def _structure3(root: ET.Element, layout: Layout) -> None:
-    structure = ET.SubElement(root, "ModelStructure")
-    unknowns = unknowns_of(layout)
-    groups = [("Output", [(u.row, u.dependencies) for u in unknowns if u.row.kind == "output"])]
-    groups += [("ContinuousStateDerivative", [(u.row, u.dependencies) for u in unknowns if u.row.kind == "rate"])]
-    groups += [("InitialUnknown", [] if layout.model.period else [(u.row, u.initial) for u in unknowns])]
-    for name, rows in groups:
-        for row, dependencies in rows:
-            ET.SubElement(
-                structure, name, valueReference=str(row.reference), dependencies=" ".join(map(str, dependencies))
-            )
+    structure, found = ET.SubElement(root, "ModelStructure"), _structure(layout)
+    for name, kind in (("Output", "output"), ("ContinuousStateDerivative", "rate"), ("InitialUnknown", "initial")):
+        for row, known in found[kind]:
+            ET.SubElement(structure, name, {"valueReference": str(row.reference)} | _dependencies(known, 0))
+
+
+def _dependencies(known: Mapping[int, str], first: int) -> dict[str, str]:
+    references = " ".join(str(reference + first) for reference in known)
+    return {"dependencies": references, "dependenciesKind": " ".join(known.values())}
 
 
 def xml_text(root: ET.Element) -> bytes:

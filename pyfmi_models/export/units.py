@@ -27,15 +27,23 @@ class Unit:
         """Units that a person may want to read instead, each with the factor from this unit to it."""
         return _DISPLAY.get(self.name, {})
 
+    def display_for(self, size: float) -> str | None:
+        """The unit in which a person would read values of this size: the coarsest in which it is no small number."""
+        fits = [name for name, factor in self.display.items() if size * factor >= _SMALL]
+        return next(iter([*fits, *reversed(self.display)]), None)
 
+
+_SMALL = 0.02
 _DISPLAY = {
     "rad": {"deg": 180 / pi, "arcsec": 648000 / pi},
-    "rad/s": {"deg/s": 180 / pi, "arcsec/s": 648000 / pi, "rev/min": 30 / pi},
-    "rad/s2": {"deg/s2": 180 / pi},
-    "s": {"ms": 1e3},
-    "m": {"mm": 1e3, "um": 1e6},
-    "m/s": {"mm/s": 1e3},
+    "rad/s": {"deg/s": 180 / pi, "arcsec/s": 648000 / pi},
+    "rad/s2": {"deg/s2": 180 / pi, "arcsec/s2": 648000 / pi},
+    "s": {"s": 1.0, "ms": 1e3},
+    "m": {"m": 1.0, "mm": 1e3, "um": 1e6},
+    "m/s": {"m/s": 1.0, "mm/s": 1e3, "um/s": 1e6},
+    "N.m": {"N.m": 1.0, "mN.m": 1e3},
 }
+"""From the coarsest to the finest."""
 
 # symbol: (factor to base units, exponents)
 _SYMBOLS: dict[str, tuple[float, dict[str, int]]] = {

@@ -56,7 +56,12 @@ class MemorylessLaw(FrictionLaw):
     """A law whose contact torque follows the speed at once: level times a steep, smooth sign of v."""
 
     smoothing: Scalar = parameter(
-        "rad/s", "Speed below which the sign of the speed is smoothed", default=1e-5, low=1e-9, nominal=1e-5
+        "rad/s",
+        "Speed below which the sign of the speed is smoothed",
+        default=1e-5,
+        low=1e-9,
+        nominal=1e-5,
+        tunable=False,
     )
 
     def contact(self, state: Any, v: Scalar, level: Scalar) -> Scalar:

@@ -39,9 +39,11 @@ class MaxwellSlip(FrictionLaw):
     Vs: Scalar = parameter("rad/s", "Stribeck speed", default=None, low=1e-9, nominal=0.01)
     delta: Scalar = parameter("1", "Shape exponent of the Stribeck curve", default=2.0, low=0.1, high=5)
     spread: Scalar = parameter(
-        "1", "Slip displacement of the last element over the first", default=18.0, low=1, high=1e6
+        "1", "Slip displacement of the last element over the first", default=18.0, low=1, high=1e6, tunable=False
     )
-    attraction: Scalar = parameter("1", "Sharpness of the passage to slip", default=50.0, low=20, high=1000)
+    attraction: Scalar = parameter(
+        "1", "Sharpness of the passage to slip", default=50.0, low=20, high=1000, tunable=False
+    )
 
     def states(self) -> tuple[Variable, ...]:
         """One state an element: its torque, from the stiffest to the softest."""

@@ -64,10 +64,10 @@ Status get_values(Instance *instance, const uint32_t *references, size_t count, 
 }
 
 /* The phases in which a kind of variable may be set. */
-static int settable(Kind kind) {
-    switch (kind) {
+static int settable(const Variable *variable) {
+    switch (variable->kind) {
     case INPUT: return ANY_PHASE - TERMINATED;
-    case PARAMETER: return INSTANTIATED + INITIALIZATION + EVENT + STEP;
+    case PARAMETER: return INSTANTIATED + INITIALIZATION + (variable->fixed ? 0 : EVENT + STEP);
     case STATE: return INSTANTIATED + INITIALIZATION;
     case OUTPUT: return is_sampled() ? INSTANTIATED + INITIALIZATION : 0;
     default: return 0;
@@ -75,13 +75,14 @@ static int settable(Kind kind) {
 }
 
 static Status check_setting(Instance *instance, const Variable *variable, double value) {
-    int phases = settable(variable->kind);
+    int phases = settable(variable);
     if (!phases) return fail(instance, FAILED, "\"%s\" is calculated and cannot be set", variable->name);
     if (!(phases & instance->memory->phase)) {
-        if (variable->kind == PARAMETER)
+        if (variable->kind == PARAMETER && !variable->fixed)
             return fail(instance, FAILED, "parameter \"%s\" can be set before the start, in event mode and between "
                         "co-simulation steps only", variable->name);
-        return fail(instance, FAILED, "\"%s\" can be set before the end of initialization only", variable->name);
+        return fail(instance, FAILED, "%s\"%s\" can be set before the end of initialization only",
+                    variable->fixed ? "fixed parameter " : "", variable->name);
     }
     if (!(fabs(value) < INFINITY)) return fail(instance, FAILED, "\"%s\" = %g is not finite", variable->name, value);
     if (variable->kind == PARAMETER && !(value >= variable->low && value <= variable->high))
