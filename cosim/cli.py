@@ -4,7 +4,8 @@ A verb `x` is the function `x` in the module `cosim.cli_x`, or the typer `app` t
 the module of the verb that is called is imported, and it imports what is heavy inside its functions: so a run needs
 neither CasADi nor a compiler.
 
-Exit codes: 0 done, 1 only where a yes or no was asked, 2 wrong use or bad input (one sentence), 130 interrupted.
+Exit codes: 0 done, 1 only where a yes or no was asked, 2 wrong use or bad input (one sentence), 130 interrupted (143 by
+SIGTERM).
 """
 
 import functools
@@ -18,6 +19,7 @@ import typer
 
 import cosim
 from cosim.errors import CosimError
+from cosim.interrupts import Terminated, end_well
 from cosim.terminal import put, say
 from pyfmi_models.errors import ModelError
 
@@ -28,6 +30,7 @@ VERBS = ("demo", "export", "run", "identify", "diagnose", "prove", "paper", "swe
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code."""
+    end_well()
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given
     rest = repeated([argument for argument in given if argument != "--debug"])
@@ -85,11 +88,12 @@ def guarded(verb: Callable[..., Any], debug: bool) -> Callable[..., Any]:
                 raise
             say(f"cosim: {error}")
             sys.exit(2)
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as error:
             if debug:
                 raise
-            say("cosim: interrupted")
-            sys.exit(130)
+            ended = isinstance(error, Terminated)
+            say(f"cosim: {'terminated' if ended else 'interrupted'}")
+            sys.exit(143 if ended else 130)
 
     return call
 

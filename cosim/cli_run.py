@@ -1,12 +1,19 @@
 """`cosim run`: a scenario to a recording."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from time import perf_counter
 from typing import Annotated, Any
 
 import typer
 
+from cosim.files import in_bytes
 from cosim.terminal import put, put_json, say, stage
+
+Progress = Callable[[int, int], None]
+SURE, LONG = 1.0, 30.0
+"""Seconds after which the speed of a run is known well enough, and time to go that is worth a word."""
 
 
 def run(
@@ -36,8 +43,10 @@ def run(
     ready = with_fmus(wanted, say)
     command = f"cosim run {scenario} --out {out}"
     title = f"{wanted.name}: {wanted.ticks:,} steps of {wanted.step:g} s"
+    size = 8 * (wanted.ticks // wanted.decimation) * (len(wanted.records) + 1)
     try:
-        with stage(title) as progress:
+        with stage(title) as shown:
+            progress = foretold(shown, size, say)
             done = run_scenario(ready, path, force=force, progress=progress, compiled=not interpreted, command=command)
     except (StepError, KeyboardInterrupt):
         say(f"what was recorded until then is in {path}")
@@ -50,6 +59,30 @@ def run(
         put_json(statistics)
     else:
         put(str(path))
+
+
+def foretold(shown: Progress, size: int, say: Callable[[str], None]) -> Progress:
+    """Return a progress that also says once how long a long run will take, and how large its recording gets."""
+    begun, told = perf_counter(), [False]
+
+    def progress(done: int, of: int) -> None:
+        shown(done, of)
+        spent = perf_counter() - begun
+        if not told[0] and spent > SURE:
+            told[0] = True
+            left = spent * (of - done) / done
+            if left > LONG:
+                say(f"about {in_time(left)} to go; the recording grows to {in_bytes(size)}")
+
+    return progress
+
+
+def in_time(seconds: float) -> str:
+    """Write a time for people."""
+    for limit, divisor, unit in ((120, 1, "s"), (7200, 60, "min"), (172_800, 3600, "h"), (6.3e7, 86_400, "days")):
+        if seconds < limit:
+            return f"{seconds / divisor:.0f} {unit}"
+    return f"{seconds / 3.156e7:.3g} years"
 
 
 def _tell(statistics: dict[str, Any]) -> None:

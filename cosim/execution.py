@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.component import STATUSES
+from cosim.component import FATAL, STATUSES, Component
 from cosim.errors import StepError
 from cosim.interrupts import uninterrupted
 from cosim.loop import CompiledLoop, InterpretedLoop, Plan, slow_because
@@ -106,7 +106,7 @@ class Execution:
             return
         part = self.plan.parts[failure.part]
         name, component = part.name, part.component
-        component.failed(failure.status)
+        self._tell_failed(component, failure.status)
         inputs = self.plan.inputs(failure.part)
         what = STATUSES.get(failure.status, f"returned status {failure.status}")
         last = ", ".join(f"{key} = {value:.9g}" for key, value in inputs.items()) or "none"
@@ -115,6 +115,13 @@ class Execution:
         raise StepError(
             f"{name} {what} {when}{said}; its last inputs: {last}.", component=name, tick=failure.tick, inputs=inputs
         )
+
+    def _tell_failed(self, component: Component, status: int) -> None:
+        """Let components know which calls are still allowed; FATAL counts for all instances of one FMU."""
+        same = component.origin.get("sha256")
+        for other in (part.component for part in self.plan.parts):
+            if other is component or (status == FATAL and same and other.origin.get("sha256") == same):
+                other.failed(status)
 
 
 def chunks(ticks: int) -> Iterator[np.ndarray]:

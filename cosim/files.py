@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -45,6 +46,36 @@ def directory(path: Path) -> Path:
         reason = f"{file} is a file" if file else (error.strerror or str(error)).lower()
         raise OutputError(f"The directory {path} cannot be made: {reason}.", culprit=str(path)) from error
     return path
+
+
+def check_room(path: Path | None, size: int, advice: str) -> None:
+    """Refuse a file (or, without a path, an array in memory) of `size` bytes for which there is no room.
+
+    Raises:
+        OutputError: names what is needed, what is free, and `advice`.
+    """
+    where = "memory" if path is None else next(one for one in path.absolute().parents if one.exists())
+    free = memory() if path is None else shutil.disk_usage(str(where)).free
+    if size > free:
+        message = f"{in_bytes(size)} are needed and {where} has {in_bytes(free)}: {advice}."
+        raise OutputError(message[0].upper() + message[1:], culprit=str(where), value=size)
+
+
+def memory() -> int:
+    """Return the bytes of memory of this machine; where it does not say, so much that nothing is refused."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        return 1 << 62
+
+
+def in_bytes(size: float) -> str:
+    """Write a number of bytes for people."""
+    for unit in ("bytes", "kB", "MB", "GB", "TB", "PB"):
+        if size < 1000 or unit == "PB":
+            return f"{size:.3g} {unit}"
+        size /= 1000
+    raise AssertionError("unreachable")
 
 
 @contextmanager

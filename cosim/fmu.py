@@ -84,6 +84,7 @@ class FmuComponent:
         except CosimError:
             raise
         except Exception as error:
+            self.failed(getattr(error, "status", 0))
             raise FmuError(f"{self.name} ({self.path}) does not start: {self._reason(error)}.") from error
 
     def set(self, references: np.ndarray, values: np.ndarray) -> int:

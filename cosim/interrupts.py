@@ -1,22 +1,44 @@
-"""Ctrl-C between pieces of work, never inside one: rows that are being written are written once."""
+"""Ctrl-C and termination between pieces of work, never inside one: rows that are being written are written once."""
 
 import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
+
+ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
+"""Signals that ask a process to end, beside Ctrl-C."""
+
+
+class Terminated(KeyboardInterrupt):
+    """The process was asked to end; files are completed on the way out, as after Ctrl-C."""
+
+
+def end_well() -> None:
+    """Let SIGTERM (and SIGHUP) end this process as Ctrl-C does, so that no file is left half written."""
+    if threading.current_thread() is threading.main_thread():
+        for number in ENDING:
+            if signal.getsignal(number) is signal.SIG_DFL:
+                signal.signal(number, _end)
+
+
+def _end(number: int, frame: FrameType | None) -> None:
+    raise Terminated
 
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Hold Ctrl-C back until the block has ended well; threads other than the main one never meet it."""
+    """Hold these signals back until the block has ended well; threads other than the main one never meet them."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
     held: list[int] = []
-    before = signal.signal(signal.SIGINT, lambda number, frame: held.append(number))
+    numbers = [one for one in (signal.SIGINT, *ENDING) if signal.getsignal(one) is not None]
+    before = {one: signal.signal(one, lambda number, frame: held.append(number)) for one in numbers}
     try:
         yield
     finally:
-        signal.signal(signal.SIGINT, before)
-    if held:
-        raise KeyboardInterrupt
+        for one, handler in before.items():
+            signal.signal(one, handler)
+    for one in held[:1]:
+        signal.raise_signal(one)

@@ -17,6 +17,7 @@ from cosim.component import Component
 from cosim.errors import ScenarioError, WiringError
 from cosim.execution import Execution, Progress
 from cosim.faults import Fault
+from cosim.files import check_room
 from cosim.fmu import FmuComponent
 from cosim.function import FunctionComponent, load_function
 from cosim.loop import make_loop
@@ -87,9 +88,12 @@ def simulate(
         compiled: False asks for the loop in Python, which gives the same bits.
 
     Raises:
-        WiringError, FmuError, SignalError: before the first step.
+        WiringError, FmuError, SignalError, OutputError: before the first step.
         StepError: a component failed; what was recorded before is in the file.
     """
+    rows = -(-ticks // decimation)
+    advice = "record fewer signals, or one row in more ticks (decimation), or stop earlier"
+    check_room(path, 8 * rows * (len(record) + 1), f"the recording has {rows:,} rows; {advice}")
     with ExitStack() as stack:
         opened = {key: _opened(stack, key, one) for key, one in components.items()}
         wiring = Wiring(

@@ -106,7 +106,12 @@ def test_a_failing_component_leaves_what_was_recorded(
     assert len(Recording.read(path)) == 151
 
 
-def test_ctrl_c_leaves_a_complete_file_and_exit_code_130(scenario: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("number", "code", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
+)
+def test_ctrl_c_and_termination_leave_a_complete_file(
+    scenario: Path, tmp_path: Path, number: int, code: int, word: str
+) -> None:
     scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e6"))
     # A shell's background jobs ignore SIGINT, and so do their children: make it count however the tests started.
     start = (
@@ -118,14 +123,32 @@ def test_ctrl_c_leaves_a_complete_file_and_exit_code_130(scenario: Path, tmp_pat
         while not list(tmp_path.glob("out/.*.partial")) and time.monotonic() < until:
             time.sleep(0.05)
         time.sleep(0.3)
-        process.send_signal(signal.SIGINT)
+        process.send_signal(number)
         _, said = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert said.endswith("cosim: interrupted\n")
+    assert process.returncode == code
+    assert said.endswith(f"cosim: {word}\n")
     assert "Traceback" not in said
     recording = Recording.read(tmp_path / "out" / "recording.parquet")
     assert recording.origin["complete"] is False
     assert [one.name for one in (tmp_path / "out").iterdir()] == ["recording.parquet"]
+
+
+def test_a_long_run_says_how_long_and_an_absurd_one_is_refused(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import cosim.cli_run
+
+    told: list[str] = []
+    with monkeypatch.context() as clock:
+        clock.setattr(cosim.cli_run, "perf_counter", iter([0.0, 2.0, 4.0]).__next__)
+        progress = cosim.cli_run.foretold(lambda done, of: None, 2_000_000_000, told.append)
+        progress(1000, 7_201_000)
+        progress(2000, 7_201_000)
+    assert told == ["about 4 h to go; the recording grows to 2 GB"]
+    scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e12"))
+    assert call("run", scenario, "--out", tmp_path / "out") == 2
+    assert "PB are needed and " in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_reference_of_the_paper_runs_from_its_card_and_builds_its_fmus_once(

@@ -1,11 +1,13 @@
 """The master steps FMUs together: counted time, stated delays, the same bits in C and in Python, failures named."""
 
+import ctypes
 import os
 import re
 import subprocess
 import sys
 import tempfile
 import zipfile
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +17,7 @@ from tiny_fmu import description, tiny
 
 import cosim.execution
 import cosim.loop
-from cosim.errors import FmuError, SignalError, StepError, WiringError
+from cosim.errors import FmuError, OutputError, SignalError, StepError, WiringError
 from cosim.fmu import FmuComponent
 from cosim.master import Run, simulate
 from cosim.recording import Recording
@@ -189,6 +191,32 @@ def test_an_output_that_is_not_a_number_stops_the_run(tiny: Tiny, compiled: bool
     parameters = CONTROL | {"plant": {"nan_at": 0.2}}
     with pytest.raises(StepError, match="plant gave an output that is not a finite number at tick 200"):
         control_loop(tiny[3], parameters=parameters, compiled=compiled)
+
+
+@VERSIONS
+@pytest.mark.parametrize(("status", "allowed"), [(0, "TF"), (3, "F"), (4, "")])
+def test_after_an_error_only_freeing_and_after_a_fatal_one_nothing_is_called(
+    tiny: Tiny, version: int, status: int, allowed: str
+) -> None:
+    with FmuComponent(tiny[version], "plant") as plant, FmuComponent(tiny[version], "other") as other:
+        both = [ctypes.CDLL(one._fmu.dll._name) for one in (plant, other)]  # kept loaded, to look into afterwards
+        parameters = {"plant": {"status": float(status), "fail_at": 0.01}}
+        settings: dict[str, Any] = {"record": {"y": "plant.y"}, "step": 0.01, "ticks": 5, "parameters": parameters}
+        with nullcontext() if status == 0 else pytest.raises(StepError):
+            simulate({"plant": plant, "other": other}, [], **settings)
+    plant_calls, other_calls = (ctypes.c_char.in_dll(one, "calls") for one in both)
+    assert ctypes.string_at(ctypes.addressof(plant_calls)).decode() == allowed
+    assert ctypes.string_at(ctypes.addressof(other_calls)).decode() == ("" if status == 4 else "TF")
+
+
+def test_a_recording_for_which_there_is_no_room_is_refused(tiny: Tiny, tmp_path: Path) -> None:
+    endless: dict[str, Any] = {"record": {"y": "one.y"}, "step": 1e-4, "ticks": 10**15}
+    sentence = r"16 PB are needed and /.* has .*B: the recording has 1,000,000,000,000,000 rows; record fewer signals"
+    with pytest.raises(OutputError, match=sentence):
+        simulate({"one": tiny[3]}, [], path=tmp_path / "run.parquet", **endless)
+    with pytest.raises(OutputError, match="16 PB are needed and memory has"):
+        simulate({"one": tiny[3]}, [], **endless)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_nothing_is_printed_and_nothing_is_left_behind(

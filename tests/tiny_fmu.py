@@ -41,14 +41,16 @@ static int step(M *m, double t, double h) {
 }
 #define API __attribute__((visibility("default")))
 #define NONE(name) API int name(void *m) { (void)m; return 0; }
+API char calls[9]; /* what was called at the end: T terminate, F free */
+static int noted(char c) { calls[strlen(calls)] = c; return 0; }
 #define UNUSED(name) API int name(void) { return 3; }
 typedef struct { Log2 *log; } Callbacks;
 API void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, Callbacks *c, int v, int l) {
   M *m = make(); m->log = (void *)c->log; strncpy(m->name, n, 98); return m; }
 API int fmi2SetupExperiment(void *m, int a, double b, double c, int d, double e) { return 0; }
-NONE(fmi2EnterInitializationMode) NONE(fmi2ExitInitializationMode) NONE(fmi2Terminate)
+NONE(fmi2EnterInitializationMode) NONE(fmi2ExitInitializationMode) API int fmi2Terminate(void *m) { return noted('T'); }
 API int fmi2Reset(M *m) { M *n = make(); n->log = m->log; strcpy(n->name, m->name); *m = *n; free(n); return 0; }
-API void fmi2FreeInstance(void *m) { free(m); }
+API void fmi2FreeInstance(void *m) { noted('F'); free(m); }
 API int fmi2GetFMUstate(M *m, M **s) { return save(m, s); }
 API int fmi2SetFMUstate(M *m, M *s) { *m = *s; return 0; }
 API int fmi2FreeFMUstate(M *m, M **s) { free(*s); *s = NULL; return 0; }
@@ -64,9 +66,9 @@ API const char *fmi2GetTypesPlatform(void) { return "default"; }
 API void *fmi3InstantiateCoSimulation(const char *n, const char *g, const char *r, bool a, bool b, bool c, bool d,
   const unsigned *q, size_t w, void *environment, void *log, void *i) { M *m = make(); m->log = log; return m; }
 API int fmi3EnterInitializationMode(void *m, bool a, double b, double c, bool d, double e) { return 0; }
-NONE(fmi3ExitInitializationMode) NONE(fmi3Terminate)
+NONE(fmi3ExitInitializationMode) API int fmi3Terminate(void *m) { return noted('T'); }
 API int fmi3Reset(M *m) { return fmi2Reset(m); }
-API void fmi3FreeInstance(void *m) { free(m); }
+API void fmi3FreeInstance(void *m) { noted('F'); free(m); }
 API int fmi3SetFloat64(M *m, const unsigned *r, size_t n, const double *x, size_t k) { return set(m, r, n, x); }
 API int fmi3GetFloat64(M *m, const unsigned *r, size_t n, double *x, size_t k) { return get(m, r, n, x); }
 API int fmi3DoStep(M *m, double t, double h, bool p, bool *e, bool *x, bool *y, double *l) {
