@@ -23,6 +23,8 @@ class Fmi(StrEnum):
 
 VERSIONS: dict[Fmi, tuple[Literal[2, 3], ...]] = {Fmi.two: (2,), Fmi.three: (3,), Fmi.both: (2, 3)}
 
+KINDS = {".ssp": "ssp", ".mo": "modelica"}
+
 
 def export(
     card: Annotated[str, typer.Argument(help="A model card (.toml), or the name of a shipped one: paper_mount.")],
@@ -65,7 +67,7 @@ def export(
     for path, write in others.items():
         write(path, force)
     if as_json:
-        put_json({"fmus": list(map(str, paths))} | {path.suffix[1:]: str(path) for path in others})
+        put_json({"fmus": list(map(str, paths))} | {KINDS[path.suffix]: str(path) for path in others})
     else:
         put("\n".join(map(str, (*paths, *others))))
 

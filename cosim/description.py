@@ -1,6 +1,7 @@
 """What an FMU says about itself, read by FMPy and judged: can it run here, and which variables does it have."""
 
 import zipfile
+from collections.abc import Mapping
 from contextlib import suppress
 from math import inf
 from pathlib import Path
@@ -10,6 +11,7 @@ from xml.etree import ElementTree
 from cosim.component import Port
 from cosim.errors import FmuError
 from cosim.files import sha256
+from cosim.units import BASE, in_base_units
 
 _REAL = ("Real", "Float64")
 
@@ -42,7 +44,8 @@ def describe(path: Path) -> Any:
 
 def ports_of(description: Any) -> dict[str, Port]:
     """List the scalar variables of a model description by name."""
-    return {v.name: _port(v) for v in description.modelVariables if not v.dimensions}
+    own = _own_units(description)
+    return {v.name: _port(v, own) for v in description.modelVariables if not v.dimensions}
 
 
 def feedthrough_of(description: Any) -> dict[str, frozenset[str] | None]:
@@ -87,7 +90,16 @@ def _version(path: Path) -> str:
         return ElementTree.parse(file).getroot().get("fmiVersion", "?")
 
 
-def _port(variable: Any) -> Port:
+def _own_units(description: Any) -> dict[str, str]:
+    """Write the units of an FMU as this project knows them."""
+    bases = {one.name: one.baseUnit for one in description.unitDefinitions or () if one.baseUnit is not None}
+    return {
+        name: in_base_units(name, {one: getattr(base, one) for one in BASE}, float(base.factor), float(base.offset))
+        for name, base in bases.items()
+    }
+
+
+def _port(variable: Any, own_units: Mapping[str, str]) -> Port:
     real = variable.type in _REAL
     kind = variable.declaredType
     inherited = {key: getattr(variable, key) or (kind and getattr(kind, key)) for key in ("unit", "min", "max")}
@@ -96,7 +108,7 @@ def _port(variable: Any) -> Port:
         name=variable.name,
         reference=variable.valueReference,
         causality=variable.causality or "local",
-        unit=inherited["unit"] or "",
+        unit=own_units.get(inherited["unit"] or "", inherited["unit"] or ""),
         description=variable.description or "",
         start=_number(variable.start),
         low=-inf if inherited["min"] is None else float(inherited["min"]),

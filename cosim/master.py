@@ -9,7 +9,7 @@ from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import cosim
 from cosim.algorithm import JACOBI, Algorithm
@@ -23,6 +23,7 @@ from cosim.function import FunctionComponent, load_function
 from cosim.loop import make_loop
 from cosim.planning import make_plan
 from cosim.recording import Recording
+from cosim.renamed import Alias, Renamed
 from cosim.scenario import ComponentSection, Scenario
 from cosim.signals import Samples, Signal
 from cosim.wiring import Record, Wire, Wiring
@@ -57,6 +58,7 @@ def simulate(
     parameters: Mapping[str, Mapping[str, Any]] | None = None,
     algorithm: Algorithm | None = None,
     every: Mapping[str, int] | None = None,
+    variables: Mapping[str, Mapping[str, Alias]] | None = None,
     faults: Sequence[Fault] = (),
     decimation: int = 1,
     path: Path | None = None,
@@ -78,6 +80,7 @@ def simulate(
         parameters: by component, parameters and start values by name.
         algorithm: how components are coupled; Jacobi where not given.
         every: by component, the ticks of its step where they are not one.
+        variables: by component, names of ours for variables of its own (see `renamed`).
         faults: what breaks on wires and signals, and when (see `faults`).
         decimation: ticks for each row.
         path: Parquet file to stream to; None keeps the recording in memory.
@@ -96,6 +99,8 @@ def simulate(
     check_room(path, 8 * rows * (len(record) + 1), f"the recording has {rows:,} rows; {advice}")
     with ExitStack() as stack:
         opened = {key: _opened(stack, key, one) for key, one in components.items()}
+        for key, names in (variables or {}).items():
+            opened[key] = cast(Component, Renamed(opened[key], names)) if names else opened[key]
         wiring = Wiring(
             components=opened,
             signals={key: _signal(key, one, ticks) for key, one in (signals or {}).items()},
@@ -149,6 +154,7 @@ def run(
         parameters={name: component.parameters for name, component in scenario.components.items()},
         algorithm=scenario.algorithm,
         every=scenario.every,
+        variables={name: component.aliases for name, component in scenario.components.items()},
         faults=scenario.faults,
         decimation=scenario.decimation,
         path=path,

@@ -3,7 +3,8 @@
     name, step [s], stop [s]
     [algorithm]         kind = "jacobi" | "gauss-seidel" | "iterated" | "energy" and its options, see `algorithm`
     [components.NAME]   fmu = "file.fmu", or card = "CARD" with part = "plant" | "controller"; parameters = { ... };
-                        or python = "file.py:function" with inputs and outputs, see `function`
+                        or python = "file.py:function" with inputs and outputs, see `function`;
+                        variables = { NAME = "its own name" or { name, unit } } where its names differ, see `renamed`
                         every = ticks of a step of this component, or step = s, a whole multiple of the scenario's
     [signals.NAME]      kind = "sine" | "ramp" | "sidereal" | "constant" | "steps" | "multisine" | "chirp" | "slews"
                         | "recorded" | "noise" and what the kind needs, see `signals`
@@ -26,6 +27,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_valida
 from cosim.algorithm import JACOBI, Algorithm
 from cosim.errors import ScenarioError, WiringError
 from cosim.faults import Fault
+from cosim.renamed import Alias
 from cosim.signals import Generator, Recorded, Signal
 from cosim.ssp import read_ssp
 from cosim.wiring import Record, Wire
@@ -33,6 +35,18 @@ from cosim.wiring import Record, Wire
 
 class _Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
+
+
+class VariableSection(_Section):
+    """A variable by the component's own name, with its unit where the component does not say it."""
+
+    name: str
+    unit: str = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _only_a_name(cls, given: Any) -> Any:
+        return {"name": given} if isinstance(given, str) else given
 
 
 class ComponentSection(_Section):
@@ -45,6 +59,7 @@ class ComponentSection(_Section):
     inputs: dict[str, str] = {}
     outputs: dict[str, str] = {}
     parameters: dict[str, float | bool | str] = {}
+    variables: dict[str, VariableSection] = {}
     every: int | None = Field(default=None, ge=1)
     step: float | None = Field(default=None, gt=0)
 
@@ -60,6 +75,11 @@ class ComponentSection(_Section):
         if self.every is not None and self.step is not None:
             raise ValueError("give either every or step")
         return self
+
+    @property
+    def aliases(self) -> dict[str, Alias]:
+        """The variables that have a name of ours, by that name."""
+        return {name: Alias(**one.model_dump()) for name, one in self.variables.items()}
 
 
 class ConnectionSection(_Section):
@@ -269,7 +289,9 @@ def _keys(location: tuple[int | str, ...]) -> tuple[str, ...]:
     """List the legal keys beside the one at `location`."""
     sections = {"components": ComponentSection, "connections": ConnectionSection, "record": RecordingSection}
     section: Any = _File
-    if len(location) > 1 and location[0] == "algorithm":
+    if location[2:3] == ("variables",):
+        section = VariableSection
+    elif len(location) > 1 and location[0] == "algorithm":
         section = _kinds(Algorithm)[str(location[1])]
     elif len(location) > 1:
         kinds = _kinds(Fault if location[0] == "faults" else Generator)

@@ -2,12 +2,13 @@
 
     value in SI = factor * value + offset
 
-A unit is a product of names with integer powers: `N.m`, `mN m`, `Ncm`, `arcsec/s`, `rad/s^2`, `kg.m2`, `%`, `1`. Names
-take the usual prefixes. Angles are dimensionless (rad = 1). Temperatures are degC inside, as in every recording. An
-empty text means "unknown" and fits everything.
+A unit is a product of names with integer powers: `N.m`, `mN m`, `Ncm`, `arcsec/s`, `rad/s^2`, `J/(kg.K)`, `%`, `1`.
+Names take the usual prefixes; a number and a blank may stand before, as in `0.5 rad/s`. Angles are dimensionless
+(rad = 1). Temperatures are degC inside, as in every recording. An empty text means "unknown" and fits everything.
 """
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from math import pi
@@ -19,6 +20,8 @@ from cosim.errors import UnitError
 Dimension = tuple[int, int, int, int, int]
 """Powers of m, kg, s, A, K."""
 
+BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+"""Base units of FMI and SSP, in the order in which they are given there."""
 _NONE: Dimension = (0, 0, 0, 0, 0)
 _PREFIXES = {"n": 1e-9, "u": 1e-6, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6, "G": 1e9}
 _PREFIXED: dict[str, Dimension] = {
@@ -56,6 +59,8 @@ _PLAIN: dict[str, tuple[float, Dimension, str]] = {
 }
 _OFFSETS = {"degF": -160 / 9, "K": -273.15}
 _SPELLINGS = {"µ": "u", "μ": "u", "·": ".", "**": "", "*": ".", "²": "2", "³": "3", "^": "", "°C": "degC", "°": "deg"}
+_BRACKETS = re.compile(r"/\(([^()]*)\)")
+_NUMBER = re.compile(r"(\d\S*) +(?=[A-Za-z%])")
 _FACTOR = re.compile(r"([A-Za-z%]+|1)(-?\d+)?$")
 
 
@@ -80,11 +85,12 @@ def unit(text: str) -> Unit:
     Raises:
         UnitError: a name in the text is not a unit.
     """
-    normal = text.strip()
+    number, normal = _number(text.strip())
     for spelling, meaning in _SPELLINGS.items():
         normal = normal.replace(spelling, meaning)
     names: list[str] = []
-    factor, dimension = 1.0, _NONE
+    normal = _BRACKETS.sub(lambda found: "/" + found[1].replace(".", "/"), normal)
+    factor, dimension = number, _NONE
     for sign, token in re.findall(r"([./ ]?)\s*([^./\s]+)", normal):
         one, powers, name = _factor(token, text)
         inverse = -1 if sign == "/" else 1
@@ -92,6 +98,20 @@ def unit(text: str) -> Unit:
         dimension = _times(dimension, powers, inverse)
         names.append(("/" if sign == "/" else "." if names else "") + name)
     return Unit(factor, _OFFSETS.get(normal, 0.0), dimension, "".join(names) or "1")
+
+
+def in_base_units(name: str, powers: Mapping[str, int], factor: float, offset: float) -> str:
+    """Write a unit that is not known here as its definition in base units says: `U/min` becomes `0.1047 rad/s`.
+
+    A known name stays; so does one whose definition says nothing.
+    """
+    try:
+        unit(name)
+    except UnitError:
+        base = ".".join(f"{one}{power if power != 1 else ''}" for one, power in powers.items() if power)
+        if base and not offset and all(one in _PLAIN or one in _PREFIXED for one, power in powers.items() if power):
+            return base if factor == 1 else f"{factor!r} {base}"
+    return name
 
 
 def conversion(source: str, target: str) -> tuple[float, float]:
@@ -106,6 +126,15 @@ def conversion(source: str, target: str) -> tuple[float, float]:
     if have.dimension != need.dimension:
         raise UnitError(f'"{source}" cannot become "{target}": they are different kinds of quantity.', value=source)
     return have.factor / need.factor, (have.offset - need.offset) / need.factor
+
+
+def _number(text: str) -> tuple[float, str]:
+    """Part a text such as `0.5 rad/s` into its number (1 where there is none) and the rest."""
+    found = _NUMBER.match(text)
+    try:
+        return (float(found[1]), text[found.end() :]) if found else (1.0, text)
+    except ValueError:
+        return 1.0, text
 
 
 def _factor(token: str, text: str) -> tuple[float, Dimension, str]:

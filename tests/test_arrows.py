@@ -21,6 +21,7 @@ RUNNERS = (
     "recording",
     "scenario",
     "ssp",
+    "renamed",
     "signals",
     "hardware",
     "wiring",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from foreign_fmu import foreign
 from tiny_fmu import tiny
 
 from cosim.cli import main
@@ -151,14 +152,40 @@ def test_outer_and_later_bindings_win_and_prefixes_and_mappings_rename(read) -> 
     assert scenario.components["two"].parameters == {"k": 4.0, "b": 5.0}
 
 
-def test_units_of_parameters_and_connectors_are_converted(read) -> None:
-    in_degrees = component("one", values(real("a", 180, "deg"))).replace(
-        '"y" kind="output"><ssc:Real/>', '"y" kind="output"><ssc:Real unit="rad"/>'
-    )
-    scenario = read(system(in_degrees + component("two"), wire("one.y", "two.a")))
+def test_units_of_parameters_are_converted(read) -> None:
+    scenario = read(system(component("one", values(real("a", 180, "deg")))))
     np.testing.assert_allclose(scenario.components["one"].parameters["a"], np.pi)
     with pytest.raises(ScenarioError, match=r'"one.a" is given in kg: "kg" cannot become "rad"'):
         read(system(component("one", values(real("a", 1, "kg")))))
+
+
+@pytest.mark.parametrize(
+    ("unit", "attributes", "factor"),
+    [
+        ("deg", "", 180 / np.pi),
+        ("deg", 'suppressUnitConversion="true"', 1.0),
+        ("half turns", "", 1 / np.pi),  # which only the archive knows
+        ("", "", 1.0),
+    ],
+)
+def test_the_unit_of_a_connector_counts_where_its_fmu_states_none(
+    unit: str, attributes: str, factor: float, tiny: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
+    fmu = foreign(tiny[2], tmp_path / "f.fmu", names={}, a="")
+    two = component("two", values(real("mode", 1)))
+    two = two.replace('"a" kind="input"><ssc:Real', f'"a" kind="input"><ssc:Real unit="{unit}"')
+    inside = system(component("one", DRIVEN) + two, wire("one.y", "two.a", attributes=attributes))
+    base = '<ssc:BaseUnit rad="1" factor="3.141592653589793"/>'
+    inside += f'<ssd:Units><ssc:Unit name="half turns">{base}</ssc:Unit></ssd:Units>'
+    recording = run(read_scenario(pack(tmp_path / "t.ssp", fmu, inside))).recording
+    np.testing.assert_allclose(recording["two.y"][2:], 0.5 * factor)
+
+
+def test_a_connector_cannot_contradict_its_fmu(read) -> None:
+    contrary = component("one").replace('"y" kind="output"><ssc:Real', '"y" kind="output"><ssc:Real unit="deg"')
+    with pytest.raises(ScenarioError, match=r'"one.y" is in deg, but its FMU says rad'):
+        read(system(contrary))
 
 
 def test_a_connection_written_from_its_end_is_understood(read) -> None:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path as File
@@ -16,7 +17,7 @@ from cosim.errors import FmuError, UnitError
 from cosim.ssp.archive import child, children
 from cosim.ssp.parameters import Setting, Value, settings_of
 from cosim.ssp.structure import End, Link, Path, Structure, name_of
-from cosim.units import conversion
+from cosim.units import BASE, conversion, in_base_units, unit
 
 STOP, STEPS = 1.0, 1000
 """Length of a run [s], and steps in it, where neither the SSP nor an FMU says any."""
@@ -45,6 +46,18 @@ class Meaning:
         """The variables of the FMUs by name."""
         return {path: ports_of(one) for path, one in self.descriptions.items()}
 
+    @cached_property
+    def own_units(self) -> dict[str, str]:
+        """The units that the archive defines, as this project knows them."""
+        found = {}
+        for one in children(self.structure.root, "ssd:Units", "ssc:Unit"):
+            name, base = one.get("name", ""), child(one, "ssc:BaseUnit")
+            if base is not None:
+                powers = {key: int(self.structure.archive.number(base, key)) for key in BASE}
+                number = self.structure.archive.number
+                found[name] = in_base_units(name, powers, number(base, "factor", 1.0), number(base, "offset"))
+        return found
+
     def name(self, end: End) -> str:
         """Name the variable of a component as a scenario does."""
         return f"{self.names[end[0]]}.{end[1]}"
@@ -69,13 +82,24 @@ class Meaning:
         return {name: self._value(one, ports[name], path) for name, one in settings.items() if name in ports}, strange
 
     def wire(self, link: Link) -> dict[str, Value]:
-        """Write a link as a connection; the unit of a connector counts where its FMU states none."""
-        source, target = self._unit(link.start), self._unit(link.end)
+        """Write a link as a connection; where no unit is to be converted, what arrives is said to be the target's."""
         wire: dict[str, Value] = {"from": self.name(link.start), "to": self.name(link.end)}
         wire |= {"gain": link.factor} if link.factor != 1 else {}
         wire |= {"offset": link.offset} if link.offset != 0 else {}
-        unit = target if link.keep else source
-        return wire | ({"unit": unit} if unit and unit != self._stated(link.start) else {})
+        unit = self._unit(link.end) if link.keep else ""
+        return wire | ({"unit": unit} if unit else {})
+
+    def units(self, path: Path) -> dict[str, str]:
+        """Units of connectors whose FMU states none."""
+        found = {}
+        for name in self.structure.nodes[path].connectors:
+            stated, said = self._stated((path, name)), self._declared((path, name))
+            if name in self.ports[path] and said and not stated:
+                found[name] = said
+            elif _differ(said, stated):
+                what = f'"{name_of((path, name))}" is in {said}'
+                raise self.structure.archive.error(f"{what}, but its FMU says {stated}")
+        return found
 
     def records(self) -> dict[str, str]:
         """Columns: all real outputs with a connector, and those of the whole system under their own names."""
@@ -105,13 +129,17 @@ class Meaning:
         return "" if port is None else port.unit
 
     def _unit(self, end: End) -> str:
-        return self._stated(end) or self.structure.nodes[end[0]].connectors[end[1]].unit
+        return self._stated(end) or self._declared(end)
+
+    def _declared(self, end: End) -> str:
+        unit = self.structure.nodes[end[0]].connectors[end[1]].unit
+        return self.own_units.get(unit, unit)
 
     def _value(self, setting: Setting, port: Port, path: Path) -> Value:
         if isinstance(setting.value, str | bool):
             return setting.value
         try:
-            gain, offset = conversion(setting.unit, port.unit)
+            gain, offset = conversion(self.own_units.get(setting.unit, setting.unit), port.unit)
         except UnitError as error:
             what = f'"{name_of((path, port.name))}" is given in {setting.unit}'
             raise self.structure.archive.error(f"{what}: {str(error).rstrip('.')}") from error
@@ -130,7 +158,8 @@ def scenario_of(structure: Structure, files: Mapping[str, File]) -> str:
     stop, step, assumed = meaning.experiment()
     parameters = {path: meaning.parameters(path) for path in structure.components}
     strange = [name for _, names in parameters.values() for name in names]
-    said = [structure.nodes[()].element.get("description", ""), assumed]
+    described = structure.nodes[()].element.get("description", "").rstrip(".")
+    said = [f"{described}." if described else "", assumed]
     said += [f"Not set, because their FMUs do not have them: {', '.join(strange)}."] if strange else []
     head = {"name": structure.root.get("name") or "system", "description": " ".join(filter(None, said))}
     lines = _table("", head | {"step": step, "stop": stop})
@@ -138,6 +167,8 @@ def scenario_of(structure: Structure, files: Mapping[str, File]) -> str:
         name = _text(meaning.names[path])
         lines += _table(f"[components.{name}]", {"fmu": files[node.source].name})
         lines += _table(f"[components.{name}.parameters]", parameters[path][0])
+        for variable, stated in meaning.units(path).items():
+            lines += _table(f"[components.{name}.variables.{_text(variable)}]", {"name": variable, "unit": stated})
     for link in structure.wires():
         lines += _table("[[connections]]", meaning.wire(link))
     return "\n".join(lines + _table("[record.signals]", meaning.records())) + "\n"
@@ -148,6 +179,13 @@ def _annotated_step(experiment: Element | None) -> str | None:
     found = [] if experiment is None else list(children(experiment, "ssd:Annotations", "ssc:Annotation"))
     steps = (one.find(f"{_OSP}Algorithm/{_OSP}FixedStepAlgorithm") for one in found)
     return next((one.get("baseStepSize") for one in steps if one is not None), None)
+
+
+def _differ(one: str, other: str) -> bool:
+    """Say whether two units are known and mean different things."""
+    with suppress(UnitError):
+        return bool(one and other) and unit(one) != unit(other)
+    return False
 
 
 def _positive(text: Any) -> float:
