@@ -20,7 +20,7 @@ from pyfmi_models.effects import (
     SensorEffect,
 )
 from pyfmi_models.friction import Frictionless, LuGre
-from pyfmi_models.model import Model
+from pyfmi_models.model import Model, parameters_of
 
 LUGRE = LuGre(sigma0=1e4, sigma1=200.0, sigma2=3.0, Fc=1.0, Fs=1.5, Vs=0.02)
 EACH = pytest.mark.parametrize("effect", EXAMPLES, ids=lambda one: type(one).__name__)
@@ -71,6 +71,18 @@ def test_equations_and_derivatives_are_finite_also_at_rest(effect: Effect, law) 
     function = slopes(model)
     for z in points(model, 40).T:
         assert all(np.all(np.isfinite(part.full())) for part in function(z)), z
+
+
+@EACH
+def test_equations_are_finite_with_each_parameter_at_its_bounds(effect: Effect) -> None:
+    """Also where a fit or a user drives one to its end; ends that break a rule of the effect are not reached."""
+    for variable in parameters_of(effect):
+        for end in (variable.low, variable.high):
+            changed = replace(effect, **{variable.name: end}) if np.isfinite(end) else effect
+            if not changed.broken_rule():
+                function = slopes(model := mount(changed, WEIGHT, friction=LUGRE).model())
+                for z in points(model, 8).T:
+                    assert all(np.all(np.isfinite(part.full())) for part in function(z)), (variable.name, end, z)
 
 
 @EACH

@@ -12,6 +12,9 @@ import pytest
 from effect_examples import mount
 
 from cosim.proof import truth
+from cosim.proof.bench import draw_bench
+from cosim.proof.families import periodic_disturbance
+from cosim.proof.recorder import columns_of
 from cosim.proof.truth import BLOCKS, TICK, Drive
 from pyfmi_models.effects import (
     ActuatorLag,
@@ -27,11 +30,13 @@ from pyfmi_models.effects import (
 )
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.cable_wrap import CableWrap
+from pyfmi_models.effects.clock_skew import ClockSkew
 from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.effects.dwell_breakaway import DwellBreakaway
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
 from pyfmi_models.effects.inertia_variation import InertiaVariation
 from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction
+from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag
 from pyfmi_models.effects.thermal_viscosity import ThermalViscosity
@@ -167,6 +172,29 @@ def test_plant_and_truth_mean_the_same(name: str) -> None:
     assert left < LEFT * done
     if name == "encoder_eccentricity":
         assert np.abs(with_it["q_true"] - made["angle"]).max() < 2e-5
+
+
+def test_a_periodic_disturbance_has_its_frequency_amplitude_and_phase() -> None:
+    bench = draw_bench(1, "lugre", 1.0, 1000, 2.0)
+    before = {name: drive.push for name, drive in bench.drives.items()}
+    true = periodic_disturbance(bench, np.random.default_rng(1), 1.0)
+    for name, phase in true["phases"].items():
+        ours = PeriodicDisturbance(frequency_hz=true["frequency_hz"], amplitude=true["amplitude"], phase=phase)
+        t = truth.ticks(before[name].size)
+        load = np.asarray(ours.load(mount().at(ca.DM(t), 0.0, 0.0))).ravel()
+        np.testing.assert_allclose(load, bench.drives[name].push - before[name], atol=1e-9 * true["amplitude"])
+
+
+def test_a_positive_offset_of_the_clocks_means_a_reading_ahead_of_the_torque() -> None:
+    bench = draw_bench(1, "lugre", 1.0, 1000, 2.0)
+    bench.clock = {"offset_ms": 5.0, "drift_ppm": 500.0}
+    bench.noise["encoder_rms"] = 0.0
+    t = truth.ticks(20_000)
+    raw = {"command": 0 * t, "reading": t, "clean_reading": t, "temperature": 0 * t}  # reads its own time
+    table = columns_of(bench, "train_1", raw, 1000, np.random.default_rng(0))
+    ours = ClockSkew(offset_ms=5.0, drift_ppm=500.0)
+    expected = [float(ours.ahead(mount().at(time, 0.0, 0.0))) for time in table.t[:1000]]
+    np.testing.assert_allclose((table.q - table.t)[:1000], expected, atol=bench.noise["quantum"])
 
 
 def test_a_contact_that_bends_is_the_same_in_both() -> None:

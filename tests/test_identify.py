@@ -16,6 +16,9 @@ from cosim.identify.machine import Machine
 from cosim.identify.presliding import presliding
 from cosim.recording import Recording
 from pyfmi_models.card import Card, read_card
+from pyfmi_models.effects.thermal_viscosity import ThermalViscosity
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
 from tests.benchmarks.identification import POSITIVE, moved, multisine, step_response, the_card
 
 
@@ -49,6 +52,19 @@ def test_derivatives_of_a_simulation_are_those_of_finite_differences() -> None:
         moved_by = machine.run(at + shift, reference, {})[0] - machine.run(at - shift, reference, {})[0]
         size = np.abs(slopes[:, :, column]).max(0)
         np.testing.assert_allclose(moved_by / (2 * step_size) / size, slopes[:, :, column] / size, atol=1e-3)
+
+
+def test_inputs_that_a_recording_lacks_are_at_their_start() -> None:
+    """At 20 degC, where the temperature starts, warm grease is as the card says: J v' = tau - sigma2 v."""
+    plant = Mount(
+        name="m",
+        axis=Axis(inertia=2.0),
+        friction=Coulomb(Fc=0.0, sigma2=4.0),
+        effects=(ThermalViscosity(viscous_per_degC=-0.1),),
+    )
+    t = np.arange(4000) * 1e-4
+    q = Machine(plant.model(), None, (), 1e-4).run(np.zeros(0), np.full((4000, 1), 3.0), {})[0][:, 0]
+    np.testing.assert_allclose(q, 0.75 * (t - 0.5 * (1 - np.exp(-2 * t))), atol=1e-9)
 
 
 def test_output_error_recovers_the_bristles_within_one_per_cent_from_starts_a_factor_of_two_off(

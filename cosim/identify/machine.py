@@ -118,7 +118,7 @@ def _functions(machine: Machine) -> tuple[ca.Function, ca.Function]:
 def _controlled(machine: Machine, parts: list[Any], r: Any, p: Any) -> tuple[Any, Any]:
     """State after the controller's tick, and (q, torque that acts now)."""
     time, x, _, pending, memory = parts
-    outputs = machine.plant.equations(time, x, ca.SX.zeros(len(machine.plant.inputs)), p)[1]
+    outputs = machine.plant.equations(time, x, _inputs(machine.plant, 0), p)[1]
     q = outputs[[variable.name for variable in machine.plant.outputs].index("q")]
     if machine.controller is None:
         return ca.vertcat(time, x, r, r), ca.vertcat(q, r)
@@ -128,8 +128,12 @@ def _controlled(machine: Machine, parts: list[Any], r: Any, p: Any) -> tuple[Any
 
 
 def _rates(plant: Model, time: Any, x: Any, torque: Any, p: Any) -> Any:
-    inputs = ca.vertcat(torque, ca.SX.zeros(len(plant.inputs) - 1))
-    return plant.equations(time, x, inputs, p)[0]
+    return plant.equations(time, x, _inputs(plant, torque), p)[0]
+
+
+def _inputs(plant: Model, torque: Any) -> Any:
+    """The torque, which comes first, and the other inputs at their start: no disturbance, 20 degC."""
+    return ca.vertcat(torque, *(variable.start for variable in plant.inputs[1:]))
 
 
 def _with_slopes(machine: Machine, result: Any, s: Any, slopes: Any, p: Any) -> tuple[Any, Any]:

@@ -20,7 +20,7 @@ class StribeckEffect(FrictionEffect):
     rivals: ClassVar[tuple[str, ...]] = ("presliding", "dwell_breakaway")
     told_apart_by: ClassVar[str] = "Stribeck friction is the same leaving and reaching standstill"
     action: ClassVar[str] = "Look at lubrication if slow motion is jerky; otherwise use the improved model."
-    Fs: Scalar = parameter("N.m", "Break-away level at rest", low=0)
+    Fs: Scalar = parameter("N.m", "Break-away level at rest", low=1e-9)
     Vs: Scalar = parameter("rad/s", "Speed over which friction falls", low=1e-7, nominal=0.01)
 
     def level(self, level: Scalar, motion: Motion) -> Scalar:
