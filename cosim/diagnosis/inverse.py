@@ -1,26 +1,32 @@
 """The torque that a recorded motion needs, and how it changes with every parameter.
 
-    needed(t) = D^-1 [ J a + contact(bristle, v, level) + viscous(v) + loads ],
+    needed(t) = D^-1 [ J(q) q'' + J'(q) q'^2 / 2 + contact + viscous + loads + coupled + (command - given) ]
 
-with the bristle state integrated along the measured speed by the law's own closed-form step, and D the drive effects
-undone in the frequency domain. The equations are those of the plant: the same objects, with measured motion put in.
+with the true motion recovered from the reading, the states of friction and effects integrated along it, what hangs on
+a spring (`coupled`) answered in the frequency domain, what a saturated drive withholds (`command - given`) taken from
+the recorded command, and D the linear drive effects undone; last, two clocks are brought together. The equations are
+those of the plant: the same objects, with measured motion put in (`equations.py`).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import casadi as ca
 import numpy as np
 import numpy.typing as npt
+from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_banded
 
+from cosim.diagnosis.equations import Equations, equations_of
 from cosim.diagnosis.prepare import Array, Piece
-from cosim.diagnosis.rowwise import Rowwise, Stepwise
-from pyfmi_models.effects import DriveEffect
-from pyfmi_models.model import structure_of, symbols_of, with_symbols
+from pyfmi_models.effects import ClockEffect, DriveEffect, Effect
+from pyfmi_models.effects.compliance import Compliance
+from pyfmi_models.model import with_symbols
 from pyfmi_models.mount import Mount
+
+BUMP = 1e-5
+"""Relative change of a parameter by which a frequency response is differentiated."""
 
 
 @dataclass(frozen=True)
@@ -41,20 +47,16 @@ class Inverse:
         return np.array([variable.start for variable in self.mount.parameters()])
 
     @cached_property
-    def _equations(self) -> "Equations":
-        parts = [(type(part), *structure_of(part).values()) for part in self.mount.components().values()]
-        key = (self.mount.motion, self.names, self.free, *parts)
-        if key not in _KNOWN:
-            _KNOWN[key] = Equations(self.mount, self.free)
-        return _KNOWN[key]
+    def _equations(self) -> Equations:
+        return equations_of(self.mount, self.names, self.free)
 
     def torque(self, piece: Piece, values: Array) -> tuple[Array, Array]:
         """Return needed torque (rows,) and its derivatives (rows, free) at all rows of a piece, filtered once more."""
         full = self._with(values)
-        torque, slopes = self._undriven(piece, full)
-        columns = piece.lowpass(np.column_stack([torque, slopes]))
-        columns, drive = self._undo_drive(columns, full, piece.dt)
-        columns[:, 1:] += drive
+        columns = piece.lowpass(np.column_stack(self._momentary(piece, full)))
+        columns = self._with_coupled(piece, columns, full)
+        columns = self._undone_drive(columns, full, piece.dt)
+        columns = self._on_one_clock(piece, columns, full)
         return columns[:, 0], columns[:, 1:]
 
     def _with(self, values: Array) -> Array:
@@ -62,95 +64,116 @@ class Inverse:
         full[[self.names.index(name) for name in self.free]] = values
         return full
 
-    def _undriven(self, piece: Piece, full: Array) -> tuple[Array, Array]:
-        motion = np.vstack([piece.t, piece.q, piece.v, piece.a])
-        state, slopes = self._bristles(piece, full)
-        out = self._equations.torque(np.vstack([motion, state]), full)
+    def _momentary(self, piece: Piece, full: Array) -> tuple[Array, Array]:
+        """Torque that the motion of each moment and the states need, and its derivatives (rows, free)."""
+        rows = self._equations.columns(piece)
+        state, slopes = self._states(piece, rows, full)
+        out = self._equations.torque(np.vstack([rows, state]), full)
         torque, by_state, by_free = out[0], out[1 : 1 + len(state)], out[1 + len(state) :]
         for row, slope in zip(by_state, slopes, strict=True):
             by_free = by_free + row * slope
         return torque, by_free.T
 
-    def _bristles(self, piece: Piece, full: Array) -> tuple[Array, list[Array]]:
-        """Integrate the friction states along the motion; return them (states, rows) and their derivatives."""
-        rows, count = len(piece.t), len(self.mount.friction.states())
+    def _states(self, piece: Piece, rows: Array, full: Array) -> tuple[Array, list[Array]]:
+        """States of effects and friction along the motion, (states, rows), and their derivatives (free, rows) each.
+
+        A state's step may depend on itself and on those before it, so their derivatives are carried one by one.
+        """
+        equations, count = self._equations, self._equations.count
         if count == 0:
-            return np.zeros((0, rows)), []
-        middle = [(x[1:] + x[:-1]) / 2 for x in (piece.t, piece.q, piece.v)]
-        steps = np.vstack([*middle, np.full(rows - 1, piece.dt)])
-        state = self._equations.step(steps, full)
-        out = self._equations.step_slopes(np.vstack([steps, state[:, :-1]]), full)
-        own, by_free = out[:count], out[count:].reshape(count, len(self.free), rows - 1)
-        slopes = [_recurrence(decay, drift.T).T for decay, drift in zip(own, by_free, strict=True)]
+            return np.zeros((0, len(piece.t))), []
+        steps = np.vstack([(rows[:, 1:] + rows[:, :-1]) / 2, np.full(len(piece.t) - 1, piece.dt)])
+        state = equations.step(steps, full)
+        out = equations.step_slopes(np.vstack([steps, state[:, :-1]]), full)
+        steps_count = len(piece.t) - 1
+        between = out[: count * count].reshape(count, count, steps_count)
+        by_free = out[count * count :].reshape(count, len(self.free), steps_count)
+        slopes: list[Array] = []
+        for k in range(count):
+            drift = by_free[k] + sum((between[k, j] * slopes[j][:, :-1] for j in equations.feeds[k]), start=0.0)
+            slopes.append(_recurrence(between[k, k], np.asarray(drift).T).T)
         return state, slopes
 
-    def _undo_drive(self, columns: Array, full: Array, dt: float) -> tuple[Array, Array]:
-        """Undo the drive effects on all columns; return them and the torque's derivatives by the drive parameters."""
+    def _parts(self, kind: type[Effect]) -> list[str]:
+        return [name for name, part in self.mount.components().items() if isinstance(part, kind)]
+
+    def _set(self, prefix: str, full: Array) -> Any:
         values = dict(zip(self.names, full, strict=True))
-        drives = {n: part for n, part in self.mount.components().items() if isinstance(part, DriveEffect)}
-        slopes = np.zeros((len(columns), len(self.free)))
-        if not drives:
-            return columns, slopes
-        spectrum = Spectrum(columns, dt)
-        inverse = 1 / np.prod([_set(part, values, n).response(spectrum.omega) for n, part in drives.items()], axis=0)
+        return with_symbols(self.mount.components()[prefix], values, 0.0, prefix)
+
+    def _bumped(self, full: Array, name: str) -> tuple[Array, float]:
+        """All parameters with one of them changed a little, and by how much."""
+        index = self.names.index(name)
+        change = BUMP * (abs(full[index]) or 1.0)
+        other = full.copy()
+        other[index] += change
+        return other, change
+
+    def _with_coupled(self, piece: Piece, columns: Array, full: Array) -> Array:
+        """Add what masses behind a spring need beyond being carried rigidly."""
+        if not self._parts(Compliance):
+            return columns
+        spectrum = Spectrum(piece.lowpass(self._equations.acceleration(piece, full))[:, None], piece.dt)
+
+        def added(numbers: Array) -> Array:
+            inertia = numbers[self.names.index("axis.inertia")]
+            total = np.zeros_like(spectrum.omega, dtype=np.complex128)
+            for prefix in self._parts(Compliance):
+                spring = self._set(prefix, numbers)
+                total += inertia * spring.share() * (spring.carried(spectrum.omega) - 1)
+                inertia = inertia * spring.share()
+            return spectrum.times(total)[:, 0]
+
+        return self._with_changes(columns, full, added, ("axis.inertia", *self._parts(Compliance)))
+
+    def _with_changes(
+        self, columns: Array, full: Array, added: Callable[[Array], Array], prefixes: Sequence[str]
+    ) -> Array:
+        """Add a torque that depends on some parts, and its derivatives, by differences."""
+        now, out = added(full), columns.copy()
+        out[:, 0] += now
         for column, name in enumerate(self.free):
-            prefix = name.split(".")[0]
-            if prefix in drives:
-                bumped = values | {name: values[name] * 1.001}
-                ratio = _set(drives[prefix], values, prefix).response(spectrum.omega)
-                ratio = ratio / _set(drives[prefix], bumped, prefix).response(spectrum.omega)
-                slopes[:, column] = spectrum.times(inverse * (ratio - 1) / (1e-3 * values[name]))[:, 0]
-        return spectrum.times(inverse), slopes
+            if name.startswith(tuple(prefixes)):
+                other, change = self._bumped(full, name)
+                out[:, 1 + column] += (added(other) - now) / change
+        return out
 
+    def _undone_drive(self, columns: Array, full: Array, dt: float) -> Array:
+        """Undo the linear drive effects on all columns, and add the derivatives by their parameters."""
+        drives = self._parts(DriveEffect)
+        if not any(self.mount.components()[name].states() for name in drives):
+            return columns
+        spectrum = Spectrum(columns, dt)
 
-class Equations:
-    """Compiled expressions of a structure; numbers are parameters, so one serves all fits of the structure."""
+        def inverse(numbers: Array) -> npt.NDArray[np.complex128]:
+            return np.asarray(1 / np.prod([self._set(n, numbers).response(spectrum.omega) for n in drives], axis=0))
 
-    def __init__(self, mount: Mount, free: tuple[str, ...]) -> None:
-        self._mount, self._free = mount, free
+        now = inverse(full)
+        out = spectrum.times(now)
+        for column, name in enumerate(self.free):
+            if name.split(".")[0] in drives:
+                other, change = self._bumped(full, name)
+                out[:, 1 + column] += spectrum.times((inverse(other) - now) / change)[:, 0]
+        return out
 
-    @cached_property
-    def _symbolic(self) -> tuple[Any, ...]:
-        t, q, v, a, dt = (ca.SX.sym(name) for name in ("t", "q", "v", "a", "dt"))
-        p, symbols = symbols_of(self._mount.parameters())
-        this = self._mount.with_symbols(symbols, v)
-        free = ca.vertcat(*[symbols[name] for name in self._free])
-        return t, q, v, a, dt, p, free, this, this.at(t, q, v)
+    def _on_one_clock(self, piece: Piece, columns: Array, full: Array) -> Array:
+        """Bring the torque needed at a reading's time to the time of the torque recorded beside it."""
+        clocks = self._parts(ClockEffect)
+        if not clocks:
+            return columns
+        spline = CubicSpline(piece.t, columns, axis=0)
 
-    @cached_property
-    def torque(self) -> Rowwise:
-        """Torque and its derivatives by state and free parameters, from (t, q, v, a, state)."""
-        t, q, v, a, _, p, free, this, motion = self._symbolic
-        state = ca.SX.sym("state", len(self._mount.friction.states()))
-        contact = this.friction.contact(state, v, this.level(motion))
-        torque = this.axis.inertia * a + contact + this.viscous(motion) + this.loads(motion)
-        rows = ca.vertcat(torque, ca.jacobian(torque, state).T, ca.jacobian(torque, free).T)
-        return Rowwise(ca.vertcat(t, q, v, a, state), p, rows)
+        def later(numbers: Array) -> Array:
+            parts = [self._set(name, numbers) for name in clocks]
+            return np.asarray(sum(part.ahead(self.mount.at(piece.t, piece.q, piece.v)) for part in parts))
 
-    @cached_property
-    def _step(self) -> tuple[Any, ...]:
-        t, q, v, _, dt, p, free, this, motion = self._symbolic
-        state = ca.SX.sym("state", len(self._mount.friction.states()))
-        following = this.friction.advance(state, v, this.level(motion), dt)
-        return ca.vertcat(t, q, v, dt), state, p, free, following
-
-    @cached_property
-    def step(self) -> Stepwise:
-        """Friction states along the rows, from (t, q, v, dt), by the law's own closed form."""
-        column, state, p, _, following = self._step
-        return Stepwise(state, column, p, following)
-
-    @cached_property
-    def step_slopes(self) -> Rowwise:
-        """Derivatives of each friction state's step by itself and by the free parameters, from (t, q, v, dt, state)."""
-        column, state, p, free, following = self._step
-        own = ca.diag(ca.jacobian(following, state))
-        by_free = ca.vec(ca.jacobian(following, free).T)
-        return Rowwise(ca.vertcat(column, state), p, ca.vertcat(own, by_free))
-
-
-_KNOWN: dict[tuple[Any, ...], Equations] = {}
-"""Equations by structure: building them costs more than evaluating them."""
+        at = np.clip(piece.t - later(full), piece.t[0], piece.t[-1])
+        out, slope = spline(at), spline(at, 1)[:, 0]
+        for column, name in enumerate(self.free):
+            if name.split(".")[0] in clocks:
+                other, change = self._bumped(full, name)
+                out[:, 1 + column] -= slope * (later(other) - later(full)) / change
+        return np.asarray(out)
 
 
 class Spectrum:
@@ -167,10 +190,6 @@ class Spectrum:
         """Columns after a frequency response."""
         whole = np.fft.irfft(self.values * response[:, None], self.length, axis=0)
         return np.asarray(whole[self.pad : self.pad + self.rows])
-
-
-def _set(part: Any, values: dict[str, float], prefix: str) -> Any:
-    return with_symbols(part, values, 0.0, prefix)
 
 
 def _recurrence(decay: Array, drift: Array) -> Array:

@@ -7,8 +7,8 @@ import numpy as np
 from cosim.diagnosis.prepare import lowpass, prepare
 from cosim.errors import InputError, RecordingError
 from cosim.recording import Recording
-from pyfmi_models.effects import ActuatorLag, Delay, Effect, FrictionEffect, LoadEffect
-from pyfmi_models.effects.presliding import Presliding
+from pyfmi_models.effects import Effect
+from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.mount import Mount
 
 LEAST_SECONDS = 8.0
@@ -21,17 +21,16 @@ SPREAD = 2.2
 def check_effects(mount: Mount) -> None:
     """Refuse a card with an effect that the torque needed for a recorded motion does not hold yet (InputError)."""
     for effect in mount.effects:
-        if not _is_held(effect):
+        if not is_held(effect):
             text = (
                 f"The card holds {effect.id}, which a diagnosis cannot take into account yet; take it out of the card."
             )
             raise InputError(text, culprit=effect.id)
 
 
-def _is_held(effect: Effect) -> bool:
-    """Whether `Inverse` holds an effect: linear drives, and what follows from the motion of this moment alone."""
-    momentary = isinstance(effect, LoadEffect | FrictionEffect) and not isinstance(effect, Presliding)
-    return isinstance(effect, ActuatorLag | Delay) or (momentary and not effect.states() and not effect.inputs())
+def is_held(effect: Effect) -> bool:
+    """Whether `Inverse` holds an effect: all but play, whose far side the recorded motion does not tell."""
+    return not isinstance(effect, Backlash)
 
 
 def check_units(recordings: Sequence[Recording], mount: Mount) -> None:

@@ -4,6 +4,9 @@ from dataclasses import dataclass
 from math import pi
 from typing import ClassVar
 
+import numpy as np
+import numpy.typing as npt
+
 from pyfmi_models.effects.base import Coupling
 from pyfmi_models.model import Scalar, parameter
 
@@ -44,6 +47,12 @@ class Compliance(Coupling):
         """`k twist + d twist'`."""
         omega = 2 * pi * self.antiresonance_hz
         return far * omega * (omega * twist + 2 * self.damping_ratio * rate)
+
+    def carried(self, omega: npt.NDArray[np.float64]) -> npt.NDArray[np.complex128]:
+        """Acceleration of the far mass per near acceleration at angular frequencies omega: 1 where it is rigid."""
+        own, s = 2 * pi * self.antiresonance_hz, 1j * omega
+        spring = own**2 + 2 * self.damping_ratio * own * s
+        return np.asarray(spring / (s**2 + spring))
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""

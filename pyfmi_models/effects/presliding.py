@@ -61,5 +61,8 @@ class _Bristled(FrictionLaw):
     def rate(self, state: Any, v: Scalar, level: Scalar) -> Any:
         return self.bristles.rate(state, v, ca.fmax(level, LEAST_LEVEL))
 
+    def advance(self, state: Any, v: Scalar, level: Scalar, dt: Scalar) -> Any:
+        return self.bristles.advance(state, v, ca.fmax(level, LEAST_LEVEL), dt)
+
     def contact(self, state: Any, v: Scalar, level: Scalar) -> Scalar:
         return self.bristles.contact(state, v, ca.fmax(level, LEAST_LEVEL))

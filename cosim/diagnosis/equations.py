@@ -1,0 +1,151 @@
+"""The plant's own equations, turned round: from a reading and its derivatives to the torque of that moment.
+
+Expressions are compiled once for a structure; its numbers are parameters.
+"""
+
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from cosim.diagnosis.prepare import Array, Piece
+from cosim.diagnosis.rowwise import Rowwise, Stepwise
+from pyfmi_models.effects import DriveEffect, MotionEffect, SensorEffect
+from pyfmi_models.model import structure_of, symbols_of
+from pyfmi_models.mount import Mount
+
+READING = ("t", "q", "v", "a", "command")
+
+
+class Equations:
+    """Compiled expressions of a mount in which the parameters `free` may vary."""
+
+    def __init__(self, mount: Mount, free: tuple[str, ...]) -> None:
+        self._mount, self._free = mount, free
+        self._inputs = tuple(variable.name for variable in mount.inputs())
+        owners = [(name, part.states()) for name, part in mount.of_kind(MotionEffect) if part.states()]
+        self._owners = [*owners, ("friction", mount.law.states())]
+        self.count = sum(len(states) for _, states in self._owners)
+
+    def columns(self, piece: Piece) -> Array:
+        """What each row gives: time, reading, its derivatives, command, and the inputs of effects."""
+        starts = {variable.name: variable.start for variable in self._mount.inputs()}
+        given = [piece.extras.get(name, np.full(len(piece.t), starts[name])) for name in self._inputs]
+        return np.vstack([piece.t, piece.q, piece.v, piece.a, piece.command, *given])
+
+    @cached_property
+    def _symbols(self) -> dict[str, Any]:
+        p, symbols = symbols_of(self._mount.parameters())
+        found: dict[str, Any] = {name: ca.SX.sym(name) for name in (*READING, "dt", *self._inputs)}
+        found |= {"p": p, "state": ca.SX.sym("state", self.count), "symbols": symbols}
+        return found | {"free": ca.vertcat(*[symbols[name] for name in self._free])}
+
+    @cached_property
+    def _column(self) -> Any:
+        return ca.vertcat(*(self._symbols[name] for name in (*READING, *self._inputs)))
+
+    @cached_property
+    def _known(self) -> tuple[Any, ...]:
+        """Mount with symbols, motion, states by owner; in terms of the true motion."""
+        s = self._symbols
+        this = self._mount.with_symbols(s["symbols"], s["v"])
+        motion = this.at(s["t"], s["q"], s["v"], {name: s[name] for name in self._inputs})
+        own, first = {}, 0
+        for name, states in self._owners:
+            own[name] = s["state"][first : first + len(states)]
+            first += len(states)
+        return this, motion, own
+
+    def _true(self, expression: Any) -> Any:
+        """Put the true motion in: position, speed and acceleration behind the reading's."""
+        if not any(self._mount.of_kind(SensorEffect)):
+            return expression
+        s, (this, motion, own) = self._symbols, self._known
+        reading = s["q"]
+        error = ca.Function("error", [s["q"], s["t"], s["p"]], [this.reading(motion, own) - s["q"]])
+        q = reading - error(reading - error(reading, s["t"], s["p"]), s["t"], s["p"])
+        slope = ca.jacobian(q, reading)
+        speed, acceleration = slope * s["v"], slope * s["a"] + ca.jacobian(slope, reading) * s["v"] ** 2
+        return ca.substitute(expression, ca.vertcat(s["q"], s["v"], s["a"]), ca.vertcat(q, speed, acceleration))
+
+    @cached_property
+    def torque(self) -> Rowwise:
+        """Torque and its derivatives by states and free parameters, from the columns and the states."""
+        s, (this, motion, own) = self._symbols, self._known
+        level, near = this.level(motion, own), this.inertia(this.axis.inertia, motion, own)
+        torque = near * s["a"] + ca.jacobian(near, motion.q) * motion.v**2 / 2
+        torque += this.law.contact(own["friction"], motion.v, level) + this.viscous(motion, own)
+        torque += this.loads(motion, own) + _withheld(this, s["command"])
+        torque = self._true(torque)
+        rows = ca.vertcat(torque, ca.jacobian(torque, s["state"]).T, ca.jacobian(torque, s["free"]).T)
+        return Rowwise(ca.vertcat(self._column, s["state"]), s["p"], rows)
+
+    @cached_property
+    def _following(self) -> Any:
+        s, (this, motion, own) = self._symbols, self._known
+        remembering = [(own[name], part) for name, part in this.of_kind(MotionEffect) if name in own]
+        parts = [_advanced(part, motion._replace(state=state), s["dt"]) for state, part in remembering]
+        friction = this.law.advance(own["friction"], motion.v, this.level(motion, own), s["dt"])
+        return self._true(ca.vertcat(*parts, friction))
+
+    @cached_property
+    def step(self) -> Stepwise:
+        """States along the rows, from columns and dt: effects by their rates, friction by the law's closed form."""
+        s = self._symbols
+        return Stepwise(s["state"], ca.vertcat(self._column, s["dt"]), s["p"], self._following)
+
+    @cached_property
+    def step_slopes(self) -> Rowwise:
+        """Derivatives of each state's step by all states and by the free parameters, from columns, dt and states."""
+        s = self._symbols
+        by_state = ca.vec(ca.jacobian(self._following, s["state"]).T)
+        by_free = ca.vec(ca.jacobian(self._following, s["free"]).T)
+        return Rowwise(ca.vertcat(self._column, s["dt"], s["state"]), s["p"], ca.vertcat(by_state, by_free))
+
+    @cached_property
+    def feeds(self) -> list[list[int]]:
+        """For each state those before it that its step depends on."""
+        pattern = ca.jacobian(self._following, self._symbols["state"]).sparsity()
+        return [[j for j in range(k) if pattern.has_nz(k, j)] for k in range(self.count)]
+
+    def acceleration(self, piece: Piece, full: Array) -> Array:
+        """True acceleration at all rows of a piece."""
+        if not any(self._mount.of_kind(SensorEffect)):
+            return piece.a
+        return np.asarray(self._acceleration(self.columns(piece), full)[0])
+
+    @cached_property
+    def _acceleration(self) -> Rowwise:
+        return Rowwise(self._column, self._symbols["p"], self._true(self._symbols["a"]))
+
+
+def _withheld(this: Mount, command: Any) -> Any:
+    """What drives that follow at once keep back of a command [N m]."""
+    given = command
+    for _, drive in this.of_kind(DriveEffect):
+        if not drive.states():
+            given = drive.applied((), given)
+    return command - given
+
+
+def _advanced(effect: MotionEffect, motion: Any, dt: Any) -> Any:
+    """States of an effect after dt at constant motion, for a rate that is linear in each state: exact."""
+    rate = effect.rate(motion)
+    pull = ca.diag(ca.jacobian(rate, motion.state))
+    drive, x = ca.substitute(rate, motion.state, ca.DM.zeros(motion.state.numel())), pull * dt
+    growth = ca.if_else(ca.fabs(x) < 1e-6, 1 + x / 2, (ca.exp(x) - 1) / (x + 1e-300))
+    return ca.exp(x) * motion.state + dt * drive * growth
+
+
+_KNOWN: dict[tuple[Any, ...], Equations] = {}
+"""Equations by structure: building them costs more than evaluating them."""
+
+
+def equations_of(mount: Mount, names: tuple[str, ...], free: tuple[str, ...]) -> Equations:
+    """Return the equations of a structure, built once."""
+    parts = [(type(part), *structure_of(part).values()) for part in mount.components().values()]
+    key = (mount.motion, names, free, *parts)
+    if key not in _KNOWN:
+        _KNOWN[key] = Equations(mount, free)
+    return _KNOWN[key]

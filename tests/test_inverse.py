@@ -1,0 +1,96 @@
+"""The torque that a motion needs is that of the plant: every effect, put into both, leaves nothing of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from effect_examples import EXAMPLES
+
+from cosim.diagnosis.closed_loop import set_point
+from cosim.diagnosis.inverse import Inverse, stacked
+from cosim.diagnosis.prepare import Prepared, prepare
+from cosim.diagnosis.sanity import is_held
+from cosim.identify.machine import Machine
+from cosim.recording import Recording
+from pyfmi_models.card import read_card
+from pyfmi_models.effects import ClockEffect, Effect, GravityUnbalance, LocalFriction
+from pyfmi_models.effects.thermal_viscosity import WarmingViscosity
+from pyfmi_models.effects.torque_saturation import TorqueSaturation
+from pyfmi_models.friction import Stribeck
+from pyfmi_models.mount import Mount
+
+HELD = [one for one in EXAMPLES if is_held(one)]
+SECONDS = 16.0
+
+
+def fitting(effect: Effect) -> tuple[Effect, ...]:
+    """The effect so that this motion meets it, with what it needs beside it."""
+    if isinstance(effect, LocalFriction):
+        return (replace(effect, q_center=0.3),)
+    if isinstance(effect, TorqueSaturation):
+        return (replace(effect, knee_torque=5.0),)
+    known = (GravityUnbalance(mgl=3.0, phase=0.3),) if effect.id == "load_dependent_friction" else ()
+    return (*known, effect)
+
+
+def recorded(mount: Mount) -> Prepared:
+    """The closed loop over a wandering set point, as 1 kHz rows, prepared for a diagnosis."""
+    card = read_card("paper_mount")
+    t = np.arange(int(SECONDS * 1000)) / 1000
+    x = np.clip(t / 2.5, 0, 1)
+    tones = ((0.5, 0.1, 0.0), (0.1, 0.31, 1.0), (0.02, 0.83, 2.0), (0.001, 3.0, 0.5), (2e-4, 7.0, 0.5))
+    waves = sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in tones)
+    q_d = x**3 * (10 - 15 * x + 6 * x * x) * waves
+    signals = set_point(Recording("set point", {"t": t, "q": q_d, "q_d": q_d}), 1e-4)
+    machine = Machine(mount.model(), card.controller_model(), ("axis.inertia",), 1e-4)
+    y, _ = machine.run(np.array([30.0]), np.column_stack(list(signals.values())), {})
+    window = np.r_[0.5, np.ones(9), 0.5] / 10
+    rows = len(y) // 10
+    table = {"t": t[:rows], "tau": np.convolve(y[:, 1], window, mode="same")[::10][:rows], "q": y[::10, 0][:rows]}
+    return prepare([Recording("r", table)], 70.0)
+
+
+def on_two_clocks(prepared: Prepared, effect: ClockEffect, mount: Mount) -> Prepared:
+    """Readings taken `ahead` of the torque beside them."""
+    piece = prepared.pieces[0]
+    at = piece.t + effect.ahead(mount.at(piece.t, piece.q, piece.v))
+    moved = {name: np.interp(at, piece.t, getattr(piece, name)) for name in ("q", "v", "a")}
+    return replace(prepared, pieces=(replace(piece, **moved),))
+
+
+@pytest.mark.parametrize("effect", HELD, ids=lambda one: type(one).__name__)
+def test_the_plant_with_an_effect_needs_the_torque_that_the_inverse_says(effect: Effect) -> None:
+    base = read_card("paper_mount").plant()
+    if effect.id == "presliding":
+        base = replace(base, friction=Stribeck(Fc=2.3, Fs=3.3, Vs=0.04, sigma2=30.0))
+    mount = replace(base, effects=fitting(effect))
+    prepared = recorded(replace(mount, effects=tuple(e for e in mount.effects if not isinstance(e, ClockEffect))))
+    if isinstance(effect, ClockEffect):
+        prepared = on_two_clocks(prepared, effect, mount)
+    rest = {
+        name: prepared.stacked("tau") - stacked(Inverse(one, ()), prepared.pieces, np.zeros(0))[0]
+        for name, one in (("with", mount), ("without", replace(mount, effects=mount.effects[:-1])))
+    }
+    size = {name: float(np.sqrt(np.mean(one**2))) for name, one in rest.items()}
+    warm = effect.id == "thermal_viscosity" and not isinstance(effect, WarmingViscosity)
+    assert size["with"] < 0.15
+    assert warm or size["with"] < 0.5 * size["without"]
+
+
+@pytest.mark.parametrize("effect", HELD, ids=lambda one: type(one).__name__)
+def test_derivatives_by_the_numbers_of_an_effect_are_finite_differences(effect: Effect) -> None:
+    mount = replace(read_card("paper_mount").plant(), effects=fitting(effect))
+    t = np.arange(6000) / 1000
+    q = 0.4 * np.sin(2.0 * t) + 0.01 * np.sin(11.0 * t)
+    acceleration = -1.6 * np.sin(2.0 * t) - 1.21 * np.sin(11.0 * t)
+    prepared = prepare([Recording("r", {"t": t, "tau": 30.0 * acceleration, "q": q})], 40.0)
+    prefix = list(mount.components())[-1]
+    free = tuple(one.name for one in mount.parameters() if one.name.startswith(prefix))
+    inverse = Inverse(mount, free)
+    values = np.array([dict(zip(inverse.names, inverse.start, strict=True))[name] for name in free])
+    slopes = stacked(inverse, prepared.pieces, values)[1]
+    for column, value in enumerate(values):
+        step = np.eye(len(free))[column] * 1e-5 * (abs(value) or 1.0)
+        up, down = (stacked(inverse, prepared.pieces, values + s * step)[0] for s in (1, -1))
+        change = (up - down) / (2 * step[column])
+        assert np.abs(change - slopes[:, column]).max() <= 1e-3 * np.abs(change).max() + 1e-9, free[column]
