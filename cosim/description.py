@@ -37,9 +37,22 @@ def describe(path: Path) -> Any:
         raise FmuError(f"{path} has a modelDescription.xml that cannot be read: {first_line(error)}.") from error
     if description is None:
         raise FmuError(f"{path} is of FMI {version}; this tool runs FMI 2.0 and 3.0.", culprit=str(path))
-    if description.coSimulation is None:
-        raise FmuError(f"{path} has no co-simulation interface; export it again with one.", culprit=str(path))
     return description
+
+
+def own_interface(path: Path, description: Any, name: str) -> Any:
+    """Return one interface of a model description: `coSimulation` or `modelExchange`.
+
+    Raises:
+        FmuError: the FMU does not have it.
+    """
+    words = {"coSimulation": "co-simulation", "modelExchange": "model-exchange"}
+    found = getattr(description, name)
+    if found is None:
+        have = tuple(word for key, word in words.items() if getattr(description, key) is not None)
+        message = f"{path} has no {words[name]} interface; it has: {', '.join(have) or 'none'}."
+        raise FmuError(message, culprit=str(path), choices=have)
+    return found
 
 
 def ports_of(description: Any) -> dict[str, Port]:
@@ -61,7 +74,7 @@ def feedthrough_of(description: Any) -> dict[str, frozenset[str] | None]:
     return found
 
 
-def check_binary(path: Path, description: Any) -> None:
+def check_binary(path: Path, description: Any, identifier: str) -> None:
     """Refuse an FMU that has no binary for this platform.
 
     Raises:
@@ -70,7 +83,7 @@ def check_binary(path: Path, description: Any) -> None:
     import fmpy
 
     folder = fmpy.platform if description.fmiVersion[0] == "2" else fmpy.platform_tuple
-    library = f"{description.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
+    library = f"{identifier}{fmpy.sharedLibraryExtension}"
     names = _names(path)
     if f"binaries/{folder}/{library}" not in names:
         folders = [name.split("/") for name in names if name.startswith("binaries/")]

@@ -19,7 +19,15 @@ from weakref import WeakValueDictionary
 import numpy as np
 
 from cosim.component import ERROR, FATAL, TERMINATED, Functions, Port
-from cosim.description import check_binary, describe, feedthrough_of, first_line, origin_of, ports_of
+from cosim.description import (
+    check_binary,
+    describe,
+    feedthrough_of,
+    first_line,
+    origin_of,
+    own_interface,
+    ports_of,
+)
 from cosim.errors import CosimError, FmuError
 
 _NUMBERS = count(1)
@@ -44,9 +52,13 @@ class FmuComponent:
         FmuError: the file is no FMU, has no binary for this platform, or cannot be instantiated.
     """
 
+    interface = "coSimulation"
+    """The element of the model description that must be there."""
+
     def __init__(self, path: Path | str, name: str = "") -> None:
         self.path = Path(path)
         self._description = describe(self.path)
+        self._own = own_interface(self.path, self._description, self.interface)
         self.name = name or self._description.modelName
         self.ports: Mapping[str, Port] = ports_of(self._description)
         self.feedthrough = feedthrough_of(self._description)
@@ -89,11 +101,11 @@ class FmuComponent:
 
     def set(self, references: np.ndarray, values: np.ndarray) -> int:
         """Set real inputs; references uint32, values float64, shape (n,), contiguous."""
-        return int(self._set(self._fmu.component, *self._arrays(references, values)))
+        return int(self._set(*self._arrays(references, values)))
 
     def get(self, references: np.ndarray, values: np.ndarray) -> int:
         """Write the values of real variables into `values`."""
-        return int(self._get(self._fmu.component, *self._arrays(references, values)))
+        return int(self._get(*self._arrays(references, values)))
 
     def step(self, time: float, size: float, final: bool = True) -> int:
         """Go from `time` to `time + size`, both in s; `final` False: the step may be taken back."""
@@ -144,20 +156,19 @@ class FmuComponent:
     @property
     def rewinds(self) -> bool:
         """Whether the FMU can save and restore its state."""
-        return bool(self._description.coSimulation.canGetAndSetFMUstate)
+        return bool(self._own.canGetAndSetFMUstate)
 
     @property
     def _version(self) -> int:
         return int(self._description.fmiVersion[0])
 
     def _instantiate(self) -> Any:
-        from fmpy import extract
-        from fmpy.fmi2 import FMU2Slave
-        from fmpy.fmi3 import FMU3Slave
+        from fmpy import extract, fmi2, fmi3
 
-        check_binary(self.path, self._description)
+        check_binary(self.path, self._description, self._own.modelIdentifier)
         extract(str(self.path), self._directory.name, include=lambda name: name.startswith(("binaries/", "resources/")))
-        kind = FMU2Slave if self._version == 2 else FMU3Slave
+        suffix = "Slave" if self.interface == "coSimulation" else "Model"
+        kind = getattr(fmi2, f"FMU2{suffix}") if self._version == 2 else getattr(fmi3, f"FMU3{suffix}")
         description = self._description
         instance = f"{self.name}.{next(_NUMBERS)}"
         _LISTENERS[instance] = self
@@ -165,7 +176,7 @@ class FmuComponent:
             with _same_directory():
                 fmu = kind(
                     guid=description.guid if self._version == 2 else description.instantiationToken,
-                    modelIdentifier=description.coSimulation.modelIdentifier,
+                    modelIdentifier=self._own.modelIdentifier,
                     unzipDirectory=self._directory.name,
                     instanceName=instance,
                 )
@@ -194,10 +205,10 @@ class FmuComponent:
 
     def _callables(self) -> tuple[Any, Any, Any]:
         functions: Any = self.functions
-        if self._version == 2:
+        if functions.version == 2:
             do_step = _STEP2(functions.step)
             set_, get = _VALUES2(functions.set), _VALUES2(functions.get)
-            return set_, get, lambda t, h, final: do_step(self._fmu.component, t, h, final)
+            return set_, get, lambda t, h, final: do_step(functions.instance, t, h, final)
         return _VALUES3(functions.set), _VALUES3(functions.get), self._step3
 
     def _step3(self, time: float, size: float, final: bool) -> int:
@@ -208,8 +219,10 @@ class FmuComponent:
         return TERMINATED if status <= 1 and flags[1].value else status
 
     def _arrays(self, references: np.ndarray, values: np.ndarray) -> tuple[Any, ...]:
-        count = len(references)
-        return (references.ctypes.data, count, values.ctypes.data, *([count] if self._version == 3 else []))
+        count, functions = len(references), self.functions
+        assert functions is not None
+        more = [count] if functions.version == 3 else []
+        return (functions.instance, references.ctypes.data, count, values.ctypes.data, *more)
 
     def _settable(self, name: str, value: Any) -> Any:
         variables = {variable.name: variable for variable in self._description.modelVariables}

@@ -15,10 +15,10 @@ import cosim
 from cosim.algorithm import JACOBI, Algorithm
 from cosim.component import Component
 from cosim.errors import ScenarioError, WiringError
+from cosim.exchange import open_fmu
 from cosim.execution import Execution, Progress
 from cosim.faults import Fault
 from cosim.files import check_room
-from cosim.fmu import FmuComponent
 from cosim.function import FunctionComponent, load_function
 from cosim.loop import make_loop
 from cosim.planning import make_plan
@@ -144,33 +144,35 @@ def run(
             message = f'{scenario.path}: the component "{name}" has no FMU yet; `cosim run` builds it from its card.'
             raise ScenarioError(message, culprit=name)
     told = {"scenario": scenario.text, "command": command}
-    return simulate(
-        {name: _made(name, component, scenario.path) for name, component in scenario.components.items()},
-        scenario.wires,
-        record=scenario.records,
-        step=scenario.step,
-        ticks=scenario.ticks,
-        signals=scenario.signals,
-        parameters={name: component.parameters for name, component in scenario.components.items()},
-        algorithm=scenario.algorithm,
-        every=scenario.every,
-        variables={name: component.aliases for name, component in scenario.components.items()},
-        faults=scenario.faults,
-        decimation=scenario.decimation,
-        path=path,
-        force=force,
-        name=scenario.name,
-        origin=told,
-        progress=progress,
-        compiled=compiled,
-    )
+    with ExitStack() as stack:
+        return simulate(
+            {name: _made(stack, name, component, scenario.path) for name, component in scenario.components.items()},
+            scenario.wires,
+            record=scenario.records,
+            step=scenario.step,
+            ticks=scenario.ticks,
+            signals=scenario.signals,
+            parameters={name: component.parameters for name, component in scenario.components.items()},
+            algorithm=scenario.algorithm,
+            every=scenario.every,
+            variables={name: component.aliases for name, component in scenario.components.items()},
+            faults=scenario.faults,
+            decimation=scenario.decimation,
+            path=path,
+            force=force,
+            name=scenario.name,
+            origin=told,
+            progress=progress,
+            compiled=compiled,
+        )
 
 
-def _made(name: str, section: ComponentSection, path: str) -> Component | Path:
+def _made(stack: ExitStack, name: str, section: ComponentSection, path: str) -> Component | Path:
     """Return what a section of a scenario means: an FMU, or a Python function."""
-    if section.python is None:
-        assert section.fmu is not None  # the section has one source, and a card's FMU was asked for above
-        return section.fmu
+    if section.fmu is not None:
+        wanted = section.interface
+        return stack.enter_context(open_fmu(section.fmu, name, wanted)) if wanted else section.fmu
+    assert section.python is not None  # the section has one source, and a card's FMU was asked for above
     function, origin = load_function(section.python, path, name)
     return FunctionComponent(function, section.inputs, section.outputs, name, origin)
 
@@ -178,7 +180,7 @@ def _made(name: str, section: ComponentSection, path: str) -> Component | Path:
 def _opened(stack: ExitStack, name: str, component: Component | Path | str) -> Component:
     """Open an FMU for this run; a component given as such stays open after it."""
     if isinstance(component, Path | str):
-        return stack.enter_context(FmuComponent(component, name))
+        return stack.enter_context(open_fmu(component, name))
     return component
 
 

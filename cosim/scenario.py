@@ -3,6 +3,7 @@
     name, step [s], stop [s]
     [algorithm]         kind = "jacobi" | "gauss-seidel" | "iterated" | "energy" and its options, see `algorithm`
     [components.NAME]   fmu = "file.fmu", or card = "CARD" with part = "plant" | "controller"; parameters = { ... };
+                        interface = "model-exchange" to step it by the built-in solver;
                         or python = "file.py:function" with inputs and outputs, see `function`;
                         variables = { NAME = "its own name" or { name, unit } } where its names differ, see `renamed`
                         every = ticks of a step of this component, or step = s, a whole multiple of the scenario's
@@ -55,6 +56,7 @@ class ComponentSection(_Section):
     fmu: Path | None = None
     card: str | None = None
     part: Literal["plant", "controller"] | None = None
+    interface: Literal["", "co-simulation", "model-exchange"] = ""
     python: str | None = None
     inputs: dict[str, str] = {}
     outputs: dict[str, str] = {}

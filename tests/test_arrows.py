@@ -30,6 +30,7 @@ RUNNERS = (
     "planning",
     "faults",
     "function",
+    "exchange",
     "diagram",
     "execution",
     "interrupts",

@@ -16,7 +16,10 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARIES = {
-    "cosim/loop/_loop": ("cosim/loop/loop.c", "cosim/loop/coupling.c"),
+    "cosim/loop/_loop": (
+        *(f"cosim/loop/{name}.c" for name in ("loop", "coupling", "exchange")),
+        *(f"pyfmi_models/export/c/{name}.c" for name in ("solver", "detmath", "detmath_trig")),
+    ),
     "cosim/proof/_truth": ("cosim/proof/truth.c",),
 }
 FLAGS = ["-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra"]
@@ -49,7 +52,7 @@ def compile_library(sources: list[Path], target: Path) -> None:
     with tempfile.TemporaryDirectory() as directory:
         local = Path(directory) / target.name
         command = [sys.executable, "-m", "ziglang", "cc", *FLAGS, *_target(), "-shared", "-o", str(local)]
-        command += map(str, sources)
+        command += [*(f"-I{folder}" for folder in sorted({str(one.parent) for one in sources})), *map(str, sources)]
         if sys.platform != "win32":
             command += ["-fPIC", "-fvisibility=hidden", "-lm"]
         environment = os.environ | {"ZIG_LOCAL_CACHE_DIR": directory}

@@ -1,0 +1,160 @@
+"""A component that is a model-exchange FMU: a built-in solver takes it from step to step.
+
+RODAS4 with the tolerance of the FMU's default experiment (1e-8 where it has none) and a Jacobian by differences; time
+events are met exactly, state events found within a step, inputs held over it (see exchange.c, which does the work).
+"""
+
+import ctypes
+from collections.abc import Mapping
+from ctypes import POINTER, Structure, c_double, c_int64, c_void_p
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.component import Functions
+from cosim.description import describe
+from cosim.errors import FmuError
+from cosim.fmu import FmuComponent
+from cosim.loop import library
+
+TOLERANCE = 1e-8
+_REASONS = {
+    1: "the matrix of its solver is singular",
+    2: "its rates are not finite",
+    3: "the steps of its solver became too small",
+    4: "its solver took more than a million steps",
+}
+_CALLS = {
+    2: {
+        "set": "SetReal",
+        "get": "GetReal",
+        "set_time": "SetTime",
+        "get_states": "GetContinuousStates",
+        "set_states": "SetContinuousStates",
+        "rates": "GetDerivatives",
+        "indicators": "GetEventIndicators",
+        "enter_event": "EnterEventMode",
+        "enter_continuous": "EnterContinuousTimeMode",
+        "update": "NewDiscreteStates",
+        "completed": "CompletedIntegratorStep",
+    }
+}
+_CALLS[3] = _CALLS[2] | {
+    "set": "SetFloat64",
+    "get": "GetFloat64",
+    "rates": "GetContinuousStateDerivatives",
+    "update": "UpdateDiscreteStates",
+}
+
+
+class _Exchange(Structure):
+    _fields_ = [
+        ("version", c_int64),
+        ("instance", c_void_p),
+        *((name, c_void_p) for name in _CALLS[2]),
+        ("states", c_int64),
+        ("indicated", c_int64),
+        ("tolerance", c_double),
+        *((name, c_void_p) for name in ("nominals", "x", "kept", "slope", "shifted", "before", "after")),
+        ("work", c_void_p),
+        ("pivots", c_void_p),
+        ("next", c_double),
+        ("proposed", c_double),
+        ("has_next", c_int64),
+        ("in_event", c_int64),
+        ("result", c_int64),
+        ("culprit", c_int64),
+    ]
+
+
+class ExchangeComponent(FmuComponent):
+    """One instance of a model-exchange FMU with a solver; cannot be taken back.
+
+    Args:
+        path: the .fmu file.
+        name: what the component is called in messages; the model's name where not given.
+
+    Raises:
+        FmuError: as of `FmuComponent`, or the compiled loop is missing, in which the solver lives.
+    """
+
+    interface = "modelExchange"
+
+    def __init__(self, path: Path | str, name: str = "") -> None:
+        found = library()
+        if found is None:
+            message = f"{path} is for model exchange, and its solver needs the compiled loop, which is missing here."
+            raise FmuError(message, culprit=str(path))
+        self._library = found
+        super().__init__(path, name)
+
+    def start(self, parameters: Mapping[str, Any]) -> None:
+        """Set parameters and start values by name and initialise at t = 0; a second call starts all over again."""
+        super().start(parameters)
+        count = self._exchange.states
+        if count:
+            self._fmu.getNominalsOfContinuousStates(ctypes.cast(self._exchange.nominals, POINTER(c_double)), count)
+        self._exchange.in_event, self._exchange.has_next, self._exchange.proposed = 1, 0, 0.0
+
+    def messages(self) -> tuple[str, ...]:
+        """What the FMU said last, or why its solver failed."""
+        reason = _REASONS.get(self._exchange.result)
+        return (*super().messages(), *([f"{reason}, because of {self._culprit()}"] if reason else []))
+
+    @property
+    def rewinds(self) -> bool:
+        """Steps of the solver are not taken back."""
+        return False
+
+    def _culprit(self) -> str:
+        names = [one.name for one in self._derivatives()]
+        return names[self._exchange.culprit] if names else "?"
+
+    def _derivatives(self) -> list[Any]:
+        return [unknown.variable.derivative for unknown in self._description.derivatives]
+
+    def _functions(self) -> Functions:
+        self._exchange = self._made()
+        addresses = (
+            ctypes.cast(getattr(self._library, f"exchange_{name}"), c_void_p).value or 0
+            for name in ("set", "get", "step")
+        )
+        return Functions(2, ctypes.addressof(self._exchange), *addresses)
+
+    def _made(self) -> _Exchange:
+        """Fill the structure of exchange.c; its arrays live as long as the component."""
+        description, kind = self._description, "fmi2" if self._version == 2 else "fmi3"
+        count, indicated = len(description.derivatives), description.numberOfEventIndicators or 0
+        calls = {name: f"{kind}{call}" for name, call in _CALLS[self._version].items()}
+        if not description.modelExchange.needsCompletedIntegratorStep:
+            del calls["completed"]
+        sizes = dict.fromkeys(("nominals", "x", "kept", "slope", "shifted"), count)
+        sizes |= {"before": indicated, "after": indicated, "work": count * count + 12 * count}
+        self._arrays_kept = {name: np.ones(max(size, 1)) for name, size in sizes.items()}
+        self._pivots = np.zeros(max(count, 1), dtype=np.int32)
+        experiment = description.defaultExperiment
+        instance = self._fmu.component
+        return _Exchange(
+            version=self._version,
+            instance=getattr(instance, "value", instance),
+            states=count,
+            indicated=indicated,
+            tolerance=float(experiment.tolerance) if experiment and experiment.tolerance else TOLERANCE,
+            pivots=self._pivots.ctypes.data,
+            **{name: array.ctypes.data for name, array in self._arrays_kept.items()},
+            **{name: self._address(call) for name, call in calls.items()},
+        )
+
+    def _address(self, call: str) -> int:
+        return ctypes.cast(getattr(self._fmu.dll, call), c_void_p).value or 0
+
+
+def open_fmu(path: Path | str, name: str = "", interface: str = "") -> FmuComponent:
+    """Open an FMU by its `co-simulation` or `model-exchange` interface; by co-simulation where it has both.
+
+    Raises:
+        FmuError: see the components.
+    """
+    exchange = interface == "model-exchange" or (not interface and describe(Path(path)).coSimulation is None)
+    return (ExchangeComponent if exchange else FmuComponent)(path, name)

@@ -1,0 +1,229 @@
+"""Model-exchange FMUs step like any other: the built-in solver meets co-simulation, CVode, and the times of events."""
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import export_models as models
+import fmpy
+import numpy as np
+import pytest
+from tiny_fmu import tiny
+
+from cosim.errors import FmuError, StepError
+from cosim.exchange import ExchangeComponent, open_fmu
+from cosim.fmu import FmuComponent
+from cosim.master import run, simulate
+from cosim.scenario import parse_scenario
+from pyfmi_models.export import export_fmu
+
+__all__ = ["tiny"]
+
+WIRES = [
+    ("controller.command", "plant.drive"),
+    ("plant.reading", "controller.measured"),
+    ("r", "controller.wanted"),
+]
+VERSIONS = pytest.mark.parametrize("fmi", [2, 3])
+
+
+@pytest.fixture(scope="module")
+def fmus(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, int], Path]:
+    folder = tmp_path_factory.mktemp("fmus")
+    makers = (models.lugre, models.controller, models.van_der_pol, models.undefined_below_zero)
+    return {
+        (make.__name__, fmi): export_fmu(make(), folder / f"{make.__name__}{fmi}.fmu", fmi=fmi)
+        for make in makers
+        for fmi in (2, 3)
+    }
+
+
+def axis(plant: Any, controller: Any, **options: Any) -> dict[str, np.ndarray]:
+    """An axis with LuGre friction under PD control at 1 kHz, stepped four times as often."""
+    with plant, controller:
+        recording = simulate(
+            {"plant": plant, "controller": controller},
+            [
+                ("controller.command", "plant.drive"),
+                ("plant.reading", "controller.measured"),
+                ("r", "controller.wanted"),
+            ],
+            record={"q": "plant.reading", "tau": "controller.command", "friction": "plant.torque"},
+            step=2.5e-4,
+            ticks=2000,
+            signals={"r": 0.01},
+            parameters={"controller": {"kp": 3000.0, "kd": 400.0, "command": 0.0}},
+            **options,
+        ).recording
+    return {name: recording[name] for name in ("q", "tau", "friction")}
+
+
+@VERSIONS
+def test_a_sampled_controller_gives_the_bits_of_co_simulation_and_a_plant_its_numbers(
+    fmus: dict[tuple[str, int], Path], fmi: int
+) -> None:
+    plant, controller = fmus["lugre", fmi], fmus["controller", fmi]
+    both = axis(FmuComponent(plant), FmuComponent(controller))
+    sampled = axis(FmuComponent(plant), ExchangeComponent(controller))
+    exchanged = axis(ExchangeComponent(plant), ExchangeComponent(controller))
+    for name in both:
+        np.testing.assert_array_equal(sampled[name], both[name])
+        np.testing.assert_allclose(exchanged[name], both[name], rtol=1e-5, atol=1e-6 * np.ptp(both[name]))
+    python = axis(ExchangeComponent(plant), ExchangeComponent(controller), compiled=False)
+    for name in both:
+        np.testing.assert_array_equal(python[name], exchanged[name])
+
+
+@VERSIONS
+def test_the_solver_meets_cvode_on_a_stiff_oscillator(fmus: dict[tuple[str, int], Path], fmi: int) -> None:
+    path = fmus["van_der_pol", fmi]
+    with ExchangeComponent(path, "vdp") as component:
+        ours = simulate({"vdp": component}, [], record={"y": "vdp.y"}, step=0.05, ticks=2000).recording["y"]
+    options = {"stop_time": 99.95, "output_interval": 0.05, "relative_tolerance": 1e-9, "fmi_type": "ModelExchange"}
+    theirs = fmpy.simulate_fmu(str(path), solver="CVode", **options)
+    np.testing.assert_allclose(ours, theirs["y"], atol=1e-3)  # in the jumps, which go at 100 a second
+    assert np.ptp(ours) > 3.9
+
+
+BALL = r"""
+#include <stddef.h>
+#include <stdlib.h>
+enum { H, V, DH, DV, COUNT };
+typedef struct { double v[COUNT], t, next; int mode, bounces; } M;
+typedef struct { int again, terminate, nominals, values, has_next; double next; } Event;
+#define API __attribute__((visibility("default")))
+API void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, void *c, int v, int l) {
+  M *m = calloc(1, sizeof(M)); m->v[H] = 1; m->mode = 1; return m; }
+API int fmi2SetupExperiment(void *m, int a, double b, double c, int d, double e) { return 0; }
+API int fmi2EnterInitializationMode(void *m) { return 0; }
+API int fmi2ExitInitializationMode(void *m) { return 0; }
+API int fmi2Terminate(void *m) { return 0; }
+API int fmi2Reset(M *m) { *m = (M){{1}}; m->mode = 1; return 0; }
+API void fmi2FreeInstance(void *m) { free(m); }
+API int fmi2SetReal(M *m, const unsigned *r, size_t n, const double *x) { while (n--) m->v[r[n]] = x[n]; return 0; }
+API int fmi2GetReal(M *m, const unsigned *r, size_t n, double *x) { while (n--) x[n] = m->v[r[n]]; return 0; }
+API int fmi2SetTime(M *m, double t) { m->t = t; return 0; }
+API int fmi2GetContinuousStates(M *m, double *x, size_t n) { x[0] = m->v[H]; x[1] = m->v[V]; return 0; }
+API int fmi2SetContinuousStates(M *m, const double *x, size_t n) { m->v[H] = x[0]; m->v[V] = x[1]; return 0; }
+API int fmi2GetDerivatives(M *m, double *d, size_t n) { d[0] = m->v[V]; d[1] = -9.81; return 0; }
+API int fmi2GetNominalsOfContinuousStates(M *m, double *x, size_t n) { x[0] = x[1] = 1; return 0; }
+API int fmi2GetEventIndicators(M *m, double *z, size_t n) { z[0] = m->v[H]; return 0; }
+API int fmi2EnterEventMode(M *m) { m->mode = 1; return 0; }
+API int fmi2EnterContinuousTimeMode(M *m) { m->mode = 0; return 0; }
+API int fmi2CompletedIntegratorStep(M *m, int no, int *enter, int *end) { *enter = *end = 0; return 0; }
+API int fmi2NewDiscreteStates(M *m, Event *e) {
+  *e = (Event){0};
+  if (!m->mode) return 3;
+  if (m->v[H] <= 0 && m->v[V] < 0) { m->v[V] *= -0.7; e->values = 1; m->bounces++; }
+  if (m->t >= 1.50005) { if (m->next == 0) { m->v[V] += 1; e->values = 1; m->next = 1; } }
+  else { e->has_next = 1; e->next = 1.50005; }
+  return 0; }
+API const char *fmi2GetVersion(void) { return "2.0"; }
+API const char *fmi2GetTypesPlatform(void) { return "default"; }
+"""
+DESCRIPTION = """<fmiModelDescription fmiVersion="2.0" modelName="ball" guid="b" numberOfEventIndicators="1">
+<ModelExchange modelIdentifier="ball"/><ModelVariables>
+<ScalarVariable name="h" valueReference="0" causality="output" initial="exact"><Real start="1"/></ScalarVariable>
+<ScalarVariable name="v" valueReference="1" causality="output" initial="exact"><Real start="0"/></ScalarVariable>
+<ScalarVariable name="der(h)" valueReference="2"><Real derivative="1"/></ScalarVariable>
+<ScalarVariable name="der(v)" valueReference="3"><Real derivative="2"/></ScalarVariable>
+</ModelVariables><ModelStructure><Outputs><Unknown index="1" dependencies=""/><Unknown index="2" dependencies=""/>
+</Outputs><Derivatives><Unknown index="3"/><Unknown index="4"/></Derivatives></ModelStructure></fmiModelDescription>"""
+
+
+@pytest.fixture(scope="module")
+def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A ball that bounces (state events) and is pushed at 1.50005 s (a time event between two ticks)."""
+    from fmpy.fmi2 import FMU2Model
+
+    folder = tmp_path_factory.mktemp("ball")
+    wanted = [name for name in dir(FMU2Model) if name.startswith("fmi2") and f"{name}(" not in BALL]
+    source, library = folder / "ball.c", folder / f"ball{fmpy.sharedLibraryExtension}"
+    source.write_text(BALL + "".join(f"API int {name}(void) {{ return 3; }}\n" for name in wanted))
+    command = [sys.executable, "-m", "ziglang", "cc", "-shared", "-fPIC", "-O2", "-w", "-o", str(library), str(source)]
+    subprocess.run(command, check=True)
+    with zipfile.ZipFile(folder / "ball.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", DESCRIPTION)
+        archive.write(library, f"binaries/{fmpy.platform}/{library.name}")
+    return folder / "ball.fmu"
+
+
+def flight(t: np.ndarray) -> np.ndarray:
+    """Height of the ball in closed form."""
+    g, height, speed, begun = 9.81, 1.0, 0.0, 0.0
+    out, pushed = np.empty_like(t), False
+    while begun < t[-1]:
+        lands = begun + (speed + np.sqrt(speed**2 + 2 * g * height)) / g
+        until = lands if pushed or lands < 1.50005 else 1.50005
+        s = t - begun
+        flying = (t >= begun) & (t < until + 1e-12)
+        out[flying] = (height + speed * s - g * s**2 / 2)[flying]
+        s_end = until - begun
+        end = speed - g * s_end
+        if until == 1.50005 and not pushed:
+            height, speed, pushed = height + speed * s_end - g * s_end**2 / 2, end + 1.0, True
+        else:
+            height, speed = 0.0, -0.7 * end
+        begun = until
+    return out
+
+
+@pytest.mark.parametrize("compiled", [True, False])
+def test_state_and_time_events_are_met_at_their_times(ball: Path, compiled: bool) -> None:
+    run_ = simulate({"ball": ball}, [], record={"h": "ball.h"}, step=1e-3, ticks=1900, compiled=compiled)
+    np.testing.assert_allclose(run_.recording["h"], flight(run_.recording.t), atol=1e-8)
+
+
+def test_an_fmu_with_both_interfaces_is_stepped_by_co_simulation_unless_told(
+    fmus: dict[tuple[str, int], Path], ball: Path, tiny: dict[int, Path]
+) -> None:
+    for path, interface, kind in (
+        (fmus["lugre", 3], "", FmuComponent),
+        (fmus["lugre", 3], "model-exchange", ExchangeComponent),
+        (ball, "", ExchangeComponent),
+    ):
+        with open_fmu(path, interface=interface) as component:
+            assert type(component) is kind
+    for path, interface, has in (
+        (ball, "co-simulation", "model-exchange"),
+        (tiny[2], "model-exchange", "co-simulation"),
+    ):
+        with pytest.raises(FmuError, match=f"has no {interface} interface; it has: {has}."):
+            open_fmu(path, interface=interface)
+
+
+def test_a_scenario_chooses_the_interface(fmus: dict[tuple[str, int], Path]) -> None:
+    text = f"""
+    stop = 0.1
+    step = 1e-2
+    [components.axis]
+    fmu = "{fmus["lugre", 3]}"
+    interface = "model-exchange"
+    parameters = {{ drive = 20.0 }}
+    [record]
+    signals = ["axis.reading"]
+    """
+    done = run(parse_scenario(text, "x.toml", Path()))
+    plain = run(parse_scenario(text.replace('"model-exchange"', '"co-simulation"'), "x.toml", Path()))
+    np.testing.assert_allclose(done.recording["axis.reading"], plain.recording["axis.reading"], rtol=1e-6)
+
+
+@VERSIONS
+def test_a_model_that_leaves_its_domain_says_so(fmus: dict[tuple[str, int], Path], fmi: int) -> None:
+    with (
+        ExchangeComponent(fmus["undefined_below_zero", fmi], "tank") as tank,
+        pytest.raises(StepError, match=r'tank discarded the step at tick \d+ .*"flow" is not finite at t = '),
+    ):
+        simulate(
+            {"tank": tank}, [("r", "tank.sink")], record={"flow": "tank.flow"}, step=0.1, ticks=20, signals={"r": 1.0}
+        )
+
+
+def test_without_the_compiled_loop_there_is_no_solver(
+    fmus: dict[tuple[str, int], Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosim.exchange.library", lambda: None)
+    with pytest.raises(FmuError, match="its solver needs the compiled loop, which is missing here"):
+        ExchangeComponent(fmus["lugre", 3])
