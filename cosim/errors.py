@@ -6,6 +6,7 @@ CosimError                  everything this package raises on purpose
 │   ├── UnitError           a unit is unknown or is of another kind than needed
 │   ├── SignalError         a set-point generator or recorded signal cannot be made
 │   ├── ScenarioError       a scenario file is missing, unreadable, or a key or value breaks a rule
+│   ├── SweepError          a sweep file is missing, unreadable, or a key or value breaks a rule
 │   ├── WiringError         a connection names what is not there, or joins what does not fit
 │   ├── FmuError            a file is no FMU, or one that cannot run here
 │   └── OutputError         a result would overwrite a file, or cannot be written
@@ -51,6 +52,10 @@ class SignalError(InputError):
 
 class ScenarioError(InputError):
     """A scenario file is missing, unreadable, or a key or value in it breaks a rule."""
+
+
+class SweepError(InputError):
+    """A sweep file is missing, unreadable, or a key or value in it breaks a rule."""
 
 
 class WiringError(InputError):

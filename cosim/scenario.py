@@ -26,6 +26,7 @@ from typing import Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from cosim.algorithm import JACOBI, Algorithm
+from cosim.complaint import complaint
 from cosim.errors import ScenarioError, WiringError
 from cosim.faults import Fault
 from cosim.renamed import Alias
@@ -190,7 +191,7 @@ def parse_scenario(text: str, path: str, directory: Path) -> Scenario:
     except tomllib.TOMLDecodeError as error:
         raise ScenarioError(f"{path} is not valid TOML: {error}.", culprit=path) from error
     except ValidationError as error:
-        raise _sentence(error, path) from error
+        raise ScenarioError(**complaint(error, path, "a scenario", _keys)) from error
     _check_algorithm(raw, path)
     return Scenario(
         path=path,
@@ -263,23 +264,6 @@ def _records(section: RecordingSection) -> dict[str, Record]:
     named = section.signals if isinstance(section.signals, dict) else {name: name for name in section.signals}
     modes = {name: Record(one, section.mode) for name, one in named.items() if isinstance(one, str)}
     return {name: modes.get(name) or Record(**one.model_dump()) for name, one in named.items()}  # type: ignore[union-attr]
-
-
-def _sentence(error: ValidationError, path: str) -> ScenarioError:
-    """Turn the first complaint of pydantic into a sentence."""
-    first = error.errors(include_url=False)[0]
-    where = ".".join(str(part) for part in first["loc"]) or "the file"
-    message = first["msg"].removeprefix("Value error, ").rstrip(".")
-    message = message[0].lower() + message[1:]
-    if first["type"] == "extra_forbidden":
-        choices = _keys(first["loc"])
-        sentence = f'{path}: "{where}" is no key of a scenario; keys there are: {", ".join(choices)}.'
-        return ScenarioError(sentence, culprit=where, choices=choices)
-    if first["type"] == "missing":
-        return ScenarioError(f'{path}: "{where}" is missing.', culprit=where)
-    value = first["input"]
-    shown = "" if isinstance(value, dict | list) else f" = {value!r}"
-    return ScenarioError(f"{path}: {where}{shown} breaks a rule: {message}.", culprit=where, value=value)
 
 
 def _kinds(union: Any) -> dict[str, Any]:

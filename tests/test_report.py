@@ -23,8 +23,8 @@ from cosim.diagnosis.report.explorer import payload
 from cosim.diagnosis.report.figures_dynamic import VIEWS
 from cosim.diagnosis.report.figures_proof import relative
 from cosim.diagnosis.report.quantities import Scales, minus, number
-from cosim.diagnosis.report.sheet import thin
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Region, Trace, Where
+from cosim.pictures.style import thin
 
 RATE, SECONDS = 1000, 60
 FLOOR = 0.16
@@ -277,7 +277,7 @@ def test_every_effect_has_a_figure(effect: str) -> None:
     import matplotlib
 
     from cosim.diagnosis.report.figures_dynamic import effect as draw
-    from cosim.diagnosis.report.sheet import STYLE
+    from cosim.pictures.style import STYLE
 
     finding = replace(FOUND[0], effect=effect, parameters={"delay_ms": 3.0, "cycles_per_rev": 24.0})
     with matplotlib.rc_context(STYLE):

@@ -18,8 +18,9 @@ from cosim.diagnosis.report.figures_effect import (
     rest_and_motion,
 )
 from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.sheet import AFTER, BEFORE, GREY, MEASURED, Picture, heading
+from cosim.diagnosis.report.sheet import Picture, heading
 from cosim.diagnosis.result import Array, Finding
+from cosim.pictures.style import AFTER, BEFORE, GREY, MEASURED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,8 +7,9 @@ import numpy as np
 
 from cosim.diagnosis.report.derive import Curve, Mask, Samples, curve, slow
 from cosim.diagnosis.report.quantities import Scale, Scales
-from cosim.diagnosis.report.sheet import AFTER, BEFORE, GREY, Picture, Sheet, degrees, heading
+from cosim.diagnosis.report.sheet import Picture, Sheet, degrees, heading
 from cosim.diagnosis.result import Array, Finding
+from cosim.pictures.style import AFTER, BEFORE, GREY
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

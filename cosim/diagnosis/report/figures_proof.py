@@ -5,8 +5,9 @@ from typing import TYPE_CHECKING, Any
 
 from cosim.diagnosis.report.derive import Part
 from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.sheet import AFTER, BEFORE, GREY, LINE, MEASURED, SHADE, Picture, Sheet
+from cosim.diagnosis.report.sheet import Picture, Sheet
 from cosim.diagnosis.result import Diagnosis, Finding
+from cosim.pictures.style import AFTER, BEFORE, GREY, LINE, MEASURED, SHADE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,8 +6,9 @@ import numpy as np
 
 from cosim.diagnosis.report.derive import bars
 from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.sheet import AFTER, BEFORE, COLUMN, GREY, MEASURED, SHADE, Picture, Sheet, heading, thin
+from cosim.diagnosis.report.sheet import COLUMN, Picture, Sheet, heading
 from cosim.diagnosis.result import Array, Trace
+from cosim.pictures.style import AFTER, BEFORE, GREY, MEASURED, SHADE, thin
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,8 +6,9 @@ import numpy as np
 
 from cosim.diagnosis.report.derive import Samples, grid, slow
 from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.sheet import AFTER, BEFORE, GREY, LINE, MEASURED, Picture, Sheet, degrees, heading
+from cosim.diagnosis.report.sheet import Picture, Sheet, degrees, heading
 from cosim.diagnosis.result import Array, Region
+from cosim.pictures.style import AFTER, BEFORE, GREY, LINE, MEASURED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -1,0 +1,1 @@
+"""Pictures of runs and sweeps; nothing here is imported while something runs."""

@@ -1,0 +1,128 @@
+"""A sweep from its file to its table: check, rehearse, run what is not done yet, write."""
+
+import hashlib
+from collections.abc import Callable, Generator, Iterator
+from contextlib import AbstractContextManager, closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+
+import cosim
+from cosim.errors import SweepError
+from cosim.files import sha256
+from cosim.scenario import Scenario
+from cosim.sweep.cell import Cell, LostError
+from cosim.sweep.file import Sweep
+from cosim.sweep.job import Job, Row, job_of, rehearse
+from cosim.sweep.journal import Journal
+from cosim.sweep.parcel import files_of
+from cosim.sweep.pool import Numbered, Pool, cluster, cores, local
+from cosim.sweep.table import write_table
+
+Told = Callable[[int, int, int], None]
+"""Called after each run with runs done, runs in all, and runs that came to nothing."""
+
+
+@dataclass(frozen=True)
+class Summary:
+    """How a sweep went: runs in all, done now, found done, failed (all of them), seconds of this session, the table."""
+
+    runs: int
+    done: int
+    found: int
+    failed: int
+    seconds: float
+    table: Path
+
+
+def conduct(
+    sweep: Sweep,
+    scenario: Scenario,
+    out: Path,
+    *,
+    workers: int | None = None,
+    address: str = "",
+    force: bool = False,
+    retry: bool = False,
+    told: Told = lambda done, of, failed: None,
+    command: str = "",
+) -> Summary:
+    """Run a sweep, or what is left of it, and write `out`/table.parquet.
+
+    Args:
+        sweep: what `read_sweep` returned.
+        scenario: the scenario it names, with an FMU for each component.
+        out: folder of the sweep; one that was begun there is continued.
+        workers: processes; the cores of this machine where not given.
+        address: of a Dask cluster that does the runs instead.
+        force: start over.
+        retry: run again what failed, crashed or took too long.
+        told: called after each run.
+        command: what the table says it was made by.
+
+    Raises:
+        SweepError, WiringError, FmuError, SignalError: before the first run.
+        OutputError: `out` holds another sweep.
+    """
+    if workers is not None and workers < 1:
+        raise SweepError(f"--workers {workers}: there must be at least one.", culprit="workers", value=workers)
+    if sweep.record and address:
+        raise SweepError("record = true keeps files on this machine; it does not go with --cluster.", culprit="record")
+    begun = perf_counter()
+    job = job_of(sweep, scenario, out / "recordings" if sweep.record else None)
+    units = _units(job)
+    with Journal(out, _identity(sweep, scenario), force) as journal:
+        origin = {"version": f"mount-cosim {cosim.__version__}", "command": command, "scenario": scenario.text}
+        origin |= {"sweep": sweep.content, "runs": str(sweep.design.runs)}
+        known = {run for run, row in journal.rows.items() if row["status"] == "ok" or not retry}
+        rest = [(number, point) for number, point in enumerate(sweep.design.points()) if number not in known]
+        table, pool = out / "table.parquet", _pool(job, workers, address)
+        with _written(table, sweep, journal, units, origin):
+            failed = sum(journal.rows[run]["status"] != "ok" for run in known)
+            with closing(_rows(pool, rest)) as rows:
+                for done, row in enumerate(rows, len(known) + 1):
+                    journal.append(row)
+                    failed += row["status"] != "ok"
+                    told(done, sweep.design.runs, failed)
+        return Summary(sweep.design.runs, len(rest), len(known), failed, perf_counter() - begun, table)
+
+
+def _rows(pool: AbstractContextManager[Pool], rest: list[Numbered]) -> Generator[Row, None, None]:
+    if rest:
+        with pool as ready:
+            yield from ready.rows(rest)
+
+
+def _pool(job: Job, workers: int | None, address: str) -> AbstractContextManager[Pool]:
+    return cluster(job, address) if address else local(job, workers or cores())
+
+
+@contextmanager
+def _written(
+    table: Path, sweep: Sweep, journal: Journal, units: dict[str, str], origin: dict[str, str]
+) -> Iterator[None]:
+    """Write the table of what is done, however the block ends."""
+    try:
+        yield
+    finally:
+        rows = [row for _, row in sorted(journal.rows.items())]
+        write_table(table, sweep.columns, rows, units, origin)
+
+
+def _units(job: Job) -> dict[str, str]:
+    """Rehearse in a process of its own, and return the units of the columns as far as they are known."""
+    cell = Cell()
+    try:
+        found: dict[str, str] = cell.call(rehearse, job, timeout=job.timeout)
+    except LostError:
+        found = {}  # a scenario that crashes as it stands may run with other parameters
+    finally:
+        cell.close()
+    return {"seconds": "s"} | found | {name: one[0].unit for name, one in job.varied.items()}
+
+
+def _identity(sweep: Sweep, scenario: Scenario) -> dict[str, str]:
+    texts = {"sweep file": sweep.content, "scenario": scenario.text}
+    hashes = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
+    files = {f"file of {name}": sha256(path) for name, path in files_of(scenario).items()}
+    return {"version": cosim.__version__} | hashes | files

@@ -1,0 +1,101 @@
+"""One run of a sweep: a point of the parameter space to a row of the table."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import nan
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from cosim.errors import CosimError, StepError
+from cosim.master import run
+from cosim.recording import Recording
+from cosim.scenario import Scenario
+from cosim.sweep.address import Address, addresses, find
+from cosim.sweep.design import Point
+from cosim.sweep.file import Sweep
+from cosim.sweep.statistics import Statistic
+from cosim.wiring import Record
+
+Row = dict[str, Any]
+"""Column to value: run, what was varied, statistics, seconds, status ("ok", "failed", "crashed", "timeout"), reason."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """What all runs of a sweep share; it goes to other processes and machines."""
+
+    scenario: Scenario
+    varied: Mapping[str, tuple[Address, ...]]
+    statistics: Mapping[str, Statistic]
+    timeout: float | None = None
+    recordings: Path | None = None
+    kept: tuple[str, ...] = ()
+
+    def begun(self, number: int, point: Point) -> Row:
+        """Return the row of a run that has come to nothing yet."""
+        nothing = dict.fromkeys(self.statistics, nan)
+        varied = dict(zip(self.varied, point, strict=True))
+        return {"run": number, **varied, **nothing, "seconds": nan, "status": "failed", "reason": ""}
+
+    def at(self, point: Point) -> Scenario:
+        """Return the scenario of a point."""
+        scenario = self.scenario
+        for addresses_, value in zip(self.varied.values(), point, strict=True):
+            for address in addresses_:
+                scenario = address.set(scenario, value)
+        return scenario
+
+
+def job_of(sweep: Sweep, scenario: Scenario, recordings: Path | None = None) -> Job:
+    """Join a sweep and its scenario, whose components all have their FMU.
+
+    Raises:
+        SweepError: something varied does not exist.
+        FmuError: a component is no FMU.
+    """
+    known = addresses(scenario)
+    varied = {
+        name: tuple(find(target, known, f"{sweep.path}: vary.{name}") for target in variation.of)
+        for name, variation in sweep.variations.items()
+    }
+    wanted = dict.fromkeys(name for statistic in sweep.statistics.values() for name in statistic.signals)
+    watched = {name: scenario.records.get(name) or Record(name) for name in wanted}
+    kept = dict(scenario.records) if recordings else {}
+    changed = replace(scenario, records=kept | watched, decimation=sweep.decimation or scenario.decimation)
+    return Job(changed, varied, sweep.statistics, sweep.timeout, recordings, tuple(kept))
+
+
+def work(job: Job, number: int, point: Point) -> Row:
+    """Run one point. Whatever goes wrong is said in the row."""
+    row, begun = job.begun(number, point), perf_counter()
+    try:
+        recording = run(job.at(point)).recording
+        row |= {name: one.of(recording) for name, one in job.statistics.items()}
+        _keep(job, number, recording)
+        row["status"] = "ok"
+    except CosimError as error:
+        row["reason"] = str(error)
+    except Exception as error:  # whatever a foreign FMU or a full disk raises costs this row only
+        row["reason"] = f"{type(error).__name__}: {error}"
+    return row | {"seconds": perf_counter() - begun}
+
+
+def rehearse(job: Job) -> dict[str, str]:
+    """Take a step or two of the scenario as it stands and return the units of the statistics.
+
+    Raises:
+        InputError: the wiring, a signal, an FMU or a statistic is not as it must be.
+    """
+    ticks = min(2 * job.scenario.decimation, job.scenario.ticks)
+    try:
+        recording = run(replace(job.scenario, ticks=ticks)).recording
+    except StepError:
+        return {}  # with other parameters it may go on
+    return {name: one.checked_unit(recording, job.scenario.stop) for name, one in job.statistics.items()}
+
+
+def _keep(job: Job, number: int, recording: Recording) -> None:
+    if job.recordings is not None:
+        table = {name: recording[name] for name in ("t", *job.kept)}
+        replace(recording, table=table).write(job.recordings / f"{number:06d}.parquet", force=True)

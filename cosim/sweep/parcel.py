@@ -1,0 +1,59 @@
+"""A job with its files, for machines that do not have them."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from cosim.files import cache_home, replacing
+from cosim.scenario import Scenario
+from cosim.sweep.job import Job
+
+
+@dataclass(frozen=True)
+class Parcel:
+    """A job, and what is in the files it names, by their path where it was made."""
+
+    job: Job
+    files: Mapping[Path, bytes]
+
+    @classmethod
+    def of(cls, job: Job) -> "Parcel":
+        """Pack the FMUs and recordings of a job."""
+        return cls(job, {path: path.read_bytes() for path in files_of(job.scenario).values()})
+
+    def job_here(self) -> Job:
+        """Return the job with paths on this machine, where its files are put once."""
+        here = {path: _stored(content, path.suffix) for path, content in self.files.items()}
+        return replace(self.job, scenario=_located(self.job.scenario, here))
+
+
+def files_of(scenario: Scenario) -> dict[str, Path]:
+    """List by their owner the files a scenario needs: FMUs, and recordings that are replayed."""
+    fmus = {f"components.{name}": one.fmu for name, one in scenario.components.items() if one.fmu}
+    replayed = {f"signals.{name}": _file(signal) for name, signal in scenario.signals.items()}
+    return fmus | {name: path for name, path in replayed.items() if path is not None}
+
+
+def _file(signal: Any) -> Path | None:
+    return getattr(signal, "file", None)
+
+
+@cache
+def _stored(content: bytes, suffix: str) -> Path:
+    path = cache_home() / "sweeps" / (hashlib.sha256(content).hexdigest() + suffix)
+    if not path.exists():
+        with replacing(path, force=True) as partial:
+            partial.write_bytes(content)
+    return path
+
+
+def _located(scenario: Scenario, here: Mapping[Path, Path]) -> Scenario:
+    fmus = {name: here[one.fmu] for name, one in scenario.components.items() if one.fmu}
+    signals: dict[str, Any] = {
+        name: signal.model_copy(update={"file": here[file]}) if (file := _file(signal)) else signal  # type: ignore[attr-defined]
+        for name, signal in scenario.signals.items()
+    }
+    return replace(scenario.with_fmus(fmus), signals=signals)

@@ -1,0 +1,146 @@
+"""Who does the runs: processes of this machine, or those of a Dask cluster; to the sweep both are the same."""
+
+import os
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
+
+from cosim.errors import MissingPackageError, SweepError
+from cosim.sweep.cell import Cell, LostError
+from cosim.sweep.design import Point
+from cosim.sweep.job import Job, Row, work
+from cosim.sweep.parcel import Parcel
+
+Numbered = tuple[int, Point]
+
+_OWN = threading.local()
+_CELLS: list[Cell] = []
+"""The cells of all threads, so that they can be closed from one."""
+
+
+@dataclass(frozen=True)
+class Pool:
+    """`submit` gives a run away; `size` runs are done at a time, `ahead` more wait where they are done."""
+
+    submit: Callable[[int, Point], "Future[Row]"]
+    size: int
+    ahead: int
+
+    def rows(self, points: Iterable[Numbered]) -> Iterator[Row]:
+        """Yield the rows as they come; no more points are taken than can soon be run."""
+        rest = iter(points)
+        pending = {self.submit(*one) for one in islice(rest, self.size + self.ahead)}
+        try:
+            while pending:
+                done, pending = wait(pending, return_when=FIRST_COMPLETED)
+                pending |= {self.submit(*one) for one in islice(rest, len(done))}
+                for future in done:
+                    yield future.result()
+        finally:
+            for future in pending:
+                future.cancel()
+
+
+def isolated(job: Job, number: int, point: Point) -> Row:
+    """Do one run in the cell of this thread; a crash becomes a row."""
+    try:
+        row: Row = own_cell().call(work, job, number, point, timeout=job.timeout)
+    except LostError as loss:
+        return job.begun(number, point) | {"status": loss.status, "reason": str(loss)}
+    return row
+
+
+def own_cell() -> Cell:
+    """Return the cell of this thread."""
+    if not hasattr(_OWN, "cell") or _OWN.cell not in _CELLS:
+        _OWN.cell = Cell()
+        _CELLS.append(_OWN.cell)
+    cell: Cell = _OWN.cell
+    return cell
+
+
+def close_cells() -> None:
+    """End all processes that runs of this one happen in."""
+    while _CELLS:
+        _CELLS.pop().close()
+
+
+def cores() -> int:
+    """Return how many processes this one may use at a time."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+@contextmanager
+def local(job: Job, workers: int) -> Iterator[Pool]:
+    """Run in `workers` processes of this machine."""
+    threads = ThreadPoolExecutor(workers, "sweep")
+    try:
+        yield Pool(lambda number, point: threads.submit(isolated, job, number, point), workers, workers)
+    finally:
+        threads.shutdown(wait=False, cancel_futures=True)
+        close_cells()
+        threads.shutdown()
+
+
+@contextmanager
+def cluster(job: Job, address: str) -> Iterator[Pool]:
+    """Run on a Dask cluster: FMUs and recordings are sent there, mount-cosim must be installed there.
+
+    Raises:
+        MissingPackageError: Dask is not installed here.
+        SweepError: nobody answers at the address, or mount-cosim is not there.
+    """
+    client = _client(address)
+    try:
+        threads = sum(client.nthreads().values())
+        if not threads:
+            raise SweepError(f"The cluster at {address} has no workers.", culprit=address)
+        _check_versions(client, address)
+        parcel = client.scatter(Parcel.of(job), broadcast=True, hash=False)
+        executor = client.get_executor(pure=False)
+        yield Pool(lambda number, point: executor.submit(_remote, parcel, number, point), threads, 2 * threads)
+    finally:
+        with suppress(Exception):  # a cluster that is gone has closed them
+            client.run(close_cells)
+        client.close()
+
+
+def _remote(parcel: Parcel, number: int, point: Point) -> Row:
+    return isolated(parcel.job_here(), number, point)
+
+
+def _client(address: str) -> Any:
+    try:
+        from distributed import Client
+    except ImportError as error:
+        message = "--cluster needs Dask: install it with pip install 'mount-cosim[cluster]'."
+        raise MissingPackageError(message) from error
+    try:
+        return Client(address, timeout="10s", set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        message = f"No Dask scheduler answers at {address}; give its address as tcp://host:8786."
+        raise SweepError(message, culprit=address) from error
+
+
+def _check_versions(client: Any, address: str) -> None:
+    import cosim
+
+    try:
+        there = set(client.run(version).values())
+    except Exception as error:  # what a worker raises when it cannot import this comes in many shapes
+        raise SweepError(f"The workers at {address} do not have mount-cosim: {error}.", culprit=address) from error
+    if there != {cosim.__version__}:
+        found = ", ".join(sorted(there))
+        message = f"The workers at {address} have mount-cosim {found}; this is {cosim.__version__}."
+        raise SweepError(message, culprit=address, value=found)
+
+
+def version() -> str:
+    """Return the version of mount-cosim where this is called."""
+    import cosim
+
+    return cosim.__version__
