@@ -35,6 +35,7 @@ RUNNERS = (
     "execution",
     "interrupts",
     "description",
+    "sweep",
 )
 MAKERS = ("cosim.diagnosis", "cosim.identify", "cosim.proof", "cosim.demo", "cosim.stiffness", "cosim.cli")
 

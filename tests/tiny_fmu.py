@@ -1,6 +1,7 @@
 """Small FMUs for tests of the master, that can fail on demand.
 
 mode 0: y' = k (a - b); mode 1: y = k (a - b) a step later; mode 2: y = k (a - b) at once.
+From fail_at on a step returns the number `status`; 11 crashes the process, 12 never returns.
 """
 
 import subprocess
@@ -13,11 +14,13 @@ import pytest
 
 SOURCE = r"""
 #include <math.h>
+#include <signal.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdlib.h>
 #include <string.h>
-enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, STATUS, COUNT };
+#include <unistd.h>
+enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, STATUS, COUNT, CRASH = 11, HANG };
 typedef struct { double v[COUNT]; char name[99]; void *log; } M;
 typedef void Log2(void *, const char *, int, const char *, const char *, ...);
 typedef void Log3(void *, int, const char *, const char *);
@@ -37,7 +40,10 @@ static int step(M *m, double t, double h) {
   double e = m->v[K] * (m->v[A] - m->v[B]);
   m->v[Y] = m->v[MODE] > 0 ? e : m->v[Y] + h * e;
   if (t + h / 2 > m->v[NAN_AT]) m->v[Y] = NAN;
-  return t + h / 2 > m->v[FAIL_AT] ? (int)m->v[STATUS] : 0;
+  if (t + h / 2 <= m->v[FAIL_AT]) return 0;
+  if (m->v[STATUS] == CRASH) raise(SIGSEGV);
+  while (m->v[STATUS] == HANG) sleep(1);
+  return (int)m->v[STATUS];
 }
 #define API __attribute__((visibility("default")))
 #define NONE(name) API int name(void *m) { (void)m; return 0; }

@@ -1,6 +1,7 @@
 """What can be varied in a scenario, by name, and a scenario with other values.
 
-component.parameter      a parameter or start value of an FMU; one made from a card is built once and set, not rebuilt
+component.parameter      a parameter or start value of an FMU (one made from a card is built once and set, not rebuilt),
+                         or of a Python function one that the scenario gives
 signal.key               a number of a signal: reference.frequency, noise.rms, noise.seed
 component.input.key      gain, offset or quantum of the wire to this input
 """
@@ -49,8 +50,9 @@ def addresses(scenario: Scenario) -> dict[str, Address]:
     found: dict[str, Address] = {}
     for name, component in scenario.components.items():
         ports = ports_of(describe(component.fmu)) if component.fmu else {}
-        settable = [port for port in ports.values() if port.settable and f"{name}.{port.name}" not in fed]
-        found |= {f"{name}.{port.name}": Address(name, port.name, port.unit, _component) for port in settable}
+        units = {port.name: port.unit for port in ports.values() if port.settable and f"{name}.{port.name}" not in fed}
+        units |= dict.fromkeys(component.parameters, "") if component.python else {}
+        found |= {f"{name}.{key}": Address(name, key, unit, _component) for key, unit in units.items()}
         found |= _wires(scenario, name, ports)
     for name, signal in scenario.signals.items():
         found |= {f"{name}.{key}": Address(name, key, "", _signal) for key in _numbers(signal)}

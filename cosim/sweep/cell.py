@@ -32,7 +32,7 @@ class Cell:
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
-        self._said: IO[bytes] = tempfile.TemporaryFile("a+b")  # noqa: SIM115 lives as long as this does
+        self._said: IO[bytes] | None = None
 
     def call(self, function: Callable[..., Any], *arguments: Any, timeout: float | None = None) -> Any:
         """Call a function of a module in the process and return its result.
@@ -67,13 +67,14 @@ class Cell:
         if process is not None:
             process.kill()
             process.wait()
-            for pipe in (process.stdin, process.stdout):
+            for file in (process.stdin, process.stdout, self._said):
                 with suppress(OSError):  # what was on its way to a process that is gone cannot be flushed
-                    if pipe is not None:
-                        pipe.close()
+                    if file is not None:
+                        file.close()
 
     def _begin(self) -> "subprocess.Popen[bytes]":
         self.close()
+        self._said = tempfile.TemporaryFile("a+b")  # noqa: SIM115 it lives as long as the process
         home = str(Path(cosim.__file__).parents[1])
         paths = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
         # One thread of linear algebra each: the cores are busy with runs already.
@@ -93,6 +94,7 @@ class Cell:
     def _ask(self, process: "subprocess.Popen[bytes]", function: Callable[..., Any], arguments: Any) -> Any:
         assert process.stdin is not None  # both are pipes
         assert process.stdout is not None
+        assert self._said is not None
         self._said.truncate(0)
         pickle.dump((function, arguments), process.stdin)
         process.stdin.flush()
@@ -100,14 +102,18 @@ class Cell:
 
     def _loss(self, process: "subprocess.Popen[bytes]", late: str) -> LostError:
         process.kill()
-        code = process.wait()
+        code, said = process.wait(), self._last_said()
         self.close()
         if late:
             return LostError("timeout", f"It was given up: {late}.")
+        return LostError("crashed", f"The process of this run crashed: {_ending(code)}{said}.")
+
+    def _last_said(self) -> str:
+        if self._said is None or self._said.closed:
+            return ""
         self._said.seek(0)
         lines = self._said.read().decode("utf-8", "replace").strip().splitlines()
-        said = f'; it last said "{lines[-1].strip()}"' if lines else ""
-        return LostError("crashed", f"The process of this run crashed: {_ending(code)}{said}.")
+        return f'; it last said "{lines[-1].strip()}"' if lines else ""
 
 
 def _ending(code: int) -> str:

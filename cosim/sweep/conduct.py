@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Generator, Iterator
-from contextlib import AbstractContextManager, closing, contextmanager
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -11,12 +11,12 @@ import cosim
 from cosim.errors import SweepError
 from cosim.files import sha256
 from cosim.scenario import Scenario
-from cosim.sweep.cell import Cell, LostError
+from cosim.sweep.cell import LostError
 from cosim.sweep.file import Sweep
 from cosim.sweep.job import Job, Row, job_of, rehearse
 from cosim.sweep.journal import Journal
 from cosim.sweep.parcel import files_of
-from cosim.sweep.pool import Numbered, Pool, cluster, cores, local
+from cosim.sweep.pool import Numbered, Pool, close_cells, cluster, cores, free, local, new_cell
 from cosim.sweep.table import write_table
 
 Told = Callable[[int, int, int], None]
@@ -70,21 +70,20 @@ def conduct(
         raise SweepError("record = true keeps files on this machine; it does not go with --cluster.", culprit="record")
     begun = perf_counter()
     job = job_of(sweep, scenario, out / "recordings" if sweep.record else None)
-    units = _units(job)
-    with Journal(out, _identity(sweep, scenario), force) as journal:
-        origin = {"version": f"mount-cosim {cosim.__version__}", "command": command, "scenario": scenario.text}
-        origin |= {"sweep": sweep.content, "runs": str(sweep.design.runs)}
+    with ExitStack() as stack:
+        stack.callback(close_cells)
+        units = _units(job)
+        journal = stack.enter_context(Journal(out, _identity(sweep, scenario), force))
         known = {run for run, row in journal.rows.items() if row["status"] == "ok" or not retry}
         rest = [(number, point) for number, point in enumerate(sweep.design.points()) if number not in known]
-        table, pool = out / "table.parquet", _pool(job, workers, address)
-        with _written(table, sweep, journal, units, origin):
-            failed = sum(journal.rows[run]["status"] != "ok" for run in known)
-            with closing(_rows(pool, rest)) as rows:
-                for done, row in enumerate(rows, len(known) + 1):
-                    journal.append(row)
-                    failed += row["status"] != "ok"
-                    told(done, sweep.design.runs, failed)
-        return Summary(sweep.design.runs, len(rest), len(known), failed, perf_counter() - begun, table)
+        failed = sum(journal.rows[run]["status"] != "ok" for run in known)
+        table = stack.enter_context(_table(out, sweep, journal, units, _origin(sweep, scenario, command)))
+        rows = stack.enter_context(closing(_rows(_pool(job, workers, address), rest)))
+        for done, row in enumerate(rows, len(known) + 1):
+            journal.append(row)
+            failed += row["status"] != "ok"
+            told(done, sweep.design.runs, failed)
+    return Summary(sweep.design.runs, len(rest), len(known), failed, perf_counter() - begun, table)
 
 
 def _rows(pool: AbstractContextManager[Pool], rest: list[Numbered]) -> Generator[Row, None, None]:
@@ -98,26 +97,29 @@ def _pool(job: Job, workers: int | None, address: str) -> AbstractContextManager
 
 
 @contextmanager
-def _written(
-    table: Path, sweep: Sweep, journal: Journal, units: dict[str, str], origin: dict[str, str]
-) -> Iterator[None]:
-    """Write the table of what is done, however the block ends."""
+def _table(out: Path, sweep: Sweep, journal: Journal, units: dict[str, str], origin: dict[str, str]) -> Iterator[Path]:
+    """Write the table of what is done when the block ends, however it ends."""
+    path = out / "table.parquet"
     try:
-        yield
+        yield path
     finally:
         rows = [row for _, row in sorted(journal.rows.items())]
-        write_table(table, sweep.columns, rows, units, origin)
+        write_table(path, sweep.columns, rows, units, origin)
+
+
+def _origin(sweep: Sweep, scenario: Scenario, command: str) -> dict[str, str]:
+    made = {"version": f"mount-cosim {cosim.__version__}", "command": command}
+    return made | {"scenario": scenario.text, "sweep": sweep.content, "runs": str(sweep.design.runs)}
 
 
 def _units(job: Job) -> dict[str, str]:
     """Rehearse in a process of its own, and return the units of the columns as far as they are known."""
-    cell = Cell()
+    cell = new_cell()
     try:
         found: dict[str, str] = cell.call(rehearse, job, timeout=job.timeout)
     except LostError:
         found = {}  # a scenario that crashes as it stands may run with other parameters
-    finally:
-        cell.close()
+    free(cell)
     return {"seconds": "s"} | found | {name: one[0].unit for name, one in job.varied.items()}
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.files import cache_home, replacing
-from cosim.scenario import Scenario
+from cosim.scenario import ComponentSection, Scenario
 from cosim.sweep.job import Job
 
 
@@ -32,13 +32,17 @@ class Parcel:
 
 def files_of(scenario: Scenario) -> dict[str, Path]:
     """List by their owner the files a scenario needs: FMUs, and recordings that are replayed."""
-    fmus = {f"components.{name}": one.fmu for name, one in scenario.components.items() if one.fmu}
+    made = {f"components.{name}": one.fmu or _python(one) for name, one in scenario.components.items()}
     replayed = {f"signals.{name}": _file(signal) for name, signal in scenario.signals.items()}
-    return fmus | {name: path for name, path in replayed.items() if path is not None}
+    return {name: path for name, path in (made | replayed).items() if path is not None}
 
 
 def _file(signal: Any) -> Path | None:
     return getattr(signal, "file", None)
+
+
+def _python(section: ComponentSection) -> Path | None:
+    return Path(section.python.rpartition(":")[0]) if section.python else None
 
 
 @cache
@@ -51,9 +55,17 @@ def _stored(content: bytes, suffix: str) -> Path:
 
 
 def _located(scenario: Scenario, here: Mapping[Path, Path]) -> Scenario:
-    fmus = {name: here[one.fmu] for name, one in scenario.components.items() if one.fmu}
+    components = {name: _moved(one, here) for name, one in scenario.components.items()}
     signals: dict[str, Any] = {
         name: signal.model_copy(update={"file": here[file]}) if (file := _file(signal)) else signal  # type: ignore[attr-defined]
         for name, signal in scenario.signals.items()
     }
-    return replace(scenario.with_fmus(fmus), signals=signals)
+    return replace(scenario, components=components, signals=signals)
+
+
+def _moved(section: ComponentSection, here: Mapping[Path, Path]) -> ComponentSection:
+    if section.fmu is not None:
+        return section.model_copy(update={"fmu": here[section.fmu]})
+    file = _python(section)
+    function = (section.python or "").rpartition(":")[2]
+    return section if file is None else section.model_copy(update={"python": f"{here[file]}:{function}"})

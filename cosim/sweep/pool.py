@@ -17,9 +17,13 @@ from cosim.sweep.parcel import Parcel
 
 Numbered = tuple[int, Point]
 
+PATIENCE = 10.0
+"""Seconds that a scheduler may take to answer."""
 _OWN = threading.local()
 _CELLS: list[Cell] = []
 """The cells of all threads, so that they can be closed from one."""
+_FREE: list[Cell] = []
+"""Cells that are up and belong to no thread."""
 
 
 @dataclass(frozen=True)
@@ -57,14 +61,28 @@ def isolated(job: Job, number: int, point: Point) -> Row:
 def own_cell() -> Cell:
     """Return the cell of this thread."""
     if not hasattr(_OWN, "cell") or _OWN.cell not in _CELLS:
-        _OWN.cell = Cell()
-        _CELLS.append(_OWN.cell)
+        _OWN.cell = new_cell()
     cell: Cell = _OWN.cell
     return cell
 
 
+def new_cell() -> Cell:
+    """Return a cell that `close_cells` will close, one that is up already if there is one."""
+    with suppress(IndexError):
+        return _FREE.pop()
+    cell = Cell()
+    _CELLS.append(cell)
+    return cell
+
+
+def free(cell: Cell) -> None:
+    """Give a cell of `new_cell` back, for whoever needs one next."""
+    _FREE.append(cell)
+
+
 def close_cells() -> None:
     """End all processes that runs of this one happen in."""
+    _FREE.clear()
     while _CELLS:
         _CELLS.pop().close()
 
@@ -115,12 +133,12 @@ def _remote(parcel: Parcel, number: int, point: Point) -> Row:
 
 def _client(address: str) -> Any:
     try:
-        from distributed import Client
+        from dask.distributed import Client
     except ImportError as error:
         message = "--cluster needs Dask: install it with pip install 'mount-cosim[cluster]'."
         raise MissingPackageError(message) from error
     try:
-        return Client(address, timeout="10s", set_as_default=False)
+        return Client(address, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         message = f"No Dask scheduler answers at {address}; give its address as tcp://host:8786."
         raise SweepError(message, culprit=address) from error
