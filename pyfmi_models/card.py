@@ -110,7 +110,8 @@ class Card:
             torque_limit=self.mount.torque_limit,
         )
         name = _identifier(self.mount.name)
-        return Adrc(name=name, gains=gains, period=1 / tuning.loop_hz, compensation=self._compensation()).model()
+        adrc = Adrc(name=name, gains=gains, period=1 / tuning.loop_hz, compensation=self._compensation())
+        return self.plant().model_in_axis_units(adrc.model())
 
     def _compensation(self) -> Compensation | None:
         case = self.controller.compensation if self.controller else "C1"

@@ -87,10 +87,18 @@ class Mount:
         return tuple({one.name: one for effect in self.effects for one in effect.inputs()}.values())
 
     def in_axis_units(self, variable: Variable) -> Variable:
-        """Turn rotary units into those of a linear axis where that is what this is; phases stay angles."""
-        if self.motion == "rotary" or variable.name.endswith("phase"):
+        """Turn rotary units into those of a linear axis where that is what this is; phases and bandwidths stay."""
+        if self.motion == "rotary" or variable.name.endswith(("phase", "bandwidth")):
             return variable
         return replace(variable, unit=LINEAR_UNITS.get(variable.unit, variable.unit))
+
+    def model_in_axis_units(self, model: Model) -> Model:
+        """Turn the units of a model written for a rotary axis."""
+        inputs, parameters, states, outputs = (
+            tuple(map(self.in_axis_units, group))
+            for group in (model.inputs, model.parameters, model.states, model.outputs)
+        )
+        return replace(model, inputs=inputs, parameters=parameters, states=states, outputs=outputs)
 
     def with_symbols(self, symbols: dict[str, Any], v: Scalar) -> "Mount":
         """Return this mount with symbols in place of its numbers; pairs follow the direction of v."""

@@ -20,7 +20,7 @@ from cosim.cli_system import system_of
 from cosim.master import run
 from cosim.scenario import read_scenario
 from cosim.signals import Sine
-from pyfmi_models.card import read_card
+from pyfmi_models.card import parse_card, read_card
 from pyfmi_models.errors import CardError, ExportError
 from pyfmi_models.export.ssp import Connection, System, export_ssp
 from pyfmi_models.setpoint import Sine as SetPoint
@@ -144,10 +144,17 @@ def motor():
         ("m.angle", "c.measured", r'"c.measured" \[rad\] is fed by "m.angle" \[m\]'),
     ],
 )
-def test_a_wire_that_does_not_fit_is_named(source: str, target: str, said: str, tmp_path: Path) -> None:
+def test_a_wire_that_does_not_fit_is_named(source: str, target: str, said: str) -> None:
     wires = (Connection(source=source, target=target),)
     parts = {"c": controller(), "m": motor()}
-    system = System(name="s", description="", components=parts, connections=wires, step=1e-3, stop=1.0)
     with pytest.raises(ExportError, match=said):
-        export_ssp(system, tmp_path / "s.ssp")
-    assert not list(tmp_path.iterdir())
+        System(name="s", description="", components=parts, connections=wires, step=1e-3, stop=1.0)
+
+
+def test_a_linear_axis_is_wired_in_metres() -> None:
+    tuning = '[controller]\nkp = 100.0\nkd = 20.0\ncompensation = "C2a"\n'
+    axis = 'inertia = 9.0\n[friction]\nmodel = "lugre"\nsigma0 = 1e6\nFc = 2.0\n'
+    system = system_of(parse_card(f'[mount]\nmotion = "linear"\n{axis}{tuning}', "slide.toml"))
+    units = {one.name: one.unit for one in system.components["controller"].parameters}
+    assert (units["observer_bandwidth"], units["torque_limit"], units["compensation.sigma0"]) == ("rad/s", "N", "N/m")
+    assert {one.unit for one in system.components["reference"].outputs} == {"m", "m/s", "m/s2"}

@@ -46,7 +46,10 @@ class Connection:
 
 @dataclass(frozen=True, kw_only=True)
 class System:
-    """Models by the name of their component, the wires between them, and step and stop [s] of a run."""
+    """Models by the name of their component, the wires between them, and step and stop [s] of a run.
+
+    Raises ExportError if a wire joins what does not exist, or other units.
+    """
 
     name: str
     description: str
@@ -54,6 +57,14 @@ class System:
     connections: tuple[Connection, ...]
     step: float
     stop: float
+
+    def __post_init__(self) -> None:
+        for connection in self.connections:
+            ends = self.variable(connection.source, "output"), self.variable(connection.target, "input")
+            one, other = (parse_unit(end.unit) for end in ends)
+            if (one.exponents, one.factor, one.offset) != (other.exponents, other.factor, other.offset):
+                wire = f'"{connection.target}" [{other.name}] is fed by "{connection.source}" [{one.name}]'
+                raise ExportError(f"{wire}: these are different units")
 
     def variable(self, name: str, causality: Literal["input", "output"]) -> Variable:
         """Find `component.variable`; raises ExportError that names the end of a wire that is not there."""
@@ -85,26 +96,17 @@ def export_ssp(
 
     The archive holds the structure, an FMU and a parameter set a component under `resources/`, and a page of
     documentation. FMI 2 by default: FMPy's SSP runner and libcosim know no other. Equal systems give equal bytes.
-    Raises ExportError if the file exists and `force` is not given, or a wire joins what does not exist or fit.
+    Raises ExportError if the file exists and `force` is not given, or a model cannot be exported.
     """
     path = Path(path)
     if path.exists() and not force:
         raise ExportError(f"{path} exists; use force to replace it")
-    for connection in system.connections:
-        _check(system, connection)
     found = {"SystemStructure.ssd": _structure(system), "documentation/index.html": _page(system)}
     for name, model in system.components.items():
         found[f"resources/{name}.fmu"] = _fmu(model, fmi, platforms)
         found[f"resources/{name}.ssv"] = _parameters(model)
     write_zip(path, found)
     return path
-
-
-def _check(system: System, connection: Connection) -> None:
-    ends = system.variable(connection.source, "output"), system.variable(connection.target, "input")
-    source, target = (parse_unit(end.unit) for end in ends)
-    if (source.exponents, source.factor, source.offset) != (target.exponents, target.factor, target.offset):
-        raise ExportError(f'"{connection.target}" [{target.name}] is fed by "{connection.source}" [{source.name}]')
 
 
 def _fmu(model: Model, fmi: Literal[2, 3], platforms: tuple[str, ...]) -> bytes:
