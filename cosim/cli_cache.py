@@ -69,7 +69,9 @@ def _card_file(card: str, where: str) -> Path:
 def _sources() -> str:
     """Return a hash of everything that makes an FMU of a card."""
     digest = hashlib.sha256()
-    for path in sorted(one for one in _package().rglob("*") if one.suffix in {".py", ".c", ".h", ".j2", ".xml"}):
+    for path in sorted(
+        one for one in _package().rglob("*") if one.suffix in {".py", ".c", ".h", ".j2", ".xml", ".svg", ".png", ".txt"}
+    ):
         digest.update(path.name.encode() + path.read_bytes())
     return digest.hexdigest()
 

@@ -11,19 +11,37 @@ observer gains: Miklosovic, Radke, Gao, American Control Conference 2006, 3665.
 """
 
 from dataclasses import dataclass, replace
+from inspect import cleandoc
 from typing import Any, Literal
 
 import casadi as ca
 
 from pyfmi_models.friction import FrictionLaw, LuGre
-from pyfmi_models.model import Model, Scalar, Variable, parameter, parameters_of, symbols_of, with_symbols
+from pyfmi_models.model import (
+    Chapter,
+    Model,
+    Scalar,
+    Variable,
+    chapter_of,
+    parameter,
+    parameters_of,
+    symbols_of,
+    with_symbols,
+)
 
 Source = Literal["observer", "reference"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Gains:
-    """What a person tunes."""
+    """What a person tunes: gains of position and speed, bandwidth of the observer, and the inertia believed in.
+
+        tau = J (a_d + kp e + kd e') - J zeta3 + tau_f,   e = q_d - q,   e' = v_d - zeta2,   |tau| <= torque_limit
+
+    zeta2 is the observed speed, zeta3 the observed residual acceleration, tau_f the expected friction torque. The
+    command computed at a tick acts from the next tick on; the observer is fed the command that really acted.
+    Reference: Han, IEEE Trans. Ind. Electron. 56 (2009) 900.
+    """
 
     inertia: Scalar = parameter("kg.m2", "Moment of inertia the controller believes in", low=1e-9)
     kp: Scalar = parameter("1/s2", "Position gain", low=0, nominal=100)
@@ -100,7 +118,15 @@ OUTPUTS = (
 
 
 def _observe(zeta: list[Any], push: Scalar, q: Scalar, bandwidth: Scalar, period: float) -> list[Any]:
-    """One step of the extended state observer: exact prediction under constant `push` [rad/s2], then correction."""
+    """One step of the extended state observer: exact prediction under constant `push`, then correction.
+
+        zeta1 += h zeta2 + h^2/2 (zeta3 + push),      zeta2 += h (zeta3 + push)                    prediction
+        zeta1 += (1 - b^3) r,   zeta2 += 3/2 (1 - b)^2 (1 + b)/h r,   zeta3 += (1 - b)^3/h^2 r     correction
+
+    h is the period, r = q - zeta1 the surprise, b = exp(-bandwidth h) the place of all three poles; `push` [rad/s2] is
+    the torque that acted less the expected friction, over the inertia. At the first tick zeta1 starts at q.
+    Reference: Miklosovic, Radke, Gao, American Control Conference 2006, 3665.
+    """
     h = period
     position, speed, residual = zeta
     position, speed = position + h * speed + h * h / 2 * (residual + push), speed + h * (residual + push)
@@ -138,7 +164,21 @@ def _controller(adrc: Adrc) -> Model:
         outputs=OUTPUTS,
         equations=ca.Function("equations", [t, x, u, p], [following, outputs], ["t", "x", "u", "p"], ["next", "y"]),
         period=adrc.period,
+        chapters=_chapters(adrc),
     )
+
+
+def _chapters(adrc: Adrc) -> tuple[Chapter, ...]:
+    about = cleandoc(_observe.__doc__ or "")
+    observer = Chapter(
+        prefix="observer", name="Observer", title="Position, speed, residual", text=about, place="Observer"
+    )
+    law = chapter_of(adrc.gains, "", "Control law", title="Feed-forward, PD, rejection")
+    used = adrc.compensation
+    if used is None:
+        return observer, law
+    place = f"Friction from the {'observed' if used.source == 'observer' else 'desired'} speed"
+    return observer, law, chapter_of(used.law, "compensation", place, law.place)
 
 
 def _tick(adrc: Adrc, x: Any, u: Any, symbols: dict[str, Any]) -> tuple[Any, Any]:

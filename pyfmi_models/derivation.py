@@ -7,13 +7,12 @@ Each part of the mount, and the mount itself, is replaced by a listening copy, w
 from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import wraps
-from inspect import cleandoc
 from typing import Any
 
 import casadi as ca
 
 from pyfmi_models.friction import FrictionLaw
-from pyfmi_models.model import Chapter, Derivation, Pair, Scalar, Variable
+from pyfmi_models.model import Derivation, Pair, Scalar, Variable
 from pyfmi_models.mount import Mount
 from pyfmi_models.plant import written
 
@@ -44,13 +43,12 @@ Hear = Callable[[str, Variable, Scalar], None]
 
 
 def derivation_of(mount: Mount) -> Derivation:
-    """Return the derivation of `mount.model()`: its quantities in the order of writing, a chapter for each part."""
+    """Return the derivation of `mount.model()`: its quantities in the order of writing."""
     heard: dict[str, tuple[Variable, Any]] = {}
     point, following, shown = written(_listening_mount(mount, lambda *told: _note(heard, *told)))
     told = ca.vertcat(ca.SX(0, 1), *(value for _, value in heard.values()))
     results = [following, ca.vertcat(*shown.values()), told]
     return Derivation(
-        chapters=tuple(_chapter(prefix, part) for prefix, part in mount.components().items()),
         quantities=tuple(mount.in_axis_units(variable) for variable, _ in heard.values()),
         symbols=_SYMBOLS,
         equations=ca.Function("derivation", point, results, ["t", "x", "u", "p"], ["next", "y", "quantities"]),
@@ -65,10 +63,6 @@ def _note(heard: dict[str, tuple[Variable, Any]], name: str, variable: Variable,
         again = sum(one == full or one.startswith(f"{full}_again") for one in heard)
         full = f"{full}_again{again if again > 1 else ''}" if again else full
         heard[full] = (replace(variable, name=full), entry)
-
-
-def _chapter(prefix: str, part: Any) -> Chapter:
-    return Chapter(prefix=prefix, name=type(part).__name__, text=cleandoc(type(part).__doc__ or ""))
 
 
 def _listening_mount(mount: Mount, hear: Hear) -> Mount:

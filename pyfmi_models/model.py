@@ -7,6 +7,7 @@ never touches it. A component (friction law, effect, mount) is a frozen dataclas
 
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields, replace
+from inspect import cleandoc
 from math import inf
 from typing import Any, NamedTuple, TypeVar
 
@@ -58,26 +59,33 @@ class Model:
     outputs: tuple[Variable, ...]
     equations: ca.Function
     period: float | None = None
+    chapters: tuple["Chapter", ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
 class Chapter:
-    """What a person should know of the part of a model whose variables are called `prefix.name`."""
+    """What a person should know of the part of a model whose variables are called `prefix.name`.
+
+    `text` is prose with indented formulas. Chapters are in the order in which a signal meets them: `place` says where a
+    part acts, and `onto` at which other place a part works that stands beside the way from input to output.
+    """
 
     prefix: str
     name: str
+    title: str
     text: str
+    place: str = ""
+    onto: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Derivation:
-    """How the equations of a model come about, for a reader: quantities on the way, and the parts they belong to.
+    """How the equations of a model come about, for a reader: quantities on the way.
 
     `symbols` are short names by which parts know variables of the whole. `equations` maps as those of the model, to
     (next, outputs, quantities), and shares the quantities' expressions.
     """
 
-    chapters: tuple[Chapter, ...]
     quantities: tuple[Variable, ...]
     symbols: Mapping[str, str]
     equations: ca.Function
@@ -155,6 +163,13 @@ def _declared(component: Any) -> list[tuple[str, Variable, Any]]:
 def structure_of(component: Any) -> dict[str, tuple[float, ...]]:
     """Numbers of a component that shape its equations, by field; see `structure`."""
     return {item.name: getattr(component, item.name) for item in fields(component) if "structure" in item.metadata}
+
+
+def chapter_of(part: Any, prefix: str, place: str, onto: str = "", title: str = "") -> Chapter:
+    """Make a chapter of what a part of a model says of itself: its title, else its class, and its docstring."""
+    name = type(part).__name__
+    title = title or getattr(part, "title", name)
+    return Chapter(prefix=prefix, name=name, title=title, text=cleandoc(part.__doc__ or ""), place=place, onto=onto)
 
 
 def fields_of(component: Any) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ sensor effects make the reading of the position. `plant.py` puts the equations t
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import pi
-from typing import Any, Literal, TypeVar
+from typing import Any, ClassVar, Literal, TypeVar
 
 import casadi as ca
 
@@ -49,8 +49,14 @@ Seen = TypeVar("Seen", bound=MotionEffect)
 
 @dataclass(frozen=True, kw_only=True)
 class Axis:
-    """Inertia and torque limit of the axis."""
+    """Inertia and torque limit of the axis: Newton's law.
 
+        J q'' = applied(tau) - tau_f - loads - disturbance,   |tau| <= torque_limit
+
+    The disturbance and all loads resist: positive ones slow a positive speed down.
+    """
+
+    place: ClassVar[str] = "Mechanics"
     inertia: Scalar = parameter("kg.m2", "Moment of inertia", low=1e-9)
     torque_limit: Scalar = parameter("N.m", "Largest torque of the drive, either way", default=1e6, low=0)
 

@@ -12,7 +12,7 @@ import casadi as ca
 
 from pyfmi_models.effects.base import ClockEffect, Coupling, Effect, Motion, MotionEffect, SensorEffect
 from pyfmi_models.friction.base import FrictionLaw
-from pyfmi_models.model import Model, Scalar, Variable, symbols_of
+from pyfmi_models.model import Chapter, Model, Scalar, Variable, chapter_of, symbols_of
 
 if TYPE_CHECKING:
     from pyfmi_models.mount import Mount
@@ -32,7 +32,17 @@ def plant(mount: "Mount") -> Model:
         states=tuple(variable for part in _states(mount).values() for variable in part),
         outputs=tuple(mount.in_axis_units(_OUTPUTS[name]) for name in shown),
         equations=ca.Function("equations", point, results, ["t", "x", "u", "p"], ["next", "y"]),
+        chapters=_chapters(mount),
     )
+
+
+_PLACES = {"Torque path": "", "Mechanics": "", "Friction": "Mechanics", "Loads": "Mechanics", "Sensor path": ""}
+"""Where parts act, in the order in which torque becomes a reading, each with the place that it works onto."""
+
+
+def _chapters(mount: "Mount") -> tuple[Chapter, ...]:
+    found = [chapter_of(part, prefix, part.place, _PLACES[part.place]) for prefix, part in mount.components().items()]
+    return tuple(sorted(found, key=lambda chapter: list(_PLACES).index(chapter.place)))
 
 
 def written(mount: "Mount") -> tuple[list[Any], Any, dict[str, Any]]:

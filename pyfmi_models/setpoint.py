@@ -5,7 +5,7 @@ from math import pi
 
 import casadi as ca
 
-from pyfmi_models.model import Model, Scalar, Variable, parameter, parameters_of, symbols_of, with_symbols
+from pyfmi_models.model import Model, Scalar, Variable, chapter_of, parameter, parameters_of, symbols_of, with_symbols
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +47,7 @@ class Sine:
             parameters=parameters,
             states=(),
             outputs=tuple(self._in_unit(variable) for variable in _OUTPUTS),
+            chapters=(chapter_of(self, "", "Set point"),),
             equations=ca.Function("equations", [t, x, u, p], results, ["t", "x", "u", "p"], ["next", "y"]),
         )
 

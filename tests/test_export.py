@@ -1,17 +1,23 @@
 """Archives: valid in an outside tool, right in both interfaces, reproducible, self-contained."""
 
 import ctypes
+import os
 import re
+import shutil
 import subprocess
 import sys
 import time
+import xml.etree.ElementTree as ET
 import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
+from itertools import combinations
+from pathlib import Path
 
 import casadi as ca
 import export_models as models
+import fmpy
 import numpy as np
 import pytest
 from effect_examples import EXAMPLES, mount
@@ -19,6 +25,7 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 from friction_laws import EXAMPLES as LAWS
 from friction_laws import ONE_SIDED
+from lxml import etree
 from scipy.integrate import solve_ivp
 
 from pyfmi_models.card import read_card
@@ -27,8 +34,11 @@ from pyfmi_models.export import build_library, export_fmu
 from pyfmi_models.export.build import compile_shared, fmi_headers, sources_of
 from pyfmi_models.export.codegen import SHIM, generate
 from pyfmi_models.export.description import fmi2_description, fmi3_description
+from pyfmi_models.export.diagram import diagram
+from pyfmi_models.export.documentation import documentation
 from pyfmi_models.export.layout import layout_of
 from pyfmi_models.export.platforms import PLATFORMS, host
+from pyfmi_models.export.prose import formula
 from pyfmi_models.export.structure import unknowns_of
 from pyfmi_models.export.units import BASE, parse_unit
 
@@ -220,12 +230,117 @@ def test_the_archive_holds_sources_and_a_page(archive):
         assert f"binaries/{PLATFORMS[host()].fmi2}/{binary}" in file.namelist()
 
 
-def test_the_sources_in_the_archive_can_be_built_elsewhere(archive, tmp_path):
-    with zipfile.ZipFile(archive(models.controller, 3)) as file:
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_plain_gcc_makes_the_same_fmu_of_the_sources(archive, tmp_path, fmi):
+    compiler = shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("gcc is not installed")
+    with zipfile.ZipFile(archive(models.lugre, fmi)) as file:
         file.extractall(tmp_path)
-    sources = {path.name: path.read_bytes() for path in (tmp_path / "sources").glob("*.[ch]")}
-    built = compile_shared(sources, "pd.so", PLATFORMS[host()].target)
-    assert models.Driver(models.controller(), built, 3).start().step(0, 1e-3) == "ok"
+    (configuration,) = read_model_description(str(tmp_path)).buildConfigurations
+    names = [name for group in configuration.sourceFileSets for name in group.sourceFiles]
+    (binary,) = (tmp_path / "binaries").glob("*/*")
+    before = binary.read_bytes()
+    subprocess.run([compiler, "-std=c11", "-O2", "-fPIC", "-shared", *names, "-o", str(binary), "-lm"], check=True,
+                   cwd=tmp_path / "sources")  # fmt: skip
+    assert binary.read_bytes() != before
+    runs = [simulate_fmu(str(path), stop_time=0.2, output_interval=1e-3, start_values={"drive": 5.0})
+            for path in (archive(models.lugre, fmi), tmp_path)]  # fmt: skip
+    assert np.abs(runs[0]["torque"]).max() > 2
+    assert runs[0].tobytes() == runs[1].tobytes()
+
+
+def test_an_archive_made_elsewhere_by_an_empty_cache_is_the_same(archive, tmp_path):
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1]); import export_models as models;"
+        "from pyfmi_models.export import export_fmu; from pathlib import Path;"
+        "export_fmu(models.lugre(), Path('here.fmu'), fmi=3)"
+    )
+    environment = os.environ | {
+        "PYTHONHASHSEED": "77", "MOUNT_COSIM_CACHE": str(tmp_path / "cache"), "TZ": "Asia/Tokyo", "LC_ALL": "C",
+        "PYTHONPATH": os.pathsep.join(sys.path),
+    }  # fmt: skip
+    tests = str(Path(models.__file__).parent)
+    subprocess.run([sys.executable, "-c", code, tests], cwd=tmp_path, env=environment, check=True)
+    assert (tmp_path / "here.fmu").read_bytes() == archive(models.lugre, 3).read_bytes()
+
+
+def page(model):
+    return documentation(generate(model), ("x86_64-linux",))["documentation/index.html"].decode()
+
+
+def test_the_page_shows_equations_parameters_units_and_a_figure_and_needs_no_network():
+    text = page(read_card("paper_mount").plant().model())
+    assert "dz/dt = v − σ<sub>0</sub> |v| z / g(v)" in text
+    assert "<svg" in text
+    for name, value in {"friction.sigma0": "92300", "friction.Vs": "0.04129"}.items():
+        assert re.search(rf"<code>{re.escape(name)}</code></td><td>[^<]+</td><td class=\"number\">{value}<", text)
+    assert "kg m² s⁻² rad⁻¹" in text
+    for heading in ("Solver and time", "Limits", "How it was validated", "Build it from its sources", "Licences"):
+        assert f"<h2>{heading}</h2>" in text
+    assert re.findall(r"(?:src|href)=|@import|url\((?!#)", text) == []
+
+
+@pytest.mark.parametrize("name", EXPORTED)
+def test_every_part_of_a_model_has_a_chapter_and_a_place_in_the_figure(name):
+    what = EXPORTED[name]
+    model = of_case(what) if isinstance(what, str) else what.model()
+    figure = ET.fromstring(diagram(model))
+    shown = [text.text for text in figure.iter("{http://www.w3.org/2000/svg}text")]
+    assert {chapter.title for chapter in model.chapters} | {chapter.place for chapter in model.chapters} <= set(shown)
+    assert len(model.chapters) >= (2 if isinstance(what, str) else 2 + len(what.effects))
+    assert all(chapter.text for chapter in model.chapters)
+
+
+def test_boxes_of_the_figure_do_not_overlap():
+    figure = ET.fromstring(diagram(mount(*EXAMPLES).model()))
+    boxes = [[float(box.get(key)) for key in ("x", "y", "width", "height")]
+             for box in figure.iter("{http://www.w3.org/2000/svg}rect")]  # fmt: skip
+    assert len(boxes) == 7
+    for (x, y, w, h), (p, q, v, g) in combinations(boxes, 2):
+        assert x + w <= p or p + v <= x or y + h <= q or q + g <= y
+
+
+FORMULAS = {
+    "sigma0 z + sigma1 dz/dt": "σ<sub>0</sub> z + σ<sub>1</sub> dz/dt",
+    "exp(-|v/Vs|^delta)": "exp(−|v/Vs|<sup>δ</sup>)",
+    "J_far (2 pi fa)^2": "J<sub>far</sub> (2 π fa)<sup>2</sup>",
+    "warm_up_degC - rise <= 1e4": "warm_up_degC − rise ≤ 1e4",
+    "(1 - b)^3/h^2 r": "(1 − b)<sup>3</sup>/h<sup>2</sup> r",
+}
+
+
+@pytest.mark.parametrize("text", FORMULAS)
+def test_formulas_are_set_to_be_read(text):
+    assert formula(text) == FORMULAS[text]
+
+
+LICENCES = ("license", "fmi-headers")
+
+
+def test_licences_of_all_that_is_inside_are_inside(archive):
+    with zipfile.ZipFile(archive(models.lugre, 3)) as file:
+        ours, headers = (
+            file.read(f"documentation/licenses/{name}.txt").decode() for name in ("license", "fmi-headers")
+        )
+    root = Path(__file__).parents[1]
+    assert ours == (root / "LICENSE").read_text()
+    assert "Modelica Association" in headers
+    assert "Redistributions of source code must retain" in headers
+
+
+def test_the_archive_shows_an_icon_that_other_tools_find(archive):
+    with zipfile.ZipFile(archive(models.lugre, 2)) as file:
+        assert file.read("model.png").startswith(b"\x89PNG")
+    with zipfile.ZipFile(archive(models.lugre, 3)) as file:
+        icon, text = (file.read(f"terminalsAndIcons/{name}") for name in ("icon.png", "terminalsAndIcons.xml"))
+    assert icon.startswith(b"\x89PNG")
+    schema = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3TerminalsAndIcons.xsd"
+    etree.XMLSchema(etree.parse(schema)).assertValid(etree.fromstring(text))
+
+
+def test_an_archive_for_one_machine_is_small(archive):
+    assert all(archive(models.lugre, fmi).stat().st_size < 200_000 for fmi in (2, 3))
 
 
 def test_the_archive_for_another_platform_is_refused_by_name(tmp_path):
@@ -244,12 +359,6 @@ def test_a_cache_that_cannot_be_written_is_named(tmp_path, monkeypatch):
 def test_a_compiler_error_is_passed_on():
     with pytest.raises(ExportError, match=r"the C compiler failed on broken\.so .*error: "):
         compile_shared({"broken.c": b"int main(void) { return missing; }"}, "broken.so", PLATFORMS[host()].target)
-
-
-def test_a_page_of_ones_own_is_part_of_the_documentation(tmp_path):
-    path = export_fmu(models.oscillator(), tmp_path / "a.fmu", description_html="<p>by <em>hand</em></p>")
-    with zipfile.ZipFile(path) as file:
-        assert "<p>by <em>hand</em></p>" in file.read("documentation/index.html").decode()
 
 
 def test_nothing_is_overwritten_without_force(tmp_path):

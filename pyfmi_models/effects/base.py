@@ -56,6 +56,7 @@ def times(count: float) -> str:
 class Effect:
     """One kind of missing physics: what a mechanic would call it, and what tells it from its rivals."""
 
+    place: ClassVar[str] = "Mechanics"
     id: ClassVar[str]
     title: ClassVar[str]
     rivals: ClassVar[tuple[str, ...]] = ()
@@ -83,6 +84,8 @@ class Effect:
 class DriveEffect(Effect):
     """Dynamics or limits between the commanded and the applied torque."""
 
+    place: ClassVar[str] = "Torque path"
+
     def rate(self, state: Any, command: Scalar) -> Any:
         """Time derivative of the states under a command [N m], a column."""
         return ca.SX(0, 1)
@@ -109,6 +112,8 @@ class MotionEffect(Effect):
 class FrictionEffect(MotionEffect):
     """A change of the contact, of the friction level or of the viscous torque."""
 
+    place: ClassVar[str] = "Friction"
+
     def law(self, law: FrictionLaw) -> FrictionLaw:
         """Return the law that replaces `law`."""
         return law
@@ -125,6 +130,8 @@ class FrictionEffect(MotionEffect):
 @dataclass(frozen=True, kw_only=True)
 class LoadEffect(MotionEffect):
     """A torque beside friction that resists."""
+
+    place: ClassVar[str] = "Loads"
 
     def load(self, motion: Motion) -> Scalar:
         """Resisting torque [N m]."""
@@ -177,6 +184,8 @@ class Coupling(Effect):
 class SensorEffect(MotionEffect):
     """An error between the true position and what the encoder reads."""
 
+    place: ClassVar[str] = "Sensor path"
+
     def reading(self, reading: Scalar, motion: Motion) -> Scalar:
         """Return the reading [rad or m] that replaces `reading`."""
         return reading
@@ -185,6 +194,8 @@ class SensorEffect(MotionEffect):
 @dataclass(frozen=True, kw_only=True)
 class ClockEffect(MotionEffect):
     """Two clocks: the reading in a row of a recording was taken later or earlier than its torque."""
+
+    place: ClassVar[str] = "Sensor path"
 
     def ahead(self, motion: Motion) -> Scalar:
         """Seconds by which the reading runs ahead of the torque beside it."""

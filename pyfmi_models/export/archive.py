@@ -11,7 +11,7 @@ from pyfmi_models.errors import ExportError
 from pyfmi_models.export.build import FLAGS, libraries_of, sources_of, units_of
 from pyfmi_models.export.codegen import Generated, generate
 from pyfmi_models.export.description import fmi2_description, fmi3_description, xml_text
-from pyfmi_models.export.documentation import documentation_page
+from pyfmi_models.export.documentation import documentation, resource
 from pyfmi_models.export.platforms import PLATFORMS, host
 from pyfmi_models.export.universal import universal_binary
 from pyfmi_models.model import Model
@@ -22,15 +22,13 @@ def export_fmu(
     path: Path,
     *,
     fmi: Literal[2, 3] = 3,
-    description_html: str | None = None,
     force: bool = False,
     platforms: tuple[str, ...] = (),
 ) -> Path:
     """Write the model as an FMU for model exchange and co-simulation, and return its path.
 
-    The archive holds the binary for each of the platforms (names of `PLATFORMS`; default: the host), its sources and a
-    page of documentation, into which `description_html` is put before the tables. Equal models give equal bytes. The
-    file appears complete or not at all.
+    The archive holds the binary for each of the platforms (names of `PLATFORMS`; default: the host), its sources
+    and its documentation. Equal models give equal bytes. The file appears complete or not at all.
     Raises ExportError if the file exists and `force` is not given, or the model cannot be exported.
     """
     path = Path(path)
@@ -39,8 +37,9 @@ def export_fmu(
     if fmi not in (2, 3):
         raise ExportError(f"there is no FMI {fmi} export; choose 2 or 3")
     generated = generate(model)
-    files = _description(generated, fmi) | _binaries(generated, fmi, platforms or (host(),)) | _sources(generated, fmi)
-    files["documentation/index.html"] = documentation_page(generated.layout, description_html).encode()
+    platforms = platforms or (host(),)
+    files = _description(generated, fmi) | _binaries(generated, fmi, platforms) | _sources(generated, fmi)
+    files |= documentation(generated, platforms) | _icon(model, fmi)
     write_zip(path, files)
     return path
 
@@ -91,6 +90,21 @@ def _build_description(generated: Generated, units: list[str]) -> bytes:
     for name in units:
         ET.SubElement(group, "SourceFile", name=name)
     return xml_text(root)
+
+
+def _icon(model: Model, fmi: int) -> dict[str, bytes]:
+    """The picture that tools show: FMI 2 knows one file, FMI 3 a folder that says how large the picture is."""
+    name = "sampled" if model.period else "continuous"
+    if fmi == 2:
+        return {"model.png": resource(f"{name}.png")}
+    corners = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
+    root = ET.Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+    picture = ET.SubElement(root, "GraphicalRepresentation")
+    ET.SubElement(picture, "CoordinateSystem", {**corners, "suggestedScalingFactorTo_mm": "0.1"})
+    ET.SubElement(picture, "Icon", corners)
+    found = {f"icon.{kind}": resource(f"{name}.{kind}") for kind in ("png", "svg")}
+    found["terminalsAndIcons.xml"] = xml_text(root)
+    return {f"terminalsAndIcons/{file}": content for file, content in found.items()}
 
 
 def write_zip(path: Path, files: dict[str, bytes]) -> None:

@@ -86,7 +86,7 @@ class Book:
         results = graph_of(derivation.equations if derivation else model.equations)
         self._names = {node: self._argument(node) for node in _under(chain(*results)) if node.place != (-1, -1)}
         wanted = [*self._quantities(derivation, results), *self._rates(results[0]), *self._outputs(results[1])]
-        self.parts = self._empty_parts(derivation)
+        self.parts = self._empty_parts()
         wanted = [*self._shared(wanted), *wanted]
         self._locals = self._take_names(wanted)
         for one in wanted:
@@ -150,8 +150,8 @@ class Book:
             return 0
         return 1 + sum(self._length(one) for one in node.arguments)
 
-    def _empty_parts(self, derivation: Derivation | None) -> dict[str, Part]:
-        known = {chapter.prefix: chapter for chapter in (derivation.chapters if derivation else ())}
+    def _empty_parts(self) -> dict[str, Part]:
+        known = {chapter.prefix: chapter for chapter in self.model.chapters}
         dotted = [name.partition(".")[0] for name in self._variables if "." in name and not name.startswith("der(")]
         parts, titles = {}, Part("", "", "")
         titles.take("Plant")

@@ -87,11 +87,12 @@ def _head(root: ET.Element, layout: Layout) -> None:
     structured = all(_NAME.fullmatch(row.variable.name) for row in layout.rows if row.kind != "rate")
     root.set("modelName", model.name)
     root.set("description", description_text(model.description, model.period))
-    root.set("generationTool", f"mount-cosim {_version()}")
+    root.set("generationTool", f"mount-cosim {version_text()}")
     root.set("variableNamingConvention", "structured" if structured else "flat")
 
 
-def _version() -> str:
+def version_text() -> str:
+    """The version of mount-cosim that is installed."""
     try:
         return version("mount-cosim")
     except PackageNotFoundError:

@@ -9,12 +9,12 @@ import math
 import re
 import textwrap
 from collections.abc import Iterable, Iterator
-from html import escape
 from pathlib import Path
 
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export.book import Book, Definition, Named, Part
 from pyfmi_models.export.expressions import number_text
+from pyfmi_models.export.prose import prose
 from pyfmi_models.model import Derivation, Model
 
 WIDTH = 110
@@ -115,14 +115,8 @@ def _equations(definitions: Iterable[Definition]) -> Iterator[str]:
 def _documentation(text: str) -> Iterator[str]:
     if text:
         yield 'annotation(Documentation(info = "<html>'
-        yield from (line.replace("\\", "\\\\").replace('"', '\\"') for line in _html(text))
+        yield from (line.replace("\\", "\\\\").replace('"', '\\"') for line in prose(text).splitlines())
         yield '</html>"));'
-
-
-def _html(text: str) -> Iterator[str]:
-    for paragraph in re.split(r"\n\s*\n", text):
-        tag = "pre" if paragraph.startswith(" ") else "p"
-        yield from f"<{tag}>{escape(textwrap.dedent(paragraph), quote=False)}</{tag}>".splitlines()
 
 
 def _first_line(text: str) -> str:

@@ -20,6 +20,7 @@ from pyfmi_models.model import Scalar, Variable, parameter
 class FrictionLaw:
     """A friction law; subclasses state their equation, their limits and their reference."""
 
+    place: ClassVar[str] = "Friction"
     key: ClassVar[str]
 
     def states(self) -> tuple[Variable, ...]:
