@@ -90,6 +90,9 @@ def _tell(statistics: dict[str, Any]) -> None:
         "{steps:,} steps in {seconds:.3g} s, {ratio_to_real_time:.3g} times real time, "
         "{microseconds_per_step:.3g} us a step with recording ({rows:,} rows, {loop} loop)".format(**statistics)
     )
+    for effort in statistics["coupling"]:
+        a_step = effort["rounds"] / max(statistics["steps"], 1)
+        say(f"coupled components took {a_step:.3g} passes a step, {effort['greatest']} at most")
     if statistics["unconnected"]:
         say(f"not connected, at their start values: {', '.join(map(str, statistics['unconnected']))}")
     for note in statistics["notes"]:

@@ -84,6 +84,10 @@ class Component(Protocol):
         """Whether `save` and `restore` work."""
 
     @property
+    def flexible(self) -> bool:
+        """Whether steps may differ in length."""
+
+    @property
     def functions(self) -> Functions | None:
         """Addresses for the compiled loop; None for a component that only Python can step."""
 

@@ -74,6 +74,7 @@ class ExchangeComponent(FmuComponent):
     Args:
         path: the .fmu file.
         name: what the component is called in messages; the model's name where not given.
+        description: what `describe` read of it, if that was done before.
 
     Raises:
         FmuError: as of `FmuComponent`, or the compiled loop is missing, in which the solver lives.
@@ -81,13 +82,13 @@ class ExchangeComponent(FmuComponent):
 
     interface = "modelExchange"
 
-    def __init__(self, path: Path | str, name: str = "") -> None:
+    def __init__(self, path: Path | str, name: str = "", description: Any = None) -> None:
         found = library()
         if found is None:
             message = f"{path} is for model exchange, and its solver needs the compiled loop, which is missing here."
             raise FmuError(message, culprit=str(path))
         self._library = found
-        super().__init__(path, name)
+        super().__init__(path, name, description)
 
     def start(self, parameters: Mapping[str, Any]) -> None:
         """Set parameters and start values by name and initialise at t = 0; a second call starts all over again."""
@@ -106,6 +107,11 @@ class ExchangeComponent(FmuComponent):
     def rewinds(self) -> bool:
         """Steps of the solver are not taken back."""
         return False
+
+    @property
+    def flexible(self) -> bool:
+        """Steps of any length."""
+        return True
 
     def _culprit(self) -> str:
         names = [one.name for one in self._derivatives()]
@@ -156,5 +162,6 @@ def open_fmu(path: Path | str, name: str = "", interface: str = "") -> FmuCompon
     Raises:
         FmuError: see the components.
     """
-    exchange = interface == "model-exchange" or (not interface and describe(Path(path)).coSimulation is None)
-    return (ExchangeComponent if exchange else FmuComponent)(path, name)
+    description = describe(Path(path))
+    exchange = interface == "model-exchange" or (not interface and description.coSimulation is None)
+    return (ExchangeComponent if exchange else FmuComponent)(path, name, description)

@@ -1,6 +1,7 @@
 """A plan on its way: the loop runs it chunk by chunk, and its rows go to a writer."""
 
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from dataclasses import asdict, dataclass
 from time import perf_counter
 from typing import Any
@@ -36,16 +37,13 @@ class Execution:
     seconds: float = 0.0
 
     def execute(self) -> None:
-        """Run the loop to its end, writing row after row; the last row may be cut short."""
+        """Run the loop to its end and complete the recording, whatever ends the run; the last row may be cut short."""
         begun = perf_counter()
-        self.writer.origin["complete"] = False
         try:
-            self._run_chunks()
+            with closing(self.writer):
+                self._stream()
         finally:
-            with uninterrupted():
-                self._write(self.loop.flush())
             self.seconds = perf_counter() - begun
-        self.writer.origin["complete"] = True
 
     def statistics(self) -> dict[str, Any]:
         """Tell how it went, for people and programs."""
@@ -79,6 +77,15 @@ class Execution:
         if self.loop.kind != "compiled":
             notes.append(f"{slow_because(self.plan)}: the loop ran in Python.")
         return notes
+
+    def _stream(self) -> None:
+        self.writer.origin["complete"] = False
+        try:
+            self._run_chunks()
+        finally:
+            with uninterrupted():
+                self._write(self.loop.flush())
+        self.writer.origin["complete"] = True
 
     def _run_chunks(self) -> None:
         streams = make_streams(self.wiring, self.plan.step)
@@ -126,7 +133,7 @@ class Execution:
 
 def chunks(ticks: int) -> Iterator[np.ndarray]:
     """Yield all ticks in pieces that take about CHUNK_SECONDS each, as measured on the piece before."""
-    first, size = 0, 1024
+    first, size = 0, 16
     while first < ticks:
         begun = perf_counter()
         last = min(first + size, ticks)

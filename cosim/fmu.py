@@ -47,6 +47,7 @@ class FmuComponent:
     Args:
         path: the .fmu file.
         name: what the component is called in messages; the model's name where not given.
+        description: what `describe` read of it, if that was done before.
 
     Raises:
         FmuError: the file is no FMU, has no binary for this platform, or cannot be instantiated.
@@ -55,9 +56,9 @@ class FmuComponent:
     interface = "coSimulation"
     """The element of the model description that must be there."""
 
-    def __init__(self, path: Path | str, name: str = "") -> None:
+    def __init__(self, path: Path | str, name: str = "", description: Any = None) -> None:
         self.path = Path(path)
-        self._description = describe(self.path)
+        self._description = description or describe(self.path)
         self._own = own_interface(self.path, self._description, self.interface)
         self.name = name or self._description.modelName
         self.ports: Mapping[str, Port] = ports_of(self._description)
@@ -157,6 +158,11 @@ class FmuComponent:
     def rewinds(self) -> bool:
         """Whether the FMU can save and restore its state."""
         return bool(self._own.canGetAndSetFMUstate)
+
+    @property
+    def flexible(self) -> bool:
+        """Whether the FMU takes steps of changing length."""
+        return bool(self._own.canHandleVariableCommunicationStepSize)
 
     @property
     def _version(self) -> int:

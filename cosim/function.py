@@ -44,7 +44,7 @@ class FunctionComponent:
         origin: what a recording shall say about where it comes from.
     """
 
-    rewinds = False
+    rewinds, flexible = False, True
 
     def __init__(
         self,

@@ -5,7 +5,7 @@ the algorithm's (`algorithm`); Jacobi where nothing else is said.
 """
 
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack, closing
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -118,8 +118,7 @@ def simulate(
         units = {"t": "s"} | {key: wiring.unit(one) for key, one in wiring.records.items()}
         writer = StreamWriter(path, units, story, force) if path else MemoryWriter(units, story)
         work = Execution(wiring, plan, make_loop(plan, compiled), writer, ticks, progress)
-        with closing(writer):
-            work.execute()
+        work.execute()
     known = {key: unit for key, unit in units.items() if unit}
     recording = None if path else Recording(name, writer.table(), known, writer.origin)
     return Run(work.statistics(), path, recording)

@@ -31,7 +31,6 @@ from cosim.errors import ScenarioError, WiringError
 from cosim.faults import Fault
 from cosim.renamed import Alias
 from cosim.signals import Generator, Recorded, Signal
-from cosim.ssp import read_ssp
 from cosim.wiring import Record, Wire
 
 
@@ -167,6 +166,8 @@ def read_scenario(source: str | Path) -> Scenario:
     if not path.exists() and shipped.is_file():
         return parse_scenario(shipped.read_text("utf-8"), str(source), Path())
     if path.suffix == ".ssp":
+        from cosim.ssp import read_ssp  # most runs need no XML
+
         text, folder = read_ssp(path)
         return parse_scenario(text, str(source), folder)
     if path.suffix != ".toml" or not path.is_file():

@@ -137,6 +137,9 @@ def _check_members(
                 f"leave it out of algorithm.components, or choose jacobi, gauss-seidel or energy."
             )
             raise WiringError(message, culprit=name, choices=("jacobi", "gauss-seidel", "energy"))
+        if isinstance(algorithm, Energy) and not components[name].flexible:
+            message = f'"{name}" takes steps of one length only, and the energy algorithm cuts them into pieces.'
+            raise WiringError(message, culprit=name, choices=("jacobi", "gauss-seidel", "iterated"))
 
 
 def _inner(wire: Wire, wires: Sequence[Wire], place: Mapping[str, int]) -> Inner:

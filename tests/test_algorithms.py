@@ -358,6 +358,12 @@ def test_iteration_needs_components_that_can_be_taken_back(tiny: Tiny, tmp_path:
         oscillator(fmu, Iterated(kind="iterated"))
 
 
+def test_pieces_of_a_step_need_components_that_take_them(plain: Tiny, tmp_path: Path) -> None:
+    fmu = described(plain[3], tmp_path / "stiff.fmu", description(3, flexible=False))
+    with pytest.raises(WiringError, match='"mass" takes steps of one length only, and the energy algorithm cuts them'):
+        oscillator(fmu, Energy(kind="energy", bonds=BOND))
+
+
 def test_a_quantised_wire_is_not_iterated(tiny: Tiny) -> None:
     wires = [Wire("one.y", "two.a", quantum=0.1), Wire("two.y", "one.a")]
     with pytest.raises(WiringError, match=r'The wire to "two.a" is quantised; values that are iterated must be smooth'):

@@ -126,8 +126,11 @@ def described(fmu: Path, path: Path, xml: str) -> Path:
     return path
 
 
-def description(version: int, *, direct: bool = False, state: bool = True) -> str:
-    """Write the XML of one FMI version; `direct`: y follows a and b at once; `state`: it can be saved."""
+def description(version: int, *, direct: bool = False, state: bool = True, flexible: bool = True) -> str:
+    """Write the XML of one FMI version.
+
+    `direct`: y follows a and b at once; `state`: it can be saved; `flexible`: steps may differ in length.
+    """
     head = {
         2: '<fmiModelDescription fmiVersion="2.0" modelName="tiny" guid="t">',
         3: '<fmiModelDescription fmiVersion="3.0" modelName="tiny" instantiationToken="t">',
@@ -138,6 +141,7 @@ def description(version: int, *, direct: bool = False, state: bool = True) -> st
         3: f'<Output valueReference="6" dependencies="{known}"/>',
     }
     saves = f'canGetAndSetFMU{"s" if version == 2 else "S"}tate="{str(state).lower()}"'
+    saves += f' canHandleVariableCommunicationStepSize="{str(flexible).lower()}"'
     units = "".join(f'<Unit name="{unit}"/>' for unit in ("rad", "1", "s"))
     rows = "".join(_variable(version, number, *row) for number, row in enumerate(VARIABLES))
     return (

@@ -13,6 +13,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 STEP = 1e-4
 START = {"controller": {"kp": 0.0, "v_d": 0.01}, "plant": {"speed": 0.01}}
@@ -54,7 +55,7 @@ def c(folder: Path, fmi: int, steps: int) -> float:
     return seconds
 
 
-def cosim(folder: Path, fmi: int, steps: int, compiled: bool = True) -> float:
+def cosim(folder: Path, fmi: int, steps: int, compiled: bool = True, algorithm: Any = None) -> float:
     """All of `simulate` with six signals streamed to Parquet, file closed; minus the same for one step."""
     from cosim.fmu import FmuComponent
     from cosim.master import simulate
@@ -66,10 +67,16 @@ def cosim(folder: Path, fmi: int, steps: int, compiled: bool = True) -> float:
         for ticks in (1, steps):
             begun = perf_counter()
             path = Path(out) / f"{ticks}.parquet"
-            options = {"step": STEP, "parameters": START, "compiled": compiled}
+            options: dict[str, Any] = {"step": STEP, "parameters": START, "compiled": compiled, "algorithm": algorithm}
             simulate(components, wires, record=RECORD, ticks=ticks, path=path, **options)
             seconds.append(perf_counter() - begun)
     return seconds[1] - seconds[0]
+
+
+def gauss_seidel(folder: Path, fmi: int, steps: int) -> float:
+    from cosim.algorithm import GaussSeidel
+
+    return cosim(folder, fmi, steps, algorithm=GaussSeidel(kind="gauss-seidel"))
 
 
 def interpreted(folder: Path, fmi: int, steps: int) -> float:
@@ -148,7 +155,7 @@ def libcosimpy(folder: Path, fmi: int, steps: int) -> float:
 
 
 RUNNERS: dict[str, Callable[[Path, int, int], float]] = {
-    one.__name__: one for one in (c, cosim, interpreted, fmpy, ecospy, libcosimpy)
+    one.__name__: one for one in (c, cosim, gauss_seidel, interpreted, fmpy, ecospy, libcosimpy)
 }
 
 if __name__ == "__main__":

@@ -23,10 +23,19 @@ from typing import Any
 import cosim
 
 HERE = Path(__file__).parent
-STEPS = {"c": 150_000, "cosim": 150_000, "ecospy": 150_000, "libcosimpy": 20_000, "fmpy": 20_000, "interpreted": 5_000}
+STEPS = {
+    "c": 150_000,
+    "cosim": 150_000,
+    "gauss_seidel": 150_000,
+    "ecospy": 150_000,
+    "libcosimpy": 20_000,
+    "fmpy": 20_000,
+    "interpreted": 5_000,
+}
 TITLES = {
     "c": "plain C loop",
     "cosim": "cosim, 6 signals to Parquet",
+    "gauss_seidel": "cosim, Gauss-Seidel, 6 signals to Parquet",
     "ecospy": "ecospy step(N), nothing recorded",
     "libcosimpy": "libcosimpy step(N), nothing recorded",
     "fmpy": "FMPy: get, set, doStep in Python",

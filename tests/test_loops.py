@@ -1,0 +1,90 @@
+"""Any plan gives the same bits in C and in Python: components, wires, rates, algorithms and faults at random."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from pydantic import TypeAdapter
+from tiny_fmu import tiny
+
+from cosim.algorithm import GaussSeidel, Iterated, Jacobi
+from cosim.faults import Fault
+from cosim.fmu import FmuComponent
+from cosim.master import simulate
+from cosim.wiring import Record, Wire
+
+__all__ = ["tiny"]
+
+NAMES = ("one", "two", "three")
+SOURCES = ("r", "n", *(f"{name}.y" for name in NAMES))
+
+
+@st.composite
+def wires(draw: Any) -> list[Wire]:
+    found = []
+    for target in (f"{name}.{port}" for name in NAMES for port in "ab"):
+        source = draw(st.sampled_from((None, *SOURCES)))
+        if source:
+            gain, quantum = draw(st.sampled_from((1.0, -0.5, 0.9))), draw(st.sampled_from((0.0, 0.0, 0.01)))
+            found.append(Wire(source, target, gain=gain, quantum=quantum, noise=draw(st.sampled_from(("", "n")))))
+    return found
+
+
+@st.composite
+def systems(draw: Any) -> dict[str, Any]:
+    wired = draw(wires())
+    order = tuple(draw(st.permutations(NAMES)))
+    algorithm = draw(st.sampled_from([Jacobi(), GaussSeidel(kind="gauss-seidel", order=order), "iterated"]))
+    every = {name: draw(st.sampled_from((1, 1, 2, 3, 5))) for name in NAMES}
+    if algorithm == "iterated":
+        members = order[: draw(st.integers(1, 3))]
+        algorithm = Iterated(kind="iterated", components=members, theta=draw(st.sampled_from((0.5, 1.0))))
+        every |= dict.fromkeys(members, 1)
+        wired = [
+            Wire(one.source, one.target, gain=one.gain, noise=one.noise)
+            if {one.source.partition(".")[0], one.target.partition(".")[0]} <= set(members)
+            else one
+            for one in wired
+        ]
+    kinds = [{"kind": "freeze"}, {"kind": "scale", "factor": 0.5}, {"kind": "noise", "rms": 0.1, "seed": 3}]
+    places = ["r", *(wire.target for wire in wired)]
+    faults = [
+        {"on": draw(st.sampled_from(places)), "from": draw(st.floats(0, 0.4)), **draw(st.sampled_from(kinds))}
+        for _ in range(draw(st.integers(0, 3)))
+    ]
+    records = {
+        f"c{k}": Record(signal, draw(st.sampled_from(("sample", "mean"))))
+        for k, signal in enumerate((*SOURCES, *(wire.target for wire in wired)))
+    }
+    return {
+        "wires": wired,
+        "algorithm": algorithm,
+        "every": every,
+        "faults": [TypeAdapter(Fault).validate_python(fault) for fault in faults],
+        "record": records,
+        "decimation": draw(st.integers(1, 4)),
+        "parameters": {name: {"mode": draw(st.sampled_from((0.0, 1.0))), "k": 0.7} for name in NAMES},
+    }
+
+
+@pytest.fixture(scope="module")
+def three(tiny: dict[int, Path]) -> Any:
+    parts = {name: FmuComponent(tiny[2 + (name == "two")], name) for name in NAMES}
+    yield parts
+    for part in parts.values():
+        part.close()
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(system=systems())
+def test_any_plan_gives_the_same_bits_in_c_and_in_python(three: Any, system: dict[str, Any]) -> None:
+    r = np.sin(np.arange(47) * 0.3)
+    common: dict[str, Any] = {"step": 1e-2, "ticks": 47, "signals": {"r": r, "n": 0.01 * np.cos(r * 99)}}
+    first, second = (simulate(three, compiled=compiled, **common, **system) for compiled in (True, False))
+    assert [run.statistics["loop"] for run in (first, second)] == ["compiled", "interpreted"]
+    assert first.statistics["coupling"] == second.statistics["coupling"]
+    for name in first.recording:
+        np.testing.assert_array_equal(first.recording[name], second.recording[name])
