@@ -54,6 +54,8 @@ class Renamed:
         self._component.start({self._own(name): value for name, value in parameters.items()})
 
     def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
         return getattr(self._component, name)
 
     def _feedthrough(self) -> Mapping[str, frozenset[str] | None]:

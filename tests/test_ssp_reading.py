@@ -282,10 +282,11 @@ def test_damaged_archives_are_refused(tiny: dict[int, Path], tmp_path: Path, mon
     path.write_bytes(good[:middle] + bytes(byte ^ 255 for byte in good[middle : middle + 40]) + good[middle + 40 :])
     with pytest.raises(ScenarioError, match=r'"resources/tiny 2.fmu" is damaged or encrypted'):
         read_scenario(path)
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("SystemStructure.ssd", "<a>")
-    with pytest.raises(ScenarioError, match="is not valid XML"):
-        read_scenario(path)
+    for text in ("<a>", '<?xml version="1.0" encoding="none-such"?><a/>', '<?xml version="1.0" encoding="utf-7"?><a/>'):
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("SystemStructure.ssd", text)
+        with pytest.raises(ScenarioError, match="is not valid XML"):
+            read_scenario(path)
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("notes.txt", "")
     with pytest.raises(ScenarioError, match=r'"SystemStructure.ssd" is missing'):

@@ -59,7 +59,7 @@ class Archive:
         """Read an XML member whose root is `tag`, as in `ssv:ParameterSet`."""
         try:
             root = ElementTree.fromstring(self.read(source))
-        except ElementTree.ParseError as error:
+        except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two: encodings that are not known
             raise self.error(f'"{source}" is not valid XML: {first_line(error)}') from error
         if root.tag != tagged(tag):
             raise self.error(f'"{source}" has the root "{root.tag}" where "{tagged(tag)}" is needed')
