@@ -234,7 +234,9 @@ def _value(value: Any, item: Declared[Any], by_direction: bool, where: str) -> A
 
 
 def _number_or_pair(value: Any, variable: Variable, where: str) -> float | Pair:
-    if isinstance(value, dict) and set(value) == set(Pair._fields):
+    if isinstance(value, dict):
+        if set(value) != set(Pair._fields):
+            raise CardError(f"{where} = {value!r} is no pair; a pair is {{ positive = ..., negative = ... }}.")
         return Pair(**{side: _number(value[side], variable, f"{where}.{side}") for side in Pair._fields})
     return _number(value, variable, where)
 

@@ -205,7 +205,7 @@ MISTAKES = {
         SMALL.replace("1.0", "{ positive = 1, negative = -2 }"),
         f"{LAW}: Fc.negative = -2 is outside 0 .. inf.",
     ),
-    "half a pair": (SMALL.replace("1.0", "{ positive = 1 }"), f"{LAW}: Fc = {{'positive': 1}} is not a number."),
+    "half a pair": (SMALL.replace("1.0", "{ positive = 1 }"), f"{LAW}: Fc = {{'positive': 1}} is no pair; "),
     "pair in a pair": (
         SMALL.replace("1.0", "{ positive = 1, negative = { positive = 1, negative = 2 } }"),
         f"{LAW}: Fc.negative = {{'positive': 1, 'negative': 2}} is not a number.",
