@@ -48,6 +48,7 @@ class FmuComponent:
         path: the .fmu file.
         name: what the component is called in messages; the model's name where not given.
         description: what `describe` read of it, if that was done before.
+        tolerance: relative tolerance of the FMU's own solver; the FMU's default where not given.
 
     Raises:
         FmuError: the file is no FMU, has no binary for this platform, or cannot be instantiated.
@@ -56,11 +57,14 @@ class FmuComponent:
     interface = "coSimulation"
     """The element of the model description that must be there."""
 
-    def __init__(self, path: Path | str, name: str = "", description: Any = None) -> None:
+    def __init__(
+        self, path: Path | str, name: str = "", description: Any = None, tolerance: float | None = None
+    ) -> None:
         self.path = Path(path)
         self._description = description or describe(self.path)
         self._own = own_interface(self.path, self._description, self.interface)
         self.name = name or self._description.modelName
+        self._tolerance = tolerance
         self.ports: Mapping[str, Port] = ports_of(self._description)
         self.feedthrough = feedthrough_of(self._description)
         self.origin: dict[str, Any] = origin_of(self.path, self._description)
@@ -90,9 +94,9 @@ class FmuComponent:
             for variable, value in checked:
                 self._set_start(variable, value)
             if self._version == 2:
-                self._fmu.setupExperiment(startTime=0.0)
+                self._fmu.setupExperiment(tolerance=self._tolerance, startTime=0.0)
             self._started = True
-            self._fmu.enterInitializationMode()
+            self._fmu.enterInitializationMode(**({} if self._version == 2 else {"tolerance": self._tolerance}))
             self._fmu.exitInitializationMode()
         except CosimError:
             raise

@@ -14,7 +14,7 @@ from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from pyfmi_models.adrc import Adrc, Compensation, Gains, compensation_case
+from pyfmi_models.adrc import VELOCITIES, Adrc, Compensation, Gains, Observer, compensation_case
 from pyfmi_models.effects import CATALOGUE, Effect, GravityUnbalance
 from pyfmi_models.errors import CardError
 from pyfmi_models.friction import LAWS, FrictionLaw, LuGre
@@ -49,7 +49,11 @@ class EncoderSection(_Section):
 
 
 class ControllerSection(_Section):
-    """`[controller]`: gains of the ADRC, loop and record rate [Hz], friction compensation case."""
+    """`[controller]`: gains of the ADRC, loop and record rate [Hz], and what the controller is composed of.
+
+    `velocity` is the speed in the error's derivative, `observer_order` 3 or 4, `compensation` the paper's case (C2a+C3a
+    is half of each), `[controller.friction]` the friction it compensates (without it: the card's).
+    """
 
     type: Literal["adrc"] = "adrc"
     kp: float = Field(gt=0)
@@ -57,7 +61,10 @@ class ControllerSection(_Section):
     loop_hz: float = Field(default=10_000.0, gt=0)
     record_hz: float = Field(default=1_000.0, gt=0)
     observer_bandwidth: float = Field(default=220.0, gt=0)
-    compensation: Literal["C1", "C2a", "C2b", "C3a", "C3b"] = "C1"
+    observer_order: Literal[3, 4] = 3
+    velocity: Literal["observer", "difference"] = "observer"
+    compensation: Literal["C1", "C2a", "C2b", "C3a", "C3b", "C2a+C3a"] = "C1"
+    friction: Table | None = None
 
 
 class _Card(_Section):
@@ -73,7 +80,10 @@ class _Card(_Section):
 
 @dataclass(frozen=True, kw_only=True)
 class Card:
-    """A checked card: sections as numbers, friction and effects as objects."""
+    """A checked card: sections as numbers, friction and effects as objects.
+
+    `believed` is the friction that the controller compensates, where it is not the card's.
+    """
 
     path: str
     mount: MountSection
@@ -82,6 +92,7 @@ class Card:
     effects: tuple[Effect, ...] = ()
     encoder: EncoderSection = field(default_factory=EncoderSection)
     controller: ControllerSection | None = None
+    believed: FrictionLaw | None = None
     columns: dict[str, str] = field(default_factory=dict)
     origin: Table = field(default_factory=dict)
 
@@ -110,17 +121,25 @@ class Card:
             torque_limit=self.mount.torque_limit,
         )
         name = _identifier(self.mount.name)
-        adrc = Adrc(name=name, gains=gains, period=1 / tuning.loop_hz, compensation=self._compensation())
+        adrc = Adrc(
+            name=name,
+            gains=gains,
+            period=1 / tuning.loop_hz,
+            observer=Observer(order=tuning.observer_order),
+            velocity=VELOCITIES[tuning.velocity],
+            estimates=self._compensation(tuning.compensation),
+        )
         return self.plant().model_in_axis_units(adrc.model())
 
-    def _compensation(self) -> Compensation | None:
-        case = self.controller.compensation if self.controller else "C1"
+    def _compensation(self, case: str) -> tuple[Compensation, ...]:
+        law = self.believed or self.friction
         if case == "C1":
-            return None
-        if not isinstance(self.friction, LuGre):
-            rule = 'needs [friction] model = "lugre"'
-            raise CardError(f'{self.path}: [controller] compensation = "{case}" {rule}; it is "{self.friction.key}".')
-        return compensation_case(case, self.friction)
+            return ()
+        if not isinstance(law, LuGre):
+            section = "controller.friction" if self.believed else "friction"
+            rule = f'needs [{section}] model = "lugre"'
+            raise CardError(f'{self.path}: [controller] compensation = "{case}" {rule}; it is "{law.key}".')
+        return compensation_case(case, law)
 
 
 def read_card(source: str | Path) -> Card:
@@ -151,15 +170,16 @@ def parse_card(text: str, path: str) -> Card:
         raise CardError(f"{path} is not valid TOML: {error}.") from None
     except ValidationError as error:
         raise CardError(f"{path}: {_sentence(error)}") from None
-    known = raw.unbalance
+    known, believed = raw.unbalance, raw.controller.friction if raw.controller else None
     return Card(
         path=path,
         mount=raw.mount,
-        friction=_friction(dict(raw.friction), path),
+        friction=_friction(dict(raw.friction), f"{path}: [friction]"),
         unbalance=None if known is None else _build(GravityUnbalance, dict(known), f"{path}: [unbalance]"),
         effects=tuple(_effect(dict(table), path, index) for index, table in enumerate(raw.effects)),
         encoder=raw.encoder,
         controller=raw.controller,
+        believed=None if believed is None else _friction(dict(believed), f"{path}: [controller.friction]"),
         columns=raw.columns,
         origin=raw.origin,
     )
@@ -177,12 +197,12 @@ def _sentence(error: ValidationError) -> str:
     return f"{where} = {first['input']!r} breaks the rule: {rule}."
 
 
-def _friction(table: Table, path: str) -> FrictionLaw:
-    key = _word(table, "model", LAWS, f"{path}: [friction]")
+def _friction(table: Table, where: str) -> FrictionLaw:
+    key = _word(table, "model", LAWS, where)
     # A card says "no Stribeck term" by Fs = Fc; the law says it by having no Fs, so that a fit of Fc cannot make one.
     if "Fs" in _keys(LAWS[key]) and "Fs" in table and table["Fs"] == table.get("Fc"):
         table = {name: value for name, value in table.items() if name not in ("Fs", "Vs")}
-    return _build(LAWS[key], table, f"{path}: [friction]")
+    return _build(LAWS[key], table, where)
 
 
 def _effect(table: Table, path: str, index: int) -> Effect:

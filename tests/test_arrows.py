@@ -37,7 +37,15 @@ RUNNERS = (
     "description",
     "sweep",
 )
-MAKERS = ("cosim.diagnosis", "cosim.identify", "cosim.proof", "cosim.demo", "cosim.stiffness", "cosim.cli")
+MAKERS = (
+    "cosim.diagnosis",
+    "cosim.identify",
+    "cosim.paper",
+    "cosim.proof",
+    "cosim.demo",
+    "cosim.stiffness",
+    "cosim.cli",
+)
 
 
 def imports(name: str, inside: bool = True) -> set[str]:

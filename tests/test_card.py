@@ -44,6 +44,13 @@ ratio = 3
 kp = 225
 kd = 30
 compensation = "C3a"
+observer_order = 4
+velocity = "difference"
+
+[controller.friction]
+model = "lugre"
+sigma0 = 9e4
+Fc = { positive = 2.0, negative = 2.5 }
 
 [columns]
 tau = "force"
@@ -94,6 +101,7 @@ def test_a_card_says_what_was_written() -> None:
     )
     assert card.controller is not None
     assert (card.controller.compensation, card.controller.loop_hz) == ("C3a", 10_000)
+    assert card.believed == LuGre(sigma0=9e4, Fc=Pair(2.0, 2.5))
     assert card.columns == {"tau": "force", "motor temperature": "T_m"}
 
 
@@ -190,7 +198,11 @@ MISTAKES = {
     ),
     "wrong word": (
         SMALL + '[controller]\nkp = 1\nkd = 1\ncompensation = "C9"\n',
-        "[controller] compensation = 'C9' breaks the rule: input should be 'C1', 'C2a', 'C2b', 'C3a' or 'C3b'.",
+        "compensation = 'C9' breaks the rule: input should be 'C1', 'C2a', 'C2b', 'C3a', 'C3b' or 'C2a+C3a'.",
+    ),
+    "unknown law in the controller": (
+        SMALL + '[controller]\nkp = 1\nkd = 1\n[controller.friction]\nmodel = "sand"\n',
+        "bad.toml: [controller.friction] model = 'sand' is unknown; models are: ",
     ),
     "friction without a law": (SMALL.replace("model", "#"), f"{LAW} model is missing; models are: "),
     "unknown law": (
@@ -279,7 +291,9 @@ def test_a_mistake_in_a_card_is_named_in_one_sentence(mistake: str, tmp_path: Pa
 def test_a_card_that_is_not_there_lists_those_that_are() -> None:
     with pytest.raises(CardError) as caught:
         read_card("paper_mont")
-    assert str(caught.value) == "paper_mont: no such card. Shipped cards are: emps, paper_mount."
+    assert (
+        str(caught.value) == "paper_mont: no such card. Shipped cards are: emps, paper_mount, paper_mount_directional."
+    )
 
 
 def test_a_folder_is_no_card(tmp_path: Path) -> None:

@@ -45,6 +45,7 @@ CONTRACT = {
     "compliance": {"antiresonance_hz", "resonance_hz"},
     "actuator_lag": {"time_constant_ms"},
     "delay": {"delay_ms"},
+    "friction_wander": {"std"},
     "backlash": {"gap_rad"},
     "encoder_eccentricity": {"cycles_per_rev", "amplitude_rad"},
     "quadratic_drag": {"coefficient"},

@@ -22,6 +22,7 @@ from pyfmi_models.effects.base import (
 from pyfmi_models.effects.cogging import Cogging
 from pyfmi_models.effects.delay import Delay
 from pyfmi_models.effects.friction_asymmetry import FrictionAsymmetry
+from pyfmi_models.effects.friction_wander import FrictionWander
 from pyfmi_models.effects.gravity_unbalance import GravityUnbalance
 from pyfmi_models.effects.position_friction import LocalFriction, PeriodicFriction
 from pyfmi_models.effects.stribeck import StribeckEffect
@@ -46,6 +47,7 @@ __all__ = [
     "Effect",
     "FrictionAsymmetry",
     "FrictionEffect",
+    "FrictionWander",
     "GravityUnbalance",
     "InertiaEffect",
     "LoadEffect",

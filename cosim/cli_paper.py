@@ -1,0 +1,28 @@
+"""`cosim paper`: the paper's experiments to tables, figures and a page."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cosim.terminal import put, put_json, say, stage
+
+
+def paper(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for tables and figures.")],
+    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Seeds for the conditions with noise.")] = 20,
+    seed: Annotated[int, typer.Option("--seed", min=0, help="The first seed.")] = 1000,
+    as_json: Annotated[bool, typer.Option("--json", help="Print table4.json.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+) -> None:
+    """Run every tracking experiment of the paper on FMUs; write tables and figures beside the published numbers."""
+    from cosim.paper.report import reproduce
+
+    command = f"cosim paper --out {out} --seeds {seeds} --seed {seed}"
+    with stage("the paper's tracking experiments") as progress:
+        done = reproduce(out, range(seed, seed + seeds), command, force, progress)
+    if as_json:
+        put_json(done.table)
+    else:
+        put("\n".join(map(str, done.files)))
+    say(f"read {out / 'README.md'}")

@@ -1,0 +1,38 @@
+"""The contract of a torque estimate: what a controller expects to resist before the observer has seen it."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+from pyfmi_models.model import Chapter, Scalar, Variable
+
+
+class Seen(NamedTuple):
+    """What an estimate may look at in a tick: speeds [rad/s] and the torque that nothing has explained yet [N m].
+
+    `residual` is -J zeta3, so it resists; it lags behind the true torque as the observer does.
+    """
+
+    observed: Scalar
+    reference: Scalar
+    residual: Scalar
+
+
+@dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """A part of the controller that predicts a resisting torque; several add up."""
+
+    def parameters(self) -> tuple[Variable, ...]:
+        """List the tunable numbers, with full names."""
+        return ()
+
+    def states(self) -> tuple[Variable, ...]:
+        """List what is remembered from tick to tick, with full names."""
+        return ()
+
+    def chapter(self, onto: str) -> Chapter:
+        """Say what it is; `onto` is the place that it works on."""
+        raise TypeError(f"{type(self).__name__} has no chapter")
+
+    def advance(self, symbols: dict[str, Any], state: list[Any], seen: Seen, period: float) -> tuple[list[Any], Scalar]:
+        """Return the states after this tick and the torque expected now [N m]; `symbols` are the parameters."""
+        raise TypeError(f"{type(self).__name__} predicts no torque")
