@@ -44,7 +44,7 @@ class Compensation(Estimate):
     def chapter(self, onto: str) -> Chapter:
         """Tell the law, and at which speed it is asked."""
         speed = {"observed": "observed", "reference": "desired"}[self.source]
-        return chapter_of(self.law, self.name, f"Friction from the {speed} speed", onto)
+        return chapter_of(self.law, PREFIX, f"Friction from the {speed} speed", onto)
 
     def advance(self, symbols: dict[str, Any], state: list[Any], seen: Seen, period: float) -> tuple[list[Any], Scalar]:
         """Return the states after this tick and the friction torque now."""
