@@ -22,8 +22,9 @@ from cosim.diagnosis.report.derive import part, samples
 from cosim.diagnosis.report.explorer import payload
 from cosim.diagnosis.report.figures_dynamic import VIEWS
 from cosim.diagnosis.report.figures_proof import relative
-from cosim.diagnosis.report.quantities import Scales, minus, number
+from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Region, Trace, Where
+from cosim.pictures.quantities import minus, number
 from cosim.pictures.style import thin
 
 RATE, SECONDS = 1000, 60

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cosim.diagnosis.report.derive import Curve, Mask, Samples, curve, slow
-from cosim.diagnosis.report.quantities import Scale, Scales
+from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture, Sheet, degrees, heading
 from cosim.diagnosis.result import Array, Finding
+from cosim.pictures.quantities import Scale
 from cosim.pictures.style import AFTER, BEFORE, GREY
 
 if TYPE_CHECKING:

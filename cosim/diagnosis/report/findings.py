@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 from cosim.diagnosis.report import tables, words
 from cosim.diagnosis.report.equations import EQUATIONS
-from cosim.diagnosis.report.quantities import Scales, minus
+from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.result import Diagnosis, Finding
+from cosim.pictures.quantities import minus
 
 
 @dataclass(frozen=True)

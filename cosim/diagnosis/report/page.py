@@ -16,9 +16,10 @@ from cosim.diagnosis.report.figures_proof import looked_for, proof
 from cosim.diagnosis.report.figures_time import WIDE, overlay, recording
 from cosim.diagnosis.report.figures_where import plane, region, strongest
 from cosim.diagnosis.report.findings import block
-from cosim.diagnosis.report.quantities import Scales, joined
+from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.result import Diagnosis, Trace
+from cosim.pictures.quantities import joined
 
 MOST_RECORDINGS, MOST_REGIONS = 6, 7
 

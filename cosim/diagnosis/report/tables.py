@@ -7,9 +7,10 @@ import numpy as np
 
 from cosim.diagnosis.report.derive import Part, bars
 from cosim.diagnosis.report.equations import CONDITIONS
-from cosim.diagnosis.report.quantities import Scales, decimals, minus, number
+from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.words import ANSWERS, lowered, shows_from
 from cosim.diagnosis.result import Diagnosis, Finding, Trace
+from cosim.pictures.quantities import decimals, minus, number
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass
 
-from cosim.diagnosis.report.quantities import Scales, joined, number, trimmed
+from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.result import Diagnosis, Finding
+from cosim.pictures.quantities import joined, number, trimmed
 
 COUNTS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
 ANSWERS = {
