@@ -26,8 +26,9 @@ def run(
     interpreted: Annotated[
         bool, typer.Option("--interpreted", help="Use the loop in Python: slow, same bits.")
     ] = False,
+    page: Annotated[bool, typer.Option(help="Write the page of pictures.")] = True,
 ) -> None:
-    """Run a scenario and write DIR/recording.parquet and DIR/run.json (its statistics)."""
+    """Run a scenario and write DIR/recording.parquet, DIR/run.json (its statistics) and DIR/run.html (its pictures)."""
     from cosim.cli_cache import with_fmus
     from cosim.errors import StepError
     from cosim.files import check_free, replacing
@@ -35,8 +36,8 @@ def run(
     from cosim.scenario import read_scenario
 
     wanted = read_scenario(scenario)
-    path, report = out / "recording.parquet", out / "run.json"
-    for one in (path, report):
+    path, report, pictures = out / "recording.parquet", out / "run.json", out / "run.html"
+    for one in (path, report, *([pictures] if page else [])):
         check_free(one, force)
     if Path(scenario).suffix == ".ssp":
         say(wanted.description)
@@ -52,6 +53,8 @@ def run(
         say(f"what was recorded until then is in {path}")
         raise
     statistics = done.statistics | {"scenario": wanted.name, "recording": str(path)}
+    if page:
+        statistics["page"] = str(_page(pictures, path, wanted, done.statistics, force))
     with replacing(report, force) as partial:
         partial.write_text(json.dumps(statistics, indent=2) + "\n", "utf-8")
     _tell(statistics)
@@ -59,6 +62,12 @@ def run(
         put_json(statistics)
     else:
         put(str(path))
+
+
+def _page(pictures: Path, recording: Path, scenario: Any, statistics: dict[str, Any], force: bool) -> Path:
+    from cosim.pictures.run_page import write_page
+
+    return write_page(pictures, recording, scenario, statistics, force)
 
 
 def foretold(shown: Progress, size: int, say: Callable[[str], None]) -> Progress:
@@ -93,6 +102,8 @@ def _tell(statistics: dict[str, Any]) -> None:
     for effort in statistics["coupling"]:
         a_step = effort["rounds"] / max(statistics["steps"], 1)
         say(f"coupled components took {a_step:.3g} passes a step, {effort['greatest']} at most")
+    if "page" in statistics:
+        say(f"pictures: {statistics['page']}")
     if statistics["unconnected"]:
         say(f"not connected, at their start values: {', '.join(map(str, statistics['unconnected']))}")
     for note in statistics["notes"]:

@@ -8,7 +8,6 @@ from math import ceil, floor, isfinite, log, log10
 
 import numpy as np
 
-from cosim.pictures.quantities import number
 from cosim.pictures.style import AFTER, GREY, LINE, Array
 
 LEFT, RIGHT, TOP, BOTTOM = 62, 12, 30, 40
@@ -41,6 +40,12 @@ class Ruler:
         placed: Array = self.start + self.length * share
         return placed
 
+    def labels(self) -> list[tuple[float, str]]:
+        """Return the ticks, in px, with their text."""
+        ticks = self.ticks()
+        texts = [_power(value) for value in ticks] if self.log else _digits(ticks)
+        return list(zip(self.at(np.array(ticks)).tolist(), texts, strict=True))
+
     def ticks(self, wanted: int = 5) -> list[float]:
         """Return round numbers inside, about as many as wanted."""
         if self.log:
@@ -70,7 +75,8 @@ class Chart:
         width, height = size
         across, foot, up = width - LEFT - RIGHT, height - BOTTOM, TOP + BOTTOM - height
         side = Ruler(*y, foot, up, True) if log else Ruler.around(*y, foot, up)
-        return cls(title, below, Ruler(*x, LEFT, across, log), side, width, height)
+        right = x if x[0] < x[1] else (x[0] - 0.5, x[0] + 0.5)  # a single point in time
+        return cls(title, below, Ruler(*right, LEFT, across, log), side, width, height)
 
     def line(self, x: Array, y: Array, colour: str = AFTER, width: float = 1.4) -> None:
         """Join points."""
@@ -91,24 +97,32 @@ class Chart:
     def _grid(self) -> list[str]:
         right, foot = self.width - RIGHT, self.height - BOTTOM
         below = f'<text x="{(LEFT + right) / 2:.0f}" y="{self.height - 6}" class="mid">{escape(self.below)}</text>'
-        parts, up, across = [below], self.y.ticks(), self.x.ticks()
-        for y, text in zip(self.y.at(np.array(up)), _labels(up), strict=True):
+        parts = [below]
+        for y, text in self.y.labels():
             parts.append(f'<path d="M{LEFT} {y:.1f}H{right}" stroke="{LINE}"/>')
             parts.append(f'<text x="{LEFT - 6}" y="{y + 4:.1f}" class="end">{text}</text>')
-        for x, text in zip(self.x.at(np.array(across)), _labels(across), strict=True):
+        for x, text in self.x.labels():
             parts.append(f'<path d="M{x:.1f} {foot}v4" stroke="{GREY}"/>')
             parts.append(f'<text x="{x:.1f}" y="{foot + 17}" class="mid">{text}</text>')
         return parts
 
 
-def _labels(values: Sequence[float]) -> list[str]:
+def _power(value: float) -> str:
+    """Write a power of ten."""
+    power = round(log10(value))
+    if abs(power) <= 3:
+        return f"{value:g}"
+    return f"10{str(power).translate(str.maketrans('-0123456789', '⁻⁰¹²³⁴⁵⁶⁷⁸⁹'))}"
+
+
+def _digits(values: Sequence[float]) -> list[str]:
     """Write ticks with the digits that tell them apart."""
     step = min((high - low for low, high in pairwise(values)), default=1.0)
     largest = max((abs(value) for value in values), default=1.0)
-    if largest and not 1e-3 <= largest < 1e5:
-        return [number(value, 1 + max(0, floor(log10(largest / step) + 1e-9))) for value in values]
     places = max(0, -floor(log10(step) + 1e-9))
-    return [f"{value:.{places}f}".replace("-", "−") if value else "0" for value in values]
+    digits = max(0, floor(log10(largest) + 1e-9) - floor(log10(step) + 1e-9)) if largest else 0
+    form = f".{places}f" if 1e-3 <= largest < 1e7 else f".{digits}e"
+    return [f"{value:{form}}".replace("-", "−") if value else "0" for value in values]
 
 
 def _points(x: Array, y: Array) -> str:

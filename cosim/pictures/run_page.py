@@ -24,6 +24,8 @@ from cosim.pictures.style import AFTER, BEFORE, MEASURED
 from cosim.scenario import Scenario
 
 SIZE = (560, 250)
+WORDS = {"″": "arcsec", "′": "arcmin", "°": "deg"}
+"""Units in words: beside a line of digits a stroke is no unit."""
 TITLES = {"tau": "torque", "v": "speed", "friction": "friction"}
 Facts = Mapping[str, Any]
 
@@ -136,7 +138,9 @@ def _spectrum(small: Digest, name: str) -> str:
 
 
 def _scale(line: Line) -> Scale:
-    return scale_of(line.unit, max(map(abs, line.span)))
+    scale = scale_of(line.unit, max(map(abs, line.span)))
+    sign = scale.unit[:1]
+    return Scale(scale.factor, WORDS.get(sign, sign) + scale.unit[1:])
 
 
 def _shown(line: Line, scale: Scale) -> tuple[float, float]:
