@@ -188,6 +188,12 @@ def test_a_connector_cannot_contradict_its_fmu(read) -> None:
         read(system(contrary))
 
 
+def test_the_interface_that_the_archive_asks_for_is_used(read) -> None:
+    elements = component("one", kind='implementation="CoSimulation"') + component("two", kind='implementation="any"')
+    scenario = read(system(elements + component("three", kind='implementation="ModelExchange"')))
+    assert [one.interface for one in scenario.components.values()] == ["co-simulation", "", "model-exchange"]
+
+
 def test_a_connection_written_from_its_end_is_understood(read) -> None:
     (found,) = read(system(component("one") + component("two"), wire("two.a", "one.y"))).wires
     assert (found.source, found.target) == ("one.y", "two.a")

@@ -21,6 +21,7 @@ from cosim.units import BASE, conversion, in_base_units, unit
 
 STOP, STEPS = 1.0, 1000
 """Length of a run [s], and steps in it, where neither the SSP nor an FMU says any."""
+_INTERFACES = {"CoSimulation": {"interface": "co-simulation"}, "ModelExchange": {"interface": "model-exchange"}}
 _OSP = "{http://opensimulationplatform.com/SSP/OSPAnnotations}"
 
 
@@ -165,7 +166,8 @@ def scenario_of(structure: Structure, files: Mapping[str, File]) -> str:
     lines = _table("", head | {"step": step, "stop": stop})
     for path, node in structure.components.items():
         name = _text(meaning.names[path])
-        lines += _table(f"[components.{name}]", {"fmu": files[node.source].name})
+        interface = _INTERFACES.get(node.element.get("implementation", ""), {})
+        lines += _table(f"[components.{name}]", {"fmu": files[node.source].name} | interface)
         lines += _table(f"[components.{name}.parameters]", parameters[path][0])
         for variable, stated in meaning.units(path).items():
             lines += _table(f"[components.{name}.variables.{_text(variable)}]", {"name": variable, "unit": stated})
