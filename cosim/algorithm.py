@@ -7,15 +7,18 @@
     kind = "energy", bonds = [["a.torque", "b.speed"]]
                                             those named lose little energy: pieces of a step, no rollback
 
+Where no option is wanted, `algorithm = "gauss-seidel"` says the same. A component that steps every n ticks takes its
+inputs at the first of them under each algorithm, and is seen after the last.
+
 Components that `iterated` and `energy` do not name step as in `jacobi`. What a wire delays under each is told by
 `schedule.delays` and drawn by `cosim show`.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from cosim.errors import WiringError
 
@@ -113,7 +116,12 @@ class Energy(_Algorithm):
         return _coupled(names, owners, "bonds")
 
 
-Algorithm = Annotated[Jacobi | GaussSeidel | Iterated | Energy, Field(discriminator="kind")]
+def _named(value: Any) -> Any:
+    """Let `algorithm = "gauss-seidel"` stand for the kind alone."""
+    return {"kind": value} if isinstance(value, str) else value
+
+
+Algorithm = Annotated[Jacobi | GaussSeidel | Iterated | Energy, Field(discriminator="kind"), BeforeValidator(_named)]
 
 
 def _coupled(names: Sequence[Name], members: tuple[Name, ...], key: str) -> tuple[Act, ...]:

@@ -4,21 +4,17 @@ FMI 2.0 and 3.0, co-simulation. Unpacked files live in a temporary directory tha
 """
 
 import ctypes
-import os
 import tempfile
 from collections import deque
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
-from functools import cache
-from itertools import count
 from pathlib import Path
 from typing import Any
-from weakref import WeakValueDictionary
 
 import numpy as np
 
-from cosim.component import ERROR, FATAL, TERMINATED, Functions, Port
+from cosim.component import ERROR, FATAL, OK, TERMINATED, Functions, Port
 from cosim.description import (
     check_binary,
     describe,
@@ -29,10 +25,8 @@ from cosim.description import (
     ports_of,
 )
 from cosim.errors import CosimError, FmuError
+from cosim.listeners import callbacks2, registered, same_directory
 
-_NUMBERS = count(1)
-_LISTENERS: WeakValueDictionary[str, "FmuComponent"] = WeakValueDictionary()
-"""Who hears what an FMI 2.0 instance says, by instance name; FMPy's logger can serve only one callback a process."""
 _STEP2 = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
 _VALUES2 = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
 _SAVE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
@@ -70,7 +64,7 @@ class FmuComponent:
         self.origin: dict[str, Any] = origin_of(self.path, self._description)
         self._messages: deque[str] = deque(maxlen=5)
         self._started = False
-        self._worst = 0
+        self._worst = OK
         self._state = ctypes.c_void_p()
         self._directory = tempfile.TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True)
         try:
@@ -87,10 +81,13 @@ class FmuComponent:
         Raises:
             FmuError: a name is unknown or not settable, a value breaks its bounds, or the FMU refuses.
         """
+        if self._worst == FATAL:
+            raise FmuError(f"{self.name} ({self.path}) failed for good and cannot start again; open it anew.")
         checked = [(self._settable(name, value), value) for name, value in parameters.items()]
         try:
             if self._started:
                 self._fmu.reset()
+                self._worst = OK
             for variable, value in checked:
                 self._set_start(variable, value)
             if self._version == 2:
@@ -180,10 +177,9 @@ class FmuComponent:
         suffix = "Slave" if self.interface == "coSimulation" else "Model"
         kind = getattr(fmi2, f"FMU2{suffix}") if self._version == 2 else getattr(fmi3, f"FMU3{suffix}")
         description = self._description
-        instance = f"{self.name}.{next(_NUMBERS)}"
-        _LISTENERS[instance] = self
+        instance = registered(self, self.name)
         try:
-            with _same_directory():
+            with same_directory():
                 fmu = kind(
                     guid=description.guid if self._version == 2 else description.instantiationToken,
                     modelIdentifier=self._own.modelIdentifier,
@@ -197,7 +193,7 @@ class FmuComponent:
 
     def _begin(self, fmu: Any) -> None:
         if self._version == 2:
-            fmu.instantiate(callbacks=_callbacks2())
+            fmu.instantiate(callbacks=callbacks2())
         else:
             fmu.instantiate(logMessage=lambda _, status, category, message: self.hear(message))
 
@@ -256,34 +252,3 @@ class FmuComponent:
     def _reason(self, error: Exception) -> str:
         said = f'; it said "{self._messages[-1]}"' if self._messages else ""
         return first_line(error) + said
-
-
-@contextmanager
-def _same_directory() -> Iterator[None]:
-    """Come back to the working directory, which FMPy leaves for good when a library does not load."""
-    here = os.getcwd()
-    try:
-        yield
-    finally:
-        os.chdir(here)
-
-
-def _tell(_: Any, name: bytes | None, status: int, category: bytes, message: bytes | None) -> None:
-    """Pass on what an FMI 2.0 instance says."""
-    listener = _LISTENERS.get((name or b"").decode("utf-8", "replace"))
-    if listener is not None:
-        listener.hear(message)
-
-
-@cache
-def _callbacks2() -> Any:
-    """Callbacks of FMI 2.0 that collect what the FMUs say; FMPy's own would print it on stdout."""
-    from fmpy.fmi2 import defaultCallbacks, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
-    from fmpy.logging import addLoggerProxy
-
-    callbacks = fmi2CallbackFunctions()
-    callbacks.logger = fmi2CallbackLoggerTYPE(_tell)
-    callbacks.allocateMemory, callbacks.freeMemory = defaultCallbacks.allocateMemory, defaultCallbacks.freeMemory
-    with suppress(Exception):  # without the proxy, messages come with their printf formats unfilled
-        addLoggerProxy(ctypes.byref(callbacks))
-    return callbacks

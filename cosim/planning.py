@@ -8,7 +8,7 @@ import numpy as np
 from cosim.component import Component
 from cosim.faults import broken
 from cosim.loop import Column, Link, Part, Plan
-from cosim.schedule import order_of, turns
+from cosim.schedule import backward, order_of, turns
 from cosim.signals import Stream
 from cosim.wiring import Record, Wire, Wiring
 
@@ -82,6 +82,7 @@ def _part(wiring: Wiring, name: str, places: Places, step: float) -> Part:
         input_names=tuple(full.partition(".")[2] for full in inputs),
         links=tuple(_link(wiring, wire, places, step) for wire in wiring.wires if wire.target in inputs),
         every=wiring.every.get(name, 1),
+        direct=any(component.feedthrough.values()),
     )
 
 
@@ -95,6 +96,7 @@ def _link(wiring: Wiring, wire: Wire, places: Places, step: float) -> Link:
         gain=gain * wire.gain,
         offset=gain * wire.offset + offset,
         quantum=gain * wire.quantum,
+        breaks_loop=wire.breaks_loop or wire.target in backward(wiring.algorithm, wiring.wires, wiring.components),
         faults=tuple(fault.of_wire(step, places.get(f"fault {n}.value", -1)) for n, fault in faults.items()),
     )
 

@@ -31,6 +31,7 @@ RUNNERS = (
     "faults",
     "function",
     "exchange",
+    "listeners",
     "diagram",
     "execution",
     "interrupts",

@@ -1,5 +1,6 @@
 """Any plan gives the same bits in C and in Python: components, wires, rates, algorithms and faults at random."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,12 +9,13 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
-from tiny_fmu import tiny
+from tiny_fmu import described, description, tiny
 
 from cosim.algorithm import GaussSeidel, Iterated, Jacobi
+from cosim.errors import StepError
 from cosim.faults import Fault
 from cosim.fmu import FmuComponent
-from cosim.master import simulate
+from cosim.master import Run, simulate
 from cosim.wiring import Record, Wire
 
 __all__ = ["tiny"]
@@ -29,7 +31,8 @@ def wires(draw: Any) -> list[Wire]:
         source = draw(st.sampled_from((None, *SOURCES)))
         if source:
             gain, quantum = draw(st.sampled_from((1.0, -0.5, 0.9))), draw(st.sampled_from((0.0, 0.0, 0.01)))
-            found.append(Wire(source, target, gain=gain, quantum=quantum, noise=draw(st.sampled_from(("", "n")))))
+            noise = draw(st.sampled_from(("", "n")))
+            found.append(Wire(source, target, gain=gain, quantum=quantum, noise=noise, breaks_loop=True))
     return found
 
 
@@ -44,7 +47,7 @@ def systems(draw: Any) -> dict[str, Any]:
         algorithm = Iterated(kind="iterated", components=members, theta=draw(st.sampled_from((0.5, 1.0))))
         every |= dict.fromkeys(members, 1)
         wired = [
-            Wire(one.source, one.target, gain=one.gain, noise=one.noise)
+            replace(one, quantum=0.0)
             if {one.source.partition(".")[0], one.target.partition(".")[0]} <= set(members)
             else one
             for one in wired
@@ -66,13 +69,15 @@ def systems(draw: Any) -> dict[str, Any]:
         "faults": [TypeAdapter(Fault).validate_python(fault) for fault in faults],
         "record": records,
         "decimation": draw(st.integers(1, 4)),
-        "parameters": {name: {"mode": draw(st.sampled_from((0.0, 1.0))), "k": 0.7} for name in NAMES},
+        "parameters": {name: {"mode": draw(st.sampled_from((0.0, 1.0, 2.0))), "k": 0.7} for name in NAMES},
     }
 
 
 @pytest.fixture(scope="module")
-def three(tiny: dict[int, Path]) -> Any:
-    parts = {name: FmuComponent(tiny[2 + (name == "two")], name) for name in NAMES}
+def three(tiny: dict[int, Path], tmp_path_factory: pytest.TempPathFactory) -> Any:
+    folder = tmp_path_factory.mktemp("direct")
+    fmus = {v: described(tiny[v], folder / f"{v}.fmu", description(v, direct=True)) for v in (2, 3)}
+    parts = {name: FmuComponent(fmus[2 + (name == "two")], name) for name in NAMES}
     yield parts
     for part in parts.values():
         part.close()
@@ -83,8 +88,19 @@ def three(tiny: dict[int, Path]) -> Any:
 def test_any_plan_gives_the_same_bits_in_c_and_in_python(three: Any, system: dict[str, Any]) -> None:
     r = np.sin(np.arange(47) * 0.3)
     common: dict[str, Any] = {"step": 1e-2, "ticks": 47, "signals": {"r": r, "n": 0.01 * np.cos(r * 99)}}
-    first, second = (simulate(three, compiled=compiled, **common, **system) for compiled in (True, False))
+    first, second = (outcome(three, compiled=compiled, **common, **system) for compiled in (True, False))
+    if isinstance(first, str) or isinstance(second, str):
+        assert first == second
+        return
     assert [run.statistics["loop"] for run in (first, second)] == ["compiled", "interpreted"]
     assert first.statistics["coupling"] == second.statistics["coupling"]
     for name in first.recording:
         np.testing.assert_array_equal(first.recording[name], second.recording[name])
+
+
+def outcome(*args: Any, **options: Any) -> Run | str:
+    """Return the run, or the sentence of its failure: iteration need not converge on any plan."""
+    try:
+        return simulate(*args, **options)
+    except StepError as error:
+        return str(error)

@@ -198,12 +198,16 @@ def test_an_output_that_is_not_a_number_stops_the_run(tiny: Tiny, compiled: bool
 def test_after_an_error_only_freeing_and_after_a_fatal_one_nothing_is_called(
     tiny: Tiny, version: int, status: int, allowed: str
 ) -> None:
+    sentence = r"plant \(.*\) failed for good and cannot start again; open it anew."
     with FmuComponent(tiny[version], "plant") as plant, FmuComponent(tiny[version], "other") as other:
         both = [ctypes.CDLL(one._fmu.dll._name) for one in (plant, other)]  # kept loaded, to look into afterwards
         parameters = {"plant": {"status": float(status), "fail_at": 0.01}}
         settings: dict[str, Any] = {"record": {"y": "plant.y"}, "step": 0.01, "ticks": 5, "parameters": parameters}
         with nullcontext() if status == 0 else pytest.raises(StepError):
             simulate({"plant": plant, "other": other}, [], **settings)
+        if status == 4:
+            with pytest.raises(FmuError, match=sentence):
+                plant.start({})
     plant_calls, other_calls = (ctypes.c_char.in_dll(one, "calls") for one in both)
     assert ctypes.string_at(ctypes.addressof(plant_calls)).decode() == allowed
     assert ctypes.string_at(ctypes.addressof(other_calls)).decode() == ("" if status == 4 else "TF")

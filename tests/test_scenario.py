@@ -96,6 +96,11 @@ def test_algorithm_and_steps_are_read_and_kept_in_the_recording(tiny: dict[int, 
     assert len(set(done.recording["q"])) > 200  # the plant goes on between the commands
 
 
+def test_an_algorithm_without_options_may_be_a_word() -> None:
+    text = TEXT.replace("step = 1e-3", 'step = 1e-3\nalgorithm = "iterated"', 1)
+    assert parse_scenario(text, "loop.toml", Path()).algorithm.kind == "iterated"
+
+
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [

@@ -118,6 +118,7 @@ def _part(part: Part, wire: int, bus: np.ndarray) -> CPart:
         wire=wire,
         wires=len(part.links),
         every=part.every,
+        direct=part.direct,
         state=functions.state,
     )
 
@@ -125,7 +126,15 @@ def _part(part: Part, wire: int, bus: np.ndarray) -> CPart:
 def _wire(link: Link) -> CWire:
     faults = [CFault(f.first, f.last, f.noise, f.freeze, f.gain, f.offset) for f in link.faults]
     return CWire(
-        link.source, link.target, link.noise, link.gain, link.offset, link.quantum, len(faults), _array(CFault, faults)
+        source=link.source,
+        target=link.target,
+        noise=link.noise,
+        gain=link.gain,
+        offset=link.offset,
+        quantum=link.quantum,
+        faults=len(faults),
+        breaks_loop=link.breaks_loop,
+        fault=_array(CFault, faults),
     )
 
 

@@ -50,8 +50,9 @@ class InterpretedLoop:
         bus, plan = self.plan.bus, self.plan
         for k in range(ticks):
             bus[plan.signal : plan.signal + plan.signals] = signals[:, k]
+            failed = self.tick == 0 and self._settle()
             self._note(late=False)
-            failed = any(take() for take in self._turns)
+            failed = failed or any(take() for take in self._turns)
             self._note(late=True)
             self._record(rows)
             if failed:
@@ -124,6 +125,19 @@ class InterpretedLoop:
             for link in part.links:
                 self.plan.bus[link.target] = self.carry(link)
         return False
+
+    def _settle(self) -> bool:
+        direct = [index for index, part in enumerate(self.plan.parts) if part.direct]
+        return any(self._meet(index, again > 0) for again in range(len(direct)) for index in direct)
+
+    def _meet(self, index: int, again: bool) -> bool:
+        for link in self.plan.parts[index].links:
+            if not (again and link.breaks_loop):
+                self.plan.bus[link.target] = self.carry(link)
+        status = max(self.set(index), self.get(index))
+        if status > WARNING:
+            self.failure = Failure(index, 0, status)
+        return status > WARNING
 
     def _advance(self, index: int) -> bool:
         part = self.plan.parts[index]

@@ -1,6 +1,6 @@
 /* The stepping loop. At tick k, t = k * step:
  *   1. the signals of the tick are put on the bus;
- *   2. outputs and signals are noted for the recording;
+ *   2. outputs and signals are noted for the recording (at tick 0 after outputs have met their inputs, see settle);
  *   3. the turns of the tick are taken: wires carry  y = quantise(gain * x + offset) + noise  to inputs, components step;
  *   4. the row is recorded: outputs at t_k and the inputs that act from t_k to t_(k+1).
  * A component that steps every n ticks takes its inputs at ticks 0, n, 2n, ... and is stepped at the end of the last
@@ -246,6 +246,33 @@ EXPORT int64_t loop_start(Loop *loop)
     return 1;
 }
 
+/* Before the first tick, outputs that follow inputs at once are brought to the inputs of that tick, as often as it may
+ * take to get through a chain of such components; a wire that breaks a loop is followed once. */
+static int settle(Loop *loop)
+{
+    int64_t rounds = 0;
+    for (int64_t i = 0; i < loop->parts; i++) {
+        rounds += loop->part[i].direct;
+    }
+    for (int64_t round = 0; round < rounds; round++) {
+        for (int64_t i = 0; i < loop->parts; i++) {
+            const Part *part = &loop->part[i];
+            if (part->direct) {
+                for (int64_t j = part->wire; j < part->wire + part->wires; j++) {
+                    if (round == 0 || !loop->wire[j].breaks_loop) {
+                        loop->bus[loop->wire[j].target] = carry(loop, &loop->wire[j]);
+                    }
+                }
+                int status = worse(set_inputs(part), get_outputs(part));
+                if (status > FMI_WARNING) {
+                    return fail(loop, i, status, 0);
+                }
+            }
+        }
+    }
+    return 0;
+}
+
 /* Runs `ticks` ticks. `signals` holds one column of `ticks` values for each signal, `rows` one of `capacity` for each
  * recorded column. Returns the number of rows written; `failed` and `status` tell whether it got to the end. */
 EXPORT int64_t loop_run(Loop *loop, int64_t ticks, const double *signals, double *rows, int64_t capacity)
@@ -255,8 +282,8 @@ EXPORT int64_t loop_run(Loop *loop, int64_t ticks, const double *signals, double
         for (int64_t i = 0; i < loop->signals; i++) {
             loop->signal[i] = signals[i * ticks + k];
         }
+        int failed = loop->tick == 0 ? settle(loop) : 0;
         note(loop, 0);
-        int failed = 0;
         for (int64_t i = 0; i < loop->turns && !failed; i++) {
             failed = take(loop, &loop->turn[i]);
         }

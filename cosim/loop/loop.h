@@ -32,6 +32,7 @@ typedef struct {
     double *input, *output; /* their places on the bus */
     int64_t wire, wires;    /* those that feed it, one after the other */
     int64_t every;          /* ticks of a step; inputs are taken at its first tick, outputs shown after its last */
+    int64_t direct;         /* whether outputs may follow inputs at once */
     void **state;           /* where the component keeps what was saved */
 } Part;
 
@@ -46,7 +47,7 @@ typedef struct {
 typedef struct {
     int64_t source, target, noise; /* places on the bus; noise < 0: none */
     double gain, offset, quantum;  /* quantum 0: not quantised */
-    int64_t faults;
+    int64_t faults, breaks_loop;
     Fault *fault;
 } Wire;
 

@@ -26,7 +26,10 @@ class Fault:
 
 @dataclass(frozen=True)
 class Link:
-    """A wire: bus[target] = quantise(gain * bus[source] + offset) + bus[noise]; -1 and 0 mean no noise, no quantum."""
+    """A wire: bus[target] = quantise(gain * bus[source] + offset) + bus[noise]; -1 and 0 mean no noise, no quantum.
+
+    `breaks_loop`: where outputs meet their inputs before the first tick, it is followed once only.
+    """
 
     source: int
     target: int
@@ -35,6 +38,7 @@ class Link:
     offset: float = 0.0
     quantum: float = 0.0
     faults: tuple[Fault, ...] = ()
+    breaks_loop: bool = False
 
 
 @dataclass(frozen=True)
@@ -42,6 +46,7 @@ class Part:
     """A component and the places of its values: inputs from `input`, outputs from `output` on.
 
     `links` feed it. It steps every `every` ticks: inputs are taken at the first of them, outputs shown after the last.
+    `direct`: outputs may follow inputs at once, so before the first tick they are read again with the inputs of it.
     """
 
     name: str
@@ -53,6 +58,7 @@ class Part:
     input_names: tuple[str, ...] = ()
     links: tuple[Link, ...] = ()
     every: int = 1
+    direct: bool = False
 
 
 @dataclass(frozen=True)
