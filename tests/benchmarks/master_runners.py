@@ -34,7 +34,8 @@ class Side(ctypes.Structure):
 
 def c(folder: Path, fmi: int, steps: int) -> float:
     from cosim.fmu import FmuComponent
-    from pyfmi_models.export.build import FLAGS, PLATFORMS, compile_shared, host
+    from pyfmi_models.export.build import FLAGS, compile_shared
+    from pyfmi_models.export.platforms import PLATFORMS, host
 
     source = Path(__file__).with_name("plain_loop.c").read_bytes()
     platform = PLATFORMS[host()]
