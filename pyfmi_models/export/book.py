@@ -1,13 +1,13 @@
 """A model taken apart for a reader: which variable and which equation belongs to which part of it."""
 
 from collections import Counter
-from collections.abc import Container, Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import chain
 
 import casadi as ca
 
-from pyfmi_models.export.expressions import PRODUCT, Node, Writer, graph_of
+from pyfmi_models.export.expressions import PRODUCT, Node, Writer, graph_of, under
 from pyfmi_models.export.layout import layout_of
 from pyfmi_models.model import Derivation, Model, Variable
 
@@ -84,7 +84,7 @@ class Book:
         self._layout = layout_of(model)
         self._variables = {row.variable.name: row.variable for row in self._layout.rows}
         results = graph_of(derivation.equations if derivation else model.equations)
-        self._names = {node: self._argument(node) for node in _under(chain(*results)) if node.place != (-1, -1)}
+        self._names = {node: self._argument(node) for node in under(chain(*results)) if node.place != (-1, -1)}
         wanted = [*self._quantities(derivation, results), *self._rates(results[0]), *self._outputs(results[1])]
         self.parts = self._empty_parts()
         wanted = [*self._shared(wanted), *wanted]
@@ -111,7 +111,7 @@ class Book:
 
     def _quantities(self, derivation: Derivation | None, results: list[list[Node]]) -> Iterator[_Wanted]:
         """Yield what the results need and what is more than a variable or a number under another name."""
-        needed = set(_under(chain(*results[:2])))
+        needed = set(under(chain(*results[:2])))
         for variable, node in zip(derivation.quantities, results[2], strict=True) if derivation else ():
             new = node not in self._names and variable.name not in self._variables
             if new and node in needed and not node.constant:
@@ -132,10 +132,10 @@ class Book:
 
     def _shared(self, wanted: list[_Wanted]) -> list[_Wanted]:
         """Name long expressions that are needed more than once and have no name, from the inside out."""
-        uses = Counter(part for node in _under([one.node for one in wanted]) for part in node.arguments)
+        uses = Counter(part for node in under([one.node for one in wanted]) for part in node.arguments)
         found: list[_Wanted] = []
         for one in wanted:
-            for node in _under(one.node.arguments, self._names):
+            for node in under(one.node.arguments, self._names):
                 if node not in self._names and uses[node] > 1 and self._length(node) >= LONG:
                     owner = self._owner(one.name.removeprefix("der("))
                     name = f"{owner}.shared_{len(found) + 1}".removeprefix(".")
@@ -193,7 +193,7 @@ class Book:
 
     def _fixed(self, node: Node) -> bool:
         """Say whether an expression is made of parameters and numbers only."""
-        return all(one.place[0] == _PARAMETERS for one in _under([node]) if one.place != (-1, -1))
+        return all(one.place[0] == _PARAMETERS for one in under([node]) if one.place != (-1, -1))
 
     def _owner(self, name: str) -> str:
         prefix, dot, _ = name.partition(".")
@@ -212,17 +212,3 @@ class _Scope:
     def __getitem__(self, node: Node) -> str:
         name = self.book._names[node]
         return "time" if name == "time" else self.book.reference(name, self.part)
-
-
-def _under(nodes: Iterable[Node], stop: Container[Node] = ()) -> list[Node]:
-    """List nodes and all that they are made of, each once, parts before wholes; not beyond those in `stop`."""
-    found: dict[Node, None] = {}
-    waiting = [(node, False) for node in reversed(list(nodes))]
-    while waiting:
-        node, done = waiting.pop()
-        if done:
-            found[node] = None
-        elif node not in found and node not in stop:
-            waiting.append((node, True))
-            waiting += [(one, False) for one in reversed(node.arguments)]
-    return list(found)

@@ -1,6 +1,7 @@
 """Equations as text: a CasADi function as a graph of operations, and its parts as expressions that a person reads."""
 
 import re
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from math import pi
 from typing import Protocol
@@ -47,6 +48,20 @@ def graph_of(function: ca.Function) -> list[list[Node]]:
         key = (operation, *map(id, parts), value, place)
         work[target[0]] = known.setdefault(key, Node(operation, parts, value, place))
     return [[entries[k] for k in sorted(entries)] for entries in results]
+
+
+def under(nodes: Iterable[Node], stop: Container[Node] = ()) -> list[Node]:
+    """List nodes and all that they are made of, each once, parts before wholes; not beyond those in `stop`."""
+    found: dict[Node, None] = {}
+    waiting = [(node, False) for node in reversed(list(nodes))]
+    while waiting:
+        node, done = waiting.pop()
+        if done:
+            found[node] = None
+        elif node not in found and node not in stop:
+            waiting.append((node, True))
+            waiting += [(one, False) for one in reversed(node.arguments)]
+    return list(found)
 
 
 class Names(Protocol):

@@ -7,9 +7,11 @@ parameters, tunable with them, or no such factor at all ("dependent").
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import chain
 
 import casadi as ca
 
+from pyfmi_models.export.expressions import Node, graph_of, under
 from pyfmi_models.export.layout import Layout, Row
 
 KINDS = ("constant", "fixed", "tunable", "dependent")
@@ -73,24 +75,13 @@ def _start(layout: Layout, parameters_known: bool) -> list[list[_Value]]:
 
 def _follow(layout: Layout, arguments: list[list[_Value]]) -> dict[tuple[int, int], _Value]:
     """Value of every entry of (next, outputs), by part and place."""
-    function = _dense(layout.model.equations)
-    work: dict[int, _Value] = {}
-    results: dict[tuple[int, int], _Value] = {}
-    for index in range(function.n_instructions()):
-        operation, taken = function.instruction_id(index), function.instruction_input(index)
-        given = function.instruction_output(index)
-        if operation == ca.OP_INPUT:
-            work[given[0]] = arguments[taken[0]][taken[1]]
-        elif operation == ca.OP_OUTPUT:
-            results[given[0], given[1]] = work[taken[0]]
-        else:
-            work[given[0]] = _apply(operation, [work[place] for place in taken])
-    return results
-
-
-def _dense(equations: ca.Function) -> ca.Function:
-    point = equations.expand().sx_in()
-    return ca.Function("dense", point, [ca.densify(part) for part in equations.call(point)])
+    results = graph_of(layout.model.equations.expand())
+    found: dict[Node, _Value] = {}
+    for node in under(chain(*results)):
+        part, entry = node.place
+        given = part >= 0
+        found[node] = arguments[part][entry] if given else _apply(node.operation, [found[n] for n in node.arguments])
+    return {(part, place): found[node] for part, nodes in enumerate(results) for place, node in enumerate(nodes)}
 
 
 def _apply(operation: int, values: list[_Value]) -> _Value:

@@ -46,8 +46,8 @@ def head() -> list[str]:
         "",
         "    python tests/benchmarks/archive.py --out results/archive",
         "",
-        f"mount-cosim {cosim.__version__}, ziglang {version('ziglang')}; the plant of `paper_mount`; {platform.machine()},",
-        f"{os.cpu_count()} cores shared with others, so times are rough; {ROUNDS} rounds, medians.",
+        f"mount-cosim {cosim.__version__}, ziglang {version('ziglang')}; the plant of `paper_mount`.",
+        f"{platform.machine()}, {os.cpu_count()} cores shared with others, so times are rough; medians of {ROUNDS}.",
     ]
 
 
