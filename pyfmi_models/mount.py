@@ -129,7 +129,7 @@ class Mount:
             start = [variable.start for variable in effect.states()]
             yield effect, motion._replace(state=states.get(name, start))
 
-    def applied(self, command: Scalar, states: Mapping[str, Any] = NOTHING) -> tuple[Scalar, dict[str, Any]]:
+    def applied(self, command: Scalar, states: Mapping[str, Any]) -> tuple[Scalar, dict[str, Any]]:
         """Torque path: limit, then the drive effects in series. Return the applied torque and the rates of states."""
         rates, torque = {}, ca.fmax(-self.axis.torque_limit, ca.fmin(self.axis.torque_limit, command))
         for name, effect in self.of_kind(DriveEffect):
