@@ -1,0 +1,44 @@
+"""What the guide to scenarios shows is what happens."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.cli_cache import with_fmus
+from cosim.diagram import draw
+from cosim.master import run
+from cosim.scenario import read_scenario
+
+GUIDE = (Path(__file__).parents[1] / "docs" / "scenarios.md").read_text("utf-8")
+BLOCKS = re.findall(r"```(\w+)\n(.*?)```", GUIDE, re.DOTALL)
+
+
+@pytest.fixture
+def scenario(tmp_path: Path) -> Path:
+    """The files of the guide, where each begins with its name."""
+    for _, text in BLOCKS:
+        named = re.match(r"# (\S+)\n", text)
+        if named:
+            (tmp_path / named[1]).write_text(text)
+    return tmp_path / "guided.toml"
+
+
+def test_the_drawing_in_the_guide_is_the_one_of_its_scenario(scenario: Path) -> None:
+    drawn = next(text for kind, text in BLOCKS if kind == "text")
+    assert "\n".join(draw(read_scenario(scenario))) == drawn.rstrip("\n")
+
+
+def test_the_scenario_of_the_guide_tracks_and_its_encoder_hangs(scenario: Path) -> None:
+    done = run(with_fmus(read_scenario(scenario)))
+    t, seen, reading = (done.recording[name] for name in ("t", "seen", "reading"))
+    hangs = (t >= 1.5) & (t < 1.6)
+    assert np.ptp(reading[hangs]) == 0 < np.ptp(done.recording["q"][hangs])
+    assert done.recording.units["seen"] == "arcsec"
+    assert (np.diff(np.flatnonzero(np.diff(seen))) == 50).all()  # rows, 20 Hz
+    looked = (np.arange(len(t)) // 50 - 1) * 50  # rows; a look is shown one step of the camera later
+    noise = seen - 206264.806 * done.recording["q"][looked]
+    assert 0.02 < noise[t >= 0.05].std() < 0.1
+    assert np.abs(done.recording["q"] - done.recording["q_d"])[(t > 1.0) & (t < 1.5)].max() < 1e-6
+    assert "camera is a Python function: each of its steps costs microseconds." in done.statistics["notes"]
