@@ -1,9 +1,7 @@
-"""Equations -> C: what CasADi writes, and the constant table through which the shim reads it."""
+"""Model -> C: its equations, and the constant table through which the shim reads them."""
 
 import hashlib
 import json
-import math
-import re
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,15 +9,16 @@ from typing import Any
 import casadi as ca
 
 from pyfmi_models.errors import ExportError
+from pyfmi_models.export.c_code import c_function, number
 from pyfmi_models.export.layout import Layout, Row, layout_of
+from pyfmi_models.export.rodas4 import step_functions
 from pyfmi_models.model import Model
 
 SHIM = Path(__file__).parent / "c"
 TOLERANCE = 1e-8
 """Relative tolerance of the co-simulation solver when the master gives none."""
-
-_ROLES = ("rates", "outputs", "jacobian", "directional", "tick")
-_NOT_DETERMINISTIC = re.compile(r"\b(erf|erfinv|remainder|fma|cbrt|lgamma|tgamma|round|rint|nearbyint)\s*\(")
+WORK, OVERHEAD = 1_000_000_000, 100
+"""Operations that one call may take before it gives up, about a second; and those around a step of the solver."""
 
 
 @dataclass(frozen=True)
@@ -38,47 +37,50 @@ def generate(model: Model) -> Generated:
     """
     layout = layout_of(model)
     functions = _functions(model)
-    equations = _casadi_code(model, functions)
+    try:
+        equations = "\n".join(c_function(f"model_{role}", parts) for role, parts in functions.items())
+    except ExportError as error:
+        raise ExportError(f'model "{model.name}": {error}') from None
     token = _token(layout, equations)
     return Generated(layout, token, {"equations.c": equations, "model.c": _model_code(layout, token, functions)})
 
 
-def _functions(model: Model) -> dict[str, ca.Function]:
-    symbol: Any = ca.SX if model.equations.is_a("SXFunction") else ca.MX
+def _functions(model: Model) -> dict[str, list[ca.Function]]:
+    """The functions of each role; where there are several, the later ones use what the earlier ones make."""
     sizes = (1, len(model.states), len(model.inputs), len(model.parameters))
-    point = [symbol.sym(name, size) for name, size in zip("txup", sizes, strict=True)]
-    following, outputs = (ca.densify(part) for part in model.equations.call(point))
+    point = {name: ca.SX.sym(name, size) for name, size in zip("txup", sizes, strict=True)}
+    following, outputs = _scalar(model).call([*point.values()])
     if model.period:
-        return {"tick": _function("tick", point, [following, outputs])}
-    seeds = [symbol.sym(f"d{name}", size) for name, size in zip("txup", sizes, strict=True)]
-    changes = [_directional(part, point, seeds) for part in (following, outputs)]
-    slopes = [ca.densify(ca.jacobian(following, point[1])), ca.densify(ca.jacobian(following, point[0]))]
+        return {"tick": [_function(point, {"next": following, "y": outputs})]}
+    rates = _function(point, {"rates": following})
+    found = {"rates": [rates], "outputs": [_function(point, {"y": outputs})]} | _derivatives(point, following, outputs)
+    return found | ({"step": [*step_functions(rates, [s.nominal for s in model.states])]} if model.states else {})
+
+
+def _scalar(model: Model) -> ca.Function:
+    """Return the equations written out in scalars: only so does a step of the solver know where zeros are."""
+    try:
+        return model.equations if model.equations.is_a("SXFunction") else model.equations.expand()
+    except RuntimeError as error:
+        raise ExportError(f'the equations of model "{model.name}" cannot be written out in scalars: {error}') from error
+
+
+def _derivatives(point: dict[str, Any], rates: Any, outputs: Any) -> dict[str, list[ca.Function]]:
+    """Directional derivatives, from changes of the point to changes of the results, and adjoint ones, backwards."""
+    seeds = {f"d{name}": ca.SX.sym(f"d{name}", part.numel()) for name, part in point.items()}
+    weights = {"dr": ca.SX.sym("dr", rates.numel()), "dy": ca.SX.sym("dy", outputs.numel())}
+    before = ca.vertcat(*point.values())
+    changes = [ca.jtimes(part, before, ca.vertcat(*seeds.values())) for part in (rates, outputs)]
+    back = ca.jtimes(ca.vertcat(rates, outputs), before, ca.vertcat(*weights.values()), True)
     return {
-        "rates": _function("rates", point, [following]),
-        "outputs": _function("outputs", point, [outputs]),
-        "jacobian": _function("jacobian", point, slopes),
-        "directional": _function("directional", point + seeds, changes),
+        "directional": [_function(point | seeds, {"dr": changes[0], "dy": changes[1]})],
+        "adjoint": [_function(point | weights, {"sensitivity": back})],
     }
 
 
-def _function(role: str, arguments: list[Any], results: list[Any]) -> ca.Function:
-    return ca.Function(f"model_{role}", arguments, results, {"cse": True})
-
-
-def _directional(part: Any, point: list[Any], seeds: list[Any]) -> Any:
-    total = sum(ca.jtimes(part, place, seed) for place, seed in zip(point, seeds, strict=True) if place.numel())
-    return ca.densify(total)
-
-
-def _casadi_code(model: Model, functions: dict[str, ca.Function]) -> str:
-    generator = ca.CodeGenerator("equations", {"with_header": False})
-    for function in functions.values():
-        generator.add(function)
-    code = str(generator.dump())
-    unknown = _NOT_DETERMINISTIC.search(code)
-    if unknown:
-        raise ExportError(f'model "{model.name}" uses {unknown[1]}, which has no deterministic version in detmath')
-    return code
+def _function(given: dict[str, Any], results: dict[str, Any]) -> ca.Function:
+    dense = {name: ca.densify(part) for name, part in results.items()}
+    return ca.Function("role", given | dense, [*given], [*dense], {"cse": True})
 
 
 def _token(layout: Layout, equations: str) -> str:
@@ -89,17 +91,17 @@ def _token(layout: Layout, equations: str) -> str:
     return "{" + "-".join((digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32])) + "}"
 
 
-def _model_code(layout: Layout, token: str, functions: dict[str, ca.Function]) -> str:
+def _model_code(layout: Layout, token: str, functions: dict[str, list[ca.Function]]) -> str:
     model = layout.model
     rows = ",\n".join(_row(row) for row in layout.rows)
-    nominals = ", ".join(_number(state.nominal) for state in model.states) or "1"
+    nominals = ", ".join(number(state.nominal) for state in model.states) or "1"
     counts = [len(layout.rows), *(len(layout.of(kind)) for kind in ("input", "parameter", "state", "rate", "output"))]
-    codes = ",\n".join(_code(role, functions.get(role)) for role in _ROLES)
-    return f"""/* Generated for "{_comment(model.name)}": the table beside what CasADi wrote (equations.c). */
+    codes = ",\n".join(f"    .{role}_code = model_{role}" for role in functions)
+    return f"""/* Generated for "{_comment(model.name)}": the table beside its equations. */
 #include "detmath.h"
+#include "model.h"
 
 #include "equations.c"
-#include "model.h"
 
 static const Variable variables[] = {{
 {rows}
@@ -109,35 +111,29 @@ static const double nominals[] = {{{nominals}}};
 
 const Model model = {{
     .token = "{token}",
-    .period = {_number(model.period or 0)},
-    .tolerance = {_number(TOLERANCE)},
+    .period = {number(model.period or 0)},
+    .tolerance = {number(TOLERANCE)},
     .size = {counts[0]}, .inputs = {counts[1]}, .parameters = {counts[2]},
     .states = {counts[3]}, .rates = {counts[4]}, .outputs = {counts[5]},
+    .most_steps = {_most_steps(functions)},
     .table = variables,
     .nominals = nominals,
 {codes}
 }};
+
+#include "solver.h"
 """
+
+
+def _most_steps(functions: dict[str, list[ca.Function]]) -> int:
+    once = [part.n_instructions() for role in ("step", "tick") for part in functions.get(role, ())]
+    return WORK // (sum(once) + OVERHEAD)
 
 
 def _row(row: Row) -> str:
     variable = row.variable
-    numbers = ", ".join(_number(value) for value in (variable.start, variable.low, variable.high))
-    fixed = "" if variable.tunable else ", .fixed = 1"
-    return f"    {{{json.dumps(variable.name)}, {row.kind.upper()}, {numbers}{fixed}}}"
-
-
-def _code(role: str, function: ca.Function | None) -> str:
-    if function is None:
-        return f"    .{role}_code = {{0}}"
-    sizes = (function.sz_arg(), function.sz_res(), function.sz_iw(), function.sz_w())
-    return f"    .{role}_code = {{model_{role}, {', '.join(map(str, sizes))}}}"
-
-
-def _number(value: float) -> str:
-    if math.isinf(value):
-        return "INFINITY" if value > 0 else "-INFINITY"
-    return repr(float(value))
+    numbers = ", ".join(number(value) for value in (variable.start, variable.low, variable.high))
+    return f"    {{{json.dumps(variable.name)}, {row.kind.upper()}, {numbers}}}"
 
 
 def _comment(text: str) -> str:

@@ -76,9 +76,8 @@ class MemorylessLaw(FrictionLaw):
 
 def stribeck_decay(v: Scalar, Vs: Scalar, delta: Scalar) -> Scalar:
     """`exp(-|v/Vs|^delta)`, with finite derivatives in all arguments at v = 0 and far above Vs."""
-    # |x|^delta as exp(delta log x): pow has NaN derivatives at 0, and exp(-exp(large)) has them far above Vs.
-    ratio = ca.fmin(ca.fabs(v) / Vs, 1e3) + 1e-12
-    return ca.exp(-ca.exp(delta * ca.log(ratio)))
+    # The power has no finite derivatives at 0; 1e-12 Vs beside it they are, and far above Vs, up to |v| = 1e60 Vs.
+    return ca.exp(-ca.power(ca.fabs(v) / Vs + 1e-12, delta))
 
 
 def stribeck_level(v: Scalar, Fc: Scalar, Fs: Scalar, Vs: Scalar, delta: Scalar) -> Scalar:

@@ -7,7 +7,6 @@
 #define CORE_H
 
 #include "model.h"
-#include "solver.h"
 
 #include <stddef.h>
 #include <stdint.h>
@@ -31,6 +30,12 @@ typedef enum {
 
 typedef enum { RATES_FRESH = 1, OUTPUTS_FRESH = 2 } Fresh;
 
+typedef struct {
+    enum { SOLVED, NOT_FINITE, STEP_TOO_SMALL, TOO_MANY_STEPS } result;
+    int culprit; /* state */
+    double time; /* that was reached */
+} Advance;
+
 /* Everything that `save` keeps. `ticks` counts the ticks of a sampled model that are done: time is counted, not summed. */
 typedef struct {
     uint64_t mark; /* hash of the token: a state of another model is refused */
@@ -45,12 +50,10 @@ typedef void (*Emit)(void *instance, Status status, const char *category, const 
 typedef struct {
     Memory *memory;
     double *values, *inputs, *parameters, *states, *rates, *outputs; /* inside memory */
-    double *scratch;                                                 /* states + outputs */
-    double *seeds;                                                   /* size */
-    const double **arg;
-    double **res, *w;
-    long long *iw;
-    Solver solver;
+    double *scratch;         /* states + outputs */
+    double *seeds;           /* size */
+    double *trials;          /* states of two solver steps */
+    double *error, *pivots;  /* of the last solver step */
     Emit emit;
     void (*logger)(void);
     void *environment;
@@ -87,15 +90,17 @@ Status directional(Instance *instance, const uint32_t *unknowns, size_t unknown_
                    size_t known_count, const double *seed, double *sensitivity);
 
 /* step.c */
-int evaluate(Instance *instance, const Code *code, double time, const double *x, double *first, double *second);
-int all_finite(const double *values, int count);
+void evaluate(Instance *instance, Code *code, double time, const double *x, double *first, double *second);
 int tick_is_due(const Instance *instance);
 double next_tick_time(const Instance *instance);
 Status tick(Instance *instance, int advance);
 Status update_discrete(Instance *instance);
 Status do_step(Instance *instance, double time, double length);
-int solver_rates(void *context, double time, const double *x, double *rates);
-int solver_jacobian(void *context, double time, const double *x, double *jacobian, double *by_time);
+
+/* solver.c */
+/* From start to end, or on failure not at all. The proposed step size is kept in memory, so a restored run repeats its
+ * bits. */
+Advance solver_advance(Instance *instance, double start, double end);
 
 /* memory.c */
 size_t memory_size(void);

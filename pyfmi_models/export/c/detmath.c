@@ -180,7 +180,8 @@ static double pow_extreme(double x, double y) {
 double det_pow(double x, double y) {
     if (y == 0 || x == 1) return 1;
     if (x != x || y != y) return x + y;
-    if (y == 2) return x * x; /* the usual exponent of a Stribeck curve */
+    if (y == 2) return x * x; /* the usual exponent of a Stribeck curve, and that of its slope */
+    if (y == 1) return x;
     if (x == 0 || fabs(x) == INFINITY || fabs(y) == INFINITY) return pow_extreme(x, y);
     if (x < 0 && !is_integer(y)) return NAN;
     double size = x == -1 ? 1 : pow_positive(fabs(x), y);

@@ -9,7 +9,7 @@
  *   sin, cos                                         <= 1 for |x| <= 1e5; beyond 1.6e6 an absolute error of |x| 2^-52
  *   tan, asin, acos, atan, atan2, hypot              <= 2
  *   sinh, cosh, tanh, asinh, acosh, atanh            <= 2
- *   floor, ceil, trunc, fmod, fmin, fmax             exact
+ *   floor, ceil, trunc, fmod, remainder, fmin, fmax  exact
  * Special values follow C99 Annex F; errno is never set.
  */
 #ifndef DETMATH_H
@@ -40,11 +40,18 @@ double det_acosh(double x);
 double det_atanh(double x);
 double det_hypot(double x, double y);
 double det_fmod(double x, double y);
+double det_remainder(double x, double y);
 double det_floor(double x);
 double det_ceil(double x);
 double det_trunc(double x);
-double det_fmin(double x, double y);
-double det_fmax(double x, double y);
+
+/* As in C99: the number wins over NaN. */
+static inline double det_fmin(double x, double y) { return x != x ? y : y < x ? y : x; }
+
+static inline double det_fmax(double x, double y) { return x != x ? y : y > x ? y : x; }
+
+/* -1, 1, or x where x is zero or no number. */
+static inline double det_sign(double x) { return x < 0 ? -1 : x > 0 ? 1 : x; }
 
 /* Code that includes this header after or before <math.h> calls ours by libm's names. detmath's own files opt out. */
 #ifndef DETMATH_KEEP_NAMES
@@ -71,11 +78,13 @@ double det_fmax(double x, double y);
 #define atanh det_atanh
 #define hypot det_hypot
 #define fmod det_fmod
+#define remainder det_remainder
 #define floor det_floor
 #define ceil det_ceil
 #define trunc det_trunc
 #define fmin det_fmin
 #define fmax det_fmax
+#define sign det_sign
 #endif
 
 #endif

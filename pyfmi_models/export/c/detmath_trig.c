@@ -22,11 +22,6 @@ double det_ceil(double x) {
     return whole < x ? copysign(whole + 1, x) : whole;
 }
 
-/* As in C99: the number wins over NaN. */
-double det_fmin(double x, double y) { return x != x ? y : y < x ? y : x; }
-
-double det_fmax(double x, double y) { return x != x ? y : y > x ? y : x; }
-
 /* Exact remainder by subtracting y 2^k, largest k first; each subtraction is exact (Sterbenz). */
 double det_fmod(double x, double y) {
     double rest = fabs(x), size = fabs(y);
@@ -37,6 +32,18 @@ double det_fmod(double x, double y) {
         rest -= part;
     }
     return copysign(rest, x);
+}
+
+/* x - n y with the integer n nearest to x / y, the even one of two: exact, because fmod and the differences are. */
+double det_remainder(double x, double y) {
+    double size = fabs(y), rest = fabs(x);
+    if (!(size < INFINITY)) return size == INFINITY && rest < INFINITY ? x : NAN;
+    if (size < 8.9e307) rest = det_fmod(rest, 2 * size);
+    if (size > 1e-290 ? rest > 0.5 * size : 2 * rest > size) {
+        rest -= size;
+        if (size > 1e-290 ? rest >= 0.5 * size : 2 * rest >= size) rest -= size;
+    }
+    return signbit(x) ? -rest : rest;
 }
 
 double det_hypot(double x, double y) {

@@ -9,22 +9,6 @@
 
 const char category_error[] = "logStatusError", category_event[] = "logEvents";
 
-static int larger(int a, int b) { return a > b ? a : b; }
-
-/* The longest of the arrays that the generated functions want. */
-static Code longest_arrays(void) {
-    const Code *codes[] = {&model.rates_code, &model.outputs_code, &model.jacobian_code, &model.directional_code,
-                           &model.tick_code};
-    Code most = {NULL, 8, 2, 0, 0};
-    for (size_t i = 0; i < sizeof codes / sizeof *codes; i++) {
-        most.arg = larger(most.arg, codes[i]->arg);
-        most.res = larger(most.res, codes[i]->res);
-        most.iw = larger(most.iw, codes[i]->iw);
-        most.w = larger(most.w, codes[i]->w);
-    }
-    return most;
-}
-
 /* All arrays come from one block, each a multiple of 8 bytes. */
 static void *carve(char **block, size_t count, size_t size) {
     void *part = *block;
@@ -41,28 +25,23 @@ static void point_into_memory(Instance *instance) {
     instance->outputs = instance->rates + model.rates;
 }
 
-static void carve_arrays(Instance *instance, char *block, Code most, size_t name_size) {
+static void carve_arrays(Instance *instance, char *block, size_t name_size) {
     instance->memory = carve(&block, 1, memory_size());
     instance->scratch = carve(&block, (size_t)(model.states + model.outputs), sizeof(double));
     instance->seeds = carve(&block, (size_t)model.size, sizeof(double));
-    instance->arg = carve(&block, (size_t)most.arg, sizeof(double *));
-    instance->res = carve(&block, (size_t)most.res, sizeof(double *));
-    instance->iw = carve(&block, (size_t)most.iw, sizeof(long long));
-    instance->w = carve(&block, (size_t)most.w, sizeof(double));
-    instance->solver.work = carve(&block, solver_work(model.rates), sizeof(double));
-    instance->solver.pivots = carve(&block, (size_t)model.rates, sizeof(int));
+    instance->trials = carve(&block, 2 * (size_t)model.rates, sizeof(double));
+    instance->error = carve(&block, (size_t)model.rates, sizeof(double));
+    instance->pivots = carve(&block, (size_t)model.rates, sizeof(double));
     instance->name = carve(&block, name_size, 1);
 }
 
 static Instance *allocate(const char *name) {
-    Code most = longest_arrays();
-    size_t numbers = (size_t)(model.states + model.outputs + model.size + most.arg + most.res + most.iw + most.w) +
-                     solver_work(model.rates) + (size_t)model.rates;
+    size_t numbers = (size_t)(model.states + model.outputs + model.size + 4 * model.rates);
     size_t name_size = strlen(name) + 1, head = (sizeof(Instance) + 7) / 8 * 8;
-    char *block = calloc(1, head + memory_size() + 8 * numbers + name_size + 16);
+    char *block = calloc(1, head + memory_size() + numbers * sizeof(double) + name_size + 16);
     if (!block) return NULL;
     Instance *instance = (Instance *)(void *)block;
-    carve_arrays(instance, block + head, most, name_size);
+    carve_arrays(instance, block + head, name_size);
     memcpy(instance->name, name, name_size);
     point_into_memory(instance);
     return instance;
@@ -80,14 +59,6 @@ void reset(Instance *instance) {
     for (int i = 0; i < model.size; i++) memory->values[i] = model.table[i].start;
 }
 
-static void set_up_solver(Instance *instance) {
-    instance->solver.size = model.rates;
-    instance->solver.context = instance;
-    instance->solver.rates = solver_rates;
-    instance->solver.jacobian = solver_jacobian;
-    instance->solver.nominals = model.nominals;
-}
-
 Instance *instantiate(Interface interface, const char *name, const char *token, Emit emit, void (*logger)(void),
                       void *environment, int log_events) {
     Instance *instance = allocate(name ? name : "");
@@ -98,7 +69,6 @@ Instance *instantiate(Interface interface, const char *name, const char *token, 
     instance->log_errors = 1;
     instance->log_events = log_events;
     instance->memory->interface = interface;
-    set_up_solver(instance);
     reset(instance);
     if (token && strcmp(token, model.token) == 0) return instance;
     fail(instance, FAILED, "the token \"%s\" is not that of this binary, \"%s\": description and binary do not belong "

@@ -12,29 +12,10 @@
 
 static const double slack = 0.01;
 
-int all_finite(const double *values, int count) {
-    for (int i = 0; i < count; i++)
-        if (!(fabs(values[i]) < INFINITY)) return 0;
-    return 1;
-}
-
-int evaluate(Instance *instance, const Code *code, double time, const double *x, double *first, double *second) {
-    instance->arg[0] = &time;
-    instance->arg[1] = x;
-    instance->arg[2] = instance->inputs;
-    instance->arg[3] = instance->parameters;
-    instance->res[0] = first;
-    instance->res[1] = second;
-    return code->function(instance->arg, instance->res, instance->iw, instance->w, 0);
-}
-
-int solver_rates(void *context, double time, const double *x, double *rates) {
-    return evaluate(context, &model.rates_code, time, x, rates, NULL) || !all_finite(rates, model.rates);
-}
-
-int solver_jacobian(void *context, double time, const double *x, double *jacobian, double *by_time) {
-    return evaluate(context, &model.jacobian_code, time, x, jacobian, by_time) ||
-           !all_finite(jacobian, model.rates * model.rates) || !all_finite(by_time, model.rates);
+void evaluate(Instance *instance, Code *code, double time, const double *x, double *first, double *second) {
+    const double *in[] = {&time, x, instance->inputs, instance->parameters};
+    double *out[] = {first, second};
+    code(in, out);
 }
 
 double next_tick_time(const Instance *instance) {
@@ -48,7 +29,7 @@ int tick_is_due(const Instance *instance) {
 /* Evaluate the tick that is due; with advance its new states are kept, without only its outputs are shown. */
 Status tick(Instance *instance, int advance) {
     double *next = instance->scratch, *outputs = instance->scratch + model.states;
-    evaluate(instance, &model.tick_code, next_tick_time(instance), instance->states, next, outputs);
+    evaluate(instance, model.tick_code, next_tick_time(instance), instance->states, next, outputs);
     int first_state = (int)(instance->states - instance->values), offset = first_state;
     for (int i = 0; i < model.states + model.outputs; i++)
         if (!(fabs(next[i]) < INFINITY))
@@ -84,23 +65,21 @@ static Status step_sampled(Instance *instance, double time, double length) {
     return status;
 }
 
-static Status explain(Instance *instance, SolverResult result, int culprit, double time) {
-    const char *name = model.table[1 + model.inputs + model.parameters + culprit].name;
-    if (result == TOO_MANY_STEPS)
-        return fail(instance, FAILED, "more than a million solver steps from t = %.17g s; \"%s\" changes fastest", time,
-                    name);
-    if (result == NOT_FINITE)
-        return fail(instance, FAILED, "the rates or their derivatives are not finite near t = %.17g s", time);
-    return fail(instance, FAILED, "the solver step became too small after t = %.17g s, because of \"%s\"", time, name);
+static Status explain(Instance *instance, Advance stuck) {
+    const char *name = model.table[1 + model.inputs + model.parameters + stuck.culprit].name;
+    if (stuck.result == TOO_MANY_STEPS)
+        return fail(instance, FAILED, "%d solver steps reach t = %.17g s only, because of \"%s\"; take shorter steps or a "
+                    "looser tolerance than %g", model.most_steps, stuck.time, name, instance->memory->tolerance);
+    if (stuck.result == NOT_FINITE)
+        return fail(instance, FAILED, "the rate of \"%s\" or a derivative of it is not finite near t = %.17g s", name,
+                    stuck.time);
+    return fail(instance, FAILED, "the solver step becomes too small at t = %.17g s, because of \"%s\"", stuck.time, name);
 }
 
 static Status step_continuous(Instance *instance, double time, double length) {
-    int culprit = 0;
     if (!model.rates) return OK;
-    instance->solver.tolerance = instance->memory->tolerance;
-    SolverResult result = solver_advance(&instance->solver, instance->values[0], time + length, instance->states,
-                                         &instance->memory->step, &culprit);
-    return result == SOLVED ? OK : explain(instance, result, culprit, time);
+    Advance advance = solver_advance(instance, instance->values[0], time + length);
+    return advance.result == SOLVED ? OK : explain(instance, advance);
 }
 
 static Status check_step(Instance *instance, double time, double length) {

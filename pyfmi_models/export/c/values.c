@@ -25,7 +25,7 @@ static Status not_finite(Instance *instance, const char *name) {
 
 static Status refresh_rates(Instance *instance) {
     if (!model.rates || instance->memory->fresh & RATES_FRESH) return OK;
-    evaluate(instance, &model.rates_code, instance->values[0], instance->states, instance->rates, NULL);
+    evaluate(instance, model.rates_code, instance->values[0], instance->states, instance->rates, NULL);
     const char *name = first_not_finite(instance->rates, (int)(instance->rates - instance->values), model.rates);
     if (name) return not_finite(instance, name);
     instance->memory->fresh |= RATES_FRESH;
@@ -38,7 +38,7 @@ static Status refresh_outputs(Instance *instance) {
         if (instance->memory->phase == EVENT && tick_is_due(instance)) return tick(instance, 0);
         return OK;
     }
-    evaluate(instance, &model.outputs_code, instance->values[0], instance->states, instance->outputs, NULL);
+    evaluate(instance, model.outputs_code, instance->values[0], instance->states, instance->outputs, NULL);
     const char *name = first_not_finite(instance->outputs, (int)(instance->outputs - instance->values), model.outputs);
     if (name) return not_finite(instance, name);
     instance->memory->fresh |= OUTPUTS_FRESH;
@@ -177,11 +177,11 @@ Status directional(Instance *instance, const uint32_t *unknowns, size_t unknown_
     Status status = check_unknowns(instance, unknowns, unknown_count);
     if (status == OK) status = scatter_seed(instance, knowns, known_count, seed);
     if (status != OK) return status;
-    const double *seeds = instance->seeds, *parts[] = {seeds, seeds + 1 + model.inputs + model.parameters, seeds + 1,
-                                                       seeds + 1 + model.inputs};
-    memcpy(instance->arg + 4, parts, sizeof parts);
-    evaluate(instance, &model.directional_code, instance->values[0], instance->states, instance->scratch,
-             instance->scratch + model.rates);
+    const double *seeds = instance->seeds, *inputs = seeds + 1, *parameters = inputs + model.inputs;
+    const double *in[] = {instance->values, instance->states, instance->inputs, instance->parameters,
+                          seeds, parameters + model.parameters, inputs, parameters};
+    double *out[] = {instance->scratch, instance->scratch + model.rates};
+    model.directional_code(in, out);
     int first = (int)(instance->rates - instance->values);
     const char *name = first_not_finite(instance->scratch, first, model.rates + model.outputs);
     if (name) return not_finite(instance, name);
