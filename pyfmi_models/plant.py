@@ -59,7 +59,7 @@ def written(mount: "Mount") -> tuple[list[Any], Any, dict[str, Any]]:
     applied, rates = this.applied(given["tau"], own)
     level = this.level(motion, own)
     friction = this.law.contact(own["friction"], v, level) + this.viscous(motion, own)
-    push = applied - friction - this.loads(motion, own) - given["disturbance"]
+    push = applied - given["disturbance"] - this.loads(motion, own) - friction
     acceleration, twisting = _accelerations(this, motion, push, own)
 
     rates |= {name: effect.rate(motion._replace(state=own[name])) for name, effect in this.of_kind(MotionEffect)}

@@ -10,9 +10,6 @@ import numpy as np
 import pytest
 
 from pyfmi_models.export import build_library
-from pyfmi_models.export.build import compile_shared
-from pyfmi_models.export.codegen import SHIM
-from pyfmi_models.export.platforms import PLATFORMS, host
 
 library = cache(lambda make: build_library(make()))
 pytestmark = pytest.mark.parametrize("fmi", [2, 3])
@@ -263,56 +260,3 @@ def test_log_categories_can_be_chosen(fmi):
     assert driver.call("Terminate") == "ok"
     assert driver.messages == [("ok", "logEvents", "terminated mode at t = 0 s")]
     assert driver.call("SetDebugLogging", on, ctypes.c_size_t(1), (ctypes.c_char_p * 1)(b"gossip")) == "error"
-
-
-class Solver(ctypes.Structure):
-    _fields_ = (
-        ("size", ctypes.c_int),
-        ("context", ctypes.c_void_p),
-        (
-            "rates",
-            ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, *[ctypes.POINTER(ctypes.c_double)] * 2),
-        ),
-        (
-            "jacobian",
-            ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, *[ctypes.POINTER(ctypes.c_double)] * 3),
-        ),
-        ("nominals", ctypes.POINTER(ctypes.c_double)),
-        ("tolerance", ctypes.c_double),
-        ("work", ctypes.POINTER(ctypes.c_double)),
-        ("pivots", ctypes.POINTER(ctypes.c_int)),
-    )
-
-
-def rates(context, t, x, result):
-    result[0], result[1] = x[1] * np.cos(t), -x[0] * x[1] + np.sin(2 * t)
-    return 0
-
-
-def slopes(context, t, x, result, by_time):
-    result[0], result[1], result[2], result[3] = 0.0, -x[1], np.cos(t), -x[0]
-    by_time[0], by_time[1] = -x[1] * np.sin(t), 2 * np.cos(2 * t)
-    return 0
-
-
-def fixed_steps(count):
-    """The nonlinear problem above, explicit in time, from 0 to 2 in equal steps of the C solver."""
-    sources = {p.name: p.read_bytes() for p in SHIM.iterdir() if p.name.startswith(("solver", "detmath"))}
-    flags = ("-std=c11", "-O2", "-ffp-contract=off", "-fno-math-errno", "-shared", "-fPIC")
-    step = ctypes.CDLL(str(compile_shared(sources, "solver.so", PLATFORMS[host()].target, flags))).rodas4_step
-    fields = dict(Solver._fields_)
-    solver = Solver(2, None, fields["rates"](rates), fields["jacobian"](slopes), (ctypes.c_double * 2)(1, 1), 1e-8,
-                    (ctypes.c_double * 64)(), (ctypes.c_int * 2)())  # fmt: skip
-    x, error = (ctypes.c_double * 2)(1.0, 0.5), (ctypes.c_double * 2)()
-    for i in range(count):
-        assert (
-            step(ctypes.byref(solver), ctypes.c_double(2.0 * i / count), ctypes.c_double(2.0 / count), x, x, error) == 0
-        )
-    return np.array(x)
-
-
-def test_the_solver_is_of_fourth_order(fmi):
-    exact = fixed_steps(1280)
-    errors = [np.abs(fixed_steps(count) - exact).max() for count in (20, 40, 80)]
-    orders = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert orders.min() >= 3.7

@@ -46,14 +46,15 @@ _NAMES = {getattr(ca, name): name[3:].lower() for name in dir(ca) if name.starts
 
 
 def c_function(name: str, parts: Sequence[ca.Function]) -> str:
-    """Write functions of dense columns as one C function.
+    """Write functions of dense columns as one C function; a part may use columns of the parts before it by name.
 
-    It reads the columns that the first part reads and writes those that the last part makes; in between, a part may
-    use columns of the parts before it by name.
-    Raises ExportError that names an operation that is not the same on every machine.
+    It reads the columns that no part makes and writes those that the last part makes.
+    Raises ExportError, a sentence without its subject, if an operation is not the same on every machine.
     """
-    inputs, outputs = parts[0].name_in(), parts[-1].name_out()
-    columns = {one: [f"{one}[{i}]" for i in range(parts[0].numel_in(one))] for one in inputs}
+    made = {one for part in parts for one in part.name_out()}
+    sizes = {one: part.numel_in(one) for part in parts for one in part.name_in() if one not in made}
+    columns = {one: [f"{one}[{i}]" for i in range(size)] for one, size in sizes.items()}
+    inputs, outputs = list(sizes), parts[-1].name_out()
     lines: list[str] = []
     for part in parts:
         columns |= _write(part, columns, lines)
@@ -89,9 +90,10 @@ def _write(part: ca.Function, columns: dict[str, list[str]], lines: list[str]) -
 
 def _operation(code: int, operands: Sequence[str]) -> str:
     if code not in _TEXTS:
+        name, choices = _NAMES.get(code, str(code)), ", ".join(sorted(f"{_ONE} {_TWO} pow".split()))
         raise ExportError(
-            f"the equations use {_NAMES.get(code, code)}, which has no version that is the same on every machine; "
-            f"there are: {', '.join(sorted(_NAMES[one] for one in _TEXTS))}"
+            f"uses {name}, of which there is no version with the same bits on every machine; there are, besides "
+            f"arithmetic and comparison: {choices}"
         )
     return _TEXTS[code].format(*operands)
 

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from dataclasses import asdict, dataclass
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -40,21 +41,24 @@ def generate(model: Model) -> Generated:
     try:
         equations = "\n".join(c_function(f"model_{role}", parts) for role, parts in functions.items())
     except ExportError as error:
-        raise ExportError(f'model "{model.name}": {error}') from None
+        raise ExportError(f'model "{model.name}" {error}') from None
     token = _token(layout, equations)
     return Generated(layout, token, {"equations.c": equations, "model.c": _model_code(layout, token, functions)})
 
 
 def _functions(model: Model) -> dict[str, list[ca.Function]]:
     """The functions of each role; where there are several, the later ones use what the earlier ones make."""
-    sizes = (1, len(model.states), len(model.inputs), len(model.parameters))
-    point = {name: ca.SX.sym(name, size) for name, size in zip("txup", sizes, strict=True)}
+    point = {name: ca.SX.sym(name, size) for name, size in zip("txup", _sizes(model), strict=True)}
     following, outputs = _scalar(model).call([*point.values()])
     if model.period:
         return {"tick": [_function(point, {"next": following, "y": outputs})]}
     rates = _function(point, {"rates": following})
     found = {"rates": [rates], "outputs": [_function(point, {"y": outputs})]} | _derivatives(point, following, outputs)
     return found | ({"step": [*step_functions(rates, [s.nominal for s in model.states])]} if model.states else {})
+
+
+def _sizes(model: Model) -> tuple[int, ...]:
+    return 1, len(model.states), len(model.inputs), len(model.parameters)
 
 
 def _scalar(model: Model) -> ca.Function:
@@ -72,9 +76,11 @@ def _derivatives(point: dict[str, Any], rates: Any, outputs: Any) -> dict[str, l
     before = ca.vertcat(*point.values())
     changes = [ca.jtimes(part, before, ca.vertcat(*seeds.values())) for part in (rates, outputs)]
     back = ca.jtimes(ca.vertcat(rates, outputs), before, ca.vertcat(*weights.values()), True)
+    ends = [0, *accumulate(part.numel() for part in point.values())]
+    parts = {f"d{name}": back[a:b] for name, a, b in zip(point, ends, ends[1:], strict=False)}
     return {
         "directional": [_function(point | seeds, {"dr": changes[0], "dy": changes[1]})],
-        "adjoint": [_function(point | weights, {"sensitivity": back})],
+        "adjoint": [_function(point | weights, parts)],
     }
 
 
@@ -93,7 +99,7 @@ def _token(layout: Layout, equations: str) -> str:
 
 def _model_code(layout: Layout, token: str, functions: dict[str, list[ca.Function]]) -> str:
     model = layout.model
-    rows = ",\n".join(_row(row) for row in layout.rows)
+    rows = ",\n".join(_row(row, _shown(layout).get(row.reference, row.reference)) for row in layout.rows)
     nominals = ", ".join(number(state.nominal) for state in model.states) or "1"
     counts = [len(layout.rows), *(len(layout.of(kind)) for kind in ("input", "parameter", "state", "rate", "output"))]
     codes = ",\n".join(f"    .{role}_code = model_{role}" for role in functions)
@@ -130,10 +136,23 @@ def _most_steps(functions: dict[str, list[ca.Function]]) -> int:
     return WORK // (sum(once) + OVERHEAD)
 
 
-def _row(row: Row) -> str:
+def _shown(layout: Layout) -> dict[int, int]:
+    """Outputs of a continuous model that show an input or a state as it is, with what they show."""
+    model = layout.model
+    if model.period:
+        return {}
+    point = [ca.SX.sym(name, size) for name, size in zip("txup", _sizes(model), strict=True)]
+    outputs = ca.densify(_scalar(model).call(point)[1])
+    given = [(point[part][i], row) for part, kind in ((1, "state"), (2, "input")) for i, row in enumerate(layout.of(kind))]
+    rows = enumerate(layout.of("output"))
+    return {row.reference: source.reference for i, row in rows for one, source in given if ca.is_equal(outputs[i], one)}
+
+
+def _row(row: Row, same: int) -> str:
     variable = row.variable
     numbers = ", ".join(number(value) for value in (variable.start, variable.low, variable.high))
-    return f"    {{{json.dumps(variable.name)}, {row.kind.upper()}, {numbers}}}"
+    fixed = int(not variable.tunable)
+    return f"    {{{json.dumps(variable.name)}, {row.kind.upper()}, {numbers}, {fixed}, {same}}}"
 
 
 def _comment(text: str) -> str:

@@ -10,11 +10,13 @@ whole step at once. The matrix is eliminated without exchange of rows: its pivot
 refuses a step with a small pivot and repeats it with a smaller h.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import casadi as ca
+
+from pyfmi_models.export.arrange import arranged
 
 GAMMA = 0.25
 ALPHA = (0, 0.386, 0.21, 0.63, 1, 1)
@@ -77,43 +79,47 @@ class _Factors:
         return [(k, i) for place, k in enumerate(self.order) for i in self.order[place + 1 :]]
 
 
-def step_functions(rates: ca.Function, nominals: Sequence[float]) -> tuple[ca.Function, ca.Function]:
-    """Write one step from (t, x) over h as two functions, for scalar `rates`, (t, x, u, p) -> dx/dt.
+def step_functions(rates: ca.Function, nominals: Sequence[float]) -> tuple[ca.Function, ...]:
+    """Write one step from (t, x) over h as functions of which the later use what the earlier make.
 
-    prepare: t, x, u, p, h -> reciprocals of the pivots [s], kept numbers
-    stages:  t, x, u, p, h, reciprocals, kept -> x at t + h, relative error of each state, sum of their squares, pivots
+    constants: t, x, u, p -> c, reciprocals of what inputs and parameters alone decide
+    prepare:   t, x, u, p, c, h -> reciprocals of the pivots [s], kept numbers
+    stages:    all these -> x at t + h, relative error of each state, sum of their squares, the pivots' reciprocals
 
-    The error is the difference to the embedded third order, relative to the mean of |x| before and after plus one
-    hundredth of the nominal value; `pivots` are the reciprocals once more.
+    `rates` are scalar, (t, x, u, p) -> dx/dt. The error is the difference to the embedded third order, relative to the
+    mean of |x| before and after plus one hundredth of the nominal value.
     """
-    t, x, u, p = point = [ca.SX.sym(name, rates.size1_in(i)) for i, name in enumerate("txup")]
-    h, reciprocals, keep = ca.SX.sym("h"), ca.SX.sym("r", x.numel()), _Kept()
-    matrix, order = _eliminated(ca.SX.eye(x.numel()) / (h * GAMMA) - ca.jacobian(rates(*point), x))
-    pivots = ca.vertcat(*(matrix.pop((k, k)) for k in range(x.numel())))
+    constants, rates = arranged(rates)
+    given = {name: ca.SX.sym(name, rates.numel_in(name)) for name in rates.name_in()} | {"h": ca.SX.sym("h")}
+    x, h, keep = given["x"], given["h"], _Kept()
+    start = rates(*(given[name] for name in "txupc"))
+    matrix, order = _eliminated(ca.SX.eye(x.numel()) / (h * GAMMA) - ca.jacobian(start, x))
+    pivots, reciprocals = ca.vertcat(*(matrix.pop((k, k)) for k in range(x.numel()))), ca.SX.sym("r", x.numel())
     factors = _Factors(order, {place: keep(entry) for place, entry in matrix.items()}, reciprocals)
-    last, correction = _stages(rates, point, h, factors, keep)
+    last, correction = _stages(rates, given, start, factors, keep)
     end = last + correction
     error = correction / (0.5 * (ca.fabs(x) + ca.fabs(end)) + 0.01 * ca.DM(nominals))
-    given = {"t": t, "x": x, "u": u, "p": p, "h": h}
     made = {"reciprocals": 1 / pivots, "kept": ca.vertcat(*keep.values)}
     known = {"reciprocals": reciprocals, "kept": ca.vertcat(*keep.symbols)}
     result = {"end": end, "error": error, "square": ca.sumsqr(error), "pivots": reciprocals}
     return (
+        constants,
         ca.Function("prepare", given | made, [*given], [*made], {"cse": True}),
         ca.Function("stages", given | known | result, [*given, *known], [*result], {"cse": True}),
     )
 
 
-def _stages(rates: ca.Function, point: list[Any], h: Any, factors: _Factors, keep: _Kept) -> tuple[Any, Any]:
+def _stages(
+    rates: ca.Function, given: dict[str, Any], start: Any, factors: _Factors, keep: _Kept
+) -> tuple[Any, Any]:
     """Return the point of the last stage and the last U, whose sum is the result."""
-    t, x, u, p = point
-    start, per_h, moving = rates(*point), keep(1 / h), _with_products(rates, point, keep)
-    first, by_time = keep.each(start), keep.each(h * ca.jacobian(start, t))
+    t, x, u, p, c, h = (given[name] for name in "txupch")
+    per_h, first, by_time = keep(1 / h), keep.each(start), keep.each(h * ca.jacobian(start, t))
     stages: list[list[Any]] = []
     place = x
     for s, alpha in enumerate(ALPHA):
         place = ca.vertcat(*(_combined(state, A[s], stages, i) for i, state in enumerate(_list(x))))
-        slope = _list(moving(t + alpha * h, place, u, p)) if s else first
+        slope = _list(rates(t + alpha * h, place, u, p, c)) if s else first
         past = [per_h * _combined(0, C[s], stages, i) + GAMMA_TIME[s] * by_time[i] for i in range(len(slope))]
         stages.append(factors.solve([f + other for f, other in zip(slope, past, strict=True)]))
     return place, ca.vertcat(*stages[-1])
@@ -153,32 +159,6 @@ def _neighbours(entries: dict[tuple[int, int], Any], left: set[int]) -> tuple[di
     rows = {k: [i for i in left if i != k and (i, k) in entries] for k in left}
     columns = {k: [j for j in left if j != k and (k, j) in entries] for k in left}
     return rows, columns
-
-
-def _with_products(rates: ca.Function, point: list[Any], keep: _Kept) -> Callable[..., Any]:
-    """Return the rates with products in place of divisions by what inputs and parameters alone decide."""
-    work: dict[int, tuple[Any, bool]] = {}  # expression, and whether it changes within a step
-    results = ca.SX(rates.size1_out(0), 1)
-    for k in range(rates.n_instructions()):
-        code, places, (to, *entry) = rates.instruction_id(k), rates.instruction_input(k), rates.instruction_output(k)
-        if code == ca.OP_OUTPUT:
-            results[entry[0]] = work[places[0]][0]
-        elif code == ca.OP_INPUT:
-            work[to] = point[places[0]][places[1]], places[0] < 2
-        elif code == ca.OP_CONST:
-            work[to] = ca.SX(rates.instruction_constant(k)), False
-        else:
-            work[to] = _operation(code, [work[place] for place in places], keep)
-    kept = ca.vertcat(*keep.symbols)
-    function = ca.Function("moving", [*point, kept], [results])
-    return lambda *arguments: function(*arguments, kept)
-
-
-def _operation(code: int, operands: list[tuple[Any, bool]], keep: _Kept) -> tuple[Any, bool]:
-    values, moving = zip(*operands, strict=True)
-    if code == ca.OP_DIV and moving == (True, False):
-        return values[0] * keep(1 / values[1]), True
-    return (ca.SX.unary if len(values) == 1 else ca.SX.binary)(code, *values), any(moving)
 
 
 def _list(column: Any) -> list[Any]:

@@ -88,6 +88,8 @@ Status get_rates(Instance *instance, double *rates, size_t count);
 Status set_time(Instance *instance, double time);
 Status directional(Instance *instance, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns,
                    size_t known_count, const double *seed, double *sensitivity);
+Status adjoint(Instance *instance, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns, size_t known_count,
+               const double *seed, double *sensitivity);
 
 /* step.c */
 void evaluate(Instance *instance, Code *code, double time, const double *x, double *first, double *second);

@@ -28,7 +28,7 @@ double det_fmod(double x, double y) {
     if (x != x || y != y || rest == INFINITY || size == 0) return NAN;
     while (rest >= size) {
         double part = size;
-        while (part <= rest * 0.5) part *= 2;
+        while (rest - part >= part) part *= 2;
         rest -= part;
     }
     return copysign(rest, x);

@@ -123,6 +123,14 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference
     return (fmi3Status)directional(c, unknowns, unknown_count, knowns, known_count, seed, sensitivity);
 }
 
+fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t unknown_count,
+                                    const fmi3ValueReference knowns[], size_t known_count, const fmi3Float64 seed[],
+                                    size_t seed_count, fmi3Float64 sensitivity[], size_t sensitivity_count) {
+    if (!allowed(c, INITIALIZATION + RUNNING, "fmi3GetAdjointDerivative")) return fmi3Error;
+    if (!same_count(c, unknown_count, seed_count) || !same_count(c, known_count, sensitivity_count)) return fmi3Error;
+    return (fmi3Status)adjoint(c, unknowns, unknown_count, knowns, known_count, seed, sensitivity);
+}
+
 /* Model exchange. */
 
 fmi3Status fmi3EnterEventMode(fmi3Instance c) {

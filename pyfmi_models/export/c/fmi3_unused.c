@@ -123,20 +123,6 @@ fmi3Status fmi3GetVariableDependencies(fmi3Instance c, fmi3ValueReference depend
     return refuse(c, 1, "dependencies that change (providesPerElementDependencies is false)");
 }
 
-fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t unknown_count,
-                                    const fmi3ValueReference knowns[], size_t known_count, const fmi3Float64 seed[],
-                                    size_t seed_count, fmi3Float64 sensitivity[], size_t sensitivity_count) {
-    (void)unknowns;
-    (void)unknown_count;
-    (void)knowns;
-    (void)known_count;
-    (void)seed;
-    (void)seed_count;
-    (void)sensitivity;
-    (void)sensitivity_count;
-    return refuse(c, 1, "adjoint derivatives");
-}
-
 fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference r[], size_t count, const fmi3Int32 orders[],
                                     fmi3Float64 values[], size_t n) {
     (void)r;

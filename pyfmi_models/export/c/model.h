@@ -10,6 +10,7 @@ typedef struct {
     Kind kind;
     double start, low, high;
     int fixed; /* a parameter that keeps its value from the end of initialization on */
+    int same; /* the value reference of the input or state that an output shows as it is, else its own */
 } Variable;
 
 /* A generated function: columns of numbers in, columns of numbers out. */

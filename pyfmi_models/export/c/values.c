@@ -18,16 +18,16 @@ static const char *first_not_finite(const double *values, int first, int count) 
 }
 
 /* Outside its domain a model may be asked again with a smaller step in model exchange; in co-simulation it has failed. */
-static Status not_finite(Instance *instance, const char *name) {
+static Status not_finite(Instance *instance, const char *what, const char *name) {
     Status status = instance->memory->interface == MODEL_EXCHANGE ? DISCARD : FAILED;
-    return fail(instance, status, "\"%s\" is not finite at t = %.17g s", name, instance->values[0]);
+    return fail(instance, status, "%s\"%s\" is not finite at t = %.17g s", what, name, instance->values[0]);
 }
 
 static Status refresh_rates(Instance *instance) {
     if (!model.rates || instance->memory->fresh & RATES_FRESH) return OK;
     evaluate(instance, model.rates_code, instance->values[0], instance->states, instance->rates, NULL);
     const char *name = first_not_finite(instance->rates, (int)(instance->rates - instance->values), model.rates);
-    if (name) return not_finite(instance, name);
+    if (name) return not_finite(instance, "", name);
     instance->memory->fresh |= RATES_FRESH;
     return OK;
 }
@@ -40,7 +40,7 @@ static Status refresh_outputs(Instance *instance) {
     }
     evaluate(instance, model.outputs_code, instance->values[0], instance->states, instance->outputs, NULL);
     const char *name = first_not_finite(instance->outputs, (int)(instance->outputs - instance->values), model.outputs);
-    if (name) return not_finite(instance, name);
+    if (name) return not_finite(instance, "", name);
     instance->memory->fresh |= OUTPUTS_FRESH;
     return OK;
 }
@@ -56,9 +56,10 @@ Status get_values(Instance *instance, const uint32_t *references, size_t count, 
     for (size_t i = 0; i < count; i++)
         if (references[i] >= (uint32_t)model.size) return unknown_reference(instance, references[i]);
     for (size_t i = 0; i < count; i++) {
-        Status status = refresh(instance, model.table[references[i]].kind);
+        int source = model.table[references[i]].same;
+        Status status = refresh(instance, model.table[source].kind);
         if (status != OK) return status;
-        values[i] = instance->values[references[i]];
+        values[i] = instance->values[source];
     }
     return OK;
 }
@@ -146,45 +147,67 @@ Status set_time(Instance *instance, double time) {
     return OK;
 }
 
-static Status scatter_seed(Instance *instance, const uint32_t *knowns, size_t count, const double *seed) {
+/* What is calculated has derivatives with respect to what is not. */
+static Status check_references(Instance *instance, const uint32_t *references, size_t count, int calculated) {
+    for (size_t i = 0; i < count; i++) {
+        if (references[i] >= (uint32_t)model.size) return unknown_reference(instance, references[i]);
+        const Variable *variable = &model.table[references[i]];
+        if ((variable->kind >= RATE) == calculated) continue;
+        return fail(instance, FAILED, calculated ? "\"%s\" is not calculated: it has no derivative"
+                                                 : "\"%s\" is calculated: no derivative with respect to it", variable->name);
+    }
+    return OK;
+}
+
+static Status check_derivative(Instance *instance, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns,
+                               size_t known_count, const double *seed, const double *sensitivity) {
+    if (is_sampled()) return fail(instance, FAILED, "a sampled model has no partial derivatives");
+    if ((unknown_count && !unknowns) || (known_count && !knowns) || !seed || !sensitivity)
+        return fail(instance, FAILED, "partial derivatives: an array is missing");
+    Status status = check_references(instance, unknowns, unknown_count, 1);
+    return status == OK ? check_references(instance, knowns, known_count, 0) : status;
+}
+
+/* Adds the seeds to a column that has a place for each variable. */
+static void scatter(Instance *instance, const uint32_t *references, size_t count, const double *seed) {
     memset(instance->seeds, 0, (size_t)model.size * sizeof(double));
-    for (size_t i = 0; i < count; i++) {
-        if (knowns[i] >= (uint32_t)model.size) return unknown_reference(instance, knowns[i]);
-        if (model.table[knowns[i]].kind >= RATE)
-            return fail(instance, FAILED, "\"%s\" is calculated: no derivative with respect to it",
-                        model.table[knowns[i]].name);
-        instance->seeds[knowns[i]] += seed[i];
-    }
+    for (size_t i = 0; i < count; i++) instance->seeds[references[i]] += seed[i];
+}
+
+static Status gather(Instance *instance, const uint32_t *references, size_t count, const double *column, int first,
+                     double *result) {
+    for (size_t i = 0; i < count; i++)
+        if (!(fabs(column[(int)references[i] - first]) < INFINITY))
+            return not_finite(instance, "a derivative of ", model.table[references[i]].name);
+    for (size_t i = 0; i < count; i++) result[i] = column[(int)references[i] - first];
     return OK;
 }
 
-static Status check_unknowns(Instance *instance, const uint32_t *unknowns, size_t count) {
-    for (size_t i = 0; i < count; i++) {
-        if (unknowns[i] >= (uint32_t)model.size) return unknown_reference(instance, unknowns[i]);
-        if (model.table[unknowns[i]].kind < RATE)
-            return fail(instance, FAILED, "\"%s\" is not calculated: it has no derivative",
-                        model.table[unknowns[i]].name);
-    }
-    return OK;
-}
-
-/* sensitivity = d unknowns / d knowns * seed, by the derivative that CasADi wrote. */
+/* sensitivity = d unknowns / d knowns * seed */
 Status directional(Instance *instance, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns,
                    size_t known_count, const double *seed, double *sensitivity) {
-    if (is_sampled()) return fail(instance, FAILED, "a sampled model has no directional derivatives");
-    if ((unknown_count && (!unknowns || !sensitivity)) || (known_count && (!knowns || !seed)))
-        return fail(instance, FAILED, "directional derivative: an array is missing");
-    Status status = check_unknowns(instance, unknowns, unknown_count);
-    if (status == OK) status = scatter_seed(instance, knowns, known_count, seed);
+    Status status = check_derivative(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity);
     if (status != OK) return status;
+    scatter(instance, knowns, known_count, seed);
     const double *seeds = instance->seeds, *inputs = seeds + 1, *parameters = inputs + model.inputs;
     const double *in[] = {instance->values, instance->states, instance->inputs, instance->parameters,
                           seeds, parameters + model.parameters, inputs, parameters};
     double *out[] = {instance->scratch, instance->scratch + model.rates};
     model.directional_code(in, out);
-    int first = (int)(instance->rates - instance->values);
-    const char *name = first_not_finite(instance->scratch, first, model.rates + model.outputs);
-    if (name) return not_finite(instance, name);
-    for (size_t i = 0; i < unknown_count; i++) sensitivity[i] = instance->scratch[(int)unknowns[i] - first];
-    return OK;
+    return gather(instance, unknowns, unknown_count, instance->scratch, (int)(instance->rates - instance->values), sensitivity);
+}
+
+/* sensitivity = seed * d unknowns / d knowns */
+Status adjoint(Instance *instance, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns, size_t known_count,
+               const double *seed, double *sensitivity) {
+    Status status = check_derivative(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity);
+    if (status != OK) return status;
+    scatter(instance, unknowns, unknown_count, seed);
+    const double *rates = instance->seeds + (instance->rates - instance->values);
+    const double *in[] = {instance->values, instance->states, instance->inputs, instance->parameters, rates,
+                          rates + model.rates};
+    double *column = instance->seeds, *inputs = column + 1, *parameters = inputs + model.inputs;
+    double *out[] = {column, parameters + model.parameters, inputs, parameters};
+    model.adjoint_code(in, out);
+    return gather(instance, knowns, known_count, column, 0, sensitivity);
 }
