@@ -99,7 +99,8 @@ def _token(layout: Layout, equations: str) -> str:
 
 def _model_code(layout: Layout, token: str, functions: dict[str, list[ca.Function]]) -> str:
     model = layout.model
-    rows = ",\n".join(_row(row, _shown(layout).get(row.reference, row.reference)) for row in layout.rows)
+    shown = _shown(layout)
+    rows = ",\n".join(_row(row, shown.get(row.reference, row.reference)) for row in layout.rows)
     nominals = ", ".join(number(state.nominal) for state in model.states) or "1"
     counts = [len(layout.rows), *(len(layout.of(kind)) for kind in ("input", "parameter", "state", "rate", "output"))]
     codes = ",\n".join(f"    .{role}_code = model_{role}" for role in functions)

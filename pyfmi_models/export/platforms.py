@@ -29,8 +29,9 @@ class Platform:
 PLATFORMS = {
     platform.name: platform
     for platform in (
-        Platform("x86_64-linux", "x86_64-linux-gnu.2.17", "linux64", ".so"),
-        Platform("aarch64-linux", "aarch64-linux-gnu.2.17", "linux64", ".so"),
+        # A step takes 5 % less time when compiler and linker see all of it; for macOS zig cannot.
+        Platform("x86_64-linux", "x86_64-linux-gnu.2.17", "linux64", ".so", ("-flto",)),
+        Platform("aarch64-linux", "aarch64-linux-gnu.2.17", "linux64", ".so", ("-flto",)),
         Platform(
             "x86_64-windows",
             "x86_64-windows-gnu",

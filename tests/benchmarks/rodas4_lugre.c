@@ -7,6 +7,8 @@
  * are those of the FMU. */
 #include "detmath.h"
 
+#include <stddef.h>
+
 typedef struct {
     double per_inertia, torque_limit, sigma0, sigma1, sigma2, Fc, Fs_less_Fc, per_Vs, delta;
 } Axis;
