@@ -181,7 +181,9 @@ def test_the_remainder_is_that_of_python(library):
     tiny, huge = 5e-324, 1.7e308
     pairs = list(zip(decades(-20, 20, 1).tolist(), decades(-20, 20, 2).tolist(), strict=True))
     pairs += [(x, y) for x in whole for y in whole if y]
-    pairs += [(x, y) for x in (tiny, 3 * tiny, -7 * tiny, huge, -0.7 * huge, 0.0, -0.0) for y in (tiny, 2 * tiny, huge, INF)]
+    pairs += [
+        (x, y) for x in (tiny, 3 * tiny, -7 * tiny, huge, -0.7 * huge, 0.0, -0.0) for y in (tiny, 2 * tiny, huge, INF)
+    ]
     assert [pair for pair in pairs if not same(remainder(*pair), math.remainder(*pair))] == []
     assert all(math.isnan(remainder(x, y)) for x, y in ((1.0, 0.0), (INF, 1.0), (NAN, 1.0), (1.0, NAN)))
 

@@ -1,4 +1,4 @@
-"""The step of the co-simulation solver as expressions: its order, its damping, its answer to a step that is too long."""
+"""The step of the co-simulation solver as expressions: its order, its damping, its answer to too long a step."""
 
 import casadi as ca
 import export_models as models
@@ -65,7 +65,7 @@ def test_elimination_solves_any_sparse_linear_system(seed):
 
 
 def test_a_step_that_meets_a_growing_mode_shows_a_small_pivot():
-    """x' = x grows; at h gamma = 1 the matrix 1/(h gamma) - 1 is singular, and its reciprocal says so."""
+    """Where x' = x grows: at h gamma = 1 the matrix 1/(h gamma) - 1 is singular, and its reciprocal says so."""
     step = solver((1, 0, 0), lambda t, x, u, p: [x])
     assert abs(step(0.0, 1.0, h=4.0 * (1 + 1e-12))[2][0]) > 1e9
     assert step(0.0, 1.0, h=0.04)[2][0] == pytest.approx(0.01 / 0.99)

@@ -1,7 +1,7 @@
 """Equations in the order in which a processor is done with them first.
 
-A step of the solver is one long chain: each stage waits for the one before. So what inputs and parameters alone decide is
-divided by once, as a reciprocal, and sums take their slowest term last. Both change a result in its last bit only.
+A step of the solver is one long chain: each stage waits for the one before. So what inputs and parameters alone decide
+is divided by once, as a reciprocal, and sums take their slowest term last. Both change a result by rounding only.
 """
 
 from collections import Counter
@@ -26,7 +26,10 @@ class _Value:
 
 
 def arranged(rates: ca.Function) -> tuple[ca.Function, ca.Function]:
-    """Arrange scalar `rates`, (t, x, u, p) -> dx/dt, as (t, x, u, p) -> c, the reciprocals, and (t, x, u, p, c) -> dx/dt."""
+    """Arrange scalar `rates`, (t, x, u, p) -> dx/dt.
+
+    Return (t, x, u, p) -> c, the reciprocals, and (t, x, u, p, c) -> dx/dt.
+    """
     point = {name: ca.SX.sym(name, rates.size1_in(i)) for i, name in enumerate("txup")}
     arranger = _Arranger(rates, list(point.values()))
     results = arranger.results()

@@ -144,7 +144,8 @@ def _shown(layout: Layout) -> dict[int, int]:
         return {}
     point = [ca.SX.sym(name, size) for name, size in zip("txup", _sizes(model), strict=True)]
     outputs = ca.densify(_scalar(model).call(point)[1])
-    given = [(point[part][i], row) for part, kind in ((1, "state"), (2, "input")) for i, row in enumerate(layout.of(kind))]
+    given = [*zip(ca.vertsplit(point[1]), layout.of("state"), strict=True)]
+    given += zip(ca.vertsplit(point[2]), layout.of("input"), strict=True)
     rows = enumerate(layout.of("output"))
     return {row.reference: source.reference for i, row in rows for one, source in given if ca.is_equal(outputs[i], one)}
 

@@ -1,13 +1,13 @@
 """One step of RODAS4, written out for a model: what the co-simulation solver of an FMU executes.
 
-RODAS4 is the six-stage, stiffly accurate, L-stable Rosenbrock method of order 4(3) of Hairer and Wanner, Solving Ordinary
-Differential Equations II, section IV.7, in the form without matrix products:
+RODAS4 is the six-stage, stiffly accurate, L-stable Rosenbrock method of order 4(3) of Hairer and Wanner, Solving
+Ordinary Differential Equations II, section IV.7, in the form without matrix products:
 
     (1/(h gamma) I - J) U_i = f(t + alpha_i h, x + sum_j a_ij U_j) + sum_j c_ij U_j / h + h gamma_i df/dt
 
 Written out, a zero of J costs nothing, whatever stays the same over the step is computed once, and a compiler sees the
-whole step at once. The matrix is eliminated without exchange of rows: its pivots tend to 1/(h gamma) with h, so the solver
-refuses a step with a small pivot and repeats it with a smaller h.
+whole step at once. The matrix is eliminated without exchange of rows: its pivots tend to 1/(h gamma) with h, so the
+solver refuses a step with a small pivot and repeats it with a smaller h.
 """
 
 from collections.abc import Sequence
@@ -109,9 +109,7 @@ def step_functions(rates: ca.Function, nominals: Sequence[float]) -> tuple[ca.Fu
     )
 
 
-def _stages(
-    rates: ca.Function, given: dict[str, Any], start: Any, factors: _Factors, keep: _Kept
-) -> tuple[Any, Any]:
+def _stages(rates: ca.Function, given: dict[str, Any], start: Any, factors: _Factors, keep: _Kept) -> tuple[Any, Any]:
     """Return the point of the last stage and the last U, whose sum is the result."""
     t, x, u, p, c, h = (given[name] for name in "txupch")
     per_h, first, by_time = keep(1 / h), keep.each(start), keep.each(h * ca.jacobian(start, t))

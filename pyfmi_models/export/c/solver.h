@@ -55,11 +55,6 @@ static double growth(double square) {
     return factor > 5 ? 5 : factor < 0.2 ? 0.2 : factor;
 }
 
-/* What is left in one step, in two equal ones or by the proposal. */
-static double length(double left, double proposed) {
-    return left <= 1.01 * proposed ? left : left < 2 * proposed ? 0.5 * left : proposed;
-}
-
 static double propose(double square, double h, int last, double proposed) {
     if (!(square < INFINITY)) return 0.1 * h;
     if (!(square <= 1 && last)) return h * growth(square);
@@ -71,7 +66,8 @@ Advance solver_advance(Instance *instance, double start, double end) {
     double *x_new = instance->trials, *spare = x_new + model.rates, time = start, proposed = instance->memory->step;
     if (!(proposed > 0)) proposed = first_step(instance, start, end - start);
     for (int steps = 0; time < end; steps++) {
-        double left = end - time, h = length(left, proposed), square = attempt(instance, time, h, x, x_new);
+        double left = end - time, h = left <= 1.01 * proposed ? left : proposed;
+        double square = attempt(instance, time, h, x, x_new);
         int accepted = square <= 1, tiny = !accepted && h < 1e-15 * (fabs(time) + (end - start));
         if (tiny || steps >= model.most_steps) {
             Advance stuck = {tiny ? STEP_TOO_SMALL : TOO_MANY_STEPS, worst_state(instance, time, x), time};
