@@ -1,11 +1,14 @@
 """The step of the co-simulation solver as expressions: its order, its damping, its answer to too long a step."""
 
+import re
+from pathlib import Path
+
 import casadi as ca
 import export_models as models
 import numpy as np
 import pytest
 
-from pyfmi_models.export.rodas4 import step_functions
+from pyfmi_models.export.rodas4 import ALPHA, GAMMA_TIME, A, C, step_functions
 
 
 def solver(sizes, formula):
@@ -78,3 +81,11 @@ def test_divisions_by_parameters_are_done_once_a_step():
     stages = step_functions(rates, [1.0] * 3)[-1]
     divisions = [k for k in range(stages.n_instructions()) if stages.instruction_id(k) in (ca.OP_DIV, ca.OP_INV)]
     assert len(divisions) == 5 + 3  # one by the friction level in each later stage, one for each state's error
+
+
+def test_the_loop_integrates_foreign_models_with_the_same_numbers():
+    text = (Path(__file__).parents[1] / "cosim" / "loop" / "rodas4.c").read_text("utf-8")
+    tables = {name: body for name, body in re.findall(r"double (\w+)(?:\[\w+\])+ = \{(.*?)\};", text, re.S)}
+    found = {name: [float(one) for one in re.findall(r"-?\d+\.?\d*", body)] for name, body in tables.items()}
+    numbers = {"alpha": ALPHA, "gamma_time": GAMMA_TIME, "a": sum(A, (0,)), "c": sum(C, (0,))}
+    assert found == {name: [*row] for name, row in numbers.items()}

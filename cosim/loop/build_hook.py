@@ -17,8 +17,8 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 ROOT = Path(__file__).resolve().parents[2]
 LIBRARIES = {
     "cosim/loop/_loop": (
-        *(f"cosim/loop/{name}.c" for name in ("loop", "coupling", "exchange")),
-        *(f"pyfmi_models/export/c/{name}.c" for name in ("solver", "detmath", "detmath_trig")),
+        *(f"cosim/loop/{name}.c" for name in ("loop", "coupling", "exchange", "rodas4")),
+        *(f"pyfmi_models/export/c/{name}.c" for name in ("detmath", "detmath_trig")),
     ),
     "cosim/proof/_truth": ("cosim/proof/truth.c",),
 }

@@ -1,11 +1,11 @@
 /* A model-exchange FMU behind the three functions of co-simulation, so that the loop steps it like any other.
  *
  * Over a step inputs are held, so every step begins with an event at which they jump. Between events the states are
- * integrated by RODAS4 (solver.c, the one inside our own FMUs) with a Jacobian by differences. Time events inside the
+ * integrated by RODAS4 (rodas4.c, the method inside our own FMUs) with a Jacobian by differences. Time events inside the
  * step are met exactly; one at its end belongs to the next step, whose inputs it sees. A state event is where an indicator
  * changes sign within a stretch of integration; its time is bisected. Steps that end with a discontinuity of outputs
  * leave the FMU in continuous-time mode. Nothing is allocated here. */
-#include "solver.h"
+#include "rodas4.h"
 
 #include <math.h>
 #include <stdbool.h>

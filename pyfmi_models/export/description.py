@@ -68,6 +68,7 @@ def fmi3_description(generated: Generated) -> bytes:
         "canGetAndSetFMUState": "true",
         "canSerializeFMUState": "true",
         "providesDirectionalDerivatives": continuous,
+        "providesAdjointDerivatives": continuous,
     }
     ET.SubElement(root, "ModelExchange", {**flags, "needsCompletedIntegratorStep": "false"})
     step = {"fixedInternalStepSize": repr(layout.model.period)} if layout.model.period else {}

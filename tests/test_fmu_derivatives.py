@@ -1,0 +1,172 @@
+"""Partial derivatives that an FMU tells: directional and adjoint ones agree with differences and with each other."""
+
+import ctypes
+from functools import cache
+
+import export_models as models
+import numpy as np
+import pytest
+from fmpy import extract, read_model_description
+from fmpy.fmi3 import FMU3Slave
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from pyfmi_models.card import parse_card
+from pyfmi_models.export import build_library, export_fmu
+
+RICH = """
+[mount]
+name = "rich"
+inertia = 30.0
+[friction]
+model = "lugre"
+sigma0 = 9.23e4
+sigma1 = 497.0
+sigma2 = 32.77
+Fc = 2.322
+Fs = 3.322
+Vs = 0.04129
+delta = 1.7
+[[effects]]
+effect = "cogging"
+cycles_per_rev = 20
+amplitude = 0.5
+phase = 0.3
+[[effects]]
+effect = "actuator_lag"
+time_constant_ms = 2.0
+"""
+
+
+@cache
+def rich():
+    """The paper's plant with a broken exponent, a load that depends on position and a state in the drive."""
+    return parse_card(RICH, "rich.toml").plant().model()
+
+
+# A point to differentiate at, away from the corners of the equations.
+POINTS = {
+    models.lugre: {"speed": 0.02, "z": 1.5e-5, "drive": 4.0},
+    models.oscillator: {"position": 0.7, "velocity": -0.4, "force": 0.2, "stiffness": 3.0},
+    rich: {"position": 0.3, "speed": 0.02, "friction.bristle": 1.1, "tau": 4.0, "disturbance": 0.3},
+}
+both = pytest.mark.parametrize("make", POINTS, ids=lambda make: make.__name__)
+library = cache(lambda make: build_library(make()))
+
+
+def initializing(make, fmi):
+    """An instance in initialization mode, where everything may be set and asked."""
+    driver = models.Driver(make(), library(make), fmi, "ME")
+    start = (False, 0.0, 0.0, False, 0.0)
+    assert fmi == 3 or driver.call("SetupExperiment", *start) == "ok"
+    assert driver.call("EnterInitializationMode", *(start if fmi == 3 else ())) == "ok"
+    assert {driver.set(name, value) for name, value in POINTS[make].items()} == {"ok"}
+    return driver
+
+
+def names_of(make):
+    model = make()
+    knowns = [variable.name for group in (model.states, model.inputs, model.parameters) for variable in group]
+    unknowns = [f"der({state.name})" for state in model.states] + [variable.name for variable in model.outputs]
+    return unknowns, knowns
+
+
+def ask(driver, which, unknowns, knowns, seed):
+    """Directional: seed of the knowns -> change of the unknowns; adjoint: the other way."""
+    references = [(ctypes.c_uint * len(part))(*(driver.references[one] for one in part)) for part in (unknowns, knowns)]
+    count = len(knowns if which == "Adjoint" else unknowns)
+    result = (ctypes.c_double * count)()
+    sizes = [ctypes.c_size_t(len(part)) for part in (unknowns, knowns, seed)] + [ctypes.c_size_t(count)]
+    lengths = (sizes[2:3], sizes[3:]) if driver.fmi == 3 else ((), ())
+    seeds = (ctypes.c_double * len(seed))(*seed)
+    arguments = references[0], sizes[0], references[1], sizes[1], seeds, *lengths[0], result, *lengths[1]
+    return driver.call(f"Get{which}Derivative", *arguments), np.array(result)
+
+
+@both
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_directional_derivatives_are_finite_differences(make, fmi):
+    driver = initializing(make, fmi)
+    unknowns, knowns = names_of(make)
+    for name in knowns:
+        here = driver.get(name)[0]
+        width = 1e-5 * max(abs(here), 1e-3 if name != "z" else 1e-5)
+        ends = []
+        for sign in (1, -1):
+            assert driver.set(name, here + sign * width) == "ok", driver.messages
+            ends.append(driver.get(*unknowns))
+        driver.set(name, here)
+        status, found = ask(driver, "Directional", unknowns, [name], [1.0])
+        rounding = 1e-13 * (np.abs(driver.get(*unknowns)) + 1e-3)
+        assert status == "ok"
+        assert (np.abs((ends[0] - ends[1]) / 2 - found * width) <= 1e-6 * np.abs(found * width) + rounding).all(), name
+
+
+@both
+@settings(max_examples=25, deadline=None)
+@given(data=st.data())
+def test_adjoint_and_directional_derivatives_are_one_matrix(make, data):
+    """For every seed: weights . (J seed) = (weights J) . seed."""
+    driver, (unknowns, knowns) = initializing(make, 3), names_of(make)
+    numbers = st.floats(-2, 2)
+    seed = np.array(data.draw(st.lists(numbers, min_size=len(knowns), max_size=len(knowns))))
+    weights = np.array(data.draw(st.lists(numbers, min_size=len(unknowns), max_size=len(unknowns))))
+    (forward_status, forward), (back_status, back) = (
+        ask(driver, "Directional", unknowns, knowns, seed),
+        ask(driver, "Adjoint", unknowns, knowns, weights),
+    )
+    assert (forward_status, back_status) == ("ok", "ok")
+    size = np.abs(weights) @ np.abs(forward) + np.abs(back) @ np.abs(seed)
+    assert abs(weights @ forward - back @ seed) <= 1e-12 * size + 1e-300
+
+
+def test_a_subset_in_any_order_gives_the_same_entries():
+    driver = initializing(rich, 3)
+    unknowns, knowns = names_of(rich)
+    weights = np.arange(1.0, len(unknowns) + 1)
+    whole = ask(driver, "Adjoint", unknowns, knowns, weights)[1]
+    chosen = [knowns[i] for i in (4, 0, 2)]
+    order = list(reversed(range(len(unknowns))))
+    part = ask(driver, "Adjoint", [unknowns[i] for i in order], chosen, weights[order])[1]
+    assert list(part) == [whole[4], whole[0], whole[2]]
+
+
+def test_adjoint_derivatives_refuse_what_directional_ones_refuse():
+    driver = initializing(models.lugre, 3)
+    assert ask(driver, "Adjoint", ["drive"], ["speed"], [1.0])[0] == "error"
+    assert driver.messages[-1][2] == '"drive" is not calculated: it has no derivative'
+    assert ask(driver, "Adjoint", ["torque"], ["reading"], [1.0])[0] == "error"
+    assert driver.messages[-1][2] == '"reading" is calculated: no derivative with respect to it'
+    controller = models.Driver(models.controller(), library(models.controller), 3).start()
+    assert ask(controller, "Adjoint", ["command"], ["wanted"], [1.0])[0] == "error"
+    assert "a sampled model has no partial derivatives" in controller.messages[-1][2]
+
+
+def test_fmpy_reads_the_flag_and_gets_the_adjoint(tmp_path):
+    path = export_fmu(models.oscillator(), tmp_path / "oscillator.fmu")
+    description = read_model_description(str(path))
+    assert (
+        description.modelExchange.providesAdjointDerivatives,
+        description.coSimulation.providesAdjointDerivatives,
+    ) == (
+        True,
+        True,
+    )
+    references = {variable.name: variable.valueReference for variable in description.modelVariables}
+    fmu = FMU3Slave(guid=description.instantiationToken, unzipDirectory=extract(str(path), str(tmp_path / "unzipped")),
+                    modelIdentifier="oscillator", instanceName="it")  # fmt: skip
+    fmu.instantiate()
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    unknowns = [references["der(velocity)"], references["direct"]]
+    knowns = [references[name] for name in ("position", "force", "stiffness")]
+    # der(velocity) = -stiffness position + sin(t) / 2 + force, direct = force + stiffness, at position = stiffness = 1
+    assert fmu.getAdjointDerivative(unknowns, knowns, [2.0, 3.0], nSensitivity=3) == [-2.0, 5.0, 1.0]
+    fmu.terminate()
+    fmu.freeInstance()
+
+
+def test_the_controller_announces_no_derivatives(tmp_path):
+    description = read_model_description(str(export_fmu(models.controller(), tmp_path / "pd.fmu")))
+    assert not description.coSimulation.providesAdjointDerivatives
+    assert not description.coSimulation.providesDirectionalDerivative
