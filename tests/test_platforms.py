@@ -287,7 +287,8 @@ def test_the_hash_notices_a_multiplication_and_addition_in_one_rounding(tmp_path
     assert gcc_bits(plant, tmp_path, "-O2", "-mfma", "-ffp-contract=fast") != native(plant)
 
 
-LOADER = b"""
+LOADERS = {
+    "x86_64-windows": b"""
 __declspec(dllimport) void *LoadLibraryA(const char *name);
 __declspec(dllimport) void *GetProcAddress(void *library, const char *name);
 __declspec(dllimport) void ExitProcess(unsigned code);
@@ -296,12 +297,29 @@ void mainCRTStartup(void) {
     const char *(*version)(void) = library ? (const char *(*)(void))GetProcAddress(library, "fmi3GetVersion") : 0;
     ExitProcess(version ? (unsigned)(version()[0] - '0') : 99);
 }
-"""
+""",
+    "aarch64-linux": b"""
+#include <dlfcn.h>
+int main(void) {
+    void *library = dlopen("./lugre.so", RTLD_NOW);
+    const char *(*version)(void) = library ? (const char *(*)(void))dlsym(library, "fmi3GetVersion") : 0;
+    return version ? version()[0] - '0' : 99;
+}
+""",
+}
+ARM_LIBC = Path("/usr/aarch64-linux-gnu")
+LOADING = {
+    "x86_64-windows": Machine("", ("-O2", "-nostdlib", *CONSOLE), "wine64", package="wine64"),
+    "aarch64-linux": Machine("", ("-O2", "-ldl"), "qemu-aarch64", ("-L", str(ARM_LIBC))),
+}
 
 
-def test_the_windows_library_loads(wine):
-    library = build_library(models.lugre(), "x86_64-windows")
-    flags = ("-O2", "-nostdlib", *CONSOLE)
-    program = compile_shared({"loader.c": LOADER}, "loader.exe", MACHINES["Windows"].target, flags)
-    command = [*runner_of(MACHINES["Windows"]), str(program)]
+@pytest.mark.parametrize("platform", LOADERS)
+def test_the_library_for_another_machine_loads_there(platform, wine):
+    machine, library = LOADING[platform], build_library(models.lugre(), platform)
+    runner = runner_of(machine)
+    if "-L" in runner and not ARM_LIBC.exists():
+        pytest.skip("there is no glibc for aarch64 (apt-get install libc6-arm64-cross)")
+    program = compile_shared({"l.c": LOADERS[platform]}, "l.exe", PLATFORMS[platform].target, machine.flags)
+    command = [*runner, str(program)]
     assert subprocess.run(command, cwd=library.parent, env=wine, check=False).returncode == 3

@@ -28,3 +28,10 @@ int DllMainCRTStartup(void *module, unsigned long reason, void *reserved) {
     (void)reserved;
     return 1;
 }
+
+/* Names that the linker of zig before 0.17 asks for. */
+unsigned _tls_index;
+
+int _DllMainCRTStartup(void *module, unsigned long reason, void *reserved) {
+    return DllMainCRTStartup(module, reason, reserved);
+}
