@@ -75,6 +75,25 @@ CLOSED = {
 
 
 @BOTH
+@pytest.mark.parametrize(
+    ("parameters", "sentence"),
+    [
+        (
+            {"fail_at": 0.5},
+            'spring returned an error at tick 10 (0.5 s); it said "the shaft broke"; its last inputs: a = ',
+        ),
+        ({"nan_at": 0.5}, "spring gave an output that is not a finite number at tick 10 (0.5 s)"),
+    ],
+)
+@pytest.mark.parametrize("algorithm", [Iterated(kind="iterated"), Energy(kind="energy", bonds=BOND)])
+def test_a_failure_among_coupled_components_is_named(
+    plain: Tiny, algorithm: Any, parameters: dict[str, float], sentence: str, compiled: bool
+) -> None:
+    with pytest.raises(StepError, match=re.escape(sentence)):
+        oscillator(plain[3], algorithm, parameters={"spring": parameters}, compiled=compiled)
+
+
+@BOTH
 @VERSIONS
 @pytest.mark.parametrize("case", CLOSED)
 def test_each_algorithm_is_the_method_it_says(tiny: Tiny, case: str, version: int, compiled: bool) -> None:
