@@ -1,4 +1,4 @@
-"""FMUs built from cards, kept in the user's cache under the content they were made from.
+"""FMUs built from cards and models, kept in the user's cache under the content they were made from.
 
 Looking one up hashes the card and the sources that make FMUs; CasADi and the compiler are imported only to build one.
 """
@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from cosim.errors import ScenarioError
 from cosim.files import cache_home, directory
@@ -19,7 +19,7 @@ FMI: Literal[3] = 3
 
 
 def with_fmus(scenario: Scenario, say: Callable[[str], None] = lambda text: None) -> Scenario:
-    """Return the scenario with an FMU for every component that comes from a card; `say` is told of each one built.
+    """Return the scenario with an FMU for every component made from a card or model; `say` is told of each one built.
 
     Raises:
         ScenarioError: there is no such card.
@@ -27,8 +27,10 @@ def with_fmus(scenario: Scenario, say: Callable[[str], None] = lambda text: None
     """
     made = {}
     for name, component in scenario.components.items():
-        if component.card is not None and component.fmu is None:
+        if component.fmu is None and component.card is not None:
             made[name] = _fmu(component, f"{scenario.path}: components.{name}.card", say)
+        elif component.fmu is None and component.model is not None:
+            made[name] = _fmu_of_model(component.model, say)
     return scenario.with_fmus(made)
 
 
@@ -43,12 +45,31 @@ def _fmu(component: ComponentSection, where: str, say: Callable[[str], None]) ->
     return path
 
 
+def _fmu_of_model(model: str, say: Callable[[str], None]) -> Path:
+    key = hashlib.sha256(f"{_sources()} {model} {FMI}".encode()).hexdigest()[:16]
+    path = _home() / f"{model}-{key}.fmu"
+    if not path.exists():
+        say(f"building the FMU of {model}")
+        _export(_model(model), path)
+    return path
+
+
+def _model(name: str) -> Any:
+    from pyfmi_models.pointing import PointingError
+
+    return {"pointing_error": PointingError}[name]().model()
+
+
 def _build(card: str, part: str, path: Path) -> None:
     from pyfmi_models.card import read_card
-    from pyfmi_models.export import export_fmu
 
     read = read_card(card)
-    model = read.plant().model() if part == "plant" else read.controller_model()
+    _export(read.plant().model() if part == "plant" else read.controller_model(), path)
+
+
+def _export(model: Any, path: Path) -> None:
+    from pyfmi_models.export import export_fmu
+
     directory(path.parent)
     export_fmu(model, path, fmi=FMI, force=True)
 

@@ -110,7 +110,7 @@ def _what(scenario: Scenario, owner: str) -> str:
 
 def origin(component: Any) -> str:
     """Say where a component comes from."""
-    return str(component.fmu or component.python or f"the {component.part} of {component.card}")
+    return str(component.fmu or component.python or component.model or f"the {component.part} of {component.card}")
 
 
 def in_short(scenario: Scenario) -> str:

@@ -238,6 +238,9 @@ class FmuComponent:
             what = "cannot be set before the start" if port else "does not exist"
             message = f'"{self.name}.{name}" {what}; what can be set: {", ".join(choices)}.'
             raise FmuError(message, culprit=f"{self.name}.{name}", value=value, choices=choices)
+        if isinstance(value, str) and port.real:
+            message = f'"{self.name}.{name}" is "{value}"; it must be a number, or an output of a signal.'
+            raise FmuError(message, culprit=f"{self.name}.{name}", value=value)
         if not isinstance(value, str) and not port.low <= value <= port.high:
             message = f'"{self.name}.{name}" is {value:g}; it must lie in {port.low:g} .. {port.high:g} {port.unit}.'
             raise FmuError(message, culprit=f"{self.name}.{name}", value=value)

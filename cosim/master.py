@@ -11,6 +11,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
+
 import cosim
 from cosim.algorithm import JACOBI, Algorithm
 from cosim.component import Component
@@ -77,7 +79,7 @@ def simulate(
         step: length of a tick in s.
         ticks: how many; the recording has rows at ticks 0, decimation, 2 decimation, ...
         signals: generators (see `signals`), arrays with one value a tick, or numbers.
-        parameters: by component, parameters and start values by name.
+        parameters: by component, parameters and start values by name; "signal.output" is its value at the start.
         algorithm: how components are coupled; Jacobi where not given.
         every: by component, the ticks of its step where they are not one.
         variables: by component, names of ours for variables of its own (see `renamed`).
@@ -111,7 +113,7 @@ def simulate(
             faults=faults,
         )
         plan = make_plan(wiring, step, decimation)
-        settings = _settings(opened, parameters or {})
+        settings = _settings(opened, parameters or {}, wiring.signals, step)
         for key, component in opened.items():
             component.start(settings[key])
         story = _story(wiring, settings, step, decimation) | dict(origin or {})
@@ -139,7 +141,7 @@ def run(
         ScenarioError: a component is made from a card and has no FMU yet.
     """
     for name, component in scenario.components.items():
-        if component.card is not None and component.fmu is None:
+        if component.fmu is None and component.python is None:
             message = f'{scenario.path}: the component "{name}" has no FMU yet; `cosim run` builds it from its card.'
             raise ScenarioError(message, culprit=name)
     told = {"scenario": scenario.text, "command": command}
@@ -191,14 +193,29 @@ def _signal(name: str, signal: Any, ticks: int) -> Signal:
 
 
 def _settings(
-    components: Mapping[str, Component], parameters: Mapping[str, Mapping[str, Any]]
+    components: Mapping[str, Component],
+    parameters: Mapping[str, Mapping[str, Any]],
+    signals: Mapping[str, Signal],
+    step: float,
 ) -> dict[str, dict[str, Any]]:
     for name in parameters:
         if name not in components:
             have = tuple(components)
             message = f'Parameters are given for "{name}", which is no component; components are: {", ".join(have)}.'
             raise WiringError(message, culprit=name, choices=have)
-    return {name: dict(parameters.get(name, {})) for name in components}
+    return {
+        name: {key: _at_start(value, signals, step) for key, value in parameters.get(name, {}).items()}
+        for name in components
+    }
+
+
+def _at_start(value: Any, signals: Mapping[str, Signal], step: float) -> Any:
+    """Return the value at tick 0 of a signal's output that is named, and anything else as it is."""
+    owner, _, name = value.partition(".") if isinstance(value, str) else ("", "", "")
+    if owner not in signals or name not in signals[owner].outputs:
+        return value
+    first = signals[owner].stream(step)(np.zeros(1, dtype=np.int64))
+    return float(first[list(signals[owner].outputs).index(name), 0])
 
 
 def _story(wiring: Wiring, settings: Mapping[str, Any], step: float, decimation: int) -> dict[str, Any]:

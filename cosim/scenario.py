@@ -2,13 +2,15 @@
 
     name, step [s], stop [s]
     [algorithm]         kind = "jacobi" | "gauss-seidel" | "iterated" | "energy" and its options, see `algorithm`
-    [components.NAME]   fmu = "file.fmu", or card = "CARD" with part = "plant" | "controller"; parameters = { ... };
+    [components.NAME]   fmu = "file.fmu", or card = "CARD" with part = "plant" | "controller"; parameters = { NAME =
+                        number, or "signal.output": its value at the start };
+                        or model = "pointing_error", see `pyfmi_models.pointing`;
                         interface = "model-exchange" to step it by the built-in solver;
                         or python = "file.py:function" with inputs and outputs, see `function`;
                         variables = { NAME = "its own name" or { name, unit } } where its names differ, see `renamed`
                         every = ticks of a step of this component, or step = s, a whole multiple of the scenario's
-    [signals.NAME]      kind = "sine" | "ramp" | "sidereal" | "constant" | "steps" | "multisine" | "chirp" | "slews"
-                        | "recorded" | "noise" and what the kind needs, see `signals`
+    [signals.NAME]      kind = "sine" | "ramp" | "sidereal" | "star" | "constant" | "steps" | "multisine" | "chirp"
+                        | "slews" | "recorded" | "noise" and what the kind needs, see `signals`
     [[connections]]     from, to; gain, offset, quantum, noise, unit, breaks_loop where wanted
     [[faults]]          on, kind, from, until and what the kind needs, see `faults`
     [record]            signals = { column = "component.variable", ... } or a list of them; decimation; mode
@@ -51,10 +53,11 @@ class VariableSection(_Section):
 
 
 class ComponentSection(_Section):
-    """`[components.NAME]`: an FMU, a part of a card from which one is built, or a Python function."""
+    """`[components.NAME]`: an FMU, a part of a card or a model from which one is built, or a Python function."""
 
     fmu: Path | None = None
     card: str | None = None
+    model: Literal["pointing_error"] | None = None
     part: Literal["plant", "controller"] | None = None
     interface: Literal["", "co-simulation", "model-exchange"] = ""
     python: str | None = None
@@ -67,12 +70,12 @@ class ComponentSection(_Section):
 
     @model_validator(mode="after")
     def _one_source(self) -> "ComponentSection":
-        sources = [one for one in (self.fmu, self.card, self.python) if one is not None]
+        sources = [one for one in (self.fmu, self.card, self.model, self.python) if one is not None]
         named = self.python is not None and bool(self.outputs)
         if len(sources) != 1 or (self.card is None) != (self.part is None) or named != bool(self.inputs | self.outputs):
             raise ValueError(
-                'give fmu = "...", or card = "..." with part = "plant" or "controller", or python = "file.py:function" '
-                "with inputs and outputs"
+                'give fmu = "...", or card = "..." with part = "plant" or "controller", or model = "pointing_error", '
+                'or python = "file.py:function" with inputs and outputs'
             )
         if self.every is not None and self.step is not None:
             raise ValueError("give either every or step")

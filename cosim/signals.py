@@ -16,12 +16,13 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cosim.errors import SignalError
 from cosim.profile import Motion, envelope, slews
+from cosim.star import SIDEREAL_RATE, path
 
 Stream = Callable[[np.ndarray], np.ndarray]
 Positive = Annotated[float, Field(gt=0)]
 Dwell = Annotated[float, Field(ge=0)]
-SIDEREAL_RATE = 7.292115e-5
-"""Speed of the stars in rad/s: a turn in a mean sidereal day of 86 164.1 s."""
+ZENITH = 1 / 3600
+"""Stars that pass the zenith closer than this [deg] are refused: there is no azimuth to go to."""
 
 
 class Signal(Protocol):
@@ -121,6 +122,38 @@ class Sidereal(Ramp):
 
     kind: Literal["sidereal"]  # type: ignore[assignment]
     velocity: float = SIDEREAL_RATE
+
+
+class Star(_Generator):
+    """The path of a star over an observer at a latitude: azimuth and altitude [rad] with their derivatives.
+
+    The hour angle [h] is that at the start; -0.5 is half an hour before the star culminates. See `star` for the
+    equations and what they leave out. Near the zenith the azimuth rate grows like the sidereal rate times
+    cos(declination) over the distance from the zenith: there is a blind spot in which no such mount can follow.
+    """
+
+    kind: Literal["star"]
+    latitude_deg: float = Field(ge=-90, le=90)
+    declination_deg: float = Field(ge=-90, le=90)
+    hour_angle_h: float = 0.0
+
+    @model_validator(mode="after")
+    def _misses_the_zenith(self) -> "Star":
+        if abs(self.latitude_deg - self.declination_deg) < ZENITH:
+            rule = "the star passes through the zenith, where there is no azimuth that a mount could follow"
+            raise ValueError(f"declination_deg = {self.declination_deg} is the latitude: {rule}")
+        return self
+
+    @property
+    def outputs(self) -> Mapping[str, str]:
+        """Both angles and their derivatives."""
+        kinds = {"": "rad", "_velocity": "rad/s", "_acceleration": "rad/s2"}
+        return {f"{angle}{kind}": unit for angle in ("azimuth", "altitude") for kind, unit in kinds.items()}
+
+    def stream(self, step: float) -> Stream:
+        """Make a stream of the path."""
+        place = np.deg2rad([self.latitude_deg, self.declination_deg, 15 * self.hour_angle_h]).tolist()
+        return lambda ticks: np.concatenate(path(ticks * step, *place))
 
 
 class Multisine(_SetPoint):
@@ -281,7 +314,7 @@ class Samples:
 
 
 Generator = Annotated[
-    Constant | Sine | Ramp | Sidereal | Multisine | Chirp | Slews | Steps | Noise | Recorded,
+    Constant | Sine | Ramp | Sidereal | Star | Multisine | Chirp | Slews | Steps | Noise | Recorded,
     Field(discriminator="kind"),
 ]
 

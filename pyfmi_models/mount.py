@@ -173,6 +173,10 @@ class Mount:
             inertia = effect.inertia(inertia, seen)
         return inertia
 
+    def followed(self) -> dict[str, str]:
+        """Inputs that the inertia follows, each with the input that is its rate."""
+        return {name: rate for _, effect in self.of_kind(InertiaEffect) for name, rate in effect.followed().items()}
+
     def reading(self, motion: Motion, states: Mapping[str, Any] = NOTHING) -> Scalar:
         """Sensor path: what the encoder reads [rad or m]."""
         reading = motion.q

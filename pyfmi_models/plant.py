@@ -83,10 +83,17 @@ def _accelerations(
         inertia, push = far, passed - coupling.drag(speed)
     bodies.append((inertia, push))
     near = this.inertia(bodies[0][0], motion, own)
-    bodies[0] = (near, bodies[0][1] - ca.jacobian(near, motion.q) * motion.v**2 / 2)
+    bodies[0] = (near, bodies[0][1] - _change(this, near, motion) * motion.v)
     found = [torque / inertia for inertia, torque in bodies]
     names = [name for name, _ in this.of_kind(Coupling)]
     return found[0], {name: ca.vertcat(own[name][1], found[k] - found[k + 1]) for k, name in enumerate(names)}
+
+
+def _change(this: "Mount", inertia: Scalar, motion: Motion) -> Scalar:
+    """Lagrange: half the rate of the inertia along the axis' own motion, all of it along what else moves [kg m2/s]."""
+    given = motion.inputs
+    foreign = (ca.jacobian(inertia, given[name]) * given[rate] for name, rate in this.followed().items())
+    return ca.jacobian(inertia, motion.q) * motion.v / 2 + sum(foreign)
 
 
 def _further(this: "Mount", motion: Motion, acceleration: Scalar, own: Mapping[str, Any]) -> dict[str, Scalar]:

@@ -36,6 +36,8 @@ NUMBERS: dict[str, dict[str, Any]] = {
     "QuadraticDrag": {"coefficient": 2.0},
     "CableWrap": {"stiffness": 3.0, "home": 0.2, "hardening": 0.5},
     "InertiaVariation": {"relative_amplitude": 0.3, "cycles_per_rev": 2, "phase": 0.4},
+    "AltitudeInertia": {"tube_inertia": 3.0},
+    "AzimuthCentrifugal": {"tube_inertia": 3.0},
     "LoadDependentFriction": {"coulomb_per_Nm": 0.2},
     "TorqueSaturation": {"knee_torque": 5.0, "slope": 0.4},
     "PeriodicDisturbance": {"frequency_hz": 3.0, "amplitude": 0.6, "phase": 0.2},

@@ -16,7 +16,7 @@ from cosim.complaint import complaint
 from cosim.component import Port
 from cosim.description import describe, ports_of
 from cosim.errors import ScenarioError, SweepError
-from cosim.scenario import Scenario
+from cosim.scenario import ComponentSection, Scenario
 from cosim.sweep.variation import Value
 
 WIRE_KEYS = {"gain": "1", "offset": "", "quantum": ""}
@@ -49,7 +49,7 @@ def addresses(scenario: Scenario) -> dict[str, Address]:
     fed = {wire.target for wire in scenario.wires}
     found: dict[str, Address] = {}
     for name, component in scenario.components.items():
-        ports = ports_of(describe(component.fmu)) if component.fmu else {}
+        ports = _ports(component)
         units = {port.name: port.unit for port in ports.values() if port.settable and f"{name}.{port.name}" not in fed}
         units |= dict.fromkeys(component.parameters, "") if component.python else {}
         found |= {f"{name}.{key}": Address(name, key, unit, _component) for key, unit in units.items()}
@@ -72,6 +72,13 @@ def find(name: str, known: Mapping[str, Address], where: str) -> Address:
     owners = tuple(dict.fromkeys(one.partition(".")[0] for one in known))
     rule = f"of {owner} can be varied: {', '.join(near)}" if near else f"there are: {', '.join(owners)}"
     raise SweepError(f'{where}: "{name}" is nothing that can be varied; {rule}.', culprit=name, choices=near or owners)
+
+
+def _ports(component: ComponentSection) -> dict[str, Port]:
+    """List the variables of an FMU under the names of the scenario."""
+    found = ports_of(describe(component.fmu)) if component.fmu else {}
+    ours = {alias.name: name for name, alias in component.aliases.items()}
+    return {ours.get(name, name): replace(port, name=ours.get(name, name)) for name, port in found.items()}
 
 
 def _wires(scenario: Scenario, name: str, ports: Mapping[str, Port]) -> dict[str, Address]:

@@ -145,11 +145,15 @@ class PayloadEffect(LoadEffect):
 
 @dataclass(frozen=True, kw_only=True)
 class InertiaEffect(MotionEffect):
-    """An inertia that changes with the position, on the side of the encoder."""
+    """An inertia that changes with the position or with an input, on the side of the encoder."""
 
     def inertia(self, inertia: Scalar, motion: Motion) -> Scalar:
-        """Return the inertia [kg m2] that replaces `inertia`; its slope over position is the mount's business."""
+        """Return the inertia [kg m2] that replaces `inertia`; its slopes are the plant's business."""
         return inertia
+
+    def followed(self) -> Mapping[str, str]:
+        """Inputs that the inertia follows, each with the input that is its rate."""
+        return {}
 
 
 @dataclass(frozen=True, kw_only=True)
