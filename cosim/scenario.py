@@ -57,8 +57,8 @@ class ComponentSection(_Section):
 
     fmu: Path | None = None
     card: str | None = None
-    model: Literal["pointing_error"] | None = None
     part: Literal["plant", "controller"] | None = None
+    model: Literal["pointing_error"] | None = None
     interface: Literal["", "co-simulation", "model-exchange"] = ""
     python: str | None = None
     inputs: dict[str, str] = {}

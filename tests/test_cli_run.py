@@ -173,7 +173,7 @@ def test_a_card_that_is_not_there_is_met_with_those_that_are(
     line = next(line for line in text.splitlines() if line.startswith("fmu"))
     scenario.write_text(text.replace(line, 'card = "none"\npart = "plant"', 1))
     assert call("run", scenario, "--out", tmp_path / "out") == 2
-    sentence = 'components.plant.card = "none": no such card; a card is a .toml file or one of: emps, paper_mount'
+    sentence = 'components.plant.card = "none": no such card; a card is a .toml file or one of: altaz_altitude,'
     assert sentence in capsys.readouterr().err
 
 
@@ -226,7 +226,7 @@ def test_show_tells_what_a_file_is(
 @pytest.mark.parametrize(
     ("name", "text", "sentence"),
     [
-        ("none", None, "does not exist; shipped are: sidereal, emps, paper_mount"),
+        ("none", None, "does not exist; shipped are: sidereal, two_axis, altaz_altitude,"),
         ("none.csv", None, "none.csv does not exist."),
         ("odd.toml", "a = ", "is not valid TOML"),
         ("odd", "x", "is nothing that can be shown: a recording, FMU, scenario or card."),
