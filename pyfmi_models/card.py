@@ -12,26 +12,21 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
-from pyfmi_models.adrc import VELOCITIES, Adrc, Compensation, Gains, Observer, compensation_case
+from pyfmi_models.controller_section import ControllerSection, Section, Table, compose
 from pyfmi_models.effects import CATALOGUE, Effect, GravityUnbalance
 from pyfmi_models.errors import CardError
-from pyfmi_models.friction import LAWS, FrictionLaw, LuGre
+from pyfmi_models.friction import LAWS, FrictionLaw
 from pyfmi_models.model import Model, Pair, Variable
 from pyfmi_models.mount import Axis, Mount
 
 Part = TypeVar("Part")
-Table = dict[str, Any]
 LARGEST = 1e300
 """Beyond this a number in a card is no number: it would overflow in the first product."""
 
 
-class _Section(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, strict=True)
-
-
-class MountSection(_Section):
+class MountSection(Section):
     """`[mount]`: name, motion, inertia [kg m2 or kg], torque limit [N m or N]."""
 
     name: str = "mount"
@@ -40,7 +35,7 @@ class MountSection(_Section):
     torque_limit: float = Field(default=1e6, gt=0)
 
 
-class EncoderSection(_Section):
+class EncoderSection(Section):
     """`[encoder]`: counts per turn (0: no quantisation), white noise RMS [rad], encoder turns per axis turn."""
 
     counts_per_rev: float = Field(default=0.0, ge=0)
@@ -48,34 +43,15 @@ class EncoderSection(_Section):
     ratio: float = Field(default=1.0, gt=0)
 
 
-class ControllerSection(_Section):
-    """`[controller]`: gains of the ADRC, loop and record rate [Hz], and what the controller is composed of.
-
-    `velocity` is the speed in the error's derivative, `observer_order` 3 or 4, `compensation` the paper's case (C2a+C3a
-    is half of each), `[controller.friction]` the friction it compensates (without it: the card's).
-    """
-
-    type: Literal["adrc"] = "adrc"
-    kp: float = Field(gt=0)
-    kd: float = Field(gt=0)
-    loop_hz: float = Field(default=10_000.0, gt=0)
-    record_hz: float = Field(default=1_000.0, gt=0)
-    observer_bandwidth: float = Field(default=220.0, gt=0)
-    observer_order: Literal[3, 4] = 3
-    velocity: Literal["observer", "difference"] = "observer"
-    compensation: Literal["C1", "C2a", "C2b", "C3a", "C3b", "C2a+C3a"] = "C1"
-    friction: Table | None = None
-
-
-class _Card(_Section):
+class _Card(Section):
     mount: MountSection
     friction: Table
     unbalance: Table | None = None
     encoder: EncoderSection = EncoderSection()
     controller: ControllerSection | None = None
-    columns: dict[str, str] = {}
-    effects: list[Table] = []
-    origin: Table = {}
+    columns: dict[str, str] = Field(default_factory=dict)
+    effects: list[Table] = Field(default_factory=list)
+    origin: Table = Field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,34 +88,15 @@ class Card:
         """Make the controller; the card must have a `[controller]` section."""
         if self.controller is None:
             raise CardError(f"{self.path}: there is no [controller] section, so there is no controller to export.")
-        tuning = self.controller
-        gains = Gains(
+        adrc = compose(
+            name=_identifier(self.mount.name),
+            section=self.controller,
             inertia=self.mount.inertia,
-            kp=tuning.kp,
-            kd=tuning.kd,
-            observer_bandwidth=tuning.observer_bandwidth,
-            torque_limit=self.mount.torque_limit,
-        )
-        name = _identifier(self.mount.name)
-        adrc = Adrc(
-            name=name,
-            gains=gains,
-            period=1 / tuning.loop_hz,
-            observer=Observer(order=tuning.observer_order),
-            velocity=VELOCITIES[tuning.velocity],
-            estimates=self._compensation(tuning.compensation),
+            limit=self.mount.torque_limit,
+            law=self.believed or self.friction,
+            path=self.path,
         )
         return self.plant().model_in_axis_units(adrc.model())
-
-    def _compensation(self, case: str) -> tuple[Compensation, ...]:
-        law = self.believed or self.friction
-        if case == "C1":
-            return ()
-        if not isinstance(law, LuGre):
-            section = "controller.friction" if self.believed else "friction"
-            rule = f'needs [{section}] model = "lugre"'
-            raise CardError(f'{self.path}: [controller] compensation = "{case}" {rule}; it is "{law.key}".')
-        return compensation_case(case, law)
 
 
 def read_card(source: str | Path) -> Card:

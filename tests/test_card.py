@@ -1,5 +1,6 @@
 """Cards come back as they were written, and every mistake in one is named by file, key, value and rule."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -51,6 +52,12 @@ velocity = "difference"
 model = "lugre"
 sigma0 = 9e4
 Fc = { positive = 2.0, negative = 2.5 }
+
+[controller.adaptation]
+memory = 30
+
+[controller.learning]
+period = 5
 
 [columns]
 tau = "force"
@@ -200,6 +207,10 @@ MISTAKES = {
         SMALL + '[controller]\nkp = 1\nkd = 1\ncompensation = "C9"\n',
         "compensation = 'C9' breaks the rule: input should be 'C1', 'C2a', 'C2b', 'C3a', 'C3b' or 'C2a+C3a'.",
     ),
+    "unknown key of the adaptation": (
+        SMALL + "[controller]\nkp = 1\nkd = 1\n[controller.adaptation]\nspeed = 1\n",
+        "bad.toml: [controller.adaptation] speed is not a key of a card.",
+    ),
     "unknown law in the controller": (
         SMALL + '[controller]\nkp = 1\nkd = 1\n[controller.friction]\nmodel = "sand"\n',
         "bad.toml: [controller.friction] model = 'sand' is unknown; models are: ",
@@ -323,3 +334,20 @@ def test_compensation_needs_bristles() -> None:
         'c.toml: [controller] compensation = "C3a" needs [friction] model = "lugre"; it is "coulomb".'
     )
     assert parse_card(text.replace("C3a", "C1"), "c.toml").controller_model().period == 1e-4
+
+
+@pytest.mark.parametrize(
+    ("section", "sentence"),
+    [
+        (
+            "learning]\nperiod = 0.01",
+            "period = 0.01 is not a whole number of ticks of 0.0001 s, at least one a knot (101).",
+        ),
+        ("learning]\nperiod = 0.01005", "period = 0.01005 is not a whole number of ticks of 0.0001 s, at least one"),
+        ("adaptation]", 'goes with compensation = "C2a" or "C3a"; it is "C1".'),
+    ],
+)
+def test_what_a_controller_cannot_be_composed_of_is_said(section: str, sentence: str) -> None:
+    text = f"{SMALL}[controller]\nkp = 1\nkd = 1\n[controller.{section}\n".replace("0.01\n", "0.01\nknots = 101\n")
+    with pytest.raises(CardError, match=re.escape(sentence)):
+        parse_card(text, "c.toml").controller_model()
