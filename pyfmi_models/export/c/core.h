@@ -25,6 +25,7 @@ typedef enum {
     STEP = 16,
     TERMINATED = 32,
     RUNNING = 28,
+    READABLE = 62, /* from initialization on */
     ANY_PHASE = 63
 } Phase;
 
@@ -73,6 +74,8 @@ Status fail(Instance *instance, Status status, const char *format, ...);
 void note(Instance *instance, const char *format, ...);
 Status set_logging(Instance *instance, int on, size_t count, const char *const *categories);
 Status expect(Instance *instance, int phases, const char *what);
+int allowed(Instance *instance, int phases, int complete, const char *what);
+int exchanging(Instance *instance, int phases, int complete, const char *what);
 Status enter_initialization(Instance *instance, const char *what);
 Status exit_initialization(Instance *instance, const char *what);
 Status set_experiment(Instance *instance, int has_tolerance, double tolerance, double start, int has_stop, double stop);
@@ -95,6 +98,7 @@ Status adjoint(Instance *instance, const uint32_t *unknowns, size_t unknown_coun
 void evaluate(Instance *instance, Code *code, double time, const double *x, double *first, double *second);
 int tick_is_due(const Instance *instance);
 double next_tick_time(const Instance *instance);
+int resolves_ticks(double time);
 Status tick(Instance *instance, int advance);
 Status update_discrete(Instance *instance);
 Status do_step(Instance *instance, double time, double length);

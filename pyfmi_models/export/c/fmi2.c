@@ -18,11 +18,6 @@ static void emit(void *instance, Status status, const char *category, const char
     ((fmi2CallbackLogger)sender->logger)(sender->environment, sender->name, (fmi2Status)status, category, escaped);
 }
 
-/* The instance, or NULL after a message when the call is out of order. */
-static Instance *allowed(fmi2Component c, int phases, const char *what) {
-    return c && expect(c, phases, what) == OK ? c : NULL;
-}
-
 const char *fmi2GetTypesPlatform(void) { return fmi2TypesPlatform; }
 
 const char *fmi2GetVersion(void) { return fmi2Version; }
@@ -67,7 +62,8 @@ fmi2Status fmi2Reset(fmi2Component c) {
 }
 
 fmi2Status fmi2GetReal(fmi2Component c, const fmi2ValueReference references[], size_t count, fmi2Real values[]) {
-    return c ? (fmi2Status)get_values(c, references, count, values) : fmi2Error;
+    if (!allowed(c, READABLE, 1, "fmi2GetReal")) return fmi2Error;
+    return (fmi2Status)get_values(c, references, count, values);
 }
 
 fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference references[], size_t count, const fmi2Real values[]) {
@@ -132,7 +128,7 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *state) {
 
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate state, size_t *size) {
     (void)state;
-    if (!c || !size) return fmi2Error;
+    if (!allowed(c, ANY_PHASE, size != NULL, "fmi2SerializedFMUstateSize")) return fmi2Error;
     *size = serialized_size();
     return fmi2OK;
 }
@@ -148,62 +144,66 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte bytes[], size
 fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReference unknowns[], size_t unknown_count,
                                         const fmi2ValueReference knowns[], size_t known_count, const fmi2Real seed[],
                                         fmi2Real sensitivity[]) {
-    if (!allowed(c, INITIALIZATION + RUNNING, "fmi2GetDirectionalDerivative")) return fmi2Error;
+    if (!allowed(c, READABLE, 1, "fmi2GetDirectionalDerivative")) return fmi2Error;
     return (fmi2Status)directional(c, unknowns, unknown_count, knowns, known_count, seed, sensitivity);
 }
 
 /* Model exchange. */
 
 fmi2Status fmi2EnterEventMode(fmi2Component c) {
-    return c ? (fmi2Status)set_phase(c, CONTINUOUS + EVENT, EVENT, "fmi2EnterEventMode") : fmi2Error;
+    const char *what = "fmi2EnterEventMode";
+    return exchanging(c, CONTINUOUS + EVENT, 1, what) ? (fmi2Status)set_phase(c, ANY_PHASE, EVENT, what) : fmi2Error;
 }
 
 fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info) {
-    Instance *instance = allowed(c, EVENT, "fmi2NewDiscreteStates");
-    if (!instance || !info) return fmi2Error;
+    if (!exchanging(c, EVENT, info != NULL, "fmi2NewDiscreteStates")) return fmi2Error;
     memset(info, 0, sizeof *info);
-    Status status = update_discrete(instance);
+    Status status = update_discrete(c);
     info->nextEventTimeDefined = model.period > 0;
-    info->nextEventTime = model.period > 0 ? next_tick_time(instance) : 0;
+    info->nextEventTime = model.period > 0 ? next_tick_time(c) : 0;
     return (fmi2Status)status;
 }
 
 fmi2Status fmi2EnterContinuousTimeMode(fmi2Component c) {
-    return c ? (fmi2Status)set_phase(c, EVENT, CONTINUOUS, "fmi2EnterContinuousTimeMode") : fmi2Error;
+    const char *what = "fmi2EnterContinuousTimeMode";
+    return exchanging(c, EVENT, 1, what) ? (fmi2Status)set_phase(c, ANY_PHASE, CONTINUOUS, what) : fmi2Error;
 }
 
 fmi2Status fmi2CompletedIntegratorStep(fmi2Component c, fmi2Boolean no_set, fmi2Boolean *enter_event_mode,
                                        fmi2Boolean *terminate) {
     (void)no_set;
-    if (!allowed(c, CONTINUOUS, "fmi2CompletedIntegratorStep") || !enter_event_mode || !terminate) return fmi2Error;
+    if (!exchanging(c, CONTINUOUS, enter_event_mode && terminate, "fmi2CompletedIntegratorStep")) return fmi2Error;
     *enter_event_mode = *terminate = fmi2False;
     return fmi2OK;
 }
 
 fmi2Status fmi2SetTime(fmi2Component c, fmi2Real time) {
-    return allowed(c, EVENT + CONTINUOUS, "fmi2SetTime") ? (fmi2Status)set_time(c, time) : fmi2Error;
+    return exchanging(c, EVENT + CONTINUOUS, 1, "fmi2SetTime") ? (fmi2Status)set_time(c, time) : fmi2Error;
 }
 
 fmi2Status fmi2SetContinuousStates(fmi2Component c, const fmi2Real x[], size_t count) {
-    return allowed(c, CONTINUOUS, "fmi2SetContinuousStates") ? (fmi2Status)set_states(c, x, count) : fmi2Error;
+    return exchanging(c, CONTINUOUS, 1, "fmi2SetContinuousStates") ? (fmi2Status)set_states(c, x, count) : fmi2Error;
 }
 
 fmi2Status fmi2GetDerivatives(fmi2Component c, fmi2Real derivatives[], size_t count) {
-    return c ? (fmi2Status)get_rates(c, derivatives, count) : fmi2Error;
+    if (!exchanging(c, READABLE, 1, "fmi2GetDerivatives")) return fmi2Error;
+    return (fmi2Status)get_rates(c, derivatives, count);
 }
 
 fmi2Status fmi2GetEventIndicators(fmi2Component c, fmi2Real indicators[], size_t count) {
     (void)indicators;
-    if (!c) return fmi2Error;
+    if (!exchanging(c, READABLE, 1, "fmi2GetEventIndicators")) return fmi2Error;
     return count ? (fmi2Status)fail(c, FAILED, "the model has no event indicators") : fmi2OK;
 }
 
 fmi2Status fmi2GetContinuousStates(fmi2Component c, fmi2Real x[], size_t count) {
-    return c ? (fmi2Status)get_states(c, x, count) : fmi2Error;
+    if (!exchanging(c, READABLE, 1, "fmi2GetContinuousStates")) return fmi2Error;
+    return (fmi2Status)get_states(c, x, count);
 }
 
 fmi2Status fmi2GetNominalsOfContinuousStates(fmi2Component c, fmi2Real nominals[], size_t count) {
-    return c ? (fmi2Status)get_nominals(c, nominals, count) : fmi2Error;
+    if (!exchanging(c, READABLE, 1, "fmi2GetNominalsOfContinuousStates")) return fmi2Error;
+    return (fmi2Status)get_nominals(c, nominals, count);
 }
 
 /* Co-simulation. */
@@ -231,7 +231,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real length, fmi2Boolean no_set) {
     (void)no_set;
-    return allowed(c, STEP, "fmi2DoStep") ? (fmi2Status)do_step(c, time, length) : fmi2Error;
+    return allowed(c, STEP, 1, "fmi2DoStep") ? (fmi2Status)do_step(c, time, length) : fmi2Error;
 }
 
 fmi2Status fmi2CancelStep(fmi2Component c) {

@@ -8,11 +8,6 @@ static void emit(void *instance, Status status, const char *category, const char
     ((fmi3LogMessageCallback)sender->logger)(sender->environment, (fmi3Status)status, category, message);
 }
 
-/* The instance, or NULL after a message when the call is out of order. */
-static Instance *allowed(fmi3Instance c, int phases, const char *what) {
-    return c && expect(c, phases, what) == OK ? c : NULL;
-}
-
 const char *fmi3GetVersion(void) { return fmi3Version; }
 
 fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t count, const fmi3String categories[]) {
@@ -50,7 +45,7 @@ void fmi3FreeInstance(fmi3Instance c) { free_instance(c); }
 
 fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance, fmi3Float64 tolerance,
                                        fmi3Float64 start, fmi3Boolean has_stop, fmi3Float64 stop) {
-    if (!allowed(c, INSTANTIATED, "fmi3EnterInitializationMode")) return fmi3Error;
+    if (!allowed(c, INSTANTIATED, 1, "fmi3EnterInitializationMode")) return fmi3Error;
     Status status = set_experiment(c, has_tolerance, tolerance, start, has_stop, stop);
     return (fmi3Status)(status == OK ? enter_initialization(c, "fmi3EnterInitializationMode") : status);
 }
@@ -78,7 +73,8 @@ static int same_count(fmi3Instance c, size_t references, size_t values) {
 
 fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t count, fmi3Float64 values[],
                           size_t value_count) {
-    return same_count(c, count, value_count) ? (fmi3Status)get_values(c, references, count, values) : fmi3Error;
+    if (!allowed(c, READABLE, 1, "fmi3GetFloat64") || !same_count(c, count, value_count)) return fmi3Error;
+    return (fmi3Status)get_values(c, references, count, values);
 }
 
 fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t count,
@@ -102,7 +98,7 @@ fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state) {
 
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size) {
     (void)state;
-    if (!c || !size) return fmi3Error;
+    if (!allowed(c, ANY_PHASE, size != NULL, "fmi3SerializedFMUStateSize")) return fmi3Error;
     *size = serialized_size();
     return fmi3OK;
 }
@@ -118,7 +114,7 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t unknown_count,
                                         const fmi3ValueReference knowns[], size_t known_count, const fmi3Float64 seed[],
                                         size_t seed_count, fmi3Float64 sensitivity[], size_t sensitivity_count) {
-    if (!allowed(c, INITIALIZATION + RUNNING, "fmi3GetDirectionalDerivative")) return fmi3Error;
+    if (!allowed(c, READABLE, 1, "fmi3GetDirectionalDerivative")) return fmi3Error;
     if (!same_count(c, known_count, seed_count) || !same_count(c, unknown_count, sensitivity_count)) return fmi3Error;
     return (fmi3Status)directional(c, unknowns, unknown_count, knowns, known_count, seed, sensitivity);
 }
@@ -126,7 +122,7 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference
 fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unknowns[], size_t unknown_count,
                                     const fmi3ValueReference knowns[], size_t known_count, const fmi3Float64 seed[],
                                     size_t seed_count, fmi3Float64 sensitivity[], size_t sensitivity_count) {
-    if (!allowed(c, INITIALIZATION + RUNNING, "fmi3GetAdjointDerivative")) return fmi3Error;
+    if (!allowed(c, READABLE, 1, "fmi3GetAdjointDerivative")) return fmi3Error;
     if (!same_count(c, unknown_count, seed_count) || !same_count(c, known_count, sensitivity_count)) return fmi3Error;
     return (fmi3Status)adjoint(c, unknowns, unknown_count, knowns, known_count, seed, sensitivity);
 }
@@ -134,68 +130,72 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance c, const fmi3ValueReference unk
 /* Model exchange. */
 
 fmi3Status fmi3EnterEventMode(fmi3Instance c) {
-    return c ? (fmi3Status)set_phase(c, CONTINUOUS + EVENT, EVENT, "fmi3EnterEventMode") : fmi3Error;
+    const char *what = "fmi3EnterEventMode";
+    return exchanging(c, CONTINUOUS + EVENT, 1, what) ? (fmi3Status)set_phase(c, ANY_PHASE, EVENT, what) : fmi3Error;
 }
 
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance c, fmi3Boolean *again, fmi3Boolean *terminate,
                                     fmi3Boolean *nominals_changed, fmi3Boolean *states_changed,
                                     fmi3Boolean *next_time_defined, fmi3Float64 *next_time) {
-    Instance *instance = allowed(c, EVENT, "fmi3UpdateDiscreteStates");
-    if (!instance || !again || !terminate || !nominals_changed || !states_changed || !next_time_defined || !next_time)
-        return fmi3Error;
-    Status status = update_discrete(instance);
+    int complete = again && terminate && nominals_changed && states_changed && next_time_defined && next_time;
+    if (!exchanging(c, EVENT, complete, "fmi3UpdateDiscreteStates")) return fmi3Error;
+    Status status = update_discrete(c);
     *again = *terminate = *nominals_changed = *states_changed = fmi3False;
     *next_time_defined = model.period > 0;
-    *next_time = model.period > 0 ? next_tick_time(instance) : 0;
+    *next_time = model.period > 0 ? next_tick_time(c) : 0;
     return (fmi3Status)status;
 }
 
 fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance c) {
-    return c ? (fmi3Status)set_phase(c, EVENT, CONTINUOUS, "fmi3EnterContinuousTimeMode") : fmi3Error;
+    const char *what = "fmi3EnterContinuousTimeMode";
+    return exchanging(c, EVENT, 1, what) ? (fmi3Status)set_phase(c, ANY_PHASE, CONTINUOUS, what) : fmi3Error;
 }
 
 fmi3Status fmi3CompletedIntegratorStep(fmi3Instance c, fmi3Boolean no_set, fmi3Boolean *enter_event_mode,
                                        fmi3Boolean *terminate) {
     (void)no_set;
-    if (!allowed(c, CONTINUOUS, "fmi3CompletedIntegratorStep") || !enter_event_mode || !terminate) return fmi3Error;
+    if (!exchanging(c, CONTINUOUS, enter_event_mode && terminate, "fmi3CompletedIntegratorStep")) return fmi3Error;
     *enter_event_mode = *terminate = fmi3False;
     return fmi3OK;
 }
 
 fmi3Status fmi3SetTime(fmi3Instance c, fmi3Float64 time) {
-    return allowed(c, EVENT + CONTINUOUS, "fmi3SetTime") ? (fmi3Status)set_time(c, time) : fmi3Error;
+    return exchanging(c, EVENT + CONTINUOUS, 1, "fmi3SetTime") ? (fmi3Status)set_time(c, time) : fmi3Error;
 }
 
 fmi3Status fmi3SetContinuousStates(fmi3Instance c, const fmi3Float64 x[], size_t count) {
-    return allowed(c, CONTINUOUS, "fmi3SetContinuousStates") ? (fmi3Status)set_states(c, x, count) : fmi3Error;
+    return exchanging(c, CONTINUOUS, 1, "fmi3SetContinuousStates") ? (fmi3Status)set_states(c, x, count) : fmi3Error;
 }
 
 fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance c, fmi3Float64 derivatives[], size_t count) {
-    return c ? (fmi3Status)get_rates(c, derivatives, count) : fmi3Error;
+    if (!exchanging(c, READABLE, 1, "fmi3GetContinuousStateDerivatives")) return fmi3Error;
+    return (fmi3Status)get_rates(c, derivatives, count);
 }
 
 fmi3Status fmi3GetEventIndicators(fmi3Instance c, fmi3Float64 indicators[], size_t count) {
     (void)indicators;
-    if (!c) return fmi3Error;
+    if (!exchanging(c, READABLE, 1, "fmi3GetEventIndicators")) return fmi3Error;
     return count ? (fmi3Status)fail(c, FAILED, "the model has no event indicators") : fmi3OK;
 }
 
 fmi3Status fmi3GetContinuousStates(fmi3Instance c, fmi3Float64 x[], size_t count) {
-    return c ? (fmi3Status)get_states(c, x, count) : fmi3Error;
+    if (!exchanging(c, READABLE, 1, "fmi3GetContinuousStates")) return fmi3Error;
+    return (fmi3Status)get_states(c, x, count);
 }
 
 fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance c, fmi3Float64 nominals[], size_t count) {
-    return c ? (fmi3Status)get_nominals(c, nominals, count) : fmi3Error;
+    if (!exchanging(c, READABLE, 1, "fmi3GetNominalsOfContinuousStates")) return fmi3Error;
+    return (fmi3Status)get_nominals(c, nominals, count);
 }
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance c, size_t *count) {
-    if (!c || !count) return fmi3Error;
+    if (!exchanging(c, ANY_PHASE, count != NULL, "fmi3GetNumberOfEventIndicators")) return fmi3Error;
     *count = 0;
     return fmi3OK;
 }
 
 fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *count) {
-    if (!c || !count) return fmi3Error;
+    if (!exchanging(c, ANY_PHASE, count != NULL, "fmi3GetNumberOfContinuousStates")) return fmi3Error;
     *count = (size_t)model.rates;
     return fmi3OK;
 }
@@ -205,10 +205,10 @@ fmi3Status fmi3GetNumberOfContinuousStates(fmi3Instance c, size_t *count) {
 fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 length, fmi3Boolean no_set, fmi3Boolean *event_needed,
                       fmi3Boolean *terminate, fmi3Boolean *early_return, fmi3Float64 *last_time) {
     (void)no_set;
-    Instance *instance = allowed(c, STEP, "fmi3DoStep");
-    if (!instance || !event_needed || !terminate || !early_return || !last_time) return fmi3Error;
-    Status status = do_step(instance, time, length);
+    int complete = event_needed && terminate && early_return && last_time;
+    if (!allowed(c, STEP, complete, "fmi3DoStep")) return fmi3Error;
+    Status status = do_step(c, time, length);
     *event_needed = *terminate = *early_return = fmi3False;
-    *last_time = instance->values[0];
+    *last_time = ((Instance *)c)->values[0];
     return (fmi3Status)status;
 }

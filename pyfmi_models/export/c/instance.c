@@ -132,6 +132,19 @@ Status expect(Instance *instance, int phases, const char *what) {
     return fail(instance, FAILED, "%s is not allowed in the %s mode", what, phase_name(instance->memory->phase));
 }
 
+/* Whether a call is in order: there is an instance, the phase is one of these, no argument that is needed is NULL. */
+int allowed(Instance *instance, int phases, int complete, const char *what) {
+    if (!instance || expect(instance, phases, what) != OK) return 0;
+    return complete || fail(instance, FAILED, "%s: an argument is missing", what) == OK;
+}
+
+/* The same for the functions of model exchange. */
+int exchanging(Instance *instance, int phases, int complete, const char *what) {
+    if (!allowed(instance, phases, complete, what)) return 0;
+    if (instance->memory->interface == MODEL_EXCHANGE) return 1;
+    return fail(instance, FAILED, "%s is for model exchange, and this is a co-simulation", what) == OK;
+}
+
 Status set_phase(Instance *instance, int from, Phase to, const char *what) {
     Status status = expect(instance, from, what);
     if (status != OK) return status;
@@ -152,6 +165,9 @@ Status set_experiment(Instance *instance, int has_tolerance, double tolerance, d
     Status status = expect(instance, INSTANTIATED, "setting up the experiment");
     if (status != OK) return status;
     if (!(fabs(start) < INFINITY)) return fail(instance, FAILED, "the start time %g is not finite", start);
+    if (model.period > 0 && !resolves_ticks(start))
+        return fail(instance, FAILED, "near the start time %.17g s a number cannot tell one tick from the next, %g s later",
+                    start, model.period);
     if (has_stop && !(stop >= start))
         return fail(instance, FAILED, "the stop time %.17g s is before the start time %.17g s", stop, start);
     if (has_tolerance && !(tolerance > 0 && tolerance < 1))

@@ -1,6 +1,7 @@
 /* Saving, restoring and serializing everything an instance remembers. */
 #include "core.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -43,6 +44,23 @@ static Status check(Instance *instance, const Memory *memory) {
     return OK;
 }
 
+/* What no run can have left behind: the next call could not rely on it. */
+static int plausible(const Memory *memory) {
+    const double *values = memory->values, times[] = {memory->start, memory->tolerance, memory->step, values[0]};
+    for (size_t i = 0; i < sizeof times / sizeof *times; i++)
+        if (!(times[i] > -INFINITY && times[i] < INFINITY)) return 0;
+    for (int i = 0; i < model.size; i++) {
+        const Variable *variable = &model.table[i];
+        if (variable->kind < RATE && !(fabs(values[i]) < INFINITY)) return 0;
+        if (variable->kind == PARAMETER && !(values[i] >= variable->low && values[i] <= variable->high)) return 0;
+    }
+    int phase = memory->phase, alien = memory->interface == CO_SIMULATION ? EVENT + CONTINUOUS : STEP;
+    if (phase <= 0 || phase >= ANY_PHASE || (phase & (phase - 1)) || (phase & alien)) return 0;
+    if (memory->fresh & ~(RATES_FRESH | OUTPUTS_FRESH)) return 0;
+    if (memory->ticks < 0 || memory->ticks >= INT64_C(1) << 53 || (model.period > 0 && !resolves_ticks(memory->start))) return 0;
+    return memory->tolerance > 0 && memory->step >= 0 && memory->stop >= memory->start;
+}
+
 Status restore(Instance *instance, const Memory *memory) {
     Status status = check(instance, memory);
     if (status == OK) memcpy(instance->memory, memory, memory_size());
@@ -69,7 +87,11 @@ Status deserialize(Instance *instance, const unsigned char *bytes, size_t size, 
     memcpy(&mark, bytes, sizeof mark);
     if (hash != hash_bytes(bytes, memory_size())) return fail(instance, FAILED, "the serialized state is corrupted");
     if (mark != instance->memory->mark) return fail(instance, FAILED, "the state belongs to another model");
+    Memory *given = memory ? *memory : NULL;
     Status status = provide(instance, memory);
-    if (status == OK) memcpy(*memory, bytes, memory_size());
-    return status;
+    if (status != OK) return status;
+    memcpy(*memory, bytes, memory_size());
+    if (plausible(*memory)) return OK;
+    if (!given) release(memory);
+    return fail(instance, FAILED, "the serialized state is corrupted: no run ends in such a state");
 }

@@ -22,6 +22,9 @@ double next_tick_time(const Instance *instance) {
     return instance->memory->start + (double)instance->memory->ticks * model.period;
 }
 
+/* Rounding of time must stay within the slack. */
+int resolves_ticks(double time) { return fabs(time) * 2.3e-16 < slack * model.period; }
+
 int tick_is_due(const Instance *instance) {
     return instance->values[0] >= next_tick_time(instance) - slack * model.period;
 }
@@ -42,9 +45,18 @@ Status tick(Instance *instance, int advance) {
     return OK;
 }
 
+/* A call that would take minutes is an error instead: the time is wrong, or the master skips events. */
+static Status check_ticks(Instance *instance, double ticks, double time) {
+    if (ticks <= model.most_steps) return OK;
+    return fail(instance, FAILED, "%.10g ticks of %g s are due at t = %.17g s; one call executes at most %d", ticks, model.period,
+                time, model.most_steps);
+}
+
 Status update_discrete(Instance *instance) {
-    Status status = OK;
-    while (status == OK && model.period > 0 && tick_is_due(instance)) status = tick(instance, 1);
+    if (!(model.period > 0)) return OK;
+    double time = instance->values[0];
+    Status status = check_ticks(instance, ceil((time - next_tick_time(instance)) / model.period), time);
+    while (status == OK && tick_is_due(instance)) status = tick(instance, 1);
     return status;
 }
 
@@ -55,8 +67,8 @@ static Status step_sampled(Instance *instance, double time, double length) {
     double due = ceil((time + length - memory->start) / model.period - margin);
     int64_t before = memory->ticks;
     size_t bytes = (size_t)(model.states + model.outputs) * sizeof(double);
-    Status status = OK;
-    if (due > before + 1 && bytes) memcpy(instance->seeds, instance->states, bytes);
+    Status status = check_ticks(instance, due - (double)before, time + length);
+    if (due > (double)before + 1 && bytes) memcpy(instance->seeds, instance->states, bytes);
     while (status == OK && (double)memory->ticks < due) status = tick(instance, 1);
     if (status != OK && memory->ticks > before) {
         memcpy(instance->states, instance->seeds, bytes);
@@ -84,7 +96,7 @@ static Status step_continuous(Instance *instance, double time, double length) {
 
 static Status check_step(Instance *instance, double time, double length) {
     double now = instance->values[0], margin = 1e-6 * length + 1e-14 * fabs(now), stop = instance->memory->stop;
-    if (!(fabs(time) < INFINITY) || !(length > 0 && length < INFINITY))
+    if (!(fabs(time) < INFINITY) || !(length > 0 && time + length < INFINITY))
         return fail(instance, FAILED, "a step of %.17g s from t = %.17g s: the length must be positive and finite", length,
                     time);
     if (time < now - margin)

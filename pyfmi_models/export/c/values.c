@@ -77,6 +77,8 @@ static int settable(const Variable *variable) {
 
 static Status check_setting(Instance *instance, const Variable *variable, double value) {
     int phases = settable(variable);
+    if (instance->memory->phase == TERMINATED)
+        return fail(instance, FAILED, "\"%s\" cannot be set after the end", variable->name);
     if (!phases) return fail(instance, FAILED, "\"%s\" is calculated and cannot be set", variable->name);
     if (!(phases & instance->memory->phase)) {
         if (variable->kind == PARAMETER && !variable->fixed)
@@ -160,9 +162,9 @@ static Status check_references(Instance *instance, const uint32_t *references, s
 }
 
 static Status check_derivative(Instance *instance, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns,
-                               size_t known_count, const double *seed, const double *sensitivity) {
+                               size_t known_count, const double *by_unknown, const double *by_known) {
     if (is_sampled()) return fail(instance, FAILED, "a sampled model has no partial derivatives");
-    if ((unknown_count && !unknowns) || (known_count && !knowns) || !seed || !sensitivity)
+    if ((unknown_count && (!unknowns || !by_unknown)) || (known_count && (!knowns || !by_known)))
         return fail(instance, FAILED, "partial derivatives: an array is missing");
     Status status = check_references(instance, unknowns, unknown_count, 1);
     return status == OK ? check_references(instance, knowns, known_count, 0) : status;
@@ -186,7 +188,7 @@ static Status gather(Instance *instance, const uint32_t *references, size_t coun
 /* sensitivity = d unknowns / d knowns * seed */
 Status directional(Instance *instance, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns,
                    size_t known_count, const double *seed, double *sensitivity) {
-    Status status = check_derivative(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity);
+    Status status = check_derivative(instance, unknowns, unknown_count, knowns, known_count, sensitivity, seed);
     if (status != OK) return status;
     scatter(instance, knowns, known_count, seed);
     const double *seeds = instance->seeds, *inputs = seeds + 1, *parameters = inputs + model.inputs;
