@@ -1,4 +1,4 @@
-"""What the descriptions of our FMUs announce, and what a user may rely on beside: memory, time, threads, bounded work."""
+"""What our FMUs announce, and what a user may rely on beside: memory, time, threads, bounded work."""
 
 import ctypes
 import json
@@ -49,8 +49,9 @@ def test_a_serialized_state_continues_in_another_process():
             content = driver.run(0, 100, 1e-3).serialize(driver.save())
             cases.append((make.__name__, str(library(make)), fmi, content.hex()))
             here.append(everything(driver.run(0.1, 50, 1e-3)).hex())
-    done = subprocess.run([sys.executable, "-c", CONTINUE], input=json.dumps(cases), capture_output=True, text=True,
-                          check=False, env={"PYTHONPATH": ":".join([*sys.path, str(Path(__file__).parent)])})  # fmt: skip
+    paths = ":".join([*sys.path, str(Path(__file__).parent)])
+    done = subprocess.run([sys.executable, "-c", CONTINUE], input=json.dumps(cases), text=True, capture_output=True,
+                          check=False, env={"PYTHONPATH": paths})  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.split() == here
 
