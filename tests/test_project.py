@@ -12,7 +12,7 @@ import pytest
 
 import cosim
 import pyfmi_models
-from cosim.diagnosis.candidates import TRIED
+from cosim.diagnosis.families import TRIED
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import CATALOGUE
 

@@ -39,7 +39,7 @@ class Rest:
 def rest_of(chosen: Fit, prepared: Prepared, bench: Bench) -> Rest:
     """Measure on what the residual of a structure depends."""
     shapes = _dictionary(prepared)
-    scores = bench.screen(chosen, list(shapes.values()), [False] * len(shapes))
+    scores = bench.screen(chosen, list(shapes.values()), [""] * len(shapes))
     plain = {name: _share(chosen.residual, columns) for name, columns in shapes.items()}
     gains = {
         name: score.gain if plain[name] > LEAST_PLAIN else min(score.gain, plain[name])

@@ -9,7 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cosim.diagnosis.candidates import candidates, columns_of
+from cosim.diagnosis.candidates import columns_of
+from cosim.diagnosis.families import candidates
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.select import Selection
 from cosim.diagnosis.structure import Bench, projected
@@ -132,7 +133,7 @@ def _rivals(effect: Effect, reduced: Fit, bench: Bench, gain: float) -> list[Eff
     if not alike:
         return []
     groups = columns_of(reduced.mount, alike, prepared, reduced.values)
-    scores = bench.screen(reduced, groups, [candidate.shapes_excluded for candidate in alike])
+    scores = bench.screen(reduced, groups, [candidate.makes_room for candidate in alike])
     best: dict[str, tuple[float, Effect]] = {}
     for candidate, (score, coefficients) in zip(alike, scores, strict=True):
         if score.gain > max(ALIKE * gain, best.get(candidate.effect, (LEAST_GAIN,))[0]):

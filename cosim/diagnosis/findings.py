@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from cosim.diagnosis.candidates import TRIED, candidates, columns_of
+from cosim.diagnosis.candidates import columns_of
 from cosim.diagnosis.challenge import Place
 from cosim.diagnosis.evidence import Blocks
+from cosim.diagnosis.families import TRIED, candidates
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.locate import where
 from cosim.diagnosis.prepare import Array, Prepared
@@ -30,6 +31,17 @@ MAIN = {
     "stribeck": ("Fs", 1.0, "N.m"),
     "gravity_unbalance": ("mgl", 1.0, "N.m"),
     "position_friction": ("relative_amplitude", 100.0, "%"),
+    "load_dependent_friction": ("coulomb_per_Nm", 100.0, "% of the load"),
+    "dwell_breakaway": ("torque_per_efold", 1.0, "N.m"),
+    "thermal_viscosity": ("viscous_per_degC", 100.0, "%/K"),
+    "presliding": ("sigma0", 1.0, "N.m/rad"),
+    "cable_wrap": ("stiffness", 1.0, "N.m/rad"),
+    "quadratic_drag": ("coefficient", 1.0, "N.m.s2/rad2"),
+    "torque_saturation": ("knee_torque", 1.0, "N.m"),
+    "clock_skew": ("offset_ms", 1.0, "ms"),
+    "inertia_variation": ("relative_amplitude", 100.0, "%"),
+    "compliance": ("resonance_hz", 1.0, "Hz"),
+    "encoder_eccentricity": ("amplitude_rad", 1.0, "rad"),
 }
 """The number that says how large an effect is: parameter, factor and unit of the text."""
 
@@ -141,8 +153,8 @@ def not_found(
     smallest: dict[str, float] = {}
     for candidate, column in zip(tried, columns, strict=True):
         size = _smallest(chosen, column[:, 0] * weight, known)
-        if candidate.effect in ("delay", "actuator_lag"):
-            size *= getattr(candidate.instances[0], MAIN[candidate.effect][0])
+        if candidate.finite:
+            size *= abs(getattr(candidate.instances[0], MAIN[candidate.effect][0]))
         smallest[candidate.effect] = min(size, smallest.get(candidate.effect, np.inf))
     rest = [name for name in TRIED if name not in named]
     return [_absent(name, smallest.get(name), looked_at.get(name), chosen.mount, prepared) for name in rest]

@@ -11,8 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from cosim.diagnosis.bank import bank
-from cosim.diagnosis.candidates import Candidate, candidates, columns_of
+from cosim.diagnosis.candidates import Candidate, Room, columns_of
 from cosim.diagnosis.evidence import AR_ORDER, Blocks, Grams, Score, Whitening
+from cosim.diagnosis.families import candidates
 from cosim.diagnosis.fit import BRISTLES, FIXED, Fit, fit
 from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import Array, Prepared
@@ -70,21 +71,27 @@ class Bench:
         """Rows of each block that count."""
         return np.array([float(len(rows)) for rows in self.blocks.rows])
 
-    def screen(self, found: Fit, groups: Sequence[Array], excluded: Sequence[bool]) -> list[tuple[Score, Array]]:
-        """Score groups of further columns, one at a time; return scores and the coefficients of the group."""
+    def screen(self, found: Fit, groups: Sequence[Array], excluded: Sequence[Room]) -> list[tuple[Score, Array]]:
+        """Score groups of further columns, one at a time; return scores and the coefficients of the group.
+
+        `excluded` names for each group the shapes of the bank that make room for it.
+        """
         grams, base = self._grams(found, groups), range(1, 1 + len(found.free))
-        before = {without: grams.energy(base, self._unshaped(found) if without else None) for without in (False, True)}
+        before = {room: grams.energy(base, self._others(found, room)) for room in set(excluded)}
         first, scores = 1 + len(found.free) + self.nuisances.columns.shape[1], []
-        for group, without in zip(groups, excluded, strict=True):
-            chosen, used = [*base, *range(first, first + group.shape[1])], self._unshaped(found) if without else None
-            score = Score(before[without], grams.energy(chosen, used), grams.rows)
+        for group, room in zip(groups, excluded, strict=True):
+            chosen, used = [*base, *range(first, first + group.shape[1])], self._others(found, room)
+            score = Score(before[room], grams.energy(chosen, used), grams.rows)
             scores.append((score, grams.fit(chosen, used)[len(base) :]))
             first += group.shape[1]
         return scores
 
-    def _unshaped(self, found: Fit) -> list[int]:
+    def _others(self, found: Fit, room: Room) -> list[int]:
+        """Columns of the nuisances that stay when some make room."""
         width, first = self.nuisances.columns.shape[1], 1 + len(found.free)
-        return [first + k for k in range(width) if k not in self.nuisances.speed_shapes]
+        speeds = self.nuisances.speed_shapes
+        gone = {"": (), "speeds": speeds, "stops": tuple(k for k in range(width) if k not in speeds)}[room]
+        return [first + k for k in range(width) if k not in gone]
 
     def _grams(self, found: Fit, groups: Sequence[Array]) -> Grams:
         columns = np.column_stack([found.residual, found.slopes, self.nuisances.columns, *groups])
@@ -162,7 +169,7 @@ def screen(found: Fit, prepared: Prepared, blocks: Blocks, nuisance: Nuisances, 
     rest = projected(found.residual * weight, known * counted)
     tried = candidates(found.mount, prepared, rest, np.abs(nuisance.level))
     groups = columns_of(found.mount, tried, prepared, found.values)
-    excluded = [candidate.shapes_excluded for candidate in tried]
+    excluded = [candidate.makes_room for candidate in tried]
     bench = Bench(prepared, blocks, nuisance, Whitening.of(rest, blocks, speed), weight)
     first = _best(tried, bench.screen(found, groups, excluded))
     everything = np.column_stack([known, *(groups[index] for index in first.values())])

@@ -15,6 +15,7 @@ from cosim.diagnosis.fit import FIXED, LEAST_VS, Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.structure import Bench
 from pyfmi_models.effects import ActuatorLag, Cogging, Delay, Effect, StribeckEffect
+from pyfmi_models.effects.clock_skew import ClockSkew
 from pyfmi_models.mount import Mount
 
 LEAST_GAIN, LEAST_T = 0.03, 1.8
@@ -25,6 +26,8 @@ LEAST_PLAIN_GAIN = 0.02
 """Share of the plain residual energy an effect must remove too: whitened evidence alone can be about nothing."""
 LEAST_DELAY_SAMPLES, LEAST_DELAY = 0.3, 1.5e-4
 """A delay shorter than this many samples, or seconds, is what time stamps cannot be trusted for."""
+LEAST_DRIFT_MS = 1.0
+"""A clock that is late and drifts by less than this over a recording is a delay."""
 LEAST_CYCLES = 1.5
 """A ripple with fewer cycles a turn is an unbalance."""
 WHOLE = 0.01
@@ -42,6 +45,11 @@ class Problem:
     prepared: Prepared
     weight: Array
     sample_time: float
+
+    @property
+    def seconds(self) -> float:
+        """Length of the longest piece of a recording."""
+        return max(float(piece.t[-1] - piece.t[0]) for piece in self.prepared.pieces)
 
     @property
     def top_speed(self) -> float:
@@ -116,6 +124,9 @@ def is_another(problem: Problem, effect: Effect) -> bool:
     """Whether an effect is really something else: a time-stamp convention, a level, an unbalance."""
     if isinstance(effect, Delay):
         return bool(effect.delay_ms < 1e3 * max(LEAST_DELAY_SAMPLES * problem.sample_time, LEAST_DELAY))
+    if isinstance(effect, ClockSkew):
+        drifts = 1e-3 * abs(effect.drift_ppm) * problem.seconds
+        return bool(effect.offset_ms < 0 and drifts < LEAST_DRIFT_MS)
     if isinstance(effect, Cogging) and problem.mount.motion == "rotary":
         return bool(effect.cycles_per_rev < LEAST_CYCLES)
     return isinstance(effect, StribeckEffect) and bool(effect.Vs < LEAST_VS * problem.top_speed)

@@ -1,0 +1,43 @@
+"""Timing: between command and torque, and between two clocks."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from cosim.diagnosis.candidates import Candidate, Span, has
+from cosim.diagnosis.prepare import Array
+from pyfmi_models.effects import ActuatorLag, Delay, Effect
+from pyfmi_models.effects.clock_skew import ClockSkew
+from pyfmi_models.mount import Mount
+
+
+def late(mount: Mount, span: Span) -> Iterator[Candidate]:
+    """Delays and lags of several sizes."""
+    for ms in (0.3, 1.0, 3.0, 8.0):
+        for effect in (Delay(delay_ms=ms), ActuatorLag(time_constant_ms=ms)):
+            if not has(mount, type(effect)):
+
+                def start(c: Array, effect: Effect = effect, ms: float = ms) -> Effect:
+                    return _timed(effect, ms * float(c[0]))
+
+                yield Candidate(effect.id, (effect,), (), start)
+
+
+def _timed(effect: Effect, ms: float) -> Effect:
+    ms = float(np.clip(ms, 0.03, 40))
+    return Delay(delay_ms=ms) if isinstance(effect, Delay) else ActuatorLag(time_constant_ms=ms)
+
+
+def clocks(mount: Mount, span: Span) -> Iterator[Candidate]:
+    """Readings that are newer than the torque beside them, which no delay can do, or that drift either way."""
+    if has(mount, ClockSkew):
+        return
+    ways = [ClockSkew(offset_ms=ms) for ms in (1.0, 4.0)]
+    ways += [ClockSkew(drift_ppm=1e3 * ms / span.seconds) for ms in (4.0, -4.0)]
+    for way in ways:
+
+        def start(c: Array, way: ClockSkew = way) -> Effect:
+            size = float(np.clip(c[0], 0.03, 10))
+            return ClockSkew(offset_ms=size * way.offset_ms + 1e-3, drift_ppm=size * way.drift_ppm + 1e-3)
+
+        yield Candidate("clock_skew", (way,), (), start)
