@@ -14,7 +14,7 @@ import numpy as np
 
 from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import Array, Prepared
-from pyfmi_models.effects import Effect, SensorEffect
+from pyfmi_models.effects import ClockEffect, Effect, MotionEffect, SensorEffect
 from pyfmi_models.mount import Mount
 
 Room = Literal["", "speeds", "stops"]
@@ -101,8 +101,8 @@ def columns_of(mount: Mount, found: Sequence[Candidate], prepared: Prepared, val
     for members in groups.values():
         columns = _derivatives(mount, [found[index] for index in members], prepared)
         ready |= dict(zip(members, columns, strict=True))
-    now = stacked(Inverse(mount, ()), prepared.pieces, np.zeros(0))[0]
-    return [_change(mount, c, prepared, now) if c.finite else ready[k] for k, c in enumerate(found)]
+    changes = iter(_changes(mount, [candidate for candidate in found if candidate.finite], prepared))
+    return [next(changes) if candidate.finite else ready[index] for index, candidate in enumerate(found)]
 
 
 def _group(candidate: Candidate) -> str:
@@ -126,7 +126,21 @@ def _derivatives(mount: Mount, found: Sequence[Candidate], prepared: Prepared) -
     return np.split(slopes, ends, axis=1)
 
 
-def _change(mount: Mount, candidate: Candidate, prepared: Prepared, now: Array) -> Array:
-    """Column of a candidate without linear numbers: what it does to the predicted torque as a whole."""
-    changed = replace(mount, effects=(*mount.effects, *candidate.instances))
-    return (stacked(Inverse(changed, ()), prepared.pieces, np.zeros(0))[0] - now)[:, None]
+def _changes(mount: Mount, found: Sequence[Candidate], prepared: Prepared) -> list[Array]:
+    """Columns of candidates without linear numbers: what each does to the predicted torque as a whole."""
+    none, own = np.zeros(0), Inverse(mount, ())
+    moments = [own.momentary(piece, none) for piece in prepared.pieces]
+    now = _kept(prepared, [own.behind(p, m, none) for p, m in zip(prepared.pieces, moments, strict=True)])
+    columns = []
+    for candidate in found:
+        inverse = Inverse(replace(mount, effects=(*mount.effects, *candidate.instances)), ())
+        # A spring, a drive or a clock leaves what the motion of each moment needs.
+        same = not isinstance(candidate.instances[0], MotionEffect) or isinstance(candidate.instances[0], ClockEffect)
+        own_moments = moments if same else [inverse.momentary(piece, none) for piece in prepared.pieces]
+        after = [inverse.behind(p, m, none) for p, m in zip(prepared.pieces, own_moments, strict=True)]
+        columns.append(_kept(prepared, after) - now)
+    return columns
+
+
+def _kept(prepared: Prepared, columns: Sequence[Array]) -> Array:
+    return np.concatenate([one[piece.kept] for piece, one in zip(prepared.pieces, columns, strict=True)])

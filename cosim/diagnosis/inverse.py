@@ -52,12 +52,19 @@ class Inverse:
 
     def torque(self, piece: Piece, values: Array) -> tuple[Array, Array]:
         """Return needed torque (rows,) and its derivatives (rows, free) at all rows of a piece, filtered once more."""
+        columns = self.behind(piece, self.momentary(piece, values), values)
+        return columns[:, 0], columns[:, 1:]
+
+    def momentary(self, piece: Piece, values: Array) -> Array:
+        """Torque that the motion and the states need, and its derivatives: (rows, 1 + free), filtered once more."""
+        return piece.lowpass(np.column_stack(self._momentary(piece, self._with(values))))
+
+    def behind(self, piece: Piece, columns: Array, values: Array) -> Array:
+        """The same after springs, drive and clocks, which act on a torque as a whole."""
         full = self._with(values)
-        columns = piece.lowpass(np.column_stack(self._momentary(piece, full)))
         columns = self._with_coupled(piece, columns, full)
         columns = self._undone_drive(columns, full, piece.dt)
-        columns = self._on_one_clock(piece, columns, full)
-        return columns[:, 0], columns[:, 1:]
+        return self._on_one_clock(piece, columns, full)
 
     def _with(self, values: Array) -> Array:
         full = self.start.copy()

@@ -1,14 +1,19 @@
 """Strongest cycles of a signal over angle."""
 
-from math import pi
+from itertools import pairwise
+from math import ceil, log, pi
 
 import numpy as np
+import numpy.typing as npt
 
 from cosim.diagnosis.candidates import Span
 from cosim.diagnosis.prepare import Array
 
 PEAKS = 3
 """Peaks that become candidates, for each periodic effect."""
+LEAST_ROWS = 50
+BAND, FINE = 1.15, 16
+"""Ratio of cycles that share one choice of rows, and bins of angle in the shortest wave of such a band."""
 
 
 def peaks(span: Span, signal: Array, lowest: float = 1.0) -> list[float]:
@@ -19,8 +24,9 @@ def peaks(span: Span, signal: Array, lowest: float = 1.0) -> list[float]:
     step, speed = 0.35 * 2 * pi / reach, float(np.median(np.abs(span.v)[np.abs(span.v) > 0.02 * span.top]))
     ratio = float(np.ptp(span.angle) / max(np.ptp(span.q), 1e-300))
     top = min(2 * pi * span.cutoff / max(speed * ratio, 1e-12), 3000 * step)
-    cycles = np.arange(max(2 * pi / reach * lowest, step), max(top, 10 * step), step)
-    power = np.array([_power(span, signal, float(n), ratio) for n in cycles])
+    first = max(1, ceil(max(2 * pi / reach * lowest, step) / step))
+    numbers = np.arange(first, max(ceil(top / step), first + 10))
+    cycles, power = numbers * step, _powers(span, signal, numbers, step, ratio)
     found: list[float] = []
     for index in np.argsort(power)[::-1]:
         if all(abs(cycles[index] - other) > 6 * step for other in found):
@@ -30,10 +36,29 @@ def peaks(span: Span, signal: Array, lowest: float = 1.0) -> list[float]:
     return found
 
 
+def _powers(span: Span, signal: Array, numbers: npt.NDArray[np.int64], step: float, ratio: float) -> Array:
+    """Power at whole multiples of a step, roughly: band by band, gathered in bins of angle and transformed at once."""
+    powers = np.zeros(len(numbers))
+    edges = [0, *np.flatnonzero(np.diff(np.floor(np.log(numbers) / log(BAND)))) + 1, len(numbers)]
+    for low, high in pairwise(edges):
+        passed = _passed(span, float(numbers[high - 1]) * step, ratio)
+        if passed.sum() >= LEAST_ROWS:
+            bins = FINE * int(numbers[high - 1])
+            place = np.floor(span.angle[passed] * (step * bins / (2 * pi))).astype(np.int64) % bins
+            gathered = np.bincount(place, signal[passed] - signal[passed].mean(), bins)
+            powers[low:high] = np.abs(np.fft.rfft(gathered)[numbers[low:high]]) ** 2 / passed.sum()
+    return powers
+
+
+def _passed(span: Span, cycles: float, ratio: float) -> npt.NDArray[np.bool_]:
+    """Rows slow enough for the filter to pass so many cycles per turn."""
+    return np.asarray(np.abs(span.v) * ratio * cycles < 2 * pi * span.cutoff * 0.8)
+
+
 def _power(span: Span, signal: Array, cycles: float, ratio: float) -> float:
     """Power of a signal at a number of cycles per turn, over the rows slow enough for the filter to pass them."""
-    passed = np.abs(span.v) * ratio * cycles < 2 * pi * span.cutoff * 0.8
-    if passed.sum() < 50:
+    passed = _passed(span, cycles, ratio)
+    if passed.sum() < LEAST_ROWS:
         return 0.0
     part = signal[passed] - signal[passed].mean()
     return float(np.abs(np.exp(-1j * cycles * span.angle[passed]) @ part) ** 2 / passed.sum())
