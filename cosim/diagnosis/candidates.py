@@ -47,7 +47,7 @@ class Span:
     angle: Array
     q: Array
     v: Array
-    command: Array
+    tau: Array
     level: Array
     residual: Array
     cutoff: float
@@ -82,7 +82,7 @@ def span_of(mount: Mount, prepared: Prepared, residual: Array, level: Array) -> 
         angle=np.asarray(mount.at(0.0, q, v).angle),
         q=q,
         v=v,
-        command=prepared.stacked("command"),
+        tau=prepared.stacked("tau"),
         level=level,
         residual=residual,
         cutoff=prepared.cutoff,

@@ -15,7 +15,8 @@ from pyfmi_models.effects import DriveEffect, MotionEffect, SensorEffect
 from pyfmi_models.model import structure_of, symbols_of
 from pyfmi_models.mount import Mount
 
-READING = ("t", "q", "v", "a", "command")
+READING = ("t", "q", "v", "a")
+NEWTON = 3
 
 
 class Equations:
@@ -29,10 +30,10 @@ class Equations:
         self.count = sum(len(states) for _, states in self._owners)
 
     def columns(self, piece: Piece) -> Array:
-        """What each row gives: time, reading, its derivatives, command, and the inputs of effects."""
+        """What each row gives: time, reading, its derivatives, and the inputs of effects."""
         starts = {variable.name: variable.start for variable in self._mount.inputs()}
         given = [piece.extras.get(name, np.full(len(piece.t), starts[name])) for name in self._inputs]
-        return np.vstack([piece.t, piece.q, piece.v, piece.a, piece.command, *given])
+        return np.vstack([piece.t, piece.q, piece.v, piece.a, *given])
 
     @cached_property
     def _symbols(self) -> dict[str, Any]:
@@ -76,8 +77,7 @@ class Equations:
         level, near = this.level(motion, own), this.inertia(this.axis.inertia, motion, own)
         torque = near * s["a"] + ca.jacobian(near, motion.q) * motion.v**2 / 2
         torque += this.law.contact(own["friction"], motion.v, level) + this.viscous(motion, own)
-        torque += this.loads(motion, own) + _withheld(this, s["command"])
-        torque = self._true(torque)
+        torque = self._true(_asked(this, torque + this.loads(motion, own)))
         rows = ca.vertcat(torque, ca.jacobian(torque, s["state"]).T, ca.jacobian(torque, s["free"]).T)
         return Rowwise(ca.vertcat(self._column, s["state"]), s["p"], rows)
 
@@ -120,13 +120,20 @@ class Equations:
         return Rowwise(self._column, self._symbols["p"], self._true(self._symbols["a"]))
 
 
-def _withheld(this: Mount, command: Any) -> Any:
-    """What drives that follow at once keep back of a command [N m]."""
-    given = command
-    for _, drive in this.of_kind(DriveEffect):
-        if not drive.states():
-            given = drive.applied((), given)
-    return command - given
+def _asked(this: Mount, needed: Any) -> Any:
+    """Command [N m] for which drives that follow at once give what is needed: Newton's method, from what is needed.
+
+    Past a knee the first step is exact where the drive is linear again; the others serve the bend.
+    """
+    for _, drive in reversed([(name, one) for name, one in this.of_kind(DriveEffect) if not one.states()]):
+        command = ca.SX.sym("command")
+        rest = drive.applied((), command) - needed
+        step = ca.Function("step", [command], [command - rest / ca.jacobian(rest, command)], {"allow_free": True})
+        target = needed
+        for _ in range(NEWTON):
+            target = step(target)
+        needed = target
+    return needed
 
 
 def _advanced(effect: MotionEffect, motion: Any, dt: Any) -> Any:

@@ -22,13 +22,15 @@ from pyfmi_models.mount import Mount
 FIXED = (
     "axis.torque_limit",
     *(f"friction.{name}" for name in ("smoothing", "delta", "n", "spread", "attraction")),
-    *("cycles_per_rev", "onset_s", "warm_up_degC"),
+    *("cycles_per_rev", "onset_s", "warm_up_degC", "hardening"),
 )
 """Parameters that are not fitted here: limits, shapes of laws, and numbers that candidates choose from a grid."""
 BRISTLES = ("friction.sigma0", "friction.sigma1", "friction.Fs", "friction.Vs")
 """Parameters that only the slowest motion tells: a recording that never dwells says nothing about them."""
 LEAST_VS, MOST_FS = 0.005, 5.0
 """Stribeck curves narrower than this share of the top speed, or higher than this times their start, are not fitted."""
+LEAST_KNEE = 0.5
+"""A drive that saturates does so above this share of the torque that is hardly ever exceeded (98 %)."""
 ENOUGH = 1e-5
 """A fit ends when a step lowers the sum of squares by less than this share."""
 PRIOR_FACTOR = 2.0
@@ -110,10 +112,13 @@ def fit(
         return np.concatenate([-weight_used[:, None] * evaluate(u)[1] * scale, np.diag(pull(u * scale)[1] * scale)])
 
     top = max(float(np.abs(piece.v).max()) for piece in pieces)
-    low, high = (np.array(edges) / scale for edges in zip(*(_bounds(known[name], top) for name in free), strict=True))
+    asked = float(np.quantile(np.abs(np.concatenate([piece.tau for piece in pieces])), 0.98))
+    edges = [_bounds(known[name], top, asked) for name in free]
+    lowest, highest = (np.array(column) for column in zip(*edges, strict=True))
+    low, high = lowest / scale, highest / scale
     inner = np.clip(start / scale, np.nextafter(low, 0) + 1e-9, np.nextafter(high, 0) - 1e-9)
     found = least_squares(residuals, jacobian, inner, (low, high), evaluations)
-    values = found * scale
+    values = np.clip(found * scale, lowest, highest)
     torque, slopes = stacked(inverse, pieces, values)
     return Fit(with_values(mount, free, values), free, values, torque, slopes, tau - torque)
 
@@ -194,8 +199,14 @@ def _filled(part: Any, prefix: str, numbers: dict[str, float]) -> Any:
     return replace(part, **changes)
 
 
-def _bounds(variable: Variable, top: float) -> tuple[float, float]:
-    """Bounds of a parameter in a fit: its own, and for a Stribeck curve what recorded speeds can tell from a level."""
+def _bounds(variable: Variable, top: float, asked: float) -> tuple[float, float]:
+    """Bounds of a parameter in a fit: its own, and what the recordings can tell.
+
+    A Stribeck curve needs speeds `top` beside its own; a drive that saturates gives at least half of what is `asked`,
+    else a model that needs no torque at all would fit a drive that gives none.
+    """
+    if variable.name.endswith(".knee_torque"):
+        return LEAST_KNEE * asked, variable.high
     if variable.name.endswith(".Vs"):
         return min(LEAST_VS * top, variable.start), top
     if variable.name.endswith(".Fs"):

@@ -1,11 +1,10 @@
 """The torque that a recorded motion needs, and how it changes with every parameter.
 
-    needed(t) = D^-1 [ J(q) q'' + J'(q) q'^2 / 2 + contact + viscous + loads + coupled + (command - given) ]
+    needed(t) = D^-1 [ J(q) q'' + J'(q) q'^2 / 2 + contact + viscous + loads + coupled ]
 
 with the true motion recovered from the reading, the states of friction and effects integrated along it, what hangs on
-a spring (`coupled`) answered in the frequency domain, what a saturated drive withholds (`command - given`) taken from
-the recorded command, and D the linear drive effects undone; last, two clocks are brought together. The equations are
-those of the plant: the same objects, with measured motion put in (`equations.py`).
+a spring (`coupled`) answered in the frequency domain, and D the drive effects undone; last, two clocks are brought
+together. The equations are those of the plant: the same objects, with measured motion put in (`equations.py`).
 """
 
 from collections.abc import Callable, Sequence

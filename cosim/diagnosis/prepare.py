@@ -30,8 +30,7 @@ LEAST_SECONDS = 2.0
 class Piece:
     """A contiguous piece of a recording at the rate where the model is evaluated.
 
-    All arrays have one value a row: time, filtered position, speed, acceleration, `command` the torque filtered alike;
-    `tau` is filtered twice, as model torque is. `rows` are
+    All arrays have one value a row: time, filtered position, speed, acceleration; `tau` is filtered twice. `rows` are
     the rows of the recording they stand for; `inside` marks those away from the edges, where filters and initial
     states have settled.
     """
@@ -41,7 +40,6 @@ class Piece:
     q: Array
     v: Array
     a: Array
-    command: Array
     tau: Array
     rows: npt.NDArray[np.int64]
     inside: npt.NDArray[np.bool_]
@@ -139,7 +137,6 @@ def _piece(recording: Recording, index: int, span: slice, cutoff: float) -> Piec
         q=q[::step],
         v=v[::step],
         a=a[::step],
-        command=tau[::step],
         tau=lowpass(tau[::step], coarse, cutoff),
         rows=rows,
         inside=_inside(grid[::step], float(t[0]), float(t[-1])),

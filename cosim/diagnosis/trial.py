@@ -16,6 +16,7 @@ from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.structure import Bench
 from pyfmi_models.effects import ActuatorLag, Cogging, Delay, Effect, StribeckEffect
 from pyfmi_models.effects.clock_skew import ClockSkew
+from pyfmi_models.model import parameters_of
 from pyfmi_models.mount import Mount
 
 LEAST_GAIN, LEAST_T = 0.03, 1.8
@@ -121,7 +122,9 @@ def is_real(problem: Problem, trial: Trial) -> bool:
 
 
 def is_another(problem: Problem, effect: Effect) -> bool:
-    """Whether an effect is really something else: a time-stamp convention, a level, an unbalance."""
+    """Whether an effect is really something else: a time-stamp convention, a level, an unbalance; or at a bound."""
+    if any(variable.start >= variable.high for variable in parameters_of(effect)):
+        return True
     if isinstance(effect, Delay):
         return bool(effect.delay_ms < 1e3 * max(LEAST_DELAY_SAMPLES * problem.sample_time, LEAST_DELAY))
     if isinstance(effect, ClockSkew):

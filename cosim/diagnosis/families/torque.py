@@ -46,18 +46,20 @@ def cogging(mount: Mount, span: Span) -> Iterator[Candidate]:
 
 
 def cable(mount: Mount, span: Span) -> Iterator[Candidate]:
-    """A spring whose home is where its torque vanishes: two homes span them all."""
+    """A spring, even or hardening, whose home is where its torque vanishes: two homes span them all."""
     if has(mount, CableWrap):
         return
     homes = [float(home) for home in np.quantile(span.q, [0.1, 0.9])]
+    for hardening in (0.0, 4.0 / span.reach**2):
 
-    def start(c: Array) -> Effect:
-        stiffness = float(c[0] + c[1])
-        home = float(c @ homes) / stiffness if stiffness > 0 else float(np.mean(homes))
-        soft = 0.1 / span.reach**2
-        return CableWrap(stiffness=max(stiffness, 1e-9), home=float(np.clip(home, *_beside(span))), hardening=soft)
+        def start(c: Array, hardening: float = hardening) -> Effect:
+            stiffness = float(c[0] + c[1])
+            home = float(c @ homes) / stiffness if stiffness > 0 else float(np.mean(homes))
+            home = float(np.clip(home, *_beside(span)))
+            return CableWrap(stiffness=max(stiffness, 1e-9), home=home, hardening=hardening)
 
-    yield Candidate("cable_wrap", tuple(CableWrap(stiffness=0.0, home=home) for home in homes), ("stiffness",), start)
+        pair = tuple(CableWrap(stiffness=0.0, home=home, hardening=hardening) for home in homes)
+        yield Candidate("cable_wrap", pair, ("stiffness",), start)
 
 
 def _beside(span: Span) -> tuple[float, float]:
@@ -77,7 +79,7 @@ def saturation(mount: Mount, span: Span) -> Iterator[Candidate]:
     if has(mount, TorqueSaturation):
         return
     for share in (0.8, 0.9, 0.96, 0.985):
-        knee = float(np.quantile(np.abs(span.command), share))
+        knee = float(np.quantile(np.abs(span.tau), share))
         if knee > 0:
 
             def start(c: Array, knee: float = knee) -> Effect:
