@@ -9,6 +9,7 @@ from cosim.errors import InputError, RecordingError
 from cosim.recording import Recording
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.backlash import Backlash
+from pyfmi_models.effects.friction_wander import FrictionWander
 from pyfmi_models.mount import Mount
 
 LEAST_SECONDS = 8.0
@@ -29,8 +30,8 @@ def check_effects(mount: Mount) -> None:
 
 
 def is_held(effect: Effect) -> bool:
-    """Whether `Inverse` holds an effect: all but play, whose far side the recorded motion does not tell."""
-    return not isinstance(effect, Backlash)
+    """Whether `Inverse` holds an effect: not play, whose far side no recording tells, nor what was drawn by chance."""
+    return not isinstance(effect, Backlash | FrictionWander)
 
 
 def check_units(recordings: Sequence[Recording], mount: Mount) -> None:
