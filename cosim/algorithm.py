@@ -74,7 +74,8 @@ class Iterated(_Algorithm):
 
     The values at the end are iterated with rollback until each wire that closes a loop repeats itself to `tolerance`,
     relative to the largest value it has carried. theta = 0.5 is of second order, theta = 1 damps most.
-    Algebraic loops inside are solved. Needs FMUs that save and restore their state.
+    A single such wire takes two or three passes, stiff chains of many components some tens. Algebraic loops inside are
+    solved. Needs FMUs that save and restore their state.
     """
 
     kind: Literal["iterated"]

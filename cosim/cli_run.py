@@ -50,7 +50,8 @@ def run(
             progress = foretold(shown, size, say)
             done = run_scenario(ready, path, force=force, progress=progress, compiled=not interpreted, command=command)
     except (StepError, KeyboardInterrupt):
-        say(f"what was recorded until then is in {path}")
+        if path.exists():
+            say(f"what was recorded until then is in {path}")
         raise
     statistics = done.statistics | {"scenario": wanted.name, "recording": str(path)}
     if page:

@@ -17,6 +17,7 @@ from cosim.pictures.digest import BUCKETS, DOTS, Digest, axes_of, condense
 from cosim.pictures.run_page import write_page
 from cosim.recording import Recording
 from cosim.scenario import parse_scenario
+from cosim.writer import StreamWriter
 
 __all__ = ["scenario", "tiny"]
 
@@ -185,3 +186,21 @@ def test_short_and_constant_recordings_have_a_page_too(tmp_path: Path, rows: int
     scenario = parse_scenario(TEXT, "loop.toml", Path())
     text = write_page(tmp_path / "run.html", tmp_path / "run.parquet", scenario, STATISTICS).read_text("utf-8")
     assert "nan" not in "".join(re.findall(r'points="([^"]*)"', text))
+
+
+def test_a_recording_is_looked_at_piece_by_piece(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import pyarrow
+
+    from cosim.pictures import digest as module
+
+    rows, held = 1 << 20, []
+    with StreamWriter(tmp_path / "long.parquet", {"t": "s", "a": "", "b": ""}, {}) as writer:
+        for first in range(0, rows, 1 << 16):
+            t = np.arange(first, first + (1 << 16)) * 1e-4
+            writer.write({"t": t, "a": np.sin(t), "b": t})
+    add, before = module._add, pyarrow.total_allocated_bytes()
+    monkeypatch.setattr(
+        module, "_add", lambda *args: (held.append(pyarrow.total_allocated_bytes() - before), add(*args))
+    )
+    module.digest(tmp_path / "long.parquet")
+    assert max(held) < 8 * 3 * rows / 4

@@ -88,7 +88,8 @@ def digest(path: Path) -> Digest:
     """Read a recording written by `cosim run`."""
     from pyarrow import parquet
 
-    with parquet.ParquetFile(path) as file:
+    # pre_buffer, on by default, keeps every piece that was read until the file is closed: the whole recording.
+    with parquet.ParquetFile(path, pre_buffer=False) as file:
         fields = {one.name: (one.metadata or {}).get(UNIT_KEY, b"").decode() for one in file.schema_arrow}
         return condense(_pieces(file), fields, file.metadata.num_rows)
 
