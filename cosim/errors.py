@@ -8,6 +8,7 @@ CosimError                  everything this package raises on purpose
 │   ├── ScenarioError       a scenario file is missing, unreadable, or a key or value breaks a rule
 │   ├── SweepError          a sweep file is missing, unreadable, or a key or value breaks a rule
 │   ├── WiringError         a connection names what is not there, or joins what does not fit
+│   ├── HardwareError       a machine file breaks a rule, or a scenario cannot run on a machine
 │   ├── FmuError            a file is no FMU, or one that cannot run here
 │   └── OutputError         a result would overwrite a file, or cannot be written
 ├── StepError               a component failed while stepping: component, tick, time, last inputs
@@ -60,6 +61,10 @@ class SweepError(InputError):
 
 class WiringError(InputError):
     """A connection names what is not there, or joins what does not fit."""
+
+
+class HardwareError(InputError):
+    """A machine file or black box breaks a rule, or a scenario cannot run on a machine; no torque was enabled."""
 
 
 class FmuError(InputError):

@@ -22,6 +22,11 @@ LIBRARIES = {
     ),
     "cosim/proof/_truth": ("cosim/proof/truth.c",),
 }
+if sys.platform == "linux":  # absolute sleeps
+    LIBRARIES["cosim/hardware/_hardware"] = (
+        *(f"cosim/hardware/{name}.c" for name in ("cia402", "checks", "axis", "drive", "blackbox", "realtime")),
+        *(f"cosim/loop/{name}.c" for name in ("loop", "coupling")),
+    )
 FLAGS = ["-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra"]
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 GLIBC = "2.17"

@@ -1,0 +1,103 @@
+/* A simulated drive in this process: a plant behind CiA 402 and an encoder of 32 bits, with faults on demand. It lives in
+ * the loop's ticks: a write at tick k takes the plant there under the torque held since the write before. */
+#include "drive.h"
+
+#include <math.h>
+
+static const Injection *injected(const Drive *drive, int64_t kind)
+{
+    for (int64_t i = 0; i < drive->injections; i++) {
+        const Injection *one = &drive->injection[i];
+        if (one->kind == kind && drive->tick >= one->first && drive->tick < one->last) {
+            return one;
+        }
+    }
+    return NULL;
+}
+
+static void advance(Drive *drive)
+{
+    const Part *plant = &drive->plant;
+    plant->input[drive->torque_input] = drive->held;
+    int status = set_inputs(plant);
+    if (status <= FMI_WARNING) {
+        status = worse(status, do_step(plant, (double)drive->tick * drive->step, drive->step, true));
+    }
+    if (status <= FMI_WARNING) {
+        status = worse(status, get_outputs(plant));
+    }
+    drive->failed = finite_outputs(plant, status) > FMI_WARNING;
+    drive->tick++;
+}
+
+/* Takes the plant to a tick; without a write for longer than its watchdog the drive lets go and is in fault. */
+static void catch_up(Drive *drive, int64_t tick)
+{
+    for (int64_t silent = 1; drive->tick < tick && !drive->failed; silent++) {
+        advance(drive);
+        if (silent >= drive->watchdog && drive->tick < tick) {
+            drive->held = 0.0;
+            drive->state = FAULT;
+        }
+    }
+}
+
+static double saturated(const Drive *drive, double torque)
+{
+    const Injection *fault = injected(drive, SATURATED);
+    return fault && fabs(torque) > fault->size ? copysign(fault->size, torque) : torque;
+}
+
+static int drive_write(void *self, const Order *order)
+{
+    Drive *drive = self;
+    catch_up(drive, order->tick);
+    if (injected(drive, DEAD)) {
+        drive->state = NOT_READY;
+        drive->held = 0.0;
+        return 0;
+    }
+    if (injected(drive, TRIPPED)) {
+        drive->state = FAULT;
+    }
+    drive->state = cia402_next(drive->state, order->controlword, drive->control, false, true);
+    drive->control = order->controlword;
+    drive->held = drive->state == OPERATION_ENABLED ? saturated(drive, order->torque) : 0.0;
+    return 0;
+}
+
+static int drive_read(void *self, Feedback *feedback)
+{
+    Drive *drive = self;
+    if (drive->failed) {
+        return READ_ERROR;
+    }
+    if (injected(drive, LOST) || injected(drive, DEAD)) {
+        return READ_STALE;
+    }
+    if (!injected(drive, STALE)) {
+        const Injection *jump = injected(drive, JUMP);
+        double counts = floor(drive->plant.output[0] / drive->quantum + 0.5);
+        drive->counts = (uint32_t)(int64_t)(counts + (jump ? floor(jump->size / drive->quantum + 0.5) : 0.0));
+        drive->encoder++;
+    }
+    feedback->counts = drive->counts;
+    feedback->encoder = drive->encoder;
+    feedback->statusword = cia402_statusword(drive->state);
+    feedback->reserved = 0;
+    feedback->torque = drive->held;
+    return READ_OK;
+}
+
+static int drive_status(void *self)
+{
+    return (int)((Drive *)self)->failed;
+}
+
+/* Fills the adapter's table for a drive; reads where the plant is before its first step. */
+EXPORT int64_t drive_open(Drive *drive, Adapter *adapter)
+{
+    *adapter = (Adapter){drive, drive_read, drive_write, drive_status};
+    drive->failed = get_outputs(&drive->plant) > FMI_WARNING;
+    return !drive->failed;
+}

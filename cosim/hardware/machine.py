@@ -1,0 +1,104 @@
+"""A machine file: which adapter, which limits, how the loop reacts. Every limit must be stated; times become cycles."""
+
+import tomllib
+from importlib.resources import files
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from cosim.complaint import complaint
+from cosim.errors import HardwareError
+
+Positive = Annotated[float, Field(gt=0)]
+
+
+class _Section(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Limits(_Section):
+    """`[limits]`: what the axis may never exceed; all of them are required. N m, N m/s, rad/s, rad, rad, N m."""
+
+    torque: Positive
+    slew: Positive
+    speed: Positive
+    following_error: Positive
+    jump: Positive
+    torque_mismatch: Positive
+
+
+class Reactions(_Section):
+    """`[reactions]`: how long is too long. `ramp_ms`: of the torque limit from zero; `stop_slew`: N m/s, quick stop."""
+
+    ramp_ms: Positive = 20.0
+    stop_slew: Positive = 5000.0
+    patience_ms: Positive = 100.0
+    lost_cycles: int = Field(default=2, ge=0)
+    stale_cycles: int = Field(default=2, ge=0)
+    mismatch_cycles: int = Field(default=10, ge=0)
+    late_in_a_row: int = Field(default=3, ge=1)
+    late_in_window: int = Field(default=10, ge=1, le=64)
+    window_ms: Positive = 1000.0
+    heartbeat_ms: Positive = 500.0
+
+
+class Clock(_Section):
+    """`[clock]`: the last microseconds before an edge are spent awake."""
+
+    spin_us: float = Field(default=20.0, ge=0, le=1000)
+
+
+class Inject(_Section):
+    """`[[inject]]`: a fault of the simulated drive, in seconds since it was switched on; `size` in rad or N m."""
+
+    kind: Literal["lost", "stale", "jump", "saturated", "dead", "tripped"]
+    at: float = Field(ge=0)
+    lasts: Positive = 1e9
+    size: float = 0.0
+
+
+class Machine(_Section):
+    """A whole machine file."""
+
+    name: str
+    adapter: Literal["simulated"]
+    watchdog_ms: Positive = 2.0
+    black_box_seconds: Positive = 120.0
+    limits: Limits
+    reactions: Reactions = Reactions()
+    clock: Clock = Clock()
+    inject: tuple[Inject, ...] = ()
+
+
+def read_machine(source: str | Path) -> Machine:
+    """Read a machine from a file or by the name of a shipped one.
+
+    Raises:
+        HardwareError: one sentence that names file, key, value and rule.
+    """
+    path, shipped = Path(source), files("cosim.hardware") / "machines" / f"{source}.toml"
+    if path.is_file():
+        return parse_machine(path.read_text("utf-8"), str(source))
+    if shipped.is_file():
+        return parse_machine(shipped.read_text("utf-8"), str(source))
+    names = (one.name.removesuffix(".toml") for one in (files("cosim.hardware") / "machines").iterdir())
+    choices = tuple(sorted(names))
+    rule = f"a machine is a .toml file or one of: {', '.join(choices)}."
+    raise HardwareError(f"{source}: no such machine; {rule}", culprit=str(source), choices=choices)
+
+
+def parse_machine(text: str, path: str) -> Machine:
+    """Check the text of a machine file; `path` is its name in errors."""
+    try:
+        return Machine.model_validate(tomllib.loads(text))
+    except tomllib.TOMLDecodeError as error:
+        raise HardwareError(f"{path} is not valid TOML: {error}.", culprit=path) from error
+    except ValidationError as error:
+        raise HardwareError(**complaint(error, path, "a machine", _keys)) from error
+
+
+def _keys(location: tuple[int | str, ...]) -> tuple[str, ...]:
+    sections: dict[str, type[_Section]] = {"limits": Limits, "reactions": Reactions, "clock": Clock, "inject": Inject}
+    section = sections.get(str(location[0]), Machine) if len(location) > 1 else Machine
+    return tuple(section.model_fields)

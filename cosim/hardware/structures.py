@@ -1,0 +1,144 @@
+"""What hardware.h and drive.h declare, for ctypes; see there for the meaning of each field."""
+
+from ctypes import POINTER, Structure, c_double, c_int64, c_uint32, c_uint64, c_void_p, sizeof
+
+import numpy as np
+
+from cosim.loop.structures import CPart
+
+INPUTS, MISSES, LIMITS = 8, 64, 6
+
+
+class CFeedback(Structure):
+    """What a drive says."""
+
+    _fields_ = [
+        ("counts", c_uint32),
+        ("encoder", c_uint32),
+        ("statusword", c_uint32),
+        ("reserved", c_uint32),
+        ("torque", c_double),
+    ]
+
+
+class CAdapter(Structure):
+    """The table of an adapter's functions."""
+
+    _fields_ = [("self", c_void_p), ("read", c_void_p), ("write", c_void_p), ("status", c_void_p)]
+
+
+class CSample(Structure):
+    """What enters a cycle."""
+
+    _fields_ = [
+        ("tick", c_int64),
+        ("feedback", CFeedback),
+        ("read", c_uint32),
+        ("status", c_uint32),
+        ("late", c_uint32),
+        ("request", c_uint32),
+        ("change", c_uint32),
+        ("reserved", c_uint32),
+        ("value", c_double),
+        ("input", c_double * INPUTS),
+    ]
+
+
+class CRecord(Structure):
+    """A record of the black box."""
+
+    _fields_ = [
+        ("sequence", c_uint64),
+        ("sample", CSample),
+        ("state", c_uint32),
+        ("faults", c_uint32),
+        ("notes", c_uint32),
+        ("controlword", c_uint32),
+        ("command", c_double),
+        ("torque", c_double),
+        ("crc", c_uint32),
+        ("reserved", c_uint32),
+    ]
+
+
+class CAxis(Structure):
+    """An axis."""
+
+    _fields_ = [
+        ("controller", CPart),
+        ("initial", c_void_p),
+        ("encoder_input", c_int64),
+        ("reference_input", c_int64),
+        ("step", c_double),
+        ("quantum", c_double),
+        ("limit", c_double * LIMITS),
+        ("stop_slew", c_double),
+        *((name, c_int64) for name in ("ramp", "patience", "lost_limit", "stale_limit", "mismatch_limit")),
+        *((name, c_int64) for name in ("late_row_limit", "late_limit", "late_window")),
+        *((name, c_int64) for name in ("state", "faults", "wanted", "running", "known", "lost", "stale")),
+        *((name, c_int64) for name in ("mismatched", "waiting", "late_row", "position", "rate", "fresh", "ran")),
+        *((name, c_int64) for name in ("entered", "misses")),
+        *((name, c_uint32) for name in ("last_counts", "last_encoder", "last_request", "controlword")),
+        ("torque", c_double),
+        ("miss", c_int64 * MISSES),
+        ("refused", c_int64),
+    ]
+
+
+class CBox(Structure):
+    """The ring of records."""
+
+    _fields_ = [("record", c_void_p), ("capacity", c_int64), ("written", c_int64)]
+
+
+class CSession(Structure):
+    """A session."""
+
+    _fields_ = [
+        ("axis", POINTER(CAxis)),
+        ("adapter", POINTER(CAdapter)),
+        ("box", POINTER(CBox)),
+        ("setpoint", c_void_p),
+        *((name, c_int64) for name in ("setpoints", "tick", "period", "spin", "heartbeat_limit")),
+        *((name, c_int64) for name in ("next", "late", "worst", "beat", "beaten", "locked", "fifo")),
+        ("heartbeat", c_int64),
+        ("stop", c_int64),
+        ("lose", c_int64),
+        ("request", c_uint32),
+        ("change", c_uint32),
+        ("value", c_double),
+    ]
+
+
+class CInjection(Structure):
+    """A fault of the simulated drive."""
+
+    _fields_ = [("kind", c_int64), ("first", c_int64), ("last", c_int64), ("size", c_double)]
+
+
+class CDrive(Structure):
+    """The simulated drive."""
+
+    _fields_ = [
+        ("plant", CPart),
+        ("torque_input", c_int64),
+        ("watchdog", c_int64),
+        ("injections", c_int64),
+        ("injection", POINTER(CInjection)),
+        ("step", c_double),
+        ("quantum", c_double),
+        ("tick", c_int64),
+        ("state", c_int64),
+        ("failed", c_int64),
+        *((name, c_uint32) for name in ("control", "counts", "encoder", "reserved")),
+        ("held", c_double),
+    ]
+
+
+RECORD = np.dtype(CRecord)
+"""A record of the black box as NumPy sees it."""
+LAYOUT = sum(
+    weight * sizeof(one)
+    for weight, one in zip((1, 3, 5, 7, 11, 13), (CAxis, CSample, CRecord, CSession, CAdapter, CDrive), strict=True)
+)
+"""What hardware_layout() of a library that fits returns."""
