@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 LOST = "#B3261E"
-MANY = 2_000
-"""More dots than this are drawn as pixels, so that the file stays small."""
+MANY = 4_000
+"""More dots than this in all panels are drawn as pixels, so that the file stays small."""
 LARGEST_MAP = 200
 """Values a side; a finer grid is drawn as dots."""
 
@@ -164,7 +164,8 @@ def _panel(axes: "Axes", results: Results, parameter: str, name: str) -> None:
     alone = len(results.varied) == 1
     axes.grid(axis="y")
     size = 4.0 if len(x) < 200 else 2.0
-    axes.plot(x[good], y[good], ".", color=AFTER, ms=2 * size, mew=0, alpha=_weight(len(x)), rasterized=len(x) > MANY)
+    many = len(x) * len(results.varied) * len(results.statistics) > MANY
+    axes.plot(x[good], y[good], ".", color=AFTER, ms=2 * size, mew=0, alpha=_weight(len(x)), rasterized=many)
     axes.plot(*_middle(x[good], y[good], exact=alone and results.gridded), color=AFTER)
     axes.plot(x[~good], np.zeros((~good).sum()), "|", color=LOST, ms=12, transform=axes.get_xaxis_transform())
 

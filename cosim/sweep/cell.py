@@ -41,7 +41,7 @@ class Cell:
             InputError: the function raised it.
             LostError: the process crashed, or did not answer within `timeout` seconds.
         """
-        process = self._process if self._process and self._process.poll() is None else self._begin()
+        process = self._process if self._process and self._process.poll() is None else self.begin()
         late = Event()
 
         def give_up() -> None:
@@ -72,7 +72,8 @@ class Cell:
                     if file is not None:
                         file.close()
 
-    def _begin(self) -> "subprocess.Popen[bytes]":
+    def begin(self) -> "subprocess.Popen[bytes]":
+        """Start a process, which then makes itself ready; the one before is ended."""
         self.close()
         self._said = tempfile.TemporaryFile("a+b")  # noqa: SIM115 it lives as long as the process
         home = str(Path(cosim.__file__).parents[1])

@@ -16,7 +16,7 @@ from cosim.sweep.file import Sweep
 from cosim.sweep.job import Job, Row, job_of, rehearse
 from cosim.sweep.journal import Journal
 from cosim.sweep.parcel import files_of
-from cosim.sweep.pool import Numbered, Pool, close_cells, cluster, cores, free, local, new_cell
+from cosim.sweep.pool import Numbered, Pool, close_cells, cluster, cores, free, local, new_cell, warm
 from cosim.sweep.table import write_table
 
 Told = Callable[[int, int, int], None]
@@ -72,6 +72,8 @@ def conduct(
     job = job_of(sweep, scenario, out / "recordings" if sweep.record else None)
     with ExitStack() as stack:
         stack.callback(close_cells)
+        if not address:
+            warm(min(workers or cores(), sweep.design.runs))
         units = _units(job)
         journal = stack.enter_context(Journal(out, _identity(sweep, scenario), force))
         known = {run for run, row in journal.rows.items() if row["status"] == "ok" or not retry}

@@ -75,6 +75,13 @@ def new_cell() -> Cell:
     return cell
 
 
+def warm(count: int) -> None:
+    """Begin processes that will be needed soon; they get ready while other things are done."""
+    for cell in [new_cell() for _ in range(count)]:
+        cell.begin()
+        free(cell)
+
+
 def free(cell: Cell) -> None:
     """Give a cell of `new_cell` back, for whoever needs one next."""
     _FREE.append(cell)
