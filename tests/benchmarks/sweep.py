@@ -23,7 +23,7 @@ from typing import Any
 
 import cosim
 
-COMMAND = "python tests/benchmarks/sweep.py --out results/sweep"
+COMMAND = "python tests/benchmarks/sweep.py --runs 250 --rounds 4 --out results/sweep"
 SWEEP = """
 scenario = "sidereal"
 method = "latin_hypercube"
@@ -45,8 +45,8 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path)
     parser.add_argument("--json", action="store_true")
-    parser.add_argument("--runs", type=int, default=100)
-    parser.add_argument("--rounds", type=int, default=10)
+    parser.add_argument("--runs", type=int, default=250)
+    parser.add_argument("--rounds", type=int, default=4)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         found = measure(Path(folder), options.runs, options.rounds)
