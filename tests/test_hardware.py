@@ -301,17 +301,23 @@ def test_torque_grows_from_zero_and_leaves_by_a_ramp(tmp_path: Path) -> None:
     assert np.allclose(-np.diff(stop)[:-1], 0.5)
 
 
-def test_torque_and_slew_keep_to_limits_tightened_on_the_way(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("name", "value", "note"), [("torque", 1.0, 4), ("slew", 5.0, 8)])
+def test_torque_and_slew_keep_to_limits_tightened_on_the_way(
+    tmp_path: Path, name: str, value: float, note: int
+) -> None:
     with session(tmp_path) as one:
         one.enable()
-        one.track(1000)
-        for name, value in (("torque", 1.5), ("slew", 200.0)):
-            one.tighten(name, value)
-            one.advance(200)
         one.track(500)
-    order = recorded(tmp_path)["machine.order"]
-    assert np.abs(order[-500:]).max() <= 1.5
-    assert np.abs(np.diff(order[-500:])).max() <= 200.0 * 1e-4 * (1 + 1e-9)
+        one.tighten(name, value)
+        tightened = one.status.tick
+        one.track(1500)
+    found = recorded(tmp_path)
+    order, operating = found["machine.order"], found["machine.state"] == 4
+    seen = operating & (found["machine.tick"] > tightened)
+    measured = np.abs(order) if name == "torque" else np.abs(np.diff(order, prepend=0.0)) / 1e-4
+    assert measured[seen].max() <= value * (1 + 1e-9)
+    assert (found["machine.notes"][seen].astype(int) & note).any(), "the limit was met"
+    assert replay(found).identical
 
 
 def test_a_limit_is_never_loosened_while_enabled(tmp_path: Path) -> None:
@@ -367,6 +373,16 @@ def test_a_drive_without_orders_lets_go_by_its_own_watchdog(tmp_path: Path) -> N
         one.advance(31)
         assert one._drive.held == 0
         assert "drive_fault" in one.status.faults
+
+
+def test_a_session_that_is_left_in_operation_leaves_no_torque(tmp_path: Path) -> None:
+    with session(tmp_path) as one:
+        one.enable()
+        one.track(2000)
+        assert one._drive.held != 0
+    assert one._drive.held == 0
+    assert one.status.state == "switch on disabled"
+    assert recorded(tmp_path)["machine.order"][-1] == 0
 
 
 def test_a_drive_that_is_not_there_is_never_enabled(tmp_path: Path) -> None:

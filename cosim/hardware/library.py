@@ -30,6 +30,7 @@ def library() -> ctypes.CDLL:
         raise HardwareError(f"{path} was built from another version; reinstall the package.", culprit=str(path))
     found.hardware_ready.argtypes = [POINTER(CAxis)]
     found.hardware_run.argtypes = [POINTER(CSession), POINTER(CSample), c_int64]
+    found.hardware_release.argtypes = [POINTER(CSession)]
     found.hardware_replay.argtypes = [POINTER(CAxis), POINTER(CRecord), c_int64]
     found.drive_open.argtypes = [POINTER(CDrive), POINTER(CAdapter)]
     for function in (found.hardware_ready, found.hardware_run, found.drive_open):

@@ -106,8 +106,8 @@ EXPORT int64_t hardware_ready(Axis *axis)
     return axis->controller.save(axis->controller.instance, &axis->initial) <= FMI_WARNING;
 }
 
-/* Runs cycles until there were `cycles` of them or `stop` is set; returns how many. The last order is a zero where the
- * axis is not enabled. `sample` is kept between calls. */
+/* Runs cycles until there were `cycles` of them or `stop` is set; returns how many. `sample` is kept
+ * between calls. */
 EXPORT int64_t hardware_run(Session *session, Sample *sample, int64_t cycles)
 {
     int64_t done = 0;
@@ -121,6 +121,13 @@ EXPORT int64_t hardware_run(Session *session, Sample *sample, int64_t cycles)
         munlockall();
     }
     return done;
+}
+
+/* The last order of a session: no voltage, no torque, whatever the axis was in. */
+EXPORT void hardware_release(Session *session)
+{
+    Order order = {session->tick, DISABLE_VOLTAGE, 0, 0.0};
+    session->adapter->write(session->adapter->self, &order);
 }
 
 /* Takes recorded samples through an axis: what the black box kept of a session becomes what it would keep again. */

@@ -107,10 +107,15 @@ class Session:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._session.stop = 1
-        if self._thread:
-            self._thread.join()
-        self._stack.close()
+        try:
+            if self.axis.state in (ENABLED, QUICK_STOP_STATE):
+                self.disable()
+        finally:
+            self._session.stop = 1
+            if self._thread:
+                self._thread.join()
+            self._library.hardware_release(self._session)
+            self._stack.close()
 
     @property
     def status(self) -> Status:
