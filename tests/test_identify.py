@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.identification import POSITIVE, moved, multisine, step_response, the_card
 
 from cosim.cli import main
 from cosim.errors import InputError
@@ -19,7 +20,6 @@ from pyfmi_models.card import Card, read_card
 from pyfmi_models.effects.thermal_viscosity import ThermalViscosity
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
-from tests.benchmarks.identification import POSITIVE, moved, multisine, step_response, the_card
 
 
 @pytest.fixture(scope="module")
