@@ -43,7 +43,7 @@ OPERATORS = {
     "sign": lambda a: (a > 0) - (a < 0),
     "min": min,
     "max": max,
-    **{name: getattr(math, name) for name in ("sin", "cos", "tan", "tanh", "exp", "log", "sqrt")},
+    **{name: getattr(math, name) for name in ("sin", "cos", "tan", "tanh", "exp", "log", "sqrt", "floor")},
 }
 
 
@@ -172,7 +172,7 @@ def test_the_text_reads_like_the_book() -> None:
     lines = [line.strip() for line in text.splitlines()]
     assert "level = Fc + (Fs - Fc)*exp(-(abs(v)/Vs + 1e-12)^delta);" in lines
     assert "contact = bristle + sigma1*(v - abs(v)*bristle/level);" in lines
-    assert "axis.inertia*der(speed) = applied - friction_output - disturbance;" in lines
+    assert "axis.inertia*der(speed) = applied - disturbance - friction_output;" in lines
     assert 'parameter Real sigma1(unit = "N.m.s/rad", min = 0, nominal = 100) = 497 "Bristle damping";' in lines
     assert "LuGre friction(v = speed)" in text
     assert max(map(len, lines)) <= 120

@@ -205,6 +205,11 @@ STEPS = {plant: 4_000, controller: 25_000}
 AMPLITUDES = {"tau": 9.0, "disturbance": 1.0, "temperature": 20.0, "q": 0.01, "q_d": 0.01, "v_d": 0.05, "a_d": 0.1}
 
 
+def amplitude(variable):
+    """How far an input swings: as above, others by their nominal value."""
+    return AMPLITUDES.get(variable.name, variable.nominal)
+
+
 @cache
 def sources(make):
     """The sources of an FMU and of the driver that hashes at least 100 000 states, rates and outputs of it."""
@@ -214,7 +219,7 @@ def sources(make):
         "SIZE": len(generated.layout.rows),
         "COUNT": steps,
         "LENGTH": 1e-4,
-        "AMPLITUDES": ", ".join(str(AMPLITUDES[row.variable.name]) for row in generated.layout.of("input")),
+        "AMPLITUDES": ", ".join(str(amplitude(row.variable)) for row in generated.layout.of("input")),
     }
     scenario = "".join(f"#define {name} {value}\n" for name, value in values.items())
     driver = (Path(__file__).parent / "exact_driver.c").read_bytes()
