@@ -14,7 +14,6 @@ from cosim.identify.machine import Machine
 from cosim.recording import Recording
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import ClockEffect, Effect, GravityUnbalance, LocalFriction
-from pyfmi_models.effects.thermal_viscosity import WarmingViscosity
 from pyfmi_models.effects.torque_saturation import TorqueSaturation
 from pyfmi_models.friction import Stribeck
 from pyfmi_models.mount import Mount
@@ -72,9 +71,9 @@ def test_the_plant_with_an_effect_needs_the_torque_that_the_inverse_says(effect:
         for name, one in (("with", mount), ("without", replace(mount, effects=mount.effects[:-1])))
     }
     size = {name: float(np.sqrt(np.mean(one**2))) for name, one in rest.items()}
-    warm = effect.id == "thermal_viscosity" and not isinstance(effect, WarmingViscosity)
+    silent = bool(effect.inputs()) and not effect.states()  # its input is at its start, where it does nothing
     assert size["with"] < 0.15
-    assert warm or size["with"] < 0.5 * size["without"]
+    assert silent or size["with"] < 0.5 * size["without"]
 
 
 @pytest.mark.parametrize("effect", HELD, ids=lambda one: type(one).__name__)
