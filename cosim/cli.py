@@ -20,7 +20,7 @@ import typer
 import cosim
 from cosim.errors import CosimError
 from cosim.interrupts import Terminated, end_well
-from cosim.terminal import put, say
+from cosim.terminal import keep_stdout, put, say
 from pyfmi_models.errors import ModelError
 
 SEVERAL = ("--columns", "--units")
@@ -31,6 +31,7 @@ VERBS = ("demo", "export", "run", "identify", "diagnose", "prove", "paper", "swe
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code."""
     end_well()
+    keep_stdout()
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given
     rest = repeated([argument for argument in given if argument != "--debug"])

@@ -4,6 +4,7 @@ Progress bars appear on a terminal only; elsewhere each stage is one line. NO_CO
 """
 
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -33,6 +34,13 @@ def put(text: str) -> None:
 def put_json(data: Any) -> None:
     """Write data to stdout as one JSON document."""
     sys.stdout.write(json.dumps(data, indent=2) + "\n")
+
+
+def keep_stdout() -> None:
+    """Leave stdout to data alone: what FMUs of others print from C goes to stderr from here on."""
+    if sys.stdout is sys.__stdout__ and sys.stdout.fileno() == 1:
+        sys.stdout = os.fdopen(os.dup(1), "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)
+        os.dup2(2, 1)
 
 
 class Stage:

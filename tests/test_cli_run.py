@@ -106,6 +106,14 @@ def test_a_failing_component_leaves_what_was_recorded(
     assert len(Recording.read(path)) == 151
 
 
+def test_an_fmu_that_prints_does_not_spoil_the_data(scenario: Path, tmp_path: Path) -> None:
+    scenario.write_text(scenario.read_text().replace("k = 5.0", "k = 5.0, fail_at = 0.3, status = 13"))
+    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out"), "--json"]
+    done = subprocess.run(command, env=ENVIRONMENT, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout)["steps"] == 500
+    assert done.stderr.count("chatter") == 200
+
+
 @pytest.mark.parametrize(
     ("number", "code", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
 )

@@ -1,7 +1,8 @@
 """Small FMUs for tests of the master, that can fail on demand.
 
 mode 0: y' = k (a - b); mode 1: y = k (a - b) a step later; mode 2: y = k (a - b) at once.
-From fail_at on a step returns the number `status`; 11 crashes the process, 12 never returns.
+From fail_at on a step returns the number `status`; 11 crashes the process, 12 never returns,
+13 prints a line and goes on.
 """
 
 import subprocess
@@ -17,10 +18,11 @@ SOURCE = r"""
 #include <signal.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, STATUS, COUNT, CRASH = 11, HANG };
+enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, STATUS, COUNT, CRASH = 11, HANG, CHATTER };
 typedef struct { double v[COUNT]; char name[99]; void *log; } M;
 typedef void Log2(void *, const char *, int, const char *, const char *, ...);
 typedef void Log3(void *, int, const char *, const char *);
@@ -43,6 +45,7 @@ static int step(M *m, double t, double h) {
   if (t + h / 2 <= m->v[FAIL_AT]) return 0;
   if (m->v[STATUS] == CRASH) raise(SIGSEGV);
   while (m->v[STATUS] == HANG) sleep(1);
+  if (m->v[STATUS] == CHATTER) return printf("chatter\n"), 0;
   return (int)m->v[STATUS];
 }
 #define API __attribute__((visibility("default")))
