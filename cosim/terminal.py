@@ -38,8 +38,9 @@ def put_json(data: Any) -> None:
 
 def keep_stdout() -> None:
     """Leave stdout to data alone: what FMUs of others print from C goes to stderr from here on."""
-    if sys.stdout is sys.__stdout__ and sys.stdout.fileno() == 1:
-        sys.stdout = os.fdopen(os.dup(1), "w", encoding=sys.stdout.encoding, errors=sys.stdout.errors)
+    given = sys.__stdout__
+    if given and sys.stdout is given and given.fileno() == 1:
+        sys.stdout = os.fdopen(os.dup(1), "w", encoding=given.encoding, errors=given.errors)
         os.dup2(2, 1)
 
 
