@@ -9,7 +9,6 @@ from cosim.diagnosis.report.derive import Curve, Mask, Samples, curve, slow
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture, Sheet, degrees, heading
 from cosim.diagnosis.result import Array, Finding
-from cosim.pictures.quantities import Scale
 from cosim.pictures.style import AFTER, BEFORE, GREY
 
 if TYPE_CHECKING:
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
 
 Draw = Callable[[Finding, Samples, Scales], Picture | None]
 HEIGHT = 232
-NO_UNIT = Scale(1.0, "")
 
 
 def blank(finding: Finding) -> Sheet:
