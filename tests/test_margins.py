@@ -5,10 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cosim.paper.conditions import tuned
+from cosim.paper.conditions import condition, tuned
 from cosim.paper.margins import Linear, feedback, held, margins
+from cosim.paper.options import ADAPTING, REFERENCE, options
+from cosim.paper.price import loops, price
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import ActuatorLag
+from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.friction import Frictionless
 
 H = 1e-4
@@ -88,3 +91,37 @@ def test_noise_of_the_command_is_that_of_a_simulation() -> None:
         command = out
         seen.append(out)
     assert np.std(seen[5000:]) == pytest.approx(expected, rel=0.05)
+
+
+def test_what_the_reading_does_not_reach_plays_no_part_in_a_loop() -> None:
+    """A state that only the reference drives is neutral by itself; the loop's margins are those without it."""
+    plant, controller = integrator(10.0), gain(1.0)
+    idle = Linear(np.diag([1.0, 2.0]), np.array([0.0, 1.0]), np.array([1.0, 0.0]), 1.0, H)
+    assert idle.reduced().A.shape == (0, 0)
+    assert margins(plant, idle.reduced()) == margins(plant, controller)
+    assert not margins(plant, idle).stable
+
+
+def test_the_price_of_an_option_is_that_of_its_worst_point() -> None:
+    """C2a's loop has its least phase at rest, where bristles it expects and does not meet push it."""
+    option = next(one for one in options() if one.key == "C2a")
+    where = option.under(condition("realistic_observer"))
+    at = {name: margins(*pair) for name, pair in loops(where).items()}
+    assert price(where).phase == at["at rest"].phase < at["sliding"].phase - 1
+    assert price(where).Ms == at["sliding"].Ms
+
+
+def test_a_flexible_mode_in_the_plant_is_part_of_the_loop() -> None:
+    """Poorly damped and with the encoder on the motor, 20 Hz costs phase; friction that is taken away does not."""
+    where = REFERENCE.under(condition("realistic_observer"))
+    mode = Compliance(antiresonance_hz=18.0, resonance_hz=20.0, damping_ratio=0.01)
+    flexible = replace(where, plant=replace(where.plant, effects=(*where.plant.effects, mode)))
+    assert price(flexible).Ms > price(where).Ms
+    assert price(flexible).phase < price(where).phase
+
+
+def test_learning_on_line_is_part_of_the_loop_while_it_slides() -> None:
+    adapting = ADAPTING.under(condition("realistic_observer"))
+    plain, found = price(REFERENCE.under(condition("realistic_observer"))), price(adapting)
+    assert found.stable
+    assert plain.phase - 5 < found.phase < plain.phase - 1

@@ -13,7 +13,7 @@ from cosim.cli import main
 from cosim.paper.checks import Check, checks
 from cosim.paper.conditions import CASES, Condition, condition, conditions, definitions, scaled
 from cosim.paper.experiment import Outcome, run
-from cosim.paper.report import Written, write
+from cosim.paper.report import Results, Written, write
 from cosim.paper.study import Study, Trial, everywhere, job, study
 from cosim.paper.tables import PAPER, in_order, statistics
 from cosim.paper.workshop import Workshop
@@ -124,12 +124,13 @@ def test_many_jobs_go_to_many_processes_and_keep_their_order() -> None:
 
 
 @pytest.fixture(scope="module")
-def invented() -> tuple[Study, Study]:
+def invented() -> Results:
     """Studies with the paper's own numbers in the place of runs, and with curves."""
     t = np.arange(0, 15, 0.01)
     names = ("e", "friction", "tau", "zeta3", "v_d", "v", "true_friction")
     outcome = {
-        case: Outcome(ise=value, trace={"t": t} | {n: np.sin(t) for n in names}) for case, value in PAPER.items()
+        case: Outcome(ise=value, torque=3.0, trace={"t": t} | {n: np.sin(t) for n in names})
+        for case, value in PAPER.items()
     }
 
     def of(wanted: tuple[Condition, ...]) -> Study:
@@ -141,12 +142,12 @@ def invented() -> tuple[Study, Study]:
         ]
         return Study(trials=tuple(trials), seeds=(3, 4))
 
-    return of(conditions()), of(definitions())
+    return Results(found=of(conditions()), variants=of(definitions()))
 
 
 @pytest.fixture(scope="module")
-def written(invented: tuple[Study, Study], tmp_path_factory: pytest.TempPathFactory) -> Written:
-    return write(tmp_path_factory.mktemp("out"), *invented, command="cosim paper")
+def written(invented: Results, tmp_path_factory: pytest.TempPathFactory) -> Written:
+    return write(tmp_path_factory.mktemp("out"), invented, command="cosim paper")
 
 
 def test_table_4_is_written_as_the_contract_says(written: Written) -> None:

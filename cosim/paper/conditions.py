@@ -17,8 +17,9 @@ NO_LIMIT = 1e6
 class Condition:
     """One condition: `plant` is what the axis is, `controller` what the controller is and believes.
 
-    `changes` are parameters of the controller set where it has them; `smooth_start` is in s; `encoder_noise` [rad] and
-    `torque_noise` [N m] are RMS values of white noise, a fresh sample each period of the controller.
+    `changes` are parameters of the controller set where it has them; `smooth_start` and the `run_in` after it, which do
+    not count, are in s; `encoder_noise` [rad] and `torque_noise` [N m] are RMS values of white noise, a fresh sample
+    each period of the controller.
     """
 
     key: str
@@ -27,6 +28,7 @@ class Condition:
     controller: Card
     changes: Mapping[str, float] = field(default_factory=dict)
     smooth_start: float = 2.5
+    run_in: float = 0.0
     encoder_noise: float = 0.0
     torque_noise: float = 0.0
 

@@ -26,7 +26,6 @@ KEPT = 0.01
 """Time from one kept sample of a trace to the next [s], as fine as a figure shows."""
 _MOTION = {"position": "q_d", "velocity": "v_d", "acceleration": "a_d"}
 _TRACED = {
-    "tau": "controller.tau",
     "friction": "controller.friction_estimate",
     "zeta3": "controller.zeta3",
     "v_d": "reference.velocity",
@@ -39,13 +38,17 @@ _TRACED = {
 class Job:
     """One run: plant, controller and its period [s], seconds of the reference's smooth start, noise and its seed.
 
-    `encoder_noise` [rad] and `torque_noise` [N m] are RMS values of white noise, a fresh sample each period.
+    `run_in` [s] follows the smooth start and does not count either: time for a controller that learns. `position` is
+    the plant's output whose error counts. `encoder_noise` [rad] and `torque_noise` [N m] are RMS values of white noise,
+    a fresh sample each period.
     """
 
     plant: Built
     controller: Built
     period: float = 1e-4
     smooth_start: float = 2.5
+    run_in: float = 0.0
+    position: str = "q"
     encoder_noise: float = 0.0
     torque_noise: float = 0.0
     seed: int = 0
@@ -55,30 +58,36 @@ class Job:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """ISE [arcsec^2 s] and, where wanted, curves every 10 ms: e [arcsec], torques [N m], zeta3, speeds [rad/s]."""
+    """ISE [arcsec^2 s], RMS of the command [N m], and where wanted curves every 10 ms.
+
+    Curves: e [arcsec], torques [N m], zeta3 [rad/s2], speeds [rad/s].
+    """
 
     ise: float
+    torque: float
     trace: dict[str, Floats]
 
 
 def run(job: Job) -> Outcome:
     """Run one experiment; its error is that of the true position, not of what the encoder reads."""
-    record = {"q": "plant.q", "q_d": "reference.position"} | (_TRACED if job.traced else {})
+    record = {"q": f"plant.{job.position}", "q_d": "reference.position", "tau": "controller.tau"}
     reference = Sine(kind="sine", frequency=0.2, max_velocity=5 * STARS, smooth_start=job.smooth_start)
+    before = job.smooth_start + job.run_in
     with closing(FmuComponent(job.plant.path, "plant", tolerance=job.tolerance)) as plant:
         done = simulate(
             {"plant": plant, "controller": job.controller.path},
             _wires(),
-            record={name: Record(source) for name, source in record.items()},
+            record={name: Record(source) for name, source in (record | (_TRACED if job.traced else {})).items()},
             step=job.period,
-            ticks=round((job.smooth_start + HORIZON) / job.period),
+            ticks=round((before + HORIZON) / job.period),
             signals={"reference": reference, **_noise(job)},
             parameters={"plant": job.plant.parameters, "controller": job.controller.parameters},
         ).recording
     error = (np.asarray(done["q_d"]) - np.asarray(done["q"])) / ARCSEC
-    counted = slice(round(job.smooth_start / job.period), None)
-    ise = float(np.sum(error[counted] ** 2) * job.period)
-    return Outcome(ise=ise, trace=_trace(job, done, error) if job.traced else {})
+    first = round(before / job.period)
+    ise = float(np.sum(error[first:] ** 2) * job.period)
+    torque = float(np.sqrt(np.mean(np.asarray(done["tau"])[first:] ** 2)))
+    return Outcome(ise=ise, torque=torque, trace=_trace(job, done, error, first) if job.traced else {})
 
 
 def _wires() -> list[Wire]:
@@ -98,7 +107,7 @@ def _noise(job: Job) -> dict[str, Noise]:
     }
 
 
-def _trace(job: Job, done: Recording, error: Floats) -> dict[str, Floats]:
-    curves = {name: np.asarray(done[name]) for name in _TRACED}
-    kept = slice(round(job.smooth_start / job.period), None, round(KEPT / job.period))
-    return {name: curve[kept] for name, curve in {**curves, "e": error, "t": done.t - job.smooth_start}.items()}
+def _trace(job: Job, done: Recording, error: Floats, first: int) -> dict[str, Floats]:
+    curves = {name: np.asarray(done[name]) for name in (*_TRACED, "tau")}
+    kept = slice(first, None, round(KEPT / job.period))
+    return {name: curve[kept] for name, curve in {**curves, "e": error, "t": done.t - done.t[first]}.items()}

@@ -19,6 +19,8 @@ from pyfmi_models.model import Model
 
 Floats = npt.NDArray[np.float64]
 Complexes = npt.NDArray[np.complex128]
+NEUTRAL = 1e-9
+"""An eigenvalue as near as this to 1 belongs to what nothing excites, as an estimate that is not being learned."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +38,15 @@ class Linear:
         z = np.exp(1j * omega * self.period)
         states = np.linalg.solve(z[:, None, None] * np.eye(len(self.A)) - self.A, self.B[:, None].astype(complex))
         return np.asarray(states[:, :, 0] @ self.C + self.D, dtype=np.complex128)
+
+    def reduced(self) -> "Linear":
+        """Return the part that leads from input to output: states that neither is joined to play no part in a loop."""
+        joined = self.A != 0
+        reached, seen = self.B != 0, self.C != 0
+        for _ in self.A:
+            reached, seen = reached | joined @ reached, seen | joined.T @ seen
+        kept = reached & seen
+        return Linear(self.A[np.ix_(kept, kept)], self.B[kept], self.C[kept], self.D, self.period)
 
     def delayed(self, ticks: int) -> "Linear":
         """Return the system with its output so many periods later."""
@@ -88,16 +99,16 @@ def held(plant: Model, period: float, at: Mapping[str, float], output: str = "q"
 
 
 def feedback(controller: Model, at: Mapping[str, float]) -> Linear:
-    """Return the controller from reading to minus its command."""
+    """Return the controller from reading to minus its command, without what the reading does not reach."""
     assert controller.period is not None
     A, B, C, D = linearised(controller, "tau", at, "q")
-    return Linear(A, B, -C, -D, controller.period)
+    return Linear(A, B, -C, -D, controller.period).reduced()
 
 
 def margins(plant: Linear, controller: Linear, delay: int = 1) -> Margins:
     """Return the margins of the loop in which a command acts `delay` ticks after its sample."""
     A = _closed(plant, controller.delayed(delay))
-    stable = bool(np.abs(np.linalg.eigvals(A)).max() < 1)
+    stable = bool(np.abs(np.linalg.eigvals(A)).max() < 1 + NEUTRAL)
     omega = np.geomspace(0.1, np.pi / plant.period, 4000)
     loop = plant.response(omega) * controller.response(omega) * np.exp(-1j * omega * plant.period * delay)
     phase, later, crossover = _crossovers(omega, loop)

@@ -12,6 +12,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 import cosim
 from cosim.files import check_free, replacing
 from cosim.paper.checks import checks
+from cosim.paper.comparison import Comparison, Plan, compare
+from cosim.paper.comparison_figures import comparison_figures
+from cosim.paper.comparison_tables import better, rows_csv, tables
 from cosim.paper.conditions import condition, conditions, definitions
 from cosim.paper.figures import tracking_figures
 from cosim.paper.study import Study, study
@@ -19,6 +22,7 @@ from cosim.paper.tables import ratios_of, runs_csv, table4, table_csv, table_tex
 from cosim.paper.workshop import Workshop
 
 FILES = ("table4.json", "table4.csv", "runs.csv", "definitions.csv", "README.md")
+COMPARED = ("options.json", "options.csv", "designs.csv", "robustness.csv")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,43 +33,68 @@ class Written:
     files: list[Path]
 
 
+@dataclass(frozen=True, kw_only=True)
+class Results:
+    """What was run: all `conditions()`, all `definitions()`, and better controllers where they were asked for."""
+
+    found: Study
+    variants: Study
+    comparison: Comparison | None = None
+
+
 def reproduce(
     out: Path,
     seeds: Sequence[int],
     command: str,
+    plan: Plan | None = None,
     force: bool = False,
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Written:
-    """Run all experiments and write everything into `out`.
+    """Run all experiments, and a comparison of controllers where there is a plan for one; write everything into `out`.
 
     Raises:
         OutputError: a file exists and `force` is not given.
     """
-    for name in FILES:
+    for name in FILES + (COMPARED if plan else ()):
         check_free(out / name, force)
     with TemporaryDirectory() as folder:
         workshop = Workshop(Path(folder))
         found = study(workshop, seeds, progress=progress)
         variants = study(workshop, seeds[:1], definitions())
-    return write(out, found, variants, command, force)
+        comparison = compare(workshop, plan, progress) if plan else None
+    return write(out, Results(found=found, variants=variants, comparison=comparison), command, force)
 
 
-def write(out: Path, found: Study, variants: Study, command: str, force: bool = False) -> Written:
-    """Write tables, figures and page of a study under all `conditions()` and of one under all `definitions()`."""
+def write(out: Path, results: Results, command: str, force: bool = False) -> Written:
+    """Write tables, figures and page."""
     version = f"mount-cosim {cosim.__version__}"
-    table = table4(found) | {"seed": found.seeds[0], "command": command, "version": version}
-    figures = tracking_figures(found, condition("base").controller.mount.inertia, out, force)
+    made = {"command": command, "version": version}
+    table = table4(results.found) | {"seed": results.found.seeds[0]} | made
+    inertia = condition("base").controller.mount.inertia
+    figures = {path: _about(path) for path in tracking_figures(results.found, inertia, out, force)}
     texts = {
         "table4.json": json.dumps(table, indent=2) + "\n",
         "table4.csv": table_csv(_rows(table)),
-        "runs.csv": runs_csv(found),
-        "definitions.csv": table_csv(_variants(variants)),
-        "README.md": _page(table, variants, figures, found.seeds),
+        "runs.csv": runs_csv(results.found),
+        "definitions.csv": table_csv(_variants(results.variants)),
     }
+    if results.comparison:
+        figures |= comparison_figures(results.comparison, out, force)
+        texts |= _compared(results.comparison, made)
+    texts["README.md"] = _page(table, results, figures)
     for name, text in texts.items():
         with replacing(out / name, force) as partial:
             partial.write_text(text, "utf-8")
     return Written(table=table, files=[*(out / name for name in texts), *figures])
+
+
+def _compared(found: Comparison, made: dict[str, str]) -> dict[str, str]:
+    data = tables(found)
+    names = {"options.csv": "options", "designs.csv": "designs", "robustness.csv": "robustness"}
+    return {
+        "options.json": json.dumps(data | made, indent=1) + "\n",
+        **{name: rows_csv(data[key]) for name, key in names.items()},
+    }
 
 
 def _rows(table: dict[str, Any]) -> dict[str, Any]:
@@ -76,15 +105,15 @@ def _variants(variants: Study) -> dict[str, Any]:
     return {one.key: variants.ise(one.key)[0] for one in definitions()}
 
 
-def _page(table: dict[str, Any], variants: Study, figures: list[Path], seeds: Sequence[int]) -> str:
+def _page(table: dict[str, Any], results: Results, figures: dict[Path, str]) -> str:
     titles = {"paper": "the paper, measured"} | {one.key: one.title for one in (*conditions(), *definitions())}
-    other = _variants(variants)
+    other = _variants(results.variants)
     page = Environment(loader=PackageLoader("cosim.paper", "."), undefined=StrictUndefined, keep_trailing_newline=True)
     return page.get_template("page.md.j2").render(
         command=table["command"],
         version=table["version"],
-        seeds=seeds,
-        figures=[{"name": path.name, "text": _about(path)} for path in figures],
+        seeds=results.found.seeds,
+        figures=[{"name": path.name, "text": text} for path, text in figures.items()],
         table=table_text(_rows(table), titles),
         definitions=table_text(other, titles),
         checks=checks(table),
@@ -95,6 +124,7 @@ def _page(table: dict[str, Any], variants: Study, figures: list[Path], seeds: Se
         kp_change=100 * (table["base_kp255"]["C1"] / table["base"]["C1"] - 1),
         difference_change=100 * (other["difference"]["C1"] / other["base"]["C1"] - 1),
         limited_c1=other["limited"]["C1"],
+        better=results.comparison and better(results.comparison),
     )
 
 

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from os import cpu_count
-from typing import Any
+from typing import Any, NamedTuple
 
 from cosim.paper.conditions import CASES, Condition, conditions
 from cosim.paper.experiment import Job, Outcome, run
@@ -14,6 +14,14 @@ from cosim.paper.workshop import Workshop
 
 LOOSE = 1e-4
 """Tolerance of the plant's solver where noise kicks it every tick; moves an ISE by 5e-6 of itself (from 1e-8)."""
+
+
+class Place(NamedTuple):
+    """Where a run stands in a study."""
+
+    condition: str
+    case: str
+    seed: int
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,29 +62,47 @@ def study(
     progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Study:
     """Run the experiment under each condition (default: all) with each case and, where there is noise, each seed."""
-    places, jobs = [], []
-    for condition in wanted or conditions():
-        for case in cases:
-            for seed in seeds if condition.random else seeds[:1]:
-                places.append((condition.key, case, seed))
-                jobs.append(job(workshop, condition, case, seed, traced=seed == seeds[0]))
-    with everywhere(len(jobs)) as spread:
-        trials = []
-        for place, outcome in zip(places, spread(run, jobs), strict=True):
-            trials.append(Trial(condition=place[0], case=place[1], seed=place[2], outcome=outcome))
-            progress(len(trials), len(jobs))
-    return Study(trials=tuple(trials), seeds=tuple(seeds))
+    planned = [
+        (Place(condition.key, case, seed), replace(one, traced=seed == seeds[0]))
+        for condition in wanted or conditions()
+        for case in cases
+        for seed, one in jobs(workshop, condition, case, seeds)
+    ]
+    return performed(planned, progress)
+
+
+def performed(
+    planned: Sequence[tuple[Place, Job]], progress: Callable[[int, int], None] = lambda done, of: None
+) -> Study:
+    """Run all jobs on all cores."""
+    trials = []
+    with everywhere(len(planned)) as spread:
+        outcomes = spread(run, [one for _, one in planned])
+        for (place, _), outcome in zip(planned, outcomes, strict=True):
+            trials.append(Trial(condition=place.condition, case=place.case, seed=place.seed, outcome=outcome))
+            progress(len(trials), len(planned))
+    return Study(trials=tuple(trials), seeds=tuple(dict.fromkeys(trial.seed for trial in trials)))
+
+
+def jobs(workshop: Workshop, condition: Condition, case: str, seeds: Sequence[int]) -> Iterator[tuple[int, Job]]:
+    """Yield a run for each seed; where nothing is random, one."""
+    first = job(workshop, condition, case, seeds[0])
+    for seed in seeds if condition.random else seeds[:1]:
+        yield seed, replace(first, seed=seed, plant=first.plant.with_parameters(condition.seeded(seed)))
 
 
 def job(workshop: Workshop, condition: Condition, case: str, seed: int, traced: bool = False) -> Job:
     """Build what one run needs."""
     controller = workshop.build(condition.controlled(case).controller_model())
+    plant = condition.plant.plant().model()
     known = {name: value for name, value in condition.changes.items() if name in controller.parameters}
     return Job(
-        plant=workshop.build(condition.plant.plant().model()).with_parameters(condition.seeded(seed)),
+        plant=workshop.build(plant).with_parameters(condition.seeded(seed)),
         controller=controller.with_parameters(known),
         period=condition.period,
         smooth_start=condition.smooth_start,
+        run_in=condition.run_in,
+        position="q_load" if any(one.name == "q_load" for one in plant.outputs) else "q",
         encoder_noise=condition.encoder_noise,
         torque_noise=condition.torque_noise,
         seed=seed,
