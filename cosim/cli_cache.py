@@ -34,6 +34,16 @@ def with_fmus(scenario: Scenario, say: Callable[[str], None] = lambda text: None
     return scenario.with_fmus(made)
 
 
+def fmu_of_card(card: str, part: Literal["plant", "controller"], say: Callable[[str], None]) -> Path:
+    """Return the FMU of a part of a card, built if need be.
+
+    Raises:
+        ScenarioError: there is no such card.
+        ModelError: the card is not good, or cannot be exported.
+    """
+    return _fmu(ComponentSection(card=card, part=part), "card", say)
+
+
 def _fmu(component: ComponentSection, where: str, say: Callable[[str], None]) -> Path:
     card, part = str(component.card), str(component.part)
     source = _card_file(card, where)

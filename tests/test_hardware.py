@@ -232,7 +232,7 @@ def test_the_adapter_may_say_itself_that_it_failed(tmp_path: Path) -> None:
     with session(tmp_path) as one:
         one.enable()
         one.track(2000)
-        one._drive.failed = 1
+        one.transport.drive.failed = 1
         begun = one.status.tick
         one.advance(4)
     assert_safe(recorded(tmp_path), "adapter_failed", begun, 1)
@@ -242,9 +242,9 @@ def test_a_drive_that_leaves_operation_unasked_is_a_fault(tmp_path: Path) -> Non
     with session(tmp_path) as one:
         one.enable()
         one.track(2000)
-        one._drive.state = 3
+        one.transport.drive.state = 3
         begun = one.status.tick
-        one._drive.control = 0
+        one.transport.drive.control = 0
         one.axis.controlword = 7
         one.advance(4)
     assert_safe(recorded(tmp_path), "drive_state", begun, 2)
@@ -371,7 +371,7 @@ def test_a_drive_without_orders_lets_go_by_its_own_watchdog(tmp_path: Path) -> N
         one.track(1000)
         one.lose(30)
         one.advance(31)
-        assert one._drive.held == 0
+        assert one.transport.drive.held == 0
         assert "drive_fault" in one.status.faults
 
 
@@ -379,8 +379,8 @@ def test_a_session_that_is_left_in_operation_leaves_no_torque(tmp_path: Path) ->
     with session(tmp_path) as one:
         one.enable()
         one.track(2000)
-        assert one._drive.held != 0
-    assert one._drive.held == 0
+        assert one.transport.drive.held != 0
+    assert one.transport.drive.held == 0
     assert one.status.state == "switch on disabled"
     assert recorded(tmp_path)["machine.order"][-1] == 0
 

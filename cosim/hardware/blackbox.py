@@ -18,6 +18,7 @@ import numpy as np
 
 from cosim.errors import HardwareError
 from cosim.files import check_free, check_room, directory
+from cosim.hardware.library import shared
 from cosim.hardware.structures import RECORD, CBox, CRecord
 from cosim.recording import Recording
 
@@ -45,7 +46,7 @@ class BlackBox:
         os.replace(partial, path)
         self.path = path
         self._records = np.frombuffer(self._map, RECORD, capacity, HEADER)
-        self.box = CBox(record=self._records.ctypes.data, capacity=capacity)
+        self.box = shared(CBox(record=self._records.ctypes.data, capacity=capacity))
 
     def close(self) -> None:
         """Let go of the file; its records are in it already."""
@@ -106,7 +107,7 @@ def recording_of(kept: Kept, name: str) -> Recording:
     }
     places = {name: sample["input"][:, place] for place, name in enumerate(origin["inputs"])}
     table |= {name: column for name, column in places.items() if name != origin["encoder"]}
-    table |= {f"machine.{key}": feedback[key] for key in ("counts", "encoder", "statusword", "torque")}
+    table |= {f"machine.{key}": feedback[key] for key in ("counts", "encoder", "statusword", "torque", "link")}
     table |= {f"machine.{key}": sample[key] for key in ("tick", "read", "status", "late", "request", "change", "value")}
     table |= {f"machine.{key}": records[key] for key in ("state", "faults", "notes", "controlword")}
     table |= {"machine.command": records["command"], "machine.order": records["torque"]}

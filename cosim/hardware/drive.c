@@ -4,11 +4,12 @@
 
 #include <math.h>
 
-static const Injection *injected(const Drive *drive, int64_t kind)
+const Injection *injected(const Drive *drive, int64_t kind)
 {
+    int64_t tick = drive->tick - drive->epoch;
     for (int64_t i = 0; i < drive->injections; i++) {
         const Injection *one = &drive->injection[i];
-        if (one->kind == kind && drive->tick >= one->first && drive->tick < one->last) {
+        if (one->kind == kind && tick >= one->first && tick < one->last) {
             return one;
         }
     }
@@ -30,16 +31,27 @@ static void advance(Drive *drive)
     drive->tick++;
 }
 
-/* Takes the plant to a tick; without a write for longer than its watchdog the drive lets go and is in fault. */
-static void catch_up(Drive *drive, int64_t tick)
+void drive_let_go(Drive *drive)
 {
-    for (int64_t silent = 1; drive->tick < tick && !drive->failed; silent++) {
+    drive->held = 0.0;
+    drive->state = drive->state > SWITCH_ON_DISABLED ? FAULT : drive->state;
+}
+
+/* Takes the plant to a tick. `ordered`: there an order has come; without one for as long as its watchdog it lets go. */
+static void catch_up(Drive *drive, int64_t tick, bool ordered)
+{
+    while (drive->tick < tick && !drive->failed) {
         advance(drive);
-        if (silent >= drive->watchdog && drive->tick < tick) {
-            drive->held = 0.0;
-            drive->state = FAULT;
+        if (++drive->silent >= drive->watchdog && !(ordered && drive->tick == tick)) {
+            drive_let_go(drive);
         }
     }
+}
+
+/* Takes the plant to a tick in which there is no order. */
+void drive_coast(Drive *drive, int64_t tick)
+{
+    catch_up(drive, tick, false);
 }
 
 static double saturated(const Drive *drive, double torque)
@@ -51,7 +63,8 @@ static double saturated(const Drive *drive, double torque)
 static int drive_write(void *self, const Order *order)
 {
     Drive *drive = self;
-    catch_up(drive, order->tick);
+    catch_up(drive, drive->epoch + order->tick, true);
+    drive->silent = 0;
     if (injected(drive, DEAD)) {
         drive->state = NOT_READY;
         drive->held = 0.0;
@@ -84,7 +97,7 @@ static int drive_read(void *self, Feedback *feedback)
     feedback->counts = drive->counts;
     feedback->encoder = drive->encoder;
     feedback->statusword = cia402_statusword(drive->state);
-    feedback->reserved = 0;
+    feedback->link = 0;
     feedback->torque = drive->held;
     return READ_OK;
 }

@@ -4,9 +4,10 @@
 
 #include "hardware.h"
 
-enum { LOST, STALE, JUMP, SATURATED, DEAD, TRIPPED };
+/* What can be injected: the first six into any drive, the others into the answers of one behind a network (virtual.c). */
+enum { LOST, STALE, JUMP, SATURATED, DEAD, TRIPPED, LATE, DUPLICATED, REORDERED, CORRUPTED };
 
-/* In the ticks from `first` to before `last`; `size` in rad (jump) or N m (saturated). */
+/* In the ticks of a session from `first` to before `last`; `size` in rad (jump), N m (saturated) or ticks (late). */
 typedef struct {
     int64_t kind, first, last;
     double size;
@@ -18,9 +19,14 @@ typedef struct {
     const Injection *injection;
     double step, quantum;
     /* what is remembered */
-    int64_t tick, state, failed;
+    int64_t tick, state, failed, epoch, silent; /* `epoch`: tick at which the session began; ticks without an order */
     uint32_t control, counts, encoder, reserved;
     double held;
 } Drive;
+
+/* drive.c */
+const Injection *injected(const Drive *drive, int64_t kind);
+void drive_coast(Drive *drive, int64_t tick);
+void drive_let_go(Drive *drive);
 
 #endif

@@ -15,6 +15,9 @@
 enum { READ_OK, READ_STALE, READ_ERROR };
 enum { INPUTS = 8, MISSES = 64 };
 
+/* LINK: what a transport notices. UNANSWERED: no whole answer to the last order in time; the others name what came instead. */
+enum { UNANSWERED = 1, LATE_FRAME = 2, DUPLICATE_FRAME = 4, REORDERED_FRAME = 8, CORRUPT_FRAME = 16, FOREIGN_FRAME = 32 };
+
 /* States of CiA 402, in the order of the way up. */
 enum { NOT_READY, SWITCH_ON_DISABLED, READY_TO_SWITCH_ON, SWITCHED_ON, OPERATION_ENABLED, QUICK_STOP_ACTIVE,
        FAULT_REACTION_ACTIVE, FAULT };
@@ -40,7 +43,7 @@ typedef struct {
     uint32_t counts;     /* 0x6064, wraps modulo 2^32 */
     uint32_t encoder;    /* differs from the last one if the encoder has been sampled since */
     uint32_t statusword; /* 0x6041 */
-    uint32_t reserved;
+    uint32_t link;       /* what the transport noticed since the read before, see LINK */
     double torque;       /* 0x6077, N m: what the drive says it gives */
 } Feedback;
 
@@ -124,5 +127,10 @@ void axis_cycle(Axis *axis, Sample *sample, Record *record);
 
 /* blackbox.c */
 void box_write(BlackBox *box, const Record *record);
+uint32_t crc32_of(const void *bytes, size_t size);
+
+/* realtime.c */
+int64_t now(void);    /* ns of the monotonic clock */
+bool be_urgent(void); /* asks for a real-time priority */
 
 #endif

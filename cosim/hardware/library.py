@@ -1,17 +1,21 @@
 """The compiled loop of the hardware, and parts of it made from components."""
 
 import ctypes
+import mmap
 import sys
-from ctypes import POINTER, c_int64
+from ctypes import POINTER, Structure, c_int64
 from functools import cache
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
 from cosim.component import Component, Functions
 from cosim.errors import HardwareError
-from cosim.hardware.structures import LAYOUT, CAdapter, CAxis, CDrive, CRecord, CSample, CSession
+from cosim.hardware.structures import LAYOUT, CAdapter, CAxis, CDrive, CRecord, CSample, CSession, CUdp, CVirtual
 from cosim.loop.structures import CPart
+
+Kind = TypeVar("Kind", bound=Structure)
 
 
 @cache
@@ -30,12 +34,27 @@ def library() -> ctypes.CDLL:
         raise HardwareError(f"{path} was built from another version; reinstall the package.", culprit=str(path))
     found.hardware_ready.argtypes = [POINTER(CAxis)]
     found.hardware_run.argtypes = [POINTER(CSession), POINTER(CSample), c_int64]
+    found.hardware_spawn.argtypes = [POINTER(CSession), POINTER(CSample)]
+    found.hardware_bare.argtypes = [POINTER(CSession), c_int64]
     found.hardware_release.argtypes = [POINTER(CSession)]
     found.hardware_replay.argtypes = [POINTER(CAxis), POINTER(CRecord), c_int64]
     found.drive_open.argtypes = [POINTER(CDrive), POINTER(CAdapter)]
-    for function in (found.hardware_ready, found.hardware_run, found.drive_open):
+    found.udp_open.argtypes = [POINTER(CUdp), POINTER(CAdapter)]
+    found.virtual_run.argtypes = [POINTER(CVirtual), POINTER(CAdapter)]
+    for function in (found.hardware_ready, found.hardware_run, found.hardware_spawn, found.drive_open):
         function.restype = c_int64
+    for function in (found.hardware_bare, found.hardware_release, found.hardware_replay, found.udp_open):
+        function.restype = None
+    found.virtual_run.restype = None
     return found
+
+
+def shared(structure: Kind) -> Kind:
+    """Return a copy of a structure in memory that a forked process sees too, as this one sees what it writes there."""
+    size = ctypes.sizeof(structure)
+    made = type(structure).from_buffer(mmap.mmap(-1, size))
+    ctypes.memmove(ctypes.addressof(made), ctypes.addressof(structure), size)
+    return made
 
 
 def part_of(component: Component, inputs: list[str], outputs: list[str]) -> tuple[CPart, tuple[np.ndarray, ...]]:

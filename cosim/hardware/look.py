@@ -11,6 +11,9 @@ from cosim.hardware.session import Session
 from cosim.hardware.words import LIMITS
 from cosim.scenario import Scenario
 
+SHOWN = ("cycles", "late_cycles", "worst_wake_up_us", "fifo", "memory_locked", "link")
+"""Of the statistics of a session."""
+
 
 def look(scenario: Scenario, machine: Machine, seconds: float) -> dict[str, Any]:
     """Watch a machine that is never enabled for some seconds of real time; returns what was seen, SI.
@@ -33,12 +36,12 @@ def look(scenario: Scenario, machine: Machine, seconds: float) -> dict[str, Any]
     setpoint = session.wired.setpoints[session.wired.inputs.index("q_d"), 0]
     position = recording["q"][read]
     return {
-        "drive": machine.name,
+        "drive": f"{machine.name}, {machine.adapter}",
         "answered": f"{read.mean():.2%} of {len(read):,} cycles",
         "position": float(position[-1]),
         "moved_by": float(position.max() - position.min()),
         "first_set_point": float(setpoint),
         "within_reach": bool(abs(setpoint - position[-1]) <= machine.limits.following_error),
         "limits": {name: getattr(machine.limits, name) for name in LIMITS},
-        **{key: statistics[key] for key in ("cycles", "late_cycles", "worst_wake_up_us", "fifo", "memory_locked")},
+        **{key: statistics[key] for key in SHOWN if key in statistics},
     }

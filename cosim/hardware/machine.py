@@ -1,11 +1,13 @@
 """A machine file: which adapter, which limits, how the loop reacts. Every limit must be stated; times become cycles."""
 
 import tomllib
+from contextlib import suppress
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
+from urllib.parse import urlsplit
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
 from cosim.complaint import complaint
 from cosim.errors import HardwareError
@@ -44,25 +46,40 @@ class Reactions(_Section):
 
 
 class Clock(_Section):
-    """`[clock]`: the last microseconds before an edge are spent awake."""
+    """`[clock]`: the last microseconds before an edge are spent awake; how long a read waits for a drive's answer."""
 
     spin_us: float = Field(default=20.0, ge=0, le=1000)
+    answer_us: Positive = 60.0
 
 
 class Inject(_Section):
-    """`[[inject]]`: a fault of the simulated drive, in seconds since it was switched on; `size` in rad or N m."""
+    """`[[inject]]`: a fault of the simulated or virtual drive, in seconds of a session.
 
-    kind: Literal["lost", "stale", "jump", "saturated", "dead", "tripped"]
+    `size` in rad (jump), N m (saturated) or cycles (late).
+    """
+
+    kind: Literal[
+        "lost", "stale", "jump", "saturated", "dead", "tripped", "late", "duplicated", "reordered", "corrupted"
+    ]
     at: float = Field(ge=0)
     lasts: Positive = 1e9
     size: float = 0.0
+
+
+def _adapter(value: str) -> str:
+    """Refuse what is no adapter."""
+    parts = urlsplit(value)
+    with suppress(ValueError):  # a port that is no number
+        if value == "simulated" or (parts.scheme == "udp" and parts.hostname and parts.port and not parts.path):
+            return value
+    raise ValueError('an adapter is "simulated" or "udp://HOST:PORT"')
 
 
 class Machine(_Section):
     """A whole machine file."""
 
     name: str
-    adapter: Literal["simulated"]
+    adapter: Annotated[str, AfterValidator(_adapter)]
     watchdog_ms: Positive = 2.0
     black_box_seconds: Positive = 120.0
     limits: Limits
@@ -91,11 +108,21 @@ def read_machine(source: str | Path) -> Machine:
 def parse_machine(text: str, path: str) -> Machine:
     """Check the text of a machine file; `path` is its name in errors."""
     try:
-        return Machine.model_validate(tomllib.loads(text))
+        return _checked(tomllib.loads(text), path)
     except tomllib.TOMLDecodeError as error:
         raise HardwareError(f"{path} is not valid TOML: {error}.", culprit=path) from error
+
+
+def changed(machine: Machine, where: str, **changes: Any) -> Machine:
+    """Return a machine with other values for some keys, checked as those of a file; `where` is their name in errors."""
+    return _checked(machine.model_dump() | changes, where)
+
+
+def _checked(values: dict[str, Any], where: str) -> Machine:
+    try:
+        return Machine.model_validate(values)
     except ValidationError as error:
-        raise HardwareError(**complaint(error, path, "a machine", _keys)) from error
+        raise HardwareError(**complaint(error, where, "a machine", _keys)) from error
 
 
 def _keys(location: tuple[int | str, ...]) -> tuple[str, ...]:

@@ -1,7 +1,7 @@
 /* The cycles of a session: against an absolute clock (period > 0) or as fast as possible (period 0), with the same
  * order of things in each. An edge that was missed is counted and skipped: cycles are never made up for in bursts. */
 #define _GNU_SOURCE
-#include "drive.h"
+#include "udp.h"
 
 #include <pthread.h>
 #include <sched.h>
@@ -9,7 +9,7 @@
 #include <sys/mman.h>
 #include <time.h>
 
-static int64_t now(void)
+int64_t now(void)
 {
     struct timespec t;
     clock_gettime(CLOCK_MONOTONIC, &t);
@@ -85,11 +85,16 @@ static void cycle(Session *session, Sample *sample, uint32_t late)
     session->tick++;
 }
 
+bool be_urgent(void)
+{
+    struct sched_param high = {.sched_priority = 80};
+    return pthread_setschedparam(pthread_self(), SCHED_FIFO, &high) == 0;
+}
+
 /* Asks the system for what real time needs; a session runs without where it says no. */
 static void prepare(Session *session)
 {
-    struct sched_param high = {.sched_priority = 80};
-    session->fifo = pthread_setschedparam(pthread_self(), SCHED_FIFO, &high) == 0;
+    session->fifo = be_urgent();
     session->locked = mlockall(MCL_CURRENT) == 0;
     session->next = now() + session->period;
 }
@@ -97,7 +102,7 @@ static void prepare(Session *session)
 EXPORT int64_t hardware_layout(void)
 {
     return (int64_t)(sizeof(Axis) + 3 * sizeof(Sample) + 5 * sizeof(Record) + 7 * sizeof(Session) + 11 * sizeof(Adapter) +
-                     13 * sizeof(Drive));
+                     13 * sizeof(Drive) + 17 * sizeof(Udp) + 19 * sizeof(Virtual));
 }
 
 /* Keeps the controller's state from before its first tick. */
@@ -106,21 +111,28 @@ EXPORT int64_t hardware_ready(Axis *axis)
     return axis->controller.save(axis->controller.instance, &axis->initial) <= FMI_WARNING;
 }
 
-/* Runs cycles until there were `cycles` of them or `stop` is set; returns how many. `sample` is kept
- * between calls. */
+/* Runs cycles until there were `cycles` of them or `stop` is set; returns how many. `sample` is kept between calls. */
 EXPORT int64_t hardware_run(Session *session, Sample *sample, int64_t cycles)
 {
     int64_t done = 0;
-    if (session->period > 0) {
+    if (session->period > 0 && session->next == 0) {
         prepare(session);
     }
     for (; done < cycles && !atomic_load(&session->stop); done++) {
         cycle(session, sample, wait(session));
     }
-    if (session->locked) {
-        munlockall();
-    }
     return done;
+}
+
+/* The clock of a session and nothing else, for `cycles` edges: what a loop on this computer can hope for. */
+EXPORT void hardware_bare(Session *session, int64_t cycles)
+{
+    prepare(session);
+    for (session->tick = 0; session->tick < cycles; session->tick++) {
+        uint32_t late = wait(session);
+        session->late += late;
+        session->tick += late;
+    }
 }
 
 /* The last order of a session: no voltage, no torque, whatever the axis was in. */
@@ -128,6 +140,9 @@ EXPORT void hardware_release(Session *session)
 {
     Order order = {session->tick, DISABLE_VOLTAGE, 0, 0.0};
     session->adapter->write(session->adapter->self, &order);
+    if (session->locked) {
+        munlockall();
+    }
 }
 
 /* Takes recorded samples through an axis: what the black box kept of a session becomes what it would keep again. */

@@ -10,9 +10,9 @@ import numpy as np
 from cosim.errors import HardwareError
 from cosim.exchange import open_fmu
 from cosim.files import sha256
+from cosim.hardware.axis import make_axis
 from cosim.hardware.library import library
 from cosim.hardware.machine import Machine
-from cosim.hardware.session import make_axis
 from cosim.hardware.structures import RECORD, CRecord
 from cosim.hardware.wired import Wired
 from cosim.recording import Recording

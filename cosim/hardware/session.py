@@ -5,8 +5,8 @@
         session.track()
         session.disable()
 
-`fast` lets the clock go: the same cycles in the same order, as fast as possible. In real time the loop runs in a thread
-of its own that holds no lock of Python; this one only watches, and its heartbeat keeps the torque on.
+`fast` lets the clock go: the same cycles in the same order, as fast as possible. In real time the loop runs in a
+process of its own (loops.py); this one only watches, and its heartbeat keeps the torque on.
 """
 
 import ctypes
@@ -14,19 +14,18 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
-from threading import Thread
-from time import perf_counter, sleep
+from time import perf_counter
 from typing import Any
 
-import numpy as np
-
-import cosim
 from cosim.errors import HardwareError
+from cosim.hardware.axis import cycles_of, make_axis, story_of
 from cosim.hardware.blackbox import BlackBox
-from cosim.hardware.library import library, part_of
+from cosim.hardware.library import library, shared
+from cosim.hardware.loops import Called, Forked, Loop, Threaded
 from cosim.hardware.machine import Machine
-from cosim.hardware.structures import CAdapter, CAxis, CDrive, CInjection, CSample, CSession
-from cosim.hardware.wired import REFERENCE, Wired, wire_up
+from cosim.hardware.structures import CSample, CSession
+from cosim.hardware.transport import Transport, open_transport
+from cosim.hardware.wired import wire_up
 from cosim.hardware.words import (
     ASK_ENABLE,
     ASK_ESTOP,
@@ -34,16 +33,12 @@ from cosim.hardware.words import (
     ASK_RESET,
     ENABLED,
     FAULT,
-    INJECTIONS,
     LIMITS,
     QUICK_STOP_STATE,
     STATES,
     faults_of,
 )
 from cosim.scenario import Scenario
-
-POLL = 0.002
-"""Seconds between two looks at a loop in real time."""
 
 
 @dataclass(frozen=True)
@@ -85,12 +80,12 @@ class Session:
     ) -> None:
         self.scenario, self.machine, self._fast = scenario, machine, fast
         self._library, self._stack = library(), ExitStack()
-        self._thread: Thread | None = None
-        self._sample = CSample()
+        self._sample = shared(CSample())
         try:
             self.wired = wire_up(scenario, self._stack)
             self.axis, self._kept = make_axis(self.wired, machine, scenario.step)
-            self._adapter = self._simulated()
+            self.transport: Transport = open_transport(scenario, machine, self.wired, fast)
+            self._stack.callback(self.transport.close)
             seconds = min(machine.black_box_seconds, scenario.stop + 10)
             story = story_of(scenario, machine, self.wired) | (origin or {})
             self._box = BlackBox(path, ceil(seconds / scenario.step), story, force)
@@ -98,23 +93,19 @@ class Session:
             self._stack.close()
             raise
         self._stack.callback(self._box.close)
-        self._session = self._made()
+        self._session = shared(self._made())
+        self.loop: Loop = self._kind()(self._session, self._sample)
 
     def __enter__(self) -> "Session":
-        if not self._fast:
-            self._thread = Thread(target=self._library.hardware_run, args=(self._session, self._sample, 2**62))
-            self._thread.start()
+        self.loop.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         try:
-            if self.axis.state in (ENABLED, QUICK_STOP_STATE):
+            if self.loop.alive and self.axis.state in (ENABLED, QUICK_STOP_STATE):
                 self.disable()
         finally:
-            self._session.stop = 1
-            if self._thread:
-                self._thread.join()
-            self._library.hardware_release(self._session)
+            self.loop.stop()
             self._stack.close()
 
     @property
@@ -136,6 +127,7 @@ class Session:
             "fifo": bool(session.fifo),
             "memory_locked": bool(session.locked),
             "refused_limits": self.axis.refused,
+            **self.transport.statistics(),
         }
 
     def advance(self, cycles: int) -> Status:
@@ -144,10 +136,7 @@ class Session:
         beat = max(1, self._session.heartbeat_limit // 2)
         while self._session.tick < last:
             self._session.heartbeat += 1
-            if self._fast:
-                self.run_alone(min(beat, last - self._session.tick))
-            else:
-                sleep(POLL)
+            self.loop.go(min(beat, last - self._session.tick))
         return self.status
 
     def run_alone(self, cycles: int) -> Status:
@@ -224,12 +213,17 @@ class Session:
     def _ask(self, request: int) -> None:
         self._session.request = request
 
+    def _kind(self) -> type[Called] | type[Forked]:
+        if self._fast:
+            return Called
+        return Threaded if self.transport.python else Forked
+
     def _made(self) -> CSession:
         wired, step = self.wired, self.scenario.step
         reactions = self.machine.reactions
         return CSession(
             axis=ctypes.pointer(self.axis),
-            adapter=ctypes.pointer(self._adapter),
+            adapter=ctypes.pointer(self.transport.adapter),
             box=ctypes.pointer(self._box.box),
             setpoint=wired.setpoints.ctypes.data,
             setpoints=wired.setpoints.shape[1],
@@ -237,75 +231,6 @@ class Session:
             spin=round(self.machine.clock.spin_us * 1000),
             heartbeat_limit=cycles_of(reactions.heartbeat_ms, step),
         )
-
-    def _simulated(self) -> CAdapter:
-        wired, step, adapter = self.wired, self.scenario.step, CAdapter()
-        plant, arrays = part_of(wired.plant, [wired.torque], [wired.position])
-        faults = [
-            CInjection(INJECTIONS.index(one.kind), round(one.at / step), round((one.at + one.lasts) / step), one.size)
-            for one in self.machine.inject
-        ]
-        self._drive = CDrive(
-            plant=plant,
-            watchdog=cycles_of(self.machine.watchdog_ms, step),
-            injections=len(faults),
-            injection=(CInjection * len(faults))(*faults),
-            step=step,
-            quantum=wired.quantum,
-        )
-        self._kept += arrays
-        if not self._library.drive_open(self._drive, adapter):
-            raise HardwareError(f"{self.machine.name}: the plant of the simulated drive does not start.")
-        return adapter
-
-
-def cycles_of(milliseconds: float, step: float) -> int:
-    """Return a time as cycles, at least one."""
-    return max(1, round(milliseconds / 1000 / step))
-
-
-def make_axis(wired: Wired, machine: Machine, step: float) -> tuple[CAxis, tuple[np.ndarray, ...]]:
-    """Return an axis that has just been switched on, and the arrays that must live as long as it."""
-    part, arrays = part_of(wired.controller, list(wired.inputs), [wired.command])
-    reactions = machine.reactions
-    axis = CAxis(
-        controller=part,
-        encoder_input=wired.inputs.index(wired.encoder),
-        reference_input=wired.inputs.index(REFERENCE),
-        step=step,
-        quantum=wired.quantum,
-        limit=tuple(getattr(machine.limits, name) for name in LIMITS),
-        stop_slew=reactions.stop_slew,
-        ramp=cycles_of(reactions.ramp_ms, step),
-        patience=cycles_of(reactions.patience_ms, step),
-        lost_limit=reactions.lost_cycles,
-        stale_limit=reactions.stale_cycles,
-        mismatch_limit=reactions.mismatch_cycles,
-        late_row_limit=reactions.late_in_a_row,
-        late_limit=reactions.late_in_window,
-        late_window=cycles_of(reactions.window_ms, step),
-    )
-    if not library().hardware_ready(axis):
-        raise HardwareError("The controller cannot save its state, which each entry into operation starts from.")
-    return axis, arrays
-
-
-def story_of(scenario: Scenario, machine: Machine, wired: Wired) -> dict[str, Any]:
-    """Say all that a replay needs beside the records."""
-    name = wired.controller.name
-    return {
-        "version": f"mount-cosim {cosim.__version__}",
-        "step": scenario.step,
-        "quantum": wired.quantum,
-        "inputs": list(wired.inputs),
-        "encoder": wired.encoder,
-        "output": wired.command,
-        "units": wired.units,
-        "machine": machine.model_dump(),
-        "controller": wired.controller.origin
-        | {"path": str(wired.controller.path), "parameters": dict(scenario.components[name].parameters)},
-        "scenario": scenario.text,
-    }
 
 
 def run_session(session: Session) -> dict[str, Any]:

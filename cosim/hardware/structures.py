@@ -1,6 +1,6 @@
-"""What hardware.h and drive.h declare, for ctypes; see there for the meaning of each field."""
+"""What hardware.h, drive.h and udp.h declare, for ctypes; see there for the meaning of each field."""
 
-from ctypes import POINTER, Structure, c_double, c_int64, c_uint32, c_uint64, c_void_p, sizeof
+from ctypes import POINTER, Structure, c_byte, c_double, c_int64, c_uint32, c_uint64, c_void_p, sizeof
 
 import numpy as np
 
@@ -16,7 +16,7 @@ class CFeedback(Structure):
         ("counts", c_uint32),
         ("encoder", c_uint32),
         ("statusword", c_uint32),
-        ("reserved", c_uint32),
+        ("link", c_uint32),
         ("torque", c_double),
     ]
 
@@ -130,8 +130,51 @@ class CDrive(Structure):
         ("tick", c_int64),
         ("state", c_int64),
         ("failed", c_int64),
+        ("epoch", c_int64),
+        ("silent", c_int64),
         *((name, c_uint32) for name in ("control", "counts", "encoder", "reserved")),
         ("held", c_double),
+    ]
+
+
+COUNTED = ("sent", "good", "lost", "late", "duplicated", "reordered", "corrupted", "foreign")
+"""What is counted of the frames of a link."""
+
+
+class CLink(Structure):
+    """What came over a link."""
+
+    _fields_ = [
+        *((name, c_int64) for name in (*COUNTED, "worst")),
+        ("newest", c_uint32),
+        ("reserved", c_uint32),
+        ("seen", c_uint64),
+    ]
+
+
+class CUdp(Structure):
+    """The adapter of process data over UDP."""
+
+    _fields_ = [
+        *((name, c_int64) for name in ("socket", "patience", "sent_at", "failed")),
+        ("session", c_uint32),
+        ("sequence", c_uint32),
+        ("link", CLink),
+    ]
+
+
+class CVirtual(Structure):
+    """A drive at the other end of a network."""
+
+    _fields_ = [
+        ("drive", POINTER(CDrive)),
+        *((name, c_int64) for name in ("socket", "period", "watchdog")),
+        *((name, c_uint32) for name in ("address", "port", "session", "waiting")),
+        *((name, c_int64) for name in ("begun", "heard", "trips", "let_go", "silence")),
+        ("taken", c_double),
+        ("stop", c_int64),
+        ("link", CLink),
+        ("delayed", c_byte * (64 * 72)),
     ]
 
 
@@ -139,6 +182,9 @@ RECORD = np.dtype(CRecord)
 """A record of the black box as NumPy sees it."""
 LAYOUT = sum(
     weight * sizeof(one)
-    for weight, one in zip((1, 3, 5, 7, 11, 13), (CAxis, CSample, CRecord, CSession, CAdapter, CDrive), strict=True)
+    for weight, one in (
+        *((1, CAxis), (3, CSample), (5, CRecord), (7, CSession), (11, CAdapter), (13, CDrive)),
+        *((17, CUdp), (19, CVirtual)),
+    )
 )
 """What hardware_layout() of a library that fits returns."""

@@ -35,7 +35,11 @@ FAULTS = {
 ASK_ENABLE, ASK_QUICK_STOP, ASK_ESTOP, ASK_RESET = 1, 2, 4, 8
 ENTERED, STEPPED, LIMITED, SLEWED = 1, 2, 4, 8
 LIMITS = ("torque", "slew", "speed", "following_error", "jump", "torque_mismatch")
-INJECTIONS = ("lost", "stale", "jump", "saturated", "dead", "tripped")
+LINK = ("unanswered", "late", "duplicated", "reordered", "corrupted", "foreign")
+"""What a transport notices in a cycle, in the order of its bits."""
+OF_FRAMES = ("late", "duplicated", "reordered", "corrupted")
+"""Injections into the frames of a drive behind a network; the drive in this process has none."""
+INJECTIONS = ("lost", "stale", "jump", "saturated", "dead", "tripped", *OF_FRAMES)
 
 
 def faults_of(bits: int) -> tuple[str, ...]:

@@ -22,9 +22,10 @@ LIBRARIES = {
     ),
     "cosim/proof/_truth": ("cosim/proof/truth.c",),
 }
+_HARDWARE = ("cia402", "checks", "axis", "drive", "udp", "virtual", "blackbox", "realtime", "process")
 if sys.platform == "linux":  # absolute sleeps
     LIBRARIES["cosim/hardware/_hardware"] = (
-        *(f"cosim/hardware/{name}.c" for name in ("cia402", "checks", "axis", "drive", "blackbox", "realtime")),
+        *(f"cosim/hardware/{name}.c" for name in _HARDWARE),
         *(f"cosim/loop/{name}.c" for name in ("loop", "coupling")),
     )
 FLAGS = ["-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra"]

@@ -1,0 +1,125 @@
+/* The loop's end of the process data: an adapter that sends an order, waits for its answer, and counts what else comes. */
+#define _GNU_SOURCE
+#include "udp.h"
+
+#include <poll.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <time.h>
+
+enum { COVERED = offsetof(Frame, crc) };
+
+void frame_close(Frame *frame)
+{
+    frame->magic = MAGIC;
+    frame->reserved = 0;
+    frame->crc = crc32_of(frame, COVERED);
+}
+
+bool frame_whole(const Frame *frame, int64_t size)
+{
+    return size == (int64_t)sizeof *frame && frame->magic == MAGIC && frame->crc == crc32_of(frame, COVERED);
+}
+
+/* Notes a frame by its sequence number: 0 if it is newer than all before it, else how it comes. */
+uint32_t frame_seen(Link *link, const Frame *frame)
+{
+    int32_t ahead = (int32_t)(frame->sequence - link->newest);
+    if (ahead > 0) {
+        link->seen = (ahead < SEEN ? link->seen << ahead : 0) | 1;
+        link->newest = frame->sequence;
+        return 0;
+    }
+    uint64_t bit = -ahead < SEEN ? (uint64_t)1 << -ahead : 0;
+    if (bit == 0 || (link->seen & bit)) {
+        link->duplicated++;
+        return DUPLICATE_FRAME;
+    }
+    link->seen |= bit;
+    link->reordered++;
+    return REORDERED_FRAME;
+}
+
+static int udp_write(void *self, const Order *order)
+{
+    Udp *udp = self;
+    Frame frame = {.kind = ORDER, .session = udp->session, .sequence = ++udp->sequence, .tick = order->tick,
+                   .word = order->controlword, .value = order->torque};
+    frame_close(&frame);
+    udp->sent_at = now();
+    udp->link.sent++;
+    /* A refusal (nobody listens any more) is as good as a lost frame: the read will find no answer. */
+    (void)send((int)udp->socket, &frame, sizeof frame, MSG_DONTWAIT | MSG_NOSIGNAL);
+    return 0;
+}
+
+/* Whether an answer is that to the order just written; `feedback` is filled only then. */
+static bool accept_answer(Udp *udp, const Frame *frame, Feedback *feedback)
+{
+    Link *link = &udp->link;
+    if (frame->kind != ANSWER || frame->session != udp->session || (int32_t)(frame->sequence - udp->sequence) > 0) {
+        link->foreign++;
+        feedback->link |= FOREIGN_FRAME;
+        return false;
+    }
+    uint32_t seen = frame_seen(link, frame);
+    if (seen) {
+        feedback->link |= seen;
+        return false;
+    }
+    if (frame->sequence != udp->sequence) {
+        link->late++;
+        feedback->link |= LATE_FRAME;
+        return false;
+    }
+    int64_t trip = now() - udp->sent_at;
+    link->worst = trip > link->worst ? trip : link->worst;
+    link->good++;
+    feedback->counts = frame->counts;
+    feedback->encoder = frame->encoder;
+    feedback->statusword = frame->word;
+    feedback->torque = frame->value;
+    return true;
+}
+
+/* Takes all frames that are there, up to the awaited one. */
+static bool take(Udp *udp, Feedback *feedback)
+{
+    Frame frame;
+    ssize_t size;
+    while ((size = recv((int)udp->socket, &frame, sizeof frame, MSG_DONTWAIT | MSG_TRUNC)) >= 0) {
+        if (!frame_whole(&frame, size)) {
+            udp->link.corrupted++;
+            feedback->link |= CORRUPT_FRAME;
+        } else if (accept_answer(udp, &frame, feedback)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static int udp_read(void *self, Feedback *feedback)
+{
+    Udp *udp = self;
+    feedback->link = 0;
+    struct pollfd ready = {.fd = (int)udp->socket, .events = POLLIN};
+    while (!take(udp, feedback)) {
+        int64_t left = udp->sent_at + udp->patience - now();
+        struct timespec time = {.tv_sec = left / 1000000000, .tv_nsec = left % 1000000000};
+        if (left <= 0 || ppoll(&ready, 1, &time, NULL) <= 0 || (ready.revents & (POLLERR | POLLNVAL))) {
+            feedback->link |= UNANSWERED;
+            return READ_STALE;
+        }
+    }
+    return READ_OK;
+}
+
+static int udp_status(void *self)
+{
+    return (int)((Udp *)self)->failed;
+}
+
+EXPORT void udp_open(Udp *udp, Adapter *adapter)
+{
+    *adapter = (Adapter){udp, udp_read, udp_write, udp_status};
+}
