@@ -1,6 +1,8 @@
 """A recording is read as it is, judged in one sentence, and never repaired."""
 
+import errno
 import gzip
+import os
 import re
 from pathlib import Path
 
@@ -214,6 +216,23 @@ def test_a_stream_is_a_complete_file_even_when_the_run_breaks(tmp_path: Path) ->
     back = Recording.read(tmp_path / "run.parquet")
     assert back.origin["interrupted"] is True
     np.testing.assert_array_equal(back["q"], table["q"])
+
+
+def test_a_stream_that_finds_the_disk_full_says_so_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr("cosim.writer.GROUP", 1)
+    monkeypatch.setattr("pyarrow.parquet.ParquetWriter.write_table", full)
+    stream = StreamWriter(tmp_path / "run.parquet", {"t": "s", "tau": "", "q": "rad"}, {})
+    stream.write(columns())
+    with pytest.raises(OSError, match="No space left"):
+        stream.write(columns())
+    with pytest.raises(OutputError, match=r"run.parquet cannot be written: No space left on device."):
+        stream.close()
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
