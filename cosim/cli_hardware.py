@@ -96,14 +96,21 @@ def check(
     machine: MachineOption = "simulated",
     drive: DriveOption = "",
     seconds: Annotated[float, typer.Option(help="How long to watch the clock of this computer.")] = 1.0,
+    move: Annotated[
+        bool, typer.Option("--move", help="Then move the axis a little: is the encoder scaled right?")
+    ] = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Look at scenario, limits, drive, encoder and clock, without enabling torque."""
+    """Look at scenario, limits, drive, encoder and clock, without enabling torque (unless with --move)."""
     from cosim.cli_cache import with_fmus
     from cosim.hardware.look import look
+    from cosim.hardware.move import try_move
     from cosim.scenario import read_scenario
 
-    found = look(with_fmus(read_scenario(scenario), say), _machine(machine, drive), seconds)
+    wanted, given = with_fmus(read_scenario(scenario), say), _machine(machine, drive)
+    found = look(wanted, given, seconds)
+    if move:
+        found["moved"] = try_move(wanted, given).shown
     if as_json:
         put_json(found)
         return

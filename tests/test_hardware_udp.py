@@ -23,6 +23,7 @@ from cosim.cli_hardware import _plant
 from cosim.errors import HardwareError
 from cosim.exchange import open_fmu
 from cosim.hardware.machine import Machine, changed, read_machine
+from cosim.hardware.move import try_move
 from cosim.hardware.replay import replay
 from cosim.hardware.session import Session, run_session
 from cosim.hardware.simulated import Plant
@@ -363,3 +364,27 @@ def test_a_drive_of_a_card_has_the_cards_encoder() -> None:
         assert quantum == pytest.approx(2 * np.pi / 2**32)
     with ExitStack() as stack, pytest.raises(HardwareError, match='no plant of a drive: it has no input "tau"'):
         plant_of(stack.enter_context(open_fmu(fmu_of_card("paper_mount", "controller", print), "controller")))
+
+
+@pytest.mark.parametrize(("scale", "times"), [(0.5, "2.1"), (3.0, "0.45")])
+def test_the_test_move_finds_an_encoder_that_counts_wrongly(scale: float, times: str) -> None:
+    with drive(scale=scale) as there, pytest.raises(HardwareError, match=f"about {times} times the counts per turn"):
+        try_move(scenario(), over(there.url), fast=True)
+    assert there.drive.held == 0
+
+
+def test_the_test_move_ends_in_a_sentence_where_the_loop_cannot_even_follow() -> None:
+    with drive(scale=1 / 60) as there, pytest.raises(HardwareError, match=r"ended in: .*scaling of the encoder"):
+        try_move(scenario(), over(there.url), fast=True)
+    assert there.drive.held == 0
+
+
+def test_the_test_move_of_an_encoder_that_counts_right_is_small_and_shows_the_inertia() -> None:
+    with drive() as there:
+        move = try_move(scenario(), over(there.url), fast=True)
+    assert move.scale == pytest.approx(1, rel=1e-3), "the drive has rested elsewhere than its twin"
+    assert move.seen == pytest.approx(30, rel=0.25), (
+        "the inertia of the paper's mount, less some of its elastic friction"
+    )
+    assert move.way <= 0.2 * SIMULATED.limits.following_error
+    assert move.torque <= 0.5 * SIMULATED.limits.torque

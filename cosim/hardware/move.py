@@ -5,12 +5,13 @@ acceleration that the encoder shows, is an inertia: with w the frequency and < >
 
     J_seen = <tau> / (-w^2 <q>)
 
-Friction hardly enters: Coulomb and viscous torque swing with the velocity, a constant load not at all. The scenario's own
-plant, moved in the same way, says what J_seen should be; an encoder that counts s times too much shows J / s.
+Friction hardly enters: Coulomb and viscous torque swing with the velocity, a constant load not at all; what is elastic
+does. The scenario's own plant, moved in the same way, says what J_seen should be; an encoder that counts s times too
+much shows about J / s.
 """
 
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,11 @@ class Move:
         """How many times too much the encoder counts; 1 where scenario and machine agree."""
         return self.expected / self.seen
 
+    @property
+    def shown(self) -> dict[str, float]:
+        """All of it by name."""
+        return asdict(self) | {"scale": self.scale}
+
 
 def try_move(scenario: Scenario, machine: Machine, *, fast: bool = False) -> Move:
     """Move the axis a little and compare it with the scenario's own plant.
@@ -65,8 +71,9 @@ def try_move(scenario: Scenario, machine: Machine, *, fast: bool = False) -> Mov
     move = Move(way, seen, expected, torque)
     if not 1 / TOLERANCE < move.scale < TOLERANCE:
         message = (
-            f"{machine.name} moves as if its encoder had {move.scale:.3g} times the counts per turn that {scenario.path} "
-            f"says (or its torque or inertia were off by that factor): inertia seen {seen:.4g}, expected {expected:.4g}."
+            f"{machine.name} moves as if its encoder had about {move.scale:.2g} times the counts per turn of "
+            f"{scenario.path} (or torque or inertia were off by that factor): inertia seen {seen:.4g}, "
+            f"expected {expected:.4g} N.m.s2/rad."
         )
         raise HardwareError(message, culprit=machine.name, value=move.scale)
     return move
