@@ -1,4 +1,4 @@
-"""`cosim hardware`: the controller on a machine: check, run, replay; and a virtual drive to try it on."""
+"""`cosim hardware`: the controller on a machine: check, run, replay, firmware; and a virtual drive to try it on."""
 
 import json
 import sys
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cosim.cli_firmware import firmware
 from cosim.terminal import put, put_json, say
 
 if TYPE_CHECKING:
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from cosim.hardware.virtual import Event
 
 app = typer.Typer(no_args_is_help=True, help="The same controller on a machine.")
+app.command()(firmware)
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A scenario (.toml) or the name of a shipped one: sidereal.")]
 MachineOption = Annotated[str, typer.Option("--machine", help="A machine (.toml) or a shipped one: simulated.")]
