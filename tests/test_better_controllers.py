@@ -21,7 +21,7 @@ from pyfmi_models.effects import FrictionWander
 from pyfmi_models.effects.compliance import Compliance
 
 FOURTH = next(one for one in options() if one.key == "fourth_220")
-TRIED = ("order3_400_loop30_observer_nominal", "order4_220_loop15_observer_none")
+TRIED = ("order3_400_loop30_nominal", "order4_220_loop15_none")
 PLAN = Plan(
     seeds=(7,),
     design_seeds=(8,),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.identification import POSITIVE, moved, multisine, step_response, the_card
+from benchmarks.identification import POSITIVE, multisine, the_card
 
 from cosim.cli import main
 from cosim.errors import InputError
@@ -15,6 +15,7 @@ from cosim.identify.friction_map import friction_map
 from cosim.identify.identify import Options, free_names, identify, with_numbers
 from cosim.identify.machine import Machine
 from cosim.identify.presliding import presliding
+from cosim.paper.benches import moved, step_response
 from cosim.recording import Recording
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.effects.thermal_viscosity import ThermalViscosity

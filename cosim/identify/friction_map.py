@@ -59,16 +59,17 @@ def friction_map(
     recordings: Sequence[Recording], inertia: float, cut: float | None = None, keep_inertia: bool = True
 ) -> FrictionMap:
     """Fit the maps; raise InputError where no speed is above the cut in either direction."""
-    samples, cut = _samples(recordings, inertia, cut, keep_inertia)
+    samples, cut = samples_of(recordings, inertia, cut, keep_inertia)
     fits = {name: _fitted(samples, signs) for name, signs in DIRECTIONS.items() if _enough(samples, signs)}
     if not fits:
         raise InputError(f"No friction map: fewer than {LEAST_ROWS} rows are faster than the cut of {cut:.3g}.")
     return FrictionMap(fits, cut, keep_inertia, samples)
 
 
-def _samples(
+def samples_of(
     recordings: Sequence[Recording], inertia: float, cut: float | None, keep_inertia: bool
 ) -> tuple[Samples, float]:
+    """Speed and friction torque of the rows that are faster than a cut (none: a share of the highest), and that cut."""
     prepared = prepare(recordings, choose_cutoff(recordings, inertia))
     top = max(abs(edge) for edge in prepared.ranges["v"])
     cut = CUT * top if cut is None else cut

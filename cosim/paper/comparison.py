@@ -117,7 +117,7 @@ def _places(compared: Sequence[Option], best: Sequence[Option]) -> list[Pair]:
     found += [(condition(A), one, most) for one in best]
     learners = [one for one in (REFERENCE, ADAPTING, LEARNING) if one in compared]
     for key in (A, B) if len(learners) > 1 else ():
-        found += [(settled(condition(key)), one, most) for one in learners]
+        found += [(settled(condition(key)), one, 2 * FEW) for one in learners]
         found += [(repeating(settled(condition(key))), one, FEW) for one in learners]
     limits = [one for one in compared if one.key in ("C3a", "refitted", "chosen")]
     return found + [(repeating(condition(A)), one, FEW) for one in limits]

@@ -17,8 +17,8 @@ MODELS: dict[str, tuple[str, Knowledge]] = {
 }
 OBSERVERS = {3: (220.0, 300.0, 400.0, 600.0, 800.0), 4: (90.0, 120.0, 160.0, 220.0, 300.0)}
 """Bandwidths tried [rad/s], by the observer's order."""
-LOOPS = (15.0, 20.0, 30.0)
-"""Bandwidths of the loop tried [rad/s]."""
+LOOPS = {3: (15.0, 20.0, 30.0), 4: (15.0, 30.0)}
+"""Bandwidths of the loop tried [rad/s], by the observer's order."""
 PHASE = 45.0
 """Least phase margin asked for [deg]."""
 GAIN = 0.1
@@ -41,21 +41,24 @@ class Design:
 
 
 def designs() -> tuple[Option, ...]:
-    """Return all designs that are tried: order and bandwidth of the observer, loop, source of e', friction model."""
-    places = [(order, wide) for order, bandwidths in OBSERVERS.items() for wide in bandwidths]
+    """Return all designs that are tried: order and bandwidth of the observer, bandwidth of the loop, friction model.
+
+    Their e' is the observer's: the raw difference commands 28 N m RMS of noise with a loop at 15 rad/s, 56 with 30.
+    """
     return tuple(
-        _design(order, wide, narrow, source, model)
-        for (order, wide), narrow, source, model in product(places, LOOPS, ("observer", "difference"), MODELS)
+        _design(order, wide, narrow, model)
+        for order in OBSERVERS
+        for wide, narrow, model in product(OBSERVERS[order], LOOPS[order], MODELS)
     )
 
 
-def _design(order: int, wide: float, narrow: float, source: str, model: str) -> Option:
+def _design(order: int, wide: float, narrow: float, model: str) -> Option:
     compensation, knows = MODELS[model]
-    changes = {"observer_order": order, "observer_bandwidth": wide, "velocity": source, **loop(narrow)}
+    changes = {"observer_order": order, "observer_bandwidth": wide, "velocity": "observer", **loop(narrow)}
     friction = {"none": "no friction model", "nominal": "C3a, nominal friction", "refitted": "C3a, refitted friction"}
     return Option(
-        key=f"order{order}_{wide:.0f}_loop{narrow:.0f}_{source}_{model}",
-        title=f"order {order} at {wide:.0f} rad/s, loop at {narrow:.0f} rad/s, e' by {source}, {friction[model]}",
+        key=f"order{order}_{wide:.0f}_loop{narrow:.0f}_{model}",
+        title=f"order {order} at {wide:.0f} rad/s, loop at {narrow:.0f} rad/s, {friction[model]}",
         compensation=compensation,
         knows=knows,
         changes=changes,

@@ -17,11 +17,15 @@ from cosim.paper.comparison_figures import comparison_figures
 from cosim.paper.comparison_tables import better, rows_csv, tables
 from cosim.paper.conditions import condition, conditions, definitions
 from cosim.paper.figures import tracking_figures
+from cosim.paper.identification import Identification, identification
+from cosim.paper.identification_figures import identification_figures
+from cosim.paper.identification_tables import identified, table2, table3, varying
 from cosim.paper.study import Study, study
 from cosim.paper.tables import ratios_of, runs_csv, table4, table_csv, table_text
 from cosim.paper.workshop import Workshop
 
 FILES = ("table4.json", "table4.csv", "runs.csv", "definitions.csv", "README.md")
+IDENTIFIED = ("identification.json", "table2.csv", "table3.csv", "periods.csv")
 COMPARED = ("options.json", "options.csv", "designs.csv", "robustness.csv")
 
 
@@ -35,10 +39,11 @@ class Written:
 
 @dataclass(frozen=True, kw_only=True)
 class Results:
-    """What was run: all `conditions()`, all `definitions()`, and better controllers where they were asked for."""
+    """What was run: `conditions()`, `definitions()`, identification, and a comparison where it was asked for."""
 
     found: Study
     variants: Study
+    identified: Identification
     comparison: Comparison | None = None
 
 
@@ -55,14 +60,15 @@ def reproduce(
     Raises:
         OutputError: a file exists and `force` is not given.
     """
-    for name in FILES + (COMPARED if plan else ()):
+    for name in FILES + IDENTIFIED + (COMPARED if plan else ()):
         check_free(out / name, force)
     with TemporaryDirectory() as folder:
         workshop = Workshop(Path(folder))
         found = study(workshop, seeds, progress=progress)
         variants = study(workshop, seeds[:1], definitions())
         comparison = compare(workshop, plan, progress) if plan else None
-    return write(out, Results(found=found, variants=variants, comparison=comparison), command, force)
+    results = Results(found=found, variants=variants, identified=identification(seeds[0]), comparison=comparison)
+    return write(out, results, command, force)
 
 
 def write(out: Path, results: Results, command: str, force: bool = False) -> Written:
@@ -78,6 +84,8 @@ def write(out: Path, results: Results, command: str, force: bool = False) -> Wri
         "runs.csv": runs_csv(results.found),
         "definitions.csv": table_csv(_variants(results.variants)),
     }
+    figures = identification_figures(results.identified, out, force) | figures
+    texts |= _identified(results.identified)
     if results.comparison:
         figures |= comparison_figures(results.comparison, out, force)
         texts |= _compared(results.comparison, made)
@@ -86,6 +94,12 @@ def write(out: Path, results: Results, command: str, force: bool = False) -> Wri
         with replacing(out / name, force) as partial:
             partial.write_text(text, "utf-8")
     return Written(table=table, files=[*(out / name for name in texts), *figures])
+
+
+def _identified(found: Identification) -> dict[str, str]:
+    data = {"table2": table2(found), "table3": table3(found), "periods": varying(found)}
+    texts = {f"{name}.csv": rows_csv(rows) for name, rows in data.items()}
+    return texts | {"identification.json": json.dumps(data | {"seed": found.seed}, indent=1) + "\n"}
 
 
 def _compared(found: Comparison, made: dict[str, str]) -> dict[str, str]:
@@ -124,6 +138,7 @@ def _page(table: dict[str, Any], results: Results, figures: dict[Path, str]) -> 
         kp_change=100 * (table["base_kp255"]["C1"] / table["base"]["C1"] - 1),
         difference_change=100 * (other["difference"]["C1"] / other["base"]["C1"] - 1),
         limited_c1=other["limited"]["C1"],
+        identified=identified(results.identified),
         better=results.comparison and better(results.comparison),
     )
 

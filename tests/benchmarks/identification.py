@@ -8,7 +8,6 @@ Everything is simulated with the paper's card and known numbers; noise is inside
 import argparse
 import csv
 import platform
-import tempfile
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -18,18 +17,13 @@ from typing import Any
 import numpy as np
 
 import cosim
-from cosim.diagnosis.closed_loop import set_point
 from cosim.identify.friction_map import friction_map
 from cosim.identify.identify import Options, identify, with_numbers
 from cosim.identify.presliding import presliding
-from cosim.master import simulate
-from cosim.recording import Recording
-from cosim.wiring import Record, Wire
+from cosim.paper.benches import moved, step_response
 from pyfmi_models.card import Card, read_card
-from pyfmi_models.export import export_fmu
 from pyfmi_models.friction import LuGre
 
-STEP = 1e-4
 SEVEN = ("sigma0", "sigma1", "sigma2", "Fc", "Fs", "Vs", "delta")
 POSITIVE = {
     "sigma0": 9.7869e4,
@@ -88,33 +82,6 @@ def the_card(**numbers: float) -> Card:
     return replace(card, friction=replace(card.friction, **numbers), controller=plain)
 
 
-def moved(card: Card, q_d: np.ndarray, noise: float, seed: int) -> Recording:
-    """Plant and controller FMUs under a set point given at 1 kHz; white encoder noise [rad rms] in the loop."""
-    t = np.arange(len(q_d)) / 1000
-    signals: dict[str, Any] = set_point(Recording("set point", {"t": t, "q": q_d, "q_d": q_d}), STEP)
-    ticks = len(signals["q_d"])
-    signals["noise"] = noise * np.random.default_rng(seed).standard_normal(ticks)
-    with tempfile.TemporaryDirectory() as folder:
-        run = simulate(
-            {
-                "plant": export_fmu(card.plant().model(), Path(folder) / "plant.fmu"),
-                "controller": export_fmu(card.controller_model(), Path(folder) / "controller.fmu"),
-            },
-            [
-                Wire("controller.tau", "plant.tau"),
-                Wire("plant.q", "controller.q", noise="noise"),
-                *(Wire(name, f"controller.{name}") for name in ("q_d", "v_d", "a_d")),
-            ],
-            record={"tau": Record("plant.tau", "mean"), "q": Record("controller.q"), "q_d": Record("q_d")},
-            step=STEP,
-            ticks=ticks,
-            signals=signals,
-            decimation=10,
-        )
-    assert run.recording is not None
-    return run.recording
-
-
 def multisine(seconds: float, seed: int = 1) -> np.ndarray:
     """A set point at 1 kHz that slides and reverses."""
     t = np.arange(int(seconds * 1000)) / 1000
@@ -123,25 +90,6 @@ def multisine(seconds: float, seed: int = 1) -> np.ndarray:
     x = np.clip(t / 2.5, 0, 1)
     waves = (a * np.sin(2 * np.pi * f * t + p) for a, f, p in zip(sizes, tones, phases, strict=True))
     return np.asarray(x**3 * (10 - 15 * x + 6 * x * x) * sum(waves))
-
-
-def step_response(card: Card, torque: float, noise: float, seed: int) -> Recording:
-    """One second at 10 kHz from rest, the torque from 0.05 s on."""
-    t = np.arange(10_001) * STEP
-    tau = np.where(t >= 0.05, torque, 0.0)
-    with tempfile.TemporaryDirectory() as folder:
-        run = simulate(
-            {"plant": export_fmu(card.plant().model(), Path(folder) / "plant.fmu")},
-            [("torque", "plant.tau")],
-            record={"tau": Record("plant.tau", "mean"), "q": Record("plant.q")},
-            step=STEP,
-            ticks=len(t),
-            signals={"torque": tau},
-        )
-    assert run.recording is not None
-    table = dict(run.recording.table)
-    table["q"] = table["q"] + noise * np.random.default_rng(seed).standard_normal(len(table["q"]))
-    return Recording("step", table, run.recording.units)
 
 
 def presliding_rows(seed: int) -> Iterator[dict[str, Any]]:
