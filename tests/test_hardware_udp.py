@@ -388,3 +388,25 @@ def test_the_test_move_of_an_encoder_that_counts_right_is_small_and_shows_the_in
     )
     assert move.way <= 0.2 * SIMULATED.limits.following_error
     assert move.torque <= 0.5 * SIMULATED.limits.torque
+
+
+def test_a_supervisor_drains_each_record_once_while_the_loop_goes_on(tmp_path: Path) -> None:
+    with drive() as there, session(tmp_path, there.url) as one:
+        drained = []
+        for cycles in (1, 700, 0, 299):
+            one.advance(cycles)
+            drained.append(one.drain())
+    assert [len(records) for records in drained] == [1, 700, 0, 299]
+    sequence = np.concatenate([records["sequence"] for records in drained])
+    assert np.array_equal(sequence, np.arange(1, 1001))
+    assert np.array_equal(np.concatenate(drained)["sample"]["tick"], recorded(tmp_path)["machine.tick"])
+
+
+def test_records_that_the_ring_has_overwritten_are_missing_not_wrong(tmp_path: Path) -> None:
+    short = changed(SIMULATED, "test", black_box_seconds=0.05)
+    with Session(scenario(), short, tmp_path / "box", fast=True) as one:
+        one.advance(1234)
+        records = one.drain()
+    assert records["sequence"][-1] == 1234
+    assert np.all(np.diff(records["sequence"].astype(int)) == 1)
+    assert 400 < len(records) <= 500

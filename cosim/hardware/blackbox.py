@@ -44,9 +44,21 @@ class BlackBox:
             file.truncate(size)
             self._map = mmap.mmap(file.fileno(), size)
         os.replace(partial, path)
-        self.path = path
+        self.path, self._drained = path, 0
         self._records = np.frombuffer(self._map, RECORD, capacity, HEADER)
         self.box = shared(CBox(record=self._records.ctypes.data, capacity=capacity))
+
+    def drain(self) -> np.ndarray:
+        """Return a copy of the whole records since the last call, while the loop goes on writing.
+
+        Those that the ring has overwritten meanwhile are missing: their sequence numbers do not follow each other.
+        """
+        newest, capacity = self.box.written, self.box.capacity
+        numbers = np.arange(max(self._drained, newest - capacity + capacity // 16), newest)
+        found: np.ndarray = self._records[numbers % capacity]
+        found = found[found["sequence"] == numbers + 1]
+        self._drained = int(found["sequence"][-1]) if len(found) else self._drained
+        return found
 
     def close(self) -> None:
         """Let go of the file; its records are in it already."""

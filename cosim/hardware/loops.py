@@ -118,3 +118,16 @@ class Forked:
             self._ended = os.waitstatus_to_exitcode(status)
         if self._ended:
             library().hardware_release(self._session)
+
+
+def bare_clock(step: float, spin_us: float, seconds: float) -> tuple[int, int, float]:
+    """Run the clock of a loop, and nothing else, in a thread: what a loop on this computer can hope for.
+
+    Returns:
+        Edges in all, those that were missed, and the worst wake-up in us.
+    """
+    session = CSession(period=round(step * 1e9), spin=round(spin_us * 1000))
+    thread = Thread(target=library().hardware_bare, args=(session, round(seconds / step)))
+    thread.start()
+    thread.join()
+    return int(session.tick), int(session.late), session.worst / 1000

@@ -46,10 +46,14 @@ class Reactions(_Section):
 
 
 class Clock(_Section):
-    """`[clock]`: the last microseconds before an edge are spent awake; how long a read waits for a drive's answer."""
+    """`[clock]`: how many of the last microseconds before an edge are spent awake.
+
+    `answer_us`: for how long a read waits for the answer of a drive behind a network; `answer_spin_us`: of that, awake.
+    """
 
     spin_us: float = Field(default=20.0, ge=0, le=1000)
     answer_us: Positive = 60.0
+    answer_spin_us: float = Field(default=50.0, ge=0, le=1000)
 
 
 class Inject(_Section):

@@ -17,6 +17,8 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import numpy as np
+
 from cosim.errors import HardwareError
 from cosim.hardware.axis import cycles_of, make_axis, story_of
 from cosim.hardware.blackbox import BlackBox
@@ -129,6 +131,10 @@ class Session:
             "refused_limits": self.axis.refused,
             **self.transport.statistics(),
         }
+
+    def drain(self) -> np.ndarray:
+        """Return the records of the cycles since the last call, for whoever watches; the black box keeps them."""
+        return self._box.drain()
 
     def advance(self, cycles: int) -> Status:
         """Let the loop run for some cycles, with a heartbeat, and return its status."""

@@ -156,7 +156,7 @@ class CUdp(Structure):
     """The adapter of process data over UDP."""
 
     _fields_ = [
-        *((name, c_int64) for name in ("socket", "patience", "sent_at", "failed")),
+        *((name, c_int64) for name in ("socket", "patience", "spin", "sent_at", "failed")),
         ("session", c_uint32),
         ("sequence", c_uint32),
         ("link", CLink),

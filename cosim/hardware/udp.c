@@ -104,7 +104,10 @@ static int udp_read(void *self, Feedback *feedback)
     feedback->link = 0;
     struct pollfd ready = {.fd = (int)udp->socket, .events = POLLIN};
     while (!take(udp, feedback)) {
-        int64_t left = udp->sent_at + udp->patience - now();
+        int64_t waited = now() - udp->sent_at, left = udp->patience - waited;
+        if (waited < udp->spin) { /* sleeping and waking costs tens of microseconds */
+            continue;
+        }
         struct timespec time = {.tv_sec = left / 1000000000, .tv_nsec = left % 1000000000};
         if (left <= 0 || ppoll(&ready, 1, &time, NULL) <= 0 || (ready.revents & (POLLERR | POLLNVAL))) {
             feedback->link |= UNANSWERED;

@@ -28,9 +28,9 @@ typedef struct {
     uint64_t seen;             /* bit n: that of newest - n has come */
 } Link;
 
-/* The adapter of the loop. A read waits for the answer to the order before it, at most `patience` ns. */
+/* The adapter of the loop. A read waits for the answer to the order before it, at most `patience` ns, the first `spin` awake. */
 typedef struct {
-    int64_t socket, patience, sent_at, failed;
+    int64_t socket, patience, spin, sent_at, failed;
     uint32_t session, sequence;
     Link link;
 } Udp;

@@ -42,8 +42,10 @@ class UdpDrive:
         except BaseException:
             self._socket.close()
             raise
-        patience = LOCKSTEP_PATIENCE if fast else machine.clock.answer_us / 1e6
-        self.udp = shared(CUdp(socket=self._socket.fileno(), patience=round(patience * 1e9), session=session))
+        clock, descriptor = machine.clock, self._socket.fileno()
+        patience, spin = (LOCKSTEP_PATIENCE, 0.0) if fast else (clock.answer_us / 1e6, clock.answer_spin_us / 1e6)
+        numbers = {"patience": round(patience * 1e9), "spin": round(spin * 1e9)}
+        self.udp = shared(CUdp(socket=descriptor, session=session, **numbers))
         self.adapter = CAdapter()
         library().udp_open(self.udp, self.adapter)
 
