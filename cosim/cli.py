@@ -23,7 +23,7 @@ from cosim.interrupts import Terminated, end_well
 from cosim.terminal import keep_stdout, put, say
 from pyfmi_models.errors import ModelError
 
-SEVERAL = ("--columns", "--units")
+SEVERAL = ("--columns", "--units", "--variables")
 """Options that may be followed by several name=value pairs."""
 VERBS = ("demo", "export", "run", "identify", "diagnose", "prove", "paper", "sweep", "hardware", "show")
 
@@ -39,7 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def repeated(arguments: Sequence[str]) -> list[str]:
-    """Let `--columns a=b c=d` (and `--units`) take several values: repeat the option before each further one."""
+    """Let `--columns a=b c=d` (all of `SEVERAL`) take several values: repeat the option before each further one."""
     out: list[str] = []
     option = ""
     for argument in arguments:

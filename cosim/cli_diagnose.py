@@ -3,12 +3,13 @@
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from cosim.errors import InputError
-from cosim.reading import read_recordings
+from cosim.reading import pairs_of, read_recordings
+from cosim.renamed import Alias
 from cosim.terminal import put, put_json, say, stage
 
 
@@ -21,11 +22,20 @@ def diagnose(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
     columns: Annotated[list[str] | None, typer.Option("--columns", help="Our name = the file's: tau=force ...")] = None,
     units: Annotated[list[str] | None, typer.Option("--units", help="Units in the files: q=deg ...")] = None,
+    fmu: Annotated[
+        Path | None,
+        typer.Option("--fmu", help="Anyone's plant FMU as the base; the card says roughly what it is."),
+    ] = None,
+    variables: Annotated[
+        list[str] | None, typer.Option("--variables", help="Our name = the FMU's: tau=Motor.torque q=Encoder.angle ...")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
     check: Annotated[bool, typer.Option("--check", help="Exit with 1 if something is missing.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
 ) -> None:
     """Say which physics a card lacks, and prove it on a recording that was never fitted."""
+    from cosim.diagnosis.black_box import BlackBox, as_base
+    from cosim.diagnosis.corrected import Correction, motion_of
     from cosim.diagnosis.deliver import as_json as to_json
     from cosim.diagnosis.deliver import check_out, deliver
     from cosim.diagnosis.diagnose import diagnose as find
@@ -38,10 +48,16 @@ def diagnose(
     _check_split(recordings[:-1], recordings[-1])
     seconds = sum(recording.duration for recording in recordings)
     say(f"Read {len(recordings)} recordings, {seconds:.0f} s; card {believed.mount.name}")
+    command = f"cosim diagnose {' '.join(map(str, train))} --heldout {heldout} --card {card} --out {out}"
+    more: Any = {}
     with stage("looking for what the model lacks") as progress:
+        if fmu:
+            box = BlackBox(fmu, {name: Alias(theirs) for name, theirs in pairs_of("--variables", variables).items()})
+            base = as_base(box, recordings[:-1], recordings[-1], believed, progress.tell)
+            more["more"] = Correction(box, base.card, *motion_of(recordings[0])).deliver
+            recordings, believed, command = [*base.train, base.heldout], base.card, f"{command} --fmu {fmu}"
         outcome = find(recordings[:-1], recordings[-1], believed, progress.tell)
-        command = f"cosim diagnose {' '.join(map(str, train))} --heldout {heldout} --card {card} --out {out}"
-        done = deliver(outcome, recordings[:-1], recordings[-1], believed, out, command, progress.tell)
+        done = deliver(outcome, recordings[:-1], recordings[-1], believed, out, command, progress.tell, **more)
     if as_json:
         put_json(to_json(done))
     else:

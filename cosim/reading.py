@@ -26,13 +26,14 @@ def read_recordings(
     Raises:
         InputError: a pair is malformed, a unit does not fit the axis, or a recording is bad (`Recording.read`).
     """
-    names = dict(columns) | _pairs("--columns", given)
-    recordings = [Recording.read(path, names, _pairs("--units", units)) for path in paths]
+    names = dict(columns) | pairs_of("--columns", given)
+    recordings = [Recording.read(path, names, pairs_of("--units", units)) for path in paths]
     _check_kind(recordings, motion)
     return recordings
 
 
-def _pairs(option: str, given: Sequence[str] | None) -> dict[str, str]:
+def pairs_of(option: str, given: Sequence[str] | None) -> dict[str, str]:
+    """Read what an option was given as name=value pairs; raises InputError for one that is none."""
     pairs = [item.partition("=") for item in given or []]
     for name, equals, value in pairs:
         if not (name and equals and value):

@@ -38,8 +38,12 @@ def deliver(
     out: Path,
     command: str,
     say: Callable[[str], None] = lambda _: None,
+    more: Callable[[Card, Path], dict[str, Any]] = lambda *_: {},
 ) -> Diagnosis:
-    """Write all files of a diagnosis into `out` and return it with provenance and file names filled in."""
+    """Write all files of a diagnosis into `out` and return it with provenance and file names filled in.
+
+    Where effects were found, `more` writes what else shall lie beside the better card, and tells it.
+    """
     directory(out)
     provenance = _provenance(train, heldout, card, command)
     found = replace(outcome.diagnosis, provenance=provenance)
@@ -48,7 +52,8 @@ def deliver(
         partial.write_text(card_text(better, _comment(found)), "utf-8")
     if _names_effects(found):
         say("building the improved FMU")
-        found = replace(found, improved={"card": "card.toml", **_fmus(better, found, out), **_proven_range(found)})
+        improved = {"card": "card.toml", **_fmus(better, found, out), **_proven_range(found), **more(better, out)}
+        found = replace(found, improved=improved)
     _missing_torque(found, [*train, heldout], out / "missing_torque.parquet")
     with replacing(out / "diagnosis.json", True) as partial:
         partial.write_text(json.dumps(as_json(found), indent=2, allow_nan=False) + "\n", "utf-8")

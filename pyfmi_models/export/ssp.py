@@ -45,15 +45,27 @@ class Connection:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Archive:
+    """An FMU that exists already, as a component of a system: those of its variables that wires may reach."""
+
+    path: Path
+    description: str
+    inputs: tuple[Variable, ...]
+    outputs: tuple[Variable, ...]
+    parameters: tuple[Variable, ...] = ()
+    period: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
 class System:
-    """Models by the name of their component, the wires between them, and step and stop [s] of a run.
+    """Models or FMUs by the name of their component, the wires between them, and step and stop [s] of a run.
 
     Raises ExportError if a wire joins what does not exist, or other units.
     """
 
     name: str
     description: str
-    components: Mapping[str, Model]
+    components: Mapping[str, Model | Archive]
     connections: tuple[Connection, ...]
     step: float
     stop: float
@@ -104,12 +116,15 @@ def export_ssp(
     found = {"SystemStructure.ssd": _structure(system), "documentation/index.html": _page(system)}
     for name, model in system.components.items():
         found[f"resources/{name}.fmu"] = _fmu(model, fmi, platforms)
-        found[f"resources/{name}.ssv"] = _parameters(model)
+        if model.parameters:
+            found[f"resources/{name}.ssv"] = _parameters(model)
     write_zip(path, found)
     return path
 
 
-def _fmu(model: Model, fmi: Literal[2, 3], platforms: tuple[str, ...]) -> bytes:
+def _fmu(model: Model | Archive, fmi: Literal[2, 3], platforms: tuple[str, ...]) -> bytes:
+    if isinstance(model, Archive):
+        return model.path.read_bytes()
     with tempfile.TemporaryDirectory() as folder:
         return export_fmu(model, Path(folder) / "model.fmu", fmi=fmi, platforms=platforms).read_bytes()
 
@@ -135,7 +150,7 @@ def _structure(system: System) -> bytes:
     return xml_text(root)
 
 
-def _component(elements: ET.Element, name: str, model: Model, system: System) -> None:
+def _component(elements: ET.Element, name: str, model: Model | Archive, system: System) -> None:
     element = ET.SubElement(
         elements,
         "ssd:Component",
@@ -154,6 +169,8 @@ def _component(elements: ET.Element, name: str, model: Model, system: System) ->
                 connectors, "ssd:Connector", name=one.name, kind=kind, description=one.description
             )
             ET.SubElement(connector, "ssc:Real", unit=one.unit)
+    if not model.parameters:
+        return
     bindings = ET.SubElement(element, "ssd:ParameterBindings")
     ET.SubElement(bindings, "ssd:ParameterBinding", source=f"resources/{name}.ssv")
 
@@ -192,14 +209,13 @@ def _experiment(root: ET.Element, system: System) -> None:
     ET.SubElement(algorithm, "osp:FixedStepAlgorithm", baseStepSize=repr(float(system.step)))
 
 
-def _parameters(model: Model) -> bytes:
+def _parameters(model: Model | Archive) -> bytes:
     root = _root("ssv:ParameterSet", PARAMETER_SET, "ssv", "ssc")
     group = ET.SubElement(root, "ssv:Parameters")
     for one in model.parameters:
         parameter = ET.SubElement(group, "ssv:Parameter", name=one.name, description=one.description)
         ET.SubElement(parameter, "ssv:Real", value=repr(float(one.start)), unit=one.unit)
-    if model.parameters:
-        _units(ET.SubElement(root, "ssv:Units"), model.parameters)
+    _units(ET.SubElement(root, "ssv:Units"), model.parameters)
     return xml_text(root)
 
 

@@ -1,0 +1,212 @@
+"""The plant of another team, known only as an FMU, as the base of a diagnosis.
+
+Their model cannot be read, but it can be run: in a stiff loop it follows each recorded motion, low-passed, and the
+torque which that takes is what it needs for the motion. A card with the same needs, as near as its parameters go, says
+in numbers what their model is like; what is left between the two is taken off the recorded torque,
+
+    tau' = tau - (needed by the FMU - needed by the card)
+
+so recordings miss beside the card exactly what they miss beside the FMU. All of a diagnosis then works as it stands:
+base parameters that are refitted, and effects that are found, are corrections to the FMU.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from math import ceil
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from scipy.interpolate import BPoly, make_interp_spline
+
+from cosim.diagnosis.fit import fit
+from cosim.diagnosis.inverse import Inverse
+from cosim.diagnosis.prepare import Array, Piece, choose_cutoff, derivative, lowpass, prepare
+from cosim.errors import InputError, StepError
+from cosim.files import sha256
+from cosim.master import simulate
+from cosim.recording import Recording
+from cosim.renamed import Alias
+from cosim.wiring import Record
+from pyfmi_models.card import Card
+from pyfmi_models.controller_section import ControllerSection
+from pyfmi_models.export import export_fmu
+from pyfmi_models.mount import Mount
+
+LONGEST_TICK = 1e-4
+SET_POINT = ("q_d", "v_d", "a_d")
+TRIAL = 5.0
+"""Seconds of the first recording on which a loop is tried."""
+APPROACH = 2.0
+"""Seconds that the FMU is given to come from where it starts to where the recording begins."""
+BANDWIDTHS = (600.0, 300.0, 150.0, 75.0)
+"""Bandwidths of the loop [rad/s], the stiffest first: a drive with a lag allows less."""
+CLOSELY = 0.02
+"""The FMU follows if its error stays below this share of the motion, RMS."""
+
+
+@dataclass(frozen=True)
+class BlackBox:
+    """A plant FMU with a torque or force input `tau` and an output `q`, and our names for what it calls otherwise."""
+
+    fmu: Path
+    variables: Mapping[str, Alias] = field(default_factory=dict)
+
+    @property
+    def told(self) -> str:
+        """Name and content of the FMU."""
+        return f"{self.fmu.name} (SHA-256 {sha256(self.fmu)[:12]})"
+
+
+@dataclass(frozen=True)
+class Base:
+    """What stands for an FMU in a diagnosis: recordings without what it needs beyond the card that is most like it."""
+
+    train: tuple[Recording, ...]
+    heldout: Recording
+    card: Card
+    unlike: float
+    """RMS of the torque by which the FMU and the card differ [N m or N]."""
+
+
+def as_base(
+    box: BlackBox,
+    train: Sequence[Recording],
+    heldout: Recording,
+    card: Card,
+    say: Callable[[str], None] = lambda _: None,
+) -> Base:
+    """Let an FMU take the place of a card.
+
+    Args:
+        box: the FMU; nothing but its input and its output is used.
+        train: recordings that may be fitted.
+        heldout: the recording that proves the result.
+        card: what is believed of the FMU: inertia and friction within a factor of two or so.
+        say: told, in a few words, what is being done.
+
+    Raises:
+        InputError: no loop makes the FMU follow the recorded motion.
+        WiringError, FmuError: the FMU has no such variables, or cannot be run.
+    """
+    cutoff = choose_cutoff(train, card.mount.inertia)
+    prepared = [prepare([one], cutoff) for one in (*train, heldout)]
+    with TemporaryDirectory() as folder:
+        follower = _Follower(box, card, Path(folder)).fitting(prepared[0].pieces[0])
+        followed = []
+        for one in prepared:
+            say(f"letting {box.fmu.name} follow {one.names[0]}")
+            followed.append([follower.followed(piece) for piece in one.pieces])
+    like = _likeness(followed, card)
+    rests = [_rests(pieces, like.plant()) for pieces in followed]
+    unlike = float(np.sqrt(np.mean(np.concatenate([rest for one in rests[:-1] for rest in one]) ** 2)))
+    note = f"The base is {box.told}; the card that is most like it needs another torque by {unlike:.3g} RMS."
+    beside = [_without(one, pieces, rest) for one, pieces, rest in zip((*train, heldout), followed, rests, strict=True)]
+    beside[0] = replace(beside[0], notes=(*beside[0].notes, note))
+    return Base(tuple(beside[:-1]), beside[-1], like, unlike)
+
+
+@dataclass(frozen=True)
+class _Follower:
+    """A stiff loop around the FMU, without a friction model: the FMU is asked, not the card."""
+
+    box: BlackBox
+    card: Card
+    folder: Path
+    bandwidth: float = BANDWIDTHS[0]
+
+    def fitting(self, piece: Piece) -> "_Follower":
+        """The stiffest loop in which the FMU follows the first seconds of a motion."""
+        count = ceil(TRIAL / piece.dt)
+        start = replace(piece, t=piece.t[:count], q=piece.q[:count])
+        for bandwidth in BANDWIDTHS:
+            loop = replace(self, bandwidth=bandwidth)
+            with suppress(StepError):
+                if float(np.std(loop.run(start)[0])) < CLOSELY * float(np.std(start.q)):
+                    return loop
+        raise InputError(
+            f"{self.box.fmu.name} does not follow the recorded motion in a loop around it: look at its torque input "
+            "and position output (--variables), their signs and units, and at the card's inertia of "
+            f"{self.card.mount.inertia:g}.",
+            culprit=str(self.box.fmu),
+        )
+
+    def followed(self, piece: Piece) -> Piece:
+        """The piece with the torque that the FMU needs for its motion, filtered once more."""
+        error, tau = self.run(piece)
+        slip = lowpass(error, piece.dt, piece.cutoff)
+        needed = tau + self.card.mount.inertia * derivative(derivative(slip, piece.dt), piece.dt)
+        return replace(piece, tau=piece.lowpass(needed))
+
+    def run(self, piece: Piece) -> tuple[Array, Array]:
+        """Let the FMU follow a motion; return its error and its torque at the rows of the piece."""
+        per_row = ceil(piece.dt / LONGEST_TICK)
+        step, before = piece.dt / per_row, ceil(APPROACH / piece.dt)
+        ticks = (before + len(piece.t) - 1) * per_row + 1
+        signals = _path(piece, step, before * per_row, ticks, self._start(step))
+        run = self._simulate(step, ticks, signals, per_row)
+        rows = slice(before, before + len(piece.t))
+        return piece.q - run["q"][rows], run["tau"][rows]
+
+    def _simulate(self, step: float, ticks: int, signals: Mapping[str, Array], decimation: int = 1) -> Recording:
+        wires = [("controller.tau", "plant.tau"), ("plant.q", "controller.q")]
+        run = simulate(
+            {"plant": self.box.fmu, "controller": self._loop(step)},
+            [*wires, *((name, f"controller.{name}") for name in signals)],
+            record={"tau": Record("plant.tau", "mean"), "q": Record("plant.q")},
+            step=step,
+            ticks=ticks,
+            signals=signals,
+            variables={"plant": self.box.variables},
+            decimation=decimation,
+        )
+        assert run.recording is not None
+        return run.recording
+
+    def _start(self, step: float) -> float:
+        """Position at which the FMU starts."""
+        return float(self._simulate(step, 1, dict.fromkeys(SET_POINT, np.zeros(1)))["q"][0])
+
+    def _loop(self, step: float) -> Path:
+        path = self.folder / f"loop_{self.bandwidth:.0f}_{1e12 * step:.0f}.fmu"
+        if not path.exists():
+            w = self.bandwidth
+            section = ControllerSection(loop_hz=1 / step, kp=w**2, kd=2 * w, observer_bandwidth=3 * w)
+            mount = self.card.mount.model_copy(update={"torque_limit": 1e9})
+            model = replace(self.card, mount=mount, controller=section).controller_model()
+            export_fmu(model, path, fmi=3)
+        return path
+
+
+def _path(piece: Piece, step: float, before: int, ticks: int, start: float) -> dict[str, Array]:
+    """Set point at every tick: from where the FMU is smoothly onto the motion of the piece, and along it."""
+    spline = make_interp_spline(piece.t - piece.t[0], piece.q, k=5)
+    t = step * (np.arange(ticks) - before)
+    first = [float(spline(0.0, order)) for order in range(3)]
+    approach = BPoly.from_derivatives([-before * step, 0.0], [[start, 0.0, 0.0], first])
+    return {name: np.where(t < 0, approach(t, k), spline(np.maximum(t, 0), k)) for k, name in enumerate(SET_POINT)}
+
+
+def _likeness(followed: Sequence[Sequence[Piece]], card: Card) -> Card:
+    """The card whose base needs most nearly the torque that the FMU needs, on the training recordings."""
+    pieces = [piece for one in followed[:-1] for piece in one]
+    weight = np.ones(sum(len(piece.kept) for piece in pieces))
+    base = fit(card.plant(), pieces, weight).mount
+    section = card.mount.model_copy(update={"inertia": float(base.axis.inertia)})
+    return replace(card, mount=section, friction=base.friction)
+
+
+def _rests(pieces: Sequence[Piece], like: Mount) -> list[Array]:
+    """What the FMU needs beyond the card, at the rows of each piece; nothing at its edges, where filters settle."""
+    inverse = Inverse(like, ())
+    return [np.where(piece.inside, piece.tau - inverse.torque(piece, np.zeros(0))[0], 0.0) for piece in pieces]
+
+
+def _without(recording: Recording, pieces: Sequence[Piece], rests: Sequence[Array]) -> Recording:
+    """The recording without a torque that is known at the rows of its pieces."""
+    tau = recording["tau"].copy()
+    for piece, rest in zip(pieces, rests, strict=True):
+        rows = slice(piece.rows[0], piece.rows[-1] + 1)
+        tau[rows] -= np.interp(recording.t[rows], piece.t, rest)
+    return replace(recording, table=recording.table | {"tau": tau})

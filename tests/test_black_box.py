@@ -1,0 +1,145 @@
+"""An FMU of another team as the base of a diagnosis: asked by following the motion, corrected by an FMU in front of it."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_fmu import foreign
+
+from cosim.diagnosis.black_box import Base, BlackBox, as_base
+from cosim.diagnosis.corrected import Correction
+from cosim.diagnosis.prepare import prepare
+from cosim.diagnosis.protocol import residuals
+from cosim.errors import InputError, WiringError
+from cosim.master import run, simulate
+from cosim.recording import Recording
+from cosim.renamed import Alias
+from cosim.scenario import read_scenario
+from cosim.signals import Multisine
+from cosim.wiring import Record
+from pyfmi_models.card import Card, read_card
+from pyfmi_models.correction import correction, left_out
+from pyfmi_models.effects import ActuatorLag, Cogging, FrictionAsymmetry
+from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
+from pyfmi_models.export import export_fmu
+
+CARD = read_card("paper_mount")
+RIPPLE = Cogging(cycles_per_rev=20, amplitude=0.6, phase=0.3)
+CONCEALED = replace(CARD, effects=(RIPPLE,))
+NAMES = {"tau": "Motor.torque", "q": "Encoder.angle", "v": "Encoder.speed"}
+SECONDS = 14
+
+
+@dataclass(frozen=True)
+class Team:
+    """Their FMU of the card's physics, and recordings of a mount that also has a ripple."""
+
+    box: BlackBox
+    recordings: tuple[Recording, ...]
+    rough: Card
+    folder: Path
+
+
+def motion(seed: int) -> dict[str, Multisine]:
+    tones = [0.07, 0.13, 0.19, 0.29]
+    return {"ref": Multisine(kind="multisine", frequencies=tones, amplitudes=0.1, seed=seed, smooth_start=1.0)}
+
+
+WIRES = [("k.tau", "p.tau"), ("p.q", "k.q"), ("ref.position", "k.q_d"), ("ref.velocity", "k.v_d")]
+WIRES += [("ref.acceleration", "k.a_d")]
+
+
+def recorded(plant: Path, controller: Path, seed: int, wires: list[tuple[str, str]] = WIRES, **more: Path) -> Recording:
+    run = simulate(
+        {"p": plant, "k": controller, **more},
+        wires,
+        record={"tau": Record("k.tau", "mean"), "q": Record("p.q")},
+        step=1e-4,
+        ticks=10_000 * SECONDS,
+        signals=motion(seed),
+        decimation=10,
+        name=f"run{seed}",
+    )
+    assert run.recording is not None
+    return run.recording
+
+
+@pytest.fixture(scope="module")
+def team(tmp_path_factory: pytest.TempPathFactory) -> Team:
+    folder = tmp_path_factory.mktemp("team")
+    controller = export_fmu(CARD.controller_model(), folder / "controller.fmu", fmi=3)
+    real = export_fmu(CONCEALED.plant().model(), folder / "real.fmu", fmi=3)
+    theirs = foreign(export_fmu(CARD.plant().model(), folder / "ours.fmu", fmi=2), folder / "theirs.fmu", names=NAMES)
+    rough = replace(CARD, mount=CARD.mount.model_copy(update={"inertia": 20.0}), controller=None)
+    box = BlackBox(theirs, {ours: Alias(name) for ours, name in NAMES.items()})
+    return Team(box, tuple(recorded(real, controller, seed) for seed in (1, 2)), rough, folder)
+
+
+@pytest.fixture(scope="module")
+def base(team: Team) -> Base:
+    return as_base(team.box, team.recordings[:1], team.recordings[1], team.rough)
+
+
+def test_the_card_that_is_most_like_the_fmu_has_its_numbers(base: Base) -> None:
+    """The rough card is a third off in inertia; the FMU is this card's own physics."""
+    assert base.card.mount.inertia == pytest.approx(CARD.mount.inertia, rel=5e-3)
+    assert base.unlike < 0.05
+    assert "theirs.fmu (SHA-256" in base.train[0].notes[-1]
+
+
+def test_what_is_missing_beside_the_card_is_what_is_missing_beside_the_fmu(base: Base) -> None:
+    prepared = prepare([base.heldout], 30.0)
+    (missing,), piece = residuals(prepared, base.card.plant()), prepared.pieces[0]
+    ripple = 0.6 * np.cos(20 * piece.q + 0.3)
+    inside = piece.inside & (np.abs(piece.v) > 0.02)
+    assert np.std((missing - piece.lowpass(ripple))[inside]) < 0.1 * np.std(ripple[inside])
+
+
+@pytest.mark.parametrize(
+    ("names", "error", "sentence"),
+    [
+        ({"tau": "disturbance", "q": "Encoder.angle"}, InputError, "does not follow the recorded motion"),
+        ({"tau": "Motor.Torque"}, WiringError, r'stands for "Motor.Torque", which does not exist; .*Motor.torque'),
+    ],
+)
+def test_an_fmu_that_is_asked_wrongly_is_refused(
+    team: Team, names: dict[str, str], error: type[Exception], sentence: str
+) -> None:
+    box = BlackBox(team.box.fmu, {ours: Alias(name) for ours, name in names.items()})
+    with pytest.raises(error, match=sentence):
+        as_base(box, team.recordings[:1], team.recordings[1], team.rough)
+
+
+def test_a_plant_behind_a_correction_does_what_the_better_mount_does(tmp_path: Path) -> None:
+    effects = (ActuatorLag(time_constant_ms=1.0), RIPPLE, FrictionAsymmetry(level_asymmetry=0.3, viscous_asymmetry=0.1))
+    plant = CARD.plant()
+    better = replace(plant, axis=replace(plant.axis, inertia=33.0), effects=effects)
+    models = {"p": plant.model(), "better": better.model(), "c": correction(plant, better), "k": CARD.controller_model()}
+    fmus = {name: export_fmu(model, tmp_path / f"{name}.fmu", fmi=3) for name, model in models.items()}
+    plain, wanted = (recorded(fmus[name], fmus["k"], 3) for name in ("p", "better"))
+    through = [("k.tau", "c.tau"), ("c.corrected", "p.tau"), ("p.q", "c.q"), ("p.v", "c.v"), *WIRES[1:]]
+    found = recorded(fmus["p"], fmus["k"], 3, through, c=fmus["c"])
+    for column, share in (("tau", 0.02), ("q", 0.05)):
+        off, before = (np.std((one[column] - wanted[column])[1000:]) for one in (found, plain))
+        assert off < share * before, column
+
+
+def test_what_a_torque_cannot_give_is_left_out_by_name() -> None:
+    sensor = EncoderEccentricity(cycles_per_rev=1.0, amplitude_rad=1e-4, phase=0.0)
+    assert left_out(replace(CARD.plant(), effects=(RIPPLE, sensor))) == ("encoder_eccentricity",)
+
+
+def test_the_improvement_comes_as_an_ssp_that_runs(team: Team, base: Base, tmp_path: Path) -> None:
+    told = Correction(team.box, base.card, 0.2, 0.2).deliver(replace(base.card, effects=(RIPPLE,)), tmp_path)
+    assert told["ssp"] == "improved.ssp"
+    done = run(read_scenario(tmp_path / "improved.ssp"))
+    assert done.statistics["steps"] == 150_000
+    assert np.all(np.isfinite(done.recording["plant.Encoder.angle"] if done.recording else np.nan))
+
+
+def test_without_a_speed_there_is_no_ssp_and_it_says_why(team: Team, base: Base, tmp_path: Path) -> None:
+    names = {ours: one for ours, one in team.box.variables.items() if ours != "v"}
+    told = Correction(replace(team.box, variables=names), base.card, 0.2, 0.2).deliver(base.card, tmp_path)
+    assert "their FMU has no v; say which of its variables that is (--variables v=...)" in told["no_ssp"]
+    assert not (tmp_path / "improved.ssp").exists()
