@@ -1,4 +1,4 @@
-"""An FMU of another team as the base of a diagnosis: asked by following the motion, corrected by an FMU in front of it."""
+"""An FMU of another team as the base of a diagnosis: it follows the motion; an FMU in front of it corrects it."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -115,7 +115,8 @@ def test_a_plant_behind_a_correction_does_what_the_better_mount_does(tmp_path: P
     effects = (ActuatorLag(time_constant_ms=1.0), RIPPLE, FrictionAsymmetry(level_asymmetry=0.3, viscous_asymmetry=0.1))
     plant = CARD.plant()
     better = replace(plant, axis=replace(plant.axis, inertia=33.0), effects=effects)
-    models = {"p": plant.model(), "better": better.model(), "c": correction(plant, better), "k": CARD.controller_model()}
+    models = {"p": plant.model(), "better": better.model(), "c": correction(plant, better)}
+    models |= {"k": CARD.controller_model()}
     fmus = {name: export_fmu(model, tmp_path / f"{name}.fmu", fmi=3) for name, model in models.items()}
     plain, wanted = (recorded(fmus[name], fmus["k"], 3) for name in ("p", "better"))
     through = [("k.tau", "c.tau"), ("c.corrected", "p.tau"), ("p.q", "c.q"), ("p.v", "c.v"), *WIRES[1:]]
