@@ -7,6 +7,7 @@ CosimError                  everything this package raises on purpose
 │   ├── SignalError         a set-point generator or recorded signal cannot be made
 │   ├── ScenarioError       a scenario file is missing, unreadable, or a key or value breaks a rule
 │   ├── SweepError          a sweep file is missing, unreadable, or a key or value breaks a rule
+│   ├── ProofError          a sealed truth was changed
 │   ├── WiringError         a connection names what is not there, or joins what does not fit
 │   ├── HardwareError       a machine file breaks a rule, or a scenario cannot run on a machine
 │   ├── FmuError            a file is no FMU, or one that cannot run here
@@ -57,6 +58,10 @@ class ScenarioError(InputError):
 
 class SweepError(InputError):
     """A sweep file is missing, unreadable, or a key or value in it breaks a rule."""
+
+
+class ProofError(InputError):
+    """The truth of a concealed case is not the one that was sealed before the tool ran."""
 
 
 class WiringError(InputError):

@@ -54,7 +54,9 @@ def stribeck(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     speed = bench.pace.speed * log_uniform(rng, 0.08, 0.25)
     mount |= {"breakaway": breakaway, "stribeck_speed": speed}
     bench.belief["friction"] |= {"Fs": mount["coulomb"], "Vs": speed}
-    return {"Fs": breakaway, "Vs": speed, "delta": mount["stribeck_power"]}
+    edge = min(2 * speed, float(np.max(np.abs(bench.training.v))))
+    where = {"axis": "speed", "regions": [[-edge, edge]]}
+    return {"Fs": breakaway, "Vs": speed, "delta": mount["stribeck_power"], "where": where}
 
 
 def presliding(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:

@@ -25,7 +25,7 @@ from cosim.proof.outside import OUTSIDE_EFFECTS
 from cosim.proof.recorder import columns_of, decoys, oracle
 from cosim.proof.truth import TICK, Array, simulate
 
-__all__ = ["FAMILIES", "OUTSIDE", "Case", "make_case", "write_case"]
+__all__ = ["FAMILIES", "OUTSIDE", "Case", "make_case", "write_case", "write_given"]
 
 EFFECTS = {**AT_THE_AXIS, **BETWEEN_COMMAND_AND_READING, **OUTSIDE_EFFECTS}
 FAMILIES = (*AT_THE_AXIS, *BETWEEN_COMMAND_AND_READING)
@@ -152,11 +152,16 @@ def to_toml(card: dict[str, dict[str, Any]]) -> str:
 
 def write_case(case: Case, directory: Path) -> None:
     """Three Parquet recordings, card.toml and truth.json; the folder is made."""
+    write_given(case, directory)
+    (directory / "truth.json").write_text(json.dumps(case.truth, indent=1) + "\n", encoding="utf-8")
+
+
+def write_given(case: Case, directory: Path) -> None:
+    """What the tool may see: three Parquet recordings and card.toml; the folder is made."""
     directory.mkdir(parents=True, exist_ok=True)
     for name, table in zip(RECORDINGS, [*case.train, case.heldout], strict=True):
         table.to_parquet(directory / f"{name}.parquet", index=False)
     (directory / "card.toml").write_text(to_toml(case.card), encoding="utf-8")
-    (directory / "truth.json").write_text(json.dumps(case.truth, indent=1) + "\n", encoding="utf-8")
 
 
 def _arguments() -> argparse.Namespace:

@@ -1,4 +1,4 @@
-"""The folder of a sweep: what it is, and a line for each run as soon as it is done, so that nothing done is lost.
+"""The folder of a sweep (or of a proof): what it is, and a line for each run as soon as it is done: nothing is lost.
 
 sweep.json       what the runs depend on, as hashes, and the units of the columns
 runs.jsonl       one row a line, appended; a line cut short by a kill is dropped
@@ -8,7 +8,7 @@ recordings/      one file a run, where wanted
 
 import json
 import shutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
@@ -18,7 +18,8 @@ from cosim.files import check_free, directory, replacing
 from cosim.interrupts import uninterrupted
 from cosim.sweep.job import Row
 
-MADE = ("sweep.json", "runs.jsonl", "table.parquet", "sweep.svg", "recordings")
+RUNS = "runs.jsonl"
+MADE = ("sweep.json", RUNS, "table.parquet", "sweep.svg", "recordings")
 
 
 class Journal:
@@ -28,21 +29,30 @@ class Journal:
         folder: of the sweep; made where it is not there.
         identity: what the runs depend on; a folder with another one is refused.
         force: start over, whatever is there.
+        kind: what the folder holds, in messages.
+        made: files and folders that belong to it; the first is that of the identity.
 
     Raises:
         OutputError: the folder holds another sweep, or one that is being written.
     """
 
-    def __init__(self, folder: Path, identity: Mapping[str, str], force: bool = False) -> None:
-        self.folder, self.rows = folder, dict[int, Row]()
+    def __init__(
+        self,
+        folder: Path,
+        identity: Mapping[str, str],
+        force: bool = False,
+        kind: str = "sweep",
+        made: Sequence[str] = MADE,
+    ) -> None:
+        self.folder, self.rows, self._kind, self._identity = folder, dict[int, Row](), kind, folder / made[0]
         if force:
-            clear(folder)
-        self._check(identity)
-        self._file = directory(folder).joinpath("runs.jsonl").open("a+b")
+            clear(folder, made)
+        self._check(identity, made)
+        self._file = directory(folder).joinpath(RUNS).open("a+b")
         try:
-            _lock(self._file, folder)
+            _lock(self._file, folder, kind)
             self._read()
-            with replacing(folder / "sweep.json", force=True) as partial:
+            with replacing(self._identity, force=True) as partial:
                 partial.write_text(json.dumps(dict(identity), indent=2) + "\n", "utf-8")
         except BaseException:
             self._file.close()
@@ -65,16 +75,15 @@ class Journal:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _check(self, identity: Mapping[str, str]) -> None:
-        path = self.folder / "sweep.json"
-        if not path.exists():
-            check_free(self.folder / "table.parquet", force=False)
+    def _check(self, identity: Mapping[str, str], made: Sequence[str]) -> None:
+        if not self._identity.exists():
+            _check_free(self.folder, made)
             return
-        before: dict[str, Any] = json.loads(path.read_text("utf-8"))
+        before: dict[str, Any] = json.loads(self._identity.read_text("utf-8"))
         changed = [name for name in {**before, **identity} if before.get(name) != identity.get(name)]
         if changed:
             rule = "give another --out, or --force to start over"
-            message = f"{self.folder} holds another sweep: its {' and '.join(changed)} differ from now; {rule}."
+            message = f"{self.folder} holds another {self._kind}: its {' and '.join(changed)} differ from now; {rule}."
             raise OutputError(message, culprit=str(self.folder), value=changed)
 
     def _read(self) -> None:
@@ -90,17 +99,24 @@ class Journal:
         self._file.truncate(whole)
 
 
-def clear(folder: Path) -> None:
+def _check_free(folder: Path, made: Sequence[str]) -> None:
+    """Refuse a folder that was not begun here and holds a file with the name of a result."""
+    for name in made:
+        if name != RUNS and (folder / name).is_file():
+            check_free(folder / name, force=False)
+
+
+def clear(folder: Path, made: Sequence[str] = MADE) -> None:
     """Remove what a sweep made here, and nothing else."""
-    for name in MADE:
+    for name in made:
         path = folder / name
         if path.is_dir():
             shutil.rmtree(path)
         path.unlink(missing_ok=True)
 
 
-def _lock(file: IO[bytes], folder: Path) -> None:
-    """Refuse a second sweep at the same time; where the system has no such locks, the user must see to it."""
+def _lock(file: IO[bytes], folder: Path, kind: str) -> None:
+    """Refuse a second one at the same time; where the system has no such locks, the user must see to it."""
     with suppress(ImportError):
         import fcntl
 
@@ -108,5 +124,5 @@ def _lock(file: IO[bytes], folder: Path) -> None:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except OSError as error:
             raise OutputError(
-                f"Another sweep is writing to {folder}; wait for it, or end it.", culprit=str(folder)
+                f"Another {kind} is writing to {folder}; wait for it, or end it.", culprit=str(folder)
             ) from error

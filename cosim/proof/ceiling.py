@@ -1,0 +1,69 @@
+"""The best that could be done: the true structure, refitted on the training recordings, on the held-out one.
+
+The names of what was concealed are given away, the numbers are not: they are the start of the fit. Friction stays the
+law of the card, also where slip blocks made the recordings: a better law is no effect.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from cosim.diagnosis.fit import fit
+from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare
+from cosim.diagnosis.protocol import CLEAR_MOTION, heldout_rms
+from cosim.diagnosis.sanity import is_held
+from cosim.proof.tool import given
+from pyfmi_models.effects import CATALOGUE, Effect
+from pyfmi_models.friction import MemorylessLaw
+from pyfmi_models.mount import Mount
+
+SINES = ("cogging", "position_friction")
+"""Effects whose waves the generator writes as sines; in a card they are cosines."""
+EVALUATIONS = 60
+
+
+def in_card_words(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """The true parameters of an effect with the phase as a card has it."""
+    numbers = dict(entry["parameters"])
+    if entry["effect"] in SINES and "phase" in numbers:
+        numbers["phase"] = float((numbers["phase"] - pi / 2 + pi) % (2 * pi) - pi)
+    return numbers
+
+
+def ceiling(folder: str, entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """{"heldout_rms": x}, or {"reason": why there is none}, for the effects of a truth."""
+    if foreign := [entry["effect"] for entry in entries if not entry["listed"]]:
+        return {"reason": f"{foreign[0]} has no structure in the library"}
+    if any("phases" in entry["parameters"] for entry in entries):
+        return {"reason": "its phase is another in each recording, and one structure is fitted to all"}
+    effects = [true_effect(entry) for entry in entries]
+    if beyond := [effect.id for effect in effects if not is_held(effect)]:
+        return {"reason": f"the torque that a motion needs is not defined with {beyond[0]}"}
+    card, train, held = given(folder)
+    mount, prepared = card.plant(), prepare(train, choose_cutoff(train, card.mount.inertia))
+    grown = replace(mount, effects=(*mount.effects, *effects))
+    found = fit(grown, prepared.pieces, _weight(grown, prepared), mount, EVALUATIONS)
+    return {"heldout_rms": heldout_rms(held, found.mount)}
+
+
+def true_effect(entry: Mapping[str, Any]) -> Effect:
+    """An effect of the library with the true numbers."""
+    numbers = in_card_words(entry)
+    form = max(CATALOGUE[entry["effect"]], key=lambda form: len(_names(form) & set(numbers)))
+    kept = {name: numbers[name] for name in _names(form) & set(numbers)}
+    return form(**{name: tuple(value) if isinstance(value, list) else value for name, value in kept.items()})
+
+
+def _names(form: type[Effect]) -> set[str]:
+    return {one.name for one in fields(form)}
+
+
+def _weight(mount: Mount, prepared: Prepared) -> Array:
+    """Rows at rest tell nothing where friction has no memory, of the law's own or by presliding."""
+    v = np.abs(prepared.stacked("v"))
+    bends = any(effect.id == "presliding" for effect in mount.effects)
+    remembers = bends or not isinstance(mount.friction, MemorylessLaw)
+    return np.ones(len(v)) if remembers else np.asarray(v > CLEAR_MOTION * v.max(), float)
