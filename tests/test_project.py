@@ -23,6 +23,8 @@ START = "python3 -m venv .venv && .venv/bin/pip install . && .venv/bin/cosim dem
 TEST = ".venv/bin/pip install '.[test]' && .venv/bin/pytest"
 PACKAGES = {"cosim": cosim, "pyfmi_models": pyfmi_models}
 SOURCES = [path for name in PACKAGES for path in (ROOT / name).rglob("*")]
+CALLED = {"sklearn": "scikit-learn"}
+"""Optional packages that are installed by another name than they are imported by."""
 BUILT = {".so", ".dylib", ".dll", ".pyc"}
 
 
@@ -99,7 +101,7 @@ def test_what_is_imported_is_required() -> None:
     required = {re.split(r"[^\w-]", one)[0].lower() for one in stated} | {"hatchling"}
     providers = packages_distributions()
     for module, path in sorted(imported().items()):
-        names = {one.lower() for one in providers.get(module, [module])}
+        names = {one.lower() for one in providers.get(module, [CALLED.get(module, module)])}
         assert names & required, f"{path} imports {module}, which pyproject.toml does not require"
 
 

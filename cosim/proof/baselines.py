@@ -11,11 +11,12 @@ packages, or a round number stated here.
 """
 
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from cosim.diagnosis.result import Trace
 from cosim.errors import MissingPackageError
 
 Array = npt.NDArray[np.float64]
@@ -34,18 +35,7 @@ CENTRES = 800
 """Rows that a kernel is placed at."""
 
 
-class Signals(Protocol):
-    """A recording as a diagnosis shows it: one value a row; `missing` is what the refitted base leaves."""
-
-    name: str
-    heldout: bool
-    t: Array
-    q: Array
-    v: Array
-    missing: Array
-
-
-def compared(traces: Sequence[Signals]) -> dict[str, dict[str, Any]]:
+def compared(traces: Sequence[Trace]) -> dict[str, dict[str, Any]]:
     """Held-out RMS and alarm of each baseline: {"refit": {"heldout_rms", "alarm"}, ...}; a missing package is said."""
     train = [trace for trace in traces if not trace.heldout]
     (held,) = (trace for trace in traces if trace.heldout)
@@ -63,7 +53,7 @@ def rms(x: Array) -> float:
     return float(np.sqrt(np.mean(x**2)))
 
 
-def features(trace: Signals) -> Array:
+def features(trace: Trace) -> Array:
     """Position, speed, acceleration, direction, logarithm of the time since the last reversal."""
     direction = np.sign(trace.v)
     turned = np.flatnonzero(np.diff(direction, prepend=direction[:1]) != 0)
@@ -72,7 +62,7 @@ def features(trace: Signals) -> Array:
     return np.column_stack([trace.q, trace.v, np.gradient(trace.v, trace.t), direction, np.log(since + 1e-2)])
 
 
-def terms(trace: Signals, top: float) -> Array:
+def terms(trace: Trace, top: float) -> Array:
     """The library of the sparse regression: what a control engineer would write down; `top` is the highest speed."""
     q, v, a, direction, _ = features(trace).T
     slow = direction * np.exp(-np.abs(v) / (0.05 * top))
@@ -82,7 +72,7 @@ def terms(trace: Signals, top: float) -> Array:
     return np.column_stack([*plain, *waves, *rubbing])
 
 
-def _sindy(train: Sequence[Signals], held: Signals) -> dict[str, Any]:
+def _sindy(train: Sequence[Trace], held: Trace) -> dict[str, Any]:
     optimizer = _stlsq()
     top = max(float(np.abs(trace.v).max()) for trace in train)
     columns = np.concatenate([terms(trace, top) for trace in train])[::EVERY]
@@ -102,7 +92,7 @@ def _stlsq() -> Any:
     return STLSQ(threshold=THRESHOLD)
 
 
-def _regression(train: Sequence[Signals], held: Signals) -> dict[str, Any]:
+def _regression(train: Sequence[Trace], held: Trace) -> dict[str, Any]:
     kind, fit = _regressor()
     model = fit(*_stacked(train))
     gains = [_left_out(train, one, fit) for one in train] if len(train) > 1 else [0.0]
@@ -110,13 +100,13 @@ def _regression(train: Sequence[Signals], held: Signals) -> dict[str, Any]:
     return {"heldout_rms": rms(held.missing - model(features(held))), "alarm": alarm, "kind": kind}
 
 
-def _left_out(train: Sequence[Signals], one: Signals, fit: Callable[[Array, Array], Model]) -> float:
+def _left_out(train: Sequence[Trace], one: Trace, fit: Callable[[Array, Array], Model]) -> float:
     """Share of the RMS of one recording that a model of the others takes away."""
     model = fit(*_stacked([other for other in train if other is not one]))
     return 1 - rms(one.missing - model(features(one))) / rms(one.missing)
 
 
-def _stacked(traces: Sequence[Signals]) -> tuple[Array, Array]:
+def _stacked(traces: Sequence[Trace]) -> tuple[Array, Array]:
     rows = np.concatenate([features(trace) for trace in traces])[::EVERY]
     return rows, np.concatenate([trace.missing for trace in traces])[::EVERY]
 

@@ -2,10 +2,11 @@
 
 import hashlib
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor, as_completed, wait
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from time import sleep
 from typing import Any
 
 import cosim
@@ -79,8 +80,9 @@ def conduct(
 
 
 def _check(deck: Deck, workers: int | None) -> None:
-    for name, value, least in (("--cases", deck.cases, 1), ("--workers", workers or 1, 1), ("--seed", deck.seed, 0)):
-        if value < least:
+    wished = (("--cases", deck.cases, 1), ("--seed", deck.seed, 0), ("--workers", workers, 1))
+    for name, value, least in wished:
+        if value is not None and value < least:
             raise ProofError(f"{name} {value}: it must be at least {least}.", culprit=name, value=value)
     if deck.seconds < LEAST_SECONDS:
         text = f"--seconds {deck.seconds:g}: a recording must last {LEAST_SECONDS:g} s at least."
@@ -106,8 +108,9 @@ def _played(table: Table, hands: Sequence[Hand], workers: int) -> Generator[Row,
             yield future.result()
     finally:
         threads.shutdown(wait=False, cancel_futures=True)
-        while wait(pending, timeout=0.1).not_done:
+        while not all(future.done() for future in pending):
             table.close()  # again and again: a thread may just have begun a process
+            sleep(0.05)
         table.close()
 
 

@@ -5,6 +5,7 @@ wherever an answer was due.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from math import pi
 from typing import Any
 
@@ -147,7 +148,7 @@ def iou(one: Spans, other: Spans, window: Sequence[float] | None = None) -> floa
     sets = [[(max(a, low), min(b, high)) for a, b in spans if min(b, high) > max(a, low)] for spans in (one, other)]
     edges = sorted({edge for spans in sets for span in spans for edge in span})
     both = either = 0.0
-    for a, b in zip(edges, edges[1:], strict=False):
+    for a, b in pairwise(edges):
         inside = [any(x <= a and b <= y for x, y in spans) for spans in sets]
         both += (b - a) * all(inside)
         either += (b - a) * any(inside)

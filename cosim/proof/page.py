@@ -29,7 +29,7 @@ from cosim.files import replacing
 from cosim.proof import marks, score
 from cosim.proof.deck import SHARES
 from cosim.proof.figures import draw_calibration, draw_confusion, draw_gaps
-from cosim.proof.seal import Row
+from cosim.proof.marks import Row
 
 FIGURES = ("confusion.svg", "calibration.svg", "gap.svg")
 MADE = ("deck.json", "runs.jsonl", "seals.jsonl", "proof.json", "cases.csv", "README.md", *FIGURES)

@@ -193,7 +193,7 @@ def baselines(rows: Rows) -> list[dict[str, Any]]:
 
 def _baseline(rows: Rows, name: str) -> dict[str, Any]:
     nothing, something = kind(rows, "none"), kind(rows, "one", "several", "outside")
-    found = {"baseline": name, "skipped": _skipped(rows, name)}
+    found: dict[str, Any] = {"baseline": name, "skipped": _skipped(rows, name)}
     for key, cases in (("nothing", nothing), ("something", something)):
         gains = [gain for row in cases if (gain := marks.gain(row, name)) is not None]
         alarms = [alarm for row in cases if (alarm := marks.raises_alarm(row, name)) is not None]
