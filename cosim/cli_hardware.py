@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cosim.cli_firmware import firmware
+from cosim.cli_supervisor import alpaca
 from cosim.terminal import put, put_json, say
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 app = typer.Typer(no_args_is_help=True, help="The same controller on a machine.")
 app.command()(firmware)
+app.command()(alpaca)
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A scenario (.toml) or the name of a shipped one: sidereal.")]
 MachineOption = Annotated[str, typer.Option("--machine", help="A machine (.toml) or a shipped one: simulated.")]

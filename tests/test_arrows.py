@@ -24,6 +24,7 @@ RUNNERS = (
     "renamed",
     "signals",
     "hardware",
+    "supervisor",
     "wiring",
     "algorithm",
     "schedule",

@@ -1,0 +1,347 @@
+"""A program of an observatory, here ASCOM's own Python client, points the simulated mount over Alpaca."""
+
+import http.client
+import json
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from math import degrees, radians
+from pathlib import Path
+from time import monotonic, sleep
+from typing import Any
+from urllib.parse import urlencode
+from urllib.request import Request, urlopen
+
+import numpy as np
+import pytest
+
+from cosim.cli_cache import with_fmus
+from cosim.errors import OutputError, ScenarioError
+from cosim.recording import Recording
+from cosim.scenario import read_scenario
+from cosim.supervisor.alpaca import ABSENT, Server
+from cosim.supervisor.guide import Guide, still
+from cosim.supervisor.mount import Limits, SimulatedMount
+from cosim.supervisor.sky import equatorial, horizontal, sidereal_time
+from cosim.supervisor.telescope import HORIZON, Telescope
+
+SPEED, ARCSEC = 20.0, 1 / 3600
+QUICK = Limits(velocity=radians(10), acceleration=radians(10))
+BEGUN = datetime(2026, 11, 21, 20, tzinfo=UTC)
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    with (
+        SimulatedMount(with_fmus(read_scenario("two_axis")), limits=QUICK, speed=SPEED) as mount,
+        Server(Telescope(mount, radians(9.0), BEGUN), port=0, discovery=0) as one,
+    ):
+        yield one
+
+
+@pytest.fixture
+def telescope(server: Server) -> Iterator[Any]:
+    """The client's telescope, connected, unparked, at rest, not tracking."""
+    alpaca = pytest.importorskip("alpaca.telescope", reason="alpyca is not installed (pip install '.[alpaca]')")
+    one = alpaca.Telescope(f"127.0.0.1:{server.port}", 0)
+    one.Connected = True
+    until(lambda: not one.Slewing)
+    one.Unpark()
+    one.Tracking = False
+    yield one
+    until(lambda: not one.Slewing)
+
+
+def until(done: Callable[[], bool], seconds: float = 20.0) -> None:
+    last = monotonic() + seconds
+    while not done():
+        assert monotonic() < last
+        sleep(0.01)
+
+
+def axis(number: int) -> Any:
+    from alpaca.telescope import TelescopeAxes
+
+    return TelescopeAxes(number)
+
+
+def go(telescope: Any, azimuth: float, altitude: float) -> None:
+    telescope.SlewToAltAzAsync(azimuth, altitude)
+    assert telescope.Slewing
+    until(lambda: not telescope.Slewing)
+    sleep(0.1)
+
+
+def test_a_slew_to_a_direction_ends_there(telescope: Any) -> None:
+    go(telescope, 200.0, 60.0)
+    assert telescope.Azimuth == pytest.approx(200.0, abs=10 * ARCSEC)
+    assert telescope.Altitude == pytest.approx(60.0, abs=10 * ARCSEC)
+
+
+def test_a_slew_to_a_star_ends_on_it_and_follows_it_at_the_sidereal_rate(telescope: Any) -> None:
+    go(telescope, 150.0, 50.0)
+    telescope.Tracking = True
+    star = (telescope.SiderealTime + 1.0) % 24, 30.0
+    telescope.SlewToCoordinatesAsync(*star)
+    assert telescope.Slewing
+    assert telescope.Tracking
+    until(lambda: not telescope.Slewing)
+    sleep(0.1)
+    first, begun = telescope.Azimuth, telescope.SiderealTime
+    for _ in range(3):
+        assert telescope.RightAscension == pytest.approx(star[0], abs=20 * ARCSEC / 15)
+        assert telescope.Declination == pytest.approx(star[1], abs=10 * ARCSEC)
+        sleep(0.1)
+    assert (telescope.TargetRightAscension, telescope.TargetDeclination) == star
+    turned, passed = telescope.Azimuth - first, 15 * (telescope.SiderealTime - begun)
+    assert turned > 0.5 * passed > 10 * ARCSEC
+
+
+def test_tracking_from_rest_keeps_the_star_in_view_and_without_it_the_sky_moves_on(telescope: Any) -> None:
+    go(telescope, 180.0, 45.0)
+    before, begun = telescope.RightAscension, telescope.SiderealTime
+    until(lambda: telescope.SiderealTime > begun + 4 / 3600)
+    drift = telescope.RightAscension - before
+    assert drift == pytest.approx(telescope.SiderealTime - begun, rel=0.2)
+    telescope.Tracking = True
+    until(lambda: not telescope.Slewing)
+    sleep(0.1)
+    before, begun = telescope.RightAscension, telescope.SiderealTime
+    until(lambda: telescope.SiderealTime > begun + 4 / 3600)
+    assert abs(telescope.RightAscension - before) < 5 * ARCSEC / 15
+
+
+def test_an_abort_stops_a_slew_on_its_way_and_goes_on_tracking(telescope: Any) -> None:
+    go(telescope, 180.0, 45.0)
+    telescope.SlewToAltAzAsync(90.0, 45.0)
+    until(lambda: telescope.Azimuth < 175)
+    telescope.AbortSlew()
+    until(lambda: not telescope.Slewing)
+    stopped = telescope.Azimuth
+    assert 95 < stopped < 176
+    sleep(0.1)
+    assert telescope.Azimuth == pytest.approx(stopped, abs=10 * ARCSEC)
+    telescope.Tracking = True
+    telescope.SlewToCoordinatesAsync(telescope.RightAscension, telescope.Declination - 10)
+    telescope.AbortSlew()
+    until(lambda: not telescope.Slewing)
+    assert telescope.Tracking
+
+
+def test_a_parked_mount_goes_home_and_refuses_to_move(telescope: Any) -> None:
+    from alpaca.exceptions import ParkedException
+
+    go(telescope, 170.0, 80.0)
+    telescope.Park()
+    until(lambda: telescope.AtPark)
+    assert telescope.Altitude == pytest.approx(86.0, abs=0.1)
+    for refused in (
+        lambda: telescope.SlewToAltAzAsync(1.0, 45.0),
+        lambda: telescope.SlewToCoordinatesAsync(1.0, 45.0),
+        lambda: setattr(telescope, "Tracking", True),
+        lambda: telescope.MoveAxis(axis(0), 1.0),
+        telescope.AbortSlew,
+    ):
+        with pytest.raises(ParkedException):
+            refused()
+    telescope.Park()
+    telescope.Unpark()
+    assert not telescope.AtPark
+    assert not telescope.Tracking
+
+
+def test_an_axis_moves_by_hand_until_its_rate_is_zero(telescope: Any) -> None:
+    go(telescope, 180.0, 45.0)
+    telescope.MoveAxis(axis(0), 1.5)
+    until(lambda: telescope.Azimuth > 183.0)
+    assert telescope.Slewing
+    telescope.MoveAxis(axis(0), 0.0)
+    until(lambda: not telescope.Slewing)
+    assert 183.0 < telescope.Azimuth < 200.0
+    assert telescope.AxisRates(axis(0))[0].Maximum == 2.0
+    assert [telescope.CanMoveAxis(axis(one)) for one in range(3)] == [True, True, False]
+    assert telescope.Altitude == pytest.approx(45.0, abs=10 * ARCSEC)
+
+
+def test_what_moves_down_by_hand_stops_above_the_horizon(telescope: Any) -> None:
+    go(telescope, 180.0, 12.0)
+    telescope.MoveAxis(axis(1), -2.0)
+    until(lambda: not telescope.Slewing)
+    assert -5 < telescope.Altitude - degrees(HORIZON) < 0.1
+    go(telescope, 180.0, 45.0)
+
+
+def test_errors_are_those_of_the_standard(telescope: Any) -> None:
+    from alpaca import exceptions
+    from alpaca.telescope import DriveRates as rates
+
+    with pytest.raises(exceptions.InvalidOperationException, match="Tracking must be on"):
+        telescope.SlewToCoordinatesAsync(1.0, 45.0)
+    telescope.Tracking = True
+    with pytest.raises(exceptions.InvalidOperationException, match="Tracking must be off"):
+        telescope.SlewToAltAzAsync(180.0, 45.0)
+    with pytest.raises(exceptions.InvalidValueException, match="TargetRightAscension 25 is outside 0 to 24"):
+        telescope.SlewToCoordinatesAsync(25.0, 45.0)
+    with pytest.raises(exceptions.InvalidOperationException, match=r"is outside 5 to 89\.5 deg"):
+        telescope.SlewToCoordinatesAsync(telescope.SiderealTime, -60.0)
+    with pytest.raises(exceptions.InvalidValueException):
+        telescope.MoveAxis(axis(0), 3.0)
+    with pytest.raises(exceptions.InvalidValueException):
+        telescope.TrackingRate = rates(1)
+    with pytest.raises(exceptions.NotImplementedException):
+        telescope.FindHome()
+    with pytest.raises(exceptions.NotImplementedException):
+        telescope.SiteLatitude = 5.0
+    with pytest.raises(exceptions.ActionNotImplementedException):
+        telescope.Action("dance", "")
+    telescope.Connected = False
+    with pytest.raises(exceptions.NotConnectedException):
+        telescope.Altitude  # noqa: B018
+    telescope.Connected = True
+
+
+def test_what_it_is_and_can_is_told(telescope: Any) -> None:
+    telescope.Connect()
+    assert not telescope.Connecting
+    assert telescope.InterfaceVersion == 4
+    assert telescope.Name == "mount-cosim simulated mount"
+    assert telescope.SiteLatitude == pytest.approx(49.0)
+    assert telescope.SiteLongitude == pytest.approx(9.0)
+    assert telescope.CanSlewAsync
+    assert not telescope.CanSlew
+    assert [int(rate) for rate in telescope.TrackingRates] == [0]
+    assert telescope.AlignmentMode.value == 0
+    assert telescope.EquatorialSystem.value == 1
+    assert telescope.UTCDate.replace(tzinfo=UTC) > BEGUN
+    state = {one["Name"]: one["Value"] for one in telescope.DeviceState}
+    assert {"Altitude", "Slewing", "UTCDate", "TimeStamp"} <= set(state)
+
+
+def test_clients_find_the_server_and_its_device(server: Server, telescope: Any) -> None:
+    from alpaca import management
+
+    assert server.discovery is not None
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
+        asking.settimeout(5)
+        asking.sendto(b"alpacadiscovery1", server.discovery.getsockname())
+        assert json.loads(asking.recv(100)) == {"AlpacaPort": server.port}
+    address = f"127.0.0.1:{server.port}"
+    assert management.apiversions(address) == [1]
+    assert management.description(address)["ServerName"] == "mount-cosim"
+    (device,) = management.configureddevices(address)
+    assert (device["DeviceType"], device["DeviceNumber"]) == ("Telescope", 0)
+
+
+def request(server: Server, method: str, path: str, **given: Any) -> tuple[int, str]:
+    text = urlencode(given)
+    wire = http.client.HTTPConnection("127.0.0.1", server.port, timeout=5)
+    wire.request(method, f"{path}?{text}" if method == "GET" else path, None if method == "GET" else text)
+    answer = wire.getresponse()
+    found = answer.status, answer.read().decode()
+    wire.close()
+    return found
+
+
+BASE = "/api/v1/telescope/0/"
+
+
+def test_a_request_that_cannot_be_understood_is_a_400_with_a_sentence(server: Server) -> None:
+    request(server, "PUT", f"{BASE}connected", Connected="True")
+    for method, path, given, sentence in (
+        ("GET", "/api/v1/telescope/1/altitude", {}, "is not here"),
+        ("GET", "/api/v1/camera/0/gain", {}, "is not here"),
+        ("GET", f"{BASE}dance", {}, "a telescope has no member dance"),
+        ("GET", f"{BASE}_sky", {}, "no member _sky"),
+        ("GET", f"{BASE}watch", {}, "no member watch"),
+        ("GET", f"{BASE}park", {}, "park is called by PUT"),
+        ("GET", f"{BASE}altitude", {"ClientID": "me"}, 'ClientID = "me" is no int'),
+        ("GET", f"{BASE}altitude", {"ClientTransactionID": -1}, "32 bits without a sign"),
+        ("PUT", f"{BASE}tracking", {}, "Tracking is missing"),
+        ("PUT", f"{BASE}tracking", {"tracking": "True"}, "Tracking is missing"),
+        ("PUT", f"{BASE}tracking", {"Tracking": "yes"}, 'Tracking = "yes" is no bool'),
+        ("PUT", f"{BASE}moveaxis", {"Axis": 0, "Rate": "nan"}, 'Rate = "nan" is no float'),
+        ("PUT", f"{BASE}moveaxis", {"Axis": 0.5, "Rate": 0}, 'Axis = "0.5" is no int'),
+    ):
+        status, text = request(server, method, path, **given)
+        assert (status, sentence in text) == (400, True), (path, text)
+
+
+def test_transactions_are_counted_and_names_in_a_query_may_be_spelt_anyhow(server: Server) -> None:
+    request(server, "PUT", f"{BASE}connected", Connected="True")
+    first, second = (
+        json.loads(request(server, "GET", f"{BASE}axisrates", AXIS=0, clientid=3, CLIENTTRANSACTIONID=7)[1])
+        for _ in range(2)
+    )
+    assert first["ClientTransactionID"] == 7
+    assert second["ServerTransactionID"] == first["ServerTransactionID"] + 1
+    assert first["Value"] == [{"Minimum": 0.0, "Maximum": 2.0}]
+    for member in ABSENT:
+        for method in ("GET", "PUT"):
+            assert json.loads(request(server, method, f"{BASE}{member}")[1])["ErrorNumber"] == 0x400
+
+
+def test_a_port_that_is_taken_and_a_scenario_without_a_star_are_refused(server: Server) -> None:
+    with pytest.raises(OutputError, match=f"Port {server.port} of 127.0.0.1 cannot be served: address already in use"):
+        Server(Telescope.__new__(Telescope), port=server.port)
+    with pytest.raises(ScenarioError, match='needs one signal of kind "star" to guide, and this has 0'):
+        SimulatedMount(read_scenario("sidereal"))
+
+
+def test_set_points_never_jump_and_keep_the_limits_whatever_is_asked_when() -> None:
+    velocity, acceleration = np.array([0.07, 0.05]), np.array([0.04, 0.03])
+    guide, step, random = Guide(np.zeros(2), velocity, acceleration), 2e-3, np.random.default_rng(3)
+    found, now = [], 0.0
+    for _ in range(100):
+        if random.random() < 0.3:
+            guide.stop(now)
+        else:
+            guide.follow(still(random.uniform(-1, 1, 2)), now)
+        t = now + step * np.arange(1, 2 + int(random.integers(25, 4000)))
+        found.append(guide(t))
+        now = float(t[-1])
+    q, v, a = np.moveaxis(np.concatenate(found, axis=2), 1, 0)
+    assert (np.abs(v) <= 1.07 * velocity[:, np.newaxis]).all()
+    assert (np.abs(a) <= 1.001 * acceleration[:, np.newaxis]).all()
+    assert np.abs(np.diff(q) / step - (v[:, 1:] + v[:, :-1]) / 2).max() < 1e-5  # of the trapezoidal rule
+    assert np.abs(np.diff(v) / step - (a[:, 1:] + a[:, :-1]) / 2).max() < 1e-3
+
+
+def test_directions_and_places_on_the_sky_are_each_others_inverse() -> None:
+    random = np.random.default_rng(4)
+    for _ in range(100):
+        azimuth, altitude, latitude = random.uniform(0, 6.28), random.uniform(-1.5, 1.5), random.uniform(-1.5, 1.5)
+        back = horizontal(*equatorial(azimuth, altitude, latitude), latitude)
+        assert np.allclose(back, (azimuth, altitude), atol=1e-9)
+    # The pole stands at the latitude; due east on the horizon lies the equator, six hours before it culminates.
+    assert horizontal(1.0, np.pi / 2, 0.8)[1] == pytest.approx(0.8)
+    assert np.allclose(equatorial(np.pi / 2, 0.0, 0.8), (-np.pi / 2, 0.0), atol=1e-9)
+
+
+def test_sidereal_time_is_that_of_the_almanac() -> None:
+    # Meeus, example 12.b: 10 April 1987, 19h21m00s UT at Greenwich: 8h34m57.0896s.
+    found = sidereal_time(datetime(1987, 4, 10, 19, 21, tzinfo=UTC), 0.0)
+    assert degrees(found) / 15 == pytest.approx(8 + 34 / 60 + 57.0896 / 3600, abs=0.001 / 3600 * 15)
+
+
+def asked(address: str, member: str) -> float:
+    with urlopen(f"{address}/{member}", timeout=10) as answer:
+        return float(json.load(answer)["Value"])
+
+
+def test_the_command_serves_until_it_is_interrupted_and_completes_its_recording(tmp_path: Path) -> None:
+    words = ("hardware", "alpaca", "--port", "0", "--speed", "4", "--out", str(tmp_path))
+    with subprocess.Popen([sys.executable, "-m", "cosim", *words], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        address = process.stdout.readline().strip()
+        with urlopen(Request(f"{address}/connected", b"Connected=True", method="PUT"), timeout=10) as answer:
+            assert json.load(answer)["ErrorNumber"] == 0
+        begun = asked(address, "siderealtime")
+        until(lambda: asked(address, "siderealtime") > begun + 1 / 3600)
+        process.send_signal(signal.SIGINT)
+    assert process.returncode == 130
+    kept = Recording.read(tmp_path / "recording.parquet", required=())
+    assert kept.t[-1] > 0.5
+    assert np.ptp(np.degrees(kept["altitude_position"])) < 10 * ARCSEC, "it is parked"
