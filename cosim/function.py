@@ -147,13 +147,13 @@ class FunctionComponent:
         return self.step(time, size)
 
 
-def load_function(source: str, path: str, name: str) -> tuple[Callable[..., Any], dict[str, Any]]:
-    """Return the function that `file.py:name` means, and its origin; `path` and `name` of the scenario for messages.
+def load_function(source: str, where: str) -> tuple[Callable[..., Any], dict[str, Any]]:
+    """Return the function that `file.py:name` means, and its origin; `where` it stands, for messages.
 
     Raises:
         ScenarioError: there is no such file or function, or the file cannot be run.
     """
-    where = f'{path}: components.{name}.python = "{source}"'
+    where = f'{where} = "{source}"'
     file, _, attribute = source.rpartition(":")
     if not Path(file).is_file():
         raise ScenarioError(f'{where}: the file does not exist; write "file.py:function".', culprit=source)

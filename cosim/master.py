@@ -174,7 +174,7 @@ def _made(stack: ExitStack, name: str, section: ComponentSection, path: str) -> 
         wanted = section.interface
         return stack.enter_context(open_fmu(section.fmu, name, wanted)) if wanted else section.fmu
     assert section.python is not None  # the section has one source, and a card's FMU was asked for above
-    function, origin = load_function(section.python, path, name)
+    function, origin = load_function(section.python, f"{path}: components.{name}.python")
     return FunctionComponent(function, section.inputs, section.outputs, name, origin)
 
 

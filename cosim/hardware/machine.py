@@ -1,5 +1,6 @@
 """A machine file: which adapter, which limits, how the loop reacts. Every limit must be stated; times become cycles."""
 
+import re
 import tomllib
 from contextlib import suppress
 from importlib.resources import files
@@ -74,9 +75,11 @@ def _adapter(value: str) -> str:
     """Refuse what is no adapter."""
     parts = urlsplit(value)
     with suppress(ValueError):  # a port that is no number
-        if value == "simulated" or (parts.scheme == "udp" and parts.hostname and parts.port and not parts.path):
+        if parts.scheme == "udp" and parts.hostname and parts.port and not parts.path:
             return value
-    raise ValueError('an adapter is "simulated" or "udp://HOST:PORT"')
+    if value == "simulated" or re.fullmatch(r".+\.py:\w+", value):
+        return value
+    raise ValueError('an adapter is "simulated" or "udp://HOST:PORT" or "FILE.py:CLASS"')
 
 
 class Machine(_Section):
@@ -100,13 +103,20 @@ def read_machine(source: str | Path) -> Machine:
     """
     path, shipped = Path(source), files("cosim.hardware") / "machines" / f"{source}.toml"
     if path.is_file():
-        return parse_machine(path.read_text("utf-8"), str(source))
+        return _located(parse_machine(path.read_text("utf-8"), str(source)), path.parent)
     if shipped.is_file():
         return parse_machine(shipped.read_text("utf-8"), str(source))
     names = (one.name.removesuffix(".toml") for one in (files("cosim.hardware") / "machines").iterdir())
     choices = tuple(sorted(names))
     rule = f"a machine is a .toml file or one of: {', '.join(choices)}."
     raise HardwareError(f"{source}: no such machine; {rule}", culprit=str(source), choices=choices)
+
+
+def _located(machine: Machine, folder: Path) -> Machine:
+    """Take the file of an adapter in Python from where the machine file is."""
+    if ".py:" not in machine.adapter:
+        return machine
+    return machine.model_copy(update={"adapter": str(folder.resolve() / machine.adapter)})
 
 
 def parse_machine(text: str, path: str) -> Machine:

@@ -102,7 +102,7 @@ static void prepare(Session *session)
 EXPORT int64_t hardware_layout(void)
 {
     return (int64_t)(sizeof(Axis) + 3 * sizeof(Sample) + 5 * sizeof(Record) + 7 * sizeof(Session) + 11 * sizeof(Adapter) +
-                     13 * sizeof(Drive) + 17 * sizeof(Udp) + 19 * sizeof(Virtual));
+                     13 * sizeof(Drive) + 17 * sizeof(Udp) + 19 * sizeof(Virtual) + 23 * sizeof(Order));
 }
 
 /* Keeps the controller's state from before its first tick. */

@@ -21,6 +21,12 @@ class CFeedback(Structure):
     ]
 
 
+class COrder(Structure):
+    """What a drive shall do."""
+
+    _fields_ = [("tick", c_int64), ("controlword", c_uint32), ("reserved", c_uint32), ("torque", c_double)]
+
+
 class CAdapter(Structure):
     """The table of an adapter's functions."""
 
@@ -184,7 +190,7 @@ LAYOUT = sum(
     weight * sizeof(one)
     for weight, one in (
         *((1, CAxis), (3, CSample), (5, CRecord), (7, CSession), (11, CAdapter), (13, CDrive)),
-        *((17, CUdp), (19, CVirtual)),
+        *((17, CUdp), (19, CVirtual), (23, COrder)),
     )
 )
 """What hardware_layout() of a library that fits returns."""

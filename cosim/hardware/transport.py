@@ -3,6 +3,7 @@
 from typing import Any, Protocol
 
 from cosim.hardware.machine import Machine
+from cosim.hardware.python_adapter import PythonTransport, load_adapter
 from cosim.hardware.simulated import SimulatedDrive
 from cosim.hardware.structures import CAdapter
 from cosim.hardware.udp import UdpDrive
@@ -32,4 +33,6 @@ def open_transport(scenario: Scenario, machine: Machine, wired: Wired, fast: boo
     """
     if machine.adapter.startswith("udp://"):
         return UdpDrive(machine, scenario.step, fast)
+    if ".py:" in machine.adapter:
+        return PythonTransport(load_adapter(machine.adapter, scenario.step))
     return SimulatedDrive(scenario, machine, wired)
