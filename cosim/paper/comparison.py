@@ -91,8 +91,13 @@ class Comparison:
         return [row for row in self.rows if row.condition == key]
 
 
-def compare(workshop: Workshop, plan: Plan, progress: Progress = lambda done, of: None) -> Comparison:
-    """Search a design on the design seeds, then measure it and all options on the test seeds."""
+def compare(
+    workshop: Workshop, plan: Plan, known: Study | None = None, progress: Progress = lambda done, of: None
+) -> Comparison:
+    """Search a design on the design seeds, then measure it and all options on the test seeds.
+
+    What is `known` already of conditions, cases and test seeds is not run again.
+    """
     tried = tuple(_tried(workshop, plan, progress))
     chosen = choice(tried)
     best = [one.option for one in frontier(one for one in tried if one.option.knows == "nominal")]
@@ -101,7 +106,7 @@ def compare(workshop: Workshop, plan: Plan, progress: Progress = lambda done, of
         plan=plan,
         designs=tried,
         chosen=chosen,
-        rows=tuple(_rows(workshop, _places(compared, best), plan.seeds, progress)),
+        rows=tuple(_rows(workshop, _places(compared, best), plan.seeds, known, progress)),
         survivals=tuple(_survivals(workshop, compared, plan, progress)),
     )
 
@@ -114,10 +119,10 @@ def _places(compared: Sequence[Option], best: Sequence[Option]) -> list[Pair]:
     """List what is measured on the test seeds."""
     most = 10**9
     found = [(condition(key), one, most) for key in (A, B) for one in compared]
-    found += [(condition(A), one, most) for one in best]
+    found += [(condition(A), one, FEW) for one in best]
     learners = [one for one in (REFERENCE, ADAPTING, LEARNING) if one in compared]
     for key in (A, B) if len(learners) > 1 else ():
-        found += [(settled(condition(key)), one, 2 * FEW) for one in learners]
+        found += [(settled(condition(key)), one, FEW) for one in learners]
         found += [(repeating(settled(condition(key))), one, FEW) for one in learners]
     limits = [one for one in compared if one.key in ("C3a", "refitted", "chosen")]
     return found + [(repeating(condition(A)), one, FEW) for one in limits]
@@ -146,8 +151,14 @@ def _tried(workshop: Workshop, plan: Plan, progress: Progress) -> Iterator[Desig
         )
 
 
-def _rows(workshop: Workshop, pairs: Sequence[Pair], seeds: Sequence[int], progress: Progress) -> Iterator[Row]:
-    found = Ratios(performed(list(planned(workshop, pairs, seeds)), progress))
+def _rows(
+    workshop: Workshop, pairs: Sequence[Pair], seeds: Sequence[int], known: Study | None, progress: Progress
+) -> Iterator[Row]:
+    cases = {REFERENCE.key, "C2a"}  # these controllers are the paper's cases as they are
+    done = [trial for trial in (known.trials if known else ()) if trial.case in cases]
+    ready = {(trial.condition, trial.case, trial.seed) for trial in done}
+    wanted = [(place, job) for place, job in planned(workshop, pairs, seeds) if place not in ready]
+    found = Ratios(Study(trials=(*done, *performed(wanted, progress).trials), seeds=tuple(seeds)))
     for where, option, _ in pairs:
         ratios, cost = found.ratios(where.key, option.key), price(option.under(where))
         yield Row(

@@ -12,18 +12,18 @@ import numpy as np
 from cosim.paper.comparison import A, B, Comparison, Row
 from cosim.paper.conditions import condition
 from cosim.paper.experiment import ARCSEC
-from cosim.paper.figures import figure
 from cosim.paper.frontier import GAIN, PHASE, Design, frontier
 from cosim.paper.margins import Complexes, Floats, Linear
 from cosim.paper.price import loops
+from cosim.pictures.sheet import figure, plain_logs
 from cosim.pictures.style import AFTER, BEFORE, GREY, LINE, MEASURED, SHADE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-DRAWN = ("C3a", "third_400", "fourth_220", "chosen")
+DRAWN = ("C3a", "third_400_30", "fourth_220", "chosen")
 """Controllers whose loops are drawn."""
-COLOURS = {"C3a": MEASURED, "third_400": "#7A8791", "fourth_220": BEFORE, "chosen": AFTER}
+COLOURS = {"C3a": MEASURED, "third_400_30": "#7A8791", "fourth_220": BEFORE, "chosen": AFTER}
 MARKERS = {3: "o", 4: "s"}
 APART = 0.055
 """Least distance of two labels, as a share of the axis."""
@@ -56,6 +56,7 @@ def draw_gain(found: Comparison, path: Path, force: bool) -> None:
         axes[0, 0].set_ylabel("ISE / ISE of C3a")
         axes[0, 0].axvspan(PHASE, axes[0, 0].get_xlim()[1], 0, _height(axes[0, 0], GAIN), color=SHADE, zorder=0)
         axes[0, 1].legend(frameon=False, loc="upper right")
+        plain_logs(*axes[0])
 
 
 def _height(axes: "Axes", value: float) -> float:
@@ -113,6 +114,7 @@ def draw_loops(found: Comparison, path: Path, force: bool) -> None:
         axes[2].set(xscale="log", yscale="log", title="error per torque [arcsec per N m]", xlabel="[rad/s]")
         for one in axes[1:]:
             one.grid(True)
+        plain_logs(*axes)
 
 
 def _loop(plant: Linear, controller: Linear, omega: Floats) -> Complexes:

@@ -3,17 +3,16 @@
 matplotlib is imported on use only.
 """
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cosim.files import replacing
 from cosim.paper.experiment import Floats
 from cosim.paper.study import Study
-from cosim.pictures.style import AFTER, BEFORE, GREY, MEASURED, STYLE
+from cosim.pictures.sheet import figure
+from cosim.pictures.style import AFTER, BEFORE, GREY, MEASURED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,23 +20,8 @@ if TYPE_CHECKING:
 NUMBERS = {"C1": 7, "C2a": 8, "C2b": 9, "C3a": 10, "C3b": 11}
 """The paper's number of the figure of a case."""
 COLUMNS = {"base": "base, no noise", "realistic_observer": "realistic B, first seed"}
-SIZES: Any = {"font.size": 10, "axes.titlesize": 10, "axes.labelsize": 9, "xtick.labelsize": 9, "ytick.labelsize": 9}
 EVERY = 2
 """Kept samples for each drawn one: 20 ms."""
-
-
-@contextmanager
-def figure(path: Path, rows: int, columns: int, size: tuple[float, float], force: bool) -> Iterator[tuple[Any, Any]]:
-    """Yield a figure and its axes (a 2-D array), and write it as SVG when the block ends well."""
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    with mpl.rc_context({**STYLE, **SIZES}):
-        sheet = Figure(figsize=size, layout="constrained")
-        axes = sheet.subplots(rows, columns, squeeze=False)
-        yield sheet, axes
-        with replacing(path, force) as partial:
-            sheet.savefig(partial, format="svg", metadata={"Date": None, "Creator": None})
 
 
 def tracking_figures(study: Study, inertia: float, folder: Path, force: bool = False) -> list[Path]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cosim.identify.friction_map import Samples
-from cosim.paper.figures import figure
 from cosim.paper.identification import CUT, PAPER_NOMINAL, PEAK, SIDES, Identification, curve, true_numbers
+from cosim.pictures.sheet import figure
 from cosim.pictures.style import AFTER, BEFORE, GREY, LINE, MEASURED
 
 if TYPE_CHECKING:

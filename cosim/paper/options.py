@@ -63,25 +63,12 @@ def options() -> tuple[Option, ...]:
     return (
         REFERENCE,
         Option(key="C2a", title="C2a, nominal friction", compensation="C2a"),
-        Option(key="blend", title="half C2a, half C3a", compensation="C2a+C3a"),
         Option(key="directional", title="C3a, friction by direction (Tables 2, 3)", knows="directional"),
         Option(key="refitted", title="C3a, refitted by direction", knows="plant"),
+        Option(key="blend", title="half C2a, half C3a", compensation="C2a+C3a"),
         Option(key="blend_refitted", title="half C2a, half C3a, refitted", compensation="C2a+C3a", knows="plant"),
-        *(
-            Option(
-                key=f"fourth_{bandwidth:.0f}",
-                title=f"C3a, observer of order 4 at {bandwidth:.0f} rad/s",
-                changes={"observer_order": 4, "observer_bandwidth": bandwidth},
-            )
-            for bandwidth in (120.0, 160.0, 220.0)
-        ),
-        Option(
-            key="fourth_220_alone",
-            title="no friction model, observer of order 4 at 220 rad/s",
-            compensation="C1",
-            changes={"observer_order": 4, "observer_bandwidth": 220.0},
-        ),
-        Option(key="third_400", title="C3a, observer of order 3 at 400 rad/s", changes={"observer_bandwidth": 400.0}),
+        _fourth(120.0),
+        _fourth(220.0),
         Option(
             key="third_400_30",
             title="C3a, order 3 at 400 rad/s, loop at 30 rad/s",
@@ -89,6 +76,13 @@ def options() -> tuple[Option, ...]:
         ),
         ADAPTING,
         LEARNING,
+    )
+
+
+def _fourth(bandwidth: float) -> Option:
+    changes = {"observer_order": 4, "observer_bandwidth": bandwidth}
+    return Option(
+        key=f"fourth_{bandwidth:.0f}", title=f"C3a, observer of order 4 at {bandwidth:.0f} rad/s", changes=changes
     )
 
 

@@ -66,7 +66,7 @@ def reproduce(
         workshop = Workshop(Path(folder))
         found = study(workshop, seeds, progress=progress)
         variants = study(workshop, seeds[:1], definitions())
-        comparison = compare(workshop, plan, progress) if plan else None
+        comparison = compare(workshop, plan, found, progress) if plan else None
     results = Results(found=found, variants=variants, identified=identification(seeds[0]), comparison=comparison)
     return write(out, results, command, force)
 
