@@ -70,8 +70,8 @@ def page(seed: int, tables: dict[str, list[dict[str, Any]]], found: Identified) 
         f"    {command(seed)}",
         "",
         f"Made by mount-cosim {cosim.__version__} on Python {platform.python_version()}; ratios to the true numbers.",
-        "The tables are also [tables.json](tables.json) and a CSV each. `cosim paper` draws the paper's own Figs. 4-6 and",
-        "writes its Tables 2 and 3: [results/paper](../paper/README.md).",
+        "The tables are also [tables.json](tables.json) and a CSV each. `cosim paper` draws the paper's own Figs. 4-6",
+        "and writes its Tables 2 and 3: [results/paper](../paper/README.md).",
         "",
         "## Asked and found",
         "",
@@ -95,9 +95,9 @@ def page(seed: int, tables: dict[str, list[dict[str, Any]]], found: Identified) 
         "",
         "## What `cosim identify` writes",
         "",
-        "From three recordings (15 s in closed loop, a step of 1 N m that friction holds, the quasi-static sine), 1e-7 rad",
-        "of encoder noise, and a card whose friction is wrong by up to a factor of two: [identify.json](identify.json),",
-        "[card.toml](card.toml), and a figure for each way.",
+        "From three recordings (15 s in closed loop, a step of 1 N m that friction holds, the quasi-static sine),",
+        "1e-7 rad of encoder noise, and a card whose friction is wrong by up to a factor of two:",
+        "[identify.json](identify.json), [card.toml](card.toml), and a figure for each way.",
         "",
         *table(rows),
         "",
@@ -125,7 +125,7 @@ def asked(tables: dict[str, list[dict[str, Any]]]) -> Iterator[dict[str, Any]]:
     yield {
         "number": "static curve, J q'' kept, cut at 4 mrad/s: largest error [N m]",
         "asked": "<= 0.05",
-        "found": max(row["curve error [N m]"] for row in kept),
+        "found": max(float(row["curve error [N m]"]) for row in kept),
     }
     for torque, wanted in ((1.0, "x 0.56, x 3.5"), (0.02, "x 1, x 1 within 2 to 3 %")):
         row = steps[torque]
