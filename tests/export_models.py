@@ -90,7 +90,18 @@ def undefined_below_zero():
                   states=(variable("level", start=1.0),), outputs=(variable("flow"),))  # fmt: skip
 
 
+def root_of_a_count():
+    """Count ticks, and show a root that is none after some of them: the middle of a step fails."""
+    t, x, u, p = symbols(1, 1, 1)
+    increment = variable("increment", start=1.0, low=0.0, high=2.0, tunable=False)
+    return finish("ticking_root", [t, x, u, p], [x + p], [ca.sqrt(u + 3 - x), x], period=1e-3,
+                  inputs=(variable("given", start=1.0),), parameters=(increment,), states=(variable("count"),),
+                  outputs=(variable("root"), variable("shown")))  # fmt: skip
+
+
 STATUS = ("ok", "warning", "discard", "error", "fatal")
+RESOURCES: bytes | None = b""
+"""Folder that an instance is told its resources lie in."""
 LOGGER2 = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
 LOGGER3 = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
 
@@ -108,9 +119,10 @@ class Callbacks2(ctypes.Structure):
 class Driver:
     """One instance behind the C interface of FMI 2 or 3, with the messages that it logged."""
 
-    def __init__(self, model: Model, library: Path, fmi: int, kind: str = "CS", token: str | None = None):
+    def __init__(self, model: Model, library: Path, fmi: int, kind: str = "CS", token: str | None = None, *,
+                 logging: bool = False):  # fmt: skip
         generated = generate(model)
-        self.fmi, self.messages = fmi, []
+        self.fmi, self.messages, self.logging = fmi, [], logging
         self.references = {row.variable.name: row.reference for row in generated.layout.rows}
         self.library = ctypes.CDLL(str(library))
         token = (generated.token if token is None else token).encode()
@@ -120,7 +132,9 @@ class Driver:
         logger = LOGGER2(lambda e, n, s, c, m: self.messages.append((STATUS[s], c.decode(), m.decode())))
         self.callbacks = Callbacks2(logger, None, None, None, None)
         self.library.fmi2Instantiate.restype = ctypes.c_void_p
-        return self.library.fmi2Instantiate(b"it", int(kind == "CS"), token, b"", ctypes.byref(self.callbacks), 0, 0)
+        return self.library.fmi2Instantiate(
+            b"it", int(kind == "CS"), token, RESOURCES, ctypes.byref(self.callbacks), 0, self.logging
+        )
 
     def _instantiate3(self, kind, token):
         self.callbacks = LOGGER3(lambda e, s, c, m: self.messages.append((STATUS[s], c.decode(), m.decode())))
@@ -128,7 +142,7 @@ class Driver:
         create.restype = ctypes.c_void_p
         extra = (False, False, None, ctypes.c_size_t(0)) if kind == "CS" else ()
         tail = (None,) if kind == "CS" else ()
-        return create(b"it", token, b"", False, False, *extra, None, self.callbacks, *tail)
+        return create(b"it", token, RESOURCES, False, self.logging, *extra, None, self.callbacks, *tail)
 
     def call(self, name, *arguments):
         """Call fmi<n><name> on the instance; return the status as a word."""

@@ -137,6 +137,7 @@ WRONG = {
     "gap": (lambda d: d.step(0.5, 1e-3), "leaves a gap: the model is at t = 0.01"),
     "no length": (lambda d: d.step(0.01, 0.0), "must be positive and finite"),
     "negative length": (lambda d: d.step(0.01, -1.0), "must be positive and finite"),
+    "lost in rounding": (lambda d: d.step(0.01, 1e-19), "is lost in rounding"),
     "length nan": (lambda d: d.step(0.01, nan), "must be positive and finite"),
     "time nan": (lambda d: d.step(nan, 0.1), "must be positive and finite"),
     "past the stop time": (lambda d: d.step(0.01, 5.0), "passes the stop time 1"),
@@ -260,3 +261,11 @@ def test_log_categories_can_be_chosen(fmi):
     assert driver.call("Terminate") == "ok"
     assert driver.messages == [("ok", "logEvents", "terminated mode at t = 0 s")]
     assert driver.call("SetDebugLogging", on, ctypes.c_size_t(1), (ctypes.c_char_p * 1)(b"gossip")) == "error"
+
+
+def test_with_logging_on_changes_of_mode_are_told_from_the_start(fmi):
+    driver = models.Driver(models.lugre(), library(models.lugre), fmi, logging=True).start()
+    assert [message[:2] for message in driver.messages] == [("ok", "logEvents")] * 2
+    assert driver.messages[-1][2] == "step mode at t = 0 s"
+    driver.call("SetDebugLogging", False, ctypes.c_size_t(0), None)
+    assert [driver.set("drive", nan), len(driver.messages)] == ["error", 2]

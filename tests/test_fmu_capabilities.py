@@ -2,6 +2,7 @@
 
 import ctypes
 import json
+import re
 import subprocess
 import sys
 import time
@@ -15,6 +16,7 @@ import pytest
 
 from pyfmi_models.export import build_library
 from pyfmi_models.export.build import compile_shared
+from pyfmi_models.export.codegen import SHIM
 from pyfmi_models.export.platforms import PLATFORMS, host
 
 both = pytest.mark.parametrize("fmi", [2, 3])
@@ -56,6 +58,14 @@ def test_a_serialized_state_continues_in_another_process():
     assert done.stdout.split() == here
 
 
+def test_a_state_serialized_in_one_version_of_fmi_goes_on_in_the_other():
+    """One archive binary serves both; the same bits."""
+    two, three = (instance(models.lugre, fmi, drive=4.0) for fmi in (2, 3))
+    content = two.run(0, 100, 1e-3).serialize(two.save())
+    assert three.restore(three.deserialize(content)) == "ok"
+    assert everything(three.run(0.1, 50, 1e-3)) == everything(two.run(0.1, 50, 1e-3))
+
+
 @both
 def test_an_instance_goes_on_from_a_state_of_another_however_far_it_went_itself(fmi):
     first, second = instance(models.lugre, fmi, drive=5.0), instance(models.lugre, fmi, drive=-3.0)
@@ -88,6 +98,19 @@ def test_there_is_no_global_state(make):
     sections = {line.split("]")[1].split()[0] for line in listing.splitlines() if "]" in line and "Nr]" not in line}
     assert ".text" in sections
     assert sections & {".data", ".bss", ".tdata", ".tbss"} == set()
+
+
+def test_only_instantiation_and_saving_a_state_allocate():
+    calls = {path.name: re.findall(r"\b(?:m|c|re)alloc\(", path.read_text()) for path in SHIM.glob("*.[ch]")}
+    assert {name: found for name, found in calls.items() if found} == {
+        "instance.c": ["calloc("],
+        "memory.c": ["malloc("],
+    }
+    assert library(models.lugre)  # what is asked of libc besides is in the table of its symbols
+    listing = subprocess.run(
+        ["nm", "-Du", str(library(models.lugre))], capture_output=True, text=True, check=True
+    ).stdout
+    assert not {line.split()[-1].split("@")[0] for line in listing.splitlines()} & {"exit", "abort", "printf", "fopen"}
 
 
 DRIVE = b"""
@@ -236,3 +259,81 @@ def test_a_call_is_allowed_in_the_modes_of_the_standard(mode, fmi):
         assert answers[name] or driver.messages, f"{name} is refused in silence"
     allowed = {name for name, is_allowed in answers.items() if is_allowed}
     assert allowed - ({"event"} if mode == "event" else set()) == MODES[mode]
+
+
+@both
+@pytest.mark.parametrize("make", [models.lugre, models.controller])
+def test_a_saved_state_is_that_of_its_point_whatever_was_asked_before(make, fmi):
+    driver = instance(make, fmi).run(0, 10, 1e-3)
+    before = driver.serialize(driver.save())
+    everything(driver)
+    assert driver.serialize(driver.save()) == before
+
+
+@both
+@pytest.mark.parametrize("kind", ["CS", "ME"])
+def test_a_tick_that_fails_takes_those_before_it_back(fmi, kind):
+    """Root of 4 - count: five ticks have one, the sixth has none."""
+    driver = instance(models.root_of_a_count, fmi, kind)
+    before = driver.serialize(driver.save())
+    if kind == "CS":
+        assert driver.step(0, 8e-3) == "error"
+    else:
+        driver.call("SetTime", 8e-3)
+        before = driver.serialize(driver.save())
+        room = ctypes.create_string_buffer(64)
+        flags = [ctypes.byref(ctypes.c_bool()) for _ in range(5)]
+        arguments = (room,) if fmi == 2 else (*flags, ctypes.byref(ctypes.c_double()))
+        assert driver.call("NewDiscreteStates" if fmi == 2 else "UpdateDiscreteStates", *arguments) == "error"
+    assert '"root" is not finite after the tick at t = 0.005' in driver.messages[-1][2]
+    assert driver.serialize(driver.save()) == before
+    assert list(driver.get("count")) == [0.0]
+
+
+@both
+def test_a_seed_that_is_not_finite_is_refused_by_name(fmi):
+    driver = instance(models.lugre, fmi)
+    names = ("torque", "speed")
+    torque, speed = (ctypes.byref(ctypes.c_uint(driver.references[name])) for name in names)
+    one, seed, result = ctypes.c_size_t(1), ctypes.byref(ctypes.c_double(float("nan"))), (ctypes.c_double * 1)()
+    lengths = (one,) if fmi == 3 else ()
+    arguments = (torque, one, speed, one, seed, *lengths, result, *lengths)
+    assert driver.call("GetDirectionalDerivative", *arguments) == "error"
+    assert driver.messages[-1][2] == 'the seed nan of "speed" is not finite'
+
+
+def test_an_importer_that_asks_for_event_mode_in_co_simulation_gets_a_sentence():
+    said, logger = [], models.LOGGER3(lambda e, status, category, message: said.append(message.decode()))
+    create = ctypes.CDLL(str(library(models.lugre))).fmi3InstantiateCoSimulation
+    create.restype = ctypes.c_void_p
+    token = models.generate(models.lugre()).token.encode()
+    none = (None, ctypes.c_size_t(0), None)
+    assert create(b"it", token, None, False, False, True, False, *none, logger, None) is None
+    assert said == ["event mode is not available in co-simulation"]
+
+
+@both
+def test_nothing_is_read_from_the_folder_of_resources(fmi, monkeypatch):
+    """There is none to miss: the same bits with a folder that does not exist, and without one."""
+    found = []
+    for folder in (b"file:///there/is/nothing", None):
+        monkeypatch.setattr(models, "RESOURCES", folder)
+        found.append(everything(instance(models.lugre, fmi, drive=5.0).run(0, 20, 1e-3)))
+    assert found[0] == found[1]
+
+
+@both
+def test_where_the_equations_have_no_value_model_exchange_may_try_a_smaller_step(fmi):
+    driver = instance(models.undefined_below_zero, fmi, "ME")
+    driver.call("EnterContinuousTimeMode")
+    assert driver.call("SetContinuousStates", ctypes.byref(ctypes.c_double(-1.0)), ctypes.c_size_t(1)) == "ok"
+    assert driver.get("flow") == "discard"
+    assert driver.call("SetContinuousStates", ctypes.byref(ctypes.c_double(4.0)), ctypes.c_size_t(1)) == "ok"
+    assert driver.get("flow") == 2.0
+
+
+@both
+def test_an_input_beyond_its_bounds_is_taken(fmi):
+    driver = instance(models.lugre, fmi)
+    assert driver.set("drive", 1000.0) == "ok"
+    assert driver.get("drive") == 1000.0

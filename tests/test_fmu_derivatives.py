@@ -120,6 +120,20 @@ def test_adjoint_and_directional_derivatives_are_one_matrix(make, data):
     assert abs(weights @ forward - back @ seed) <= 1e-12 * size + 1e-300
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_at_a_corner_a_derivative_is_of_one_side_or_between_both(fmi):
+    """The bristles' rate w - sigma0 |w| z / g(w) bends at w = 0."""
+    driver = initializing(models.lugre, fmi)
+    assert driver.set("speed", 0.0) == "ok"
+    found = ask(driver, "Directional", ["der(z)"], ["speed"], [1.0])[1][0]
+    sides, width = [], 1e-9
+    for side in (-width, width):
+        driver.set("speed", side)
+        sides.append(driver.get("der(z)")[0] / side)
+    assert sides[0] - sides[1] > 0.5
+    assert sides[1] - 1e-6 <= found <= sides[0] + 1e-6
+
+
 def test_a_subset_in_any_order_gives_the_same_entries():
     driver = initializing(rich, 3)
     unknowns, knowns = names_of(rich)

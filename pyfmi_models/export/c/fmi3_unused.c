@@ -14,8 +14,7 @@ static fmi3Status refuse(fmi3Instance c, size_t count, const char *what) {
     fmi3Status NAME(fmi3Instance c, const fmi3ValueReference r[], size_t count, POINTER values, size_t n) {   \
         (void)r;                                                                                              \
         (void)values;                                                                                         \
-        (void)n;                                                                                              \
-        return refuse(c, count, "variables of another type than Float64");                                    \
+        return refuse(c, count | n, "variables of another type than Float64");                                \
     }
 #define NO_CLOCK(NAME, FIRST)                                                                                 \
     fmi3Status NAME(fmi3Instance c, const fmi3ValueReference r[], size_t count, FIRST first) {                \
@@ -75,8 +74,7 @@ fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference r[], size_t co
     (void)sizes;
     (void)values;
     (void)r;
-    (void)n;
-    return refuse(c, count, "binary variables");
+    return refuse(c, count | n, "binary variables");
 }
 
 fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference r[], size_t count, const size_t sizes[],
@@ -84,8 +82,7 @@ fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference r[], size_t co
     (void)sizes;
     (void)values;
     (void)r;
-    (void)n;
-    return refuse(c, count, "binary variables");
+    return refuse(c, count | n, "binary variables");
 }
 
 fmi3Status fmi3GetIntervalDecimal(fmi3Instance c, const fmi3ValueReference r[], size_t count, fmi3Float64 intervals[],
@@ -128,8 +125,7 @@ fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference r[]
     (void)r;
     (void)orders;
     (void)values;
-    (void)n;
-    return refuse(c, count, "output derivatives");
+    return refuse(c, count | n, "output derivatives");
 }
 
 fmi3Status fmi3ActivateModelPartition(fmi3Instance c, fmi3ValueReference clock, fmi3Float64 time) {

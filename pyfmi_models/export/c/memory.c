@@ -24,10 +24,17 @@ static Status provide(Instance *instance, Memory **memory) {
     return *memory ? OK : fail(instance, FAILED, "no memory for a state of %zu bytes", memory_size());
 }
 
+/* What is calculated anew when it is asked for; outputs of a sampled model hold from tick to tick and are remembered. */
+static int first_forgotten(void) { return model.period > 0 ? model.size : model.size - model.rates - model.outputs; }
+
+/* One point, one state: what happens to have been calculated at it is left out. */
 Status save(Instance *instance, Memory **memory) {
     Status status = provide(instance, memory);
-    if (status == OK) memcpy(*memory, instance->memory, memory_size());
-    return status;
+    if (status != OK) return status;
+    memcpy(*memory, instance->memory, memory_size());
+    (*memory)->fresh = 0;
+    for (int i = first_forgotten(); i < model.size; i++) (*memory)->values[i] = 0;
+    return OK;
 }
 
 void release(Memory **memory) {
@@ -51,12 +58,12 @@ static int plausible(const Memory *memory) {
         if (!(times[i] > -INFINITY && times[i] < INFINITY)) return 0;
     for (int i = 0; i < model.size; i++) {
         const Variable *variable = &model.table[i];
-        if (variable->kind < RATE && !(fabs(values[i]) < INFINITY)) return 0;
+        if (!(fabs(values[i]) < INFINITY)) return 0;
         if (variable->kind == PARAMETER && !(values[i] >= variable->low && values[i] <= variable->high)) return 0;
     }
     int phase = memory->phase, alien = memory->interface == CO_SIMULATION ? EVENT + CONTINUOUS : STEP;
     if (phase <= 0 || phase >= ANY_PHASE || (phase & (phase - 1)) || (phase & alien)) return 0;
-    if (memory->fresh & ~(RATES_FRESH | OUTPUTS_FRESH)) return 0;
+    if (memory->fresh) return 0;
     if (memory->ticks < 0 || memory->ticks >= INT64_C(1) << 53 || (model.period > 0 && !resolves_ticks(memory->start))) return 0;
     return memory->tolerance > 0 && memory->step >= 0 && memory->stop >= memory->start;
 }

@@ -68,7 +68,7 @@ Advance solver_advance(Instance *instance, double start, double end) {
     for (int steps = 0; time < end; steps++) {
         double left = end - time, h = left <= 1.01 * proposed ? left : proposed;
         double square = attempt(instance, time, h, x, x_new);
-        int accepted = square <= 1, tiny = !accepted && h < 1e-15 * (fabs(time) + (end - start));
+        int accepted = square <= 1, tiny = !accepted && h <= 1e-15 * (fabs(time) + (end - start));
         if (tiny || steps >= model.most_steps) {
             Advance stuck = {tiny ? STEP_TOO_SMALL : TOO_MANY_STEPS, worst_state(instance, time, x), time};
             if (tiny && !(square < INFINITY)) stuck.result = NOT_FINITE;

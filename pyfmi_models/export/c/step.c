@@ -26,7 +26,7 @@ double next_tick_time(const Instance *instance) {
 int resolves_ticks(double time) { return fabs(time) * 2.3e-16 < slack * model.period; }
 
 int tick_is_due(const Instance *instance) {
-    return instance->values[0] >= next_tick_time(instance) - slack * model.period;
+    return model.period > 0 && instance->values[0] >= next_tick_time(instance) - slack * model.period;
 }
 
 /* Evaluate the tick that is due; with advance its new states are kept, without only its outputs are shown. */
@@ -52,22 +52,12 @@ static Status check_ticks(Instance *instance, double ticks, double time) {
                 time, model.most_steps);
 }
 
-Status update_discrete(Instance *instance) {
-    if (!(model.period > 0)) return OK;
-    double time = instance->values[0];
-    Status status = check_ticks(instance, ceil((time - next_tick_time(instance)) / model.period), time);
-    while (status == OK && tick_is_due(instance)) status = tick(instance, 1);
-    return status;
-}
-
-/* On failure the states and outputs of the ticks already done are taken back. */
-static Status step_sampled(Instance *instance, double time, double length) {
+/* Execute ticks until `due` are done since the start. On failure the states and outputs of those done are taken back. */
+static Status execute_ticks(Instance *instance, double due, double time) {
     Memory *memory = instance->memory;
-    double margin = slack * (length < model.period ? length / model.period : 1);
-    double due = ceil((time + length - memory->start) / model.period - margin);
     int64_t before = memory->ticks;
     size_t bytes = (size_t)(model.states + model.outputs) * sizeof(double);
-    Status status = check_ticks(instance, due - (double)before, time + length);
+    Status status = check_ticks(instance, due - (double)before, time);
     if (due > (double)before + 1 && bytes) memcpy(instance->seeds, instance->states, bytes);
     while (status == OK && (double)memory->ticks < due) status = tick(instance, 1);
     if (status != OK && memory->ticks > before) {
@@ -75,6 +65,18 @@ static Status step_sampled(Instance *instance, double time, double length) {
         memory->ticks = before;
     }
     return status;
+}
+
+Status update_discrete(Instance *instance) {
+    if (!tick_is_due(instance)) return OK;
+    double time = instance->values[0], due = floor((time - instance->memory->start) / model.period + slack) + 1;
+    return execute_ticks(instance, fmax(due, (double)instance->memory->ticks + 1), time);
+}
+
+static Status step_sampled(Instance *instance, double time, double length) {
+    double margin = slack * (length < model.period ? length / model.period : 1);
+    double due = ceil((time + length - instance->memory->start) / model.period - margin);
+    return execute_ticks(instance, due, time + length);
 }
 
 static Status explain(Instance *instance, Advance stuck) {

@@ -171,9 +171,14 @@ static Status check_derivative(Instance *instance, const uint32_t *unknowns, siz
 }
 
 /* Adds the seeds to a column that has a place for each variable. */
-static void scatter(Instance *instance, const uint32_t *references, size_t count, const double *seed) {
+static Status scatter(Instance *instance, const uint32_t *references, size_t count, const double *seed) {
     memset(instance->seeds, 0, (size_t)model.size * sizeof(double));
-    for (size_t i = 0; i < count; i++) instance->seeds[references[i]] += seed[i];
+    for (size_t i = 0; i < count; i++) {
+        if (!(fabs(seed[i]) < INFINITY))
+            return fail(instance, FAILED, "the seed %g of \"%s\" is not finite", seed[i], model.table[references[i]].name);
+        instance->seeds[references[i]] += seed[i];
+    }
+    return OK;
 }
 
 static Status gather(Instance *instance, const uint32_t *references, size_t count, const double *column, int first,
@@ -189,8 +194,8 @@ static Status gather(Instance *instance, const uint32_t *references, size_t coun
 Status directional(Instance *instance, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns,
                    size_t known_count, const double *seed, double *sensitivity) {
     Status status = check_derivative(instance, unknowns, unknown_count, knowns, known_count, sensitivity, seed);
+    if (status == OK) status = scatter(instance, knowns, known_count, seed);
     if (status != OK) return status;
-    scatter(instance, knowns, known_count, seed);
     const double *seeds = instance->seeds, *inputs = seeds + 1, *parameters = inputs + model.inputs;
     const double *in[] = {instance->values, instance->states, instance->inputs, instance->parameters,
                           seeds, parameters + model.parameters, inputs, parameters};
@@ -203,8 +208,8 @@ Status directional(Instance *instance, const uint32_t *unknowns, size_t unknown_
 Status adjoint(Instance *instance, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns, size_t known_count,
                const double *seed, double *sensitivity) {
     Status status = check_derivative(instance, unknowns, unknown_count, knowns, known_count, seed, sensitivity);
+    if (status == OK) status = scatter(instance, unknowns, unknown_count, seed);
     if (status != OK) return status;
-    scatter(instance, unknowns, unknown_count, seed);
     const double *rates = instance->seeds + (instance->rates - instance->values);
     const double *in[] = {instance->values, instance->states, instance->inputs, instance->parameters, rates,
                           rates + model.rates};
