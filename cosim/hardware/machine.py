@@ -12,6 +12,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationErr
 
 from cosim.complaint import complaint
 from cosim.errors import HardwareError
+from cosim.hardware.mapping import Entry, Ethercat
 
 Positive = Annotated[float, Field(gt=0)]
 
@@ -77,9 +78,9 @@ def _adapter(value: str) -> str:
     with suppress(ValueError):  # a port that is no number
         if parts.scheme == "udp" and parts.hostname and parts.port and not parts.path:
             return value
-    if value == "simulated" or re.fullmatch(r".+\.py:\w+", value):
+    if value == "simulated" or re.fullmatch(r".+\.py:\w+|ethercat:\S+", value):
         return value
-    raise ValueError('an adapter is "simulated" or "udp://HOST:PORT" or "FILE.py:CLASS"')
+    raise ValueError('an adapter is "simulated" or "udp://HOST:PORT" or "ethercat:INTERFACE" or "FILE.py:CLASS"')
 
 
 class Machine(_Section):
@@ -93,6 +94,7 @@ class Machine(_Section):
     reactions: Reactions = Reactions()
     clock: Clock = Clock()
     inject: tuple[Inject, ...] = ()
+    ethercat: Ethercat | None = None
 
 
 def read_machine(source: str | Path) -> Machine:
@@ -140,6 +142,12 @@ def _checked(values: dict[str, Any], where: str) -> Machine:
 
 
 def _keys(location: tuple[int | str, ...]) -> tuple[str, ...]:
-    sections: dict[str, type[_Section]] = {"limits": Limits, "reactions": Reactions, "clock": Clock, "inject": Inject}
+    sections: dict[str, type[BaseModel]] = {
+        "limits": Limits,
+        "reactions": Reactions,
+        "clock": Clock,
+        "inject": Inject,
+        "ethercat": Ethercat,
+    }
     section = sections.get(str(location[0]), Machine) if len(location) > 1 else Machine
-    return tuple(section.model_fields)
+    return tuple((Entry if section is Ethercat and len(location) > 2 else section).model_fields)

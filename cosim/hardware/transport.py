@@ -2,6 +2,7 @@
 
 from typing import Any, Protocol
 
+from cosim.hardware.ethercat import EthercatDrive
 from cosim.hardware.machine import Machine
 from cosim.hardware.python_adapter import PythonTransport, load_adapter
 from cosim.hardware.simulated import SimulatedDrive
@@ -33,6 +34,8 @@ def open_transport(scenario: Scenario, machine: Machine, wired: Wired, fast: boo
     """
     if machine.adapter.startswith("udp://"):
         return UdpDrive(machine, scenario.step, fast)
+    if machine.adapter.startswith("ethercat:"):
+        return PythonTransport(EthercatDrive(machine, scenario.step))
     if ".py:" in machine.adapter:
         return PythonTransport(load_adapter(machine.adapter, scenario.step))
     return SimulatedDrive(scenario, machine, wired)

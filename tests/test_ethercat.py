@@ -1,0 +1,215 @@
+"""A drive on EtherCAT: the bytes of its process data, its way up, and what is refused or noticed on the bus."""
+
+import struct
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import fake_soem
+import numpy as np
+import pytest
+from test_hardware import SIMULATED, assert_safe, recorded, scenario
+
+from cosim.errors import HardwareError, MissingPackageError
+from cosim.hardware.ethercat import CHECKED_EVERY
+from cosim.hardware.machine import Machine, changed, parse_machine
+from cosim.hardware.mapping import Entry, Ethercat, Layout
+from cosim.hardware.replay import replay
+from cosim.hardware.session import Session, run_session
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
+
+RATED = 100.0
+
+
+@pytest.fixture
+def bus(monkeypatch: pytest.MonkeyPatch) -> type[fake_soem.Master]:
+    class Fresh(fake_soem.Master):
+        pass
+
+    monkeypatch.setitem(sys.modules, "pysoem", fake_soem)
+    monkeypatch.setattr(fake_soem, "Master", Fresh)
+    return Fresh
+
+
+def machine(interface: str = "fake0", limits: dict[str, float] | None = None, **ethercat: Any) -> Machine:
+    limits = SIMULATED.limits.model_dump() | {"torque_mismatch": RATED / 1000} | (limits or {})
+    section = {"rated_torque": RATED} | ethercat
+    return changed(SIMULATED, "test", adapter=f"ethercat:{interface}", limits=limits, ethercat=section)
+
+
+def session(folder: Path, given: Machine | None = None) -> Session:
+    return Session(scenario(), given or machine(), folder / "box", fast=True)
+
+
+def test_a_layout_is_the_entries_one_after_the_other_little_endian_and_signed_where_they_are() -> None:
+    layout = Layout(
+        [
+            Entry(name="controlword", object=0x6040, bits=16),
+            Entry(object=0x60FE, subindex=1, bits=32),
+            Entry(name="torque", object=0x6071, bits=16),
+            Entry(name="mode", object=0x6060, bits=8),
+        ]
+    )
+    raw = layout.pack({"controlword": 0x800F, "torque": -2, "mode": 10})
+    assert raw == bytes.fromhex("0f80 00000000 feff 0a")
+    assert layout.unpack(raw) == {"controlword": 0x800F, "torque": -2, "mode": 10}
+    assert layout.entries[1].mapped == 0x60FE0120
+
+
+def test_the_mapping_written_into_the_drive_is_that_of_the_machine_file(
+    tmp_path: Path, bus: type[fake_soem.Master]
+) -> None:
+    outputs = [{"name": "torque", "object": 0x6071, "bits": 16}, {"object": 0x6072, "bits": 16}]
+    outputs += [{"name": "controlword", "object": 0x6040, "bits": 16}]
+    with session(tmp_path, machine(outputs=outputs, receive_pdo=0x1602, distributed_clock=True)) as one:
+        one.advance(10)
+        slave = bus.last.slaves[0]
+        assert slave.mapped(0x1C12) == [(0x6071, 2), (0x6072, 2), (0x6040, 2)]
+        assert slave.objects[0x1C12, 1] == struct.pack("<H", 0x1602)
+        assert slave.objects[0x6060, 0] == b"\x0a", "cyclic synchronous torque, also where it is not in the PDO"
+        assert slave.watchdog == ("processdata", SIMULATED.watchdog_ms)
+        assert slave.sync == (True, 100_000)
+        assert slave.state == fake_soem.OP_STATE
+    assert bus.last.closed
+    assert bus.last.states[-1] == fake_soem.INIT_STATE
+
+
+def test_a_drive_on_the_bus_goes_up_gives_torque_in_per_mille_and_comes_down(
+    tmp_path: Path, bus: type[fake_soem.Master]
+) -> None:
+    with session(tmp_path) as one:
+        done = run_session(one)
+        assert bus.last.slaves[0].drive == "disabled"
+    assert done["completed"], done["faults"]
+    found = recorded(tmp_path)
+    order, given = found["machine.order"], found["machine.torque"]
+    assert np.abs(order).max() > 1
+    assert np.allclose(given[1:], RATED / 1000 * np.round(order[:-1] * 1000 / RATED), atol=1e-12)
+    assert np.all(found["machine.counts"] == 2**32 - 5)
+    assert replay(found).identical
+
+
+def after(cycle: int, change: Callable[[fake_soem.Master], Any]) -> Callable[[fake_soem.Master, int], None]:
+    return lambda master, now: change(master) if now >= cycle else None
+
+
+def leaves(master: fake_soem.Master) -> None:
+    """The bus watchdog trips: the slave has left operation, its inputs go on as if nothing were."""
+    master.slaves[0].state, master.slaves[0].al_status = fake_soem.SAFEOP_STATE, 0x1B
+
+
+@pytest.mark.parametrize(
+    ("change", "fault", "within", "says"),
+    [
+        (lambda master: setattr(master, "wkc", 1), "frame_lost", 4, None),
+        (leaves, "adapter_failed", CHECKED_EVERY + 1, "has left operation of the bus: Sync manager watchdog"),
+        (lambda master: setattr(master.slaves[0], "drive", "fault"), "drive_fault", 3, None),
+    ],
+)
+def test_what_goes_wrong_on_the_bus_is_a_fault(
+    tmp_path: Path, bus: type[fake_soem.Master], change: Any, fault: str, within: int, says: str | None
+) -> None:
+    bus.change = after(2001, change)
+    with session(tmp_path) as one:
+        done = run_session(one)
+    assert_safe(recorded(tmp_path), fault, 1999, within)
+    assert (says or "") in done.get("adapter_error", "")
+
+
+def test_a_drive_that_is_enabled_in_another_mode_is_a_fault(tmp_path: Path, bus: type[fake_soem.Master]) -> None:
+    outputs = [one.model_dump() for one in Ethercat(rated_torque=1.0).outputs[:2]]
+
+    def other_mode(master: fake_soem.Master) -> None:
+        master.slaves[0].objects[0x6060, 0] = b"\x08"
+
+    bus.change = after(2001, other_mode)
+    with session(tmp_path, machine(outputs=outputs)) as one:
+        done = run_session(one)
+    assert_safe(recorded(tmp_path), "adapter_failed", 1999, 3)
+    assert "is enabled in mode 8, not 10" in done["adapter_error"]
+
+
+@pytest.mark.parametrize(
+    ("interface", "changes", "bus_is", "sentence"),
+    [
+        ("none0", {}, {}, r"could not open interface none0 \(EtherCAT needs the rights of root\)"),
+        ("fake0", {}, {"count": 0}, "no slave 0 at fake0, which has 0"),
+        ("fake0", {"position": 3}, {}, "no slave 3 at fake0, which has 1"),
+        ("fake0", {}, {"goes_up": False}, "does not reach operation of the bus: No error"),
+        ("fake0", {"rated_torque": 0.1}, {}, r"limits.torque = 50 N m does not fit into 16 bits of 0.0001 N m"),
+        ("fake0", {"rated_torque": 200.0}, {}, r"limits.torque_mismatch = 0.1 N m is below what the drive counts"),
+    ],
+)
+def test_a_bus_or_drive_that_does_not_fit_is_refused(
+    tmp_path: Path,
+    bus: type[fake_soem.Master],
+    interface: str,
+    changes: dict[str, Any],
+    bus_is: dict[str, Any],
+    sentence: str,
+) -> None:
+    for name, value in bus_is.items():
+        setattr(bus, name, value)
+    with pytest.raises(HardwareError, match=sentence):
+        session(tmp_path, machine(interface, **changes))
+    assert not (tmp_path / "box").exists()
+
+
+def test_a_drive_that_refuses_a_mapping_is_named(tmp_path: Path, bus: type[fake_soem.Master], monkeypatch: Any) -> None:
+    original = fake_soem.Slave.__init__
+
+    def stubborn(self: fake_soem.Slave) -> None:
+        original(self)
+        self.refused = (0x1600, 2)
+
+    monkeypatch.setattr(fake_soem.Slave, "__init__", stubborn)
+    with pytest.raises(HardwareError, match="refuses its PDOs: RuntimeError abort 0x06090030"):
+        session(tmp_path)
+    assert bus.last.closed
+
+
+@pytest.mark.parametrize(
+    ("section", "sentence"),
+    [
+        ("", r"needs a section \[ethercat\]"),
+        ("[ethercat]\n", '"ethercat.rated_torque" is missing'),
+        (
+            "[ethercat]\nrated_torque = 1.0\nspeed = 2",
+            '"ethercat.speed" is no key of a machine; keys there are: position',
+        ),
+        (
+            '[ethercat]\nrated_torque = 1.0\noutputs = [{ name = "torque", object = 0x6071, bits = 16 }]',
+            "outputs must have controlword; they have: torque",
+        ),
+        (
+            '[ethercat]\nrated_torque = 1.0\ninputs = [{ name = "torque", object = 0x6077, bits = 12 }]',
+            "ethercat.inputs.0.bits = 12 breaks a rule",
+        ),
+    ],
+)
+def test_a_mapping_that_is_none_is_refused(
+    tmp_path: Path, bus: type[fake_soem.Master], section: str, sentence: str
+) -> None:
+    limits = "\n".join(f"{name} = {value}" for name, value in SIMULATED.limits.model_dump().items())
+    text = f'name = "x"\nadapter = "ethercat:fake0"\n[limits]\n{limits}\n{section}'
+    with pytest.raises(HardwareError, match=sentence):
+        session(tmp_path, parse_machine(text, "m.toml"))
+
+
+def test_without_pysoem_a_sentence_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "pysoem", None)
+    with pytest.raises(MissingPackageError, match=r"pip install 'mount-cosim\[ethercat\]'"):
+        session(tmp_path)
+
+
+def test_the_stand_in_has_what_pysoem_has() -> None:
+    soem = pytest.importorskip("pysoem", reason="the extra ethercat is not installed")
+    for name in ("INIT_STATE", "PREOP_STATE", "SAFEOP_STATE", "OP_STATE"):
+        assert getattr(soem, name) == getattr(fake_soem, name)
+    assert callable(soem.al_status_code_to_string)
+    for kind, real in ((fake_soem.Master, soem.CdefMaster), (fake_soem.Slave, soem.CdefSlave)):
+        calls = {name for name in vars(kind) if not name.startswith("_")} - {"mapped", "exchange", "obey"}
+        extras = {"last", "count", "goes_up", "change"}
+        assert calls - extras <= set(dir(real))
