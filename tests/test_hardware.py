@@ -301,6 +301,25 @@ def test_torque_grows_from_zero_and_leaves_by_a_ramp(tmp_path: Path) -> None:
     assert np.allclose(-np.diff(stop)[:-1], 0.5)
 
 
+def entered(folder: Path, position: float) -> np.ndarray:
+    """Return the orders of a session that enters operation with the axis at rest at a position, and follows a ramp."""
+    sine = 'kind = "sine"\nfrequency = 1.0\nmax_velocity = 2e-3\nsmooth_start = 0.1'
+    ramp = f'kind = "ramp"\nstart = {position}\nvelocity = 1e-4'
+    what = scenario((sine, ramp), ('part = "plant"', f'part = "plant"\nparameters = {{ position = {position} }}'))
+    with session(folder, what=what) as one:
+        one.enable()
+        one.track(1000)
+    found = recorded(folder)
+    return found["machine.order"][int(np.flatnonzero(found["machine.notes"].astype(int) & 1)[0]) :][:1000]
+
+
+def test_entry_is_bumpless_wherever_the_axis_is(tmp_path: Path) -> None:
+    at_zero, elsewhere = (entered(tmp_path / str(place), place) for place in (0.0, np.pi / 4))
+    assert np.abs(at_zero[:50]).max() < 0.5, "the observer begins at the measured position"
+    assert np.abs(at_zero).max() > 0.1
+    assert np.allclose(elsewhere, at_zero, atol=1e-6), "what rounding does"
+
+
 @pytest.mark.parametrize(("name", "value", "note"), [("torque", 1.0, 4), ("slew", 5.0, 8)])
 def test_torque_and_slew_keep_to_limits_tightened_on_the_way(
     tmp_path: Path, name: str, value: float, note: int

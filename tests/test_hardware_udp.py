@@ -19,7 +19,7 @@ import pytest
 from test_hardware import SCENARIO, SIMULATED, assert_safe, invoke, recorded, scenario, simulated
 
 from cosim.cli_cache import fmu_of_card
-from cosim.cli_hardware import _plant
+from cosim.cli_drive import _plant
 from cosim.errors import HardwareError
 from cosim.exchange import open_fmu
 from cosim.hardware.machine import Machine, changed, read_machine
@@ -334,7 +334,7 @@ def test_when_the_drive_is_killed_the_loop_orders_zero_and_a_new_drive_has_no_to
         assert (ended.state, ended.torque) == ("fault", 0)
         assert "frame_lost" in ended.faults
     box_of(tmp_path)
-    again = started(tmp_path, port)
+    again = started(tmp_path, port, "--inject", "late:0.1:0.2:3", "--counts-per-turn", "65536")
     again.send_signal(signal.SIGINT)
     assert again.wait(10) == 0
     again.communicate()
@@ -362,6 +362,11 @@ def test_a_drive_of_a_card_has_the_cards_encoder() -> None:
         plant, step, quantum = _plant("paper_mount", 1e-4, stack)
         assert (plant.torque, plant.position, step) == ("tau", "q", 1e-4)
         assert quantum == pytest.approx(2 * np.pi / 2**32)
+    with (
+        ExitStack() as stack,
+        pytest.raises(HardwareError, match=r"no such scenario or card; .*sidereal, .*paper_mount"),
+    ):
+        _plant("nonsense", 1e-4, stack)
     with ExitStack() as stack, pytest.raises(HardwareError, match='no plant of a drive: it has no input "tau"'):
         plant_of(stack.enter_context(open_fmu(fmu_of_card("paper_mount", "controller", print), "controller")))
 
