@@ -137,6 +137,7 @@ def test_scores_of_hand_made_answers_are_what_one_counts() -> None:
     assert {key: found[key]["value"] for key in expected} == pytest.approx(expected)
     assert found["false_alarms"]["met"] is False
     assert found["gap_closed"]["met"] is True
+    assert (found["gap_closed"]["sure"], found["false_alarms"]["sure"]) == (False, True)
     assert found["exact"]["met"] is None
     assert all(found[key]["low"] <= found[key]["value"] <= found[key]["high"] for key in expected)
 

@@ -26,7 +26,7 @@ def draw_confusion(table: Mapping[str, Mapping[str, int]], path: Path) -> None:
                 _cell(axes, columns.index(answer), y, count / sum(table[label].values()), count, answer == right)
         axes.set(xlim=(-0.5, len(columns) - 0.5), ylim=(len(rows) - 0.5, -0.5), ylabel="concealed")
         axes.set_xticks(range(len(columns)), [_words(c) for c in columns], rotation=90)
-        axes.set_yticks(range(len(rows)), [_words(r) for r in rows])
+        axes.set_yticks(range(len(rows)), [_words(r) + " (outside)" * (r in OUTSIDE) for r in rows])
         axes.set_title("first answer", loc="left", color=GREY)
         axes.grid(True, linewidth=0.4)
 
@@ -54,8 +54,10 @@ def draw_calibration(reliability: Sequence[Mapping[str, Any]], path: Path) -> No
         for one in reliability:
             axes.plot([one["printed"]] * 2, [one["low"], one["high"]], color=AFTER, linewidth=1.2)
             axes.plot(one["printed"], one["true"], "o", color=AFTER, markersize=5)
-            axes.annotate(f" {one['n']}", (one["printed"], one["true"]), color=GREY, fontsize=8)
-        axes.set(xlim=(0, 1.02), ylim=(0, 1.02), xlabel="printed probability", ylabel="share that was true")
+            place = {"xytext": (5, 4), "textcoords": "offset points"}
+            axes.annotate(str(one["n"]), (one["printed"], one["true"]), color=GREY, fontsize=8, **place)
+        axes.set(xlim=(-0.03, 1.08), ylim=(-0.03, 1.08), xlabel="printed probability", ylabel="share that was true")
+        axes.set_title("effects offered; the number of them beside each dot", loc="left", color=GREY)
         axes.grid(True)
 
 

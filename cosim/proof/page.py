@@ -3,7 +3,8 @@
 `proof.json`:
     command, seed, cases, seconds      how it was made; `played` is the number of cases done
     version, code                      of the project, and SHA-256 of the code that decides the scores
-    scores       [{key, title, value, low, high, n, asked, met}]   95 % intervals; met is null where nothing was asked
+    scores       [{key, title, value, low, high, n, asked, met, sure}]   95 % intervals; met is null where nothing was
+                 asked; sure if the whole interval says the same
     confusion    {concealed: {first answer: cases}}                cases with at most one effect
     reliability  [{printed, true, low, high, n}]                   bins of printed probabilities
     gaps         [share of the removable held-out RMS removed]
@@ -123,9 +124,15 @@ def page(found: Mapping[str, Any]) -> str:
         least_removable=marks.LEAST_REMOVABLE,
         lines=[_line(row) for row in found["rows"] if not marks.exact(row)],
         number=_estimate,
-        met={True: "met", False: "**missed**", None: ""},
+        met=_met,
         short=_short,
     )
+
+
+def _met(one: Mapping[str, Any]) -> str:
+    """Whether the bar is met, and whether more cases could change that."""
+    word = {True: "met", False: "**missed**", None: ""}[one["met"]]
+    return word if one["sure"] or not word else f"{word}, not sure"
 
 
 def _estimate(one: Mapping[str, Any]) -> str:

@@ -1,6 +1,7 @@
 """Scores of a proof: each number with its interval, the cases it rests on, and the bar that was set before.
 
-Bars are those of the design (issue 6); a score is met if its value is on the right side, whatever its interval says.
+Bars are those of the design (issue 6). A bar is met if the value is on its right side; `sure` if all of the interval is
+on the same side as the value.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -122,13 +123,14 @@ BARS = (
 
 
 def scored(rows: Rows) -> list[dict[str, Any]]:
-    """Every score as a JSON object: key, title, value, low, high, n, asked, met."""
+    """Every score as a JSON object: key, title, value, low, high, n, asked, met, sure."""
     return [_scored(bar, bar.of(rows)) for bar in BARS]
 
 
 def _scored(bar: Bar, found: Estimate) -> dict[str, Any]:
     head = {"key": bar.key, "title": bar.title, **found.as_json()}
-    return head | {"asked": bar.asked(), "met": bar.met(found.value)}
+    sides = {bar.met(value) for value in (found.value, found.low, found.high)}
+    return head | {"asked": bar.asked(), "met": bar.met(found.value), "sure": len(sides) == 1}
 
 
 def confusion(rows: Rows) -> dict[str, dict[str, int]]:
