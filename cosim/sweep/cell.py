@@ -19,6 +19,10 @@ import cosim
 from cosim.errors import InputError
 
 
+GRACE = 2.0
+"""Seconds that a process which gave no answer has to end by itself."""
+
+
 class LostError(Exception):
     """The process ended, or was ended, before it answered; `status` is "crashed" or "timeout"."""
 
@@ -102,6 +106,8 @@ class Cell:
         return pickle.load(process.stdout)
 
     def _loss(self, process: "subprocess.Popen[bytes]", late: str) -> LostError:
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(0 if late else GRACE)  # it may be ending just now: its own code says more than our signal
         process.kill()
         code, said = process.wait(), self._last_said()
         self.close()
