@@ -18,7 +18,6 @@ from typing import IO, Any
 import cosim
 from cosim.errors import InputError
 
-
 GRACE = 2.0
 """Seconds that a process which gave no answer has to end by itself."""
 
