@@ -419,7 +419,7 @@ def test_an_axis_far_from_its_set_point_is_never_enabled(tmp_path: Path) -> None
 
 
 def test_every_fault_is_provoked_and_documented() -> None:
-    others = {"power_up", "not_a_number", "controller_failed", "adapter_failed", "drive_state"}
+    others = {"power_up", "not_a_number", "controller_failed", "adapter_failed", "drive_state", "encoder_heads"}
     assert set(FAULTS) == {*INJECTED, *PROVOKED, *others}
     page = (Path(__file__).parents[1] / "docs" / "hardware.md").read_text("utf-8")
     for number, (name, meaning) in enumerate(FAULTS.items(), 1):

@@ -160,6 +160,7 @@ void axis_cycle(Axis *axis, Sample *sample, Record *record)
     record->sample = *sample;
     record->state = (uint32_t)axis->state;
     record->faults = (uint32_t)axis->faults;
+    record->heads = axis->heads.reasons;
     record->controlword = axis->controlword;
     record->torque = axis->torque;
 }

@@ -8,7 +8,7 @@ import cosim
 from cosim.errors import HardwareError
 from cosim.hardware.library import library, part_of, shared
 from cosim.hardware.machine import Machine
-from cosim.hardware.structures import CAxis
+from cosim.hardware.structures import CAxis, CHeads
 from cosim.hardware.wired import REFERENCE, Wired
 from cosim.hardware.words import LIMITS
 from cosim.scenario import Scenario
@@ -39,6 +39,11 @@ def make_axis(wired: Wired, machine: Machine, step: float) -> tuple[CAxis, tuple
         late_row_limit=reactions.late_in_a_row,
         late_limit=reactions.late_in_window,
         late_window=cycles_of(reactions.window_ms, step),
+        heads=CHeads(
+            used=machine.encoder.heads,
+            apart=round(machine.encoder.apart / wired.quantum),
+            jump=round(machine.limits.jump / wired.quantum),
+        ),
     )
     if not library().hardware_ready(axis):
         raise HardwareError("The controller cannot save its state, which each entry into operation starts from.")

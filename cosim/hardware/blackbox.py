@@ -19,7 +19,7 @@ import numpy as np
 from cosim.errors import HardwareError
 from cosim.files import check_free, check_room, directory
 from cosim.hardware.library import shared
-from cosim.hardware.structures import RECORD, CBox, CRecord
+from cosim.hardware.structures import HEADS, RECORD, CBox, CRecord
 from cosim.recording import Recording
 
 MAGIC = b"mount-cosim black box 1\n"
@@ -122,6 +122,9 @@ def recording_of(kept: Kept, name: str) -> Recording:
     table |= {f"machine.{key}": feedback[key] for key in ("counts", "encoder", "statusword", "torque", "link")}
     table |= {f"machine.{key}": sample[key] for key in ("tick", "read", "status", "late", "request", "change", "value")}
     table |= {f"machine.{key}": records[key] for key in ("state", "faults", "notes", "controlword")}
+    if origin["machine"]["encoder"]["heads"]:
+        table |= {f"machine.head{k}": feedback["head"][:, k] for k in range(HEADS)}
+        table |= {"machine.heads": feedback["heads"], "machine.left_out": records["heads"]}
     table |= {"machine.command": records["command"], "machine.order": records["torque"]}
     units = {"t": "s", "tau": "N.m", "q": "rad", "machine.command": "N.m", "machine.order": "N.m"}
     units |= {name: unit for name, unit in origin["units"].items() if name in table and unit}

@@ -60,7 +60,7 @@ static uint32_t check_drive(Axis *axis, const Sample *sample)
            bit(axis->mismatched > axis->mismatch_limit, TORQUE_MISMATCH);
 }
 
-uint32_t check(Axis *axis, const Sample *sample)
+uint32_t check(Axis *axis, Sample *sample)
 {
     uint32_t found = check_time(axis, sample) | bit(axis->state == NOT_READY, POWER_UP) |
                      bit(sample->request & ASK_ESTOP, ESTOP) |
@@ -68,6 +68,9 @@ uint32_t check(Axis *axis, const Sample *sample)
     axis->lost = sample->read == READ_OK ? 0 : axis->lost + 1;
     if (axis->lost > 0) {
         return found | bit(axis->lost > axis->lost_limit, FRAME_LOST);
+    }
+    if (heads_combine(&axis->heads, &sample->feedback)) { /* there is no position to check */
+        return found | bit(true, ENCODER_HEADS) | check_drive(axis, sample);
     }
     return found | check_encoder(axis, sample) | check_drive(axis, sample);
 }

@@ -79,6 +79,29 @@ static int drive_write(void *self, const Order *order)
     return 0;
 }
 
+/* What four heads around an eccentric, slightly oval disc read: e sin(q + k pi/2), a quarter of it twice a turn, an eighth
+ * three times. */
+static double misread(const Drive *drive, double q, int head)
+{
+    double at = q + head * 1.5707963267948966;
+    return drive->eccentricity * (sin(at) + sin(2.0 * at) / 4.0 + sin(3.0 * at) / 8.0);
+}
+
+static void read_heads(Drive *drive, Feedback *feedback)
+{
+    const Injection *silent = injected(drive, SILENT_HEAD), *stray = injected(drive, STRAY_HEAD);
+    const Injection *frozen = injected(drive, FROZEN_HEAD);
+    double q = drive->plant.output[0];
+    for (int k = 0; k < HEADS; k++) {
+        double angle = q + misread(drive, q, k) + (stray && stray->head == k ? stray->size : 0.0);
+        if (!(frozen && frozen->head == k)) {
+            drive->shown[k] = (uint32_t)(int64_t)floor(angle / drive->quantum + 0.5);
+        }
+        feedback->head[k] = drive->shown[k];
+    }
+    feedback->heads = silent ? 15u & ~(1u << silent->head) : 15u;
+}
+
 static int drive_read(void *self, Feedback *feedback)
 {
     Drive *drive = self;
@@ -93,6 +116,9 @@ static int drive_read(void *self, Feedback *feedback)
         double counts = floor(drive->plant.output[0] / drive->quantum + 0.5);
         drive->counts = (uint32_t)(int64_t)(counts + (jump ? floor(jump->size / drive->quantum + 0.5) : 0.0));
         drive->encoder++;
+    }
+    if (drive->heads) {
+        read_heads(drive, feedback);
     }
     feedback->counts = drive->counts;
     feedback->encoder = drive->encoder;

@@ -5,12 +5,14 @@
 #include "hardware.h"
 
 /* What can be injected: the first six into any drive, the others into the answers of one behind a network (virtual.c). */
-enum { LOST, STALE, JUMP, SATURATED, DEAD, TRIPPED, LATE, DUPLICATED, REORDERED, CORRUPTED };
+enum { LOST, STALE, JUMP, SATURATED, DEAD, TRIPPED, LATE, DUPLICATED, REORDERED, CORRUPTED, SILENT_HEAD,
+       FROZEN_HEAD, STRAY_HEAD };
 
-/* In the ticks of a session from `first` to before `last`; `size` in rad (jump), N m (saturated) or ticks (late). */
+/* In the ticks of a session from `first` to before `last`; `size` in rad (jump, stray head), N m (saturated) or ticks (late). */
 typedef struct {
     int64_t kind, first, last;
     double size;
+    int64_t head; /* of the encoder, where it is about one */
 } Injection;
 
 typedef struct {
@@ -22,6 +24,9 @@ typedef struct {
     int64_t tick, state, failed, epoch, silent; /* `epoch`: tick at which the session began; ticks without an order */
     uint32_t control, counts, encoder, reserved;
     double held;
+    int64_t heads; /* read heads of the encoder; 0: it is without error */
+    double eccentricity; /* rad; that of its disc */
+    uint32_t shown[HEADS];
 } Drive;
 
 /* drive.c */

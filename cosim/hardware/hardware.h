@@ -13,7 +13,7 @@
 #include "loop.h"
 
 enum { READ_OK, READ_STALE, READ_ERROR };
-enum { INPUTS = 8, MISSES = 64 };
+enum { INPUTS = 8, MISSES = 64, HEADS = 4 };
 
 /* LINK: what a transport notices. UNANSWERED: no whole answer to the last order in time; the others name what came instead. */
 enum { UNANSWERED = 1, LATE_FRAME = 2, DUPLICATE_FRAME = 4, REORDERED_FRAME = 8, CORRUPT_FRAME = 16, FOREIGN_FRAME = 32 };
@@ -28,7 +28,10 @@ enum { DISABLE_VOLTAGE = 0x00, SHUTDOWN = 0x06, SWITCH_ON = 0x07, ENABLE_OPERATI
 
 /* Faults, by bit; docs/hardware.md numbers them from 1. */
 enum { POWER_UP, ESTOP, FRAME_LOST, ENCODER_STALE, ENCODER_JUMP, OVERSPEED, FOLLOWING_ERROR, NOT_A_NUMBER,
-       TORQUE_MISMATCH, DRIVE_FAULT, DRIVE_STATE, HEARTBEAT_LOST, DEADLINE, CONTROLLER_FAILED, ADAPTER_FAILED };
+       TORQUE_MISMATCH, DRIVE_FAULT, DRIVE_STATE, HEARTBEAT_LOST, DEADLINE, CONTROLLER_FAILED, ADAPTER_FAILED, ENCODER_HEADS };
+
+/* Why a read head is left out; of head k in the bits from 4 k on. */
+enum { HEAD_SILENT = 1, HEAD_FROZEN, HEAD_ASTRAY };
 
 /* What the supervisor asks for. RESET and ENABLE act on their rising edge only. */
 enum { ASK_ENABLE = 1, ASK_QUICK_STOP = 2, ASK_ESTOP = 4, ASK_RESET = 8, NO_HEARTBEAT = 16 };
@@ -45,6 +48,9 @@ typedef struct {
     uint32_t statusword; /* 0x6041 */
     uint32_t link;       /* what the transport noticed since the read before, see LINK */
     double torque;       /* 0x6077, N m: what the drive says it gives */
+    uint32_t head[HEADS]; /* of an encoder with read heads, all of them at one angle; `counts` is made from them */
+    uint32_t heads;       /* bit k: head k has answered */
+    uint32_t unused;
 } Feedback;
 
 typedef struct {
@@ -78,8 +84,18 @@ typedef struct {
     Sample sample;
     uint32_t state, faults, notes, controlword;
     double command, torque; /* of the controller; ordered, to be written in the next cycle */
+    uint32_t heads, unused; /* why read heads are left out */
     uint32_t crc, reserved;
 } Record;
+
+/* The read heads of an encoder, see heads.c. `apart`: counts that a well one may be from the middle of all, `jump`:
+ * and may move from one cycle to the next beside it. */
+typedef struct {
+    int64_t used, apart, jump;
+    /* what is remembered */
+    int64_t known, shift; /* `shift`: quarters of a count, so that nothing jumps when a head is left out */
+    uint32_t counts, in, reasons, last[HEADS], unused;
+} Heads;
 
 typedef struct {
     Part controller;
@@ -94,6 +110,7 @@ typedef struct {
     double torque; /* ordered last; it acts since the edge of this cycle */
     int64_t miss[MISSES];
     int64_t refused; /* limits that were not loosened */
+    Heads heads;
 } Axis;
 
 typedef struct {
@@ -120,7 +137,10 @@ uint32_t cia402_statusword(int64_t state);
 int64_t cia402_state(uint32_t statusword);
 
 /* checks.c */
-uint32_t check(Axis *axis, const Sample *sample);
+uint32_t check(Axis *axis, Sample *sample);
+
+/* heads.c */
+bool heads_combine(Heads *heads, Feedback *feedback);
 
 /* axis.c */
 void axis_cycle(Axis *axis, Sample *sample, Record *record);

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 from urllib.parse import urlsplit
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from cosim.complaint import complaint
 from cosim.errors import HardwareError
@@ -58,6 +58,18 @@ class Clock(_Section):
     answer_spin_us: float = Field(default=50.0, ge=0, le=1000)
 
 
+class Encoder(_Section):
+    """`[encoder]`: `heads` = 4 read heads around one disc, whose mean is the position; 0: the encoder is one.
+
+    A head that is farther than `apart` [rad] from the middle of all is left out; an eccentric disc must stay below.
+    `eccentricity` [rad] is what the simulated encoder has of it.
+    """
+
+    heads: Literal[0, 4] = 0
+    apart: Positive = 1e-4
+    eccentricity: float = Field(default=0.0, ge=0)
+
+
 class Inject(_Section):
     """`[[inject]]`: a fault of the simulated or virtual drive, in seconds of a session.
 
@@ -65,11 +77,13 @@ class Inject(_Section):
     """
 
     kind: Literal[
-        "lost", "stale", "jump", "saturated", "dead", "tripped", "late", "duplicated", "reordered", "corrupted"
-    ]
+        "lost", "stale", "jump", "saturated", "dead", "tripped", "late", "duplicated", "reordered", "corrupted",
+        "silent_head", "frozen_head", "stray_head",
+    ]  # fmt: skip
     at: float = Field(ge=0)
     lasts: Positive = 1e9
     size: float = 0.0
+    head: int = Field(default=0, ge=0, le=3)
 
 
 def _adapter(value: str) -> str:
@@ -93,8 +107,15 @@ class Machine(_Section):
     limits: Limits
     reactions: Reactions = Reactions()
     clock: Clock = Clock()
+    encoder: Encoder = Encoder()
     inject: tuple[Inject, ...] = ()
     ethercat: Ethercat | None = None
+
+    @model_validator(mode="after")
+    def _heads_are_read(self) -> "Machine":
+        if self.encoder.heads and self.adapter != "simulated":
+            raise ValueError("[encoder] heads = 4, and only adapter = "simulated" brings the readings of heads yet")
+        return self
 
 
 def read_machine(source: str | Path) -> Machine:
@@ -146,6 +167,7 @@ def _keys(location: tuple[int | str, ...]) -> tuple[str, ...]:
         "limits": Limits,
         "reactions": Reactions,
         "clock": Clock,
+        "encoder": Encoder,
         "inject": Inject,
         "ethercat": Ethercat,
     }

@@ -13,7 +13,7 @@ from cosim.files import sha256
 from cosim.hardware.axis import make_axis
 from cosim.hardware.library import library
 from cosim.hardware.machine import Machine
-from cosim.hardware.structures import RECORD, CRecord
+from cosim.hardware.structures import HEADS, RECORD, CRecord
 from cosim.hardware.wired import Wired
 from cosim.recording import Recording
 
@@ -91,6 +91,10 @@ def _records(recording: Recording, origin: dict[str, Any]) -> np.ndarray:
         feedback[key] = recording[f"machine.{key}"]
     for key in ("tick", "read", "status", "late", "request", "change", "value"):
         sample[key] = recording[f"machine.{key}"]
+    if origin["machine"]["encoder"]["heads"]:
+        feedback["heads"], records["heads"] = recording["machine.heads"], recording["machine.left_out"]
+        for head in range(HEADS):
+            feedback["head"][:, head] = recording[f"machine.head{head}"]
     for name, field in COMPARED.items():
         records[field] = recording[name]
     for place, name in enumerate(origin["inputs"]):

@@ -39,6 +39,7 @@ from cosim.hardware.words import (
     QUICK_STOP_STATE,
     STATES,
     faults_of,
+    heads_of,
 )
 from cosim.scenario import Scenario
 
@@ -129,6 +130,7 @@ class Session:
             "fifo": bool(session.fifo),
             "memory_locked": bool(session.locked),
             "refused_limits": self.axis.refused,
+            **({"heads_left_out": heads_of(self.axis.heads.reasons)} if self.machine.encoder.heads else {}),
             **self.transport.statistics(),
         }
 

@@ -75,6 +75,8 @@ def make_drive(
         injection=(CInjection * len(faults))(*faults),
         step=step,
         quantum=quantum,
+        heads=machine.encoder.heads,
+        eccentricity=machine.encoder.eccentricity,
     )
     if not library().drive_open(drive, adapter):
         raise HardwareError(f"{machine.name}: the plant of the simulated drive does not start.")
@@ -82,4 +84,6 @@ def make_drive(
 
 
 def _injection(one: Inject, step: float) -> CInjection:
-    return CInjection(INJECTIONS.index(one.kind), round(one.at / step), round((one.at + one.lasts) / step), one.size)
+    return CInjection(
+        INJECTIONS.index(one.kind), round(one.at / step), round((one.at + one.lasts) / step), one.size, one.head
+    )

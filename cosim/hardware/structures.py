@@ -6,7 +6,7 @@ import numpy as np
 
 from cosim.loop.structures import CPart
 
-INPUTS, MISSES, LIMITS = 8, 64, 6
+INPUTS, MISSES, LIMITS, HEADS = 8, 64, 6, 4
 
 
 class CFeedback(Structure):
@@ -18,6 +18,9 @@ class CFeedback(Structure):
         ("statusword", c_uint32),
         ("link", c_uint32),
         ("torque", c_double),
+        ("head", c_uint32 * HEADS),
+        ("heads", c_uint32),
+        ("unused", c_uint32),
     ]
 
 
@@ -62,8 +65,21 @@ class CRecord(Structure):
         ("controlword", c_uint32),
         ("command", c_double),
         ("torque", c_double),
+        ("heads", c_uint32),
+        ("unused", c_uint32),
         ("crc", c_uint32),
         ("reserved", c_uint32),
+    ]
+
+
+class CHeads(Structure):
+    """The read heads of an encoder."""
+
+    _fields_ = [
+        *((name, c_int64) for name in ("used", "apart", "jump", "known", "shift")),
+        *((name, c_uint32) for name in ("counts", "in", "reasons")),
+        ("last", c_uint32 * HEADS),
+        ("unused", c_uint32),
     ]
 
 
@@ -88,6 +104,7 @@ class CAxis(Structure):
         ("torque", c_double),
         ("miss", c_int64 * MISSES),
         ("refused", c_int64),
+        ("heads", CHeads),
     ]
 
 
@@ -119,7 +136,7 @@ class CSession(Structure):
 class CInjection(Structure):
     """A fault of the simulated drive."""
 
-    _fields_ = [("kind", c_int64), ("first", c_int64), ("last", c_int64), ("size", c_double)]
+    _fields_ = [("kind", c_int64), ("first", c_int64), ("last", c_int64), ("size", c_double), ("head", c_int64)]
 
 
 class CDrive(Structure):
@@ -140,6 +157,9 @@ class CDrive(Structure):
         ("silent", c_int64),
         *((name, c_uint32) for name in ("control", "counts", "encoder", "reserved")),
         ("held", c_double),
+        ("heads", c_int64),
+        ("eccentricity", c_double),
+        ("shown", c_uint32 * HEADS),
     ]
 
 

@@ -29,6 +29,7 @@ FAULTS = {
     "deadline": "too many cycles were late within the window",
     "controller_failed": "the controller's step returned an error",
     "adapter_failed": "the adapter says that it has failed",
+    "encoder_heads": "two read heads of the encoder have failed",
 }
 """Faults in the order of their bits, numbered from 1 in docs/hardware.md."""
 
@@ -39,9 +40,19 @@ LINK = ("unanswered", "late", "duplicated", "reordered", "corrupted", "foreign")
 """What a transport notices in a cycle, in the order of its bits."""
 OF_FRAMES = ("late", "duplicated", "reordered", "corrupted")
 """Injections into the frames of a drive behind a network; the drive in this process has none."""
-INJECTIONS = ("lost", "stale", "jump", "saturated", "dead", "tripped", *OF_FRAMES)
+OF_HEADS = ("silent_head", "frozen_head", "stray_head")
+"""Injections into one read head of the encoder."""
+INJECTIONS = ("lost", "stale", "jump", "saturated", "dead", "tripped", *OF_FRAMES, *OF_HEADS)
+REASONS = ("", "silent", "frozen", "astray")
+"""Why a read head is left out, by number."""
 
 
 def faults_of(bits: int) -> tuple[str, ...]:
     """Name the faults of a word of bits."""
     return tuple(name for place, name in enumerate(FAULTS) if bits >> place & 1)
+
+
+def heads_of(reasons: int) -> dict[int, str]:
+    """Name why read heads are left out, by head from 0."""
+    found = {head: reasons >> 4 * head & 15 for head in range(4)}
+    return {head: REASONS[reason] for head, reason in found.items() if reason}

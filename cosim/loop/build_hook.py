@@ -22,7 +22,7 @@ LIBRARIES = {
     ),
     "cosim/proof/_truth": ("cosim/proof/truth.c",),
 }
-_HARDWARE = ("cia402", "checks", "axis", "drive", "udp", "virtual", "blackbox", "realtime", "process")
+_HARDWARE = ("cia402", "checks", "heads", "axis", "drive", "udp", "virtual", "blackbox", "realtime", "process")
 if sys.platform == "linux":  # absolute sleeps
     LIBRARIES["cosim/hardware/_hardware"] = (
         *(f"cosim/hardware/{name}.c" for name in _HARDWARE),
