@@ -114,7 +114,7 @@ class Machine(_Section):
     @model_validator(mode="after")
     def _heads_are_read(self) -> "Machine":
         if self.encoder.heads and self.adapter != "simulated":
-            raise ValueError("[encoder] heads = 4, and only adapter = "simulated" brings the readings of heads yet")
+            raise ValueError('[encoder] heads = 4, and only adapter = "simulated" brings the readings of heads yet')
         return self
 
 
