@@ -67,7 +67,7 @@ static bool accept_answer(Udp *udp, const Frame *frame, Feedback *feedback)
         feedback->link |= seen;
         return false;
     }
-    if (frame->sequence != udp->sequence) {
+    if (frame->sequence != udp->sequence || (int64_t)frame->age * 1000 > udp->patience) {
         link->late++;
         feedback->link |= LATE_FRAME;
         return false;

@@ -16,7 +16,7 @@ typedef struct {
     int64_t tick;             /* of the loop; in HELLO and WELCOME: ns of a cycle, 0 where there is no clock */
     uint32_t word;            /* controlword, statusword */
     uint32_t counts, encoder; /* of an answer, as in Feedback */
-    uint32_t age;             /* us from the sample of the encoder to the sending of the answer, by the drive's clock */
+    uint32_t age;             /* us from the sample of the encoder to the sending, by the drive's clock; too old is late */
     double value;             /* N m, ordered or given; in HELLO and WELCOME: s of a cycle */
     uint32_t reserved, crc;   /* CRC-32 of IEEE 802.3 of all before it */
 } Frame;
