@@ -27,10 +27,17 @@ def plant():
     return replace(read_card("paper_mount"), effects=effects).plant().model()
 
 
+def emptying():
+    """A level that soon falls below zero, where its root is no number."""
+    model = export_models.undefined_below_zero()
+    inputs, states = ((replace(group[0], start=start),) for group, start in ((model.inputs, 1.0), (model.states, 0.1)))
+    return replace(model, inputs=inputs, states=states)
+
+
 MODELS: dict[str, Callable[[], Any]] = {
     "plant": plant,
     "controller": lambda: read_card("paper_mount").controller_model(),
-    "root": export_models.undefined_below_zero,
+    "root": emptying,
     "ticking_root": export_models.root_of_a_count,
 }
 
@@ -76,13 +83,15 @@ class Planted:
         return {**sources, self.file: before.replace(self.text, self.instead).encode()}
 
 
+MISSING, GETTING = "count && (!references || !values)", 'return fail(instance, FAILED, "getting values'
+GAP = 'fail(instance, FAILED, "a step from t = %.17g s leaves a gap: the model is at t = %.17g s", time, now)'
 PLANTED = (
     Planted("an output that is no number", "values.c", "if (name) return not_finite", "if (0) return not_finite"),
-    Planted("a refusal in silence", "values.c", 'fail(instance, FAILED, "the time %g is not finite", time)', "FAILED"),
+    Planted("a refusal in silence", "step.c", GAP, "FAILED"),
     Planted("a state that is believed", "memory.c", "if (hash != hash_bytes(bytes, memory_size()))", "if (0)"),
     Planted("a fixed parameter that is set", "values.c", "variable->fixed ? 0 :", "0 ? 0 :", "ticking_root"),
     Planted("half of a step", "step.c", "memory->ticks = before;", "", "ticking_root"),
-    Planted("a crash", "values.c", "if (status == OK && count) memcpy(nominals", "if (count) memcpy(nominals"),
+    Planted("a crash", "values.c", f"if ({MISSING}) {GETTING}", f"if (0) {GETTING}"),
     Planted("a read past the table", "values.c", ">= (uint32_t)", "> (uint32_t)", seen_by=("sanitizers",)),
     Planted("memory that nobody has written", "instance.c", "calloc(1, head", "malloc(head", seen_by=("valgrind",)),
     Planted("a leak", "memory.c", "if (!given) release(memory);", "*memory = given;", seen_by=("valgrind",)),

@@ -130,7 +130,10 @@ WRONG = {
     "infinite": (lambda d: d.set("friction.Fc", inf), '"friction.Fc" = inf is not finite'),
     "calculated": (lambda d: d.set("torque", 1.0), '"torque" is calculated and cannot be set'),
     "state after the start": (lambda d: d.set("z", 1.0), '"z" can be set before the end of initialization only'),
-    "below the bound": (lambda d: d.set("friction.Fs", -1.0), 'parameter "friction.Fs" = -1 is not between 1e-09'),
+    "below the bound": (
+        lambda d: d.set("friction.Fs", -1.0),
+        'parameter "friction.Fs" = -1 is below its least value 1e-09',
+    ),
     "unknown to get": (lambda d: d.get(999), "no variable with the value reference 999; they go from 0 to 16"),
     "unknown to set": (lambda d: d.set(17, 0.0), "no variable with the value reference 17"),
     "backwards": (lambda d: d.step(-1e-3, 1e-3), "goes backwards: the model is at t = 0.01"),

@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from itertools import accumulate
 from pathlib import Path
@@ -24,10 +25,14 @@ WORK, OVERHEAD = 1_000_000_000, 100
 
 @dataclass(frozen=True)
 class Generated:
-    """The two generated C files of a model, the token that ties description and binary, and the variables' layout."""
+    """The two generated C files of a model, the token that ties description and binary, and the variables' layout.
+
+    `most_steps` are the steps of the solver, or the ticks, that one call takes before it gives up.
+    """
 
     layout: Layout
     token: str
+    most_steps: int
     files: dict[str, str]
 
 
@@ -43,7 +48,9 @@ def generate(model: Model) -> Generated:
     except ExportError as error:
         raise ExportError(f'model "{model.name}" {error}') from None
     token = _token(layout, equations)
-    return Generated(layout, token, {"equations.c": equations, "model.c": _model_code(layout, token, functions)})
+    most_steps = _most_steps(functions)
+    code = _model_code(layout, token, functions, most_steps)
+    return Generated(layout, token, most_steps, {"equations.c": equations, "model.c": code})
 
 
 def _functions(model: Model) -> dict[str, list[ca.Function]]:
@@ -97,7 +104,7 @@ def _token(layout: Layout, equations: str) -> str:
     return "{" + "-".join((digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32])) + "}"
 
 
-def _model_code(layout: Layout, token: str, functions: dict[str, list[ca.Function]]) -> str:
+def _model_code(layout: Layout, token: str, functions: Iterable[str], most_steps: int) -> str:
     model = layout.model
     shown = _shown(layout)
     rows = ",\n".join(_row(row, shown.get(row.reference, row.reference)) for row in layout.rows)
@@ -122,7 +129,7 @@ const Model model = {{
     .tolerance = {number(TOLERANCE)},
     .size = {counts[0]}, .inputs = {counts[1]}, .parameters = {counts[2]},
     .states = {counts[3]}, .rates = {counts[4]}, .outputs = {counts[5]},
-    .most_steps = {_most_steps(functions)},
+    .most_steps = {most_steps},
     .table = variables,
     .nominals = nominals,
 {codes}

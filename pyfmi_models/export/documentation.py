@@ -32,6 +32,7 @@ def _page(generated: Generated, platforms: tuple[str, ...]) -> str:
     layout = generated.layout
     environment = Environment(autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     tables = {title: layout.of(kind) for title, kind in _TABLES.items()}  # type: ignore[arg-type]
+    environment.filters["range"] = _range
     return environment.from_string(resource("index.html.j2").decode()).render(
         model=layout.model,
         figure=Markup(diagram(layout.model)),
@@ -39,10 +40,10 @@ def _page(generated: Generated, platforms: tuple[str, ...]) -> str:
         signs=_SIGNS,
         tables={title: rows for title, rows in tables.items() if rows},
         number=_number,
-        range=_range,
         units=[parse_unit(name) for name in sorted({row.variable.unit for row in layout.rows})],
         in_base=_in_base,
         tolerance=TOLERANCE,
+        most_steps=f"{generated.most_steps:,}".replace(",", " "),
         tick_rule=TICK_RULE.format(period=layout.model.period),
         platforms=platforms,
         build=_build_command(generated),

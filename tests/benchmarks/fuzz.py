@@ -68,7 +68,7 @@ def watched(name: str, options: argparse.Namespace, folder: Path) -> Iterator[tu
     """Rows of (watcher, model, FMI, programs, calls, functions, seconds, result)."""
     watcher = WATCHERS[name]
     for planted in [one for one in PLANTED if name in one.seen_by]:
-        played = run(watcher, planted.model, 3, 150, options.seed, folder, planted)
+        played = run(watcher, planted.model, 3, int(200 * watcher.share), options.seed, folder, planted)
         seen = "seen" if played.code else "NOT SEEN"
         print(f"{name}: planted error, {planted.what}: {seen}", file=sys.stderr)
         yield name, f"{planted.model} with a planted error: {planted.what}", "3", "", "", "", "", seen

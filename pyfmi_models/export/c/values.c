@@ -88,9 +88,12 @@ static Status check_setting(Instance *instance, const Variable *variable, double
                     variable->fixed ? "fixed parameter " : "", variable->name);
     }
     if (!(fabs(value) < INFINITY)) return fail(instance, FAILED, "\"%s\" = %g is not finite", variable->name, value);
-    if (variable->kind == PARAMETER && !(value >= variable->low && value <= variable->high))
-        return fail(instance, FAILED, "parameter \"%s\" = %.10g is not between %.10g and %.10g", variable->name, value,
-                    variable->low, variable->high);
+    if (variable->kind == PARAMETER && value < variable->low)
+        return fail(instance, FAILED, "parameter \"%s\" = %.10g is below its least value %.10g", variable->name, value,
+                    variable->low);
+    if (variable->kind == PARAMETER && value > variable->high)
+        return fail(instance, FAILED, "parameter \"%s\" = %.10g is above its largest value %.10g", variable->name, value,
+                    variable->high);
     return OK;
 }
 
