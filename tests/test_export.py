@@ -281,6 +281,20 @@ def test_the_page_shows_equations_parameters_units_and_a_figure_and_needs_no_net
     assert re.findall(r"(?:src|href)=|@import|url\((?!#)", text) == []
 
 
+def test_the_page_says_only_starts_and_ranges_that_there_are():
+    """Outputs of a plant are calculated, those of a controller hold their start value until the first tick."""
+    heads = {}
+    for part, model in (("plant", mount(*EXAMPLES).model()), ("controller", of_case("C2a"))):
+        for title, body in re.findall(r"<h2>(\w+)</h2>\n<div class=\"wide\"><table>(.*?)</table>", page(model), re.S):
+            rows = body.strip().split("</tr>")
+            heads[part, title] = re.findall(r"<th[^>]*>(\w+)", rows[0])
+            assert {row.count("<td") for row in rows[1:-1]} == {len(heads[part, title])} or title == "Units"
+    assert heads["plant", "Outputs"] == ["Name", "Unit", "Description"]
+    assert heads["controller", "Outputs"] == ["Name", "Unit", "Start", "Description"]
+    assert heads["plant", "Parameters"] == ["Name", "Unit", "Start", "Range", "Description"]
+    assert f"more than {generate(of_case('C2a')).most_steps:,} ticks".replace(",", " ") in page(of_case("C2a"))
+
+
 @pytest.mark.parametrize("name", EXPORTED)
 def test_every_part_of_a_model_has_a_chapter_and_a_place_in_the_figure(name):
     what = EXPORTED[name]
