@@ -17,6 +17,8 @@ from cosim.paper.margins import Margins
 from cosim.paper.options import REFERENCE, Option, options, repeating, settled
 from cosim.paper.robustness import Stress, stresses
 from cosim.paper.workshop import Workshop
+from pyfmi_models.card import parse_card
+from pyfmi_models.card_writer import card_text
 from pyfmi_models.effects import FrictionWander
 from pyfmi_models.effects.compliance import Compliance
 
@@ -118,6 +120,20 @@ def test_an_option_believes_the_friction_it_says() -> None:
 
 
 KNOWLEDGE = ("nominal", "directional", "plant")
+
+
+@pytest.mark.parametrize("option", options(), ids=lambda one: one.key)
+def test_the_keys_of_an_option_make_it_in_a_card(option: Option) -> None:
+    """Written as TOML into a card, the keys give the controller that was compared."""
+    where = option.under(condition("base"))
+    card = parse_card(card_text(where.controller), "written")
+    assert card.controller is not None
+    assert where.controller.controller is not None
+    made = {name: getattr(card.controller, name) for name in option.keys}
+    assert made == {name: getattr(where.controller.controller, name) for name in option.keys}
+    assert [one.name for one in card.controller_model().states] == [
+        one.name for one in where.controller.controller_model().states
+    ]
 
 
 def test_settled_and_repeating_conditions_differ_in_nothing_else() -> None:

@@ -21,9 +21,9 @@ from cosim.pictures.style import AFTER, BEFORE, GREY, LINE, MEASURED, SHADE
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-DRAWN = ("C3a", "third_400_30", "fourth_220", "chosen")
+DRAWN = ("C3a", "C2a", "fourth_120", "fourth_220", "chosen")
 """Controllers whose loops are drawn."""
-COLOURS = {"C3a": MEASURED, "third_400_30": "#7A8791", "fourth_220": BEFORE, "chosen": AFTER}
+COLOURS = dict(zip(DRAWN, (MEASURED, "#8A949E", "#E0A566", BEFORE, AFTER), strict=True))
 MARKERS = {3: "o", 4: "s"}
 APART = 0.055
 """Least distance of two labels, as a share of the axis."""
@@ -44,7 +44,7 @@ def comparison_figures(found: Comparison, folder: Path, force: bool = False) -> 
 
 def draw_gain(found: Comparison, path: Path, force: bool) -> None:
     """ISE over that of C3a against phase margin and against delay margin, condition A."""
-    with figure(path, 1, 2, (10.5, 5.2), force) as (sheet, axes):
+    with figure(path, 1, 2, (10.5, 5.6), force) as (sheet, axes):
         sheet.suptitle("Gain against margin, condition A", x=0.01, ha="left", fontsize=11)
         for one, price, factor, label in zip(
             axes[0], ("phase", "delay"), (1, 1e3), ("phase margin [deg]", "delay margin [ms]"), strict=True
@@ -55,7 +55,9 @@ def draw_gain(found: Comparison, path: Path, force: bool) -> None:
             one.grid(True)
         axes[0, 0].set_ylabel("ISE / ISE of C3a")
         axes[0, 0].axvspan(PHASE, axes[0, 0].get_xlim()[1], 0, _height(axes[0, 0], GAIN), color=SHADE, zorder=0)
-        axes[0, 1].legend(frameon=False, loc="upper right")
+        sheet.legend(
+            *axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=5, frameon=False, fontsize=9
+        )
         plain_logs(*axes[0])
 
 
@@ -110,9 +112,11 @@ def draw_loops(found: Comparison, path: Path, force: bool) -> None:
             axes[1].plot(omega, sensitivity, color=COLOURS[key])
             axes[2].plot(omega, np.abs(plant.response(omega)) * sensitivity / ARCSEC, color=COLOURS[key])
         _nyquist_paper(axes[0])
-        axes[1].set(xscale="log", yscale="log", ylim=(1e-3, 4), title="sensitivity |S|", xlabel="[rad/s]")
-        axes[2].set(xscale="log", yscale="log", title="error per torque [arcsec per N m]", xlabel="[rad/s]")
-        for one in axes[1:]:
+        axes[1].set(xscale="log", yscale="log", ylim=(1e-3, 4), xlabel="angular frequency [rad/s]")
+        axes[2].set(xscale="log", yscale="log", xlabel="angular frequency [rad/s]")
+        titles = ("Nyquist; dashed Ms = 2, dotted 45 deg", "sensitivity |S|", "error per torque [arcsec per N m]")
+        for one, title in zip(axes, titles, strict=True):
+            one.set_title(title, loc="left", color=GREY)
             one.grid(True)
         plain_logs(*axes)
 
@@ -129,8 +133,8 @@ def _nyquist_paper(axes: "Axes") -> None:
     ray = np.radians(180 + PHASE)
     axes.plot([0, 2 * np.cos(ray)], [0, 2 * np.sin(ray)], ":", color=GREY, linewidth=1)
     axes.plot(-1, 0, "+", color=MEASURED, markersize=8)
-    axes.set(xlim=(-2.5, 1), ylim=(-2, 1.5), aspect="equal", title="Nyquist; dashed Ms = 2, dotted 45 deg")
-    axes.legend(frameon=False, loc="upper right")
+    axes.set(xlim=(-2.5, 1), ylim=(-2, 1.5), aspect="equal")
+    axes.legend(frameon=False, loc="lower right", fontsize=8.5)
 
 
 def draw_robustness(found: Comparison, path: Path, force: bool) -> None:
@@ -146,7 +150,7 @@ def draw_robustness(found: Comparison, path: Path, force: bool) -> None:
             row, column = keys.index(item.option.key), stresses.index(item.stress.key)
             grid[row, column] = item.ratio
             text = _cell(item.ratio) + ("" if item.stable else " ×")
-            dark = item.ratio > 3 or item.ratio < 0.03
+            dark = item.ratio > 20 or item.ratio < 0.03
             one.text(column, row, text, ha="center", va="center", fontsize=7.5, color="white" if dark else MEASURED)
         one.imshow(np.clip(grid, 1e-2, 1e2), cmap="RdYlBu_r", norm=LogNorm(1e-2, 1e2), aspect="auto")
         one.set_xticks(range(len(stresses)), stresses, rotation=50, ha="right")

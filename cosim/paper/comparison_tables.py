@@ -2,7 +2,8 @@
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+import json
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from cosim.paper.comparison import FEW, A, B, Comparison, Row, Survival
@@ -39,6 +40,8 @@ def option_row(row: Row) -> dict[str, Any]:
         "torque_rms_N_m": _short(row.torque),
         "noise_torque_N_m": _short(row.noise),
         "seeds": row.seeds,
+        "believes": row.option.knows,
+        "controller_keys": json.dumps(row.option.keys),
     }
 
 
@@ -196,14 +199,33 @@ def better(found: Comparison) -> dict[str, Any]:
         "ms_c3a": usual.price.Ms,
         "noise_found": mine.noise,
         "noise_c3a": usual.noise,
+        "noise_raw": in_a["C3a"].noise,
+        **_advice(in_a, in_b),
         "frontier": frontier_text(found),
         "limits": limits_text(found),
         "learning": learning_text(found),
         "few": FEW,
         "stressed": len(found.plan.stresses),
         "lost": _lost(found, "chosen"),
+        "keys": [f"{key} = {json.dumps(value)}" for key, value in found.chosen.option.keys.items()],
         "unstable": unstable_text(found),
     }
+
+
+def _advice(in_a: Mapping[str, Row], in_b: Mapping[str, Row]) -> dict[str, str]:
+    """Gains in A as divisors of the ISE, margins as ranges over A and B; of what was compared."""
+    gains = {"free_gain": "blend_refitted", "chosen_gain": "chosen", "fourth_gain": "fourth_220"}
+    found = {name: f"{1 / in_a[key].ratio:.2g}" if key in in_a else "-" for name, key in gains.items()}
+    fourth = [rows["fourth_220"].price for rows in (in_a, in_b) if "fourth_220" in rows]
+    return found | {
+        "fourth_phase": _range([one.phase for one in fourth], 0),
+        "fourth_delay": _range([1e3 * one.delay for one in fourth], 1),
+    }
+
+
+def _range(values: Sequence[float], digits: int) -> str:
+    low, high = (f"{edge:.{digits}f}" for edge in (min(values), max(values))) if values else ("-", "-")
+    return low if low == high else f"{low} to {high}"
 
 
 def _lost(found: Comparison, key: str) -> str:

@@ -37,9 +37,11 @@ class Option:
         return replace(condition, controller=replace(card, believed=self._law(condition)))
 
     @property
-    def learns(self) -> bool:
-        """Whether it needs time before it is as good as it gets."""
-        return any(isinstance(value, AdaptationSection | LearningSection) for value in self.changes.values())
+    def keys(self) -> dict[str, Any]:
+        """Return the keys of a card's `[controller]` that make it, but for the friction it believes in."""
+        sections = (AdaptationSection, LearningSection)
+        tables = {key: one.model_dump() if isinstance(one, sections) else one for key, one in self.changes.items()}
+        return {"compensation": self.compensation, **tables}
 
     def _law(self, condition: Condition) -> FrictionLaw:
         card: Card = condition.plant if self.knows == "plant" else read_card(_CARDS[self.knows])
