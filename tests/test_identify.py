@@ -10,6 +10,7 @@ from benchmarks.identification import POSITIVE, multisine, the_card
 
 from cosim.cli import main
 from cosim.errors import InputError
+from cosim.identify.deliver import summary
 from cosim.identify.estimate import Outputs, estimate
 from cosim.identify.friction_map import friction_map
 from cosim.identify.identify import Options, free_names, identify, with_numbers
@@ -152,6 +153,16 @@ def test_names_may_leave_out_their_prefix_and_unknown_ones_are_refused() -> None
 def test_numbers_that_a_structure_lacks_are_left_out() -> None:
     card = read_card("paper_mount")
     assert with_numbers(card, {"friction.Fc": 2.0, "friction.Fc.positive": 3.0}).friction.Fc == 2.0  # type: ignore[attr-defined]
+
+
+def test_the_summary_warns_of_numbers_that_depend_on_each_other_and_says_how_well_the_curve_is_known(
+    quasi_static: Recording,
+) -> None:
+    card = the_card(**POSITIVE)
+    found = identify([quasi_static], card, Options(free=("sigma0",), starts=1))
+    text = summary(found, card)
+    assert "Mind, positive: these numbers cannot be told apart here, their curve can: within 0.00" in text
+    assert any("correlate" in warning for warning in found.map.fits["positive"].warnings)  # type: ignore[union-attr]
 
 
 def test_the_verb_writes_card_numbers_and_pictures(recording: Recording, step: Recording, tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import numpy as np
 import cosim
 from cosim.files import check_free, directory, replacing
 from cosim.identify.estimate import Estimate
+from cosim.identify.friction_map import FrictionMap
 from cosim.identify.identify import Identified
 from cosim.recording import Recording
 from pyfmi_models.card import Card
@@ -103,10 +104,10 @@ def summary(found: Identified, card: Card) -> str:
     lines: list[str] = []
     if found.map:
         lines.append(f"Friction map, above {found.map.cut:.3g} rad/s (or m/s)")
-        lines += [f"  {name:9}" + _numbers(fit) for name, fit in found.map.fits.items()]
+        lines += [line for name in found.map.fits for line in _mapped(found.map, name)]
     for name, one in found.presliding.items():
         lines.append(f"Presliding step {name}, {one.torque:.3g} N.m (or N)")
-        lines += [f"  {way:9}" + _numbers(fit) for way, fit in (("linear", one.linear), ("direct", one.direct))]
+        lines += [line for way, fit in (("linear", one.linear), ("direct", one.direct)) for line in _told(way, fit)]
     if found.best:
         best = found.best
         lines.append(f"Output error in closed loop, best of {len(found.output_error)} starts")
@@ -116,6 +117,21 @@ def summary(found: Identified, card: Card) -> str:
         ]
         lines += [f"  Mind: {warning}" for warning in best.warnings]
     return "\n".join([*lines, *(f"Not done: {reason}" for reason in found.not_done)])
+
+
+def _mapped(found: FrictionMap, name: str) -> list[str]:
+    """One map as lines: where single numbers depend on each other, how well the curve is known all the same."""
+    fit, line = found.fits[name], f"  {name:9}{_numbers(found.fits[name])}"
+    if not fit.warnings:
+        return [line]
+    band = found.curve(name, np.linspace(found.cut, float(np.abs(found.samples.v).max()), 60))[1].max()
+    rule = "these numbers cannot be told apart here, their curve can"
+    return [line, f"  Mind, {name}: {rule}: within {band:.2g} N.m or N (95 %)."]
+
+
+def _told(name: str, fit: Estimate) -> list[str]:
+    """One fit as lines: its numbers, and what the recording cannot tell."""
+    return [f"  {name:9}{_numbers(fit)}", *(f"  Mind, {name}: {warning}" for warning in fit.warnings)]
 
 
 def _numbers(fit: Estimate) -> str:
