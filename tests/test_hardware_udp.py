@@ -16,12 +16,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from benchmarks import hardware as benchmark
 from test_hardware import SCENARIO, SIMULATED, assert_safe, invoke, recorded, scenario, simulated
 
 from cosim.cli_cache import fmu_of_card
 from cosim.cli_drive import _plant
 from cosim.errors import HardwareError
 from cosim.exchange import open_fmu
+from cosim.hardware.loops import bare_clock
 from cosim.hardware.machine import Machine, changed, read_machine
 from cosim.hardware.move import try_move
 from cosim.hardware.replay import replay
@@ -343,15 +345,27 @@ with Session(scenario(("stop = 0.4", "stop = 30.0")), over({url!r}, PATIENT), Pa
 """
 
 
+@contextmanager
+def spawned(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+    """A process of Python that is gone afterwards."""
+    process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.PIPE)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def line_of(process: subprocess.Popen[bytes]) -> bytes:
+    assert process.stdout is not None
+    return process.stdout.readline()
+
+
 def test_when_python_is_killed_the_loop_notices_takes_the_torque_to_zero_and_leaves(tmp_path: Path) -> None:
     with drive(PATIENT, lockstep=False) as there:
         code = SUPERVISOR.format(tests=str(Path(__file__).parent), url=there.url, box=str(tmp_path / "box"))
-        process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
-        assert process.stdout is not None
-        with process.stdout:
-            loop = int(process.stdout.readline())
-        os.kill(process.pid, signal.SIGKILL)
-        process.wait()
+        with spawned("-c", code) as process:
+            loop = line_of(process).decode().strip() or pytest.skip("this computer was never in time")
         wait_for(lambda: not Path(f"/proc/{loop}").exists())
         assert there.drive.held == 0
     found = box_of(tmp_path)
@@ -359,42 +373,35 @@ def test_when_python_is_killed_the_loop_notices_takes_the_torque_to_zero_and_lea
     assert found["machine.order"][-1] == 0
 
 
-def started(tmp_path: Path, port: int, *options: str) -> subprocess.Popen[bytes]:
+@contextmanager
+def drive_process(tmp_path: Path, port: int, *options: str) -> Iterator[subprocess.Popen[bytes]]:
+    """`cosim hardware virtual-drive`, up to its first word."""
     (tmp_path / "s.toml").write_text(SCENARIO, "utf-8")
-    command = [
-        sys.executable,
-        "-m",
-        "cosim",
-        "hardware",
-        "virtual-drive",
-        str(tmp_path / "s.toml"),
-        "--port",
-        str(port),
-    ]
-    process = subprocess.Popen([*command, "--json", *options], stdout=subprocess.PIPE)
-    assert process.stdout is not None
-    assert json.loads(process.stdout.readline()) == {"what": "state", "state": "not ready", "torque": 0.0}
-    return process
+    verb = ("-m", "cosim", "hardware", "virtual-drive", str(tmp_path / "s.toml"), "--port", str(port), "--json")
+    with spawned(*verb, *options) as process:
+        assert json.loads(line_of(process)) == {"what": "state", "state": "not ready", "torque": 0.0}
+        yield process
 
 
 def test_when_the_drive_is_killed_the_loop_orders_zero_and_a_new_drive_has_no_torque(tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    process = started(tmp_path, port, "--machine", "virtual")
-    with session(tmp_path, f"udp://127.0.0.1:{port}", PATIENT, fast=False) as one:
+    with (
+        drive_process(tmp_path, port, "--machine", "virtual") as process,
+        session(tmp_path, f"udp://127.0.0.1:{port}", PATIENT, fast=False) as one,
+    ):
         operating(one)
         process.kill()
-        process.communicate()
+        process.wait()
         ended = one.track()
         assert not ended.running
         assert (ended.state, ended.torque) == ("fault", 0)
         assert {"frame_lost", "deadline"} & set(ended.faults), "or it was late before"
     box_of(tmp_path)
-    again = started(tmp_path, port, "--inject", "late:0.1:0.2:3", "--counts-per-turn", "65536")
-    again.send_signal(signal.SIGINT)
-    assert again.wait(10) == 0
-    again.communicate()
+    with drive_process(tmp_path, port, "--inject", "late:0.1:0.2:3", "--counts-per-turn", "65536") as again:
+        again.send_signal(signal.SIGINT)
+        assert again.wait(10) == 0
 
 
 def test_the_commands_check_and_run_over_udp(tmp_path: Path) -> None:
@@ -472,3 +479,19 @@ def test_records_that_the_ring_has_overwritten_are_missing_not_wrong(tmp_path: P
     assert records["sequence"][-1] == 1234
     assert np.all(np.diff(records["sequence"].astype(int)) == 1)
     assert 400 < len(records) <= 500
+
+
+def test_a_fault_that_the_benchmark_injects_becomes_a_row_of_its_page() -> None:
+    trials = [benchmark.injected("lost", {}, "frame_lost", 0.1), benchmark.injected("lost", {}, "estop", 0.1)]
+    seen, missed = (benchmark.row("lost", "frame_lost", [one]) for one in trials)
+    assert (seen["detected"], seen["cycles"], seen["states"], seen["torque_after"]) == (1.0, [3, 3], ["fault"], 0.0)
+    assert missed["detected"] == 0.0
+    page = "\n".join(benchmark.fault_lines({"rows": [seen], "detected": 1.0}))
+    assert "| lost | `frame_lost` | 100% of 1 | 3 | fault | 0 |" in page
+
+
+def test_a_bare_clock_counts_its_edges() -> None:
+    edges, late, worst = bare_clock(1e-3, 20.0, 0.05)
+    assert edges >= 50
+    assert 0 <= late <= edges
+    assert worst > 0
