@@ -8,12 +8,13 @@ import typer
 
 from cosim.cli_drive import JsonOption, MachineOption, machine_of, virtual_drive
 from cosim.cli_firmware import firmware
-from cosim.cli_supervisor import alpaca
+from cosim.cli_supervisor import alpaca, indi
 from cosim.terminal import put, put_json, say
 
 app = typer.Typer(no_args_is_help=True, help="The same controller on a machine.")
 app.command()(firmware)
 app.command()(alpaca)
+app.command()(indi)
 app.command("virtual-drive")(virtual_drive)
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A scenario (.toml) or the name of a shipped one: sidereal.")]

@@ -22,11 +22,13 @@ from cosim.cli_cache import with_fmus
 from cosim.errors import OutputError, ScenarioError
 from cosim.recording import Recording
 from cosim.scenario import read_scenario
-from cosim.supervisor.alpaca import ABSENT, Server
+from cosim.supervisor.alpaca import Server
 from cosim.supervisor.guide import Guide, still
+from cosim.supervisor.members import ABSENT
 from cosim.supervisor.mount import Limits, SimulatedMount
+from cosim.supervisor.pointing import HORIZON, Pointing
 from cosim.supervisor.sky import equatorial, horizontal, sidereal_time
-from cosim.supervisor.telescope import HORIZON, Telescope
+from cosim.supervisor.telescope import Telescope
 
 SPEED, ARCSEC = 20.0, 1 / 3600
 QUICK = Limits(velocity=radians(10), acceleration=radians(10))
@@ -37,7 +39,7 @@ BEGUN = datetime(2026, 11, 21, 20, tzinfo=UTC)
 def server() -> Iterator[Server]:
     with (
         SimulatedMount(with_fmus(read_scenario("two_axis")), limits=QUICK, speed=SPEED) as mount,
-        Server(Telescope(mount, radians(9.0), BEGUN), port=0, discovery=0) as one,
+        Server(Telescope(Pointing(mount, radians(9.0), BEGUN)), port=0, discovery=0) as one,
     ):
         yield one
 
@@ -285,7 +287,7 @@ def test_transactions_are_counted_and_names_in_a_query_may_be_spelt_anyhow(serve
 
 def test_a_port_that_is_taken_and_a_scenario_without_a_star_are_refused(server: Server) -> None:
     with pytest.raises(OutputError, match=f"Port {server.port} of 127.0.0.1 cannot be served: address already in use"):
-        Server(Telescope.__new__(Telescope), port=server.port)
+        Server(server.telescope, port=server.port)
     with pytest.raises(ScenarioError, match='needs one signal of kind "star" to guide, and this has 0'):
         SimulatedMount(read_scenario("sidereal"))
 
