@@ -4,7 +4,7 @@ Each cycle sends one process image and takes one back, from Python: see python_a
 Working counter, statusword, mode shown and, every few cycles, the state of the slave itself are looked at: after a bus
 watchdog has tripped the working counter may stay good while the slave has left operation.
 
-Not tried on a bus: tests know its state machine and the bytes of its PDOs from a stand-in for `pysoem`.
+Not tried on a bus with a drive: tests use a stand-in for `pysoem`, and `pysoem` itself with a slave in software.
 """
 
 import struct
@@ -42,6 +42,7 @@ class EthercatDrive(PythonAdapter):
         self._out, self._in = Layout(self._given.outputs), Layout(self._given.inputs)
         self._soem = _pysoem()
         self._master = self._soem.Master()
+        self._master.always_release_gil = True  # the supervisor goes on while a frame is under way
         self._samples = self._cycles = 0
         self._order = self._out.pack({"mode": TORQUE_MODE})
         try:
