@@ -29,6 +29,7 @@ from lxml import etree
 from scipy.integrate import solve_ivp
 
 from pyfmi_models.card import read_card
+from pyfmi_models.controller_section import AdaptationSection, LearningSection
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export import build_library, export_fmu
 from pyfmi_models.export.build import compile_shared, fmi_headers, sources_of
@@ -59,9 +60,18 @@ def test_the_archive_is_valid(archive, make, fmi):
     assert validate_fmu(str(archive(make, fmi))) == []
 
 
+CONTROLLERS = {
+    **{case: {"compensation": case} for case in ("C1", "C2a", "C2b", "C3a", "C3b", "C2a+C3a")},
+    "that identifies": {"adaptation": AdaptationSection()},
+    "that learns": {"learning": LearningSection(period=1.0, knots=10)},
+    "of order 4": {"observer_order": 4},
+    "by differences": {"velocity": "difference"},
+}
+
+
 def of_case(case):
     card = read_card("paper_mount")
-    return replace(card, controller=card.controller.model_copy(update={"compensation": case})).controller_model()
+    return replace(card, controller=card.controller.model_copy(update=CONTROLLERS[case])).controller_model()
 
 
 EXPORTED = {
@@ -69,7 +79,7 @@ EXPORTED = {
     **{f"one-sided {key} friction": mount(friction=law) for key, law in ONE_SIDED.items()},
     **{type(effect).__name__: mount(effect) for effect in EXAMPLES},
     "every effect": mount(*EXAMPLES),
-    **{case: case for case in ("C1", "C2a", "C2b", "C3a", "C3b")},
+    **{case: case for case in CONTROLLERS},
 }
 
 
