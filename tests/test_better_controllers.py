@@ -15,6 +15,7 @@ from cosim.paper.conditions import condition
 from cosim.paper.frontier import Design, choice, designs, frontier
 from cosim.paper.margins import Margins
 from cosim.paper.options import REFERENCE, Option, options, repeating, settled
+from cosim.paper.report import rendered
 from cosim.paper.robustness import Stress, stresses
 from cosim.paper.workshop import Workshop
 from pyfmi_models.card import parse_card
@@ -72,6 +73,9 @@ def test_tables_and_figures_say_all_of_it(found: Comparison, tmp_path: Path) -> 
     rows = list(csv.DictReader(rows_csv(data["options"]).splitlines()))
     assert {"ise_to_C3a", "phase_margin_deg", "delay_margin_ms", "Ms", "torque_rms_N_m"} <= set(rows[0])
     said = better(found)
+    page = rendered("better.md.j2", better=said)
+    assert "| `chosen`: phase margin at its worst point [deg] | >= 45 | 47.3 | yes |" in page
+    assert "kp = 900.0" in page
     assert "`fourth_220`: delay 4 ms" in said["unstable"]
     assert found.chosen.option.title in frontier_text(found)
     figures = comparison_figures(found, tmp_path)

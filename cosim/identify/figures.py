@@ -17,7 +17,7 @@ from cosim.pictures.style import AFTER, BEFORE, GREY, LINE, MEASURED
 from cosim.recording import Recording
 from pyfmi_models.card import Card
 
-POINTS = 1500
+POINTS = 700
 UNITS = {"rotary": ("rad/s", "N m", "rad"), "linear": ("m/s", "N", "m")}
 
 

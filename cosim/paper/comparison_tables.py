@@ -127,7 +127,7 @@ def ratio(value: float) -> str:
 def frontier_text(found: Comparison) -> str:
     """Write the frontier as Markdown: what each phase margin costs in ISE, on test seeds."""
     lines = [
-        "| design | phase | delay margin [ms] | Ms | torque for noise [N m] | ISE/C3a, design seeds | test seeds |",
+        "| design | phase | delay margin [ms] | Ms | torque for noise [N m] | ISE/C3a, design seeds | first test seeds |",
         "|---|---|---|---|---|---|---|",
     ]
     tested = {row.option.key: row for row in found.of(A)}
@@ -184,7 +184,7 @@ def better(found: Comparison) -> dict[str, Any]:
         "design_seeds": found.plan.design_seeds,
         "gain": gain_text(found),
         "asked": GAIN,
-        "phase": f"{PHASE:.0f}",
+        "phase": PHASE,
         "guarded": f"{GUARD * GAIN:g}",
         "most_noise": f"{NOISE:g}",
         "tried": len(found.designs),
@@ -207,7 +207,7 @@ def better(found: Comparison) -> dict[str, Any]:
         "few": FEW,
         "stressed": len(found.plan.stresses),
         "lost": _lost(found, "chosen"),
-        "keys": [f"{key} = {json.dumps(value)}" for key, value in found.chosen.option.keys.items()],
+        "card_keys": [f"{key} = {json.dumps(value)}" for key, value in found.chosen.option.keys.items()],
         "unstable": unstable_text(found),
     }
 

@@ -90,4 +90,4 @@ def choice(found: Sequence[Design]) -> Design:
 
 def chosen_option(design: Design) -> Option:
     """Return the chosen design under a name of its own."""
-    return replace(design.option, key="chosen", title=f"chosen: {design.option.title}")
+    return replace(design.option, key="chosen")

@@ -122,8 +122,8 @@ def _variants(variants: Study) -> dict[str, Any]:
 def _page(table: dict[str, Any], results: Results, figures: dict[Path, str]) -> str:
     titles = {"paper": "the paper, measured"} | {one.key: one.title for one in (*conditions(), *definitions())}
     other = _variants(results.variants)
-    page = Environment(loader=PackageLoader("cosim.paper", "."), undefined=StrictUndefined, keep_trailing_newline=True)
-    return page.get_template("page.md.j2").render(
+    return rendered(
+        "page.md.j2",
         command=table["command"],
         version=table["version"],
         seeds=results.found.seeds,
@@ -132,7 +132,6 @@ def _page(table: dict[str, Any], results: Results, figures: dict[Path, str]) -> 
         definitions=table_text(other, titles),
         checks=checks(table),
         base=ratios_of(table["base"]),
-        r=lambda value: f"{value:.3f}",
         ideal_c1=table["ideal"]["C1"],
         base_c1=table["base"]["C1"],
         kp_change=100 * (table["base_kp255"]["C1"] / table["base"]["C1"] - 1),
@@ -141,6 +140,12 @@ def _page(table: dict[str, Any], results: Results, figures: dict[Path, str]) -> 
         identified=identified(results.identified),
         better=results.comparison and better(results.comparison),
     )
+
+
+def rendered(template: str, **values: Any) -> str:
+    """Fill in a template of this folder; `r` writes a ratio."""
+    page = Environment(loader=PackageLoader("cosim.paper", "."), undefined=StrictUndefined, keep_trailing_newline=True)
+    return page.get_template(template).render(r=lambda value: f"{value:.3f}", **values)
 
 
 def _about(path: Path) -> str:
