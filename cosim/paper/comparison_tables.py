@@ -127,7 +127,7 @@ def ratio(value: float) -> str:
 def frontier_text(found: Comparison) -> str:
     """Write the frontier as Markdown: what each phase margin costs in ISE, on test seeds."""
     lines = [
-        "| design | phase | delay margin [ms] | Ms | torque for noise [N m] | ISE/C3a, design seeds | first test seeds |",
+        "| design | phase | delay margin [ms] | Ms | noise [N m] | ISE/C3a, design seeds | first test seeds |",
         "|---|---|---|---|---|---|---|",
     ]
     tested = {row.option.key: row for row in found.of(A)}
