@@ -7,6 +7,7 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from datetime import UTC, datetime
 from math import degrees, radians
 from pathlib import Path
@@ -26,9 +27,10 @@ from cosim.supervisor.alpaca import Server
 from cosim.supervisor.guide import Guide, still
 from cosim.supervisor.members import ABSENT
 from cosim.supervisor.mount import Limits, SimulatedMount
-from cosim.supervisor.pointing import HORIZON, Pointing
+from cosim.supervisor.pointing import HORIZON, DeviceError, Pointing
 from cosim.supervisor.sky import equatorial, horizontal, sidereal_time
 from cosim.supervisor.telescope import Telescope
+from cosim.wiring import Wire
 
 SPEED, ARCSEC = 20.0, 1 / 3600
 QUICK = Limits(velocity=radians(10), acceleration=radians(10))
@@ -347,3 +349,37 @@ def test_the_command_serves_until_it_is_interrupted_and_completes_its_recording(
     kept = Recording.read(tmp_path / "recording.parquet", required=())
     assert kept.t[-1] > 0.5
     assert np.ptp(np.degrees(kept["altitude_position"])) < 10 * ARCSEC, "it is parked"
+
+
+def test_whatever_bytes_come_the_server_goes_on(server: Server) -> None:
+    random = np.random.default_rng(6)
+    heads = (
+        b"GET /api/v1/telescope/0/%s HTTP/1.1\r\n\r\n",
+        b"PUT /api/v1/telescope/0/%s HTTP/1.1\r\nContent-Length: %s\r\n\r\n",
+    )
+    for trial in range(40):
+        noise = random.integers(1, 256, int(random.integers(0, 60)), dtype=np.uint8).tobytes()
+        text = (noise, heads[0] % noise, heads[1] % (b"tracking", noise), heads[1] % (b"tracking", b"9999999"))[
+            trial % 4
+        ]
+        with socket.create_connection(("127.0.0.1", server.port), timeout=5) as wire:
+            wire.sendall(text)
+            wire.shutdown(socket.SHUT_WR)
+            answer = wire.recv(1000)
+        assert (
+            not answer or answer.split()[1] in (b"400", b"414", b"501", b"505") or not answer.startswith(b"HTTP/1.1 ")
+        )
+    assert request(server, "GET", f"{BASE}name")[0] == 200
+
+
+def test_a_simulation_that_fails_is_told_to_whoever_asks() -> None:
+    scenario = with_fmus(read_scenario("two_axis"))
+    broken = replace(
+        scenario,
+        wires=[one for one in scenario.wires if one.target != "azimuth.tau"] + [Wire("nobody.x", "azimuth.tau")],
+    )
+    with SimulatedMount(broken) as mount:
+        until(lambda: bool(mount.failure))
+        with pytest.raises(DeviceError, match=r'The simulation has ended: .*"nobody') as refused:
+            _ = Telescope(Pointing(mount)).slewing
+    assert refused.value.number == 0x500

@@ -10,6 +10,7 @@ Reference: ASCOM Alpaca API Reference, version 1 (2019-2024), and its discovery 
 
 import json
 import socket
+import sys
 from collections.abc import Callable
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from itertools import count
@@ -26,6 +27,8 @@ from cosim.supervisor.telescope import Telescope
 PORT, DISCOVERY_PORT = 11111, 32227
 DISCOVERY = b"alpacadiscovery1"
 IDENTITY = "mount-cosim-simulated-mount-0"
+LONGEST = 65_536
+"""Bytes of a request's body."""
 
 
 class Server(ThreadingHTTPServer):
@@ -70,6 +73,11 @@ class Server(ThreadingHTTPServer):
         except DeviceError:
             return  # the next request is told
 
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Stay silent where a client has gone in the middle of an answer."""
+        if not isinstance(sys.exception(), OSError):
+            super().handle_error(request, client_address)
+
     def _answer_discovery(self) -> None:
         assert self.discovery is not None
         while True:
@@ -105,8 +113,13 @@ class _Handler(BaseHTTPRequestHandler):
         self._answer(dict(parse_qsl(urlsplit(self.path).query, keep_blank_values=True)))
 
     def do_PUT(self) -> None:
-        length = int(self.headers.get("Content-Length") or 0)
-        self._answer(dict(parse_qsl(self.rfile.read(length).decode("utf-8", "replace"), keep_blank_values=True)))
+        length = self.headers.get("Content-Length") or "0"
+        if not length.isascii() or not length.isdigit() or int(length) > LONGEST:
+            self.close_connection = True
+            self._send(400, f"Content-Length must be a number of at most {LONGEST} bytes", "text/plain; charset=utf-8")
+            return
+        body = self.rfile.read(int(length)).decode("utf-8", "replace")
+        self._answer(dict(parse_qsl(body, keep_blank_values=True)))
 
     def log_message(self, format: str, *args: Any) -> None:
         """Stay silent."""

@@ -66,6 +66,8 @@ class SimulatedMount:
 
     Raises:
         ScenarioError: there is no star in the scenario, or nothing that follows it.
+
+    `failure` says why the simulation ended by itself; it is empty while it runs.
     """
 
     def __init__(
@@ -86,7 +88,7 @@ class SimulatedMount:
         self._lock, self._stop = RLock(), Event()
         self._asked = 0.0
         self._seen: tuple[float, float, float] = (0.0, float(start[0]), float(start[1]))
-        self._failure: BaseException | None = None
+        self.failure = ""
         self._thread = Thread(target=self._run, name="mount", daemon=True)
 
     def __enter__(self) -> "SimulatedMount":
@@ -121,11 +123,6 @@ class SimulatedMount:
         with self._lock:
             return self.time < self._guide.arrival
 
-    @property
-    def failure(self) -> str:
-        """Why the simulation ended by itself; empty while it runs."""
-        return "" if self._failure is None else str(self._failure)
-
     def follow(self, path: Motion) -> None:
         """Join a path, smoothly and within the limits, from the next set point on."""
         with self._lock:
@@ -156,10 +153,11 @@ class SimulatedMount:
     def _run(self) -> None:
         try:
             self._simulate()
+            self.failure = f"a session lasts {LONGEST:g} simulated seconds."
         except _Ended:
             pass
-        except CosimError as error:
-            self._failure = error
+        except Exception as error:  # a thread has nobody else to tell
+            self.failure = str(error)
 
     def _simulate(self) -> None:
         scenario = self.scenario
