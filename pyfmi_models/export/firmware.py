@@ -51,7 +51,7 @@ _BOARDS = {
         target="arm-linux-musleabihf",
         flags=("-mcpu=cortex_a9",),
         link=("-static",),
-        gcc="arm-linux-gnueabihf-gcc -mcpu=cortex-a9 -mfpu=vfpv3 -static",
+        gcc="arm-linux-gnueabihf-gcc -mcpu=cortex-a9 -mfpu=vfpv3",
     ),
 }
 TARGETS = (*_BOARDS, "host")
