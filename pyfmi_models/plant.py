@@ -26,7 +26,7 @@ def plant(mount: "Mount") -> Model:
     results = [following, ca.vertcat(*shown.values())]
     return Model(
         name=f"{mount.name}_plant",
-        description=f"{mount.name}: one axis with {mount.friction.key} friction",
+        description=f"{mount.name}: one axis with {_parts(mount)}",
         inputs=_inputs(mount),
         parameters=mount.parameters(),
         states=tuple(variable for part in _states(mount).values() for variable in part),
@@ -34,6 +34,12 @@ def plant(mount: "Mount") -> Model:
         equations=ca.Function("equations", point, results, ["t", "x", "u", "p"], ["next", "y"]),
         chapters=_chapters(mount),
     )
+
+
+def _parts(mount: "Mount") -> str:
+    """What an axis has, in words: its friction, then its effects."""
+    friction = "no" if mount.friction.key == "none" else mount.friction.key
+    return ", ".join([f"{friction} friction", *dict.fromkeys(one.id.replace("_", " ") for one in mount.effects)])
 
 
 _PLACES = {"Torque path": "", "Mechanics": "", "Friction": "Mechanics", "Loads": "Mechanics", "Sensor path": ""}

@@ -19,6 +19,11 @@ SETS = {
 INPUTS = {"disturbance": 0.4, "temperature": 33.0}
 
 
+def plant(chosen: str) -> Model:
+    """A plant with one of the sets of effects."""
+    return mount(*SETS[chosen], friction=LAW).model()
+
+
 def by_equations(model: Model, torques: dict[float, float], shown: tuple[str, ...], **inputs: float) -> np.ndarray:
     """Values at the end of each span: torques by the time up to which they act; a tight implicit method."""
     now, start, rows = 0.0, {}, []
@@ -44,7 +49,7 @@ def by_fmu(
 
 @pytest.mark.parametrize("chosen", SETS)
 def test_an_fmu_with_many_effects_steps_as_its_equations_say(chosen: str) -> None:
-    model = mount(*SETS[chosen], friction=LAW).model()
+    model = plant(chosen)
     torques = {0.1: 6.0, 0.2: -5.0, 0.3: 9.0}
     inputs = {name: value for name, value in INPUTS.items() if name in {one.name for one in model.inputs}}
     shown = tuple(one.name for one in (*model.outputs, *model.states))

@@ -291,6 +291,14 @@ def test_the_page_shows_equations_parameters_units_and_a_figure_and_needs_no_net
     assert re.findall(r"(?:src|href)=|@import|url\((?!#)", text) == []
 
 
+def test_the_description_of_a_plant_names_its_parts():
+    chosen = [one for one in EXAMPLES if one.id in ("backlash", "torque_offset")]
+    assert mount(
+        *chosen, friction=LAWS["lugre"]
+    ).model().description == "m: one axis with lugre friction, " + ", ".join(one.id.replace("_", " ") for one in chosen)
+    assert mount(friction=LAWS["none"]).model().description == "m: one axis with no friction"
+
+
 def test_the_page_says_only_starts_and_ranges_that_there_are():
     """Outputs of a plant are calculated, those of a controller hold their start value until the first tick."""
     heads = {}

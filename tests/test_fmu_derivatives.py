@@ -6,6 +6,8 @@ from functools import cache
 import export_models as models
 import numpy as np
 import pytest
+import test_effects_fmu
+from effect_examples import slopes
 from fmpy import extract, read_model_description
 from fmpy.fmi3 import FMU3Slave
 from hypothesis import given, settings
@@ -132,6 +134,25 @@ def test_at_a_corner_a_derivative_is_of_one_side_or_between_both(fmi):
         sides.append(driver.get("der(z)")[0] / side)
     assert sides[0] - sides[1] > 0.5
     assert sides[1] - 1e-6 <= found <= sides[0] + 1e-6
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_with_every_effect_the_binary_tells_the_matrix_of_the_equations(seed):
+    """All rates and outputs by all states, inputs and parameters of a plant with all effects, column by column."""
+    model, random = test_effects_fmu.plant("all"), np.random.default_rng(seed)
+    driver = models.Driver(model, build_library(model), 3, "ME")
+    assert driver.call("EnterInitializationMode", False, 0.0, 0.0, False, 0.0) == "ok"
+    moving = (*model.states, *model.inputs)
+    point = {one.name: one.start + 0.3 * one.nominal * random.standard_normal() for one in moving}
+    assert {driver.set(name, value) for name, value in point.items()} == {"ok"}, driver.messages
+    knowns = [one.name for group in (model.states, model.inputs, model.parameters) for one in group]
+    unknowns = [f"der({state.name})" for state in model.states] + [one.name for one in model.outputs]
+    exact = slopes(model)([0.0, *driver.get(*knowns)])[1].full()[:, 1:]
+    forward = np.array([ask(driver, "Directional", unknowns, [name], [1.0])[1] for name in knowns]).T
+    back = np.array([ask(driver, "Adjoint", [name], knowns, [1.0])[1] for name in unknowns])
+    size = np.abs(exact).max(axis=1, keepdims=True)
+    np.testing.assert_allclose(forward / size, exact / size, rtol=1e-9, atol=1e-13)
+    np.testing.assert_allclose(back / size, exact / size, rtol=1e-9, atol=1e-13)
 
 
 def test_a_subset_in_any_order_gives_the_same_entries():
