@@ -224,15 +224,15 @@ def test_what_it_is_and_can_is_told(telescope: Any) -> None:
     assert {"Altitude", "Slewing", "UTCDate", "TimeStamp"} <= set(state)
 
 
-def test_clients_find_the_server_and_its_device(server: Server, telescope: Any) -> None:
-    from alpaca import management
+def test_clients_find_the_server_and_its_device(
+    server: Server, telescope: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from alpaca import discovery, management
 
     assert server.discovery is not None
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asking:
-        asking.settimeout(5)
-        asking.sendto(b"alpacadiscovery1", server.discovery.getsockname())
-        assert json.loads(asking.recv(100)) == {"AlpacaPort": server.port}
+    monkeypatch.setattr(discovery, "port", server.discovery.getsockname()[1])
     address = f"127.0.0.1:{server.port}"
+    assert address in discovery.search_ipv4(numquery=2, timeout=0.2)
     assert management.apiversions(address) == [1]
     assert management.description(address)["ServerName"] == "mount-cosim"
     (device,) = management.configureddevices(address)

@@ -45,7 +45,7 @@ class Server(ThreadingHTTPServer):
         except OSError as error:
             message = f"Port {port} of {address} cannot be served: {(error.strerror or str(error)).lower()}."
             raise OutputError(message, culprit=str(port)) from error
-        self.discovery = _discovery(address, discovery)
+        self.discovery = _discovery(discovery)
         self._serving = [Thread(target=self.serve_forever, daemon=True)]
         if self.discovery:
             self._serving.append(Thread(target=self._answer_discovery, daemon=True))
@@ -80,21 +80,22 @@ class Server(ThreadingHTTPServer):
 
     def _answer_discovery(self) -> None:
         assert self.discovery is not None
+        here = str(self.server_address[0]).startswith("127.")
         while True:
             try:
                 asked, sender = self.discovery.recvfrom(64)
-                if asked[:16] == DISCOVERY:
+                if asked[:16] == DISCOVERY and (not here or sender[0].startswith("127.")):
                     self.discovery.sendto(json.dumps({"AlpacaPort": self.port}).encode(), sender)
             except OSError:
                 return  # closed
 
 
-def _discovery(address: str, port: int) -> socket.socket | None:
-    """Open the socket on which clients ask who is there; None where another program has it for itself."""
+def _discovery(port: int) -> socket.socket | None:
+    """Open the socket on which clients ask everybody who is there; None where another program has it for itself."""
     found = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
-        found.bind(("" if address != "127.0.0.1" else address, port))
+        found.bind(("", port))  # an address of its own would not hear what is sent to all
     except OSError:
         found.close()
         return None
