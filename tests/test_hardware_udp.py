@@ -67,10 +67,10 @@ def session(folder: Path, url: str, given: Machine = SIMULATED, **options: Any) 
     return Session(scenario(), over(url, given), folder / "box", **({"fast": True} | options))
 
 
-def impatient(one: Session) -> Session:
-    """An answer that does not come is waited for 10 ms only."""
+def impatient(one: Session, milliseconds: int = 10) -> Session:
+    """Wait for an answer that does not come for so long only."""
     assert isinstance(one.transport, UdpDrive)
-    one.transport.udp.patience = 10_000_000
+    one.transport.udp.patience = milliseconds * 1_000_000
     return one
 
 
@@ -182,7 +182,7 @@ def answer(who: int, number: int, age: int = 0) -> bytes:
     ("make", "noticed"),
     [
         (answer, "good"),
-        (lambda who, number: answer(who, number, age=20_000), "late"),
+        (lambda who, number: answer(who, number, age=100_000), "late"),
         (lambda who, number: answer(who, number + 1), "foreign"),
         (lambda who, number: answer(who ^ 2, number), "foreign"),
         (lambda who, number: answer(who, number)[:-1] + b"?", "corrupted"),
@@ -193,7 +193,7 @@ def answer(who: int, number: int, age: int = 0) -> bytes:
 def test_an_answer_is_a_sample_only_if_it_is_whole_fresh_and_to_this_very_order(
     tmp_path: Path, make: Callable[[int, int], bytes], noticed: str
 ) -> None:
-    with answering(make) as url, impatient(session(tmp_path, url)) as one:
+    with answering(make) as url, impatient(session(tmp_path, url), 90) as one:
         one.advance(5)
         link = one.statistics["link"]
     assert {name: count for name, count in link.items() if count == 5} | {"sent": 5} == {
@@ -365,8 +365,12 @@ def test_when_python_is_killed_the_loop_notices_takes_the_torque_to_zero_and_lea
     with drive(PATIENT, lockstep=False) as there:
         code = SUPERVISOR.format(tests=str(Path(__file__).parent), url=there.url, box=str(tmp_path / "box"))
         with spawned("-c", code) as process:
-            loop = line_of(process).decode().strip() or pytest.skip("this computer was never in time")
-        wait_for(lambda: not Path(f"/proc/{loop}").exists())
+            loop = int(line_of(process) or pytest.skip("this computer was never in time"))
+        try:
+            wait_for(lambda: not Path(f"/proc/{loop}").exists())
+        except AssertionError:
+            os.kill(loop, signal.SIGKILL)
+            raise
         assert there.drive.held == 0
     found = box_of(tmp_path)
     assert {"heartbeat_lost", "deadline"} & set(faults_of(int(found["machine.faults"][-1]))), "or it was late before"
