@@ -10,8 +10,10 @@ import firmware_tools as tools
 import numpy as np
 import pytest
 from firmware_tools import ENABLE, FAULT, OFF, ON, RESET
+from test_hardware import recorded, session
 
 from cosim.cli import main
+from cosim.hardware.session import run_session
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export.build import compile_shared
@@ -131,6 +133,22 @@ def test_entering_again_the_controller_starts_anew() -> None:
     later = np.vstack((given[:2], given[23:]))
     later[:2, 0] = later[2, 0]
     assert np.array_equal(found[23:, 2:], tools.answers(program("host"), "host", later, 5)[2:, 2:])
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_what_the_loop_on_a_machine_recorded_gives_the_same_commands_again(tmp_path: Path, target: str) -> None:
+    with session(tmp_path) as one:
+        assert run_session(one)["completed"]
+    kept = recorded(tmp_path)
+    stepped = np.flatnonzero(kept["machine.notes"].astype(int) & 2)
+    rows = np.zeros((stepped[-1] + 1, 7))
+    rows[:, 0] = kept["machine.counts"][: len(rows)]
+    rows[:, 4:] = np.column_stack([kept[name][: len(rows)] for name in ("q_d", "v_d", "a_d")])
+    rows[1, 1], rows[stepped[0] :, 1] = RESET, ENABLE
+    found = tools.answers(program(target), target, rows, 5)
+    assert (found[stepped, 0] == ON).all()
+    assert np.array_equal(found[stepped, 2], kept["machine.command"][stepped])
+    assert len(stepped) > 3000
 
 
 C = """
