@@ -84,6 +84,7 @@ class Planted:
 
 
 MISSING, GETTING = "count && (!references || !values)", 'return fail(instance, FAILED, "getting values'
+COPY = "memcpy(*memory, instance->memory, memory_size()"
 GAP = 'fail(instance, FAILED, "a step from t = %.17g s leaves a gap: the model is at t = %.17g s", time, now)'
 PLANTED = (
     Planted("an output that is no number", "values.c", "if (name) return not_finite", "if (0) return not_finite"),
@@ -93,7 +94,7 @@ PLANTED = (
     Planted("half of a step", "step.c", "memory->ticks = before;", "", "ticking_root"),
     Planted("a crash", "values.c", f"if ({MISSING}) {GETTING}", f"if (0) {GETTING}"),
     Planted("a read past the table", "values.c", ">= (uint32_t)", "> (uint32_t)", seen_by=("sanitizers",)),
-    Planted("memory that nobody has written", "instance.c", "calloc(1, head", "malloc(head", seen_by=("valgrind",)),
+    Planted("memory that nobody has written", "memory.c", COPY, f"{COPY} - 8", "ticking_root", ("valgrind",)),
     Planted("a leak", "memory.c", "if (!given) release(memory);", "*memory = given;", seen_by=("valgrind",)),
 )
 
