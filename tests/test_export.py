@@ -39,7 +39,7 @@ from pyfmi_models.export.diagram import diagram
 from pyfmi_models.export.documentation import documentation
 from pyfmi_models.export.layout import layout_of
 from pyfmi_models.export.platforms import PLATFORMS, host
-from pyfmi_models.export.prose import formula
+from pyfmi_models.export.prose import formula, prose
 from pyfmi_models.export.structure import unknowns_of
 from pyfmi_models.export.units import BASE, parse_unit
 
@@ -345,6 +345,14 @@ FORMULAS = {
 @pytest.mark.parametrize("text", FORMULAS)
 def test_formulas_are_set_to_be_read(text):
     assert formula(text) == FORMULAS[text]
+
+
+def test_prose_shows_symbols_as_formulas_do_and_leaves_names_and_words():
+    text = "The sigma0 of `friction.sigma0` < tau_f; delta and beta_version are words, mu2 is not."
+    assert prose(text) == (
+        "<p>The σ<sub>0</sub> of <code>friction.sigma0</code> &lt; τ<sub>f</sub>; "
+        "delta and beta_version are words, μ<sub>2</sub> is not.</p>"
+    )
 
 
 LICENCES = ("license", "fmi-headers")

@@ -312,6 +312,15 @@ def test_an_importer_that_asks_for_event_mode_in_co_simulation_gets_a_sentence()
     assert said == ["event mode is not available in co-simulation"]
 
 
+def test_scheduled_execution_is_refused_with_a_sentence():
+    said, logger = [], models.LOGGER3(lambda e, status, category, message: said.append(message.decode()))
+    create = ctypes.CDLL(str(library(models.lugre))).fmi3InstantiateScheduledExecution
+    create.restype = ctypes.c_void_p
+    token = models.generate(models.lugre()).token.encode()
+    assert create(b"it", token, None, False, False, None, logger, None, None, None) is None
+    assert said == ["the model has no scheduled execution"]
+
+
 @both
 def test_nothing_is_read_from_the_folder_of_resources(fmi, monkeypatch):
     """There is none to miss: the same bits with a folder that does not exist, and without one."""

@@ -17,8 +17,17 @@ def prose(text: str) -> str:
 def _paragraph(paragraph: str) -> str:
     if paragraph.startswith(" "):
         return f"<pre>{formula(textwrap.dedent(paragraph).rstrip())}</pre>"
-    coded = re.sub(r"`([^`]+)`", r"<code>\1</code>", escape(paragraph.strip(), quote=False))
-    return f"<p>{coded}</p>"
+    plain, *coded = paragraph.strip().split("`")
+    parts = [_words(plain)]
+    for k, part in enumerate(coded):
+        parts.append(_words(part) if k % 2 else f"<code>{escape(part, quote=False)}</code>")
+    return f"<p>{''.join(parts)}</p>"
+
+
+def _words(text: str) -> str:
+    """Set a Greek letter with an index, `sigma0` or `tau_f`, as formulas do; other words are words."""
+    indexed = rf"(?<!\w)({'|'.join(_GREEK)})_?(\d|(?<=_)[a-z]{{1,3}})(?!\w)"
+    return re.sub(indexed, lambda m: f"{_GREEK[m[1]]}<sub>{m[2]}</sub>", escape(text, quote=False))
 
 
 def formula(text: str) -> str:
