@@ -9,6 +9,7 @@ import typer
 
 from cosim.errors import InputError
 from cosim.reading import pairs_of, read_recordings
+from cosim.recording import Recording
 from cosim.renamed import Alias
 from cosim.terminal import put, put_json, say, stage
 
@@ -16,7 +17,7 @@ from cosim.terminal import put, put_json, say, stage
 def diagnose(
     train: Annotated[list[Path], typer.Argument(help="Recordings that may be fitted.", metavar="TRAIN...")],
     heldout: Annotated[
-        Path, typer.Option("--heldout", help="Recording that proves the result, and may veto an effect.")
+        list[Path], typer.Option("--heldout", help="Recordings that prove the result, and may veto an effect.")
     ],
     card: Annotated[str, typer.Option("--card", help="Model card (.toml), or the name of a shipped one.")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
@@ -44,20 +45,22 @@ def diagnose(
 
     check_out(out, force)
     believed = read_card(card)
-    recordings = read_recordings((*train, heldout), believed.columns, columns, units, believed.mount.motion)
-    _check_split(recordings[:-1], recordings[-1])
+    recordings = read_recordings((*train, *heldout), believed.columns, columns, units, believed.mount.motion)
+    fitted, held = recordings[: len(train)], recordings[len(train) :]
+    _check_split(fitted, held)
     seconds = sum(recording.duration for recording in recordings)
     say(f"Read {len(recordings)} recordings, {seconds:.0f} s; card {believed.mount.name}")
-    command = f"cosim diagnose {' '.join(map(str, train))} --heldout {heldout} --card {card} --out {out}"
+    kept = " ".join(f"--heldout {path}" for path in heldout)
+    command = f"cosim diagnose {' '.join(map(str, train))} {kept} --card {card} --out {out}"
     more: Any = {}
     with stage("looking for what the model lacks") as progress:
         if fmu:
             box = BlackBox(fmu, {name: Alias(theirs) for name, theirs in pairs_of("--variables", variables).items()})
-            base = as_base(box, recordings[:-1], recordings[-1], believed, progress.tell)
+            base = as_base(box, fitted, _only(held), believed, progress.tell)
             more["more"] = Correction(box, base.card, *motion_of(recordings[0])).deliver
-            recordings, believed, command = [*base.train, base.heldout], base.card, f"{command} --fmu {fmu}"
-        outcome = find(recordings[:-1], recordings[-1], believed, progress.tell)
-        done = deliver(outcome, recordings[:-1], recordings[-1], believed, out, command, progress.tell, **more)
+            fitted, held, believed, command = [*base.train], [base.heldout], base.card, f"{command} --fmu {fmu}"
+        outcome = find(fitted, held, believed, progress.tell)
+        done = deliver(outcome, fitted, held, believed, out, command, progress.tell, **more)
     if as_json:
         put_json(to_json(done))
     else:
@@ -66,8 +69,16 @@ def diagnose(
         sys.exit(1)
 
 
-def _check_split(train: Sequence[object], heldout: object) -> None:
-    hashes = [getattr(recording, "sha256", "") for recording in train]
-    if getattr(heldout, "sha256", None) in hashes:
-        name = getattr(heldout, "name", "the held-out recording")
-        raise InputError(f"{name} is held out and among the training recordings; a proof needs a recording of its own.")
+def _only(heldout: Sequence[Recording]) -> Recording:
+    """The held-out recording of a diagnosis whose base is an FMU."""
+    if len(heldout) != 1:
+        raise InputError(f"--fmu takes one held-out recording, not {len(heldout)}.", culprit="--heldout")
+    return heldout[0]
+
+
+def _check_split(train: Sequence[Recording], heldout: Sequence[Recording]) -> None:
+    hashes = [recording.sha256 for recording in train]
+    for one in heldout:
+        if one.sha256 in hashes:
+            text = f"{one.name} is held out and among the training recordings; a proof needs a recording of its own."
+            raise InputError(text, culprit=one.name)

@@ -16,11 +16,13 @@ from friction_laws import EXAMPLES, WITH_MEMORY, numeric
 
 from cosim.cli import main
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.evidence import Blocks, Score
+from cosim.diagnosis.evidence import Blocks, Score, Whitening
 from cosim.diagnosis.fit import fit
 from cosim.diagnosis.inverse import Inverse, stacked
-from cosim.diagnosis.prepare import choose_cutoff, derivative, noise_of, prepare
-from cosim.errors import InputError
+from cosim.diagnosis.prepare import choose_cutoff, derivative, noise_of, prepare, quality
+from cosim.diagnosis.protocol import Structures, judge, traces
+from cosim.diagnosis.sanity import check_recordings
+from cosim.errors import InputError, RecordingError
 from cosim.proof.demo import demo_case
 from cosim.proof.generator import make_case, to_toml, write_case
 from cosim.recording import Recording
@@ -93,6 +95,36 @@ class TestPreparation:
         pieces = prepare([recorded((5 * a)[keep], t[keep], q[keep])], 30.0).pieces
         assert [float(round(piece.t[0])) for piece in pieces] == [0.0, 10.0]
 
+    def test_a_hole_that_is_short_beside_what_the_filter_passes_is_bridged_and_said(self) -> None:
+        t, q, v, a = wander()
+        keep = np.ones(len(t), bool)
+        keep[[4000, 4001, 7000]] = False
+        holed = recorded((5 * a)[keep], t[keep], q[keep])
+        (piece,) = prepare([holed], 20.0).pieces
+        assert np.abs(piece.v - np.interp(piece.t, t, v))[piece.inside].max() < 1e-3
+        assert any("short beside what the filter passes" in said for said in quality(holed, 20.0))
+        assert len(prepare([holed], 100.0).pieces) == 3
+
+    def test_speeds_are_right_where_time_steps_jitter_to_one_side(self) -> None:
+        t, q, v, a = wander()
+        late = t + 0.4 * (t[1] - t[0]) * (np.arange(len(t)) % 3 == 0)
+        piece = prepare([recorded(5 * a, late, np.interp(late, t, q))], 20.0).pieces[0]
+        moving = piece.inside & (np.abs(piece.v) > 0.05)
+        assert np.median(piece.v[moving] / np.interp(piece.t[moving], t, v)) == pytest.approx(1, abs=2e-3)
+
+    def test_short_recordings_are_enough_if_there_are_several(self) -> None:
+        t, q, v, a = wander(4.0)
+        short = [recorded(5 * a + 2 * np.sign(v), t, q, f"run_{k}") for k in range(3)]
+        check_recordings(short, short[:1], axis())
+        with pytest.raises(RecordingError, match="fitting needs 8 s"):
+            check_recordings(short[:1], short[:1], axis())
+
+    def test_a_constant_speed_says_nothing_about_units(self) -> None:
+        t = np.arange(5000) / 500
+        ripple = 1e-3 * np.sin(3 * t)
+        run = Recording("steady", {"t": t, "tau": 2.0 + ripple, "v": 0.4 + 10 * ripple})
+        check_recordings([run], [run], axis(inertia=5.0))
+
 
 class TestInverse:
     @pytest.mark.parametrize("law", [law for law in EXAMPLES.values() if law.key != "none"], ids=lambda law: law.key)
@@ -144,6 +176,33 @@ class TestEvidence:
         blocks = Blocks.of(prepare([recorded(a, t, q)], 30.0))
         assert np.all(np.diff(blocks.fold) >= 0)
         assert set(blocks.fold) == {0, 1, 2, 3}
+
+    def test_whitening_keeps_every_row_so_that_the_mean_of_a_short_block_counts(self) -> None:
+        t, q, _v, a = wander(20.0)
+        prepared = prepare([recorded(a, t, q)], 30.0)
+        blocks = Blocks.of(prepared)
+        noise = np.random.default_rng(1).standard_normal(len(prepared.stacked("v")))
+        smooth = np.convolve(noise, np.ones(4) / 4, "same")
+        whitening = Whitening.of(smooth, blocks, prepared.stacked("v"))
+        white = np.concatenate(whitening.apply(smooth[:, None], blocks))[:, 0]
+        assert len(white) == len(smooth)
+        assert abs(np.corrcoef(white[1:], white[:-1])[0, 1]) < 0.1 < 0.6 < np.corrcoef(smooth[1:], smooth[:-1])[0, 1]
+
+    def test_many_recordings_share_four_folds(self) -> None:
+        t, q, _v, a = wander(6.0)
+        blocks = Blocks.of(prepare([recorded(a, t, q, f"run_{k}") for k in range(10)], 30.0))
+        assert set(blocks.fold) == {0, 1, 2, 3}
+        assert {(owner, owner % 4) for owner in range(10)} == set(zip(blocks.recording, blocks.fold, strict=True))
+
+    def test_several_recordings_may_be_held_out(self) -> None:
+        t, q, v, a = wander()
+        pair = [recorded(5 * a + 2 * np.sign(v) + off, t, q, name) for off, name in ((0.3, "one"), (-0.3, "two"))]
+        models = Structures(axis(), axis(), axis())
+        judged = judge(pair, models, 30.0)
+        each = [judge([one], models, 30.0).before_rms for one in pair]
+        assert judged.name == "one, two"
+        assert judged.before_rms == pytest.approx(np.sqrt(np.mean(np.square(each))), rel=1e-6)
+        assert [trace.heldout for trace in traces(pair[:1], pair, models)] == [False, True, True]
 
 
 class TestAnswers:

@@ -18,7 +18,8 @@ from pyfmi_models.effects import ClockEffect, Effect, MotionEffect, SensorEffect
 from pyfmi_models.mount import Mount
 
 Room = Literal["", "speeds", "stops"]
-"""Shapes of the bank that must make room for a candidate, because they are this effect."""
+ROOM: dict[str, Room] = {"stribeck": "speeds", "presliding": "stops"}
+"""Shapes of the bank that must make room for an effect, because they are this effect."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,6 @@ class Candidate:
     instances: tuple[Effect, ...]
     linear: tuple[str, ...]
     start: Callable[[Array], Effect]
-    makes_room: Room = ""
 
     @property
     def finite(self) -> bool:

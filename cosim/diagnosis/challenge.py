@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cosim.diagnosis.candidates import columns_of
+from cosim.diagnosis.candidates import ROOM, columns_of
 from cosim.diagnosis.families import candidates
 from cosim.diagnosis.fit import Fit
+from cosim.diagnosis.instruments import DECISIVE, Misfits, excludes, misfits_of
 from cosim.diagnosis.select import Selection
 from cosim.diagnosis.structure import Bench, projected
 from cosim.diagnosis.trial import (
@@ -32,6 +33,8 @@ ALIKE = 0.4
 """A rival is refitted in an effect's place if its linear gain there reaches this share of the effect's."""
 TEMPERATURE = 60.0
 """Divides log-likelihoods before they become probabilities: neighbouring samples are far from independent."""
+NESTED = {"torque_offset": ("friction_asymmetry", "cable_wrap")}
+"""Effects that hold another as a special case: they take its place by explaining more, not by explaining as much."""
 ROUNDS = 2
 NEAR = 0.9
 """A rival with this share of the winner's gain is excluded only if it is clearly worse block by block."""
@@ -44,11 +47,28 @@ class Place:
     effect: Effect
     trial: Trial
     rivals: tuple[Trial, ...]
+    misfits: Misfits = None
+    """What the set point says of a delay and of a lag, where this is one of them."""
 
     @property
     def ambiguous_with(self) -> tuple[str, ...]:
         """Rivals that these recordings cannot exclude."""
-        return tuple(rival.effect.id for rival in self.rivals if _too_close(self.trial, rival))
+        return tuple(rival.effect.id for rival in self.rivals if self._is_close(rival))
+
+    def _is_close(self, rival: Trial) -> bool:
+        margin = excludes(self.misfits, self.effect, rival.effect)
+        if margin is not None:
+            return margin < DECISIVE
+        holds_it = rival.effect.id in NESTED.get(self.effect.id, ())
+        return _too_close(self.trial, rival) and not (holds_it and self.trial.gain >= TIE * rival.gain)
+
+    @property
+    def better(self) -> Trial:
+        """The trial that should hold this place: by gain, but between delay and lag the set point decides."""
+        margins = [(rival, excludes(self.misfits, self.effect, rival.effect)) for rival in self.rivals]
+        swapped = next((rival for rival, margin in margins if margin is not None and margin < -DECISIVE), None)
+        judged_by_gain = [rival for rival, margin in margins if margin is None]
+        return swapped or max((self.trial, *judged_by_gain), key=lambda trial: trial.gain)
 
     @property
     def probability(self) -> float:
@@ -88,7 +108,7 @@ def _round(problem: Problem, chosen: Fit, bench: Bench, say: Callable[[str], Non
     for effect in _added(problem, chosen):
         say(effect.title)
         place = _place(problem, effect, chosen, bench)
-        best = max((place.trial, *place.rivals), key=lambda trial: trial.gain)
+        best = place.better
         if place.trial.gain < LEAST_GAIN and not is_real(problem, best):
             return [], _without(problem, chosen, effect)
         if best is not place.trial and not _simpler_wins(place.trial, best):
@@ -118,11 +138,11 @@ def _without(problem: Problem, chosen: Fit, effect: Effect) -> Fit:
 
 def _place(problem: Problem, effect: Effect, chosen: Fit, bench: Bench) -> Place:
     reduced = _without(problem, chosen, effect)
-    before = bench.energy(reduced)
-    own = judged(effect, chosen, reduced, before, bench)
-    rivals = [tried(problem, reduced, start, before, bench) for start in _rivals(effect, reduced, bench, own.gain)]
+    own = judged(effect, chosen, reduced, bench)
+    rivals = [tried(problem, reduced, start, bench) for start in _rivals(effect, reduced, bench, own.gain)]
     real = [rival for rival in rivals if not is_another(problem, rival.effect)]
-    return Place(effect, own, tuple(sorted(real, key=lambda trial: -trial.gain)))
+    misfits = misfits_of(problem.prepared, chosen.mount, effect) if real else None
+    return Place(effect, own, tuple(sorted(real, key=lambda trial: -trial.gain)), misfits)
 
 
 def _rivals(effect: Effect, reduced: Fit, bench: Bench, gain: float) -> list[Effect]:
@@ -133,7 +153,7 @@ def _rivals(effect: Effect, reduced: Fit, bench: Bench, gain: float) -> list[Eff
     if not alike:
         return []
     groups = columns_of(reduced.mount, alike, prepared, reduced.values)
-    scores = bench.screen(reduced, groups, [candidate.makes_room for candidate in alike])
+    scores = bench.screen(reduced, groups, [ROOM.get(candidate.effect, "") for candidate in alike])
     best: dict[str, tuple[float, Effect]] = {}
     for candidate, (score, coefficients) in zip(alike, scores, strict=True):
         if score.gain > max(ALIKE * gain, best.get(candidate.effect, (LEAST_GAIN,))[0]):

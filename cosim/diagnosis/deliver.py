@@ -33,7 +33,7 @@ def check_out(out: Path, force: bool) -> None:
 def deliver(
     outcome: Outcome,
     train: Sequence[Recording],
-    heldout: Recording,
+    heldout: Recording | Sequence[Recording],
     card: Card,
     out: Path,
     command: str,
@@ -45,7 +45,8 @@ def deliver(
     Where effects were found, `more` writes what else shall lie beside the better card, and tells it.
     """
     directory(out)
-    provenance = _provenance(train, heldout, card, command)
+    held = [heldout] if isinstance(heldout, Recording) else list(heldout)
+    provenance = _provenance(train, held, card, command)
     found = replace(outcome.diagnosis, provenance=provenance)
     better = replace(outcome.card, origin=_origin(found, provenance))
     with replacing(out / "card.toml", True) as partial:
@@ -54,7 +55,7 @@ def deliver(
         say("building the improved FMU")
         improved = {"card": "card.toml", **_fmus(better, found, out), **_proven_range(found), **more(better, out)}
         found = replace(found, improved=improved)
-    _missing_torque(found, [*train, heldout], out / "missing_torque.parquet")
+    _missing_torque(found, [*train, *held], out / "missing_torque.parquet")
     with replacing(out / "diagnosis.json", True) as partial:
         partial.write_text(json.dumps(as_json(found), indent=2, allow_nan=False) + "\n", "utf-8")
     say("writing the report")
@@ -100,6 +101,7 @@ def _effect(finding: Finding) -> dict[str, Any]:
         "ranges": {name: list(ends) for name, ends in finding.ranges.items()},
         "units": finding.units,
         "statement": finding.statement,
+        "told_apart_by": finding.told_apart_by,
         "evidence": finding.evidence,
         "where": {
             "axis": place.axis,
@@ -129,16 +131,17 @@ def _names_effects(found: Diagnosis) -> bool:
     return any(finding.answer == "found" for finding in found.findings)
 
 
-def _provenance(train: Sequence[Recording], heldout: Recording, card: Card, command: str) -> dict[str, Any]:
+def _provenance(train: Sequence[Recording], heldout: Sequence[Recording], card: Card, command: str) -> dict[str, Any]:
     recordings = [
         {
             "name": one.name,
             "sha256": one.sha256,
-            "role": "heldout" if one is heldout else "train",
+            "role": role,
             "seconds": one.duration,
             "rate_hz": 1 / one.sample_time,
         }
-        for one in (*train, heldout)
+        for role, group in (("train", train), ("heldout", heldout))
+        for one in group
     ]
     date = datetime.now(UTC).strftime("%Y-%m-%d %H:%M")
     described = {"name": Path(card.path).name, "path": card.path}

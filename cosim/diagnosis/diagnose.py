@@ -15,7 +15,7 @@ from cosim.diagnosis.locate import regions
 from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare, quality
 from cosim.diagnosis.protocol import CLEAR_MOTION, Structures, heldout_rms, judge, traces
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
-from cosim.diagnosis.sanity import check_effects, check_units
+from cosim.diagnosis.sanity import check_effects, check_recordings
 from cosim.diagnosis.select import select
 from cosim.diagnosis.trial import Problem
 from cosim.recording import Recording
@@ -29,20 +29,23 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """A diagnosis, the card of the model it ends with, and the card that training alone, without veto, would give."""
+    """A diagnosis, and three cards: the model it ends with, what training alone proposes, the base refitted."""
 
     diagnosis: Diagnosis
     card: Card
     proposed: Card
+    refitted: Card
 
 
-def diagnose(train: Sequence[Recording], heldout: Recording, card: Card, say: Say = lambda _: None) -> Outcome:
+def diagnose(
+    train: Sequence[Recording], heldout: Recording | Sequence[Recording], card: Card, say: Say = lambda _: None
+) -> Outcome:
     """Find what physics a card lacks.
 
     Args:
         train: recordings that may be fitted.
-        heldout: recording that nothing is fitted to. It proves the result, and it has a veto: an effect that does not
-            lower its error is taken out as not proven. So its error after the veto is a little optimistic;
+        heldout: recording, or several, that nothing is fitted to. It proves the result, and it has a veto: an effect
+            that does not lower its error is taken out as not proven. So its error after it is a little optimistic;
             `HeldOut.unvetoed_rms` is the error of what training alone proposed.
         card: the model as delivered.
         say: told, in a few words, what is being done.
@@ -52,8 +55,9 @@ def diagnose(train: Sequence[Recording], heldout: Recording, card: Card, say: Sa
         RecordingError: the recordings cannot belong to this card (units), or are too short.
     """
     started, mount = time.perf_counter(), card.plant()
+    held = [heldout] if isinstance(heldout, Recording) else list(heldout)
     check_effects(mount)
-    check_units([*train, heldout], mount)
+    check_recordings(train, held, mount)
     cutoff = choose_cutoff(train, card.mount.inertia)
     prepared = prepare(train, cutoff)
     weight = _weight(mount, prepared)
@@ -62,15 +66,15 @@ def diagnose(train: Sequence[Recording], heldout: Recording, card: Card, say: Sa
     verdict = challenge(problem, select(problem, say), say)
     say("proving on the recording that was not fitted")
     proposed = verdict.chosen.mount
-    verdict, unproven = _proven(problem, verdict, heldout)
+    verdict, unproven = _proven(problem, verdict, held)
     rest = rest_of(verdict.chosen, prepared, verdict.bench)
     models = Structures(mount, verdict.base.mount, verdict.chosen.mount)
-    signals = traces(train, heldout, models)
+    signals = traces(train, held, models)
     found = _findings(verdict, unproven, prepared, weight, signals)
     diagnosis = Diagnosis(
         verdict=_verdict(found, rest),
         findings=tuple(found),
-        heldout=replace(judge(heldout, models, cutoff), unvetoed_rms=heldout_rms(heldout, proposed)),
+        heldout=replace(judge(held, models, cutoff), unvetoed_rms=heldout_rms(held, proposed)),
         traces=signals,
         regions=regions(signals, False, mount.motion == "linear"),
         regions_after=regions(signals, True, mount.motion == "linear"),
@@ -78,12 +82,13 @@ def diagnose(train: Sequence[Recording], heldout: Recording, card: Card, say: Sa
         motion=mount.motion,
         ambiguous_with=tuple((p.effect.id, *p.ambiguous_with) for p in verdict.places if p.ambiguous_with),
         depends_on=rest.depends_on,
-        data_quality=tuple(note for recording in (*train, heldout) for note in quality(recording)),
+        data_quality=tuple(note for recording in (*train, *held) for note in quality(recording, prepared.cutoff)),
         friction_law={"base": mount.friction.key, "proposed": mount.friction.key, "gain": 0.0},
         base_parameters=_base_parameters(models),
         seconds=time.perf_counter() - started,
     )
-    return Outcome(diagnosis, _improved(card, _certain(problem, verdict)), _improved(card, proposed))
+    cards = (_improved(card, mount) for mount in (_certain(problem, verdict), proposed, verdict.base.mount))
+    return Outcome(diagnosis, *cards)
 
 
 def _certain(problem: Problem, verdict: Verdict) -> Mount:
@@ -102,7 +107,7 @@ def _weight(mount: Mount, prepared: Prepared) -> Array:
     return np.asarray(v > CLEAR_MOTION * v.max(), float)
 
 
-def _proven(problem: Problem, verdict: Verdict, heldout: Recording) -> tuple[Verdict, tuple[Place, ...]]:
+def _proven(problem: Problem, verdict: Verdict, heldout: Sequence[Recording]) -> tuple[Verdict, tuple[Place, ...]]:
     """Take out effects that do not help on the held-out recording; return what stands, and those taken out."""
     chosen = verdict.chosen
     out: list[Place] = []

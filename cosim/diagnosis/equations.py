@@ -86,8 +86,9 @@ class Equations:
         s, (this, motion, own) = self._symbols, self._known
         remembering = [(own[name], part) for name, part in this.of_kind(MotionEffect) if name in own]
         parts = [_advanced(part, motion._replace(state=state), s["dt"]) for state, part in remembering]
-        friction = this.law.advance(own["friction"], motion.v, this.level(motion, own), s["dt"])
-        return self._true(ca.vertcat(*parts, friction))
+        if this.law.states():
+            parts.append(this.law.advance(own["friction"], motion.v, this.level(motion, own), s["dt"]))
+        return self._true(ca.vertcat(*parts))
 
     @cached_property
     def step(self) -> Stepwise:

@@ -19,7 +19,11 @@ BLOCK_SECONDS = 5.0
 AR_ORDER = 8
 SPEED_BINS = 16
 FOLDS = 4
-"""Folds of a single training recording; with several, each recording is a fold."""
+"""Folds of a single training recording; with several, each recording is a fold ..."""
+MOST_FOLDS = 8
+"""... up to this many; of more every fourth one shares a fold, so that each fold holds motions of all kinds."""
+LEAST_ROWS = 10 * AR_ORDER
+"""Recordings with fewer kept rows have one noise filter together."""
 
 Index = npt.NDArray[np.int64]
 Mask = npt.NDArray[np.bool_]
@@ -44,20 +48,23 @@ class Blocks:
             recording += [piece.recording] * count
             first += len(kept)
         owner = np.array(recording)
-        single = len(set(recording)) == 1
-        fold = np.arange(len(rows)) * FOLDS // len(rows) if single else owner
+        count = len(set(recording))
+        fold = np.arange(len(rows)) * FOLDS // len(rows) if count == 1 else owner
+        fold = owner % FOLDS if count > MOST_FOLDS else fold
         return cls(tuple(rows), fold, owner)
 
 
 @dataclass(frozen=True)
 class Whitening:
-    """How the noise looks: one autoregressive prediction-error filter a recording, and a scale that depends on speed.
+    """How the noise looks: autoregressive prediction-error filters of a recording, and a scale that depends on speed.
 
+    The first rows of a block are predicted from the few before: no row is lost, and in a short block the mean counts.
     Friction is least certain where the motion turns, so the innovations are larger at low speed; `scale` holds their
     RMS at every row.
     """
 
-    filters: dict[int, tuple[Array, float]]
+    filters: dict[int, Array]
+    """For each recording a triangle of taps: row k predicts from k rows before, divided by its RMS error."""
     scale: Array
 
     @classmethod
@@ -67,16 +74,19 @@ class Whitening:
         rows_of: dict[int, list[Index]] = {}
         for rows, owner in owners:
             rows_of.setdefault(owner, []).append(rows)
-        filters = {owner: _yule_walker(residual[np.concatenate(rows)]) for owner, rows in rows_of.items()}
+        of = {owner: residual[np.concatenate(rows)] for owner, rows in rows_of.items()}
+        short = [part for part in of.values() if len(part) < LEAST_ROWS]
+        together = _yule_walker(np.concatenate(short)) if short else np.eye(1)
+        filters = {owner: _yule_walker(part) if len(part) >= LEAST_ROWS else together for owner, part in of.items()}
         plain = cls(filters, np.ones(len(residual)))
         white = np.concatenate(plain.apply(residual[:, None], blocks))[:, 0]
-        used = np.concatenate([rows[AR_ORDER:] for rows in blocks.rows])
+        used = np.concatenate(blocks.rows)
         return cls(filters, _scale_by_speed(white, np.abs(speed[used]), np.abs(speed)))
 
     def apply(self, columns: Array, blocks: Blocks) -> list[Array]:
-        """Whiten columns (rows, n) block by block; each block loses its first `AR_ORDER` rows."""
+        """Whiten columns (rows, n) block by block."""
         return [
-            _filtered(columns[rows], *self.filters[owner]) / self.scale[rows[AR_ORDER:], None]
+            _filtered(columns[rows], self.filters[owner]) / self.scale[rows, None]
             for rows, owner in zip(blocks.rows, blocks.recording.tolist(), strict=True)
         ]
 
@@ -89,25 +99,31 @@ def _scale_by_speed(white: Array, at: Array, speed: Array) -> Array:
     return np.asarray(np.interp(speed, centre, np.maximum(size, 0.2 * np.median(size) + 1e-300)))
 
 
-def _yule_walker(x: Array) -> tuple[Array, float]:
+def _yule_walker(x: Array) -> Array:
+    """Taps of the prediction-error filters of orders 0 .. `AR_ORDER`, a row each, newest row first."""
     x = x - x.mean()
     order, length = AR_ORDER, len(x)
     padded = np.fft.rfft(x, 2 * length)
     covariance = np.fft.irfft(np.abs(padded) ** 2)[: order + 1] / length
     covariance[0] *= 1 + 1e-3
     if covariance[0] <= 0:
-        return np.eye(1, order + 1)[0], 1.0
-    predictor = solve_toeplitz(covariance[:order], covariance[1:])
-    power = max(covariance[0] - predictor @ covariance[1:], 1e-12 * covariance[0])
-    return np.concatenate([[1.0], -predictor]), float(np.sqrt(power))
+        return np.eye(1)
+    taps = np.zeros((order + 1, order + 1))
+    for k in range(order + 1):
+        predictor = solve_toeplitz(covariance[:k], covariance[1 : k + 1]) if k else np.zeros(0)
+        power = max(covariance[0] - predictor @ covariance[1 : k + 1], 1e-12 * covariance[0])
+        taps[k, : k + 1] = np.concatenate([[1.0], -predictor]) / np.sqrt(power)
+    return taps
 
 
-def _filtered(columns: Array, taps: Array, scale: float) -> Array:
-    order = len(taps) - 1
-    out = np.zeros((max(len(columns) - order, 0), columns.shape[1]))
-    for lag, tap in enumerate(taps):
-        out += tap * columns[order - lag : len(columns) - lag]
-    return out / scale
+def _filtered(columns: Array, taps: Array) -> Array:
+    order = min(len(taps) - 1, max(len(columns) - 1, 0))
+    out = np.zeros_like(columns)
+    for lag, tap in enumerate(taps[order, : order + 1]):
+        out[order:] += tap * columns[order - lag : len(columns) - lag]
+    for row in range(order):
+        out[row] = taps[row, : row + 1] @ columns[row::-1]
+    return out
 
 
 @dataclass(frozen=True)

@@ -183,12 +183,18 @@ class Inverse:
 
 
 class Spectrum:
-    """Columns in the frequency domain, mirrored at both ends so that a shift does not wrap around."""
+    """Columns in the frequency domain, mirrored at both ends so that a shift does not wrap around.
+
+    What is mirrored fades to zero: a jump from the last row to the first would ring through all of them.
+    """
 
     def __init__(self, columns: Array, dt: float) -> None:
         self.rows = len(columns)
         self.pad = min(self.rows - 1, int(0.5 / dt) + 8)
         extended = np.pad(columns, ((self.pad, self.pad), (0, 0)), mode="reflect", reflect_type="odd")
+        fade = np.sin(np.pi / 2 * np.arange(self.pad) / self.pad)[:, None] ** 2
+        extended[: self.pad] *= fade
+        extended[len(extended) - self.pad :] *= fade[::-1]
         self.omega = 2 * np.pi * np.fft.rfftfreq(len(extended), dt)
         self.length, self.values = len(extended), np.fft.rfft(extended, axis=0)
 

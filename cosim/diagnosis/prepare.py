@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import butter, sosfiltfilt
 
-from cosim.recording import Recording
+from cosim.recording import GAP, Gap, Recording
 
 Array = npt.NDArray[np.float64]
 CUTOFFS = (100.0, 70.0, 50.0, 40.0, 30.0, 24.0, 19.0, 15.0, 12.0, 10.0, 8.0)
@@ -24,15 +24,16 @@ JITTER = 1e-3
 """RMS jitter, relative to the sample time, above which samples are interpolated to an even grid."""
 LEAST_SECONDS = 2.0
 """A contiguous piece shorter than this is left out."""
+BRIDGED = 0.25
+"""A hole shorter than this share of the shortest period that the filter passes is bridged by a straight line."""
 
 
 @dataclass(frozen=True, eq=False)
 class Piece:
     """A contiguous piece of a recording at the rate where the model is evaluated.
 
-    All arrays have one value a row: time, filtered position, speed, acceleration; `tau` is filtered twice. `rows` are
-    the rows of the recording they stand for; `inside` marks those away from the edges, where filters and initial
-    states have settled.
+    All arrays have one value a row: time, filtered position, speed, acceleration; `tau` is filtered twice. `inside`
+    marks rows away from the edges, where filters and initial states have settled.
     """
 
     recording: int
@@ -41,7 +42,6 @@ class Piece:
     v: Array
     a: Array
     tau: Array
-    rows: npt.NDArray[np.int64]
     inside: npt.NDArray[np.bool_]
     dt: float
     cutoff: float
@@ -106,15 +106,27 @@ def prepare(recordings: Sequence[Recording], cutoff: float) -> Prepared:
     return Prepared(tuple(r.name for r in recordings), tuple(pieces), cutoff, has_position)
 
 
-def quality(recording: Recording) -> tuple[str, ...]:
+def quality(recording: Recording, cutoff: float) -> tuple[str, ...]:
     """Say what is odd about a recording, and what was done about it here."""
-    rule = f"{recording.name}: interpolated to an even grid, as its time steps vary by {recording.jitter:.2%} rms."
-    return (*recording.quality(), rule) if recording.jitter > JITTER else recording.quality()
+    said = list(recording.quality())
+    if recording.jitter > JITTER:
+        steps = f"{recording.jitter:.2%} rms"
+        said.append(f"{recording.name}: interpolated to an even grid, as its time steps vary by {steps}.")
+    if bridged := len(recording.gaps) - len(_holes(recording, cutoff)):
+        said.append(
+            f"{recording.name}: {bridged} of its gaps are short beside what the filter passes; lines bridge them."
+        )
+    return tuple(said)
+
+
+def _holes(recording: Recording, cutoff: float) -> list[Gap]:
+    """Gaps that cut a recording in two at this cutoff [Hz]."""
+    return [gap for gap in recording.gaps if gap.end - gap.start > BRIDGED / cutoff]
 
 
 def _pieces(recording: Recording, index: int, cutoff: float) -> list[Piece]:
     dt = recording.sample_time
-    ends = [gap.row for gap in recording.gaps]
+    ends = [gap.row for gap in _holes(recording, cutoff)]
     spans = zip([0, *ends], [*ends, len(recording)], strict=True)
     return [
         _piece(recording, index, slice(first, last), cutoff)
@@ -124,12 +136,11 @@ def _pieces(recording: Recording, index: int, cutoff: float) -> list[Piece]:
 
 
 def _piece(recording: Recording, index: int, span: slice, cutoff: float) -> Piece:
-    t, dt = recording.t[span], recording.sample_time
     grid, table = _on_grid(recording, span)
+    dt = float(grid[-1] - grid[0]) / (len(grid) - 1)
     tau = lowpass(table["tau"], dt, cutoff)
     q, v, a = _motion(table, dt, cutoff)
     step = max(1, int(1 / (8 * cutoff * dt)))
-    rows = np.arange(span.start, span.stop)[::step]
     coarse = dt * step
     return Piece(
         recording=index,
@@ -138,8 +149,7 @@ def _piece(recording: Recording, index: int, span: slice, cutoff: float) -> Piec
         v=v[::step],
         a=a[::step],
         tau=lowpass(tau[::step], coarse, cutoff),
-        rows=rows,
-        inside=_inside(grid[::step], float(t[0]), float(t[-1])),
+        inside=_inside(grid[::step], float(grid[0]), float(grid[-1])),
         dt=coarse,
         cutoff=cutoff,
         stride=max(1, ceil(1 / (1.4 * cutoff * coarse))),
@@ -148,12 +158,12 @@ def _piece(recording: Recording, index: int, span: slice, cutoff: float) -> Piec
 
 
 def _on_grid(recording: Recording, span: slice) -> tuple[Array, dict[str, Array]]:
-    """Return the samples of a span; where time jitters, interpolated to an even grid (see `quality`)."""
-    t = recording.t[span]
+    """Return the samples of a span; where time jitters or has short holes, on an even grid (see `quality`)."""
+    t, dt = recording.t[span], recording.sample_time
     table = {name: recording[name][span] for name in recording.columns if name != "t"}
-    if recording.jitter <= JITTER:
+    if recording.jitter <= JITTER and np.diff(t).max() <= GAP * dt:
         return t, table
-    grid = np.linspace(t[0], t[-1], len(t))
+    grid = np.linspace(t[0], t[-1], round((t[-1] - t[0]) / dt) + 1)
     return grid, {name: np.interp(grid, t, column) for name, column in table.items()}
 
 

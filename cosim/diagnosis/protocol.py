@@ -45,34 +45,34 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def judge(recording: Recording, models: Structures, cutoff: float) -> HeldOut:
-    """Compare the three models on a recording that none of them was fitted to."""
-    prepared = prepare([recording], CUTOFF)
+def judge(recordings: Sequence[Recording], models: Structures, cutoff: float) -> HeldOut:
+    """Compare the three models on recordings that none of them was fitted to."""
+    prepared = prepare(recordings, CUTOFF)
     inside = np.concatenate([piece.inside for piece in prepared.pieces])
     left = {
         name: np.concatenate(residuals(prepared, mount))[inside]
         for name, mount in (("nominal", models.nominal), ("before", models.before), ("after", models.after))
     }
     return HeldOut(
-        name=recording.name,
+        name=", ".join(recording.name for recording in recordings),
         nominal_rms=rms(left["nominal"]),
         before_rms=rms(left["before"]),
         after_rms=rms(left["after"]),
         floor_rms=_floor(prepared, models.after),
         confidence_interval=_interval(left["before"], left["after"], prepared.pieces[0].dt),
-        sliding=_sliding(recording, models, cutoff),
+        sliding=_sliding(recordings, models, cutoff),
     )
 
 
-def heldout_rms(recording: Recording, mount: Mount) -> float:
+def heldout_rms(recordings: Sequence[Recording], mount: Mount) -> float:
     """RMS of the torque residual of one model by the protocol."""
-    prepared = prepare([recording], CUTOFF)
+    prepared = prepare(recordings, CUTOFF)
     inside = np.concatenate([piece.inside for piece in prepared.pieces])
     return rms(np.concatenate(residuals(prepared, mount))[inside])
 
 
-def _sliding(recording: Recording, models: Structures, cutoff: float) -> dict[str, float]:
-    prepared = prepare([recording], cutoff)
+def _sliding(recordings: Sequence[Recording], models: Structures, cutoff: float) -> dict[str, float]:
+    prepared = prepare(recordings, cutoff)
     v, inside = (np.concatenate([getattr(piece, name) for piece in prepared.pieces]) for name in ("v", "inside"))
     least = CLEAR_MOTION * float(np.abs(v[inside]).max())
     moving = inside & (np.abs(v) > least)
@@ -109,13 +109,13 @@ def _interval(before: Array, after: Array, dt: float) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def traces(recordings: Sequence[Recording], heldout: Recording, models: Structures) -> tuple[Trace, ...]:
+def traces(train: Sequence[Recording], heldout: Sequence[Recording], models: Structures) -> tuple[Trace, ...]:
     """Signals of all recordings for pictures and for the file of missing torque."""
     found = []
-    for recording in (*recordings, heldout):
-        prepared = prepare([recording], CUTOFF)
+    for number, recording in enumerate((*train, *heldout)):
+        prepared, held = prepare([recording], CUTOFF), number >= len(train)
         before, after = residuals(prepared, models.before), residuals(prepared, models.after)
-        found.append(_trace(recording, recording is heldout, prepared, np.concatenate(before), np.concatenate(after)))
+        found.append(_trace(recording, held, prepared, np.concatenate(before), np.concatenate(after)))
     return tuple(found)
 
 

@@ -4,7 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cosim.diagnosis.prepare import LEAST_SECONDS as SHORTEST
 from cosim.diagnosis.prepare import lowpass, prepare
+from cosim.diagnosis.structure import projected
 from cosim.errors import InputError, RecordingError
 from cosim.recording import Recording
 from pyfmi_models.effects import Effect
@@ -13,10 +15,13 @@ from pyfmi_models.effects.friction_wander import FrictionWander
 from pyfmi_models.mount import Mount
 
 LEAST_SECONDS = 8.0
+"""Seconds that the recordings to be fitted must have together."""
 RATIOS = {"deg": 57.2958, "arcmin": 3437.75, "arcsec": 206264.8, "mrad": 1000.0, "rev": 1 / 6.28319}
 LINEAR_RATIOS = {"mm": 1e3, "um": 1e6}
 SPREAD = 2.2
 """An inertia within this factor of the card's, once a unit is undone, gives the unit away."""
+TOLD = 0.02
+"""Acceleration must explain this share of the torque beside friction before it says anything about units."""
 
 
 def check_effects(mount: Mount) -> None:
@@ -34,15 +39,20 @@ def is_held(effect: Effect) -> bool:
     return not isinstance(effect, Backlash | FrictionWander)
 
 
-def check_units(recordings: Sequence[Recording], mount: Mount) -> None:
+def check_recordings(train: Sequence[Recording], heldout: Sequence[Recording], mount: Mount) -> None:
     """Refuse recordings that are too short, or whose position is in a unit that the torque contradicts.
 
     The inertia that torque and acceleration imply is compared with the card's: a position in degrees makes it 57.3
     times too small. Raises RecordingError with the unit to state.
     """
-    for recording in recordings:
-        if recording.duration < LEAST_SECONDS:
-            text = f"{recording.name}: only {recording.duration:.3g} s of recording; fitting needs {LEAST_SECONDS:g} s."
+    seconds = sum(recording.duration for recording in train)
+    if seconds < LEAST_SECONDS:
+        names = ", ".join(recording.name for recording in train)
+        text = f"{names}: only {seconds:.3g} s of recording; fitting needs {LEAST_SECONDS:g} s."
+        raise RecordingError(text, culprit=names, value=seconds)
+    for recording in (*train, *heldout):
+        if recording.duration < SHORTEST:
+            text = f"{recording.name}: only {recording.duration:.3g} s long; a recording needs {SHORTEST:g} s."
             raise RecordingError(text, culprit=recording.name, value=recording.duration)
         _check_motion(recording)
         _check_ratio(recording, mount)
@@ -59,6 +69,8 @@ def _check_motion(recording: Recording) -> None:
 
 def _check_ratio(recording: Recording, mount: Mount) -> None:
     implied = _implied_inertia(recording)
+    if implied is None:
+        return
     ratios = LINEAR_RATIOS if mount.motion == "linear" else RATIOS
     expected = float(mount.axis.inertia)
     off = expected / implied if implied > 0 else np.inf
@@ -75,11 +87,13 @@ def _check_ratio(recording: Recording, mount: Mount) -> None:
             raise RecordingError(text, culprit=name, value=off)
 
 
-def _implied_inertia(recording: Recording) -> float:
-    """Inertia from least squares of torque on acceleration, direction and speed."""
+def _implied_inertia(recording: Recording) -> float | None:
+    """Inertia from least squares of torque on acceleration, direction and speed; None where it explains too little."""
     prepared = prepare([recording], min(10.0, 0.2 / recording.sample_time))
     top = max(abs(edge) for edge in prepared.ranges["v"]) + 1e-300
     a, v, tau = (prepared.stacked(name) for name in ("a", "v", "tau"))
-    columns = np.column_stack([a, np.tanh(v / (0.02 * top)), v, np.ones_like(v)])
-    scale = np.sqrt((columns**2).sum(0)) + 1e-300
-    return float((np.linalg.lstsq(columns / scale, tau, rcond=None)[0] / scale)[0])
+    friction = np.column_stack([np.tanh(v / (0.02 * top)), v, np.ones_like(v)])
+    own, left = projected(a, friction), projected(tau, friction)
+    inertia = float(own @ left) / max(float(own @ own), 1e-300)
+    explained = inertia**2 * float(own @ own)
+    return inertia if explained > TOLD * float(tau @ tau) else None

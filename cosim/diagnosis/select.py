@@ -1,10 +1,11 @@
 """Choose effects forward, one at a time, each with a full refit of everything (see `challenge` for the way back)."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from cosim.diagnosis.evidence import Blocks
 from cosim.diagnosis.fit import Fit
+from cosim.diagnosis.instruments import DECISIVE, excludes, misfits_of
 from cosim.diagnosis.structure import Bench, Screening, nuisances, screen
 from cosim.diagnosis.trial import Problem, Trial, is_real, tried, twins, winner
 from pyfmi_models.effects import Effect
@@ -35,15 +36,25 @@ def select(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Sel
     while True:
         nuisance = nuisances(current, problem.prepared)
         screening = screen(current, problem.prepared, blocks, nuisance, problem.weight)
-        before, trials = screening.bench.energy(current), []
+        trials = []
         for effect in starts(screening):
             say(effect.title)
-            trials.append(tried(problem, current, effect, before, screening.bench))
+            trials.append(tried(problem, current, effect, screening.bench))
         looked_at |= {trial.effect.id: trial for trial in trials}
-        best = winner([trial for trial in trials if is_real(problem, trial)])
+        best = _settled(problem, winner([trial for trial in trials if is_real(problem, trial)]), trials)
         if best is None or _full(best, problem):
             return Selection(base, current, screening.bench, looked_at)
         current = best.fit
+
+
+def _settled(problem: Problem, best: Trial | None, trials: Sequence[Trial]) -> Trial | None:
+    """Between delay and lag the set point decides."""
+    misfits = misfits_of(problem.prepared, best.fit.mount, best.effect) if best else None
+    for trial in trials if best and misfits else ():
+        margin = excludes(misfits, best.effect, trial.effect)  # type: ignore[union-attr]
+        if margin is not None and margin < -DECISIVE:
+            return trial
+    return best
 
 
 def starts(screening: Screening) -> list[Effect]:

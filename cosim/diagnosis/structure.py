@@ -5,14 +5,14 @@ nuisances and the whitening. Energies are per block and cross-validated, so two 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from cosim.diagnosis.bank import bank
-from cosim.diagnosis.candidates import Candidate, Room, columns_of
-from cosim.diagnosis.evidence import AR_ORDER, Blocks, Grams, Score, Whitening
+from cosim.diagnosis.candidates import ROOM, Candidate, Room, columns_of
+from cosim.diagnosis.evidence import Blocks, Grams, Score, Whitening
 from cosim.diagnosis.families import candidates
 from cosim.diagnosis.fit import BRISTLES, FIXED, Fit, fit
 from cosim.diagnosis.inverse import Inverse, stacked
@@ -23,6 +23,8 @@ from pyfmi_models.mount import Mount
 WANDER = 0.02
 """Prior: the friction level wanders by this share within a recording."""
 WANDER_SHAPES = 4
+LINEAR = (".Fc", ".sigma2", ".positive", ".negative")
+"""Endings of the parameters of friction whose tangents hold however far they move."""
 SHAPE_PRIOR = 0.3
 """Prior: a nuisance friction shape has this share of the friction level."""
 
@@ -48,28 +50,36 @@ class Bench:
     whitening: Whitening
     weight: Array
     """Weight of each kept row; rows of weight 0 do not count."""
+    crossed: dict[int, tuple[Fit, Array]] = field(default_factory=dict, repr=False, compare=False)
+    """Residuals of structures that were judged already, with the structure, so that its id stays its own."""
 
-    def energy(self, found: Fit) -> Array:
+    def energy(self, found: Fit, room: Room = "") -> Array:
         """Cross-validated energy of a structure in each block: refitted without a fold, judged on it.
 
-        What the nuisances can explain of a fold is taken off.
+        What the nuisances can explain of a fold is taken off; those that are an effect in question make `room`.
         """
+        grams = self._grams(replace(found, residual=self._crossed(found)), [])
+        return grams.energy([], self._others(found, room))
+
+    def _crossed(self, found: Fit) -> Array:
+        """Residual of each fold by the structure refitted without it; once for each structure."""
+        if id(found) in self.crossed:
+            return self.crossed[id(found)][1]
         residual = np.empty_like(found.residual)
-        folds = np.unique(self.blocks.fold)
-        for fold in folds:
+        for fold in np.unique(self.blocks.fold):
             rows = np.concatenate([r for r, f in zip(self.blocks.rows, self.blocks.fold, strict=True) if f == fold])
             without = self.weight.copy()
             without[rows] = 0.0
             # The bristles stay: a fold that never dwells would send them anywhere, and the judgement with them.
             refit = fit(found.mount, self.prepared.pieces, without, evaluations=4, fixed=(*FIXED, *BRISTLES))
             residual[rows] = refit.residual[rows]
-        grams = self._grams(replace(found, residual=residual), [])
-        return grams.energy([])
+        self.crossed[id(found)] = found, residual
+        return residual
 
     @property
     def rows(self) -> Array:
         """Rows of each block that count."""
-        return np.array([float(len(rows)) for rows in self.blocks.rows])
+        return np.array([float(np.sum(self.weight[rows] > 0)) for rows in self.blocks.rows])
 
     def screen(self, found: Fit, groups: Sequence[Array], excluded: Sequence[Room]) -> list[tuple[Score, Array]]:
         """Score groups of further columns, one at a time; return scores and the coefficients of the group.
@@ -112,20 +122,22 @@ class Bench:
 
     def _white(self, columns: Array) -> list[Array]:
         white = self.whitening.apply(columns, self.blocks)
-        return [one * self.weight[r[AR_ORDER:], None] for one, r in zip(white, self.blocks.rows, strict=True)]
+        return [one * self.weight[r, None] for one, r in zip(white, self.blocks.rows, strict=True)]
 
 
 def _trust(name: str, value: float) -> float:
     """How far a parameter may move from its fit before its tangent says nothing more (one standard deviation)."""
     if name.endswith("phase"):
         return 1.0
-    return (0.1 if name.startswith(("axis.", "friction.")) else 1.0) * max(abs(value), 1e-12)
+    return (0.1 if name.startswith("friction.") and not name.endswith(LINEAR) else 1.0) * max(abs(value), 1e-12)
 
 
 def nuisances(found: Fit, prepared: Prepared) -> Nuisances:
     """Make the nuisance columns of a fitted base: stop operators and speed shapes."""
     level = friction_level(found.mount, prepared)
     stops, speeds = bank(prepared)
+    # A shape is what a law lacks beyond its level: where motion never turns, stops are nothing but level.
+    stops = stops - np.outer(level, level @ stops / max(float(level @ level), 1e-300))
     size = float(np.sqrt(np.mean(level**2)))
     friction = np.full(stops.shape[1] + speeds.shape[1], max((SHAPE_PRIOR * size) ** 2, 1e-30))
     shapes = tuple(range(stops.shape[1], stops.shape[1] + speeds.shape[1]))
@@ -169,7 +181,7 @@ def screen(found: Fit, prepared: Prepared, blocks: Blocks, nuisance: Nuisances, 
     rest = projected(found.residual * weight, known * counted)
     tried = candidates(found.mount, prepared, rest, np.abs(nuisance.level))
     groups = columns_of(found.mount, tried, prepared, found.values)
-    excluded = [candidate.makes_room for candidate in tried]
+    excluded = [ROOM.get(candidate.effect, "") for candidate in tried]
     bench = Bench(prepared, blocks, nuisance, Whitening.of(rest, blocks, speed), weight)
     first = _best(tried, bench.screen(found, groups, excluded))
     everything = np.column_stack([known, *(groups[index] for index in first.values())])

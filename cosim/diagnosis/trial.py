@@ -10,11 +10,20 @@ from typing import Any
 
 import numpy as np
 
+from cosim.diagnosis.candidates import ROOM
 from cosim.diagnosis.evidence import Score, t_value
 from cosim.diagnosis.fit import FIXED, LEAST_VS, Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.structure import Bench
-from pyfmi_models.effects import ActuatorLag, Cogging, Delay, Effect, StribeckEffect
+from pyfmi_models.effects import (
+    ActuatorLag,
+    ClockEffect,
+    Cogging,
+    Delay,
+    DriveEffect,
+    Effect,
+    StribeckEffect,
+)
 from pyfmi_models.effects.clock_skew import ClockSkew
 from pyfmi_models.model import parameters_of
 from pyfmi_models.mount import Mount
@@ -27,12 +36,15 @@ LEAST_PLAIN_GAIN = 0.02
 """Share of the plain residual energy an effect must remove too: whitened evidence alone can be about nothing."""
 LEAST_DELAY_SAMPLES, LEAST_DELAY = 0.3, 1.5e-4
 """A delay shorter than this many samples, or seconds, is what time stamps cannot be trusted for."""
-LEAST_DRIFT_MS = 1.0
-"""A clock that is late and drifts by less than this over a recording is a delay."""
+LEAST_DRIFT_MS, LEAST_DRIFT = 1.0, 0.3
+"""A clock that is late and drifts by less than this, or than this share of its offset, over a recording is a delay."""
 LEAST_CYCLES = 1.5
 """A ripple with fewer cycles a turn is an unbalance."""
 WHOLE = 0.01
 """A whole number of cycles is taken if the residual grows by no more than this share."""
+LEAST_CHANGES = 0.5
+"""Share of the torque's changes from row to row that a model with a delay or a lag must explain: in noise that the
+controller answers, time runs otherwise than in the machine."""
 CLEARLY = 2.0
 TIE = 0.96
 """A simpler effect wins if it reaches this share of the best gain and is not worse by `CLEARLY` standard errors."""
@@ -83,17 +95,19 @@ class Trial:
         return self.score.t
 
 
-def tried(problem: Problem, without: Fit, effect: Effect, before: Array, bench: Bench) -> Trial:
-    """Add an effect to a fitted structure whose energies are `before`, refit everything, and judge it."""
+def tried(problem: Problem, without: Fit, effect: Effect, bench: Bench) -> Trial:
+    """Add an effect to a fitted structure, refit everything, and judge it."""
     grown = replace(without.mount, effects=(*without.mount.effects, effect))
     found = _tuned(problem, problem.fit(grown, 12))
-    return judged(found.mount.effects[-1], found, without, before, bench)
+    return judged(found.mount.effects[-1], found, without, bench)
 
 
-def judged(effect: Effect, found: Fit, without: Fit, before: Array, bench: Bench) -> Trial:
-    """Judge an effect of a fitted structure against the structure without it, whose energies are `before`."""
+def judged(effect: Effect, found: Fit, without: Fit, bench: Bench) -> Trial:
+    """Judge an effect of a fitted structure against the structure without it."""
     plain = [float(np.sum((bench.weight * one.residual) ** 2)) for one in (found, without)]
-    return Trial(effect, found, Score(before, bench.energy(found), bench.rows), 1 - plain[0] / plain[1])
+    room = ROOM.get(effect.id, "")
+    score = Score(bench.energy(without, room), bench.energy(found, room), bench.rows)
+    return Trial(effect, found, score, 1 - plain[0] / plain[1])
 
 
 def _tuned(problem: Problem, found: Fit) -> Fit:
@@ -116,9 +130,19 @@ def _tuned(problem: Problem, found: Fit) -> Fit:
 
 def is_real(problem: Problem, trial: Trial) -> bool:
     """Whether an effect is significant, large enough, and what its name says."""
-    if trial.plain_gain < LEAST_PLAIN_GAIN or is_another(problem, trial.effect):
+    if trial.plain_gain < LEAST_PLAIN_GAIN or is_another(problem, trial.effect) or not _in_time(problem, trial):
         return False
     return (trial.gain > LEAST_GAIN and trial.t > LEAST_T) or (trial.gain > SURE_GAIN and trial.t > 1)
+
+
+def _in_time(problem: Problem, trial: Trial) -> bool:
+    """Whether an effect of timing, if it is one, is told by changes of the torque that the model explains."""
+    if not isinstance(trial.effect, DriveEffect | ClockEffect):
+        return True
+    counted, owner = problem.weight > 0, problem.prepared.recording_of
+    rows = np.flatnonzero(counted[1:] & counted[:-1] & (owner[1:] == owner[:-1]))
+    left, all_of_it = (np.diff(one)[rows] for one in (trial.fit.residual, problem.prepared.stacked("tau")))
+    return float(left @ left) < (1 - LEAST_CHANGES) * float(all_of_it @ all_of_it)
 
 
 def is_another(problem: Problem, effect: Effect) -> bool:
@@ -129,7 +153,7 @@ def is_another(problem: Problem, effect: Effect) -> bool:
         return bool(effect.delay_ms < 1e3 * max(LEAST_DELAY_SAMPLES * problem.sample_time, LEAST_DELAY))
     if isinstance(effect, ClockSkew):
         drifts = 1e-3 * abs(effect.drift_ppm) * problem.seconds
-        return bool(effect.offset_ms < 0 and drifts < LEAST_DRIFT_MS)
+        return bool(effect.offset_ms < 0 and drifts < max(LEAST_DRIFT_MS, -LEAST_DRIFT * effect.offset_ms))
     if isinstance(effect, Cogging) and problem.mount.motion == "rotary":
         return bool(effect.cycles_per_rev < LEAST_CYCLES)
     return isinstance(effect, StribeckEffect) and bool(effect.Vs < LEAST_VS * problem.top_speed)

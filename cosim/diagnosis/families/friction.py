@@ -85,7 +85,7 @@ def stribeck(mount: Mount, span: Span) -> Iterator[Candidate]:
         def start(c: Array, Vs: float = Vs) -> Effect:
             return StribeckEffect(Fs=max(base + float(c[0]), 0.05 * base), Vs=Vs)
 
-        yield Candidate("stribeck", (StribeckEffect(Fs=base, Vs=Vs),), ("Fs",), start, makes_room="speeds")
+        yield Candidate("stribeck", (StribeckEffect(Fs=base, Vs=Vs),), ("Fs",), start)
 
 
 def load_dependent(mount: Mount, span: Span) -> Iterator[Candidate]:
@@ -138,7 +138,7 @@ def presliding(mount: Mount, span: Span) -> Iterator[Candidate]:
         def start(_: Array, bent: Presliding = bent) -> Effect:
             return bent
 
-        yield Candidate("presliding", (bent,), (), start, makes_room="stops")
+        yield Candidate("presliding", (bent,), (), start)
 
 
 def _level(mount: Mount) -> float:

@@ -1,0 +1,35 @@
+"""A load that is known at each moment, from a recording or from another model."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from pyfmi_models.effects.base import Motion, PayloadEffect
+from pyfmi_models.model import Scalar, Variable, parameter
+
+
+@dataclass(frozen=True, kw_only=True)
+class KnownLoad(PayloadEffect):
+    """Weight that changes from run to run, or is measured: torque = gain load, resisting; `load` is a plant input.
+
+    In a recording the input is the column `load` [N m]. A gain beside 1 says that load and drive torque are not on one
+    scale, as where the drive's torque constant is known roughly.
+    """
+
+    id: ClassVar[str] = "known_load"
+    title: ClassVar[str] = "Known load"
+    rivals: ClassVar[tuple[str, ...]] = ("gravity_unbalance", "torque_offset")
+    told_apart_by: ClassVar[str] = "it follows the load that was recorded; an unbalance follows the position alone"
+    action: ClassVar[str] = "Nothing: the load is known."
+    gain: Scalar = parameter("1", "Drive torque per torque of the load", default=1.0, low=0, high=1e3)
+
+    def inputs(self) -> tuple[Variable, ...]:
+        """The load."""
+        return (Variable(name="load", unit="N.m", description="Known load, resists"),)
+
+    def load(self, motion: Motion) -> Scalar:
+        """`gain load`."""
+        return self.gain * motion.inputs["load"]
+
+    def statement(self, unit: str = "N·m") -> str:
+        """Say it to a mechanic."""
+        return f"The known load acts with {self.gain:.3g} {unit} of drive torque for each {unit}."

@@ -1,0 +1,55 @@
+"""Between a delay and a lag the part of the signals that follows the set point decides, whatever the noise does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cosim.diagnosis.instruments import DECISIVE, misfits_of
+from cosim.diagnosis.inverse import Inverse
+from cosim.diagnosis.prepare import Prepared, prepare
+from cosim.recording import Recording
+from pyfmi_models.effects import ActuatorLag, Delay
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+BASE = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=0.5, sigma2=1.0))
+Drive = Delay | ActuatorLag
+
+
+def answered(drive: Drive, noise: float, hertz: float = 12.0) -> Prepared:
+    """A drive behind a controller that answers encoder noise: torque of the true motion, less some of the noise's."""
+    rng, t = np.random.default_rng(3), np.arange(30_000) / 1000
+    tones = [(0.3 / (2 * np.pi * f) ** 2, f, rng.uniform(0, 6)) for f in np.geomspace(0.5, hertz, 9)]
+    q = 0.2 * np.sin(0.7 * t) + sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in tones)
+    still = prepare([Recording("r", {"t": t, "tau": t, "q": q, "q_d": q})], 20.0)
+    torque = Inverse(replace(BASE, effects=(drive,)), ()).torque(still.pieces[0], np.zeros(0))[0]
+    seen = q + noise * rng.standard_normal(len(t))
+    noisy = prepare([Recording("r", {"t": t, "tau": t, "q": seen, "q_d": q})], 20.0)
+    piece = noisy.pieces[0]
+    reply = -0.4 * BASE.axis.inertia * piece.lowpass(piece.a - still.pieces[0].a)
+    return replace(noisy, pieces=(replace(piece, tau=torque + reply),))
+
+
+@pytest.mark.parametrize("drive", [Delay(delay_ms=5.0), ActuatorLag(time_constant_ms=5.0)], ids=lambda one: one.id)
+def test_the_right_one_of_delay_and_lag_is_told_in_noise_that_the_controller_answers(drive: Drive) -> None:
+    prepared = answered(drive, 2e-6)
+    for fitted in (Delay(delay_ms=6.0), ActuatorLag(time_constant_ms=6.0)):
+        misfits = misfits_of(prepared, replace(BASE, effects=(fitted,)), fitted)
+        assert misfits is not None
+        other = next(name for name in misfits if name != drive.id)
+        assert misfits[other] - misfits[drive.id] > DECISIVE
+
+
+def test_slow_motion_tells_neither_from_the_other() -> None:
+    drive = Delay(delay_ms=0.5)
+    misfits = misfits_of(answered(drive, 2e-6, 2.0), replace(BASE, effects=(drive,)), drive)
+    assert misfits is not None
+    assert abs(misfits["delay"] - misfits["actuator_lag"]) < DECISIVE
+
+
+def test_without_a_set_point_nothing_is_said() -> None:
+    drive = Delay(delay_ms=5.0)
+    prepared = answered(drive, 0.0)
+    blind = replace(prepared, pieces=tuple(replace(piece, extras={}) for piece in prepared.pieces))
+    assert misfits_of(blind, replace(BASE, effects=(drive,)), drive) is None
