@@ -24,7 +24,7 @@ from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.model import with_symbols
 from pyfmi_models.mount import Mount
 
-BUMP = 1e-5
+BUMP = 1e-6
 """Relative change of a parameter by which a frequency response is differentiated."""
 
 

@@ -15,6 +15,7 @@ from cosim.diagnosis.prepare import Array, Piece, Prepared, prepare
 from cosim.diagnosis.result import HeldOut, Trace
 from cosim.diagnosis.structure import projected
 from cosim.recording import Recording
+from pyfmi_models.friction import MemorylessLaw
 from pyfmi_models.mount import Mount
 
 CUTOFF = 30.0
@@ -69,6 +70,16 @@ def heldout_rms(recordings: Sequence[Recording], mount: Mount) -> float:
     prepared = prepare(recordings, CUTOFF)
     inside = np.concatenate([piece.inside for piece in prepared.pieces])
     return rms(np.concatenate(residuals(prepared, mount))[inside])
+
+
+def veto_rms(recordings: Sequence[Recording], mount: Mount) -> float:
+    """The same over what the law claims: at rest a law without memory says nothing, so it cannot be refuted there."""
+    prepared = prepare(recordings, CUTOFF)
+    rows = np.concatenate([piece.inside for piece in prepared.pieces])
+    if isinstance(mount.friction, MemorylessLaw):
+        v = np.abs(np.concatenate([piece.v for piece in prepared.pieces]))
+        rows &= v > CLEAR_MOTION * v[rows].max()
+    return rms(np.concatenate(residuals(prepared, mount))[rows])
 
 
 def _sliding(recordings: Sequence[Recording], models: Structures, cutoff: float) -> dict[str, float]:

@@ -202,7 +202,7 @@ def servo(folder: Path) -> Iterator[Machine]:
         card=SERVO,
         train=tables((0.535, 1.1682)),
         heldout=tables((0.741, 0.969)),
-        score=moving(0.08, 8.0, 12.0 / VOLTS),
+        score=moving(0.08, 30.0, 12.0 / VOLTS),
         unit="V",
         bar=0.28,
         first_look="0.384 -> 0.270",
