@@ -115,7 +115,8 @@ def _proven(problem: Problem, verdict: Verdict, heldout: Sequence[Recording]) ->
         gone = {_key(place.effect) for place in places}
         rest = tuple(effect for effect in chosen.mount.effects if _key(effect) not in gone)
         without = problem.fit(replace(chosen.mount, effects=rest), 10)
-        if veto_rms(heldout, without.mount) <= veto_rms(heldout, chosen.mount):
+        cutoff = problem.prepared.cutoff
+        if veto_rms(heldout, without.mount, cutoff) <= veto_rms(heldout, chosen.mount, cutoff):
             chosen, out = without, [*out, *places]
     if not out:
         return verdict, ()

@@ -72,9 +72,11 @@ def heldout_rms(recordings: Sequence[Recording], mount: Mount) -> float:
     return rms(np.concatenate(residuals(prepared, mount))[inside])
 
 
-def veto_rms(recordings: Sequence[Recording], mount: Mount) -> float:
-    """The same over what the law claims: at rest a law without memory says nothing, so it cannot be refuted there."""
-    prepared = prepare(recordings, CUTOFF)
+def veto_rms(recordings: Sequence[Recording], mount: Mount, cutoff: float) -> float:
+    """The same over what the model claims: the band of the analysis, above which the encoder's noise is the torque, and
+    for a law without memory clear motion, as it says nothing of rest.
+    """
+    prepared = prepare(recordings, min(CUTOFF, cutoff))
     rows = np.concatenate([piece.inside for piece in prepared.pieces])
     if isinstance(mount.friction, MemorylessLaw):
         v = np.abs(np.concatenate([piece.v for piece in prepared.pieces]))
