@@ -207,6 +207,6 @@ def _without(recording: Recording, pieces: Sequence[Piece], rests: Sequence[Arra
     """The recording without a torque that is known at the rows of its pieces."""
     tau = recording["tau"].copy()
     for piece, rest in zip(pieces, rests, strict=True):
-        rows = slice(piece.rows[0], piece.rows[-1] + 1)
+        rows = (recording.t >= piece.t[0]) & (recording.t <= piece.t[-1])
         tau[rows] -= np.interp(recording.t[rows], piece.t, rest)
     return replace(recording, table=recording.table | {"tau": tau})

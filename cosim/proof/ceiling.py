@@ -44,7 +44,7 @@ def ceiling(folder: str, entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]
         return {"reason": f"the torque that a motion needs is not defined with {beyond[0]}"}
     card, train, held = given(folder)
     prepared = prepare(train, choose_cutoff(train, card.mount.inertia))
-    return {"heldout_rms": heldout_rms(held, _refitted(card.plant(), effects, prepared))}
+    return {"heldout_rms": heldout_rms([held], _refitted(card.plant(), effects, prepared))}
 
 
 def _refitted(mount: Mount, effects: Sequence[Effect], prepared: Prepared) -> Mount:
