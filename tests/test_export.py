@@ -348,10 +348,9 @@ def test_formulas_are_set_to_be_read(text):
 
 
 def test_prose_shows_symbols_as_formulas_do_and_leaves_names_and_words():
-    text = "The sigma0 of `friction.sigma0` < tau_f; delta and beta_version are words, mu2 is not."
+    text = "The sigma0 of `friction.sigma0` < tau_f; delta and zeta1_last are words, mu2 is not."
     assert prose(text) == (
-        "<p>The σ<sub>0</sub> of <code>friction.sigma0</code> &lt; τ<sub>f</sub>; "
-        "delta and beta_version are words, μ<sub>2</sub> is not.</p>"
+        "<p>The σ₀ of <code>friction.sigma0</code> &lt; tau_f; delta and zeta1_last are words, μ₂ is not.</p>"
     )
 
 

@@ -25,9 +25,9 @@ def _paragraph(paragraph: str) -> str:
 
 
 def _words(text: str) -> str:
-    """Set a Greek letter with an index, `sigma0` or `tau_f`, as formulas do; other words are words."""
-    indexed = rf"(?<!\w)({'|'.join(_GREEK)})_?(\d|(?<=_)[a-z]{{1,3}})(?!\w)"
-    return re.sub(indexed, lambda m: f"{_GREEK[m[1]]}<sub>{m[2]}</sub>", escape(text, quote=False))
+    """Set a Greek letter with a number behind it, `sigma0`, as a letter with an index; other words are words."""
+    numbered = rf"(?<!\w)({'|'.join(_GREEK)})(\d)(?!\w)"
+    return re.sub(numbered, lambda m: _GREEK[m[1]] + "₀₁₂₃₄₅₆₇₈₉"[int(m[2])], escape(text, quote=False))
 
 
 def formula(text: str) -> str:
