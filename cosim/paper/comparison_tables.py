@@ -199,6 +199,7 @@ def better(found: Comparison) -> dict[str, Any]:
         "ms_c3a": usual.price.Ms,
         "noise_found": mine.noise,
         "noise_c3a": usual.noise,
+        **_limits(found, in_a),
         "noise_raw": in_a["C3a"].noise,
         **_advice(in_a, in_b),
         "frontier": frontier_text(found),
@@ -210,6 +211,15 @@ def better(found: Comparison) -> dict[str, Any]:
         "card_keys": [f"{key} = {json.dumps(value)}" for key, value in found.chosen.option.keys.items()],
         "unstable": unstable_text(found),
     }
+
+
+def _limits(found: Comparison, in_a: Mapping[str, Row]) -> dict[str, str]:
+    """What an exact mean friction law leaves of C3a's error in A, and what noise alone leaves of it."""
+    repeating = {row.option.key: row for row in found.of(f"{A}_repeating")}
+    if "refitted" not in repeating:
+        return {"refitted": "-", "floor": "-"}
+    floor = repeating["refitted"].ise / in_a["C3a"].ise
+    return {"refitted": ratio(in_a["refitted"].ratio), "floor": ratio(floor)}
 
 
 def _advice(in_a: Mapping[str, Row], in_b: Mapping[str, Row]) -> dict[str, str]:
