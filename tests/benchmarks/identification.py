@@ -138,8 +138,8 @@ def asked(tables: dict[str, list[dict[str, Any]]]) -> Iterator[dict[str, Any]]:
         "asked": f"{len(starts)}/{len(starts)}",
         "found": f"{len(right)}/{len(starts)}",
     }
-    slowest = max(float(row["seconds"]) for row in starts)
-    yield {"number": "their slowest fit of 15 s [s]", "asked": "<= 20", "found": f"{slowest:.1f}"}
+    slowest = max(float(row["processor seconds"]) for row in starts)
+    yield {"number": "their slowest fit of 15 s [s of processor time]", "asked": "<= 20", "found": f"{slowest:.1f}"}
 
 
 def example(seed: int, out: Path) -> Identified:
@@ -227,7 +227,7 @@ def output_rows(seed: int, starts: int = 12, seconds: float = 15.0) -> Iterator[
     for number in range(starts):
         factors = 2.0 ** np.random.default_rng(seed + number).choice([-1, 1], len(SEVEN))
         wrong = with_numbers(card, {f"friction.{n}": v for n, v in zip(SEVEN, true * factors, strict=True)})
-        started = time.perf_counter()
+        started = time.process_time()
         best = identify([recording], wrong, Options(free=SEVEN, starts=1)).best
         assert best is not None
         yield {
@@ -235,7 +235,7 @@ def output_rows(seed: int, starts: int = 12, seconds: float = 15.0) -> Iterator[
             **{name: f"{ratio:.4f}" for name, ratio in zip(SEVEN, best.values / true, strict=True)},
             "within 1 %": "yes" if np.all(np.abs(best.values[:2] / true[:2] - 1) < 0.01) else "no",
             "evaluations": best.evaluations,
-            "seconds": f"{time.perf_counter() - started:.1f}",
+            "processor seconds": f"{time.process_time() - started:.1f}",
         }
 
 
