@@ -13,7 +13,7 @@ from cosim.diagnosis.findings import accepted, not_found, rival_finding, standar
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.locate import regions
 from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare, quality
-from cosim.diagnosis.protocol import CLEAR_MOTION, Structures, heldout_rms, judge, traces, veto_rms
+from cosim.diagnosis.protocol import CLEAR_MOTION, Structures, heldout_rms, judge, traces, veto_band, veto_rms
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
 from cosim.diagnosis.sanity import check_effects, check_recordings
 from cosim.diagnosis.select import select
@@ -111,12 +111,12 @@ def _proven(problem: Problem, verdict: Verdict, heldout: Sequence[Recording]) ->
     """Take out effects that do not help on the held-out recording; return what stands, and those taken out."""
     chosen = verdict.chosen
     out: list[Place] = []
+    band = veto_band(heldout, verdict.base.mount, problem.prepared.cutoff)
     for places in merged(verdict.places).values():
         gone = {_key(place.effect) for place in places}
         rest = tuple(effect for effect in chosen.mount.effects if _key(effect) not in gone)
         without = problem.fit(replace(chosen.mount, effects=rest), 10)
-        cutoff = problem.prepared.cutoff
-        if veto_rms(heldout, without.mount, cutoff) <= veto_rms(heldout, chosen.mount, cutoff):
+        if veto_rms(heldout, without.mount, band) <= veto_rms(heldout, chosen.mount, band):
             chosen, out = without, [*out, *places]
     if not out:
         return verdict, ()

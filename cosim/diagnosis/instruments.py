@@ -39,6 +39,8 @@ OVERLAP = 2.0
 """Divides chi-squared: overlapping windowed segments and neighbouring bins tell the same twice."""
 DECISIVE = 9.0
 """Difference of chi-squared from which one of the two is excluded (three standard errors)."""
+TOLD = 0.65
+"""Share of the set point's misfit that a delay or a lag must explain."""
 SHAPE_PRIOR = 0.3
 """A friction shape may have about this share of the torque's RMS."""
 GRID = np.geomspace(0.3, 3.0, 13)
@@ -61,8 +63,20 @@ def excludes(misfits: Misfits, effect: Effect, rival: Effect) -> float | None:
     return misfits[rival.id] - misfits[effect.id]
 
 
+def is_told(misfits: Misfits, effect: Effect) -> bool:
+    """Whether what follows the set point is late at all: noise that the controller answers looks late by itself.
+
+    Being late must explain most of what the set point sees of a model without it: friction that meets a noisy speed
+    is late as well, but explains little.
+    """
+    if misfits is None or effect.id not in misfits:
+        return True
+    explained = misfits["none"] - misfits[effect.id]
+    return explained > max(DECISIVE, TOLD * misfits["none"])
+
+
 def misfits_of(prepared: Prepared, fitted: Mount, drive: Effect) -> Misfits:
-    """Chi-squared of a delay and of a lag, by id, each with its best time, where `drive` is one of them.
+    """Chi-squared of a delay, of a lag, each with its best time, and of none, by id, where `drive` is one of the two.
 
     None for other effects and without a recorded set point. `fitted` is the structure with the drive.
     """
@@ -76,7 +90,8 @@ def misfits_of(prepared: Prepared, fitted: Mount, drive: Effect) -> Misfits:
         return None
     ms = drive.delay_ms if isinstance(drive, Delay) else drive.time_constant_ms
     noise = [_noise(part.torque - part.columns[..., 0] / drive.response(part.omega)) for part in parts]
-    return {form.id: _least(parts, noise, form, float(ms)) for form in TWINS}
+    least = {form.id: _least(parts, noise, form, float(ms)) for form in TWINS}
+    return least | {"none": _chi2(parts, noise, Delay, 0.0)}
 
 
 def _least(parts: Sequence[Crossed], noise: Sequence[Array], form: type[Drive], fitted: float) -> float:

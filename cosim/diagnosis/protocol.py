@@ -21,6 +21,8 @@ from pyfmi_models.mount import Mount
 CUTOFF = 30.0
 CLEAR_MOTION = 0.02
 """Clear motion: faster than this share of the highest speed."""
+NOISY = 3.0
+"""Growth of the base's error beyond the band of the analysis from which that is noise of the encoder."""
 BLOCK_SECONDS = 1.0
 RESAMPLES = 400
 Z95 = 1.96
@@ -72,11 +74,19 @@ def heldout_rms(recordings: Sequence[Recording], mount: Mount) -> float:
     return rms(np.concatenate(residuals(prepared, mount))[inside])
 
 
-def veto_rms(recordings: Sequence[Recording], mount: Mount, cutoff: float) -> float:
-    """The same over what the model claims: the band of the analysis, above which the encoder's noise is the torque, and
-    for a law without memory clear motion, as it says nothing of rest.
+def veto_band(recordings: Sequence[Recording], base: Mount, cutoff: float) -> float:
+    """Band [Hz] in which held-out recordings may refute an effect: the protocol's, or that of the analysis, `cutoff`.
+
+    The latter where the base's error grows so much between the two that the encoder's noise is all there is.
     """
-    prepared = prepare(recordings, min(CUTOFF, cutoff))
+    narrow = min(CUTOFF, cutoff)
+    wide_error, narrow_error = (veto_rms(recordings, base, band) for band in (CUTOFF, narrow))
+    return narrow if wide_error > NOISY * narrow_error else CUTOFF
+
+
+def veto_rms(recordings: Sequence[Recording], mount: Mount, cutoff: float) -> float:
+    """RMS of the torque residual over what the model claims: of rest a law without memory says nothing."""
+    prepared = prepare(recordings, cutoff)
     rows = np.concatenate([piece.inside for piece in prepared.pieces])
     if isinstance(mount.friction, MemorylessLaw):
         v = np.abs(np.concatenate([piece.v for piece in prepared.pieces]))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from cosim.diagnosis.evidence import Blocks
 from cosim.diagnosis.fit import Fit
-from cosim.diagnosis.instruments import DECISIVE, excludes, misfits_of
+from cosim.diagnosis.instruments import DECISIVE, Misfits, excludes, is_told, misfits_of
 from cosim.diagnosis.structure import Bench, Screening, nuisances, screen
 from cosim.diagnosis.trial import Problem, Trial, is_real, tried, twins, winner
 from pyfmi_models.effects import Effect
@@ -41,15 +41,22 @@ def select(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Sel
             say(effect.title)
             trials.append(tried(problem, current, effect, screening.bench))
         looked_at |= {trial.effect.id: trial for trial in trials}
-        best = _settled(problem, winner([trial for trial in trials if is_real(problem, trial)]), trials)
+        real = [
+            trial for trial in trials if is_real(problem, trial) and is_told(_misfits(problem, trial), trial.effect)
+        ]
+        best = _settled(problem, winner(real), trials)
         if best is None or _full(best, problem):
             return Selection(base, current, screening.bench, looked_at)
         current = best.fit
 
 
+def _misfits(problem: Problem, trial: Trial) -> Misfits:
+    return misfits_of(problem.prepared, trial.fit.mount, trial.effect)
+
+
 def _settled(problem: Problem, best: Trial | None, trials: Sequence[Trial]) -> Trial | None:
     """Between delay and lag the set point decides."""
-    misfits = misfits_of(problem.prepared, best.fit.mount, best.effect) if best else None
+    misfits = _misfits(problem, best) if best else None
     for trial in trials if best and misfits else ():
         margin = excludes(misfits, best.effect, trial.effect)  # type: ignore[union-attr]
         if margin is not None and margin < -DECISIVE:
