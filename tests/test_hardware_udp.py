@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 from benchmarks import hardware as benchmark
-from test_hardware import SCENARIO, SIMULATED, assert_safe, invoke, recorded, scenario, simulated
+from test_hardware import INJECTED, SCENARIO, SIMULATED, assert_safe, invoke, recorded, scenario, simulated
 
 from cosim.cli_cache import fmu_of_card
 from cosim.cli_drive import _plant
@@ -117,6 +117,15 @@ def test_each_fault_of_a_frame_is_noticed_and_counted(tmp_path: Path, kind: str)
     assert replay(found).identical
 
 
+@pytest.mark.parametrize("fault", [name for name in INJECTED if name != "frame_lost"])
+def test_faults_of_the_drive_itself_are_found_over_udp_as_in_one_process(tmp_path: Path, fault: str) -> None:
+    inject, within = INJECTED[fault]
+    with drive(faulty(**inject)) as there, impatient(session(tmp_path, there.url)) as one:
+        done = run_session(one)
+    assert fault in done["faults"]
+    assert_safe(recorded(tmp_path), fault, round(AT / 1e-4), within)
+
+
 def test_what_is_late_out_of_order_or_doubled_is_never_acted_upon(tmp_path: Path) -> None:
     kinds = ("late", "duplicated", "reordered")
     inject = [{"kind": kind, "at": AT + 0.02 * place, "lasts": 2e-4} for place, kind in enumerate(kinds)]
@@ -128,8 +137,8 @@ def test_what_is_late_out_of_order_or_doubled_is_never_acted_upon(tmp_path: Path
     assert replay(found).identical
 
 
-def frame(sequence: int, session: int, kind: int = 4) -> bytes:
-    body = FRAME.pack(0x3143534D, kind, session, sequence, sequence, 0, 0, 0, 0, 1.0, 0)
+def frame(sequence: int, session: int, word: int = 0, torque: float = 1.0) -> bytes:
+    body = FRAME.pack(0x3143534D, 4, session, sequence, sequence, word, 0, 0, 0, torque, 0)
     return body + zlib.crc32(body).to_bytes(4, "little")
 
 
@@ -149,6 +158,19 @@ def test_a_drive_obeys_each_order_once_and_in_order_and_its_own_loop_only() -> N
     assert answered == [1, 3, 5]
     assert (orders["duplicated"], orders["reordered"], orders["foreign"], orders["corrupted"]) == (1, 1, 1, 2)
     assert orders["lost"] == 2
+
+
+@pytest.mark.parametrize(("torque", "held", "state"), [(1.0, 1.0, 4), (np.nan, 0.0, 7), (-np.inf, 0.0, 7)])
+def test_a_drive_gives_no_torque_that_is_no_number(torque: float, held: float, state: int) -> None:
+    with drive() as there, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as loop:
+        loop.settimeout(5)
+        loop.connect((there.host, there.port))
+        loop.send(sealed(1, 77, 1e-4))
+        assert opened(loop.recv(256), 77) == (2, 0, 1e-4)
+        for sequence, word in enumerate((0, 6, 7, 15, 15), 1):
+            loop.send(frame(sequence, 77, word, torque if sequence == 5 else 0.0))
+            loop.recv(256)
+        assert (there.drive.held, there.drive.state) == (held, state)
 
 
 @contextmanager

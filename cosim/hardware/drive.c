@@ -70,7 +70,7 @@ static int drive_write(void *self, const Order *order)
         drive->held = 0.0;
         return 0;
     }
-    if (injected(drive, TRIPPED)) {
+    if (injected(drive, TRIPPED) || !isfinite(order->torque)) {
         drive->state = FAULT;
     }
     drive->state = cia402_next(drive->state, order->controlword, drive->control, false, true);
