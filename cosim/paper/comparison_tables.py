@@ -240,9 +240,11 @@ def _range(values: Sequence[float], digits: int) -> str:
 
 def _lost(found: Comparison, key: str) -> str:
     places = lost(found.survivals, key)
-    return (
-        f"It becomes unstable with {', '.join(places)}." if places else "It survives every situation of the map below."
-    )
+    if places:
+        return f"It becomes unstable with {', '.join(places)}."
+    worst = max((one for one in found.survivals if one.option.key == key), key=lambda one: one.ratio)
+    at = f"at worst ({worst.stress.key}) its ISE is {ratio(worst.ratio)} of C3a's as designed"
+    return f"It is stable in every situation of the map below; {at}."
 
 
 def unstable_text(found: Comparison) -> str:

@@ -139,7 +139,8 @@ def _pair(value: Any) -> tuple[float, float]:
 
 def breakaways(push: Recording) -> Iterator[tuple[float, float]]:
     """Yield time and torque [N m] at which each half period of the open-loop sine sets the axis in motion."""
-    along = (np.abs(push["v"]) > MOVING) & (np.sign(push["v"]) == np.sign(push["tau"]))
+    moving = np.abs(push["v"]) > MOVING
+    along = moving & (np.sign(push["v"]) == np.sign(push["tau"])) & ~np.r_[False, moving[:-1]]
     half = np.floor(push.t * RATE / np.pi + 1e-9)
     for number in range(int(half[-1]) + 1):
         rows = np.flatnonzero(along & (half == number))

@@ -16,7 +16,7 @@ from cosim.pictures.style import AFTER, BEFORE, GREY, LINE, MEASURED
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-POINTS = 700
+POINTS = 500
 SPEED = 0.05
 """Unit of the speed beside a torque [rad/s]."""
 SHADES = ("#9DB8CC", "#5C8DB3", "#00558C", "#CC6A00", "#7A4000", "#1A1A1A")
