@@ -1,7 +1,7 @@
 """Random calls of the C interface for long, as shipped, under sanitizers and under valgrind: docs/testing_fmus.md.
 
 python tests/benchmarks/fuzz.py --watch plain --examples 1000 --seed 7
-python tests/benchmarks/fuzz.py --examples 400 --seed 1 --out results/fuzz      (all three; writes the page)
+python tests/benchmarks/fuzz.py --examples 200 --seed 1 --out results/fuzz      (all three; writes the page)
 
 Each watcher is first shown planted errors, to see that it sees them.
 """
