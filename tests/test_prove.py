@@ -8,6 +8,7 @@ import numpy as np
 import prove_tool
 import pytest
 from test_arrows import imports
+from test_report import diagnosis
 
 from cosim.cli import main
 from cosim.errors import OutputError, ProofError
@@ -19,7 +20,7 @@ from cosim.proof.generator import FAMILIES, OUTSIDE, make_case, write_given
 from cosim.proof.intervals import mean, ratio, share
 from cosim.proof.page import page, proof
 from cosim.proof.seal import Seals, canonical, salt_of, seal
-from cosim.proof.tool import given
+from cosim.proof.tool import given, told
 from cosim.sweep.journal import RUNS
 
 
@@ -262,6 +263,18 @@ def test_what_makes_cases_shares_nothing_with_what_is_tested() -> None:
         rest |= {other for other in imports(name) if other.startswith(("cosim", "pyfmi_models"))} - seen
     assert "cosim.proof.truth" in seen
     assert not [name for name in seen if name.startswith(("pyfmi_models", "cosim.diagnosis", "cosim.identify"))]
+
+
+def test_what_a_diagnosis_says_is_what_is_scored() -> None:
+    found = diagnosis("two")
+    said = json.loads(json.dumps(told(found), allow_nan=False))
+    case = row("several", ["cogging", "friction_asymmetry"], []) | {"answer": said}
+    assert (marks.exact(case), marks.hits(case), marks.verdict(case)) == (True, 2, found.verdict)
+    offered = [(one.probability, one.effect) for one in found.findings if one.answer in ("found", "ambiguous")]
+    assert [p for p, _ in marks.probabilities(case)] == [p for p, _ in offered]
+    assert marks.gain(case, "cosim") == pytest.approx(1 - 0.18 / 0.37)
+    assert set(said["windows"]) == {"run1", "run2", "run3"}
+    assert set(baselines.compared(found.traces)) == {"refit", "sindy", "regression"}
 
 
 @pytest.fixture
