@@ -37,7 +37,7 @@ def comparison_figures(found: Comparison, folder: Path, force: bool = False) -> 
     draw_robustness(found, map_, force)
     return {
         gain: "ISE against phase and delay margin, with the frontier",
-        nyquist: "Nyquist curves, sensitivity and error per torque of four loops",
+        nyquist: "Nyquist curves, sensitivity and error per torque of five loops",
         map_: "what each controller survives: flexible mode, delay, noise",
     }
 
