@@ -14,6 +14,7 @@ import numpy as np
 
 import cosim
 from cosim.diagnosis.diagnose import Outcome
+from cosim.diagnosis.experiment import SCENARIO, scenario
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut
 from cosim.files import check_free, directory, replacing
 from cosim.recording import Recording
@@ -21,7 +22,7 @@ from pyfmi_models.card import Card
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.export import export_fmu
 
-FILES = ("diagnosis.json", "missing_torque.parquet", "card.toml", "report.html")
+FILES = ("diagnosis.json", "missing_torque.parquet", "card.toml", "report.html", SCENARIO)
 
 
 def check_out(out: Path, force: bool) -> None:
@@ -55,6 +56,9 @@ def deliver(
         say("building the improved FMU")
         improved = {"card": "card.toml", **_fmus(better, found, out), **_proven_range(found), **more(better, out)}
         found = replace(found, improved=improved)
+    if outcome.experiment and better.controller:
+        with replacing(out / SCENARIO, True) as partial:
+            partial.write_text(scenario(outcome.experiment, better), "utf-8")
     _missing_torque(found, [*train, *held], out / "missing_torque.parquet")
     with replacing(out / "diagnosis.json", True) as partial:
         partial.write_text(json.dumps(as_json(found), indent=2, allow_nan=False) + "\n", "utf-8")

@@ -9,6 +9,7 @@ import numpy as np
 from cosim.diagnosis.adequacy import Rest, rest_of
 from cosim.diagnosis.challenge import Place, Verdict, challenge, merged
 from cosim.diagnosis.evidence import Blocks
+from cosim.diagnosis.experiment import Experiment, best, told
 from cosim.diagnosis.findings import accepted, not_found, rival_finding, standard_errors
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.locate import regions
@@ -35,6 +36,7 @@ class Outcome:
     card: Card
     proposed: Card
     refitted: Card
+    experiment: Experiment | None = None
 
 
 def diagnose(
@@ -71,6 +73,7 @@ def diagnose(
     models = Structures(mount, verdict.base.mount, verdict.chosen.mount)
     signals = traces(train, held, models)
     found = _findings(verdict, unproven, prepared, weight, signals)
+    experiment = _experiment(verdict, prepared)
     diagnosis = Diagnosis(
         verdict=_verdict(found, rest),
         findings=tuple(found),
@@ -81,14 +84,15 @@ def diagnose(
         mount=card.mount.name,
         motion=mount.motion,
         ambiguous_with=tuple((p.effect.id, *p.ambiguous_with) for p in verdict.places if p.ambiguous_with),
+        next_experiment=told(experiment, card.controller is not None) if experiment else {},
         depends_on=rest.depends_on,
         data_quality=tuple(note for recording in (*train, *held) for note in quality(recording, prepared.cutoff)),
         friction_law={"base": mount.friction.key, "proposed": mount.friction.key, "gain": 0.0},
         base_parameters=_base_parameters(models),
         seconds=time.perf_counter() - started,
     )
-    cards = (_improved(card, mount) for mount in (_certain(problem, verdict), proposed, verdict.base.mount))
-    return Outcome(diagnosis, *cards)
+    certain, first, base = (_improved(card, one) for one in (_certain(problem, verdict), proposed, verdict.base.mount))
+    return Outcome(diagnosis, certain, first, base, experiment)
 
 
 def _certain(problem: Problem, verdict: Verdict) -> Mount:
@@ -97,6 +101,15 @@ def _certain(problem: Problem, verdict: Verdict) -> Mount:
     mount = verdict.chosen.mount
     rest = tuple(effect for effect in mount.effects if _key(effect) not in open_keys)
     return mount if len(rest) == len(mount.effects) else problem.fit(replace(mount, effects=rest), 15).mount
+
+
+def _experiment(verdict: Verdict, prepared: Prepared) -> Experiment | None:
+    """What would settle the first open question."""
+    for place in verdict.places:
+        for rival in place.rivals:
+            if rival.effect.id in place.ambiguous_with:
+                return best(place.trial.fit.mount, rival.fit.mount, (place.effect.id, rival.effect.id), prepared)
+    return None
 
 
 def _weight(mount: Mount, prepared: Prepared) -> Array:
