@@ -531,6 +531,7 @@ def page(found: dict[str, Any]) -> str:
         "",
         f"{found['version']}, seed {found['seed']}. {found['machine']}. The scenario `sidereal`, 10 kHz, UDP on one",
         "machine with other work: lateness is its own, so it stands beside a bare clock's, and nothing is a guarantee.",
+        f"Load average when all was done: {found['load_at_the_end'][0]:.1f}.",
     ]
     for name, write in sections.items():
         lines += ["", *write(found[name])] if name in found else []
@@ -546,7 +547,7 @@ def timing_lines(found: dict[str, Any]) -> list[str]:
     return [
         f"## {whole['edges'] * STEP:.0f} s in real time, the supervisor draining and plotting",
         "",
-        f"Load average at the start {found['load'][0]:.1f} ({os.cpu_count()} cores); SCHED_FIFO {whole['fifo']}.",
+        f"Load average at the start {found['load'][0]:.1f}; SCHED_FIFO: {'granted' if whole['fifo'] else 'refused'}.",
         "",
         f"- Edges {whole['edges']:,}; late {whole['late_share']:.3%}; "
         f"worst wake-up {whole['worst_wake_up_us']:.0f} us. Trips (enabled again each time): {trips}.",
@@ -588,12 +589,13 @@ def fault_lines(found: dict[str, Any]) -> list[str]:
         *(
             f"| {one['injected']} | `{one['expected']}` | {one['detected']:.0%} of {one['trials']} "
             f"| {span(one['cycles'])} | {', '.join(one['states'])} "
-            f"| {one['torque_after']:g}{' (goes on)' if one['expected'] not in FAULTS else ''} |"
+            f"| {format(one['torque_after'], 'g') if one['expected'] in FAULTS else 'goes on'} |"
             for one in found["rows"]
         ),
         "",
         f"Detected: {found['detected']:.0%} in the worst row. A controller that gives no number or fails, a drive that",
-        "leaves operation and an adapter that says so itself are provoked in `tests/test_hardware.py`.",
+        "leaves operation and an adapter that says so itself are provoked in `tests/test_hardware.py`. A heartbeat is",
+        "lost 500 ms after the last one; missed edges are known when the last of the 64 is over.",
     ]
 
 
@@ -608,7 +610,7 @@ def clean_lines(found: dict[str, Any]) -> list[str]:
         f"## {found['minutes']:g} min without a fault",
         "",
         f"In lockstep over UDP, faster than real time ({found['seconds']:.0f} s): {found['cycles']:,} cycles, {ended};",
-        f"false trips: {len(found['trips'])} {found['trips'] or ''}; frames noticed as bad: {wrong or 'none'}.",
+        f"false trips: {', '.join(found['trips']) or 'none'}; frames noticed as bad: {wrong or 'none'}.",
     ]
 
 
