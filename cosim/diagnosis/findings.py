@@ -44,6 +44,8 @@ MAIN = {
     "encoder_eccentricity": ("amplitude_rad", 1.0, "rad"),
 }
 """The number that says how large an effect is: parameter, factor and unit of the text."""
+PLACES = ("stribeck", "presliding", "torque_saturation", "clock_skew", "compliance")
+"""Effects whose number says where they set in, not how large they are: no smallest size can be told."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ def accepted(
 def _visible_from(effect: Effect, numbers: Numbers) -> float | None:
     """Size that would still stand out three standard errors from nothing."""
     name, factor, _ = MAIN[effect.id]
-    return 3 * factor * numbers.errors[name] if name in numbers.errors else None
+    return 3 * factor * numbers.errors[name] if name in numbers.errors and effect.id not in PLACES else None
 
 
 def rival_finding(rival: Trial, place: Place, mount: Mount) -> Finding:
@@ -182,7 +184,7 @@ def _absent(name: str, smallest: float | None, trial: Trial | None, mount: Mount
         probability=0.0,
         gain=max(0.0, trial.gain) if trial else 0.0,
         units={MAIN[name][0]: _unit(unit, mount)},
-        visible_from=factor * smallest if testable and smallest is not None else None,
+        visible_from=factor * smallest if testable and smallest is not None and name not in PLACES else None,
         evidence=reason,
         action=reason,
     )

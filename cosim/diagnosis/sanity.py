@@ -20,8 +20,6 @@ RATIOS = {"deg": 57.2958, "arcmin": 3437.75, "arcsec": 206264.8, "mrad": 1000.0,
 LINEAR_RATIOS = {"mm": 1e3, "um": 1e6}
 SPREAD = 2.2
 """An inertia within this factor of the card's, once a unit is undone, gives the unit away."""
-TOLD = 0.02
-"""Acceleration must explain this share of the torque beside friction before it says anything about units."""
 
 
 def check_effects(mount: Mount) -> None:
@@ -68,11 +66,11 @@ def _check_motion(recording: Recording) -> None:
 
 
 def _check_ratio(recording: Recording, mount: Mount) -> None:
-    implied = _implied_inertia(recording)
-    if implied is None:
+    expected = float(mount.axis.inertia)
+    implied, needed = _implied_inertia(recording, expected)
+    if needed <= 1:
         return
     ratios = LINEAR_RATIOS if mount.motion == "linear" else RATIOS
-    expected = float(mount.axis.inertia)
     off = expected / implied if implied > 0 else np.inf
     if 1 / 5 < off < 5:
         return
@@ -87,13 +85,16 @@ def _check_ratio(recording: Recording, mount: Mount) -> None:
             raise RecordingError(text, culprit=name, value=off)
 
 
-def _implied_inertia(recording: Recording) -> float | None:
-    """Inertia from least squares of torque on acceleration, direction and speed; None where it explains too little."""
+def _implied_inertia(recording: Recording, expected: float) -> tuple[float, float]:
+    """Inertia from least squares of torque on acceleration, direction and speed; and what the expected one would need.
+
+    The latter is the RMS of the torque that the expected inertia takes for this motion, over that of the recorded
+    torque: only where it is above one does the torque contradict the motion.
+    """
     prepared = prepare([recording], min(10.0, 0.2 / recording.sample_time))
     top = max(abs(edge) for edge in prepared.ranges["v"]) + 1e-300
     a, v, tau = (prepared.stacked(name) for name in ("a", "v", "tau"))
     friction = np.column_stack([np.tanh(v / (0.02 * top)), v, np.ones_like(v)])
-    own, left = projected(a, friction), projected(tau, friction)
-    inertia = float(own @ left) / max(float(own @ own), 1e-300)
-    explained = inertia**2 * float(own @ own)
-    return inertia if explained > TOLD * float(tau @ tau) else None
+    own = projected(a, friction)
+    energy = max(float(own @ own), 1e-300)
+    return float(own @ tau) / energy, expected * np.sqrt(energy / max(float(tau @ tau), 1e-300))
