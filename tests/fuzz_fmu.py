@@ -135,6 +135,14 @@ class Player:
         assert all(map(isfinite, values)), f"a state holds {values}"
         return content.raw
 
+    def held(self, slot: Slot, cell: int) -> bytes:
+        """What is saved in a cell, as far as an instance in this slot can tell."""
+        content = ctypes.create_string_buffer(self.facts["bytes"])
+        if not slot.pointer or not self.cells[cell]:
+            return b""
+        self.call(f"SerializeFMU{self.suffix}", slot, self.cells[cell], content, ctypes.c_size_t(len(content)))
+        return content.raw
+
     def judge_call(self, slot: Slot, call: Call) -> None:
         parameters, target = self.functions[call.name], slot if call.arguments[0] and slot.pointer else None
         arrays = [
@@ -216,7 +224,9 @@ class Player:
         data = None if missing == "bytes" else (ctypes.c_char * len(given)).from_buffer_copy(given)
         place = None if missing == "place" else ctypes.byref(self.cells[cell])
         target = None if missing == "instance" or not slot.pointer else slot
+        held = self.held(slot, cell)
         status = self.judged(call.name, slot, target, [data, ctypes.c_size_t(len(given)), place])
+        assert status == OK or self.held(slot, cell) == held, "a refusal has changed the saved state"
         if how[0] != "forged" or missing or not target:
             assert (status == OK) == (given == content and not missing and target is not None), f"{how}: {status}"
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import export_models as models
 import numpy as np
 import pytest
+from fuzz_rules import sealed
 
 from pyfmi_models.export import build_library
 from pyfmi_models.export.build import compile_shared
@@ -268,6 +269,20 @@ def test_a_saved_state_is_that_of_its_point_whatever_was_asked_before(make, fmi)
     before = driver.serialize(driver.save())
     everything(driver)
     assert driver.serialize(driver.save()) == before
+
+
+@both
+def test_a_refused_state_leaves_the_saved_one_in_whose_place_it_was_to_go(fmi):
+    driver = instance(models.lugre, fmi, drive=4.0).run(0, 10, 1e-3)
+    state = driver.save()
+    content = driver.serialize(state)
+    forged = bytearray(content[:-8])
+    forged[52:56] = (63).to_bytes(4, "little")  # a mode that there is not
+    forged = sealed(bytes(forged))
+    name = "DeSerializeFMUstate" if fmi == 2 else "DeserializeFMUState"
+    assert driver.call(name, forged, ctypes.c_size_t(len(forged)), ctypes.byref(state)) == "error"
+    assert "no run ends in such a state" in driver.messages[-1][2]
+    assert driver.serialize(state) == content
 
 
 @both

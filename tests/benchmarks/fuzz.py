@@ -30,7 +30,7 @@ import cosim
 from pyfmi_models.export.build import compile_shared, sources_of, units_of
 from pyfmi_models.export.platforms import PLATFORMS, host
 
-COMMAND = "python tests/benchmarks/fuzz.py --examples {examples} --seed {seed} --out results/fuzz"
+COMMAND = "python tests/benchmarks/fuzz.py"
 GCC = ("gcc", "-std=c11", "-g", "-O1", "-ffp-contract=off", "-fno-omit-frame-pointer", "-shared", "-fPIC")
 SANITIZERS = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all")
 VALGRIND = ("valgrind", "--leak-check=full", "--show-leak-kinds=definite,indirect", "--num-callers=30", "--xml=yes",
@@ -59,7 +59,7 @@ def main() -> None:
         for name in options.watch or WATCHERS:
             for row in watched(name, options, Path(folder)):
                 rows.append(row)
-                text = page(rows, COMMAND.format(**vars(options)))
+                text = page(rows, " ".join([COMMAND, *sys.argv[1:]]))
                 if options.out:  # what is done is kept if the rest is not
                     options.out.mkdir(parents=True, exist_ok=True)
                     (options.out / "README.md").write_text(text, "utf-8")

@@ -94,11 +94,20 @@ Status deserialize(Instance *instance, const unsigned char *bytes, size_t size, 
     memcpy(&mark, bytes, sizeof mark);
     if (hash != hash_bytes(bytes, memory_size())) return fail(instance, FAILED, "the serialized state is corrupted");
     if (mark != instance->memory->mark) return fail(instance, FAILED, "the state belongs to another model");
-    Memory *given = memory ? *memory : NULL;
-    Status status = provide(instance, memory);
-    if (status != OK) return status;
-    memcpy(*memory, bytes, memory_size());
-    if (plausible(*memory)) return OK;
-    if (!given) release(memory);
-    return fail(instance, FAILED, "the serialized state is corrupted: no run ends in such a state");
+    Memory *loaded = NULL;
+    if (!memory) return fail(instance, FAILED, "there is no place for the state");
+    if (provide(instance, &loaded) != OK) return FAILED;
+    memcpy(loaded, bytes, memory_size());
+    if (!plausible(loaded)) {
+        release(&loaded);
+        return fail(instance, FAILED, "the serialized state is corrupted: no run ends in such a state");
+    }
+    /* Only now: a refusal leaves the state that is there. */
+    if (*memory) {
+        memcpy(*memory, loaded, memory_size());
+        release(&loaded);
+    } else {
+        *memory = loaded;
+    }
+    return OK;
 }
