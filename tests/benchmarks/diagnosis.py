@@ -94,9 +94,9 @@ TITLES = {
     "concealed": "One concealed effect in a mount that shares no equations with the candidates",
 }
 NOTES = {
-    "measured": "Held-out RMS by the protocol of each recording's README; `first look` is what that README found by hand. How "
-    "each is read stands in tests/benchmarks/measured.py: columns, units, card, what is held out. `refitted` is "
-    "the base of the card with its numbers fitted, `with effects` the delivered model, `no veto` what training "
+    "measured": "Held-out RMS by the protocol of each recording's README; `first look` is what that README found by "
+    "hand. How each is read stands in tests/benchmarks/measured.py: columns, units, card, what is held out. `refitted` "
+    "is the base of the card with its numbers fitted, `with effects` the delivered model, `no veto` what training "
     "alone proposed. A set is not put into a model.\n\n"
     "Not reached, and why: the lead screw's bar in one of its halves, where six seconds of each speed place the "
     "Stribeck speed too low; the anti-backlash screw's payload, a small constant beside a torque that ripples by "
