@@ -95,7 +95,7 @@ PLANTED = (
     Planted("a crash", "values.c", f"if ({MISSING}) {GETTING}", f"if (0) {GETTING}"),
     Planted("a read past the table", "values.c", ">= (uint32_t)", "> (uint32_t)", seen_by=("sanitizers",)),
     Planted("memory that nobody has written", "memory.c", COPY, f"{COPY} - 8", "ticking_root", ("valgrind",)),
-    Planted("a leak", "memory.c", "release(&loaded);\n        return fail", "return fail", seen_by=("valgrind",)),
+    Planted("a leak", "memory.c", "free(*memory);", "", seen_by=("valgrind",)),
 )
 
 
