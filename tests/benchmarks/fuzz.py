@@ -1,7 +1,7 @@
 """Random calls of the C interface for long, as shipped, under sanitizers and under valgrind: docs/testing_fmus.md.
 
 python tests/benchmarks/fuzz.py --watch plain --examples 1000 --seed 7
-python tests/benchmarks/fuzz.py --examples 200 --seed 1 --out results/fuzz      (all three; writes the page)
+python tests/benchmarks/fuzz.py --examples 200 --seed 1 --out FOLDER      (all three; writes a page)
 
 Each watcher is first shown planted errors, to see that it sees them.
 """
@@ -155,10 +155,10 @@ def page(rows: list[tuple[str, ...]], command: str) -> str:
         "",
         f"mount-cosim {cosim.__version__}, Python {platform.python_version()}, hypothesis {hypothesis.__version__}, "
         f"{platform.machine()}; {version_of('gcc')}; {version_of('valgrind')}. How it is done and what must hold: "
-        "[docs/testing_fmus.md](../../docs/testing_fmus.md). A planted error is one put into the C for this run, to "
+        "docs/testing_fmus.md. A planted error is one put into the C for this run, to "
         "see that the watcher sees it.",
         "",
-        *(f"- {name}: {watcher.title}" for name, watcher in WATCHERS.items()),
+        *(f"- {name}: {watcher.title}" for name, watcher in WATCHERS.items() if name in {row[0] for row in rows}),
         "",
         "| watched by | model | FMI | programs | calls | granted | functions met | s | result |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
