@@ -31,9 +31,9 @@ def looked(diagnosis: Diagnosis) -> Table:
 
 def _from(finding: Finding) -> str:
     if finding.answer != "not_testable":
-        return shows_from(finding) or finding.evidence
+        return shows_from(finding) or finding.evidence or "–"
     said = [finding.evidence, finding.action or CONDITIONS.get(finding.effect, "")]
-    return "; ".join(text.rstrip(".") for text in said if text)
+    return "; ".join(dict.fromkeys(text.rstrip(".") for text in said if text))
 
 
 def limits(diagnosis: Diagnosis) -> Table:
