@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.pictures.figure import figure
+from cosim.pictures.sheet import figure
 from cosim.pictures.style import AFTER, BEFORE, GREY, LINE
 from cosim.proof.generator import FAMILIES, OUTSIDE
 
@@ -19,7 +19,7 @@ def draw_confusion(table: Mapping[str, Mapping[str, int]], path: Path) -> None:
     answers = {answer for line in table.values() for answer in line}
     columns = [name for name in (*sorted(FAMILIES), *ENDS) if name in answers]
     rows = [label for label in (*sorted(FAMILIES), *OUTSIDE, "none") if label in table]
-    with figure(path, (1.9 + 0.32 * len(columns), 1.6 + 0.27 * len(rows)), force=True) as axes:
+    with figure(path, 1, 1, (1.9 + 0.32 * len(columns), 1.6 + 0.27 * len(rows)), force=True) as (_, ((axes,),)):
         for y, label in enumerate(rows):
             right = "unknown" if label in OUTSIDE else label
             for answer, count in table[label].items():
@@ -49,7 +49,7 @@ def _words(label: str) -> str:
 
 def draw_calibration(reliability: Sequence[Mapping[str, Any]], path: Path) -> None:
     """Printed probability against the share that was true, with Wilson intervals; the diagonal keeps its word."""
-    with figure(path, (4.6, 3.8), force=True) as axes:
+    with figure(path, 1, 1, (4.6, 3.8), force=True) as (_, ((axes,),)):
         axes.plot([0, 1], [0, 1], color=LINE, linewidth=1)
         for one in reliability:
             axes.plot([one["printed"]] * 2, [one["low"], one["high"]], color=AFTER, linewidth=1.2)
@@ -64,7 +64,7 @@ def draw_calibration(reliability: Sequence[Mapping[str, Any]], path: Path) -> No
 def draw_gaps(gaps: Sequence[float], path: Path) -> None:
     """Share of the removable held-out RMS that was removed, cases in order; 1 is the true structure refitted."""
     low = -0.25
-    with figure(path, (5.6, 3.2), force=True) as axes:
+    with figure(path, 1, 1, (5.6, 3.2), force=True) as (_, ((axes,),)):
         ordered = np.sort(np.clip(gaps, low, 1.5)) if len(gaps) else np.zeros(0)
         axes.bar(range(len(ordered)), ordered, width=0.8, color=[AFTER if x >= 0.9 else BEFORE for x in ordered])
         axes.axhline(1, color=GREY, linewidth=0.8)
