@@ -9,10 +9,10 @@ from pyfmi_models.model import Scalar, Variable, parameter
 
 @dataclass(frozen=True, kw_only=True)
 class KnownLoad(PayloadEffect):
-    """Weight that changes from run to run, or is measured: torque = gain load, resisting; `load` is a plant input.
+    """Weight that changes from run to run, or is measured: torque = gain load, resisting; the load is an input.
 
-    In a recording the input is the column `load` [N m]. A gain beside 1 says that load and drive torque are not on one
-    scale, as where the drive's torque constant is known roughly.
+    The plant input and the column of a recording are called `load_torque` [N m]. A gain beside 1 says that load and
+    drive torque are not on one scale, as where the drive's torque constant is known roughly.
     """
 
     id: ClassVar[str] = "known_load"
@@ -24,11 +24,11 @@ class KnownLoad(PayloadEffect):
 
     def inputs(self) -> tuple[Variable, ...]:
         """The load."""
-        return (Variable(name="load", unit="N.m", description="Known load, resists"),)
+        return (Variable(name="load_torque", unit="N.m", description="Known load, resists"),)
 
     def load(self, motion: Motion) -> Scalar:
-        """`gain load`."""
-        return self.gain * motion.inputs["load"]
+        """`gain load_torque`."""
+        return self.gain * motion.inputs["load_torque"]
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""

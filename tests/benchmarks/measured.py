@@ -204,7 +204,7 @@ def servo(folder: Path) -> Iterator[Machine]:
 
     def loaded(one: Any) -> pd.DataFrame:
         run = table[table.run == one.run][["t", "q", "duty"]]
-        return run.assign(load=one.gravity_torque_max * np.sin(run.q))
+        return run.assign(load_torque=one.gravity_torque_max * np.sin(run.q))
 
     yield Machine(
         name="geared servo lifting a pendulum",
@@ -217,7 +217,7 @@ def servo(folder: Path) -> Iterator[Machine]:
         bar=0.28,
         first_look="0.384 -> 0.270",
         columns=("tau=duty",),
-        units=(f"tau={VOLTS!r} N.m", "q=rad", "load=N.m"),
+        units=(f"tau={VOLTS!r} N.m", "q=rad", "load_torque=N.m"),
     )
 
 
