@@ -4,8 +4,9 @@ python tests/benchmarks/sweep.py --out results/sweep     (--runs and --rounds ma
 
 The scenario `sidereal` (15 s at 0.1 ms), four parameters drawn by Latin hypercube. Each round does `runs` of its own on
 each of the three, right after each other, whole: with start-up, rehearsal, journal and table. A ratio is that of two
-sweeps of one round; the median of the rounds counts. What else runs on a shared machine takes its part of both cores,
-which a sweep on one core does not feel: so the seconds of processors are told too, which hardly depend on it.
+sweeps of one round; the median of the rounds counts. "One core" is one: all its processes are kept there. What else
+runs on a shared machine takes its part of both cores, which a sweep on one core does not feel: so the seconds of
+processors are told too, which hardly depend on it.
 """
 
 import argparse
@@ -15,7 +16,7 @@ import platform
 import resource
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from statistics import median
 from time import perf_counter
@@ -65,7 +66,8 @@ def measure(folder: Path, runs: int, rounds: int) -> dict[str, Any]:
             ways = {"one core": (1, ""), "two cores": (2, ""), "Dask, two workers": (None, address)}
             for name, (workers, where) in ways.items():
                 before = processor_seconds()
-                seconds[name].append(swept(folder, runs, number, workers, where))
+                with one_core() if name == "one core" else nullcontext():
+                    seconds[name].append(swept(folder, runs, number, workers, where))
                 busy[name] += processor_seconds() - before
     two = seconds["two cores"]
     lengths = [n for n in LENGTHS if n <= 4 * runs]
@@ -106,6 +108,17 @@ def swept(folder: Path, runs: int, seed: int, workers: int | None = None, addres
     return perf_counter() - begun
 
 
+@contextmanager
+def one_core() -> Iterator[None]:
+    """Keep this process and those it begins on one core: a sweep by one worker still has a parent and a writer."""
+    allowed = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(allowed)})
+    try:
+        yield
+    finally:
+        os.sched_setaffinity(0, allowed)
+
+
 def processor_seconds() -> float:
     """Return the seconds of processors that this process, the workers of its cluster and all ended ones have used."""
     import psutil
@@ -139,7 +152,8 @@ def page(found: dict[str, Any]) -> str:
         "",
         ", ".join(f"{name} {text}" for name, text in found["versions"].items()) + f"; {found['machine']}, shared.",
         f"`sidereal`, 15 s at 0.1 ms, four parameters by Latin hypercube, {found['runs']:,} runs each way in "
-        f"{found['rounds']} rounds side by side; start-up, rehearsal, journal and table count.",
+        f"{found['rounds']} rounds side by side; start-up, rehearsal, journal and table count. "
+        "One core: all processes of a sweep are kept on it.",
         "",
         "| who | seconds in all | a run | of processors | ratio, median of the rounds (least to greatest) |",
         "| --- | --- | --- | --- | --- |",
