@@ -145,7 +145,7 @@ def drive_process() -> Iterator[str]:
         said = next(line for line in process.stderr if " listens at " in line)
         yield said.split(" at ")[1].split(",")[0]
     finally:
-        process.send_signal(signal.SIGINT)
+        process.send_signal(signal.SIGTERM)
         process.communicate()
 
 
