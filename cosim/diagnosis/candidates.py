@@ -120,8 +120,7 @@ def _derivatives(mount: Mount, found: Sequence[Candidate], prepared: Prepared) -
     wanted = [[f"{own}.{n}" for own in group for n in c.linear] for group, c in zip(owners, found, strict=True)]
     flat = tuple(name for group in wanted for name in group)
     inverse = Inverse(extended, flat)
-    start = np.array([dict(zip(inverse.names, inverse.start, strict=True))[name] for name in flat])
-    slopes = stacked(inverse, prepared.pieces, start)[1]
+    slopes = stacked(inverse, prepared.pieces, inverse.present)[1]
     ends = np.cumsum([len(group) for group in wanted])[:-1]
     return np.split(slopes, ends, axis=1)
 

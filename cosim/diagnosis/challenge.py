@@ -5,14 +5,14 @@ a better one takes it, one that comes close makes the answer a set.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from cosim.diagnosis.candidates import ROOM, columns_of
 from cosim.diagnosis.families import candidates
 from cosim.diagnosis.fit import Fit
-from cosim.diagnosis.instruments import DECISIVE, Misfits, excludes, misfits_of
+from cosim.diagnosis.instruments import DECISIVE, Misfits, excludes, misfits_of, settled
 from cosim.diagnosis.select import Selection
 from cosim.diagnosis.structure import Bench, projected
 from cosim.diagnosis.trial import (
@@ -47,7 +47,7 @@ class Place:
     effect: Effect
     trial: Trial
     rivals: tuple[Trial, ...]
-    misfits: Misfits = None
+    misfits: Misfits = field(default_factory=dict)
     """What the set point says of a delay and of a lag, where this is one of them."""
 
     @property
@@ -65,10 +65,9 @@ class Place:
     @property
     def better(self) -> Trial:
         """The trial that should hold this place: by gain, but between delay and lag the set point decides."""
-        margins = [(rival, excludes(self.misfits, self.effect, rival.effect)) for rival in self.rivals]
-        swapped = next((rival for rival, margin in margins if margin is not None and margin < -DECISIVE), None)
-        judged_by_gain = [rival for rival, margin in margins if margin is None]
-        return swapped or max((self.trial, *judged_by_gain), key=lambda trial: trial.gain)
+        demanded = settled(self.misfits, self.trial, self.rivals)
+        by_gain = [rival for rival in self.rivals if excludes(self.misfits, self.effect, rival.effect) is None]
+        return max((demanded, *by_gain), key=lambda trial: trial.gain) if demanded is self.trial else demanded
 
     @property
     def probability(self) -> float:
@@ -141,7 +140,7 @@ def _place(problem: Problem, effect: Effect, chosen: Fit, bench: Bench) -> Place
     own = judged(effect, chosen, reduced, bench)
     rivals = [tried(problem, reduced, start, bench) for start in _rivals(effect, reduced, bench, own.gain)]
     real = [rival for rival in rivals if not is_another(problem, rival.effect)]
-    misfits = misfits_of(problem.prepared, chosen.mount, effect) if real else None
+    misfits = misfits_of(problem.prepared, chosen.mount, effect) if real else {}
     return Place(effect, own, tuple(sorted(real, key=lambda trial: -trial.gain)), misfits)
 
 

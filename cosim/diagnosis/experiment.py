@@ -125,10 +125,8 @@ def _difference(main: Mount, rival: Mount, signal: SetPoint, visited: Visited) -
     torque = Inverse(main, ()).torque(piece, np.zeros(0))[0]
     if np.abs(torque).max() > HARDEST * visited.torque:
         return 0.0
-    free = free_parameters(rival)
-    inverse = Inverse(rival, free)
-    values = np.array([dict(zip(inverse.names, inverse.start, strict=True))[name] for name in free])
-    other, slopes = inverse.torque(piece, values)
+    inverse = Inverse(rival, free_parameters(rival))
+    other, slopes = inverse.torque(piece, inverse.present)
     rest = projected((torque - other)[piece.inside], slopes[piece.inside])
     return float(np.sqrt(np.mean(rest**2)))
 

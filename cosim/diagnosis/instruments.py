@@ -22,12 +22,13 @@ from cosim.diagnosis.bank import speed_shapes, stop_distances, stop_operators
 from cosim.diagnosis.fit import free_parameters
 from cosim.diagnosis.inverse import Inverse
 from cosim.diagnosis.prepare import Array, Piece, Prepared, derivative
+from cosim.diagnosis.trial import Trial
 from pyfmi_models.effects import ActuatorLag, Delay, Effect
 from pyfmi_models.mount import Mount
 
 Complex = npt.NDArray[np.complex128]
 Drive = Delay | ActuatorLag
-Misfits = dict[str, float] | None
+Misfits = dict[str, float]
 TWINS: tuple[type[Drive], ...] = (Delay, ActuatorLag)
 SEGMENT = 4.0
 """Seconds of a segment of the cross-spectra; segments overlap by half."""
@@ -58,9 +59,18 @@ class Crossed:
 
 def excludes(misfits: Misfits, effect: Effect, rival: Effect) -> float | None:
     """By how much chi-squared speaks for an effect against its rival; None where the set point says nothing of them."""
-    if misfits is None or effect.id not in misfits or rival.id not in misfits or effect.id == rival.id:
+    if not {effect.id, rival.id} <= set(misfits) or effect.id == rival.id:
         return None
     return misfits[rival.id] - misfits[effect.id]
+
+
+def settled(misfits: Misfits, best: Trial, rivals: Sequence[Trial]) -> Trial:
+    """The rival that the set point demands in place of the best, else the best."""
+    for rival in rivals:
+        margin = excludes(misfits, best.effect, rival.effect)
+        if margin is not None and margin < -DECISIVE:
+            return rival
+    return best
 
 
 def is_told(misfits: Misfits, effect: Effect) -> bool:
@@ -69,7 +79,7 @@ def is_told(misfits: Misfits, effect: Effect) -> bool:
     Being late must explain most of what the set point sees of a model without it: friction that meets a noisy speed
     is late as well, but explains little.
     """
-    if misfits is None or effect.id not in misfits:
+    if effect.id not in misfits:
         return True
     explained = misfits["none"] - misfits[effect.id]
     return explained > max(DECISIVE, TOLD * misfits["none"])
@@ -78,16 +88,16 @@ def is_told(misfits: Misfits, effect: Effect) -> bool:
 def misfits_of(prepared: Prepared, fitted: Mount, drive: Effect) -> Misfits:
     """Chi-squared of a delay, of a lag, each with its best time, and of none, by id, where `drive` is one of the two.
 
-    None for other effects and without a recorded set point. `fitted` is the structure with the drive.
+    Empty for other effects and without a recorded set point. `fitted` is the structure with the drive.
     """
     if not isinstance(drive, Drive):
-        return None
+        return {}
     mount = replace(fitted, effects=tuple(effect for effect in fitted.effects if effect is not drive))
     if not prepared.has_position or any("q_d" not in piece.extras for piece in prepared.pieces):
-        return None
+        return {}
     parts = [part for part in (_crossed(mount, piece, prepared) for piece in prepared.pieces) if part is not None]
     if not parts:
-        return None
+        return {}
     ms = drive.delay_ms if isinstance(drive, Delay) else drive.time_constant_ms
     noise = [_noise(part.torque - part.columns[..., 0] / drive.response(part.omega)) for part in parts]
     least = {form.id: _least(parts, noise, form, float(ms)) for form in TWINS}
@@ -104,9 +114,8 @@ def _least(parts: Sequence[Crossed], noise: Sequence[Array], form: type[Drive], 
 
 
 def _crossed(mount: Mount, piece: Piece, prepared: Prepared) -> Crossed | None:
-    free = free_parameters(mount)
-    inverse = Inverse(mount, free)
-    values = np.array([dict(zip(inverse.names, inverse.start, strict=True))[name] for name in free])
+    inverse = Inverse(mount, free_parameters(mount))
+    values = inverse.present
     needed = inverse.behind(piece, inverse.momentary(piece, values), values)
     wanted = _wanted(piece)
     own = Inverse(mount, ())

@@ -46,6 +46,11 @@ class Inverse:
         return np.array([variable.start for variable in self.mount.parameters()])
 
     @cached_property
+    def present(self) -> Array:
+        """Present values of the free parameters, in the order of `free`."""
+        return np.asarray(self.start[[self.names.index(name) for name in self.free]], float)
+
+    @cached_property
     def _equations(self) -> Equations:
         return equations_of(self.mount, self.names, self.free)
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from cosim.diagnosis.evidence import Blocks
 from cosim.diagnosis.fit import Fit
-from cosim.diagnosis.instruments import DECISIVE, Misfits, excludes, is_told, misfits_of
+from cosim.diagnosis.instruments import is_told, misfits_of, settled
 from cosim.diagnosis.structure import Bench, Screening, nuisances, screen
 from cosim.diagnosis.trial import Problem, Trial, is_real, tried, twins, winner
 from pyfmi_models.effects import Effect
@@ -41,27 +41,18 @@ def select(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Sel
             say(effect.title)
             trials.append(tried(problem, current, effect, screening.bench))
         looked_at |= {trial.effect.id: trial for trial in trials}
-        real = [
-            trial for trial in trials if is_real(problem, trial) and is_told(_misfits(problem, trial), trial.effect)
-        ]
-        best = _settled(problem, winner(real), trials)
+        best = _best(problem, trials)
         if best is None or _full(best, problem):
             return Selection(base, current, screening.bench, looked_at)
         current = best.fit
 
 
-def _misfits(problem: Problem, trial: Trial) -> Misfits:
-    return misfits_of(problem.prepared, trial.fit.mount, trial.effect)
-
-
-def _settled(problem: Problem, best: Trial | None, trials: Sequence[Trial]) -> Trial | None:
-    """Between delay and lag the set point decides."""
-    misfits = _misfits(problem, best) if best else None
-    for trial in trials if best and misfits else ():
-        margin = excludes(misfits, best.effect, trial.effect)  # type: ignore[union-attr]
-        if margin is not None and margin < -DECISIVE:
-            return trial
-    return best
+def _best(problem: Problem, trials: Sequence[Trial]) -> Trial | None:
+    """The trial to go on with, if any is real; between delay and lag the set point decides."""
+    real = [trial for trial in trials if is_real(problem, trial)]
+    misfits = {trial.effect.id: misfits_of(problem.prepared, trial.fit.mount, trial.effect) for trial in real}
+    best = winner([trial for trial in real if is_told(misfits[trial.effect.id], trial.effect)])
+    return settled(misfits[best.effect.id], best, trials) if best else None
 
 
 def starts(screening: Screening) -> list[Effect]:
