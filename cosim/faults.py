@@ -9,6 +9,7 @@ Values are in the unit of what the fault is on. It acts after quantiser and nois
 reads. Several faults on one wire act in the order in which they are written. Chance is seeded.
 """
 
+from abc import abstractmethod
 from math import ceil
 from typing import Annotated, Literal
 
@@ -43,9 +44,9 @@ class _Fault(BaseModel):
         """Return the noise that the fault adds, if it does."""
         return None
 
+    @abstractmethod
     def form(self) -> tuple[float, float, bool]:
         """Return gain, offset and whether the value is frozen."""
-        raise NotImplementedError
 
     def of_wire(self, step: float, noise: int) -> loop.Fault:
         """Return what the loop does; `noise` is the place of the noise on the bus, -1 for none."""

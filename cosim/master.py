@@ -22,7 +22,7 @@ from cosim.execution import Execution, Progress
 from cosim.faults import Fault
 from cosim.files import check_room
 from cosim.function import FunctionComponent, load_function
-from cosim.loop import make_loop
+from cosim.loop import Plan, make_loop
 from cosim.planning import make_plan
 from cosim.recording import Recording
 from cosim.renamed import Alias, Renamed
@@ -96,15 +96,11 @@ def simulate(
         WiringError, FmuError, SignalError, OutputError: before the first step.
         StepError: a component failed; what was recorded before is in the file.
     """
-    rows = -(-ticks // decimation)
-    advice = "record fewer signals, or one row in more ticks (decimation), or stop earlier"
-    check_room(path, 8 * rows * (len(record) + 1), f"the recording has {rows:,} rows; {advice}")
+    output = _Output(path, force, name, dict(origin or {}))
+    output.check_room(-(-ticks // decimation), len(record) + 1)
     with ExitStack() as stack:
-        opened = {key: _opened(stack, key, one) for key, one in components.items()}
-        for key, names in (variables or {}).items():
-            opened[key] = cast(Component, Renamed(opened[key], names)) if names else opened[key]
         wiring = Wiring(
-            components=opened,
+            components=_opened(stack, components, variables or {}),
             signals={key: _signal(key, one, ticks) for key, one in (signals or {}).items()},
             wires=[wire if isinstance(wire, Wire) else Wire(*wire) for wire in wires],
             records={key: one if isinstance(one, Record) else Record(one) for key, one in record.items()},
@@ -112,18 +108,47 @@ def simulate(
             every=dict(every or {}),
             faults=faults,
         )
-        plan = make_plan(wiring, step, decimation)
-        settings = _settings(opened, parameters or {}, wiring.signals, step)
-        for key, component in opened.items():
-            component.start(settings[key])
-        story = _story(wiring, settings, step, decimation) | dict(origin or {})
-        units = {"t": "s"} | {key: wiring.unit(one) for key, one in wiring.records.items()}
-        writer = StreamWriter(path, units, story, force) if path else MemoryWriter(units, story)
+        return output.of(wiring, make_plan(wiring, step, decimation), parameters or {}, ticks, progress, compiled)
+
+
+@dataclass(frozen=True)
+class _Output:
+    """Where a recording goes: to a file, or into memory under a name; `origin` is what else it says."""
+
+    path: Path | None
+    force: bool
+    name: str
+    origin: dict[str, Any]
+
+    def check_room(self, rows: int, columns: int) -> None:
+        advice = "record fewer signals, or one row in more ticks (decimation), or stop earlier"
+        check_room(self.path, 8 * rows * columns, f"the recording has {rows:,} rows; {advice}")
+
+    def of(
+        self,
+        wiring: Wiring,
+        plan: Plan,
+        parameters: Mapping[str, Mapping[str, Any]],
+        ticks: int,
+        progress: Progress | None,
+        compiled: bool,
+    ) -> Run:
+        """Start the components and carry out the plan."""
+        writer = self._writer(wiring, plan, _started(wiring, parameters, plan.step))
         work = Execution(wiring, plan, make_loop(plan, compiled), writer, ticks, progress)
         work.execute()
-    known = {key: unit for key, unit in units.items() if unit}
-    recording = None if path else Recording(name, writer.table(), known, writer.origin)
-    return Run(work.statistics(), path, recording)
+        return Run(work.statistics(), self.path, self._kept(writer))
+
+    def _writer(self, wiring: Wiring, plan: Plan, settings: Mapping[str, Any]) -> MemoryWriter:
+        story = _story(wiring, settings, plan.step, plan.decimation) | self.origin
+        units = {"t": "s"} | {key: wiring.unit(one) for key, one in wiring.records.items()}
+        return StreamWriter(self.path, units, story, self.force) if self.path else MemoryWriter(units, story)
+
+    def _kept(self, writer: MemoryWriter) -> Recording | None:
+        if self.path:
+            return None
+        known = {key: unit for key, unit in writer.units.items() if unit}
+        return Recording(self.name, writer.table(), known, writer.origin)
 
 
 def run(
@@ -178,11 +203,18 @@ def _made(stack: ExitStack, name: str, section: ComponentSection, path: str) -> 
     return FunctionComponent(function, section.inputs, section.outputs, name, origin)
 
 
-def _opened(stack: ExitStack, name: str, component: Component | Path | str) -> Component:
-    """Open an FMU for this run; a component given as such stays open after it."""
-    if isinstance(component, Path | str):
-        return stack.enter_context(open_fmu(component, name))
-    return component
+def _opened(
+    stack: ExitStack,
+    components: Mapping[str, Component | Path | str],
+    variables: Mapping[str, Mapping[str, Alias]],
+) -> dict[str, Component]:
+    """Open the FMUs for this run, with our names for their variables; a component given as such stays open after it."""
+    opened = {}
+    for key, one in components.items():
+        component = stack.enter_context(open_fmu(one, key)) if isinstance(one, Path | str) else one
+        names = variables.get(key)
+        opened[key] = cast(Component, Renamed(component, names)) if names else component
+    return opened
 
 
 def _signal(name: str, signal: Any, ticks: int) -> Signal:
@@ -192,21 +224,20 @@ def _signal(name: str, signal: Any, ticks: int) -> Signal:
     return made
 
 
-def _settings(
-    components: Mapping[str, Component],
-    parameters: Mapping[str, Mapping[str, Any]],
-    signals: Mapping[str, Signal],
-    step: float,
-) -> dict[str, dict[str, Any]]:
+def _started(wiring: Wiring, parameters: Mapping[str, Mapping[str, Any]], step: float) -> dict[str, dict[str, Any]]:
+    """Start the components with their parameters and start values, and return those."""
     for name in parameters:
-        if name not in components:
-            have = tuple(components)
+        if name not in wiring.components:
+            have = tuple(wiring.components)
             message = f'Parameters are given for "{name}", which is no component; components are: {", ".join(have)}.'
             raise WiringError(message, culprit=name, choices=have)
-    return {
-        name: {key: _at_start(value, signals, step) for key, value in parameters.get(name, {}).items()}
-        for name in components
+    settings = {
+        name: {key: _at_start(value, wiring.signals, step) for key, value in parameters.get(name, {}).items()}
+        for name in wiring.components
     }
+    for name, component in wiring.components.items():
+        component.start(settings[name])
+    return settings
 
 
 def _at_start(value: Any, signals: Mapping[str, Signal], step: float) -> Any:

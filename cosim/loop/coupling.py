@@ -5,6 +5,7 @@ Does what coupling.c does, bit for bit; see there for the methods.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from math import sqrt
 from typing import TYPE_CHECKING, Any
@@ -30,7 +31,7 @@ class _Wire:
     slope: float = 0.0
 
 
-class Coupled:
+class Coupled(ABC):
     """What both methods share: hold inputs, step, and read the outputs that belong to the inputs at the end."""
 
     def __init__(self, loop: InterpretedLoop, turn: Any) -> None:
@@ -39,9 +40,9 @@ class Coupled:
         self.wires = [_Wire(inner, parts[inner.part].links[inner.link]) for inner in turn.inner]
         self.members = range(turn.part, turn.part + turn.parts)
 
+    @abstractmethod
     def take(self) -> bool:
         """Take the components over the tick; returns whether one failed."""
-        raise NotImplementedError
 
     def into(self, index: int) -> list[_Wire]:
         """List the inner wires that feed a part."""
