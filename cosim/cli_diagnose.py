@@ -56,9 +56,9 @@ def diagnose(
     with stage("looking for what the model lacks") as progress:
         if fmu:
             box = BlackBox(fmu, {name: Alias(theirs) for name, theirs in pairs_of("--variables", variables).items()})
-            base = as_base(box, fitted, _only(held), believed, progress.tell)
+            base = as_base(box, fitted, held, believed, progress.tell)
             more["more"] = Correction(box, base.card, *motion_of(recordings[0])).deliver
-            fitted, held, believed, command = [*base.train], [base.heldout], base.card, f"{command} --fmu {fmu}"
+            fitted, held, believed, command = [*base.train], [*base.heldout], base.card, f"{command} --fmu {fmu}"
         outcome = find(fitted, held, believed, progress.tell)
         done = deliver(outcome, fitted, held, believed, out, command, progress.tell, **more)
     if as_json:
@@ -67,13 +67,6 @@ def diagnose(
         put(summary(done))
     if check and done.verdict:
         sys.exit(1)
-
-
-def _only(heldout: Sequence[Recording]) -> Recording:
-    """The held-out recording of a diagnosis whose base is an FMU."""
-    if len(heldout) != 1:
-        raise InputError(f"--fmu takes one held-out recording, not {len(heldout)}.", culprit="--heldout")
-    return heldout[0]
 
 
 def _check_split(train: Sequence[Recording], heldout: Sequence[Recording]) -> None:

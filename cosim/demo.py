@@ -49,8 +49,8 @@ def run_demo(out: Path, command: str, say: Callable[[str], None]) -> Demo:
     simulated.write(out / "simulated.parquet", force=True)
     say("checking the stiff integration")
     table = table_text(compare_integration(card))
-    outcome = diagnose(train, heldout, card, say)
-    found = deliver(outcome, train, heldout, card, out / "diagnosis", command, say)
+    outcome = diagnose(train, [heldout], card, say)
+    found = deliver(outcome, train, [heldout], card, out / "diagnosis", command, say)
     better = out / "diagnosis" / found.improved["fmu"] if "fmu" in found.improved else plant
     improved = close_loop(better, controller, card, heldout, "improved")
     improved.write(out / "improved.parquet", force=True)

@@ -78,7 +78,7 @@ def team(tmp_path_factory: pytest.TempPathFactory) -> Team:
 
 @pytest.fixture(scope="module")
 def base(team: Team) -> Base:
-    return as_base(team.box, team.recordings[:1], team.recordings[1], team.rough)
+    return as_base(team.box, team.recordings[:1], team.recordings[::-1], team.rough)
 
 
 def test_the_card_that_is_most_like_the_fmu_has_its_numbers(base: Base) -> None:
@@ -89,11 +89,16 @@ def test_the_card_that_is_most_like_the_fmu_has_its_numbers(base: Base) -> None:
 
 
 def test_what_is_missing_beside_the_card_is_what_is_missing_beside_the_fmu(base: Base) -> None:
-    prepared = prepare([base.heldout], 30.0)
+    prepared = prepare(base.heldout[:1], 30.0)
     (missing,), piece = residuals(prepared, base.card.plant()), prepared.pieces[0]
     ripple = 0.6 * np.cos(20 * piece.q + 0.3)
     inside = piece.inside & (np.abs(piece.v) > 0.02)
     assert np.std((missing - piece.lowpass(ripple))[inside]) < 0.1 * np.std(ripple[inside])
+
+
+def test_several_recordings_are_held_out_and_each_is_treated_like_one_that_is_fitted(base: Base) -> None:
+    assert [one.name for one in base.heldout] == ["run2", "run1"]
+    assert np.array_equal(base.heldout[1]["tau"], base.train[0]["tau"])
 
 
 @pytest.mark.parametrize(
@@ -108,7 +113,7 @@ def test_an_fmu_that_is_asked_wrongly_is_refused(
 ) -> None:
     box = BlackBox(team.box.fmu, {ours: Alias(name) for ours, name in names.items()})
     with pytest.raises(error, match=sentence):
-        as_base(box, team.recordings[:1], team.recordings[1], team.rough)
+        as_base(box, team.recordings[:1], team.recordings[1:], team.rough)
 
 
 def test_a_plant_behind_a_correction_does_what_the_better_mount_does(tmp_path: Path) -> None:

@@ -212,13 +212,13 @@ class TestAnswers:
 
     def test_a_null_of_a_foreign_friction_law_is_nothing_missing(self, tmp_path: Path) -> None:
         train, held, card = loaded(make_case(203, []), tmp_path)
-        assert diagnose(train, held, card).diagnosis.verdict == ()
+        assert diagnose(train, [held], card).diagnosis.verdict == ()
 
     @pytest.mark.parametrize(("effect", "seed"), [("torque_offset", 200), ("delay", 103), ("gravity_unbalance", 103)])
     def test_a_concealed_effect_is_named_and_proven(self, effect: str, seed: int, tmp_path: Path) -> None:
         case = make_case(seed, [effect])
         train, held, card = loaded(case, tmp_path)
-        found = diagnose(train, held, card).diagnosis
+        found = diagnose(train, [held], card).diagnosis
         assert found.verdict == (effect,)
         assert found.heldout.after_rms < 0.5 * found.heldout.before_rms
         assert found.heldout.confidence_interval[0] > 0
@@ -231,7 +231,7 @@ DATA = Path(__file__).resolve().parents[2] / "shared" / "recordings" / "emps"
 def test_a_measured_axis_has_direction_dependent_friction_and_a_delay() -> None:
     card = read_card("emps")
     train, held = (Recording.read(DATA / f"{n}.parquet", card.columns) for n in ("estimation", "validation_pulses"))
-    found = diagnose([train], held, card).diagnosis
+    found = diagnose([train], [held], card).diagnosis
     delay = next(finding for finding in found.findings if finding.effect == "delay")
     assert {"friction_asymmetry", "delay"} <= set(found.verdict)
     assert 0.4 <= delay.parameters["delay_ms"] <= 0.9
@@ -332,7 +332,7 @@ def test_a_card_with_physics_that_the_inverse_model_lacks_is_refused() -> None:
     )
     t, q, _, a = wander()
     with pytest.raises(InputError) as caught:
-        diagnose([recorded(2 * a, t, q)], recorded(2 * a, t, q, "other"), card)
+        diagnose([recorded(2 * a, t, q)], [recorded(2 * a, t, q, "other")], card)
     assert "The card holds backlash, which a diagnosis cannot take into account yet" in str(caught.value)
 
 

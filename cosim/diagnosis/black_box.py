@@ -23,6 +23,7 @@ from scipy.interpolate import BPoly, make_interp_spline
 from cosim.diagnosis.fit import fit
 from cosim.diagnosis.inverse import Inverse
 from cosim.diagnosis.prepare import Array, Piece, choose_cutoff, derivative, lowpass, prepare
+from cosim.diagnosis.protocol import rms
 from cosim.errors import InputError, StepError
 from cosim.files import sha256
 from cosim.master import simulate
@@ -64,7 +65,7 @@ class Base:
     """What stands for an FMU in a diagnosis: recordings without what it needs beyond the card that is most like it."""
 
     train: tuple[Recording, ...]
-    heldout: Recording
+    heldout: tuple[Recording, ...]
     card: Card
     unlike: float
     """RMS of the torque by which the FMU and the card differ [N m or N]."""
@@ -73,7 +74,7 @@ class Base:
 def as_base(
     box: BlackBox,
     train: Sequence[Recording],
-    heldout: Recording,
+    heldout: Sequence[Recording],
     card: Card,
     say: Callable[[str], None] = lambda _: None,
 ) -> Base:
@@ -82,7 +83,7 @@ def as_base(
     Args:
         box: the FMU; nothing but its input and its output is used.
         train: recordings that may be fitted.
-        heldout: the recording that proves the result.
+        heldout: recordings that prove the result.
         card: what is believed of the FMU: inertia and friction within a factor of two or so.
         say: told, in a few words, what is being done.
 
@@ -91,20 +92,22 @@ def as_base(
         WiringError, FmuError: the FMU has no such variables, or cannot be run.
     """
     cutoff = choose_cutoff(train, card.mount.inertia)
-    prepared = [prepare([one], cutoff) for one in (*train, heldout)]
+    recordings = (*train, *heldout)
+    prepared = [prepare([one], cutoff) for one in recordings]
     with TemporaryDirectory() as folder:
-        follower = _Follower(box, card, Path(folder)).fitting(prepared[0].pieces[0])
+        follower = _Follower(box, card, Path(folder), _start(box)).fitting(prepared[0].pieces[0])
         followed = []
         for one in prepared:
             say(f"letting {box.fmu.name} follow {one.names[0]}")
             followed.append([follower.followed(piece) for piece in one.pieces])
-    like = _likeness(followed, card)
+    fitted = len(train)
+    like = _likeness([piece for pieces in followed[:fitted] for piece in pieces], card)
     rests = [_rests(pieces, like.plant()) for pieces in followed]
-    unlike = float(np.sqrt(np.mean(np.concatenate([rest for one in rests[:-1] for rest in one]) ** 2)))
+    unlike = rms(np.concatenate([rest for one in rests[:fitted] for rest in one]))
     note = f"The base is {box.told}; the card that is most like it needs another torque by {unlike:.3g} RMS."
-    beside = [_without(one, pieces, rest) for one, pieces, rest in zip((*train, heldout), followed, rests, strict=True)]
+    beside = [_without(one, pieces, rest) for one, pieces, rest in zip(recordings, followed, rests, strict=True)]
     beside[0] = replace(beside[0], notes=(*beside[0].notes, note))
-    return Base(tuple(beside[:-1]), beside[-1], like, unlike)
+    return Base(tuple(beside[:fitted]), tuple(beside[fitted:]), like, unlike)
 
 
 @dataclass(frozen=True)
@@ -114,6 +117,8 @@ class _Follower:
     box: BlackBox
     card: Card
     folder: Path
+    start: float
+    """Position at which the FMU starts."""
     bandwidth: float = BANDWIDTHS[0]
 
     def fitting(self, piece: Piece) -> "_Follower":
@@ -144,12 +149,12 @@ class _Follower:
         per_row = ceil(piece.dt / LONGEST_TICK)
         step, before = piece.dt / per_row, ceil(APPROACH / piece.dt)
         ticks = (before + len(piece.t) - 1) * per_row + 1
-        signals = _path(piece, step, before * per_row, ticks, self._start(step))
+        signals = _path(piece, step, before * per_row, ticks, self.start)
         run = self._simulate(step, ticks, signals, per_row)
         rows = slice(before, before + len(piece.t))
         return piece.q - run["q"][rows], run["tau"][rows]
 
-    def _simulate(self, step: float, ticks: int, signals: Mapping[str, Array], decimation: int = 1) -> Recording:
+    def _simulate(self, step: float, ticks: int, signals: Mapping[str, Array], decimation: int) -> Recording:
         wires = [("controller.tau", "plant.tau"), ("plant.q", "controller.q")]
         run = simulate(
             {"plant": self.box.fmu, "controller": self._loop(step)},
@@ -161,12 +166,7 @@ class _Follower:
             variables={"plant": self.box.variables},
             decimation=decimation,
         )
-        assert run.recording is not None
         return run.recording
-
-    def _start(self, step: float) -> float:
-        """Position at which the FMU starts."""
-        return float(self._simulate(step, 1, dict.fromkeys(SET_POINT, np.zeros(1)))["q"][0])
 
     def _loop(self, step: float) -> Path:
         path = self.folder / f"loop_{self.bandwidth:.0f}_{1e12 * step:.0f}.fmu"
@@ -179,6 +179,20 @@ class _Follower:
         return path
 
 
+def _start(box: BlackBox) -> float:
+    """Position at which an FMU starts."""
+    run = simulate(
+        {"plant": box.fmu},
+        [("none", "plant.tau")],
+        record={"q": Record("plant.q")},
+        step=LONGEST_TICK,
+        ticks=1,
+        signals={"none": np.zeros(1)},
+        variables={"plant": box.variables},
+    )
+    return float(run.recording["q"][0])
+
+
 def _path(piece: Piece, step: float, before: int, ticks: int, start: float) -> dict[str, Array]:
     """Set point at every tick: from where the FMU is smoothly onto the motion of the piece, and along it."""
     spline = make_interp_spline(piece.t - piece.t[0], piece.q, k=5)
@@ -188,9 +202,8 @@ def _path(piece: Piece, step: float, before: int, ticks: int, start: float) -> d
     return {name: np.where(t < 0, approach(t, k), spline(np.maximum(t, 0), k)) for k, name in enumerate(SET_POINT)}
 
 
-def _likeness(followed: Sequence[Sequence[Piece]], card: Card) -> Card:
-    """The card whose base needs most nearly the torque that the FMU needs, on the training recordings."""
-    pieces = [piece for one in followed[:-1] for piece in one]
+def _likeness(pieces: Sequence[Piece], card: Card) -> Card:
+    """The card whose base needs most nearly the torque that the FMU needs for the motion of these pieces."""
     weight = np.ones(sum(len(piece.kept) for piece in pieces))
     base = fit(card.plant(), pieces, weight).mount
     section = card.mount.model_copy(update={"inertia": float(base.axis.inertia)})

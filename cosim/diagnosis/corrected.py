@@ -15,6 +15,7 @@ from cosim.description import describe
 from cosim.diagnosis.black_box import BANDWIDTHS, BlackBox
 from cosim.errors import UnitError
 from cosim.exchange import open_fmu
+from cosim.recording import Recording
 from cosim.units import unit
 from pyfmi_models.card import Card
 from pyfmi_models.controller_section import ControllerSection
@@ -141,9 +142,9 @@ def _same(stated: str, ours: str) -> bool:
         return False
 
 
-def motion_of(train: Any) -> tuple[float, float]:
+def motion_of(recording: Recording) -> tuple[float, float]:
     """Amplitude [rad or m] and frequency [Hz] of a sine as large and about as fast as a recording."""
-    q = train["q"]
+    q = recording["q"]
     size = max(float(q.max() - q.min()) / 2, 1e-9)
-    speed = float(abs(q[1:] - q[:-1]).mean() / train.sample_time)
+    speed = float(abs(q[1:] - q[:-1]).mean() / recording.sample_time)
     return size, max(speed / (4 * size), 1 / (2 * pi * STOP))

@@ -34,7 +34,7 @@ def check_out(out: Path, force: bool) -> None:
 def deliver(
     outcome: Outcome,
     train: Sequence[Recording],
-    heldout: Recording | Sequence[Recording],
+    heldout: Sequence[Recording],
     card: Card,
     out: Path,
     command: str,
@@ -46,8 +46,7 @@ def deliver(
     Where effects were found, `more` writes what else shall lie beside the better card, and tells it.
     """
     directory(out)
-    held = [heldout] if isinstance(heldout, Recording) else list(heldout)
-    provenance = _provenance(train, held, card, command)
+    provenance = _provenance(train, heldout, card, command)
     found = replace(outcome.diagnosis, provenance=provenance)
     better = replace(outcome.card, origin=_origin(found, provenance))
     with replacing(out / "card.toml", True) as partial:
@@ -59,7 +58,7 @@ def deliver(
     if outcome.experiment and better.controller:
         with replacing(out / SCENARIO, True) as partial:
             partial.write_text(scenario(outcome.experiment, better), "utf-8")
-    _missing_torque(found, [*train, *held], out / "missing_torque.parquet")
+    _missing_torque(found, [*train, *heldout], out / "missing_torque.parquet")
     with replacing(out / "diagnosis.json", True) as partial:
         partial.write_text(json.dumps(as_json(found), indent=2, allow_nan=False) + "\n", "utf-8")
     say("writing the report")

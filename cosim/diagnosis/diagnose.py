@@ -8,13 +8,14 @@ import numpy as np
 
 from cosim.diagnosis.adequacy import Rest, rest_of
 from cosim.diagnosis.challenge import Place, Verdict, challenge, merged
+from cosim.diagnosis.claim import claimed
 from cosim.diagnosis.evidence import Blocks
 from cosim.diagnosis.experiment import Experiment, best, told
 from cosim.diagnosis.findings import accepted, not_found, rival_finding, standard_errors
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.locate import regions
 from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare, quality
-from cosim.diagnosis.protocol import CLEAR_MOTION, Structures, heldout_rms, judge, traces, veto_band, veto_rms
+from cosim.diagnosis.protocol import Structures, heldout_rms, judge, traces, veto_band, veto_rms
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
 from cosim.diagnosis.sanity import check_effects, check_recordings
 from cosim.diagnosis.select import select
@@ -22,7 +23,6 @@ from cosim.diagnosis.trial import Problem
 from cosim.recording import Recording
 from pyfmi_models.card import Card
 from pyfmi_models.effects import Effect, GravityUnbalance
-from pyfmi_models.friction import MemorylessLaw
 from pyfmi_models.mount import Mount
 
 Say = Callable[[str], None]
@@ -40,14 +40,14 @@ class Outcome:
 
 
 def diagnose(
-    train: Sequence[Recording], heldout: Recording | Sequence[Recording], card: Card, say: Say = lambda _: None
+    train: Sequence[Recording], heldout: Sequence[Recording], card: Card, say: Say = lambda _: None
 ) -> Outcome:
     """Find what physics a card lacks.
 
     Args:
         train: recordings that may be fitted.
-        heldout: recording, or several, that nothing is fitted to. It proves the result, and it has a veto: an effect
-            that does not lower its error is taken out as not proven. So its error after it is a little optimistic;
+        heldout: recordings that nothing is fitted to. They prove the result, and they have a veto: an effect that
+            does not lower their error is taken out as not proven. So their error after it is a little optimistic;
             `HeldOut.unvetoed_rms` is the error of what training alone proposed.
         card: the model as delivered.
         say: told, in a few words, what is being done.
@@ -57,9 +57,8 @@ def diagnose(
         RecordingError: the recordings cannot belong to this card (units), or are too short.
     """
     started, mount = time.perf_counter(), card.plant()
-    held = [heldout] if isinstance(heldout, Recording) else list(heldout)
     check_effects(mount)
-    check_recordings(train, held, mount)
+    check_recordings(train, heldout, mount)
     cutoff = choose_cutoff(train, card.mount.inertia)
     prepared = prepare(train, cutoff)
     weight = _weight(mount, prepared)
@@ -68,16 +67,16 @@ def diagnose(
     verdict = challenge(problem, select(problem, say), say)
     say("proving on the recording that was not fitted")
     proposed = verdict.chosen.mount
-    verdict, unproven = _proven(problem, verdict, held)
+    verdict, unproven = _proven(problem, verdict, heldout)
     rest = rest_of(verdict.chosen, prepared, verdict.bench)
     models = Structures(mount, verdict.base.mount, verdict.chosen.mount)
-    signals = traces(train, held, models)
+    signals = traces(train, heldout, models)
     found = _findings(verdict, unproven, prepared, weight, signals)
     experiment = _experiment(verdict, prepared)
     diagnosis = Diagnosis(
         verdict=_verdict(found, rest),
         findings=tuple(found),
-        heldout=replace(judge(held, models, cutoff), unvetoed_rms=heldout_rms(held, proposed)),
+        heldout=replace(judge(heldout, models, cutoff), unvetoed_rms=heldout_rms(heldout, proposed)),
         traces=signals,
         regions=regions(signals, False, mount.motion == "linear"),
         regions_after=regions(signals, True, mount.motion == "linear"),
@@ -86,7 +85,7 @@ def diagnose(
         ambiguous_with=tuple((p.effect.id, *p.ambiguous_with) for p in verdict.places if p.ambiguous_with),
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
         depends_on=rest.depends_on,
-        data_quality=tuple(note for recording in (*train, *held) for note in quality(recording, prepared.cutoff)),
+        data_quality=tuple(note for recording in (*train, *heldout) for note in quality(recording, prepared.cutoff)),
         friction_law={"base": mount.friction.key, "proposed": mount.friction.key, "gain": 0.0},
         base_parameters=_base_parameters(models),
         seconds=time.perf_counter() - started,
@@ -113,11 +112,9 @@ def _experiment(verdict: Verdict, prepared: Prepared) -> Experiment | None:
 
 
 def _weight(mount: Mount, prepared: Prepared) -> Array:
-    """All rows count, but for laws without memory only clear motion: at rest they say nothing."""
-    v = np.abs(prepared.stacked("v"))
-    if not isinstance(mount.friction, MemorylessLaw) or mount.friction.key == "none":
-        return np.ones(len(v))
-    return np.asarray(v > CLEAR_MOTION * v.max(), float)
+    """The rows that count: what the law claims, and all where there is no friction that could hold at rest."""
+    v = prepared.stacked("v")
+    return np.ones(len(v)) if mount.friction.key == "none" else claimed(mount.friction, v).astype(float)
 
 
 def _proven(problem: Problem, verdict: Verdict, heldout: Sequence[Recording]) -> tuple[Verdict, tuple[Place, ...]]:

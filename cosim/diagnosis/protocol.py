@@ -10,17 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.diagnosis.bank import bank
+from cosim.diagnosis.claim import claimed, least_speed
 from cosim.diagnosis.inverse import Inverse
 from cosim.diagnosis.prepare import Array, Piece, Prepared, prepare
 from cosim.diagnosis.result import HeldOut, Trace
 from cosim.diagnosis.structure import projected
 from cosim.recording import Recording
-from pyfmi_models.friction import MemorylessLaw
 from pyfmi_models.mount import Mount
 
 CUTOFF = 30.0
-CLEAR_MOTION = 0.02
-"""Clear motion: faster than this share of the highest speed."""
 NOISY = 3.0
 """Growth of the base's error beyond the band of the analysis from which that is noise of the encoder."""
 BLOCK_SECONDS = 1.0
@@ -87,17 +85,14 @@ def veto_band(recordings: Sequence[Recording], base: Mount, cutoff: float) -> fl
 def veto_rms(recordings: Sequence[Recording], mount: Mount, cutoff: float) -> float:
     """RMS of the torque residual over what the model claims: of rest a law without memory says nothing."""
     prepared = prepare(recordings, cutoff)
-    rows = np.concatenate([piece.inside for piece in prepared.pieces])
-    if isinstance(mount.friction, MemorylessLaw):
-        v = np.abs(np.concatenate([piece.v for piece in prepared.pieces]))
-        rows &= v > CLEAR_MOTION * v[rows].max()
-    return rms(np.concatenate(residuals(prepared, mount))[rows])
+    v, inside = (np.concatenate([getattr(piece, name) for piece in prepared.pieces]) for name in ("v", "inside"))
+    return rms(np.concatenate(residuals(prepared, mount))[inside][claimed(mount.friction, v[inside])])
 
 
 def _sliding(recordings: Sequence[Recording], models: Structures, cutoff: float) -> dict[str, float]:
     prepared = prepare(recordings, cutoff)
     v, inside = (np.concatenate([getattr(piece, name) for piece in prepared.pieces]) for name in ("v", "inside"))
-    least = CLEAR_MOTION * float(np.abs(v[inside]).max())
+    least = least_speed(v[inside])
     moving = inside & (np.abs(v) > least)
     return {
         "before_rms": rms(np.concatenate(residuals(prepared, models.before))[moving]),

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from cosim.diagnosis.claim import claimed
 from cosim.diagnosis.fit import FIXED, Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare
-from cosim.diagnosis.protocol import CLEAR_MOTION, heldout_rms
+from cosim.diagnosis.protocol import heldout_rms
 from cosim.diagnosis.sanity import is_held
 from cosim.proof.tool import given
 from pyfmi_models.effects import CATALOGUE, Effect
-from pyfmi_models.friction import MemorylessLaw
 from pyfmi_models.mount import Mount
 
 SINES = ("cogging", "position_friction")
@@ -75,7 +75,6 @@ def _names(form: type[Effect]) -> set[str]:
 
 def _weight(mount: Mount, prepared: Prepared) -> Array:
     """Rows at rest tell nothing where friction has no memory, of the law's own or by presliding."""
-    v = np.abs(prepared.stacked("v"))
+    v = prepared.stacked("v")
     bends = any(effect.id == "presliding" for effect in mount.effects)
-    remembers = bends or not isinstance(mount.friction, MemorylessLaw)
-    return np.ones(len(v)) if remembers else np.asarray(v > CLEAR_MOTION * v.max(), float)
+    return np.ones(len(v)) if bends else claimed(mount.friction, v).astype(float)

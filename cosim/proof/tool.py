@@ -31,7 +31,7 @@ def given(folder: str) -> tuple[Card, list[Recording], Recording]:
 def answer(folder: str) -> dict[str, Any]:
     """Diagnose, and let the baselines have a look at the same residual."""
     card, train, held = given(folder)
-    found = diagnose(train, held, card).diagnosis
+    found = diagnose(train, [held], card).diagnosis
     return told(found) | {"baselines": compared(found.traces)}
 
 

@@ -130,7 +130,7 @@ def emps(given: argparse.Namespace) -> Iterator[dict[str, Any]]:
     train, held = (
         Recording.read(given.data / f"{name}.parquet", card.columns) for name in ("estimation", "validation_pulses")
     )
-    outcome = diagnose([train], held, card)
+    outcome = diagnose([train], [held], card)
     found, clear = outcome.diagnosis, moving(2e-3, 100.0)
     delay = next((f for f in found.findings if f.effect == "delay" and f.parameters), None)
     yield {
@@ -170,7 +170,7 @@ def null_case(seed: int, noise: float, seconds: float = 30.0) -> Any:
         plant = export_fmu(truth.plant().model(), Path(folder) / "plant.fmu")
         controller = export_fmu(card.controller_model(), Path(folder) / "controller.fmu")
         made = [simulated(plant, controller, card, rng, noise, seconds, kind) for kind in range(3)]
-    return diagnose(made[:2], made[2], card).diagnosis
+    return diagnose(made[:2], made[2:], card).diagnosis
 
 
 def perturbed(card: Card, rng: np.random.Generator, by: float = 0.15) -> Card:
@@ -204,7 +204,7 @@ def concealed(given: argparse.Namespace) -> Iterator[dict[str, Any]]:
                 write_case(case, Path(folder))
                 names = ("train_1", "train_2", "heldout")
                 *train, held = (Recording.read(Path(folder) / f"{name}.parquet") for name in names)
-            found = diagnose(train, held, parse_card(to_toml(case.card), "card.toml")).diagnosis
+            found = diagnose(train, [held], parse_card(to_toml(case.card), "card.toml")).diagnosis
             sets = {group[0]: " or ".join(group) for group in found.ambiguous_with}
             in_the_set = any(effect in group for group in found.ambiguous_with) and len(found.verdict) == 1
             alone = list(found.verdict) == [effect] and not sets
