@@ -13,8 +13,8 @@ from cosim.terminal import put, put_json, say
 
 app = typer.Typer(no_args_is_help=True, help="The same controller on a machine.")
 app.command()(firmware)
-app.command()(alpaca)
-app.command()(indi)
+app.command("alpaca")(alpaca)
+app.command("indi")(indi)
 app.command("virtual-drive")(virtual_drive)
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A scenario (.toml) or the name of a shipped one: sidereal.")]

@@ -58,6 +58,7 @@ def _telling(title: str) -> Iterator[Callable[[int, int, str], None]]:
 
 def _line(score: dict[str, object]) -> str:
     """One score on one line."""
+    from cosim.proof.page import estimate
+
     met = {True: "met", False: "MISSED", None: ""}[score["met"]]  # type: ignore[index]
-    value = "-" if score["value"] is None else f"{score['value']:.3g} [{score['low']:.2g}, {score['high']:.2g}]"
-    return f"{score['title']:<64} {value:<22} {score['asked']:<8} {met}".rstrip()
+    return f"{score['title']:<64} {estimate(score):<22} {score['asked']:<8} {met}".rstrip()

@@ -1,7 +1,7 @@
 """`cosim hardware alpaca` and `indi`: the simulated mount as a telescope for programs of observatories."""
 
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from math import radians
 from pathlib import Path
 from time import sleep
@@ -15,52 +15,54 @@ if TYPE_CHECKING:
     from cosim.supervisor.mount import SimulatedMount
     from cosim.supervisor.telescope import Telescope
 
-ScenarioArgument = Annotated[str, typer.Argument(help='A scenario (.toml) with a signal of kind "star".')]
-AddressOption = Annotated[str, typer.Option("--address", help="0.0.0.0: every machine of the network may ask.")]
-LongitudeOption = Annotated[float, typer.Option("--longitude", help="Of the site, degrees east.")]
-SpeedOption = Annotated[float, typer.Option("--speed", help="Simulated seconds a second.")]
-OutOption = Annotated[Path | None, typer.Option("--out", "-o", help="Directory for the recording.")]
-ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite what is there.")]
+Served = AbstractContextManager[tuple[str, str]]
+"""A server that runs: where it is, and what else there is to say."""
 
 
-def alpaca(
-    scenario: ScenarioArgument = "two_axis",
-    port: Annotated[int, typer.Option("--port", help="TCP port; 0: any free one.")] = 11111,
-    address: AddressOption = "127.0.0.1",
-    longitude: LongitudeOption = 0.0,
-    speed: SpeedOption = 1.0,
-    out: OutOption = None,
-    force: ForceOption = False,
-) -> None:
-    """Serve a simulated mount as an ASCOM Alpaca telescope until Ctrl-C; it starts parked."""
+def _command(kind: str, default: int, served: "Callable[[Telescope, str, int], Served]") -> Callable[..., None]:
+    """Make the command that serves the simulated mount as a telescope of a kind, at a TCP port by default."""
+
+    def command(
+        scenario: Annotated[str, typer.Argument(help='A scenario (.toml) with a signal of kind "star".')] = "two_axis",
+        port: Annotated[int, typer.Option("--port", help="TCP port; 0: any free one.")] = default,
+        address: Annotated[
+            str, typer.Option("--address", help="0.0.0.0: every machine of the network may ask.")
+        ] = "127.0.0.1",
+        longitude: Annotated[float, typer.Option("--longitude", help="Of the site, degrees east.")] = 0.0,
+        speed: Annotated[float, typer.Option("--speed", help="Simulated seconds a second.")] = 1.0,
+        out: Annotated[Path | None, typer.Option("--out", "-o", help="Directory for the recording.")] = None,
+        force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+    ) -> None:
+        with ExitStack() as stack:
+            mount, telescope = stack.enter_context(_telescope(scenario, longitude, speed, out, force))
+            place, told = stack.enter_context(served(telescope, address, port))
+            put(place)
+            say(f"Ctrl-C ends it{told}")
+            _wait(mount)
+
+    command.__doc__ = f"Serve a simulated mount as an {kind} telescope until Ctrl-C; it starts parked."
+    return command
+
+
+@contextmanager
+def _alpaca(telescope: "Telescope", address: str, port: int) -> Iterator[tuple[str, str]]:
     from cosim.supervisor.alpaca import Server
 
-    with ExitStack() as stack:
-        mount, telescope = stack.enter_context(_telescope(scenario, longitude, speed, out, force))
-        server = stack.enter_context(Server(telescope, address, port))
-        put(f"http://{address}:{server.port}/api/v1/telescope/0")
-        say("Ctrl-C ends it" if server.discovery else "Ctrl-C ends it; discovery is another program's here")
-        _wait(mount)
+    with Server(telescope, address, port) as server:
+        found = "" if server.discovery else "; discovery is another program's here"
+        yield f"http://{address}:{server.port}/api/v1/telescope/0", found
 
 
-def indi(
-    scenario: ScenarioArgument = "two_axis",
-    port: Annotated[int, typer.Option("--port", help="TCP port; 0: any free one.")] = 7624,
-    address: AddressOption = "127.0.0.1",
-    longitude: LongitudeOption = 0.0,
-    speed: SpeedOption = 1.0,
-    out: OutOption = None,
-    force: ForceOption = False,
-) -> None:
-    """Serve a simulated mount as an INDI telescope until Ctrl-C; it starts parked."""
+@contextmanager
+def _indi(telescope: "Telescope", address: str, port: int) -> Iterator[tuple[str, str]]:
     from cosim.supervisor.indi import IndiServer
 
-    with ExitStack() as stack:
-        mount, telescope = stack.enter_context(_telescope(scenario, longitude, speed, out, force))
-        server = stack.enter_context(IndiServer(telescope, address, port))
-        put(f"{telescope.name}@{address}:{server.port}")
-        say("Ctrl-C ends it")
-        _wait(mount)
+    with IndiServer(telescope, address, port) as server:
+        yield f"{telescope.name}@{address}:{server.port}", ""
+
+
+alpaca = _command("ASCOM Alpaca", 11111, _alpaca)
+indi = _command("INDI", 7624, _indi)
 
 
 @contextmanager

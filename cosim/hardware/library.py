@@ -13,6 +13,7 @@ import numpy as np
 from cosim.component import Component, Functions
 from cosim.errors import HardwareError
 from cosim.hardware.structures import LAYOUT, CAdapter, CAxis, CDrive, CRecord, CSample, CSession, CUdp, CVirtual
+from cosim.loop.shared import declare, opened, part
 from cosim.loop.structures import CPart
 
 Kind = TypeVar("Kind", bound=Structure)
@@ -29,23 +30,27 @@ def library() -> ctypes.CDLL:
     if not path.exists():
         where = "reinstall the package to build it" if sys.platform == "linux" else "it needs Linux"
         raise HardwareError(f"The compiled loop of the hardware is missing here: {where}.", culprit=str(path))
-    found = ctypes.CDLL(str(path))
-    if found.hardware_layout() != LAYOUT:
-        raise HardwareError(f"{path} was built from another version; reinstall the package.", culprit=str(path))
-    found.hardware_ready.argtypes = [POINTER(CAxis)]
-    found.hardware_run.argtypes = [POINTER(CSession), POINTER(CSample), c_int64]
-    found.hardware_spawn.argtypes = [POINTER(CSession), POINTER(CSample)]
-    found.hardware_bare.argtypes = [POINTER(CSession), c_int64]
-    found.hardware_release.argtypes = [POINTER(CSession)]
-    found.hardware_replay.argtypes = [POINTER(CAxis), POINTER(CRecord), c_int64]
-    found.drive_open.argtypes = [POINTER(CDrive), POINTER(CAdapter)]
-    found.udp_open.argtypes = [POINTER(CUdp), POINTER(CAdapter)]
-    found.virtual_run.argtypes = [POINTER(CVirtual), POINTER(CAdapter)]
-    for function in (found.hardware_ready, found.hardware_run, found.hardware_spawn, found.drive_open):
-        function.restype = c_int64
-    for function in (found.hardware_bare, found.hardware_release, found.hardware_replay, found.udp_open):
-        function.restype = None
-    found.virtual_run.restype = None
+    try:
+        found = opened(str(path), "hardware_layout", LAYOUT)
+    except OSError as error:
+        raise HardwareError(f"{error}; reinstall the package.", culprit=str(path)) from error
+    declare(
+        found,
+        c_int64,
+        hardware_ready=[POINTER(CAxis)],
+        hardware_run=[POINTER(CSession), POINTER(CSample), c_int64],
+        hardware_spawn=[POINTER(CSession), POINTER(CSample)],
+        drive_open=[POINTER(CDrive), POINTER(CAdapter)],
+    )
+    declare(
+        found,
+        None,
+        hardware_bare=[POINTER(CSession), c_int64],
+        hardware_release=[POINTER(CSession)],
+        hardware_replay=[POINTER(CAxis), POINTER(CRecord), c_int64],
+        udp_open=[POINTER(CUdp), POINTER(CAdapter)],
+        virtual_run=[POINTER(CVirtual), POINTER(CAdapter)],
+    )
     return found
 
 
@@ -67,23 +72,9 @@ def part_of(component: Component, inputs: list[str], outputs: list[str]) -> tupl
     if not isinstance(functions, Functions):
         message = f"{component.name} can only be stepped by Python; a machine needs an FMU."
         raise HardwareError(message, culprit=component.name)
-    references = [np.array([component.ports[n].reference for n in names], np.uint32) for names in (inputs, outputs)]
-    values = [np.zeros(len(names)) for names in (inputs, outputs)]
-    part = CPart(
-        version=functions.version,
-        instance=functions.instance,
-        set=functions.set,
-        get=functions.get,
-        step=functions.step,
-        save=functions.save,
-        restore=functions.restore,
-        inputs=len(inputs),
-        outputs=len(outputs),
-        input_references=references[0].ctypes.data,
-        output_references=references[1].ctypes.data,
-        input=values[0].ctypes.data,
-        output=values[1].ctypes.data,
-        every=1,
-        state=functions.state,
+    read, written = (
+        np.array([component.ports[name].reference for name in names], np.uint32) for names in (inputs, outputs)
     )
-    return part, (*references, *values)
+    values = [np.zeros(len(names)) for names in (inputs, outputs)]
+    made = part(functions, (read, written), *(one.ctypes.data for one in values), every=1)
+    return made, (read, written, *values)

@@ -8,6 +8,8 @@ import numpy as np
 
 from cosim.component import Functions
 from cosim.loop.plan import Balance, Effort, Failure, Gather, Iterate, Link, Part, Plan, Step, Turn
+from cosim.loop.shared import declare, opened
+from cosim.loop.shared import part as as_part
 from cosim.loop.structures import LAYOUT, CBond, CColumn, CFault, CInner, CLoop, CPart, CTurn, CWire
 
 _KINDS = {Gather: 0, Step: 1, Iterate: 2, Balance: 3}
@@ -19,14 +21,14 @@ def load(path: str) -> ctypes.CDLL:
     Raises:
         OSError: it cannot be loaded, or was built from another version of its C.
     """
-    library = ctypes.CDLL(path)
-    if not hasattr(library, "loop_layout") or library.loop_layout() != LAYOUT:
-        raise OSError(f"{path} was built from another version")
-    library.loop_start.argtypes = [POINTER(CLoop)]
-    library.loop_run.argtypes = [POINTER(CLoop), c_int64, c_void_p, c_void_p, c_int64]
-    library.loop_flush.argtypes = [POINTER(CLoop), c_void_p, c_int64]
-    for function in (library.loop_start, library.loop_run, library.loop_flush):
-        function.restype = c_int64
+    library = opened(path, "loop_layout", LAYOUT)
+    declare(
+        library,
+        c_int64,
+        loop_start=[POINTER(CLoop)],
+        loop_run=[POINTER(CLoop), c_int64, c_void_p, c_void_p, c_int64],
+        loop_flush=[POINTER(CLoop), c_void_p, c_int64],
+    )
     return library
 
 
@@ -101,25 +103,10 @@ class CompiledLoop:
 def _part(part: Part, wire: int, bus: np.ndarray) -> CPart:
     functions: Any = part.component.functions
     assert isinstance(functions, Functions)  # the factory chose this loop because all offer them
-    return CPart(
-        version=functions.version,
-        instance=functions.instance,
-        set=functions.set,
-        get=functions.get,
-        step=functions.step,
-        save=functions.save,
-        restore=functions.restore,
-        inputs=len(part.input_references),
-        outputs=len(part.output_references),
-        input_references=part.input_references.ctypes.data,
-        output_references=part.output_references.ctypes.data,
-        input=_address(bus, part.input),
-        output=_address(bus, part.output),
-        wire=wire,
-        wires=len(part.links),
-        every=part.every,
-        direct=part.direct,
-        state=functions.state,
+    references = (part.input_references, part.output_references)
+    places = (_address(bus, part.input), _address(bus, part.output))
+    return as_part(
+        functions, references, *places, wire=wire, wires=len(part.links), every=part.every, direct=part.direct
     )
 
 

@@ -15,7 +15,7 @@ from cosim.paper.experiment import ARCSEC
 from cosim.paper.frontier import GAIN, PHASE, Design, frontier
 from cosim.paper.margins import Complexes, Floats, Linear
 from cosim.paper.price import loops
-from cosim.pictures.sheet import figure, plain_logs
+from cosim.pictures.sheet import draw_all, figure, plain_logs
 from cosim.pictures.style import AFTER, BEFORE, GREY, LINE, MEASURED, SHADE
 
 if TYPE_CHECKING:
@@ -31,15 +31,12 @@ APART = 0.055
 
 def comparison_figures(found: Comparison, folder: Path, force: bool = False) -> dict[Path, str]:
     """Draw all; return what each shows."""
-    gain, nyquist, map_ = (folder / f"{name}.svg" for name in ("gain_against_margin", "loops", "robustness"))
-    draw_gain(found, gain, force)
-    draw_loops(found, nyquist, force)
-    draw_robustness(found, map_, force)
-    return {
-        gain: "ISE against phase and delay margin, with the frontier",
-        nyquist: "Nyquist curves, sensitivity and error per torque of five loops",
-        map_: "what each controller survives: flexible mode, delay, noise",
+    pictures = {
+        "gain_against_margin": (draw_gain, "ISE against phase and delay margin, with the frontier"),
+        "loops": (draw_loops, "Nyquist curves, sensitivity and error per torque of five loops"),
+        "robustness": (draw_robustness, "what each controller survives: flexible mode, delay, noise"),
     }
+    return draw_all(found, folder, pictures, force)
 
 
 def draw_gain(found: Comparison, path: Path, force: bool) -> None:

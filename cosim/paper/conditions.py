@@ -62,11 +62,12 @@ def tuned(card: Card, **changes: Any) -> Card:
 def scaled(law: FrictionLaw, level: float, stiffness: float) -> FrictionLaw:
     """Return LuGre friction with all torques times `level` and sigma0 times `stiffness`."""
     assert isinstance(law, LuGre)
-    torques = {name: _times(getattr(law, name), level) for name in ("Fc", "Fs", "sigma2")}
-    return replace(law, sigma0=_times(law.sigma0, stiffness), **torques)
+    torques = {name: times(getattr(law, name), level) for name in ("Fc", "Fs", "sigma2")}
+    return replace(law, sigma0=times(law.sigma0, stiffness), **torques)
 
 
-def _times(value: Any, factor: float) -> Any:
+def times(value: Any, factor: float) -> Any:
+    """Return a parameter times a factor, a pair in both directions."""
     return Pair(*(factor * side for side in value)) if isinstance(value, Pair) else factor * value
 
 

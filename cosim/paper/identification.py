@@ -13,7 +13,7 @@ from cosim.identify.estimate import Estimate
 from cosim.identify.friction_map import FrictionMap, Samples, friction_map, samples_of
 from cosim.identify.presliding import Presliding, presliding, simulated
 from cosim.paper.benches import STEP, moved, pushed, step_response
-from cosim.paper.conditions import tuned
+from cosim.paper.conditions import times, tuned
 from cosim.paper.experiment import Floats
 from cosim.recording import Recording
 from pyfmi_models.card import Card, read_card
@@ -116,7 +116,7 @@ def _steps(seed: int) -> Iterator[Step]:
     for plant, torques in (("one", STEPS), ("both", STEPS[:2])):
         for torque in torques:
             law = mount().friction if plant == "both" else replace(mount().friction, **true_numbers(side_of(torque)))
-            wrong = {name: _scaled(getattr(law, name), 1.5) for name in ("sigma0", "sigma1", "Fs")}
+            wrong = {name: times(getattr(law, name), 1.5) for name in ("sigma0", "sigma1", "Fs")}
             started = mount(friction=replace(law, **wrong))
             recording = step_response(mount(friction=law), torque, NOISE, seed)
             found = presliding(started, recording)
@@ -127,10 +127,6 @@ def _steps(seed: int) -> Iterator[Step]:
 def side_of(torque: float) -> str:
     """Direction that a torque pushes in."""
     return "positive" if torque > 0 else "negative"
-
-
-def _scaled(value: Any, factor: float) -> Any:
-    return Pair(*(factor * side for side in value)) if isinstance(value, Pair) else factor * value
 
 
 def _pair(value: Any) -> tuple[float, float]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.identify.friction_map import Samples
 from cosim.paper.identification import CUT, PAPER_NOMINAL, PEAK, SIDES, Identification, curve, true_numbers
-from cosim.pictures.sheet import figure
+from cosim.pictures.sheet import draw_all, figure
 from cosim.pictures.style import AFTER, BEFORE, GREY, LINE, MEASURED
 
 if TYPE_CHECKING:
@@ -25,15 +25,21 @@ SHADES = ("#9DB8CC", "#5C8DB3", "#00558C", "#CC6A00", "#7A4000", "#1A1A1A")
 
 def identification_figures(found: Identification, folder: Path, force: bool = False) -> dict[Path, str]:
     """Draw all; return what each shows."""
-    static, varying, steps = (folder / f"{name}.svg" for name in ("fig04_map", "fig05_varying", "fig06_presliding"))
-    draw_map(found, static, force)
-    draw_varying(found, varying, force)
-    draw_steps(found, steps, force)
-    return {
-        static: "friction over speed by direction and jointly, and over time, as in the paper's Fig. 4",
-        varying: "break-away and friction map that vary from period to period, as in the paper's Fig. 5",
-        steps: "presliding steps of 1 N m by (16) and by the direct fit, as in the paper's Fig. 6",
+    pictures = {
+        "fig04_map": (
+            draw_map,
+            "friction over speed by direction and jointly, and over time, as in the paper's Fig. 4",
+        ),
+        "fig05_varying": (
+            draw_varying,
+            "break-away and friction map that vary from period to period, as in the paper's Fig. 5",
+        ),
+        "fig06_presliding": (
+            draw_steps,
+            "presliding steps of 1 N m by (16) and by the direct fit, as in the paper's Fig. 6",
+        ),
     }
+    return draw_all(found, folder, pictures, force)
 
 
 def draw_map(found: Identification, path: Path, force: bool) -> None:

@@ -1,6 +1,6 @@
 """A sheet of several small drawings as one SVG, for results on paper; matplotlib is imported on use only."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,22 @@ def figure(path: Path, rows: int, columns: int, size: tuple[float, float], force
         yield sheet, axes
         with replacing(path, force) as partial:
             sheet.savefig(partial, format="svg", metadata={"Date": None, "Creator": None})
+
+
+def draw_all(
+    found: Any, folder: Path, pictures: Mapping[str, tuple[Callable[[Any, Path, bool], None], str]], force: bool
+) -> dict[Path, str]:
+    """Draw pictures of what was found, each a name with the function that draws it and what it shows.
+
+    Returns:
+        What each file shows.
+    """
+    made = {}
+    for name, (draw, shows) in pictures.items():
+        path = folder / f"{name}.svg"
+        draw(found, path, force)
+        made[path] = shows
+    return made
 
 
 def plain_logs(*axes: Any) -> None:

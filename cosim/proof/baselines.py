@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cosim.diagnosis.protocol import rms
 from cosim.diagnosis.result import Trace
 from cosim.errors import MissingPackageError
 
@@ -47,11 +48,6 @@ def compared(traces: Sequence[Trace]) -> dict[str, dict[str, Any]]:
         except MissingPackageError as error:
             answers[name] = {"skipped": str(error)}
     return answers
-
-
-def rms(x: Array) -> float:
-    """Root of the mean square."""
-    return float(np.sqrt(np.mean(x**2)))
 
 
 def features(trace: Trace) -> Array:

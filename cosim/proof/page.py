@@ -123,7 +123,7 @@ def page(found: Mapping[str, Any]) -> str:
         bins=score.BINS,
         least_removable=marks.LEAST_REMOVABLE,
         lines=[_line(row) for row in found["rows"] if not marks.exact(row)],
-        number=_estimate,
+        number=estimate,
         met=_met,
         short=_short,
     )
@@ -135,7 +135,7 @@ def _met(one: Mapping[str, Any]) -> str:
     return word if one["sure"] or not word else f"{word}, not sure"
 
 
-def _estimate(one: Mapping[str, Any]) -> str:
+def estimate(one: Mapping[str, Any]) -> str:
     """A value with its interval."""
     if one["value"] is None:
         return "-"

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cosim.files import replacing
+from cosim.pictures.sheet import figure, plain_logs
+from cosim.pictures.style import AFTER, BEFORE
 from cosim.stiffness.comparison import FMU, Limit, Row
 from cosim.stiffness.errata import FOUND
 from cosim.stiffness.methods import METHODS
@@ -21,38 +22,24 @@ SPEEDS = np.geomspace(radians(0.02), 3.0, 25)
 """Largest speeds of the sine [rad/s]: from the sky's to twice that of any slew."""
 _START, _MIDDLE, _EULER, _RUNGE = METHODS
 LOOK: dict[str, dict[str, Any]] = {
-    _START: {"color": "#CC6A00"},
-    _MIDDLE: {"color": "#CC6A00", "linestyle": "--"},
+    _START: {"color": BEFORE},
+    _MIDDLE: {"color": BEFORE, "linestyle": "--"},
     _EULER: {"color": "#8A5AA8"},
     _RUNGE: {"color": "#3A8A5C"},
-    FMU: {"color": "#00558C", "linewidth": 2.4},
+    FMU: {"color": AFTER, "linewidth": 2.4},
 }
 LOWEST, HIGHEST = 3e-15, 3.0
-STYLE: Any = {
-    "svg.hashsalt": "stiffness",
-    "svg.fonttype": "none",
-    "font.size": 11,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "lines.linewidth": 1.6,
-}
 
 
 def draw(sweeps: Mapping[float, Sequence[Row]], limits: Sequence[Limit], path: Path, force: bool = False) -> Path:
     """Draw the errors at `SPEEDS`, one panel for each step, and write an SVG; return its path."""
-    import matplotlib
-    from matplotlib.figure import Figure
-
-    with matplotlib.rc_context(rc=STYLE):
-        figure = Figure(figsize=(10, 4.8), layout="constrained")
-        panels = figure.subplots(1, len(sweeps), sharey=True)
+    with figure(path, 1, len(sweeps), (10, 4.8), force) as (sheet, (panels,)):
         for axes, (step, rows) in zip(panels, sweeps.items(), strict=True):
             _panel(axes, step, rows, [one for one in limits if one.step == step])
         panels[0].set_ylabel("largest error of z, relative to the largest |z|")
         _known(panels[0])
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
-        with replacing(path, force) as partial:
-            figure.savefig(partial, format="svg", metadata={"Date": None})
+        sheet.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+        plain_logs(*panels)
     return path
 
 
@@ -67,7 +54,7 @@ def _panel(axes: "Axes", step: float, rows: Sequence[Row], limits: Sequence[Limi
         _limit(axes, limit, 0.97 if limit.method == _EULER else 0.03)
     axes.set(xscale="log", yscale="log", ylim=(LOWEST, HIGHEST), xlim=(0.7 * speeds[0], 1.1 * speeds[-1]))
     axes.set(title=f"steps of {1e3 * step:g} ms", xlabel="largest speed of a sine of 0.2 Hz [deg/s]")
-    axes.grid(color="#E3E6E8", linewidth=0.8)
+    axes.grid(True)
 
 
 def _limit(axes: "Axes", limit: Limit, height: float) -> None:
