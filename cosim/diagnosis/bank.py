@@ -8,8 +8,11 @@ they keep an imprecise friction law from being taken for a missing effect.
 from functools import lru_cache
 
 import numpy as np
+import numpy.typing as npt
 
 from cosim.diagnosis.prepare import Array, Piece, Prepared
+
+Index = npt.NDArray[np.int64]
 
 STOPS = 8
 
@@ -30,6 +33,22 @@ def stop_operators(piece: Piece, distances: Array) -> Array:
         state = np.minimum(np.maximum(state + move, -1.0), 1.0)
         out[row] = state
     return out
+
+
+def last_reversal(q: Array, least: float) -> tuple[Index, Array]:
+    """Row from which the motion goes the other way, and its direction (+-1), at each row of positions q.
+
+    A turn counts once the motion came back by `least`: a way, not a speed, so noise at rest reverses nothing. Before
+    the first turn the row is 0.
+    """
+    turned, direction = np.zeros(len(q), np.int64), np.ones(len(q))
+    ahead, start, extreme = 1.0, 0, float(q[0])
+    for row, place in enumerate(q.tolist()):
+        if ahead * (extreme - place) > least:
+            ahead, start, extreme = -ahead, row, place
+        extreme = max(ahead * extreme, ahead * place) * ahead
+        turned[row], direction[row] = start, ahead
+    return turned, direction
 
 
 def speed_shapes(piece: Piece, top: float) -> Array:

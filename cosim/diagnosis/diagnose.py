@@ -165,7 +165,7 @@ def _findings(
 
 def _verdict(found: Sequence[Finding], rest: Rest) -> tuple[str, ...]:
     named = tuple(f.effect for f in found if f.answer in ("found", "ambiguous") and f.where is not None)
-    return named or (("unknown",) if rest.depends_on else ())
+    return (*named, *(("unknown",) if rest.unexplained else ()))
 
 
 def _base_parameters(models: Structures) -> dict[str, tuple[float, float, float]]:
