@@ -21,6 +21,7 @@ def summary(diagnosis: Diagnosis, bold: bool = False) -> str:
     parts = [
         [f"\033[1m{line}\033[0m" if bold else line for line in textwrap.wrap(title, WIDTH)],
         [line for block in blocks(diagnosis) for line in _block(block)],
+        _goes_with(diagnosis),
         _rest(diagnosis),
         _error(diagnosis, scales),
         _next(diagnosis),
@@ -68,6 +69,11 @@ def _row(word: str, finding: Finding) -> list[str]:
 def _wrapped(text: str, indent: int) -> list[str]:
     margin = " " * indent
     return textwrap.wrap(printable(text), WIDTH, initial_indent=margin, subsequent_indent=margin)
+
+
+def _goes_with(diagnosis: Diagnosis) -> list[str]:
+    """Return on what an unknown rest depends."""
+    return _wrapped(f"The rest goes with: {', '.join(diagnosis.depends_on)}", 2) if diagnosis.depends_on else []
 
 
 def _rest(diagnosis: Diagnosis) -> list[str]:

@@ -1,0 +1,114 @@
+"""What no structure explains is called unknown if it is large beside friction, and said to follow what predicts it."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from cosim.diagnosis.adequacy import LARGE, Rest, rest_of
+from cosim.diagnosis.bank import last_reversal
+from cosim.diagnosis.evidence import Blocks, Whitening
+from cosim.diagnosis.fit import fit
+from cosim.diagnosis.prepare import prepare
+from cosim.diagnosis.structure import Bench, nuisances
+from cosim.recording import Recording
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+Array = np.ndarray
+Extra = Callable[[dict[str, Array]], Array]
+FC = 2.0
+
+
+def night(seed: int) -> dict[str, Array]:
+    """A minute of a smooth motion that turns often, with a temperature that rises, faster or slower."""
+    rng, t = np.random.default_rng(seed), np.arange(6000) / 100
+    tones = [(0.3, rng.uniform(0.05, 0.1)), (0.2, rng.uniform(0.1, 0.2)), (0.05, rng.uniform(0.3, 0.5))]
+    table = {"t": t, "q": np.zeros_like(t), "v": np.zeros_like(t), "a": np.zeros_like(t)}
+    for size, hertz in tones:
+        w, phase = 2 * np.pi * hertz, rng.uniform(0, 2 * np.pi)
+        table["q"] += size * np.sin(w * t + phase)
+        table["v"] += size * w * np.cos(w * t + phase)
+        table["a"] -= size * w**2 * np.sin(w * t + phase)
+    warm = 10 * (1 - np.exp(-t / rng.uniform(10, 30))) + rng.uniform(10, 20)
+    return {**table, "temperature": warm, "run": np.full_like(t, float(seed))}
+
+
+def rest(extra: Extra) -> Rest:
+    """What the refitted base of two nights leaves of a torque that it lacks."""
+    recordings = []
+    for seed in (1, 2):
+        now = night(seed)
+        tau = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"] + extra(now)
+        recordings.append(Recording(f"night_{seed}", {n: now[n] for n in ("t", "q", "temperature")} | {"tau": tau}))
+    mount = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=FC, sigma2=1.0), effects=())
+    prepared = prepare(recordings, 10.0)
+    v = np.abs(prepared.stacked("v"))
+    weight = np.asarray(v > 0.02 * v.max(), float)
+    found, blocks = fit(mount, prepared.pieces, weight), Blocks.of(prepared)
+    whitening = Whitening.of(found.residual, blocks, v)
+    return rest_of(found, prepared, Bench(prepared, blocks, nuisances(found, prepared), whitening, weight))
+
+
+def kick(now: dict[str, Array]) -> Array:
+    turned, direction = last_reversal(now["q"], 1e-4)
+    return 2.0 * direction * np.exp(-(now["t"] - now["t"][turned]) / 0.5)
+
+
+def iron(now: dict[str, Array]) -> Array:
+    """An elastic stop over 0.25 rad."""
+    state, out = 0.0, []
+    for step in np.diff(now["q"], prepend=now["q"][0]) / 0.25:
+        state = min(max(state + step, -1.0), 1.0)
+        out.append(1.0 * state)
+    return np.array(out)
+
+
+def once(now: dict[str, Array]) -> Array:
+    return 1.2 * np.exp(-(((now["t"] - 12 * now["run"]) / 3) ** 2)) * (-1) ** now["run"]
+
+
+def rubs(now: dict[str, Array]) -> Array:
+    return 1.5 * np.sign(now["v"]) * (np.abs(now["t"] - 15 * now["run"]) < 4)
+
+
+@pytest.mark.parametrize(
+    ("extra", "goes_with"),
+    [
+        (lambda now: 20.0 * np.abs(now["a"]) * now["v"], "acceleration and speed"),
+        (kick, "time since reversal"),
+        (iron, "hysteresis over a long stroke"),
+        (lambda now: 0.3 * now["q"] * (now["temperature"] - 20) * np.sign(now["v"]), "position and temperature"),
+        (lambda now: 0.08 * (now["temperature"] - 20), "temperature"),
+        (lambda now: 0.7 * np.sin(9 * now["q"]), "position"),
+        (once, "time"),
+        (rubs, "friction level over time"),
+    ],
+    ids=["acceleration", "kick", "iron", "tilt", "warmth", "teeth", "once", "rubbing"],
+)
+def test_a_large_rest_is_unknown_and_goes_with_what_makes_it(extra: Extra, goes_with: str) -> None:
+    found = rest(extra)
+    assert found.unexplained
+    assert found.depends_on[0] == goes_with
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        lambda now: 0 * now["t"],
+        lambda now: 0.04 * FC * np.sign(now["v"]) * np.sin(0.9 * now["t"] + now["run"]),
+        lambda now: 0.3 * FC * np.random.default_rng(0).standard_normal(len(now["t"])),
+    ],
+    ids=["nothing", "wandering level", "noise"],
+)
+def test_a_small_rest_and_noise_are_nothing_to_explain(extra: Extra) -> None:
+    found = rest(extra)
+    assert found.share < LARGE
+    assert found.depends_on == ()
+
+
+def test_a_turn_counts_once_the_motion_came_back_far_enough() -> None:
+    q = np.array([0.0, 1.0, 2.0, 1.95, 2.0, 1.5, 1.0, 1.05, 1.0, 2.0])
+    turned, direction = last_reversal(q, 0.1)
+    assert turned.tolist() == [0, 0, 0, 0, 0, 5, 5, 5, 5, 9]
+    assert direction.tolist() == [1, 1, 1, 1, 1, -1, -1, -1, -1, 1]
