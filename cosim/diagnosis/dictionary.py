@@ -1,0 +1,154 @@
+"""What a rest may follow: shapes of recorded quantities, by plain names, none of them an effect.
+
+Smooth and general: waves over the position, speed, acceleration, time since the start and since the last reversal,
+long hysteresis, user columns, and products of those with the position.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from cosim.diagnosis.bank import last_reversal, stop_operators
+from cosim.diagnosis.prepare import Array, Piece, Prepared
+
+TURN = 5e-4
+"""Share of the range of positions by which a motion must come back to count as reversed."""
+
+Column = Callable[[Piece], Array]
+Maker = Callable[[Piece], list[Array]]
+
+
+@dataclass(frozen=True)
+class Term:
+    """Shapes of one quantity at the kept rows, (rows, n), and what they must go `beyond`."""
+
+    columns: Array
+    beyond: Array
+
+
+def dictionary(prepared: Prepared) -> dict[str, Term]:
+    """What was recorded, by plain names."""
+    makers = {**_of_speed(prepared), **_of_time(prepared), **_of_columns(prepared)}
+    if prepared.has_position:
+        makers |= {**_of_position(prepared), **_of_reversals(prepared)}
+    terms = {name: Term(_columns(prepared, make), _columns(prepared, _nothing)) for name, make in makers.items()}
+    return terms | (_products(prepared) if prepared.has_position else {})
+
+
+def _of_position(prepared: Prepared) -> dict[str, Maker]:
+    sign, place = _sign(prepared), _place(prepared)
+    return {
+        "position": lambda p: _waves(place(p)),
+        "friction level over position": lambda p: [wave * sign(p) for wave in _waves(place(p))],
+    }
+
+
+def _of_speed(prepared: Prepared) -> dict[str, Maker]:
+    top = max(abs(edge) for edge in prepared.ranges["v"])
+    hard = max(float(np.abs(piece.a).max()) for piece in prepared.pieces)
+    return {
+        "speed": lambda p: [np.tanh(p.v / (s * top)) for s in (0.01, 0.05, 0.2, 1.0)] + [p.v * np.abs(p.v)],
+        "speed whatever its direction": lambda p: [np.abs(p.v) / top, (p.v / top) ** 2],
+        "acceleration": lambda p: [p.a * np.abs(p.a) / hard**2, np.abs(p.a) / hard, np.tanh(4 * p.a / hard)],
+        "acceleration and speed": lambda p: [p.a * np.abs(p.v), p.a * p.v, p.v * np.abs(p.a)],
+        "rate of torque": lambda p: [np.gradient(p.tau, p.dt)],
+    }
+
+
+def _of_time(prepared: Prepared) -> dict[str, Maker]:
+    sign = _sign(prepared)
+    return {
+        "time since the start": lambda p: _waves((p.t - p.t[0]) / (p.t[-1] - p.t[0]), 4),
+        "friction level over time since the start": lambda p: [
+            wave * sign(p) for wave in _waves((p.t - p.t[0]) / (p.t[-1] - p.t[0]), 4)
+        ],
+    }
+
+
+def _of_reversals(prepared: Prepared) -> dict[str, Maker]:
+    """Memory of the last reversal that fades with time, or with the way; elastic iron over long strokes."""
+    reach = float(np.ptp(prepared.ranges["q"]))
+
+    def by_time(p: Piece) -> list[Array]:
+        turned, direction = last_reversal(p.q, TURN * reach)
+        return [direction * np.exp(-(p.t - p.t[turned]) / fade) for fade in (0.1, 0.2, 0.4, 0.8, 1.6)]
+
+    def by_distance(p: Piece) -> list[Array]:
+        turned, direction = last_reversal(p.q, TURN * reach)
+        way = np.abs(p.q - p.q[turned]) / reach
+        return [direction * np.exp(-way / fade) for fade in (0.003, 0.01, 0.03, 0.1)]
+
+    return {
+        "time since reversal": by_time,
+        "distance since reversal": by_distance,
+        "hysteresis over a long stroke": lambda p: [*stop_operators(p, reach * np.array([0.1, 0.2, 0.4, 0.8])).T],
+    }
+
+
+def _of_columns(prepared: Prepared) -> dict[str, Maker]:
+    """User columns, offered as causes: alone, as a friction level, and with the speed."""
+    sign = _sign(prepared)
+    return {name: partial(_by_column, column, sign) for name, column in _user_columns(prepared).items()}
+
+
+def _by_column(column: Column, sign: Column, p: Piece) -> list[Array]:
+    return [column(p), column(p) * sign(p), column(p) * p.v]
+
+
+def _products(prepared: Prepared) -> dict[str, Term]:
+    """Products of position and user columns, beyond either of the two alone."""
+    sign, place, terms = _sign(prepared), _place(prepared), dict[str, Term]()
+    for name, column in _user_columns(prepared).items():
+        alone, product = partial(_alone, place, column, sign), partial(_product, place, column, sign)
+        terms[f"position and {name}"] = Term(_columns(prepared, product), _columns(prepared, alone))
+    return terms
+
+
+def _alone(one: Column, other: Column, sign: Column, p: Piece) -> list[Array]:
+    return [one(p), other(p), one(p) * sign(p), other(p) * sign(p)]
+
+
+def _product(one: Column, other: Column, sign: Column, p: Piece) -> list[Array]:
+    return [one(p) * other(p), one(p) * other(p) * sign(p)]
+
+
+def _nothing(_: Piece) -> list[Array]:
+    return []
+
+
+def _user_columns(prepared: Prepared) -> dict[str, Column]:
+    common = set.intersection(*(set(piece.extras) for piece in prepared.pieces)) - {"q_d", "v"}
+    return {name: _centred(prepared, name) for name in sorted(common)}
+
+
+def _centred(prepared: Prepared, name: str) -> Column:
+    whole = np.concatenate([piece.extras[name] for piece in prepared.pieces])
+    mean, size = float(whole.mean()), float(whole.std()) + 1e-300
+    return lambda p: np.asarray((p.extras[name] - mean) / size)
+
+
+def _sign(prepared: Prepared) -> Column:
+    top = max(abs(edge) for edge in prepared.ranges["v"])
+    return lambda p: np.tanh(p.v / (0.003 * top))
+
+
+def _place(prepared: Prepared) -> Column:
+    """Position, 0 to 1."""
+    low, high = prepared.ranges["q"]
+    return lambda p: np.asarray((p.q - low) / (high - low))
+
+
+def _waves(x: Array, count: int = 8) -> list[Array]:
+    return [np.cos(np.pi * k * x) for k in range(1, count + 1)]
+
+
+def _columns(prepared: Prepared, make: Maker) -> Array:
+    parts = []
+    for piece in prepared.pieces:
+        made = make(piece)
+        rows = piece.lowpass(np.column_stack(made))[piece.kept] if made else np.empty((len(piece.kept), 0))
+        parts.append(rows)
+    columns = np.concatenate(parts)
+    return np.asarray(columns / (columns.std(0) + 1e-300))
