@@ -22,8 +22,8 @@ from cosim.diagnosis.structure import Bench, projected
 LARGE = 0.07
 """Share of the friction torque above which the rest is unexplained.
 
-From generated cases: 40 nulls (a level that wanders by up to 4 %, coloured noise of up to 3 %, slip blocks) left at most
-0.044, in the middle 0.019; 40 cases with an effect outside the list 0.093 and more, in the middle 0.25.
+From generated cases: 40 nulls (a level that wanders by up to 4 %, coloured noise of up to 3 %, slip blocks) left at
+most 0.044, in the middle 0.019; 40 cases with an effect outside the list 0.093 and more, in the middle 0.25.
 """
 CELL = 0.25
 """Seconds over which the rest is averaged: noise and presliding go, what lasts stays."""
