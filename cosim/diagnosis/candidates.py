@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
+import numpy.typing as npt
 
 from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import Array, Prepared
@@ -44,6 +45,9 @@ class Candidate:
 class Span:
     """What the recordings visit: enough to choose grids; all at the kept rows."""
 
+    piece: npt.NDArray[np.int64]
+    """Number of the piece of each row."""
+    t: Array
     angle: Array
     q: Array
     v: Array
@@ -79,6 +83,8 @@ def span_of(mount: Mount, prepared: Prepared, residual: Array, level: Array) -> 
     q, v = prepared.stacked("q"), prepared.stacked("v")
     common = frozenset.intersection(*(frozenset(piece.extras) for piece in prepared.pieces))
     return Span(
+        piece=np.repeat(np.arange(len(prepared.pieces)), [len(piece.kept) for piece in prepared.pieces]),
+        t=prepared.stacked("t"),
         angle=np.asarray(mount.at(0.0, q, v).angle),
         q=q,
         v=v,

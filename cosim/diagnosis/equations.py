@@ -3,6 +3,7 @@
 Expressions are compiled once for a structure; its numbers are parameters.
 """
 
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +13,7 @@ import numpy as np
 from cosim.diagnosis.prepare import Array, Piece
 from cosim.diagnosis.rowwise import Rowwise, Stepwise
 from pyfmi_models.effects import DriveEffect, MotionEffect, SensorEffect
+from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.model import structure_of, symbols_of
 from pyfmi_models.mount import Mount
 
@@ -48,9 +50,13 @@ class Equations:
 
     @cached_property
     def _known(self) -> tuple[Any, ...]:
-        """Mount with symbols, motion, states by owner; in terms of the true motion."""
+        """Mount with symbols, motion, states by owner; in terms of the true motion.
+
+        What shakes the axis in time is left out: the time of a recording does not tell its phase (`shaken.py`).
+        """
         s = self._symbols
         this = self._mount.with_symbols(s["symbols"], s["v"])
+        this = replace(this, effects=tuple(e for e in this.effects if not isinstance(e, PeriodicDisturbance)))
         motion = this.at(s["t"], s["q"], s["v"], {name: s[name] for name in self._inputs})
         own, first = {}, 0
         for name, states in self._owners:

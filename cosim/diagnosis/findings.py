@@ -38,6 +38,7 @@ MAIN = {
     "cable_wrap": ("stiffness", 1.0, "N.m/rad"),
     "quadratic_drag": ("coefficient", 1.0, "N.m.s2/rad2"),
     "torque_saturation": ("knee_torque", 1.0, "N.m"),
+    "periodic_disturbance": ("amplitude", 1.0, "N.m"),
     "clock_skew": ("offset_ms", 1.0, "ms"),
     "inertia_variation": ("relative_amplitude", 100.0, "%"),
     "compliance": ("resonance_hz", 1.0, "Hz"),

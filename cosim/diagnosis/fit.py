@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import Array, Piece
+from cosim.diagnosis.shaken import phases_of
 from pyfmi_models.model import Pair, Variable, fields_of
 from pyfmi_models.mount import Mount
 
@@ -38,7 +39,10 @@ PRIOR_FACTOR = 2.0
 
 @dataclass(frozen=True)
 class Fit:
-    """Result: the mount with fitted numbers, its torque (rows,), the derivatives (rows, free), and the residual."""
+    """Result: the mount with fitted numbers, its torque (rows,), the derivatives (rows, free), and the residual.
+
+    A phase that is another in each recording is that of the first piece.
+    """
 
     mount: Mount
     free: tuple[str, ...]
@@ -58,9 +62,9 @@ class Fit:
 
 
 def free_parameters(mount: Mount, fixed: Sequence[str] = FIXED) -> tuple[str, ...]:
-    """Names of the parameters a fit may change."""
-    known = [variable.name for variable in mount.parameters()]
-    return tuple(name for name in known if not name.endswith(tuple(fixed)))
+    """Names of the parameters a fit may change; a phase that is another in each recording is none of them."""
+    known, own = [variable.name for variable in mount.parameters()], phases_of(mount)
+    return tuple(name for name in known if not name.endswith(tuple(fixed)) and name not in own)
 
 
 def fit(
@@ -120,7 +124,9 @@ def fit(
     found = least_squares(residuals, jacobian, inner, (low, high), evaluations)
     values = np.clip(found * scale, lowest, highest)
     torque, slopes = stacked(inverse, pieces, values)
-    return Fit(with_values(mount, free, values), free, values, torque, slopes, tau - torque)
+    phases = inverse.phases(pieces[0], values)
+    fitted = with_values(mount, (*free, *phases), np.array([*values, *phases.values()]))
+    return Fit(fitted, free, values, torque, slopes, tau - torque)
 
 
 def least_squares(

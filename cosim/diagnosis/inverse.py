@@ -1,10 +1,11 @@
 """The torque that a recorded motion needs, and how it changes with every parameter.
 
-    needed(t) = D^-1 [ J(q) q'' + J'(q) q'^2 / 2 + contact + viscous + loads + coupled ]
+    needed(t) = D^-1 [ J(q) q'' + J'(q) q'^2 / 2 + contact + viscous + loads + coupled ] + shaken
 
 with the true motion recovered from the reading, the states of friction and effects integrated along it, what hangs on
-a spring (`coupled`) answered in the frequency domain, and D the drive effects undone; last, two clocks are brought
-together. The equations are those of the plant: the same objects, with measured motion put in (`equations.py`).
+a spring (`coupled`) answered in the frequency domain, and D the drive effects undone; then two clocks are brought
+together. Last comes what shakes the axis in time: its phase is another in each piece, found in the torque recorded
+there (`shaken.py`). The equations are those of the plant: the same objects, with measured motion put in (`equations.py`).
 """
 
 from collections.abc import Callable, Sequence
@@ -18,10 +19,13 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_banded
 
+from cosim.diagnosis.claim import claimed
 from cosim.diagnosis.equations import Equations, equations_of
 from cosim.diagnosis.prepare import Array, Piece
+from cosim.diagnosis.shaken import Tone, in_phase, phases_of
 from pyfmi_models.effects import ClockEffect, DriveEffect, Effect
 from pyfmi_models.effects.compliance import Compliance
+from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.model import with_symbols
 from pyfmi_models.mount import Mount
 
@@ -65,8 +69,23 @@ class Inverse:
         return piece.lowpass(np.column_stack(self._momentary(piece, self._with(values))))
 
     def behind(self, piece: Piece, columns: Array, values: Array) -> Array:
-        """The same after springs, drive and clocks, which act on a torque as a whole."""
+        """The same after springs, drive and clocks, which act on a torque as a whole, and with what shakes the axis."""
         full = self._with(values)
+        return self._with_shaken(piece, self._unshaken(piece, columns, full), full)
+
+    def phases(self, piece: Piece, values: Array) -> dict[str, float]:
+        """Phase [rad] at time zero of what shakes the axis in a piece, by the name of the parameter."""
+        names = phases_of(self.mount)
+        if not names:
+            return {}
+        full = self._with(values)
+        rest = piece.tau - self._unshaken(piece, self.momentary(piece, values), full)[:, 0]
+        tones = self._tones(full)
+        late = [float(np.angle(self._drive(full, tone.hertz))) for tone in tones]
+        found = in_phase(piece, rest, tones, self._telling(piece))
+        return {name: phase + lag for name, (phase, _), lag in zip(names, found, late, strict=True)}
+
+    def _unshaken(self, piece: Piece, columns: Array, full: Array) -> Array:
         columns = self._with_coupled(piece, columns, full)
         columns = self._undone_drive(columns, full, piece.dt)
         return self._on_one_clock(piece, columns, full)
@@ -186,6 +205,33 @@ class Inverse:
                 other, change = self._bumped(full, name)
                 out[:, 1 + column] -= slope * (later(other) - later(full)) / change
         return np.asarray(out)
+
+
+    def _with_shaken(self, piece: Piece, columns: Array, full: Array) -> Array:
+        """Add what shakes the axis, in the phase that the torque recorded in this piece tells, and its derivatives."""
+        prefixes = self._parts(PeriodicDisturbance)
+        if not prefixes:
+            return columns
+        rest, rows = piece.tau - columns[:, 0], self._telling(piece)
+
+        def added(numbers: Array) -> Array:
+            return np.asarray(sum(torque for _, torque in in_phase(piece, rest, self._tones(numbers), rows)))
+
+        return self._with_changes(columns, full, added, prefixes)
+
+    def _tones(self, full: Array) -> list[Tone]:
+        """What shakes the axis, as the torque in front of the drive shows it."""
+        parts = [self._set(prefix, full) for prefix in self._parts(PeriodicDisturbance)]
+        return [Tone(one.frequency_hz, one.amplitude / abs(self._drive(full, one.frequency_hz))) for one in parts]
+
+    def _drive(self, full: Array, hertz: float) -> complex:
+        """Response of the drive, from command to applied torque, at one frequency."""
+        omega, names = np.array([2 * np.pi * hertz]), self._parts(DriveEffect)
+        return complex(np.prod([self._set(name, full).response(omega)[0] for name in names]))
+
+    def _telling(self, piece: Piece) -> npt.NDArray[np.bool_]:
+        """Rows whose rest tells a phase."""
+        return np.asarray(piece.inside & claimed(self.mount.friction, piece.v))
 
 
 class Spectrum:

@@ -91,6 +91,14 @@ def lowpass(columns: Array, dt: float, cutoff: float) -> Array:
     return filtered
 
 
+def gain(hertz: float, dt: float, cutoff: float) -> float:
+    """What one pass of `lowpass` leaves of a tone."""
+    if cutoff >= 0.45 / dt:
+        return 1.0
+    ratio = np.tan(np.pi * min(hertz * dt, 0.49)) / np.tan(np.pi * cutoff * dt)
+    return float(1 / (1 + ratio**8))
+
+
 def derivative(x: Array, dt: float) -> Array:
     """Five-point central difference; the two rows at each end repeat the nearest one."""
     inner = (x[:-4] - 8 * x[1:-3] + 8 * x[3:-1] - x[4:]) / (12 * dt)

@@ -37,8 +37,6 @@ def ceiling(folder: str, entries: Sequence[Mapping[str, Any]]) -> dict[str, Any]
     """{"heldout_rms": x}, or {"reason": why there is none}, for the effects of a truth."""
     if foreign := [entry["effect"] for entry in entries if not entry["listed"]]:
         return {"reason": f"{foreign[0]} has no structure in the library"}
-    if any("phases" in entry["parameters"] for entry in entries):
-        return {"reason": "its phase is another in each recording, and one structure is fitted to all"}
     effects = [true_effect(entry) for entry in entries]
     if beyond := [effect.id for effect in effects if not is_held(effect)]:
         return {"reason": f"the torque that a motion needs is not defined with {beyond[0]}"}

@@ -32,6 +32,7 @@ FAMILIES = (
     Family(("cogging",), torque.cogging),
     Family(("gravity_unbalance",), torque.unbalance),
     Family(("torque_offset",), torque.offset, position=False),
+    Family(("periodic_disturbance",), torque.disturbance, position=False),
     Family(("cable_wrap",), torque.cable),
     Family(("quadratic_drag",), torque.drag, position=False),
     Family(("torque_saturation",), torque.saturation, position=False),

@@ -1,4 +1,4 @@
-"""Strongest cycles of a signal over angle."""
+"""Strongest cycles of a signal over angle, and strongest tones over time."""
 
 from itertools import pairwise
 from math import ceil, log, pi
@@ -12,6 +12,10 @@ from cosim.diagnosis.prepare import Array
 PEAKS = 3
 """Peaks that become candidates, for each periodic effect."""
 LEAST_ROWS = 50
+LEAST_WAVES = 6
+"""Waves that the shortest piece must hold: what is slower is drift, or friction that wanders."""
+NEIGHBOURS = 10
+"""Tones that a piece tells apart, on either side of one, whose mean power is the level there."""
 BAND, FINE = 1.15, 16
 """Ratio of cycles that share one choice of rows, and bins of angle in the shortest wave of such a band."""
 
@@ -34,6 +38,43 @@ def peaks(span: Span, signal: Array, lowest: float = 1.0) -> list[float]:
         if len(found) == PEAKS:
             break
     return found
+
+
+def tones(span: Span, signal: Array) -> list[float]:
+    """Frequencies [Hz] of the tones that stand out most from their neighbours, at most `PEAKS`, well apart.
+
+    Each piece has its own phase, so powers are added, each in units of the level of its neighbours.
+    """
+    numbers = np.unique(span.piece)
+    seconds = min(float(np.ptp(span.t[span.piece == number])) for number in numbers)
+    fine = np.arange(LEAST_WAVES / seconds, span.cutoff, 0.25 / seconds)
+    standing = np.sum([_standing(span.t[own], signal[own], fine) for own in (span.piece == n for n in numbers)], axis=0)
+    found: list[float] = []
+    for index in np.argsort(standing)[::-1]:
+        if all(abs(fine[index] - other) > 3 / seconds for other in found):
+            found.append(float(fine[index]))
+        if len(found) == PEAKS:
+            break
+    return found
+
+
+def _standing(t: Array, signal: Array, hertz: Array) -> Array:
+    """Power of a signal in even rows at many frequencies, in units of the mean power of the neighbours."""
+    power, own = _spectrum(t, signal, hertz), 1 / float(np.ptp(t))
+    step = float(hertz[1] - hertz[0])
+    gap, reach = (max(1, round(count * own / step)) for count in (2, NEIGHBOURS))
+    beside = np.r_[np.ones(reach), np.zeros(2 * gap + 1), np.ones(reach)]
+    padded = np.pad(np.log(power + 1e-300), reach + gap, mode="reflect")
+    return np.asarray(power / np.exp(np.convolve(padded, beside / beside.sum(), "valid") + np.euler_gamma))
+
+
+def _spectrum(t: Array, signal: Array, hertz: Array) -> Array:
+    """Power per row at many frequencies, also above half the rate of the rows, where it is that of the mirror image."""
+    dt = float(t[-1] - t[0]) / (len(t) - 1)
+    length = 1 << int(np.ceil(np.log2(len(t) * 16)))
+    window = np.hanning(len(t))
+    power = np.abs(np.fft.fft((signal - signal.mean()) * window, length)) ** 2 / np.sum(window**2)
+    return np.asarray(power[np.round(hertz * dt * length).astype(np.int64) % length])
 
 
 def _powers(span: Span, signal: Array, numbers: npt.NDArray[np.int64], step: float, ratio: float) -> Array:

@@ -6,10 +6,11 @@ from math import atan2, hypot, pi
 import numpy as np
 
 from cosim.diagnosis.candidates import Candidate, Span, has
-from cosim.diagnosis.families.periodogram import peaks
+from cosim.diagnosis.families.periodogram import peaks, tones
 from cosim.diagnosis.prepare import Array
 from pyfmi_models.effects import Cogging, Effect, GravityUnbalance, TorqueOffset
 from pyfmi_models.effects.cable_wrap import CableWrap
+from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag
 from pyfmi_models.effects.torque_saturation import TorqueSaturation
 from pyfmi_models.mount import Mount
@@ -43,6 +44,17 @@ def cogging(mount: Mount, span: Span) -> Iterator[Candidate]:
 
         pair = tuple(Cogging(cycles_per_rev=cycles, amplitude=0.0, phase=phase) for phase in (0.0, -pi / 2))
         yield Candidate("cogging", pair, ("amplitude",), start)
+
+
+def disturbance(mount: Mount, span: Span) -> Iterator[Candidate]:
+    """Tones that stand out most from the torque; their phase is each recording's own."""
+    for hertz in tones(span, span.residual):
+
+        def start(c: Array, hertz: float = hertz) -> Effect:
+            return PeriodicDisturbance(frequency_hz=hertz, amplitude=max(float(c[0]), 1e-12))
+
+        still = PeriodicDisturbance(frequency_hz=hertz, amplitude=0.0)
+        yield Candidate("periodic_disturbance", (still,), ("amplitude",), start)
 
 
 def cable(mount: Mount, span: Span) -> Iterator[Candidate]:
