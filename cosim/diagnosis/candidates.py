@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import Array, Prepared
+from cosim.diagnosis.shaken import heard
 from pyfmi_models.effects import ClockEffect, Effect, MotionEffect, SensorEffect
 from pyfmi_models.mount import Mount
 
@@ -55,6 +56,8 @@ class Span:
     level: Array
     residual: Array
     cutoff: float
+    heard: tuple[float, float]
+    """Lowest and highest frequency [Hz] of a tone over time that could be told."""
     seconds: float
     extras: frozenset[str]
     """Columns that all recordings have beside the usual ones."""
@@ -92,6 +95,7 @@ def span_of(mount: Mount, prepared: Prepared, residual: Array, level: Array) -> 
         level=level,
         residual=residual,
         cutoff=prepared.cutoff,
+        heard=heard(prepared),
         seconds=max(float(piece.t[-1] - piece.t[0]) for piece in prepared.pieces),
         extras=common,
     )

@@ -141,7 +141,9 @@ def _key(effect: Effect) -> tuple[str, float]:
 
 
 def _same(place: Place, chosen: Fit) -> Effect:
-    return next(effect for effect in chosen.mount.effects if _key(effect) == _key(place.effect))
+    alike = [effect for effect in chosen.mount.effects if _key(effect) == _key(place.effect)]
+    hertz = getattr(place.effect, "frequency_hz", 0.0)
+    return min(alike, key=lambda effect: abs(getattr(effect, "frequency_hz", 0.0) - hertz))
 
 
 def _findings(

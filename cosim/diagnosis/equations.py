@@ -3,7 +3,6 @@
 Expressions are compiled once for a structure; its numbers are parameters.
 """
 
-from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -12,8 +11,8 @@ import numpy as np
 
 from cosim.diagnosis.prepare import Array, Piece
 from cosim.diagnosis.rowwise import Rowwise, Stepwise
+from cosim.diagnosis.shaken import still
 from pyfmi_models.effects import DriveEffect, MotionEffect, SensorEffect
-from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.model import structure_of, symbols_of
 from pyfmi_models.mount import Mount
 
@@ -55,8 +54,7 @@ class Equations:
         What shakes the axis in time is left out: the time of a recording does not tell its phase (`shaken.py`).
         """
         s = self._symbols
-        this = self._mount.with_symbols(s["symbols"], s["v"])
-        this = replace(this, effects=tuple(e for e in this.effects if not isinstance(e, PeriodicDisturbance)))
+        this = still(self._mount.with_symbols(s["symbols"], s["v"]))
         motion = this.at(s["t"], s["q"], s["v"], {name: s[name] for name in self._inputs})
         own, first = {}, 0
         for name, states in self._owners:

@@ -7,7 +7,7 @@ torque that it needs is computed for the model with one cause; the model with th
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -126,7 +126,7 @@ def _difference(main: Mount, rival: Mount, signal: SetPoint, visited: Visited) -
     if np.abs(torque).max() > HARDEST * visited.torque:
         return 0.0
     inverse = Inverse(rival, free_parameters(rival))
-    other, slopes = inverse.torque(piece, inverse.present)
+    other, slopes = inverse.torque(replace(piece, tau=torque), inverse.present)
     rest = projected((torque - other)[piece.inside], slopes[piece.inside])
     return float(np.sqrt(np.mean(rest**2)))
 

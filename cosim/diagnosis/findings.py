@@ -15,6 +15,7 @@ from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.locate import where
 from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.result import Finding, Trace
+from cosim.diagnosis.shaken import heard
 from cosim.diagnosis.structure import nuisances, projected
 from cosim.diagnosis.trial import LEAST_GAIN, Trial
 from pyfmi_models.effects import CATALOGUE, DriveEffect, Effect, GravityUnbalance
@@ -45,6 +46,11 @@ MAIN = {
     "encoder_eccentricity": ("amplitude_rad", 1.0, "rad"),
 }
 """The number that says how large an effect is: parameter, factor and unit of the text."""
+NOTES = {
+    "periodic_disturbance": "; its phase is that of each recording, told by the recording itself, by the one not "
+    "fitted too; card and FMU hold that of the first"
+}
+"""What must be said beside the evidence."""
 PLACES = ("stribeck", "presliding", "torque_saturation", "clock_skew", "compliance")
 """Effects whose number says where they set in, not how large they are: no smallest size can be told."""
 
@@ -114,7 +120,7 @@ def accepted(
         told_apart_by=effect.told_apart_by,
         action=effect.action,
         evidence=f"removes {place.trial.gain:.0%} of the error energy on data left out of the fit "
-        f"(t = {place.trial.t:.1f} over blocks)",
+        f"(t = {place.trial.t:.1f} over blocks){NOTES.get(effect.id, '')}",
         visible_from=_visible_from(effect, numbers),
     )
 
@@ -177,7 +183,7 @@ def _absent(name: str, smallest: float | None, trial: Trial | None, mount: Mount
     torque = float(np.abs(prepared.stacked("tau")).max())
     most = min(high, 10 * torque if unit == "N.m" else np.inf)
     testable = smallest is not None and smallest < most
-    reason = "" if testable else _why_not(name, mount, prepared)
+    reason = _where_looked(name, prepared) if testable else _why_not(name, mount, prepared)
     return Finding(
         effect=name,
         title=form.title,
@@ -187,12 +193,20 @@ def _absent(name: str, smallest: float | None, trial: Trial | None, mount: Mount
         units={MAIN[name][0]: _unit(unit, mount)},
         visible_from=factor * smallest if testable and smallest is not None and name not in PLACES else None,
         evidence=reason,
-        action=reason,
+        action="" if testable else reason,
     )
 
 
 def _parameters(form: type[Effect]) -> list[Variable]:
     return [replace(f.metadata["variable"], name=f.name) for f in fields(form) if "variable" in f.metadata]
+
+
+def _where_looked(name: str, prepared: Prepared) -> str:
+    """Where an effect would have been seen, if not everywhere."""
+    if name != "periodic_disturbance":
+        return ""
+    slowest, fastest = heard(prepared)
+    return f"between {slowest:.2g} and {fastest:.3g} Hz"
 
 
 def _why_not(name: str, mount: Mount, prepared: Prepared) -> str:

@@ -22,6 +22,7 @@ from cosim.diagnosis.bank import speed_shapes, stop_distances, stop_operators
 from cosim.diagnosis.fit import free_parameters
 from cosim.diagnosis.inverse import Inverse
 from cosim.diagnosis.prepare import Array, Piece, Prepared, derivative
+from cosim.diagnosis.shaken import still
 from cosim.diagnosis.trial import Trial
 from pyfmi_models.effects import ActuatorLag, Delay, Effect
 from pyfmi_models.mount import Mount
@@ -118,7 +119,7 @@ def _crossed(mount: Mount, piece: Piece, prepared: Prepared) -> Crossed | None:
     values = inverse.present
     needed = inverse.behind(piece, inverse.momentary(piece, values), values)
     wanted = _wanted(piece)
-    own = Inverse(mount, ())
+    own = Inverse(still(mount), ())
     instrument = own.behind(wanted, own.momentary(wanted, np.zeros(0)), np.zeros(0))
     top = max(abs(edge) for edge in prepared.ranges["v"])
     shapes = piece.lowpass(np.column_stack([stop_operators(piece, stop_distances(prepared)), speed_shapes(piece, top)]))

@@ -5,7 +5,8 @@
 with the true motion recovered from the reading, the states of friction and effects integrated along it, what hangs on
 a spring (`coupled`) answered in the frequency domain, and D the drive effects undone; then two clocks are brought
 together. Last comes what shakes the axis in time: its phase is another in each piece, found in the torque recorded
-there (`shaken.py`). The equations are those of the plant: the same objects, with measured motion put in (`equations.py`).
+there (`shaken.py`). The equations are those of the plant: the same objects, with measured motion put in
+(`equations.py`).
 """
 
 from collections.abc import Callable, Sequence
@@ -205,7 +206,6 @@ class Inverse:
                 other, change = self._bumped(full, name)
                 out[:, 1 + column] -= slope * (later(other) - later(full)) / change
         return np.asarray(out)
-
 
     def _with_shaken(self, piece: Piece, columns: Array, full: Array) -> Array:
         """Add what shakes the axis, in the phase that the torque recorded in this piece tells, and its derivatives."""

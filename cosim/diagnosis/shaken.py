@@ -6,21 +6,36 @@ which it explains most of what is left of the torque recorded in that piece: lea
 """
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from cosim.diagnosis.prepare import Array, Piece, gain
+from cosim.diagnosis.prepare import Array, Piece, Prepared, gain
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.mount import Mount
 
+LEAST_WAVES = 6
+"""Waves that the shortest piece must hold: what is slower is drift, or friction that wanders."""
 Rows = npt.NDArray[np.bool_]
+
+
+def still(mount: Mount) -> Mount:
+    """The mount without what shakes it in time."""
+    rest = tuple(effect for effect in mount.effects if not isinstance(effect, PeriodicDisturbance))
+    return mount if len(rest) == len(mount.effects) else replace(mount, effects=rest)
 
 
 def phases_of(mount: Mount) -> tuple[str, ...]:
     """Names of the phases that are each recording's own."""
     return tuple(f"{name}.phase" for name, _ in mount.of_kind(PeriodicDisturbance))
+
+
+def heard(prepared: Prepared) -> tuple[float, float]:
+    """Lowest and highest frequency [Hz] that can be told from drift and lies in the band of the analysis."""
+    seconds = min(float(np.ptp(piece.t[piece.kept])) for piece in prepared.pieces)
+    return LEAST_WAVES / seconds, prepared.cutoff
 
 
 class Tone(NamedTuple):

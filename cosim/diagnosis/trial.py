@@ -14,6 +14,7 @@ from cosim.diagnosis.candidates import ROOM
 from cosim.diagnosis.evidence import Score, t_value
 from cosim.diagnosis.fit import FIXED, LEAST_VS, Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared
+from cosim.diagnosis.shaken import heard
 from cosim.diagnosis.structure import Bench
 from pyfmi_models.effects import (
     ActuatorLag,
@@ -25,6 +26,7 @@ from pyfmi_models.effects import (
     StribeckEffect,
 )
 from pyfmi_models.effects.clock_skew import ClockSkew
+from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.model import parameters_of
 from pyfmi_models.mount import Mount
 
@@ -146,7 +148,9 @@ def _in_time(problem: Problem, trial: Trial) -> bool:
 
 
 def is_another(problem: Problem, effect: Effect) -> bool:
-    """Whether an effect is really something else: a time-stamp convention, a level, an unbalance; or at a bound."""
+    """Whether an effect is really something else: a time-stamp convention, a level, an unbalance, a drift; or at a
+    bound.
+    """
     if any(variable.start >= variable.high for variable in parameters_of(effect)):
         return True
     if isinstance(effect, Delay):
@@ -154,6 +158,9 @@ def is_another(problem: Problem, effect: Effect) -> bool:
     if isinstance(effect, ClockSkew):
         drifts = 1e-3 * abs(effect.drift_ppm) * problem.seconds
         return bool(effect.offset_ms < 0 and drifts < max(LEAST_DRIFT_MS, -LEAST_DRIFT * effect.offset_ms))
+    if isinstance(effect, PeriodicDisturbance):
+        slowest, fastest = heard(problem.prepared)
+        return not bool(slowest <= effect.frequency_hz <= fastest)
     if isinstance(effect, Cogging) and problem.mount.motion == "rotary":
         return bool(effect.cycles_per_rev < LEAST_CYCLES)
     return isinstance(effect, StribeckEffect) and bool(effect.Vs < LEAST_VS * problem.top_speed)

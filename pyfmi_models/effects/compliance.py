@@ -24,7 +24,7 @@ class Compliance(Coupling):
 
     id: ClassVar[str] = "compliance"
     title: ClassVar[str] = "Compliance"
-    rivals: ClassVar[tuple[str, ...]] = ("delay", "actuator_lag", "backlash")
+    rivals: ClassVar[tuple[str, ...]] = ("delay", "actuator_lag", "backlash", "periodic_disturbance")
     told_apart_by: ClassVar[str] = "it resonates at one frequency and scales with acceleration; lag and delay do not"
     action: ClassVar[str] = "Stiffen couplings, pinion and pier; keep the controller well below the resonance."
     antiresonance_hz: Scalar = parameter(

@@ -16,7 +16,7 @@ class PeriodicDisturbance(LoadEffect):
 
     id: ClassVar[str] = "periodic_disturbance"
     title: ClassVar[str] = "Periodic disturbance"
-    rivals: ClassVar[tuple[str, ...]] = ("cogging", "compliance")
+    rivals: ClassVar[tuple[str, ...]] = ("cogging", "position_friction", "compliance")
     told_apart_by: ClassVar[str] = "its frequency stays when the speed changes; that of cogging follows the speed"
     action: ClassVar[str] = "Look for fans, pumps or a machine next door that runs at this frequency."
     frequency_hz: Scalar = parameter("Hz", "Frequency", low=1e-4, high=1e4)

@@ -12,8 +12,6 @@ from cosim.diagnosis.prepare import Array
 PEAKS = 3
 """Peaks that become candidates, for each periodic effect."""
 LEAST_ROWS = 50
-LEAST_WAVES = 6
-"""Waves that the shortest piece must hold: what is slower is drift, or friction that wanders."""
 NEIGHBOURS = 10
 """Tones that a piece tells apart, on either side of one, whose mean power is the level there."""
 BAND, FINE = 1.15, 16
@@ -47,7 +45,7 @@ def tones(span: Span, signal: Array) -> list[float]:
     """
     numbers = np.unique(span.piece)
     seconds = min(float(np.ptp(span.t[span.piece == number])) for number in numbers)
-    fine = np.arange(LEAST_WAVES / seconds, span.cutoff, 0.25 / seconds)
+    fine = np.arange(*span.heard, 0.25 / seconds)
     standing = np.sum([_standing(span.t[own], signal[own], fine) for own in (span.piece == n for n in numbers)], axis=0)
     found: list[float] = []
     for index in np.argsort(standing)[::-1]:

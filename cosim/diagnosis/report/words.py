@@ -184,7 +184,8 @@ def shows_from(finding: Finding) -> str:
     """Return the smallest size that would have shown, with the unit of the size."""
     if finding.visible_from is None:
         return ""
-    return joined(trimmed(number(finding.visible_from)), unit_of(finding))
+    size = joined(trimmed(number(finding.visible_from)), unit_of(finding))
+    return f"{size} {finding.evidence}" if finding.answer == "not_seen" and finding.evidence else size
 
 
 def unit_of(finding: Finding) -> str:
