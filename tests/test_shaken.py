@@ -8,14 +8,13 @@ import pytest
 from test_inverse import recorded
 
 from cosim.diagnosis.diagnose import Outcome, diagnose
-from cosim.diagnosis.fit import fit, free_parameters
+from cosim.diagnosis.fit import fit
 from cosim.diagnosis.inverse import Inverse
-from cosim.diagnosis.prepare import Prepared, gain, lowpass, prepare
-from cosim.diagnosis.shaken import heard
+from cosim.diagnosis.prepare import gain, lowpass, prepare
 from cosim.proof.ceiling import ceiling
 from cosim.proof.generator import make_case, to_toml, write_case
 from cosim.recording import Recording
-from pyfmi_models.card import Card, parse_card, read_card
+from pyfmi_models.card import parse_card, read_card
 from pyfmi_models.effects import ActuatorLag
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.friction import Coulomb
@@ -90,7 +89,8 @@ def test_where_nothing_shakes_the_axis_it_is_said_which_frequencies_would_have_s
     found = answered(0.0, 0.0, 0.0).diagnosis
     (one,) = (finding for finding in found.findings if finding.effect == "periodic_disturbance")
     assert one.answer == "not_seen"
-    assert one.evidence.startswith("between ") and one.evidence.endswith(" Hz")
+    assert one.evidence.startswith("between ")
+    assert one.evidence.endswith(" Hz")
 
 
 def test_a_concealed_disturbance_is_named_and_has_a_ceiling(tmp_path: Path) -> None:
