@@ -12,7 +12,7 @@ from typing import Any
 import fake_soem
 import numpy as np
 import pytest
-from test_hardware import SIMULATED, assert_safe, recorded, scenario
+from on_hardware import SIMULATED, assert_safe, recorded, scenario
 
 from cosim.errors import HardwareError, MissingPackageError
 from cosim.hardware.ethercat import CHECKED_EVERY

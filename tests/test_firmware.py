@@ -10,7 +10,7 @@ import firmware_tools as tools
 import numpy as np
 import pytest
 from firmware_tools import ENABLE, FAULT, OFF, ON, RESET
-from test_hardware import recorded, session
+from on_hardware import recorded, session
 
 from cosim.cli import main
 from cosim.hardware.session import run_session

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_hardware import SCENARIO, SIMULATED, assert_safe, invoke, recorded, scenario
+from on_hardware import SCENARIO, SIMULATED, assert_safe, invoke, recorded, scenario
 
 from cosim.errors import CosimError
 from cosim.hardware.machine import changed, read_machine

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from test_hardware import SCENARIO, SIMULATED, recorded, scenario, session
+from on_hardware import SCENARIO, SIMULATED, recorded, scenario, session
 
 from cosim.cli_cache import with_fmus
 from cosim.errors import HardwareError

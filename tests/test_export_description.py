@@ -1,0 +1,165 @@
+"""The description says of variables what is true: dependencies, kinds, times, units to show."""
+
+from dataclasses import replace
+
+import casadi as ca
+import export_models as models
+import numpy as np
+import pytest
+from archives import archive
+from fmpy import read_model_description
+from fmpy.validation import validate_fmu
+
+from pyfmi_models.card import read_card
+from pyfmi_models.export import build_library, export_fmu
+from pyfmi_models.export.codegen import generate
+from pyfmi_models.export.layout import layout_of
+from pyfmi_models.export.structure import unknowns_of
+
+__all__ = ["archive"]
+
+
+def structure(path):
+    description = read_model_description(str(path))
+    groups = {"outputs": description.outputs, "derivatives": description.derivatives,
+              "initial": description.initialUnknowns}  # fmt: skip
+    return {
+        group: {
+            u.variable.name: dict(zip([d.name for d in u.dependencies], u.dependenciesKind, strict=True))
+            for u in unknowns
+        }
+        for group, unknowns in groups.items()
+    }
+
+
+CONSTANT, FIXED, TUNABLE, DEPENDENT = "constant", "fixed", "tunable", "dependent"
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_dependencies_are_the_true_ones_and_say_how(archive, fmi):
+    outputs = {"where": {"position": CONSTANT}, "direct": {"force": CONSTANT}, "clock": {"time": CONSTANT}}
+    speed = {"time": DEPENDENT, "force": CONSTANT}
+    rates = {"der(position)": {"velocity": CONSTANT}, "der(velocity)": speed | {"position": TUNABLE}}
+    initial = {"direct": {"force": CONSTANT, "stiffness": CONSTANT},
+               "der(velocity)": speed | {"stiffness": DEPENDENT, "position": DEPENDENT}}  # fmt: skip
+    found = structure(archive(models.oscillator, fmi))
+    assert (found["outputs"], found["derivatives"]) == (outputs, rates)
+    assert found["initial"] == outputs | rates | initial
+
+
+def test_a_factor_that_is_fixed_or_jumps_is_told_from_one_that_can_be_tuned(tmp_path):
+    model = models.oscillator()
+    t, x, u, p = models.symbols(2, 1, 1)
+    rates = [ca.if_else(x[0] > 0, 1, 2) * x[1], 3 * u / p]
+    shown = [ca.if_else(x[0] > 0, 1, 2), ca.sign(u) + 2 * u, p * x[1] + ca.fabs(x[0])]
+    equations = ca.Function("equations", [t, x, u, p], [ca.vertcat(*rates), ca.vertcat(*shown)])
+    fixed = (replace(model.parameters[0], tunable=False, low=0.5),)
+    path = export_fmu(replace(model, equations=equations, parameters=fixed), tmp_path / "a.fmu")
+    found = structure(path)
+    assert found["derivatives"] == {
+        "der(position)": {"position": DEPENDENT, "velocity": DEPENDENT},
+        "der(velocity)": {"force": FIXED},
+    }
+    assert found["outputs"] == {
+        "where": {"position": DEPENDENT},
+        "direct": {"force": DEPENDENT},
+        "clock": {"position": DEPENDENT, "velocity": FIXED},
+    }
+    assert validate_fmu(str(path)) == []
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("part", ["plant", "controller"])
+def test_what_is_said_of_dependencies_holds_in_numbers(part, seed):
+    card = read_card("paper_mount")
+    model = card.plant().model() if part == "plant" else card.controller_model()
+    layout, random = layout_of(model), np.random.default_rng(seed)
+    groups = ("time", "state", "input", "parameter")
+    rows = [row for group in groups for row in layout.of(group)]
+    sizes = np.cumsum([len(layout.of(group)) for group in groups])[:-1]
+
+    def evaluate(column):
+        return np.concatenate([np.array(part).ravel() for part in model.equations(*np.split(column, sizes))])
+
+    starts = np.array([row.variable.start for row in rows])
+    first, second = (starts + random.normal(size=len(rows)) * (np.abs(starts) + 0.01) / 10 for _ in range(2))
+    offset = len(model.states) if model.period else 0
+    for i, unknown in enumerate(unknowns_of(layout)):
+        for j, row in enumerate(rows):
+            kind = unknown.dependencies.get(row.reference, "none" if row.kind in ("time", "input") else "hidden")
+            if kind == "none":
+                moved = first.copy()
+                moved[j] += 0.01
+                assert evaluate(moved)[offset + i] == evaluate(first)[offset + i]
+            if kind in (CONSTANT, TUNABLE, FIXED):
+                slopes = []
+                for point in (first, np.where([r.kind == "parameter" for r in rows], first, second)):
+                    moved = point.copy()
+                    moved[j] += 0.01
+                    slopes.append((evaluate(moved) - evaluate(point))[offset + i] / 0.01)
+                assert slopes[0] == pytest.approx(slopes[1], rel=1e-6, abs=1e-6)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_variables_say_what_they_are(archive, fmi):
+    description = read_model_description(str(archive(models.lugre, fmi)))
+    found = {v.name: v for v in description.modelVariables}
+    assert [(v.causality, v.variability, v.initial) for v in (found["friction.Fc"], found["z"], found["torque"])] == [
+        ("parameter", "tunable", "exact"),
+        ("local", "continuous", "exact"),
+        ("output", "continuous", "calculated"),
+    ]
+    assert (found["friction.Fc"].unit, found["friction.Fc"].start, found["friction.Fc"].min) == ("N.m", "2.32", "1e-09")
+    assert (found["drive"].min, found["drive"].max, found["z"].nominal) == ("-100.0", "100.0", "1e-05")
+    assert found["der(z)"].derivative.name == "z"
+    assert (found["der(speed)"].unit, found["der(angle)"].unit) == ("rad/s2", "rad/s")
+    assert (description.defaultExperiment.stepSize, description.defaultExperiment.tolerance) == ("0.0001", "1e-08")
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_time_is_the_one_independent_variable_and_has_no_start(archive, fmi):
+    description = read_model_description(str(archive(models.controller, fmi)))
+    independent = [v for v in description.modelVariables if v.causality == "independent"]
+    assert [(v.name, v.unit, v.variability, v.start) for v in independent] == [("time", "s", "continuous", None)]
+
+
+DISPLAYED = {
+    "paper_mount": {"q": "deg", "v": "deg/s", "der(speed)": "deg/s2", "tau": None, "friction.Vs": "deg/s"},
+    "emps": {"q": None, "v": None, "friction.smoothing": "um/s"},
+}
+
+
+@pytest.mark.parametrize("card", DISPLAYED)
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_display_units_are_those_of_the_field(tmp_path, card, fmi):
+    path = export_fmu(read_card(card).plant().model(), tmp_path / "a.fmu", fmi=fmi)
+    description = read_model_description(str(path))
+    found = {v.name: v.displayUnit for v in description.modelVariables}
+    assert {name: found.get(name) for name in DISPLAYED[card]} == DISPLAYED[card]
+    assert validate_fmu(str(path)) == []
+
+
+def test_small_angles_are_shown_in_arcseconds(archive):
+    description = read_model_description(str(archive(models.lugre, 3)))
+    units = {unit.name: {d.name: float(d.factor) for d in unit.displayUnits} for unit in description.unitDefinitions}
+    assert {v.name: v.displayUnit for v in description.modelVariables}["z"] == "arcsec"
+    assert units["rad"]["arcsec"] * np.pi / 180 == pytest.approx(3600, rel=1e-15)
+
+
+@pytest.mark.parametrize("kind", ["CS", "ME"])
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_a_fixed_parameter_is_settled_by_the_end_of_initialization(fmi, kind):
+    model = models.oscillator()
+    fixed = replace(model, parameters=(replace(model.parameters[0], tunable=False),))
+    driver = models.Driver(fixed, build_library(fixed), fmi, kind).start(stiffness=2.0)
+    assert driver.set("stiffness", 3.0) == "error"
+    assert driver.messages[-1][2] == 'fixed parameter "stiffness" can be set before the end of initialization only'
+    assert driver.get("stiffness")[0] == 2.0
+
+
+def test_the_token_follows_the_content():
+    model = models.lugre()
+    assert generate(model).token == generate(models.lugre()).token
+    assert generate(model).token != generate(replace(model, name="other")).token
+    harder = (replace(model.parameters[0], start=31.0), *model.parameters[1:])
+    assert generate(model).token != generate(replace(model, parameters=harder)).token

@@ -1,0 +1,141 @@
+"""Whichever process is killed, loop, Python or drive, the torque goes."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+from on_hardware import SCENARIO, recorded
+from over_udp import PATIENT, drive, session
+
+from cosim.errors import HardwareError
+from cosim.hardware.replay import replay
+from cosim.hardware.session import Session
+from cosim.hardware.words import STATES, faults_of
+from cosim.recording import Recording
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
+
+
+def operating(one: Session) -> Session:
+    """Bring a session in real time into operation, with torque; on a computer that is too late for that, skip."""
+    for _ in range(20):
+        with suppress(HardwareError):
+            one.enable()
+            if one.track(2000).torque:
+                return one
+    pytest.skip("this computer was never in time for a second of operation")
+
+
+def box_of(folder: Path) -> Recording:
+    found = recorded(folder)
+    assert found["machine.order"].any()
+    assert replay(found).identical
+    return found
+
+
+def wait_for(condition: Callable[[], bool], seconds: float = 5.0) -> None:
+    last = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < last, "it did not happen in time"
+        time.sleep(0.001)
+
+
+def test_when_the_loop_is_killed_the_drive_lets_go_by_its_watchdog(tmp_path: Path) -> None:
+    with drive(PATIENT, lockstep=False) as there, session(tmp_path, there.url, PATIENT, fast=False) as one:
+        operating(one)
+        trips = there.virtual.trips
+        os.kill(one.loop.process, signal.SIGKILL)
+        with pytest.raises(HardwareError, match="ended by signal SIGKILL; the drive's watchdog takes the torque away"):
+            one.advance(10_000)
+        wait_for(lambda: there.drive.held == 0)
+        assert there.drive.state == STATES.index("fault") or "deadline" in one.status.faults, "this computer was late"
+        if there.virtual.trips > trips:
+            assert there.virtual.taken != 0
+            assert 20e6 <= there.virtual.silence < 1e9, "20 ms, and what this computer adds"
+    box_of(tmp_path)
+
+
+SUPERVISOR = """
+import sys
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from on_hardware import scenario
+from over_udp import PATIENT, over
+from test_hardware_kill import operating
+from cosim.hardware.session import Session
+with Session(scenario(("stop = 0.4", "stop = 30.0")), over({url!r}, PATIENT), Path({box!r})) as one:
+    operating(one)
+    print(one.loop.process, flush=True)
+    one.track()
+"""
+
+
+@contextmanager
+def spawned(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+    """A process of Python that is gone afterwards."""
+    process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.PIPE)
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.communicate()
+
+
+def line_of(process: subprocess.Popen[bytes]) -> bytes:
+    assert process.stdout is not None
+    return process.stdout.readline()
+
+
+def test_when_python_is_killed_the_loop_notices_takes_the_torque_to_zero_and_leaves(tmp_path: Path) -> None:
+    with drive(PATIENT, lockstep=False) as there:
+        code = SUPERVISOR.format(tests=str(Path(__file__).parent), url=there.url, box=str(tmp_path / "box"))
+        with spawned("-c", code) as process:
+            loop = int(line_of(process) or pytest.skip("this computer was never in time"))
+        try:
+            wait_for(lambda: not Path(f"/proc/{loop}").exists())
+        except AssertionError:
+            os.kill(loop, signal.SIGKILL)
+            raise
+        assert there.drive.held == 0
+    found = box_of(tmp_path)
+    assert {"heartbeat_lost", "deadline"} & set(faults_of(int(found["machine.faults"][-1]))), "or it was late before"
+    assert found["machine.order"][-1] == 0
+
+
+@contextmanager
+def drive_process(tmp_path: Path, port: int, *options: str) -> Iterator[subprocess.Popen[bytes]]:
+    """`cosim hardware virtual-drive`, up to its first word."""
+    (tmp_path / "s.toml").write_text(SCENARIO, "utf-8")
+    verb = ("-m", "cosim", "hardware", "virtual-drive", str(tmp_path / "s.toml"), "--port", str(port), "--json")
+    with spawned(*verb, *options) as process:
+        assert json.loads(line_of(process)) == {"what": "state", "state": "not ready", "torque": 0.0}
+        yield process
+
+
+def test_when_the_drive_is_killed_the_loop_orders_zero_and_a_new_drive_has_no_torque(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    with (
+        drive_process(tmp_path, port, "--machine", "virtual") as process,
+        session(tmp_path, f"udp://127.0.0.1:{port}", PATIENT, fast=False) as one,
+    ):
+        operating(one)
+        process.kill()
+        process.wait()
+        ended = one.track()
+        assert not ended.running
+        assert (ended.state, ended.torque) == ("fault", 0)
+        assert {"frame_lost", "deadline"} & set(ended.faults), "or it was late before"
+    box_of(tmp_path)
+    with drive_process(tmp_path, port, "--inject", "late:0.1:0.2:3", "--counts-per-turn", "65536") as again:
+        again.send_signal(signal.SIGINT)
+        assert again.wait(10) == 0
