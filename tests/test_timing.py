@@ -1,4 +1,7 @@
-"""Between a delay and a lag the part of the signals that follows the set point decides, whatever the noise does."""
+"""Between a delay and a lag the part of the signals that follows the set point decides, whatever the noise does.
+
+Between a late torque and a late reading the reading's own lateness behind the set point decides.
+"""
 
 from dataclasses import replace
 
@@ -7,6 +10,7 @@ import pytest
 
 from cosim.diagnosis.instruments import DECISIVE, misfits_of
 from cosim.diagnosis.inverse import Inverse
+from cosim.diagnosis.lateness import blamed, lateness
 from cosim.diagnosis.prepare import Prepared, prepare
 from cosim.recording import Recording
 from pyfmi_models.effects import ActuatorLag, Delay
@@ -51,3 +55,31 @@ def test_without_a_set_point_nothing_is_said() -> None:
     prepared = answered(drive, 0.0)
     blind = replace(prepared, pieces=tuple(replace(piece, extras={}) for piece in prepared.pieces))
     assert misfits_of(blind, replace(BASE, effects=(drive,)), drive) == {}
+
+
+def trailing(seconds: float, noise: float = 2e-6) -> Prepared:
+    """A reading that is so much later than its set point, and a motion that turns now and then."""
+    rng, t = np.random.default_rng(4), np.arange(40_000) / 1000
+    q_d, q = (0.2 * np.sin(0.7 * late) + 0.01 * np.sin(9 * late) for late in (t, t - seconds))
+    row = {"t": t, "tau": np.gradient(q, t), "q": q + noise * rng.standard_normal(len(t)), "q_d": q_d}
+    return prepare([Recording("r", row)], 20.0)
+
+
+def test_how_late_a_reading_is_behind_its_set_point_is_measured_within_its_error() -> None:
+    late = lateness(trailing(5e-3))
+    assert late is not None
+    assert abs(late.seconds - 5e-3) < 3 * late.error + 2e-5
+    assert late.error < 1e-4
+
+
+def test_a_reading_that_trails_by_what_the_torque_is_late_is_the_clock_and_one_that_does_not_is_the_drive() -> None:
+    assert blamed(trailing(5e-3), 5.2e-3, 1e-3) == "clock"
+    assert blamed(trailing(0.0), 5e-3, 1e-3) == "drive"
+
+
+def test_a_loop_that_trails_by_itself_leaves_it_open_as_does_a_set_point_that_was_not_recorded() -> None:
+    prepared = trailing(12e-3)
+    assert blamed(prepared, 5e-3, 1e-3) == "either"
+    blind = replace(prepared, pieces=tuple(replace(piece, extras={}) for piece in prepared.pieces))
+    assert blamed(blind, 5e-3, 1e-3) == "either"
+    assert blamed(blind, 0.5e-3, 1e-3) == "drive"

@@ -6,6 +6,7 @@ a better one takes it, one that comes close makes the answer a set.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from math import log
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from cosim.diagnosis.select import Selection
 from cosim.diagnosis.structure import Bench, projected
 from cosim.diagnosis.trial import (
     LEAST_GAIN,
+    LIMITS,
     TIE,
     Problem,
     Trial,
@@ -24,6 +26,7 @@ from cosim.diagnosis.trial import (
     is_another,
     is_real,
     judged,
+    simpler_wins,
     tried,
     twins,
 )
@@ -71,10 +74,30 @@ class Place:
 
     @property
     def probability(self) -> float:
-        """Tempered posterior of this effect among its rivals and "none", with equal priors."""
-        others = [0.0, *(rival.score.nats for rival in self.rivals)]
-        weights = np.exp(np.clip((np.array(others) - self.trial.score.nats) / TEMPERATURE, -50, 50))
-        return float(1 / (1 + weights.sum()))
+        """Share of this effect among its rivals and "none"."""
+        return self.shares[self.effect.id]
+
+    @property
+    def shares(self) -> dict[str, float]:
+        """Tempered posterior of this effect and of each rival, "none" being the rest; equal priors.
+
+        A parameter more than this effect has costs what it does in BIC, with as many rows as are independent; where
+        the set point speaks of both, its chi-squared is the evidence.
+        """
+        own = self.trial.score.nats / TEMPERATURE
+        odds = np.array([0.0, *(self._log_odds(rival) for rival in self.rivals), -own])
+        weights = np.exp(odds - odds.max())
+        names = [self.effect.id, *(rival.effect.id for rival in self.rivals)]
+        return dict(zip(names, (weights[:-1] / weights.sum()).tolist(), strict=True))
+
+    def _log_odds(self, rival: Trial) -> float:
+        """Log-odds of a rival against this effect."""
+        margin = excludes(self.misfits, self.effect, rival.effect)
+        if margin is not None:
+            return -margin / 2
+        more = len(rival.fit.free) - len(self.trial.fit.free)
+        price = log(max(float(self.trial.score.rows.sum()) / TEMPERATURE, 1.0)) / 2
+        return (rival.score.nats - self.trial.score.nats) / TEMPERATURE - more * price
 
 
 @dataclass(frozen=True)
@@ -110,7 +133,7 @@ def _round(problem: Problem, chosen: Fit, bench: Bench, say: Callable[[str], Non
         best = place.better
         if place.trial.gain < LEAST_GAIN and not is_real(problem, best):
             return [], _without(problem, chosen, effect)
-        if best is not place.trial and not _simpler_wins(place.trial, best):
+        if best is not place.trial and not simpler_wins(place.trial, best):
             return [], best.fit
         places.append(place)
     return places, None
@@ -121,13 +144,12 @@ def _added(problem: Problem, chosen: Fit) -> tuple[Effect, ...]:
 
 
 def _too_close(winner: Trial, rival: Trial) -> bool:
-    """Whether a rival cannot be excluded: its gain comes near, and block by block it is not clearly worse."""
-    return rival.gain >= NEAR * winner.gain and not clearly_worse(rival, winner)
+    """Whether a rival cannot be excluded: its gain comes near, and block by block it is not clearly worse.
 
-
-def _simpler_wins(holder: Trial, best: Trial) -> bool:
-    close = holder.gain >= TIE * best.gain and not clearly_worse(holder, best)
-    return close and len(holder.fit.free) < len(best.fit.free)
+    A rival that the winner becomes in a limit is excluded by its gain alone.
+    """
+    is_limit = winner.effect.id in LIMITS.get(rival.effect.id, ())
+    return rival.gain >= NEAR * winner.gain and (is_limit or not clearly_worse(rival, winner))
 
 
 def _without(problem: Problem, chosen: Fit, effect: Effect) -> Fit:

@@ -159,7 +159,9 @@ def _findings(
     found.sort(key=lambda finding: -finding.gain)
     named = {finding.effect for finding in found}
     rivals = [finding for finding in rivals if finding.effect not in named]
-    lost = [replace(rival_finding(p.trial, p, mount), answer="not_proven") for p in unproven]
+    lost = [
+        replace(rival_finding(p.trial, p, mount), answer="not_proven", probability=1 - p.probability) for p in unproven
+    ]
     lost = [finding for finding in lost if finding.effect not in named]
     named |= {finding.effect for finding in (*rivals, *lost)}
     return [*found, *rivals, *lost, *not_found(verdict.chosen, prepared, weight, verdict.looked_at, sorted(named))]

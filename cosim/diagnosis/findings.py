@@ -140,7 +140,7 @@ def rival_finding(rival: Trial, place: Place, mount: Mount) -> Finding:
         effect=effect.id,
         title=effect.title,
         answer="ambiguous",
-        probability=max(0.0, (1 - place.probability) / max(len(place.ambiguous_with), 1)),
+        probability=place.shares[effect.id],
         gain=rival.gain,
         parameters=values,
         units=_units(effect, mount),

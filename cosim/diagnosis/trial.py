@@ -13,6 +13,7 @@ import numpy as np
 from cosim.diagnosis.candidates import ROOM
 from cosim.diagnosis.evidence import Score, t_value
 from cosim.diagnosis.fit import FIXED, LEAST_VS, Fit, fit
+from cosim.diagnosis.lateness import blamed
 from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.shaken import heard
 from cosim.diagnosis.structure import Bench
@@ -25,6 +26,7 @@ from pyfmi_models.effects import (
     Effect,
     StribeckEffect,
 )
+from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.effects.clock_skew import ClockSkew
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.model import parameters_of
@@ -39,7 +41,7 @@ LEAST_PLAIN_GAIN = 0.02
 LEAST_DELAY_SAMPLES, LEAST_DELAY = 0.3, 1.5e-4
 """A delay shorter than this many samples, or seconds, is what time stamps cannot be trusted for."""
 LEAST_DRIFT_MS, LEAST_DRIFT = 1.0, 0.3
-"""A clock that is late and drifts by less than this, or than this share of its offset, over a recording is a delay."""
+"""A clock that drifts by less than this, or than this share of its offset, over a recording is late like a delay."""
 LEAST_CYCLES = 1.5
 """A ripple with fewer cycles a turn is an unbalance."""
 WHOLE = 0.01
@@ -50,6 +52,12 @@ controller answers, time runs otherwise than in the machine."""
 CLEARLY = 2.0
 TIE = 0.96
 """A simpler effect wins if it reaches this share of the best gain and is not worse by `CLEARLY` standard errors."""
+LIMITS = {"torque_offset": ("cable_wrap", "gravity_unbalance")}
+"""Effects that others become in a limit (home far away, a short stroke): such a one wins at `TIE` even if it is clearly
+worse, as the larger family's further number takes up what the friction law leaves over the stroke."""
+BESIDE = 1.0
+"""A cable whose home lies further beside the visited positions than this share of their range is an offset: of its
+energy its change over the range has less than about 1 - `TIE`."""
 
 
 @dataclass(frozen=True)
@@ -153,17 +161,48 @@ def is_another(problem: Problem, effect: Effect) -> bool:
     """
     if any(variable.start >= variable.high for variable in parameters_of(effect)):
         return True
-    if isinstance(effect, Delay):
-        return bool(effect.delay_ms < 1e3 * max(LEAST_DELAY_SAMPLES * problem.sample_time, LEAST_DELAY))
-    if isinstance(effect, ClockSkew):
-        drifts = 1e-3 * abs(effect.drift_ppm) * problem.seconds
-        return bool(effect.offset_ms < 0 and drifts < max(LEAST_DRIFT_MS, -LEAST_DRIFT * effect.offset_ms))
+    if isinstance(effect, DriveEffect | ClockEffect):
+        return _is_other_timing(problem, effect)
     if isinstance(effect, PeriodicDisturbance):
         slowest, fastest = heard(problem.prepared)
         return not bool(slowest <= effect.frequency_hz <= fastest)
+    if isinstance(effect, CableWrap):
+        return _is_far(problem.prepared, effect)
     if isinstance(effect, Cogging) and problem.mount.motion == "rotary":
         return bool(effect.cycles_per_rev < LEAST_CYCLES)
     return isinstance(effect, StribeckEffect) and bool(effect.Vs < LEAST_VS * problem.top_speed)
+
+
+def _is_far(prepared: Prepared, cable: CableWrap) -> bool:
+    low, high = prepared.ranges["q"]
+    room = BESIDE * (high - low)
+    return not low - room <= float(cable.home) <= high + room
+
+
+def _is_other_timing(problem: Problem, effect: Effect) -> bool:
+    """Whether a lateness is too short to be told from the time stamps', or lies in the clocks and not in the drive."""
+    if isinstance(effect, Delay) and effect.delay_ms < 1e3 * max(
+        LEAST_DELAY_SAMPLES * problem.sample_time, LEAST_DELAY
+    ):
+        return True
+    late = _late(problem, effect)
+    if late is None:
+        return False
+    return blamed(problem.prepared, late, problem.sample_time) == (
+        "drive" if isinstance(effect, ClockSkew) else "clock"
+    )
+
+
+def _late(problem: Problem, effect: Effect) -> float | None:
+    """Seconds by which an effect makes the torque constantly late against the reading; None if it does not."""
+    if isinstance(effect, Delay):
+        return 1e-3 * float(effect.delay_ms)
+    if isinstance(effect, ActuatorLag):
+        return 1e-3 * float(effect.time_constant_ms)
+    if isinstance(effect, ClockSkew) and effect.offset_ms < 0:
+        drifts = 1e-3 * abs(effect.drift_ppm) * problem.seconds
+        return -1e-3 * effect.offset_ms if drifts < max(LEAST_DRIFT_MS, -LEAST_DRIFT * effect.offset_ms) else None
+    return None
 
 
 def winner(trials: Sequence[Trial]) -> Trial | None:
@@ -171,8 +210,15 @@ def winner(trials: Sequence[Trial]) -> Trial | None:
     if not trials:
         return None
     best = max(trials, key=lambda trial: trial.gain)
-    near = [trial for trial in trials if trial.gain >= TIE * best.gain and not clearly_worse(trial, best)]
+    near = [best, *(trial for trial in trials if simpler_wins(trial, best))]
     return min(near, key=lambda trial: (len(trial.fit.free), -trial.gain))
+
+
+def simpler_wins(trial: Trial, best: Trial) -> bool:
+    """Whether a trial with fewer parameters explains as much as the best one, as far as that can be said."""
+    if len(trial.fit.free) >= len(best.fit.free) or trial.gain < TIE * best.gain:
+        return False
+    return best.effect.id in LIMITS.get(trial.effect.id, ()) or not clearly_worse(trial, best)
 
 
 def clearly_worse(trial: Trial, best: Trial) -> bool:

@@ -21,7 +21,9 @@ class ClockSkew(ClockEffect):
     id: ClassVar[str] = "clock_skew"
     title: ClassVar[str] = "Clock skew"
     rivals: ClassVar[tuple[str, ...]] = ("delay",)
-    told_apart_by: ClassVar[str] = "a clock may drift, or run ahead; a delay is constant and always late"
+    told_apart_by: ClassVar[str] = (
+        "a clock may drift, or run ahead, or trail the set point; a delay is constant, and the loop makes up for it"
+    )
     action: ClassVar[str] = "Nothing mechanical. Take time stamps of torque and encoder from one clock."
     drift_ppm: Scalar = parameter(
         "1", "Drift of the reading's clock, parts per million", default=0.0, low=-1e5, high=1e5

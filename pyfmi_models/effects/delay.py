@@ -27,8 +27,10 @@ class Delay(DriveEffect):
 
     id: ClassVar[str] = "delay"
     title: ClassVar[str] = "Delay"
-    rivals: ClassVar[tuple[str, ...]] = ("actuator_lag",)
-    told_apart_by: ClassVar[str] = "a delay turns phase only; a lag also takes amplitude away at high frequency"
+    rivals: ClassVar[tuple[str, ...]] = ("actuator_lag", "clock_skew")
+    told_apart_by: ClassVar[str] = (
+        "a delay turns phase only; a lag also takes amplitude away at high frequency; a late clock trails the set point"
+    )
     action: ClassVar[str] = "Nothing mechanical. Shorten the bus cycle, or use the improved model for tuning."
     delay_ms: Scalar = parameter(
         "ms", "Dead time between commanded and applied torque", low=0.02, high=50, tunable=False

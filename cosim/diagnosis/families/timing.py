@@ -29,15 +29,15 @@ def _timed(effect: Effect, ms: float) -> Effect:
 
 
 def clocks(mount: Mount, span: Span) -> Iterator[Candidate]:
-    """Readings that are newer than the torque beside them, which no delay can do, or that drift either way."""
+    """Readings that are newer or older than the torque beside them, or that drift either way."""
     if has(mount, ClockSkew):
         return
     ways = [ClockSkew(offset_ms=ms) for ms in (1.0, 4.0)]
-    ways += [ClockSkew(drift_ppm=1e3 * ms / span.seconds) for ms in (4.0, -4.0)]
+    ways += [ClockSkew(drift_ppm=4e3 / span.seconds)]
     for way in ways:
 
         def start(c: Array, way: ClockSkew = way) -> Effect:
-            size = float(np.clip(c[0], 0.03, 10))
+            size = float(np.copysign(np.clip(abs(c[0]), 0.03, 10), c[0]))
             return ClockSkew(offset_ms=size * way.offset_ms + 1e-3, drift_ppm=size * way.drift_ppm + 1e-3)
 
         yield Candidate("clock_skew", (way,), (), start)
