@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.diagnosis.report import render, write_report
+from cosim.diagnosis.report import render, words, write_report
 from cosim.diagnosis.report.derive import part, samples
 from cosim.diagnosis.report.explorer import payload
 from cosim.diagnosis.report.figures_dynamic import VIEWS
 from cosim.diagnosis.report.figures_proof import relative
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Region, Trace, Where
+from cosim.diagnosis.terminal import summary
 from cosim.pictures.quantities import minus, number
 from cosim.pictures.style import thin
 
@@ -384,3 +385,12 @@ def test_browser_shows_it_without_complaint(kind: str, motion: str, width: int, 
         done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False, env=home)
         assert expected in done.stdout, re.findall(r'data-probe="[^"]*"', done.stdout)
         assert "CONSOLE" not in done.stderr
+
+
+def test_a_proposed_friction_law_is_told_on_page_and_terminal_and_the_bases_own_is_not() -> None:
+    told = diagnosis("two")
+    said = "Friction law: maxwell_slip in place of lugre would remove up to 8 % of the error energy"
+    assert words.law(told).startswith(said)
+    assert said in render(told)
+    assert said in " ".join(summary(told).split())
+    assert words.law(replace(told, friction_law={"base": "lugre", "proposed": "lugre", "gain": 0.0})) == ""

@@ -13,6 +13,7 @@ from cosim.diagnosis.evidence import Blocks
 from cosim.diagnosis.experiment import Experiment, best, told
 from cosim.diagnosis.findings import accepted, not_found, rival_finding, standard_errors
 from cosim.diagnosis.fit import Fit
+from cosim.diagnosis.laws import proposed_law
 from cosim.diagnosis.locate import regions
 from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare, quality
 from cosim.diagnosis.protocol import Structures, heldout_rms, judge, traces, veto_band, veto_rms
@@ -86,7 +87,7 @@ def diagnose(
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
         depends_on=rest.depends_on,
         data_quality=tuple(note for recording in (*train, *heldout) for note in quality(recording, prepared.cutoff)),
-        friction_law={"base": mount.friction.key, "proposed": mount.friction.key, "gain": 0.0},
+        friction_law=proposed_law(problem, verdict.chosen),
         base_parameters=_base_parameters(models),
         seconds=time.perf_counter() - started,
     )

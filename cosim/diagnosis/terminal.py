@@ -6,7 +6,7 @@ import textwrap
 from typing import TextIO
 
 from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.words import Block, blocks, heading, lowered, proven_range, shows_from, verdict
+from cosim.diagnosis.report.words import Block, blocks, heading, law, lowered, proven_range, shows_from, verdict
 from cosim.diagnosis.result import Diagnosis, Finding
 
 WIDTH = 80
@@ -23,6 +23,7 @@ def summary(diagnosis: Diagnosis, bold: bool = False) -> str:
         [line for block in blocks(diagnosis) for line in _block(block)],
         _goes_with(diagnosis),
         _rest(diagnosis),
+        _wrapped(law(diagnosis), 0),
         _error(diagnosis, scales),
         _next(diagnosis),
         _wrote(diagnosis, scales),

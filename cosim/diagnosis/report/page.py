@@ -191,7 +191,7 @@ def _end(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any
     return {
         "parameters": tables.parameters(diagnosis),
         "parameters_sentence": "The base was refitted on the training recordings before any effect was tested.",
-        "law": _law(diagnosis),
+        "law": words.law(diagnosis),
         "quality": diagnosis.data_quality,
         "command": str(made.get("command", "")),
         "files": tables.files(diagnosis),
@@ -201,12 +201,3 @@ def _end(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any
         "script_hash": digest,
         "css": here.joinpath("report.css").read_text("utf-8"),
     }
-
-
-def _law(diagnosis: Diagnosis) -> str:
-    law = diagnosis.friction_law
-    if not law.get("proposed"):
-        return ""
-    gain = f"; it removes {100 * float(law['gain']):.0f} % of the error" if law.get("gain") else ""
-    base = law.get("base", "the base")
-    return f"Friction law: {law['proposed']} fits better than {base}{gain}. This is no missing effect."

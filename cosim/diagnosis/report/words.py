@@ -50,6 +50,18 @@ def count(number: int) -> str:
     return COUNTS[number] if number < len(COUNTS) else str(number)
 
 
+def law(diagnosis: Diagnosis) -> str:
+    """Return the sentence on the base's friction law, empty where no other one is proposed."""
+    told = diagnosis.friction_law
+    if not told.get("proposed") or told["proposed"] == told.get("base"):
+        return ""
+    share = f"{100 * float(told['gain']):.0f} %"
+    return (
+        f"Friction law: {told['proposed']} in place of {told['base']} would remove up to {share} of the error "
+        "energy that is left. This is no missing effect."
+    )
+
+
 def verdict(diagnosis: Diagnosis) -> str:
     """Return "found", "either" (only rivals), "unknown" or "none"."""
     if "unknown" in diagnosis.verdict:
