@@ -213,8 +213,8 @@ def test_two_effects_are_told_on_the_first_screen() -> None:
     first = re.sub(r"<[^>]+>", " ", page().split("<h2>Findings")[0].split("</style>")[1])
     assert "Two effects are missing from the model" in first
     assert "Turning forward takes 0.26 N·m more than backward." in first
-    for words in ("0.39 to 0.45", "Found", "Two possible causes", "Not proven", "mount_improved.fmu", "20 to 90°/s"):
-        assert words in first
+    for text in ("0.39 to 0.45", "Found", "Two possible causes", "Not proven", "mount_improved.fmu", "20 to 90°/s"):
+        assert text in first
     assert "Not seen: delay, clock skew. These recordings cannot show: thermal drift, dwell break-away." in first
 
 
