@@ -1,0 +1,90 @@
+"""An effect that another becomes in a limit wins by its gain; what cannot be excluded stays in the set."""
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from cosim.diagnosis.challenge import Place
+from cosim.diagnosis.evidence import Score
+from cosim.diagnosis.fit import Fit
+from cosim.diagnosis.prepare import prepare
+from cosim.diagnosis.trial import Problem, Trial, clearly_worse, is_another, is_real, winner
+from cosim.recording import Recording
+from pyfmi_models.effects import ActuatorLag, Delay, Effect, FrictionAsymmetry, GravityUnbalance, TorqueOffset
+from pyfmi_models.effects.cable_wrap import CableWrap
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+Array = npt.NDArray[np.float64]
+OFFSET, UNBALANCE = TorqueOffset(torque=1.0), GravityUnbalance(mgl=1.0, phase=1.5)
+CABLE = CableWrap(stiffness=0.1, home=-0.5)
+ASYMMETRY = FrictionAsymmetry(level_asymmetry=0.3)
+MOUNT = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=1.0))
+NONE: Array = np.zeros(0)
+
+
+def trial(effect: Effect, gain: float, parameters: int = 1) -> Trial:
+    """A trial that removes the same share in each of twenty blocks: any difference of two is a clear one."""
+    rows = np.full(20, 50.0)
+    after = (1 - gain) * (1 + 1e-4 * np.sin(np.arange(20) * (1 + 10 * gain)))
+    free = tuple(f"effect.{number}" for number in range(parameters))
+    return Trial(effect, Fit(MOUNT, free, NONE, NONE, NONE, NONE), Score(np.ones(20), after, rows), gain)
+
+
+@pytest.mark.parametrize("larger", [CABLE, UNBALANCE])
+def test_an_offset_wins_over_what_becomes_one_in_a_limit_if_it_explains_nearly_as_much(larger: Effect) -> None:
+    offset, other = trial(OFFSET, 0.88), trial(larger, 0.90, 2)
+    assert clearly_worse(offset, other)
+    best = winner([offset, other])
+    assert best is offset
+    assert winner([trial(OFFSET, 0.85), other]) is other
+
+
+def test_an_offset_that_is_clearly_worse_loses_to_an_asymmetry_which_is_none_at_rest() -> None:
+    other = trial(ASYMMETRY, 0.90, 2)
+    assert winner([trial(OFFSET, 0.88), other]) is other
+
+
+def test_the_set_holds_an_unbalance_over_a_short_stroke_whichever_of_the_two_stands() -> None:
+    offset, other = trial(OFFSET, 0.895), trial(UNBALANCE, 0.8951, 2)
+    assert Place(OFFSET, offset, (other,)).ambiguous_with == ("gravity_unbalance",)
+    assert Place(UNBALANCE, other, (trial(OFFSET, 0.84),)).ambiguous_with == ("torque_offset",)
+    assert Place(UNBALANCE, other, (trial(OFFSET, 0.7),)).ambiguous_with == ()
+
+
+def test_shares_of_an_effect_and_its_rivals_leave_the_rest_to_nothing_and_a_parameter_has_its_price() -> None:
+    shares = Place(OFFSET, trial(OFFSET, 0.9), (trial(UNBALANCE, 0.9, 2),)).shares
+    assert 0.99 < sum(shares.values()) < 1
+    assert shares["torque_offset"] > 2 * shares["gravity_unbalance"]
+
+
+def test_where_the_set_point_speaks_its_chi_squared_is_the_evidence() -> None:
+    delay, lag = Delay(delay_ms=5.0), ActuatorLag(time_constant_ms=5.0)
+    heard = {"delay": 10.0, "actuator_lag": 30.0, "none": 500.0}
+    place = Place(delay, trial(delay, 0.6), (trial(lag, 0.8),), heard)
+    assert place.better.effect is delay
+    assert place.ambiguous_with == ()
+    assert place.shares["actuator_lag"] == pytest.approx(np.exp(-10) * place.probability)
+
+
+def problem(speed: Array, **columns: Array) -> Problem:
+    t = np.arange(len(speed)) / 1000
+    given = {"t": t, "tau": speed, "q": np.cumsum(speed) / 1000, **columns}
+    prepared = prepare([Recording("r", given)], 10.0)
+    return Problem(MOUNT, prepared, np.ones(len(prepared.recording_of)), 1e-3)
+
+
+def test_a_cable_whose_home_is_many_strokes_away_is_an_offset() -> None:
+    swing = problem(np.sin(np.arange(20_000) / 1000))  # from 0 to 2 rad
+    assert not is_another(swing, CableWrap(stiffness=0.1, home=-1.5))
+    assert is_another(swing, CableWrap(stiffness=0.1, home=-3.0))
+    assert is_another(swing, CableWrap(stiffness=0.1, home=5.0))
+
+
+def test_noise_at_constant_speed_tells_no_delay_unless_a_set_point_asks_for_it() -> None:
+    late = trial(Delay(delay_ms=5.0), 0.5)
+    steady = 1 + 0.02 * np.random.default_rng(1).standard_normal(20_000)
+    for found, told in ((problem(steady), False), (problem(steady, q_d=np.arange(20_000) / 1000), True)):
+        rest = np.zeros(len(found.prepared.recording_of))
+        explained = Trial(late.effect, Fit(MOUNT, (), NONE, NONE, NONE, rest), late.score, 0.5)
+        assert is_real(found, explained) is told
