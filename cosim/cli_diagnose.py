@@ -1,8 +1,9 @@
 """`cosim diagnose`: recordings and a card to what the card lacks, and a better card and FMU."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from shlex import join
 from typing import Annotated, Any
 
 import typer
@@ -50,15 +51,16 @@ def diagnose(
     _check_split(fitted, held)
     seconds = sum(recording.duration for recording in recordings)
     say(f"Read {len(recordings)} recordings, {seconds:.0f} s; card {believed.mount.name}")
-    kept = " ".join(f"--heldout {path}" for path in heldout)
-    command = f"cosim diagnose {' '.join(map(str, train))} {kept} --card {card} --out {out}"
+    given: dict[str, Sequence[object]] = {"--heldout": heldout, "--card": [card], "--out": [out]}
+    given |= {"--columns": columns or (), "--units": units or (), "--fmu": [fmu] if fmu else ()}
+    command = _command(train, given | {"--variables": variables or ()})
     more: Any = {}
     with stage("looking for what the model lacks") as progress:
         if fmu:
             box = BlackBox(fmu, {name: Alias(theirs) for name, theirs in pairs_of("--variables", variables).items()})
             base = as_base(box, fitted, held, believed, progress.tell)
             more["more"] = Correction(box, base.card, *motion_of(recordings[0])).deliver
-            fitted, held, believed, command = [*base.train], [*base.heldout], base.card, f"{command} --fmu {fmu}"
+            fitted, held, believed = [*base.train], [*base.heldout], base.card
         outcome = find(fitted, held, believed, progress.tell)
         done = deliver(outcome, fitted, held, believed, out, command, progress.tell, **more)
     if as_json:
@@ -67,6 +69,12 @@ def diagnose(
         put(summary(done))
     if check and done.verdict:
         sys.exit(1)
+
+
+def _command(train: Sequence[Path], options: Mapping[str, Sequence[object]]) -> str:
+    """The command line that does the same again."""
+    told = [word for name, values in options.items() for value in values for word in (name, str(value))]
+    return join(["cosim", "diagnose", *map(str, train), *told])
 
 
 def _check_split(train: Sequence[Recording], heldout: Sequence[Recording]) -> None:

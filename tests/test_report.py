@@ -23,6 +23,7 @@ from cosim.diagnosis.report.explorer import payload
 from cosim.diagnosis.report.figures_dynamic import VIEWS
 from cosim.diagnosis.report.figures_proof import relative
 from cosim.diagnosis.report.quantities import Scales
+from cosim.diagnosis.report.tables import limits, numbers
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Region, Trace, Where
 from cosim.diagnosis.terminal import summary
 from cosim.pictures.quantities import minus, number
@@ -77,7 +78,8 @@ def region(axis: str, unit: str, traces: tuple[Trace, ...], after: bool) -> Regi
 FOUND = (
     Finding(
         effect="cogging", title="Cogging", answer="found", probability=0.97, gain=0.62,
-        parameters={"cycles_per_rev": 24.0, "amplitude": 0.42, "phase": 0.4},
+        parameters={"cycles_per_rev": 24.0, "amplitude": 0.42, "phase": 0.4, "harmonics": [
+            {"cycles_per_rev": 48.0, "amplitude": 0.125, "phase": -0.3}]},
         units={"amplitude": "N·m", "phase": "rad"},
         standard_errors={"amplitude": 0.015, "phase": 0.03}, ranges={"amplitude": (0.39, 0.45), "phase": (0.34, 0.46)},
         size="0.42 N·m", size_range="0.39 to 0.45", visible_from=0.05,
@@ -322,6 +324,19 @@ def test_explorer_data_comes_back_within_its_step() -> None:
     tau = diagnosis().traces[0].tau
     assert name == "tau"
     assert np.allclose((values.min(), values.max()), (tau.min(), tau.max()), atol=2 * step)
+
+
+def test_further_waves_of_a_ripple_stand_in_its_table() -> None:
+    rows = {row[0]: row[1] for row in numbers(FOUND[0]).rows}
+    assert (rows["amplitude"], rows["amplitude, wave 2"], rows["phase, wave 2"]) == ("0.4200", "0.1250", "−0.3000")
+
+
+def test_where_nothing_is_missing_no_effect_is_left_out_of_the_first_screen_and_no_gain_is_claimed() -> None:
+    whole = diagnosis("none")
+    cells = " ".join(row[0] for row in limits(whole).rows).lower()
+    assert all(one.title.lower() in cells for one in whole.findings if one.answer in ("not_seen", "not_testable"))
+    assert "so there is no gain to prove" in page("none")
+    assert "so there is no gain to prove" not in page("two")
 
 
 def test_numbers_read_well() -> None:

@@ -33,7 +33,8 @@ class Finding:
     probability: float
     gain: float
     """Share of the cross-validated residual energy that this effect removes (0..1), on training data."""
-    parameters: dict[str, float] = field(default_factory=dict)
+    parameters: dict[str, Any] = field(default_factory=dict)
+    """Numbers by name; those of the further waves of a ripple as a list under "harmonics"."""
     standard_errors: dict[str, float] = field(default_factory=dict)
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
     """95 % ranges of the parameters, from a block bootstrap."""

@@ -46,7 +46,7 @@ def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, A
         "unseen": "" if kind == "none" else tables.unseen(diagnosis),
         "proof": proof(diagnosis, rows, scales),
         "parts_table": tables.parts(rows, scales),
-        "added": any(finding.answer == "found" for finding in diagnosis.findings),
+        "added": bool(_added(diagnosis)),
         "with_effects": _with_effects(diagnosis),
         "box": _box(diagnosis, [row.label for row in rows if row.change == "worse"], scales),
         "noun": "torque" if diagnosis.motion == "rotary" else "force",
@@ -69,8 +69,13 @@ def _rate(hertz: float) -> str:
     return joined(f"{hertz / 1000:.4g}", "kHz") if hertz >= 1000 else joined(f"{hertz:.4g}", "Hz")
 
 
+def _added(diagnosis: Diagnosis) -> int:
+    """Count the effects that are in the improved model."""
+    return sum(finding.answer == "found" for finding in diagnosis.findings)
+
+
 def _with_effects(diagnosis: Diagnosis) -> str:
-    found = sum(finding.answer == "found" for finding in diagnosis.findings)
+    found = _added(diagnosis)
     return {0: "after (nothing added)", 1: "with the effect"}.get(
         found, f"with the {words.count(found).lower()} effects"
     )
@@ -139,10 +144,13 @@ def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
 
 def _proof_sentence(diagnosis: Diagnosis, scales: Scales) -> str:
     held, unit = diagnosis.heldout, scales.torque
+    kept = f"{held.name} was not used for fitting."
+    if not _added(diagnosis):
+        return f"{kept} Nothing was added to the model, so there is no gain to prove."
     low, high = held.confidence_interval
     sure = "" if low > 0 else " That range includes zero: no clear change." if high >= 0 else " It is worse."
     gain = f"The error falls by {unit.text(held.before_rms - held.after_rms)} (95 % range {unit.span(low, high)})."
-    return f"{held.name} was not used for fitting. {gain}{sure}"
+    return f"{kept} {gain}{sure}"
 
 
 def _places(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> Iterator[Picture]:

@@ -1,6 +1,6 @@
 """The tables of the page, as rows of text."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from cosim.diagnosis.report.derive import Part, bars
 from cosim.diagnosis.report.equations import CONDITIONS
 from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.words import ANSWERS, lowered, shows_from
+from cosim.diagnosis.report.words import ANSWERS, lowered, shows_from, unit_of
 from cosim.diagnosis.result import Diagnosis, Finding, Trace
 from cosim.pictures.quantities import decimals, minus, number
 
@@ -38,24 +38,46 @@ def _from(finding: Finding) -> str:
 
 def limits(diagnosis: Diagnosis) -> Table:
     """Group effects that were not seen or cannot be tested, for the first screen of "nothing is missing"."""
-    unseen = [finding for finding in diagnosis.findings if finding.answer == "not_seen"]
-    rows = [(ANSWERS["not_seen"], finding.title, shows_from(finding) or "–") for finding in unseen[:9]]
-    rows += [(ANSWERS["not_testable"], f.title, _from(f)) for f in diagnosis.findings if f.answer == "not_testable"][:4]
-    return Table(
-        ("Effect", "Answer", "Would have shown from"), tuple((name, answer, text) for answer, name, text in rows)
-    )
+    groups: dict[tuple[str, str], list[Finding]] = {}
+    for finding in diagnosis.findings:
+        if finding.answer == "not_seen":
+            key = unit_of(finding) if finding.visible_from is not None else _from(finding)
+            groups.setdefault((finding.answer, key), []).append(finding)
+    for finding in diagnosis.findings:
+        if finding.answer == "not_testable":
+            groups.setdefault((finding.answer, _from(finding)), []).append(finding)
+    rows = [(_titles(group), ANSWERS[answer], _limits(group)) for (answer, _), group in groups.items()]
+    return Table(("Effect", "Answer", "Would have shown from"), tuple(rows))
+
+
+def _titles(group: Sequence[Finding]) -> str:
+    return ", ".join([group[0].title, *(lowered(finding.title) for finding in group[1:])])
+
+
+def _limits(group: Sequence[Finding]) -> str:
+    """The limits of effects in their order, or what is the same for all of them."""
+    texts = [_from(finding) for finding in group]
+    return ", ".join(texts) if len(set(texts)) > 1 else texts[0]
 
 
 def numbers(finding: Finding) -> Table:
     """List the parameters of a finding with standard error and 95 % range."""
     rows = []
-    for name, value in finding.parameters.items():
+    for name, unit, value in _values(finding):
         error, ends = finding.standard_errors.get(name), finding.ranges.get(name)
         span = " to ".join(decimals(ends, 3)) if ends else ""
-        rows.append(
-            (name, number(value, 4), number(error) if error is not None else "", span, finding.units.get(name, ""))
-        )
+        rows.append((name, number(value, 4), number(error) if error is not None else "", span, unit))
     return filled(Table(("Parameter", "Value", "Standard error", "95 % range", "Unit"), tuple(rows), (1, 2, 3), ""))
+
+
+def _values(finding: Finding) -> Iterator[tuple[str, str, float]]:
+    """Name, unit and value of each parameter; of the further waves of a ripple with their number before it."""
+    for name, value in finding.parameters.items():
+        if name != "harmonics":
+            yield name, finding.units.get(name, ""), value
+    for number_, wave in enumerate(finding.parameters.get("harmonics", ()), 2):
+        for name, value in wave.items():
+            yield f"{name}, wave {number_}", finding.units.get(name, ""), value
 
 
 def filled(table: Table) -> Table:
