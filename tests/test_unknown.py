@@ -9,6 +9,8 @@ from cosim.diagnosis.adequacy import LARGE, Rest, rest_of
 from cosim.diagnosis.bank import last_reversal
 from cosim.diagnosis.evidence import Blocks, Whitening
 from cosim.diagnosis.fit import fit
+from cosim.diagnosis.flagged import Rest as Pieces
+from cosim.diagnosis.flagged import flagged, loud_states, noise_at
 from cosim.diagnosis.prepare import prepare
 from cosim.diagnosis.structure import Bench, nuisances
 from cosim.recording import Recording
@@ -112,3 +114,37 @@ def test_a_turn_counts_once_the_motion_came_back_far_enough() -> None:
     turned, direction = last_reversal(q, 0.1)
     assert turned.tolist() == [0, 0, 0, 0, 0, 5, 5, 5, 5, 9]
     assert direction.tolist() == [1, 1, 1, 1, 1, -1, -1, -1, -1, 1]
+
+
+def piece(loud: tuple[float, float], seed: int, fitted: bool = True, noise: float = 0.05) -> Pieces:
+    """A minute that turns every 7 s and rests from 40 to 44 s; friction is doubled in one span."""
+    t = np.arange(6000) / 100
+    v = np.where(np.abs(t - 42) < 2, 0.0, np.sin(2 * np.pi * t / 14))
+    rubbing = (t > loud[0]) & (t < loud[1])
+    left = noise * np.random.default_rng(seed).standard_normal(len(t)) + rubbing * np.sign(v) - 0.2 * np.sign(v)
+    return Pieces(t, v, left, left, np.column_stack([np.sign(v), v]), fitted)
+
+
+def test_spans_are_found_though_the_base_was_fitted_to_them_too() -> None:
+    when = [(10.0, 25.0), (38.0, 47.0), (30.0, 36.0)]
+    found = flagged([piece(span, k, k < 2) for k, span in enumerate(when)])
+    for spans, true in zip(found, when, strict=True):
+        np.testing.assert_allclose(spans, [true], atol=0.5)
+
+
+def test_noise_is_never_flagged() -> None:
+    assert flagged([piece((0, 0), seed) for seed in (1, 2, 3)]) == [(), (), ()]
+
+
+def test_one_spike_is_no_span_and_a_lasting_change_is() -> None:
+    spike, step = np.full(50, -0.3), np.full(50, -0.3)
+    spike[20], step[:20], step[20:40], step[40:] = 9.0, -1.0, 1.0, -1.0
+    assert not loud_states(spike, 5.0).any()
+    assert np.flatnonzero(loud_states(step, 5.0)).tolist() == list(range(20, 40))
+
+
+def test_noise_is_measured_at_each_speed_and_not_by_what_is_there_for_a_while() -> None:
+    rng, speed = np.random.default_rng(0), np.linspace(0, 1, 8000)
+    left = (1 + 4 * speed) * rng.standard_normal(8000)
+    left[rng.random(8000) < 0.1] *= 30
+    assert noise_at(speed, left, np.array([0.1, 0.9])) == pytest.approx([1.4, 4.6], rel=0.25)

@@ -11,6 +11,8 @@ import numpy as np
 
 from cosim.diagnosis.bank import bank
 from cosim.diagnosis.claim import claimed, least_speed
+from cosim.diagnosis.fit import free_parameters
+from cosim.diagnosis.flagged import Rest, Spans, flagged, noise_at
 from cosim.diagnosis.inverse import Inverse
 from cosim.diagnosis.prepare import Array, Piece, Prepared, prepare
 from cosim.diagnosis.result import HeldOut, Trace
@@ -129,22 +131,35 @@ def _interval(before: Array, after: Array, dt: float) -> tuple[float, float]:
 
 def traces(train: Sequence[Recording], heldout: Sequence[Recording], models: Structures) -> tuple[Trace, ...]:
     """Signals of all recordings for pictures and for the file of missing torque."""
-    found = []
-    for number, recording in enumerate((*train, *heldout)):
-        prepared, held = prepare([recording], CUTOFF), number >= len(train)
-        before, after = residuals(prepared, models.before), residuals(prepared, models.after)
-        found.append(_trace(recording, held, prepared, np.concatenate(before), np.concatenate(after)))
-    return tuple(found)
+    prepared = [prepare([recording], CUTOFF) for recording in (*train, *heldout)]
+    rests = [_rests(one, models, number < len(train)) for number, one in enumerate(prepared)]
+    spans = iter(flagged([rest for parts in rests for rest in parts]))
+    intervals = [tuple(span for _ in parts for span in next(spans)) for parts in rests]
+    found = zip(prepared, rests, intervals, strict=True)
+    return tuple(_trace(one, parts, when) for one, parts, when in found)
 
 
-def _trace(recording: Recording, held: bool, prepared: Prepared, before: Array, after: Array) -> Trace:
-    inside = np.concatenate([piece.inside for piece in prepared.pieces])
-    signals = [np.concatenate([getattr(p, name) for p in prepared.pieces])[inside] for name in ("t", "q", "v", "tau")]
-    (t, q, v, tau), before, after = signals, before[inside], after[inside]
-    band = _band(after, v)
+def _rests(prepared: Prepared, models: Structures, fitted: bool) -> list[Rest]:
+    """What the refitted base and the better model leave of each piece, away from its edges."""
+    inverse = Inverse(models.before, free_parameters(models.before))
+    rests = []
+    for piece, after in zip(prepared.pieces, residuals(prepared, models.after), strict=True):
+        torque, slopes = inverse.torque(piece, inverse.present)
+        rows = piece.inside
+        left = (piece.tau - torque)[rows]
+        rests.append(Rest(piece.t[rows], piece.v[rows], left, after[rows], slopes[rows], fitted))
+    return rests
+
+
+def _trace(prepared: Prepared, rests: Sequence[Rest], intervals: Spans) -> Trace:
+    (name,) = prepared.names
+    q, tau = (np.concatenate([getattr(p, signal)[p.inside] for p in prepared.pieces]) for signal in ("q", "tau"))
+    t, v, before, after = (
+        np.concatenate([getattr(rest, signal) for rest in rests]) for signal in ("t", "v", "residual", "after")
+    )
     return Trace(
-        name=recording.name,
-        heldout=held,
+        name=name,
+        heldout=not rests[0].fitted,
         t=t,
         q=q,
         v=v,
@@ -152,24 +167,6 @@ def _trace(recording: Recording, held: bool, prepared: Prepared, before: Array, 
         before=tau - before,
         after=tau - after,
         missing=before,
-        band=band,
-        intervals=_intervals(t, before, band),
+        band=Z95 * noise_at(v, after, v),
+        intervals=intervals,
     )
-
-
-def _band(after: Array, v: Array) -> Array:
-    """Half width of the 95 % band: what the better model leaves at about this speed."""
-    order = np.argsort(np.abs(v))
-    parts = [part for part in np.array_split(order, 12) if len(part)]
-    centres = [float(np.median(np.abs(v[part]))) for part in parts]
-    return np.interp(np.abs(v), centres, [Z95 * rms(after[part]) for part in parts])
-
-
-def _intervals(t: Array, missing: Array, band: Array) -> tuple[tuple[float, float], ...]:
-    """Spans of at least 0.2 s in which the missing torque, smoothed over 0.1 s, leaves its band."""
-    width = max(1, int(0.1 / (t[1] - t[0])))
-    smooth = np.convolve(missing, np.ones(width) / width, "same")
-    out = np.concatenate([[False], np.abs(smooth) > band, [False]])
-    starts, ends = np.flatnonzero(~out[:-1] & out[1:]), np.flatnonzero(out[:-1] & ~out[1:])
-    spans = zip(t[starts], t[np.minimum(ends, len(t) - 1)], strict=True)
-    return tuple((float(a), float(b)) for a, b in spans if b - a >= 0.2)
