@@ -61,6 +61,8 @@ class Span:
     seconds: float
     extras: frozenset[str]
     """Columns that all recordings have beside the usual ones."""
+    asked: bool
+    """Whether any motion was asked for, which alone tells of timing."""
 
     @property
     def top(self) -> float:
@@ -98,6 +100,7 @@ def span_of(mount: Mount, prepared: Prepared, residual: Array, level: Array) -> 
         heard=heard(prepared),
         seconds=max(float(piece.t[-1] - piece.t[0]) for piece in prepared.pieces),
         extras=common,
+        asked=any(piece.asked for piece in prepared.pieces),
     )
 
 

@@ -218,6 +218,8 @@ def _why_not(name: str, mount: Mount, prepared: Prepared) -> str:
         return "the card's friction law has it already"
     if not prepared.has_position and name in ("cogging", "position_friction", "gravity_unbalance"):
         return "no position was recorded; record q"
+    if name in ("delay", "actuator_lag", "clock_skew") and not any(piece.asked for piece in prepared.pieces):
+        return "nothing asks for a change of torque; record a speed that changes, and the set point"
     if name in ("delay", "actuator_lag") and any(isinstance(effect, DriveEffect) for effect in mount.effects):
         return "alike to what was found in the drive; record faster reversals to tell them apart"
     return "the model has it already, or these recordings do not excite it"

@@ -22,6 +22,8 @@ CUTOFFS = (100.0, 70.0, 50.0, 40.0, 30.0, 24.0, 19.0, 15.0, 12.0, 10.0, 8.0)
 NOISE_SHARE = 0.003
 JITTER = 1e-3
 """RMS jitter, relative to the sample time, above which samples are interpolated to an even grid."""
+STEADY = 0.1
+"""Without a set point, a speed that varies by less than this share is taken for constant: what a loop leaves of it."""
 LEAST_SECONDS = 2.0
 """A contiguous piece shorter than this is left out."""
 BRIDGED = 0.25
@@ -51,6 +53,11 @@ class Piece:
     def lowpass(self, columns: Array) -> Array:
         """Second pass of the filter, along the first axis."""
         return lowpass(columns, self.dt, self.cutoff)
+
+    @cached_property
+    def asked(self) -> bool:
+        """Whether its motion was asked for: a set point tells, else a speed that is not constant."""
+        return "q_d" in self.extras or bool(np.std(self.v) > STEADY * np.sqrt(np.mean(self.v**2)))
 
     @cached_property
     def kept(self) -> npt.NDArray[np.int64]:

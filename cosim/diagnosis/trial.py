@@ -14,7 +14,7 @@ from cosim.diagnosis.candidates import ROOM
 from cosim.diagnosis.evidence import Score, t_value
 from cosim.diagnosis.fit import FIXED, LEAST_VS, Fit, fit
 from cosim.diagnosis.lateness import blamed
-from cosim.diagnosis.prepare import Array, Piece, Prepared
+from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.shaken import heard
 from cosim.diagnosis.structure import Bench
 from pyfmi_models.effects import (
@@ -49,8 +49,6 @@ WHOLE = 0.01
 LEAST_CHANGES = 0.5
 """Share of the torque's changes from row to row that a model with a delay or a lag must explain: in noise that the
 controller answers, time runs otherwise than in the machine."""
-STEADY = 0.1
-"""Without a set point, a speed that varies by less than this share is taken for constant: what a loop leaves of it."""
 CLEARLY = 2.0
 TIE = 0.96
 """A simpler effect wins if it reaches this share of the best gain and is not worse by `CLEARLY` standard errors."""
@@ -156,16 +154,11 @@ def _in_time(problem: Problem, trial: Trial) -> bool:
     if not isinstance(trial.effect, DriveEffect | ClockEffect):
         return True
     pieces = problem.prepared.pieces
-    counted = np.concatenate([np.full(len(piece.kept), _is_asked(piece)) for piece in pieces]) & (problem.weight > 0)
+    counted = np.concatenate([np.full(len(piece.kept), piece.asked) for piece in pieces]) & (problem.weight > 0)
     owner = problem.prepared.recording_of
     rows = np.flatnonzero(counted[1:] & counted[:-1] & (owner[1:] == owner[:-1]))
     left, all_of_it = (np.diff(one)[rows] for one in (trial.fit.residual, problem.prepared.stacked("tau")))
     return float(left @ left) < (1 - LEAST_CHANGES) * float(all_of_it @ all_of_it)
-
-
-def _is_asked(piece: Piece) -> bool:
-    """Whether a piece holds motion that was asked for: a set point tells, else a speed that is not constant."""
-    return "q_d" in piece.extras or bool(np.std(piece.v) > STEADY * np.sqrt(np.mean(piece.v**2)))
 
 
 def is_another(problem: Problem, effect: Effect) -> bool:

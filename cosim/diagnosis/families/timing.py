@@ -13,6 +13,8 @@ from pyfmi_models.mount import Mount
 
 def late(mount: Mount, span: Span) -> Iterator[Candidate]:
     """Delays and lags of several sizes."""
+    if not span.asked:
+        return
     for ms in (0.3, 1.0, 3.0, 8.0):
         for effect in (Delay(delay_ms=ms), ActuatorLag(time_constant_ms=ms)):
             if not has(mount, type(effect)):
@@ -30,7 +32,7 @@ def _timed(effect: Effect, ms: float) -> Effect:
 
 def clocks(mount: Mount, span: Span) -> Iterator[Candidate]:
     """Readings that are newer or older than the torque beside them, or that drift either way."""
-    if has(mount, ClockSkew):
+    if has(mount, ClockSkew) or not span.asked:
         return
     ways = [ClockSkew(offset_ms=ms) for ms in (1.0, 4.0)]
     ways += [ClockSkew(drift_ppm=4e3 / span.seconds)]
