@@ -43,7 +43,7 @@ def answered(*amplitudes: float) -> Outcome:
     *train, held = shaken(*amplitudes)
     card = replace(read_card("paper_mount"), controller=None)
     card = replace(card, mount=card.mount.model_copy(update={"inertia": 5.0}), friction=BASE.friction)
-    return diagnose(train, held, card)
+    return diagnose(train, [held], card)
 
 
 def test_a_fit_finds_one_frequency_and_one_amplitude_over_recordings_of_other_phases() -> None:
@@ -97,7 +97,8 @@ def test_a_concealed_disturbance_is_named_and_has_a_ceiling(tmp_path: Path) -> N
     case = make_case(5000, ["periodic_disturbance"], duration=20)
     write_case(case, tmp_path)
     train = [Recording.read(tmp_path / f"train_{k}.parquet") for k in (1, 2)]
-    outcome = diagnose(train, Recording.read(tmp_path / "heldout.parquet"), parse_card(to_toml(case.card), "card.toml"))
+    held = Recording.read(tmp_path / "heldout.parquet")
+    outcome = diagnose(train, [held], parse_card(to_toml(case.card), "card.toml"))
     assert outcome.diagnosis.verdict == ("periodic_disturbance",)
     true = case.truth["effects"][0]["parameters"]
     (tone,) = outcome.card.effects
