@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from test_inverse import recorded
 
+from cosim.diagnosis.candidates import Span
 from cosim.diagnosis.diagnose import Outcome, diagnose
+from cosim.diagnosis.families.periodogram import tones
 from cosim.diagnosis.fit import fit
 from cosim.diagnosis.inverse import Inverse
 from cosim.diagnosis.prepare import gain, lowpass, prepare
@@ -82,12 +84,10 @@ def test_gain_is_what_the_filter_leaves_of_a_tone() -> None:
 
 def test_a_tone_in_one_recording_only_is_no_disturbance_of_all() -> None:
     assert "periodic_disturbance" in answered(AMPLITUDE, AMPLITUDE, AMPLITUDE).diagnosis.verdict
-    assert "periodic_disturbance" not in answered(AMPLITUDE, 0.0, 0.0).diagnosis.verdict
-
-
-def test_where_nothing_shakes_the_axis_it_is_said_which_frequencies_would_have_shown() -> None:
-    found = answered(0.0, 0.0, 0.0).diagnosis
+    found = answered(AMPLITUDE, 0.0, 0.0).diagnosis
+    assert "periodic_disturbance" not in found.verdict
     (one,) = (finding for finding in found.findings if finding.effect == "periodic_disturbance")
+    # Which frequencies would have shown is said where it was not seen.
     assert one.answer == "not_seen"
     assert one.evidence.startswith("between ")
     assert one.evidence.endswith(" Hz")
@@ -107,3 +107,35 @@ def test_a_concealed_disturbance_is_named_and_has_a_ceiling(tmp_path: Path) -> N
     best, base = (ceiling(str(tmp_path), effects)["heldout_rms"] for effects in (case.truth["effects"], []))
     assert best < 0.5 * base
     assert outcome.diagnosis.heldout.after_rms < 1.2 * best
+
+
+def test_harmonics_of_a_motion_that_repeats_itself_are_no_tones() -> None:
+    t = np.arange(6000) / 125
+    pitch = 0.35
+    steady, wandering = (np.cos(2 * np.pi * pitch * t + 0.5 * wild * np.sin(0.4 * t)) for wild in (0, 9))
+    residual = np.sin(2 * np.pi * 3 * pitch * t) + 0.1 * np.random.default_rng(1).standard_normal(len(t))
+    for v, seen in ((steady, False), (wandering, True)):
+        given = {name: np.zeros(len(t)) for name in ("angle", "q", "tau", "level")}
+        piece = np.zeros(len(t), np.int64)
+        span = Span(
+            piece=piece,
+            t=t,
+            v=v,
+            residual=residual,
+            cutoff=20.0,
+            heard=(0.2, 20.0),
+            seconds=48.0,
+            extras=frozenset(),
+            **given,
+        )
+        found = tones(span, residual)
+        assert any(abs(hertz - 3 * pitch) < 0.02 for hertz in found) == seen
+
+
+def test_recordings_too_short_for_a_tone_have_none() -> None:
+    t = np.arange(40) / 10
+    given = {name: np.zeros(len(t)) for name in ("angle", "q", "v", "tau", "level", "residual")}
+    span = Span(
+        piece=np.zeros(40, np.int64), t=t, cutoff=2.0, heard=(1.5, 2.0), seconds=4.0, extras=frozenset(), **given
+    )
+    assert tones(span, span.residual) == []

@@ -95,7 +95,7 @@ class Place:
         margin = excludes(self.misfits, self.effect, rival.effect)
         if margin is not None:
             return -margin / 2
-        more = len(rival.fit.free) - len(self.trial.fit.free)
+        more = rival.fit.count - self.trial.fit.count
         price = log(max(float(self.trial.score.rows.sum()) / TEMPERATURE, 1.0)) / 2
         return (rival.score.nats - self.trial.score.nats) / TEMPERATURE - more * price
 

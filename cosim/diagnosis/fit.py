@@ -50,6 +50,13 @@ class Fit:
     torque: Array
     slopes: Array
     residual: Array
+    phases: int = 0
+    """How many phases were found beside the free parameters, one in each piece for each tone."""
+
+    @property
+    def count(self) -> int:
+        """How many numbers were fitted."""
+        return len(self.free) + self.phases
 
     @property
     def rms(self) -> float:
@@ -126,7 +133,7 @@ def fit(
     torque, slopes = stacked(inverse, pieces, values)
     phases = inverse.phases(pieces[0], values)
     fitted = with_values(mount, (*free, *phases), np.array([*values, *phases.values()]))
-    return Fit(fitted, free, values, torque, slopes, tau - torque)
+    return Fit(fitted, free, values, torque, slopes, tau - torque, len(phases) * len(pieces))
 
 
 def least_squares(

@@ -17,7 +17,7 @@ from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.mount import Mount
 
 LEAST_WAVES = 6
-"""Waves that the shortest piece must hold: what is slower is drift, or friction that wanders."""
+"""Waves that the longest piece must hold: what is slower is drift, or friction that wanders."""
 Rows = npt.NDArray[np.bool_]
 
 
@@ -34,7 +34,7 @@ def phases_of(mount: Mount) -> tuple[str, ...]:
 
 def heard(prepared: Prepared) -> tuple[float, float]:
     """Lowest and highest frequency [Hz] that can be told from drift and lies in the band of the analysis."""
-    seconds = min(float(np.ptp(piece.t[piece.kept])) for piece in prepared.pieces)
+    seconds = max(len(piece.kept) * piece.stride * piece.dt for piece in prepared.pieces)
     return LEAST_WAVES / seconds, prepared.cutoff
 
 

@@ -217,12 +217,12 @@ def winner(trials: Sequence[Trial]) -> Trial | None:
         return None
     best = max(trials, key=lambda trial: trial.gain)
     near = [best, *(trial for trial in trials if simpler_wins(trial, best))]
-    return min(near, key=lambda trial: (len(trial.fit.free), -trial.gain))
+    return min(near, key=lambda trial: (trial.fit.count, -trial.gain))
 
 
 def simpler_wins(trial: Trial, best: Trial) -> bool:
     """Whether a trial with fewer parameters explains as much as the best one, as far as that can be said."""
-    if len(trial.fit.free) >= len(best.fit.free) or trial.gain < TIE * best.gain:
+    if trial.fit.count >= best.fit.count or trial.gain < TIE * best.gain:
         return False
     return best.effect.id in LIMITS.get(trial.effect.id, ()) or not clearly_worse(trial, best)
 

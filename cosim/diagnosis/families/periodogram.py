@@ -8,10 +8,13 @@ import numpy.typing as npt
 
 from cosim.diagnosis.candidates import Span
 from cosim.diagnosis.prepare import Array
+from cosim.diagnosis.shaken import LEAST_WAVES
 
 PEAKS = 3
 """Peaks that become candidates, for each periodic effect."""
 LEAST_ROWS = 50
+LEAST_TURNS, REPEATING = 8, 0.9
+"""Periods of a motion, and share of the energy of its speed in their harmonics, that show that it repeats itself."""
 NEIGHBOURS = 10
 """Tones that a piece tells apart, on either side of one, whose mean power is the level there."""
 BAND, FINE = 1.15, 16
@@ -41,19 +44,35 @@ def peaks(span: Span, signal: Array, lowest: float = 1.0) -> list[float]:
 def tones(span: Span, signal: Array) -> list[float]:
     """Frequencies [Hz] of the tones that stand out most from their neighbours, at most `PEAKS`, well apart.
 
-    Each piece has its own phase, so powers are added, each in units of the level of its neighbours.
+    Each piece has its own phase, so powers are added, each in units of the level of its neighbours. Where the motion
+    repeats itself, so does all that depends on it: its harmonics are no sign of a disturbance.
     """
-    numbers = np.unique(span.piece)
-    seconds = min(float(np.ptp(span.t[span.piece == number])) for number in numbers)
+    pieces = [np.flatnonzero(span.piece == number) for number in np.unique(span.piece)]
+    pieces = [own for own in pieces if len(own) >= LEAST_ROWS]
+    seconds = LEAST_WAVES / span.heard[0]
     fine = np.arange(*span.heard, 0.25 / seconds)
-    standing = np.sum([_standing(span.t[own], signal[own], fine) for own in (span.piece == n for n in numbers)], axis=0)
+    if not pieces or len(fine) < NEIGHBOURS:
+        return []
+    standing = np.sum([_standing(span.t[own], signal[own], fine) for own in pieces], axis=0)
+    standing[np.all([_repeated(span.t[own], span.v[own], fine) for own in pieces], axis=0)] = 0.0
     found: list[float] = []
     for index in np.argsort(standing)[::-1]:
-        if all(abs(fine[index] - other) > 3 / seconds for other in found):
+        if all(abs(fine[index] - other) > 3 / seconds for other in found) and standing[index] > 0:
             found.append(float(fine[index]))
         if len(found) == PEAKS:
             break
     return found
+
+
+def _repeated(t: Array, v: Array, hertz: Array) -> npt.NDArray[np.bool_]:
+    """Which frequencies are harmonics of a motion that repeats itself: none, if its speed is not a line spectrum."""
+    width = 1 / float(np.ptp(t))
+    fine = np.arange(width, 0.5 / float(t[1] - t[0]), 0.125 * width)
+    power = _spectrum(t, v, fine)
+    pitch = float(fine[np.argmax(power)])
+    harmonic = [np.abs(f - pitch * np.maximum(np.round(f / pitch), 1)) < 2 * width for f in (fine, hertz)]
+    repeats = pitch > LEAST_TURNS * width and power[harmonic[0]].sum() > REPEATING * power.sum()
+    return np.asarray(harmonic[1] & repeats)
 
 
 def _standing(t: Array, signal: Array, hertz: Array) -> Array:
