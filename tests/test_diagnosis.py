@@ -327,13 +327,14 @@ class TestCommand:
 def test_a_card_with_physics_that_the_inverse_model_lacks_is_refused() -> None:
     card = parse_card(
         '[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\n'
-        '[[effects]]\neffect = "quadratic_drag"\ncoefficient = 1.0\n[[effects]]\neffect = "backlash"\ngap_rad = 1e-3\n',
+        '[[effects]]\neffect = "quadratic_drag"\ncoefficient = 1.0\n'
+        '[[effects]]\neffect = "friction_wander"\nstd = 0.1\n',
         "card.toml",
     )
     t, q, _, a = wander()
     with pytest.raises(InputError) as caught:
         diagnose([recorded(2 * a, t, q)], [recorded(2 * a, t, q, "other")], card)
-    assert "The card holds backlash, which a diagnosis cannot take into account yet" in str(caught.value)
+    assert "The card holds friction_wander, which a diagnosis cannot take into account yet" in str(caught.value)
 
 
 def test_diagnosis_is_not_imported_by_a_run() -> None:

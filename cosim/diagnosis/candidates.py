@@ -63,6 +63,7 @@ class Span:
     """Columns that all recordings have beside the usual ones."""
     asked: bool
     """Whether any motion was asked for, which alone tells of timing."""
+    prepared: Prepared
 
     @property
     def top(self) -> float:
@@ -101,6 +102,7 @@ def span_of(mount: Mount, prepared: Prepared, residual: Array, level: Array) -> 
         seconds=max(float(piece.t[-1] - piece.t[0]) for piece in prepared.pieces),
         extras=common,
         asked=any(piece.asked for piece in prepared.pieces),
+        prepared=prepared,
     )
 
 

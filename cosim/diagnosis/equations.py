@@ -114,15 +114,15 @@ class Equations:
         pattern = ca.jacobian(self._following, self._symbols["state"]).sparsity()
         return [[j for j in range(k) if pattern.has_nz(k, j)] for k in range(self.count)]
 
-    def acceleration(self, piece: Piece, full: Array) -> Array:
-        """True acceleration at all rows of a piece."""
+    def motion(self, piece: Piece, full: Array) -> Array:
+        """True speed and acceleration at all rows of a piece, (2, rows)."""
         if not any(self._mount.of_kind(SensorEffect)):
-            return piece.a
-        return np.asarray(self._acceleration(self.columns(piece), full)[0])
+            return np.vstack([piece.v, piece.a])
+        return self._motion(self.columns(piece), full)
 
     @cached_property
-    def _acceleration(self) -> Rowwise:
-        return Rowwise(self._column, self._symbols["p"], self._true(self._symbols["a"]))
+    def _motion(self) -> Rowwise:
+        return Rowwise(self._column, self._symbols["p"], self._true(ca.vertcat(self._symbols["v"], self._symbols["a"])))
 
 
 def _asked(this: Mount, needed: Any) -> Any:

@@ -43,6 +43,7 @@ MAIN = {
     "clock_skew": ("offset_ms", 1.0, "ms"),
     "inertia_variation": ("relative_amplitude", 100.0, "%"),
     "compliance": ("resonance_hz", 1.0, "Hz"),
+    "backlash": ("gap_rad", 1.0, "rad"),
     "encoder_eccentricity": ("amplitude_rad", 1.0, "rad"),
 }
 """The number that says how large an effect is: parameter, factor and unit of the text."""
@@ -51,7 +52,7 @@ NOTES = {
     "fitted too; card and FMU hold that of the first"
 }
 """What must be said beside the evidence."""
-PLACES = ("stribeck", "presliding", "torque_saturation", "clock_skew", "compliance")
+PLACES = ("stribeck", "presliding", "torque_saturation", "clock_skew", "compliance", "backlash")
 """Effects whose number says where they set in, not how large they are: no smallest size can be told."""
 
 

@@ -3,10 +3,10 @@
     needed(t) = D^-1 [ J(q) q'' + J'(q) q'^2 / 2 + contact + viscous + loads + coupled ] + shaken
 
 with the true motion recovered from the reading, the states of friction and effects integrated along it, what hangs on
-a spring (`coupled`) answered in the frequency domain, and D the drive effects undone; then two clocks are brought
-together. Last comes what shakes the axis in time: its phase is another in each piece, found in the torque recorded
-there (`shaken.py`). The equations are those of the plant: the same objects, with measured motion put in
-(`equations.py`).
+a spring (`coupled`) answered in the frequency domain, what is behind a play simulated (`play.py`), and D the drive
+effects undone; then two clocks are brought together. Last comes what shakes the axis in time: its phase is another in
+each piece, found in the torque recorded there (`shaken.py`). The equations are those of the plant: the same objects,
+with measured motion put in (`equations.py`).
 """
 
 from collections.abc import Callable, Sequence
@@ -22,10 +22,12 @@ from scipy.linalg import solve_banded
 
 from cosim.diagnosis.claim import claimed
 from cosim.diagnosis.equations import Equations, equations_of
+from cosim.diagnosis.play import play_torque
 from cosim.diagnosis.prepare import Array, Piece
 from cosim.diagnosis.shaken import Tone, in_phase, phases_of
 from pyfmi_models.effects import ClockEffect, DriveEffect, Effect
-from pyfmi_models.effects.compliance import Compliance
+from pyfmi_models.effects.backlash import Backlash
+from pyfmi_models.effects.base import Coupling
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.model import with_symbols
 from pyfmi_models.mount import Mount
@@ -142,21 +144,30 @@ class Inverse:
         return other, change
 
     def _with_coupled(self, piece: Piece, columns: Array, full: Array) -> Array:
-        """Add what masses behind a spring need beyond being carried rigidly."""
-        if not self._parts(Compliance):
+        """Add what masses behind a spring or a play need beyond being carried rigidly.
+
+        Where several stand in a row, each is taken to follow the axis itself: what one of them does to the motion that
+        the next one sees is left out.
+        """
+        couplings = self._parts(Coupling)
+        if not couplings:
             return columns
-        spectrum = Spectrum(piece.lowpass(self._equations.acceleration(piece, full))[:, None], piece.dt)
+        v, a = self._equations.motion(piece, full)
+        spectrum = Spectrum(piece.lowpass(a)[:, None], piece.dt)
 
         def added(numbers: Array) -> Array:
-            inertia = numbers[self.names.index("axis.inertia")]
-            total = np.zeros_like(spectrum.omega, dtype=np.complex128)
-            for prefix in self._parts(Compliance):
-                spring = self._set(prefix, numbers)
-                total += inertia * spring.share() * (spring.carried(spectrum.omega) - 1)
-                inertia = inertia * spring.share()
-            return spectrum.times(total)[:, 0]
+            total: Array = np.zeros_like(a)
+            far = numbers[self.names.index("axis.inertia")]
+            for prefix in couplings:
+                coupling = self._set(prefix, numbers)
+                far = far * coupling.share()
+                if isinstance(coupling, Backlash):
+                    total += piece.lowpass(play_torque(coupling, far, v, a, piece.dt))
+                else:
+                    total += spectrum.times(far * (coupling.carried(spectrum.omega) - 1))[:, 0]
+            return total
 
-        return self._with_changes(columns, full, added, ("axis.inertia", *self._parts(Compliance)))
+        return self._with_changes(columns, full, added, ("axis.inertia", *couplings))
 
     def _with_changes(
         self, columns: Array, full: Array, added: Callable[[Array], Array], prefixes: Sequence[str]

@@ -19,6 +19,7 @@ from pyfmi_models.effects import (
     PeriodicFriction,
     StribeckEffect,
 )
+from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 
 BINS = 40
@@ -82,6 +83,8 @@ def where(effect: Effect, traces: Sequence[Trace]) -> Where:
         return Where(axis="direction", description="both directions, differently", regions=((-1, -1), (1, 1)))
     if isinstance(effect, Cogging | PeriodicFriction | GravityUnbalance):
         return Where(axis="position", description="everywhere that was visited", regions=((low, high),))
+    if isinstance(effect, Backlash):
+        return Where(axis="time since reversal", description="after each reversal, until the play is crossed")
     if isinstance(effect, PeriodicDisturbance):
         return Where(axis="frequency", description=f"everywhere, at {effect.frequency_hz:.4g} Hz", regions=())
     if isinstance(effect, DriveEffect):

@@ -16,7 +16,7 @@ class ActuatorLag(DriveEffect):
 
     id: ClassVar[str] = "actuator_lag"
     title: ClassVar[str] = "Actuator lag"
-    rivals: ClassVar[tuple[str, ...]] = ("delay", "clock_skew")
+    rivals: ClassVar[tuple[str, ...]] = ("delay", "clock_skew", "backlash")
     told_apart_by: ClassVar[str] = "a lag takes amplitude away at high frequency; a delay turns phase only"
     action: ClassVar[str] = "Check the bandwidth of the current loop and any torque filter in the drive."
     time_constant_ms: Scalar = parameter("ms", "Time constant of the torque build-up", low=0.02, high=200)

@@ -23,13 +23,14 @@ class Backlash(Coupling):
         torque = sign(twist) max(k depth + d depth', 0)
 
     With the defaults it rebounds at a seventh of the speed. Drive, friction, loads and encoder act on the near (motor)
-    mass; `load_friction` is what the far mass, output `q_load`, rubs by itself. It starts in the middle of the gap.
+    mass; the far mass, output `q_load`, rubs by itself: load_friction sign(v) + load_viscous v. That is what stops it
+    in the gap, so it says how much the play is felt. It starts in the middle of the gap.
     Reference: Nordin and Gutman, Automatica 38 (2002) 1633, dead-zone model with a damped shaft.
     """
 
     id: ClassVar[str] = "backlash"
     title: ClassVar[str] = "Backlash"
-    rivals: ClassVar[tuple[str, ...]] = ("compliance", "presliding", "friction_asymmetry")
+    rivals: ClassVar[tuple[str, ...]] = ("compliance", "presliding", "friction_asymmetry", "actuator_lag", "delay")
     told_apart_by: ClassVar[str] = "after each reversal the motor runs free over the same distance, at any speed"
     action: ClassVar[str] = "Preload the gear or the nut; check the key and the coupling."
     gap_rad: Scalar = parameter("rad", "Width of the play", low=0, nominal=1e-3, tunable=False)
@@ -41,6 +42,7 @@ class Backlash(Coupling):
     )
     damping_ratio: Scalar = parameter("1", "Damping of the contact", default=0.75, low=0, high=5)
     load_friction: Scalar = parameter("N.m", "Friction level of the far mass itself", default=0.0, low=0)
+    load_viscous: Scalar = parameter("N.m.s/rad", "Viscous friction of the far mass itself", default=0.0, low=0)
 
     def share(self) -> Scalar:
         """`load_share`."""
@@ -53,8 +55,26 @@ class Backlash(Coupling):
         return side * far * ca.fmax(omega * (omega * depth + 2 * self.damping_ratio * full * side * rate), 0)
 
     def drag(self, speed: Scalar) -> Scalar:
-        """`load_friction sign(speed)`, the sign smoothed."""
-        return self.load_friction * ca.tanh(speed / SMOOTHING)
+        """`load_friction sign(speed) + load_viscous speed`, the sign smoothed."""
+        return self.load_friction * ca.tanh(speed / SMOOTHING) + self.load_viscous * speed
+
+    def advance(self, twist: Scalar, far_speed: Scalar, speed: Scalar, dt: Scalar, far: Scalar) -> tuple[Scalar, ...]:
+        """Twist, speed of the far side and torque passed on [N m] after dt, the near side moving at `speed`.
+
+        One implicit step of the equations above, for any dt: contact and dry friction each answer the speed at its
+        end, so none of them rings, and a contact that is met within the step is damped by what it gave way. All is
+        continuous in the parameters. Reference: Moreau, Unilateral contact and dry friction (1988), time stepping.
+        """
+        free = twist + dt * (speed - far_speed)
+        side, omega = ca.sign(free), 2 * pi * self.contact_hz
+        before = ca.fmax(side * twist - self.gap_rad / 2, 0)
+        stiff, damped = omega**2, 2 * self.damping_ratio * omega / dt
+        met = (stiff + damped) * (side * free - self.gap_rad / 2) - damped * before
+        push = side * ca.fmax(met / (1 + (stiff + damped) * dt**2), 0)
+        pushed = (far_speed + dt * push) / (1 + dt * self.load_viscous / far)
+        rubbed = dt * self.load_friction / far
+        after = pushed - ca.fmax(-rubbed, ca.fmin(rubbed, pushed))
+        return twist + dt * (speed - after), after, far * push
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""

@@ -10,6 +10,9 @@ import numpy.typing as npt
 from pyfmi_models.effects.base import Coupling
 from pyfmi_models.model import Scalar, parameter
 
+LEAST_DAMPING = 1e-4
+"""Damping ratio that keeps the answer at the antiresonance finite."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Compliance(Coupling):
@@ -51,7 +54,7 @@ class Compliance(Coupling):
     def carried(self, omega: npt.NDArray[np.float64]) -> npt.NDArray[np.complex128]:
         """Acceleration of the far mass per near acceleration at angular frequencies omega: 1 where it is rigid."""
         own, s = 2 * pi * self.antiresonance_hz, 1j * omega
-        spring = own**2 + 2 * self.damping_ratio * own * s
+        spring = own**2 + 2 * max(float(self.damping_ratio), LEAST_DAMPING) * own * s
         return np.asarray(spring / (s**2 + spring))
 
     def statement(self, unit: str = "N·m") -> str:

@@ -27,7 +27,7 @@ class Delay(DriveEffect):
 
     id: ClassVar[str] = "delay"
     title: ClassVar[str] = "Delay"
-    rivals: ClassVar[tuple[str, ...]] = ("actuator_lag", "clock_skew")
+    rivals: ClassVar[tuple[str, ...]] = ("actuator_lag", "clock_skew", "backlash")
     told_apart_by: ClassVar[str] = (
         "a delay turns phase only; a lag also takes amplitude away at high frequency; a late clock trails the set point"
     )

@@ -40,6 +40,7 @@ FAMILIES = (
     Family(("clock_skew",), timing.clocks, position=False),
     Family(("inertia_variation",), mechanics.inertia),
     Family(("compliance",), mechanics.springs),
+    Family(("backlash",), mechanics.plays),
     Family(("encoder_eccentricity",), mechanics.eccentricity),
 )
 TRIED = tuple(dict.fromkeys(name for family in FAMILIES for name in family.ids))
