@@ -169,4 +169,10 @@ def _trace(prepared: Prepared, rests: Sequence[Rest], intervals: Spans) -> Trace
         missing=before,
         band=Z95 * noise_at(v, after, v),
         intervals=intervals,
+        extras=_extras(prepared),
     )
+
+
+def _extras(prepared: Prepared) -> dict[str, Array]:
+    names = set.intersection(*(set(piece.extras) for piece in prepared.pieces)) - {"q_d", "v"}
+    return {name: np.concatenate([piece.extras[name][piece.inside] for piece in prepared.pieces]) for name in names}

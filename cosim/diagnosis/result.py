@@ -89,7 +89,9 @@ class Trace:
     band: Array
     """Half width of its 95 % band."""
     intervals: tuple[tuple[float, float], ...] = ()
-    """Time spans where the missing torque leaves its band for long."""
+    """Time spans where the missing torque is louder than the noise for long."""
+    extras: dict[str, Array] = field(default_factory=dict)
+    """User columns, one value a row: temperature, load, ..."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,6 +104,8 @@ class Region:
     mean: Array
     band: Array
     count: Array
+    measure: str = "mean missing"
+    """What `mean` is of the missing torque: its mean, the mean of what resists the motion, or its RMS."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -35,7 +35,7 @@ def region(before: Region, after: Region | None, scales: Scales) -> Picture:
     else:
         caption = _along(axes, before, after, scales, name)
     axes.axhline(0, color=GREY, lw=0.8, zorder=1)
-    heading(axes, f"mean missing {_noun(scales)} [{scales.torque.unit}]")
+    heading(axes, f"{before.measure} {_noun(scales)} [{scales.torque.unit}]")
     axes.locator_params(axis="y", nbins=5)
     return sheet.picture(f"Missing over {name}, before and after. {caption}", caption, f"Over {name}")
 

@@ -21,7 +21,7 @@ from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.result import Diagnosis, Trace
 from cosim.pictures.quantities import joined
 
-MOST_RECORDINGS, MOST_REGIONS = 6, 7
+MOST_RECORDINGS, MOST_REGIONS = 6, 12
 
 
 def context(diagnosis: Diagnosis) -> dict[str, Any]:

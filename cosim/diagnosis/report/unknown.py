@@ -61,7 +61,8 @@ def _when(diagnosis: Diagnosis) -> str:
 def _size(diagnosis: Diagnosis, own: Finding | None, scales: Scales) -> str:
     if own and own.size:
         return f"{own.size} ({own.size_range})" if own.size_range else own.size
-    peaks = [float(np.nanmax(np.abs(r.mean))) for r in diagnosis.regions if np.isfinite(r.mean).any()]
+    placed = [r for r in diagnosis.regions if r.axis != "frequency" and np.isfinite(r.mean).any()]
+    peaks = [float(np.nanmax(np.abs(region.mean))) for region in placed]
     return f"mean error up to {scales.torque.text(max(peaks))} at one place" if peaks else ""
 
 
