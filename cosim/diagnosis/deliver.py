@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 import cosim
+from cosim.diagnosis.closed_loop import loop_errors
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.experiment import SCENARIO, scenario
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut
@@ -55,6 +56,8 @@ def deliver(
         say("building the improved FMU")
         improved = {"card": "card.toml", **_fmus(better, found, out), **_proven_range(found), **more(better, out)}
         found = replace(found, improved=improved)
+    say("closing the loop")
+    found = replace(found, heldout=replace(found.heldout, position=_positions(outcome, card, heldout)))
     if outcome.experiment and better.controller:
         with replacing(out / SCENARIO, True) as partial:
             partial.write_text(scenario(outcome.experiment, better), "utf-8")
@@ -66,6 +69,13 @@ def deliver(
 
     write_report(found, out / "report.html")
     return found
+
+
+def _positions(outcome: Outcome, card: Card, heldout: Sequence[Recording]) -> dict[str, float]:
+    """Closed-loop position error of the model as delivered, refitted, and with the effects."""
+    cards = {"nominal": card, "before": outcome.refitted, "after": outcome.card}
+    errors = loop_errors({key: one.plant() for key, one in cards.items()}, card, heldout)
+    return {key: error.position for key, error in errors.items()}
 
 
 def as_json(found: Diagnosis) -> dict[str, Any]:
@@ -81,6 +91,7 @@ def as_json(found: Diagnosis) -> dict[str, Any]:
         "intervals": {trace.name: [list(span) for span in trace.intervals] for trace in found.traces},
         "depends_on": list(found.depends_on),
         "data_quality": list(found.data_quality),
+        "loop_bias": found.loop_bias,
         "base_parameters": {name: list(values) for name, values in found.base_parameters.items()},
         "improved": found.improved,
         "provenance": found.provenance,
@@ -126,6 +137,7 @@ def _heldout(held: HeldOut) -> dict[str, Any]:
         "unvetoed_rms": held.unvetoed_rms,
         "confidence_interval": list(held.confidence_interval),
         "clear_motion": held.sliding,
+        "black_box_rms": held.black_box_rms,
         "position": held.position,
     }
 

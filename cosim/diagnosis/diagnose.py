@@ -15,8 +15,10 @@ from cosim.diagnosis.findings import accepted, not_found, rival_finding, standar
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.laws import proposed_law
 from cosim.diagnosis.locate import regions
+from cosim.diagnosis.loop_bias import loop_bias
 from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare, quality
 from cosim.diagnosis.protocol import Structures, heldout_rms, judge, traces, veto_band, veto_rms
+from cosim.diagnosis.regression import black_box_rms
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
 from cosim.diagnosis.sanity import check_effects, check_recordings
 from cosim.diagnosis.select import select
@@ -74,10 +76,15 @@ def diagnose(
     signals = traces(train, heldout, models)
     found = _findings(verdict, unproven, prepared, weight, signals)
     experiment = _experiment(verdict, prepared)
+    bias = loop_bias(prepared, verdict.chosen, weight)
     diagnosis = Diagnosis(
         verdict=_verdict(found, rest),
         findings=tuple(found),
-        heldout=replace(judge(heldout, models, cutoff), unvetoed_rms=heldout_rms(heldout, proposed)),
+        heldout=replace(
+            judge(heldout, models, cutoff),
+            unvetoed_rms=heldout_rms(heldout, proposed),
+            black_box_rms=black_box_rms(signals),
+        ),
         traces=signals,
         regions=regions(signals, False, mount.motion == "linear"),
         regions_after=regions(signals, True, mount.motion == "linear"),
@@ -88,6 +95,7 @@ def diagnose(
         depends_on=rest.depends_on,
         data_quality=tuple(note for recording in (*train, *heldout) for note in quality(recording, prepared.cutoff)),
         friction_law=proposed_law(problem, verdict.chosen),
+        loop_bias=bias.as_json() if bias else {},
         base_parameters=_base_parameters(models),
         seconds=time.perf_counter() - started,
     )

@@ -38,12 +38,12 @@ class Blocks:
     recording: Index
 
     @classmethod
-    def of(cls, prepared: Prepared) -> "Blocks":
-        """Cut each piece into blocks of about `BLOCK_SECONDS`."""
+    def of(cls, prepared: Prepared, seconds: float = BLOCK_SECONDS) -> "Blocks":
+        """Cut each piece into blocks of about so many seconds."""
         rows, recording, first = [], [], 0
         for piece in prepared.pieces:
             kept = np.arange(first, first + len(piece.kept))
-            count = max(1, round(len(kept) * piece.dt * piece.stride / BLOCK_SECONDS))
+            count = max(1, round(len(kept) * piece.dt * piece.stride / seconds))
             rows += np.array_split(kept, count)
             recording += [piece.recording] * count
             first += len(kept)

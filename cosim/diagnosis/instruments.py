@@ -118,7 +118,7 @@ def _crossed(mount: Mount, piece: Piece, prepared: Prepared) -> Crossed | None:
     inverse = Inverse(mount, free_parameters(mount))
     values = inverse.present
     needed = inverse.behind(piece, inverse.momentary(piece, values), values)
-    wanted = _wanted(piece)
+    wanted = on_set_point(piece)
     own = Inverse(still(mount), ())
     instrument = own.behind(wanted, own.momentary(wanted, np.zeros(0)), np.zeros(0))
     top = max(abs(edge) for edge in prepared.ranges["v"])
@@ -141,7 +141,7 @@ def _crossed(mount: Mount, piece: Piece, prepared: Prepared) -> Crossed | None:
     return Crossed(omega[used], crossed[..., 0], crossed[..., 1:])
 
 
-def _wanted(piece: Piece) -> Piece:
+def on_set_point(piece: Piece) -> Piece:
     """The piece as it would be if the axis followed its set point."""
     q = piece.lowpass(piece.extras["q_d"])
     v = derivative(q, piece.dt)

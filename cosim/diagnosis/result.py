@@ -67,8 +67,10 @@ class HeldOut:
     """The same RMS values over samples in clear motion only, with the cutoff and the least speed used."""
     unvetoed_rms: float | None = None
     """RMS with all effects that training alone proposed, before this recording's veto."""
+    black_box_rms: float | None = None
+    """RMS that the refitted base leaves with a smooth black box beside it, learnt on the training recordings."""
     position: dict[str, float] = field(default_factory=dict)
-    """Closed-loop position error RMS (set point driven), where the controller is known."""
+    """Closed-loop position error RMS (set point driven), where the controller is known: nominal, before, after."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,6 +130,8 @@ class Diagnosis:
     depends_on: tuple[str, ...] = ()
     data_quality: tuple[str, ...] = ()
     friction_law: dict[str, Any] = field(default_factory=dict)
+    loop_bias: dict[str, Any] = field(default_factory=dict)
+    """Whether the loop biased the fit: {"biased", "p_value", "moved": {parameter: relative move}}; {} if untested."""
     base_parameters: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     """Per base parameter: as delivered, refitted, with the missing physics."""
     provenance: dict[str, Any] = field(default_factory=dict)

@@ -18,23 +18,18 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.diagnosis.protocol import rms
+from cosim.diagnosis.regression import EVERY, Model, features, kernel, stacked
 from cosim.diagnosis.result import Trace
 from cosim.errors import MissingPackageError
 
 Array = npt.NDArray[np.float64]
-Model = Callable[[Array], Array]
-"""From features (rows, features) to torque (rows,)."""
 
-EVERY = 4
-"""Rows of a trace for each row that is fitted: the trace is filtered at 30 Hz and has eight rows a period of that."""
 THRESHOLDS = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0, 2.0)
 """Size, relative to the residual, from which a term of the library stays."""
 ORDERS = range(1, 13)
 """Waves over a turn in the library of terms."""
 ALARM = 0.05
 """Share of the RMS that regression must take from a training recording left out."""
-CENTRES = 800
-"""Rows that a kernel is placed at."""
 
 
 def compared(traces: Sequence[Trace]) -> dict[str, dict[str, Any]]:
@@ -48,15 +43,6 @@ def compared(traces: Sequence[Trace]) -> dict[str, dict[str, Any]]:
         except MissingPackageError as error:
             answers[name] = {"skipped": str(error)}
     return answers
-
-
-def features(trace: Trace) -> Array:
-    """Position, speed, acceleration, direction, logarithm of the time since the last reversal."""
-    direction = np.sign(trace.v)
-    turned = np.flatnonzero(np.diff(direction, prepend=direction[:1]) != 0)
-    last = np.concatenate([[0], turned])[np.searchsorted(turned, np.arange(len(trace.t)), side="right")]
-    since = trace.t - trace.t[last]
-    return np.column_stack([trace.q, trace.v, np.gradient(trace.v, trace.t), direction, np.log(since + 1e-2)])
 
 
 def terms(trace: Trace, top: float) -> Array:
@@ -107,7 +93,7 @@ def _stlsq() -> Any:
 
 def _regression(train: Sequence[Trace], held: Trace) -> dict[str, Any]:
     kind, fit = _regressor()
-    model = fit(*_stacked(train))
+    model = fit(*stacked(train))
     gains = [_left_out(train, one, fit) for one in train] if len(train) > 1 else [0.0]
     alarm = float(np.mean(gains)) > ALARM
     return {"heldout_rms": rms(held.missing - model(features(held))), "alarm": alarm, "kind": kind}
@@ -115,13 +101,8 @@ def _regression(train: Sequence[Trace], held: Trace) -> dict[str, Any]:
 
 def _left_out(train: Sequence[Trace], one: Trace, fit: Callable[[Array, Array], Model]) -> float:
     """Share of the RMS of one recording that a model of the others takes away."""
-    model = fit(*_stacked([other for other in train if other is not one]))
+    model = fit(*stacked([other for other in train if other is not one]))
     return 1 - rms(one.missing - model(features(one))) / rms(one.missing)
-
-
-def _stacked(traces: Sequence[Trace]) -> tuple[Array, Array]:
-    rows = np.concatenate([features(trace) for trace in traces])[::EVERY]
-    return rows, np.concatenate([trace.missing for trace in traces])[::EVERY]
 
 
 def _regressor() -> tuple[str, Callable[[Array, Array], Model]]:
@@ -135,22 +116,3 @@ def _regressor() -> tuple[str, Callable[[Array, Array], Model]]:
         return lambda others: np.asarray(fitted.predict(others))
 
     return "boosted trees", trees
-
-
-def kernel(rows: Array, target: Array, ridge: float = 1e-2) -> Model:
-    """Kernel ridge regression on evenly spaced centres; widths are the spread of each feature.
-
-    k(x, c) = exp(-|x - c|^2 / 2) of features scaled to unit spread; ridge relative to the mean of the normal matrix.
-    """
-    middle, spread = rows.mean(0), rows.std(0) + 1e-300
-    centres = ((rows - middle) / spread)[:: max(1, len(rows) // CENTRES)]
-
-    def lifted(others: Array) -> Array:
-        x = (others - middle) / spread
-        squares = (x**2).sum(1)[:, None] + (centres**2).sum(1) - 2 * x @ centres.T
-        return np.asarray(np.exp(-squares / 2))
-
-    columns = lifted(rows)
-    normal = columns.T @ columns
-    weights = np.linalg.solve(normal + ridge * np.trace(normal) / len(normal) * np.eye(len(normal)), columns.T @ target)
-    return lambda others: np.asarray(lifted(others) @ weights)

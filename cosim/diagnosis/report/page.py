@@ -150,7 +150,16 @@ def _proof_sentence(diagnosis: Diagnosis, scales: Scales) -> str:
     low, high = held.confidence_interval
     sure = "" if low > 0 else " That range includes zero: no clear change." if high >= 0 else " It is worse."
     gain = f"The error falls by {unit.text(held.before_rms - held.after_rms)} (95 % range {unit.span(low, high)})."
-    return f"{kept} {gain}{sure}"
+    return f"{kept} {gain}{sure}{_black_box(diagnosis, scales)}"
+
+
+def _black_box(diagnosis: Diagnosis, scales: Scales) -> str:
+    """Say what a smooth black box would have reached in place of named physics."""
+    held, unit = diagnosis.heldout, scales.torque
+    if held.black_box_rms is None:
+        return ""
+    error = unit.text(held.black_box_rms)
+    return f" The refitted base with a black box beside it, learnt on the training recordings, leaves {error}."
 
 
 def _places(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> Iterator[Picture]:
@@ -198,7 +207,7 @@ def _end(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any
     ]
     return {
         "parameters": tables.parameters(diagnosis),
-        "parameters_sentence": "The base was refitted on the training recordings before any effect was tested.",
+        "parameters_sentence": " ".join(_refitted(diagnosis)),
         "law": words.law(diagnosis),
         "quality": diagnosis.data_quality,
         "command": str(made.get("command", "")),
@@ -209,3 +218,14 @@ def _end(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any
         "script_hash": digest,
         "css": here.joinpath("report.css").read_text("utf-8"),
     }
+
+
+def _refitted(diagnosis: Diagnosis) -> Iterator[str]:
+    """Say that the base was refitted, and whether the loop, in which noise reaches the motion, biased the numbers."""
+    yield "The base was refitted on the training recordings before any effect was tested."
+    tested = diagnosis.loop_bias
+    if tested and tested["biased"]:
+        moves = [f"{name} by {100 * move:+.0f} %".replace("-", "−") for name, move in tested["moved"].items()]
+        yield f"The loop, or an imprecise friction law, biases them: instruments would move {', '.join(moves)}."
+    elif tested:
+        yield "Instruments from the set point do not move these numbers: the control loop did not bias them."

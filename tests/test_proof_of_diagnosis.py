@@ -1,0 +1,127 @@
+"""What proves a diagnosis beside its torque residual: the closed loop, a black box, the test for bias by the loop."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.diagnosis.closed_loop import loop_errors
+from cosim.diagnosis.loop_bias import loop_bias
+from cosim.diagnosis.prepare import Prepared, choose_cutoff, prepare
+from cosim.diagnosis.regression import black_box_rms
+from cosim.diagnosis.result import Trace
+from cosim.diagnosis.trial import Problem
+from cosim.proof.generator import make_case, write_case
+from cosim.proof.tool import given
+from cosim.recording import Recording
+from pyfmi_models.card import Card
+from pyfmi_models.effects.quadratic_drag import QuadraticDrag
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory: pytest.TempPathFactory) -> tuple[Card, list[Recording], Recording, float]:
+    folder = tmp_path_factory.mktemp("drag")
+    made = make_case(5, ["quadratic_drag"], friction="lugre", duration=25.0)
+    write_case(made, folder)
+    return *given(str(folder)), float(made.truth["effects"][0]["parameters"]["coefficient"])
+
+
+def fitted(card: Card, train: list[Recording], drag: float) -> tuple[Problem, Prepared]:
+    prepared = prepare(train, choose_cutoff(train, card.mount.inertia))
+    mount = replace(card.plant(), effects=(QuadraticDrag(coefficient=drag),))
+    return Problem(mount, prepared, np.ones(len(prepared.recording_of)), 1e-3), prepared
+
+
+def test_the_true_model_follows_the_recorded_set_point_better(
+    case: tuple[Card, list[Recording], Recording, float],
+) -> None:
+    card, train, held, drag = case
+    problem, _ = fitted(card, train, drag)
+    better = problem.fit(problem.mount, 25).mount
+    found = loop_errors({"nominal": card.plant(), "after": better}, card, [held])
+    assert found["after"].position < 0.6 * found["nominal"].position
+    assert found["after"].torque < 0.6 * found["nominal"].torque
+
+
+def test_no_loop_is_closed_without_a_controller_or_a_set_point(
+    case: tuple[Card, list[Recording], Recording, float],
+) -> None:
+    card, _, held, _ = case
+    blind = replace(held, table={name: values for name, values in held.table.items() if name != "q_d"})
+    assert loop_errors({"nominal": card.plant()}, card, [blind]) == {}
+    assert loop_errors({"nominal": card.plant()}, replace(card, controller=None), [held]) == {}
+
+
+def test_the_loop_does_not_bias_a_right_model_and_a_planted_bias_is_seen(
+    case: tuple[Card, list[Recording], Recording, float],
+) -> None:
+    card, train, _, drag = case
+    problem, prepared = fitted(card, train, drag)
+    fit = problem.fit(problem.mount, 25)
+    weight = np.ones(len(fit.residual))
+    right = loop_bias(prepared, fit, weight)
+    assert right is not None
+    assert not right.is_biased
+    index = fit.free.index("friction.sigma2")
+    noise = np.random.default_rng(1).standard_normal(len(fit.residual))
+    # An error in the derivative that the residual knows too, and the set point does not: what noise does in a loop.
+    slopes = fit.slopes.copy()
+    size = 0.5 * slopes[:, index].std()
+    slopes[:, index] += size * noise
+    push = 0.2 * abs(fit.values[index]) * size * noise
+    biased = loop_bias(prepared, replace(fit, slopes=slopes, residual=fit.residual + push), weight)
+    assert biased is not None
+    assert biased.p_value < 1e-3
+
+
+def test_without_a_set_point_nothing_is_said_of_bias(case: tuple[Card, list[Recording], Recording, float]) -> None:
+    card, train, _, drag = case
+    blind = [replace(one, table={n: c for n, c in one.table.items() if n != "q_d"}) for one in train]
+    problem, prepared = fitted(card, blind, drag)
+    assert loop_bias(prepared, problem.fit(problem.mount, 5), np.ones(len(prepared.recording_of))) is None
+
+
+def traced(name: str, heldout: bool, seed: int, noise: float) -> Trace:
+    rng, t = np.random.default_rng(seed), np.arange(0.0, 30.0, 1 / 240)
+    q = np.sin(0.8 * t + seed)
+    v, zero = 0.8 * np.cos(0.8 * t + seed), np.zeros_like(t)
+    missing = np.sin(5 * q) + noise * rng.standard_normal(len(t))
+    return Trace(
+        name=name,
+        heldout=heldout,
+        t=t,
+        q=q,
+        v=v,
+        tau=missing,
+        before=zero,
+        after=zero,
+        missing=missing,
+        band=zero,
+    )
+
+
+def test_a_black_box_learns_what_is_smooth_and_leaves_the_noise() -> None:
+    learnt = black_box_rms([traced("a", False, 1, 0.1), traced("b", False, 2, 0.1), traced("c", True, 3, 0.1)])
+    without = float(np.sqrt(np.mean(traced("c", True, 3, 0.1).missing ** 2)))
+    assert 0.1 < learnt < 0.3 * without
+
+
+def test_the_improved_files_say_all_three(tmp_path: Path, case: tuple[Card, list[Recording], Recording, float]) -> None:
+    import json
+
+    from cosim.diagnosis.deliver import deliver
+    from cosim.diagnosis.diagnose import diagnose
+
+    card, train, held, _ = case
+    outcome = diagnose(train, [held], card)
+    deliver(outcome, train, [held], card, tmp_path, "a test")
+    told = json.loads((tmp_path / "diagnosis.json").read_text("utf-8"))
+    position = told["heldout"]["position"]
+    assert position["after"] < position["before"] <= 1.05 * position["nominal"]
+    assert told["heldout"]["black_box_rms"] > 0
+    assert set(told["loop_bias"]) == {"biased", "p_value", "moved"}
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert "Position, closed loop" in page
+    assert "black box" in page
+    assert "set point" in page
