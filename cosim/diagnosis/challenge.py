@@ -39,6 +39,8 @@ TEMPERATURE = 60.0
 NESTED = {"torque_offset": ("friction_asymmetry", "cable_wrap")}
 """Effects that hold another as a special case: they take its place by explaining more, not by explaining as much."""
 ROUNDS = 2
+CREDIBLE = 0.05
+"""A rival with a smaller share of the probability is not in the set, which is to hold the truth in 95 % of cases."""
 NEAR = 0.9
 """A rival with this share of the winner's gain is excluded only if it is clearly worse block by block."""
 
@@ -63,6 +65,8 @@ class Place:
         if margin is not None:
             return margin < DECISIVE
         holds_it = rival.effect.id in NESTED.get(self.effect.id, ())
+        if self.shares[rival.effect.id] < CREDIBLE:
+            return False
         return _too_close(self.trial, rival) and not (holds_it and self.trial.gain >= TIE * rival.gain)
 
     @property

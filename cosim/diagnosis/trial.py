@@ -121,13 +121,15 @@ def judged(effect: Effect, found: Fit, without: Fit, bench: Bench) -> Trial:
 
 
 def _tuned(problem: Problem, found: Fit) -> Fit:
-    """Fit the cycles of a periodic effect that was added last, which its grid knows only roughly.
+    """Fit what its grid knows only roughly of an effect that was added last: a ripple's cycles, how a cable hardens.
 
     Slots, teeth and rolling elements come in whole numbers: one that fits as well is taken.
     """
+    if isinstance(found.mount.effects[-1], CableWrap):
+        return problem.fit(_freed(problem, found, "hardening").mount, 4)
     if getattr(found.mount.effects[-1], "cycles_per_rev", 0.0) <= 0:
         return found
-    free = problem.fit(found.mount, 10, [name for name in FIXED if name != "cycles_per_rev"])
+    free = _freed(problem, found, "cycles_per_rev")
     best = min((found, free), key=lambda one: one.rms)
     ripple: Any = best.mount.effects[-1]
     for cycles in (max(1.0, float(round(ripple.cycles_per_rev))), ripple.cycles_per_rev):
@@ -136,6 +138,10 @@ def _tuned(problem: Problem, found: Fit) -> Fit:
         if settled.rms < best.rms * (1 + WHOLE):
             return settled
     return found
+
+
+def _freed(problem: Problem, found: Fit, name: str) -> Fit:
+    return problem.fit(found.mount, 10, [fixed for fixed in FIXED if fixed != name])
 
 
 def is_real(problem: Problem, trial: Trial) -> bool:
@@ -200,15 +206,20 @@ def _is_other_timing(problem: Problem, effect: Effect) -> bool:
 
 
 def _late(problem: Problem, effect: Effect) -> float | None:
-    """Seconds by which an effect makes the torque constantly late against the reading; None if it does not."""
+    """Seconds by which an effect makes the torque late against the reading; None if it is not late.
+
+    Of a clock that drifts it is the middle of a recording that counts, if late by a sample at least.
+    """
     if isinstance(effect, Delay):
         return 1e-3 * float(effect.delay_ms)
     if isinstance(effect, ActuatorLag):
         return 1e-3 * float(effect.time_constant_ms)
-    if isinstance(effect, ClockSkew) and effect.offset_ms < 0:
-        drifts = 1e-3 * abs(effect.drift_ppm) * problem.seconds
-        return -1e-3 * effect.offset_ms if drifts < max(LEAST_DRIFT_MS, -LEAST_DRIFT * effect.offset_ms) else None
-    return None
+    if not isinstance(effect, ClockSkew):
+        return None
+    offset, drift = float(effect.offset_ms), 1e-3 * float(effect.drift_ppm) * problem.seconds
+    steady = abs(drift) < max(LEAST_DRIFT_MS, LEAST_DRIFT * abs(offset))
+    late = -1e-3 * (offset + drift / 2)
+    return late if late > (0 if steady else problem.sample_time) else None
 
 
 def winner(trials: Sequence[Trial]) -> Trial | None:
