@@ -1,5 +1,7 @@
 """An effect that another becomes in a limit wins by its gain; what cannot be excluded stays in the set."""
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -8,10 +10,11 @@ from cosim.diagnosis.challenge import Place
 from cosim.diagnosis.evidence import Score
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.prepare import prepare
-from cosim.diagnosis.trial import Problem, Trial, clearly_worse, is_another, is_real, winner
+from cosim.diagnosis.trial import Problem, Trial, _tuned, clearly_worse, is_another, is_real, winner
 from cosim.recording import Recording
 from pyfmi_models.effects import ActuatorLag, Delay, Effect, FrictionAsymmetry, GravityUnbalance, TorqueOffset
 from pyfmi_models.effects.cable_wrap import CableWrap
+from pyfmi_models.effects.clock_skew import ClockSkew
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
@@ -74,6 +77,21 @@ def problem(speed: Array, **columns: Array) -> Problem:
     return Problem(MOUNT, prepared, np.ones(len(prepared.recording_of)), 1e-3)
 
 
+def test_a_clock_that_the_set_point_does_not_see_late_is_a_drive_whether_it_drifts_or_not() -> None:
+    t = np.arange(40_000) / 1000
+    q_d = np.sin(0.7 * t)
+    in_time, late = (
+        problem(0.7 * np.cos(0.7 * t), q_d=q_d),
+        problem(0.7 * np.cos(0.7 * t), q_d=np.sin(0.7 * t + 3.5e-3)),
+    )
+    for clock in (ClockSkew(offset_ms=-5.0), ClockSkew(offset_ms=-4.0, drift_ppm=-50.0)):
+        assert is_another(in_time, clock)
+        assert not is_another(late, clock)
+    assert is_another(late, Delay(delay_ms=5.0))
+    assert not is_another(in_time, Delay(delay_ms=5.0))
+    assert not is_another(in_time, ClockSkew(offset_ms=-0.5, drift_ppm=100.0))
+
+
 def test_a_cable_whose_home_is_many_strokes_away_is_an_offset() -> None:
     swing = problem(np.sin(np.arange(20_000) / 1000))  # from 0 to 2 rad
     assert not is_another(swing, CableWrap(stiffness=0.1, home=-1.5))
@@ -88,3 +106,15 @@ def test_noise_at_constant_speed_tells_no_delay_unless_a_set_point_asks_for_it()
         rest = np.zeros(len(found.prepared.recording_of))
         explained = Trial(late.effect, Fit(MOUNT, (), NONE, NONE, NONE, rest), late.score, 0.5)
         assert is_real(found, explained) is told
+
+
+def test_how_a_cable_hardens_is_fitted_as_its_grid_knows_it_only_roughly() -> None:
+    t = np.arange(40_000) / 1000
+    q, v = 1.5 * np.sin(0.9 * t), 1.35 * np.cos(0.9 * t)
+    tau = -0.81 * 5 * q + np.sign(v) + 2 * (q - 0.2) * (1 + 0.3 * (q - 0.2) ** 2)
+    this = problem(v, tau=tau, q=q)
+    rough = replace(MOUNT, effects=(CableWrap(stiffness=1.0, home=0.0, hardening=4 / 9),))
+    found = _tuned(this, this.fit(rough, 12)).mount.effects[-1]
+    assert isinstance(found, CableWrap)
+    assert float(found.hardening) == pytest.approx(0.3, rel=0.05)
+    assert float(found.home) == pytest.approx(0.2, rel=0.05)
