@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from test_inverse import recorded
 
-from cosim.diagnosis.candidates import Span
+from cosim.diagnosis.candidates import span_of
 from cosim.diagnosis.diagnose import Outcome, diagnose
 from cosim.diagnosis.families.periodogram import tones
 from cosim.diagnosis.fit import fit
@@ -22,22 +22,22 @@ from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
-HERTZ, AMPLITUDE = 4.3, 0.4
+HERTZ, SECOND, AMPLITUDE = 4.3, 9.1, 0.4
 BASE = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0))
 
 
 def run(name: str, amplitude: float, phase: float, seed: int, seconds: float = 12.0) -> Recording:
-    """A wandering motion of the base, shaken, with a little noise."""
+    """A wandering motion of the base, shaken with two tones, with a little noise."""
     t, rng = np.arange(int(seconds * 250)) / 250, np.random.default_rng(seed)
     tones = [(a, 2 * np.pi * f, p) for a, f, p in zip((0.2, 0.1, 0.03), rng.uniform(0.1, 1, 3), (0, 1, 2), strict=True)]
     q, v, a = (sum(s * w**k * np.sin(w * t + p + k * np.pi / 2) for s, w, p in tones) for k in range(3))
-    shaken = amplitude * np.sin(2 * np.pi * HERTZ * t + phase)
+    shaken = amplitude * (np.sin(2 * np.pi * HERTZ * t + phase) + 0.6 * np.sin(2 * np.pi * SECOND * t + 2 * phase))
     noise = 0.05 * rng.standard_normal(len(t))
     return Recording(name, {"t": t, "tau": 5.0 * a + 2.0 * np.sign(v) + 1.0 * v + shaken + noise, "q": q})
 
 
 def shaken(*amplitudes: float) -> list[Recording]:
-    """Recordings with tones of these amplitudes, each in another phase."""
+    """Recordings with tones of these amplitudes, in each in other phases."""
     return [run(f"run_{k}", amplitude, 0.5 + k, k) for k, amplitude in enumerate(amplitudes)]
 
 
@@ -82,8 +82,18 @@ def test_gain_is_what_the_filter_leaves_of_a_tone() -> None:
     assert gain(18.0, 1 / 200, 95.0) == 1.0
 
 
+def test_a_machine_with_two_tones_is_one_disturbance_and_its_card_holds_both() -> None:
+    outcome = answered(AMPLITUDE, AMPLITUDE, AMPLITUDE)
+    assert outcome.diagnosis.verdict == ("periodic_disturbance",)
+    (found,) = (one for one in outcome.diagnosis.findings if one.answer == "found")
+    assert found.statement.endswith("Further tones: 9.1 Hz.")
+    main, second = sorted(outcome.card.effects, key=lambda tone: tone.frequency_hz)
+    assert (main.frequency_hz, main.amplitude, main.phase) == pytest.approx((HERTZ, AMPLITUDE, 0.5), abs=0.03)
+    assert (second.frequency_hz, second.amplitude) == pytest.approx((SECOND, 0.6 * AMPLITUDE), abs=0.03)
+    assert np.cos(second.phase - 1.0) > 0.99
+
+
 def test_a_tone_in_one_recording_only_is_no_disturbance_of_all() -> None:
-    assert "periodic_disturbance" in answered(AMPLITUDE, AMPLITUDE, AMPLITUDE).diagnosis.verdict
     found = answered(AMPLITUDE, 0.0, 0.0).diagnosis
     assert "periodic_disturbance" not in found.verdict
     (one,) = (finding for finding in found.findings if finding.effect == "periodic_disturbance")
@@ -109,33 +119,21 @@ def test_a_concealed_disturbance_is_named_and_has_a_ceiling(tmp_path: Path) -> N
     assert outcome.diagnosis.heldout.after_rms < 1.2 * best
 
 
+def heard_in(q: np.ndarray, t: np.ndarray, residual: np.ndarray) -> list[float]:
+    """The tones that stand out from a residual beside a motion."""
+    prepared = prepare([Recording("r", {"t": t, "tau": residual, "q": q})], 20.0)
+    rest = prepared.stacked("tau")
+    return tones(span_of(BASE, prepared, rest, np.zeros(len(rest))), rest)
+
+
 def test_harmonics_of_a_motion_that_repeats_itself_are_no_tones() -> None:
-    t = np.arange(6000) / 125
-    pitch = 0.35
-    steady, wandering = (np.cos(2 * np.pi * pitch * t + 0.5 * wild * np.sin(0.4 * t)) for wild in (0, 9))
+    t, pitch = np.arange(6000) / 125, 0.35
     residual = np.sin(2 * np.pi * 3 * pitch * t) + 0.1 * np.random.default_rng(1).standard_normal(len(t))
-    for v, seen in ((steady, False), (wandering, True)):
-        given = {name: np.zeros(len(t)) for name in ("angle", "q", "tau", "level")}
-        piece = np.zeros(len(t), np.int64)
-        span = Span(
-            piece=piece,
-            t=t,
-            v=v,
-            residual=residual,
-            cutoff=20.0,
-            heard=(0.2, 20.0),
-            seconds=48.0,
-            extras=frozenset(),
-            **given,
-        )
-        found = tones(span, residual)
-        assert any(abs(hertz - 3 * pitch) < 0.02 for hertz in found) == seen
+    for wild in (0, 9):
+        found = heard_in(np.sin(2 * np.pi * pitch * t + 0.5 * wild * np.sin(0.4 * t)), t, residual)
+        assert any(abs(hertz - 3 * pitch) < 0.02 for hertz in found) == bool(wild)
 
 
 def test_recordings_too_short_for_a_tone_have_none() -> None:
     t = np.arange(40) / 10
-    given = {name: np.zeros(len(t)) for name in ("angle", "q", "v", "tau", "level", "residual")}
-    span = Span(
-        piece=np.zeros(40, np.int64), t=t, cutoff=2.0, heard=(1.5, 2.0), seconds=4.0, extras=frozenset(), **given
-    )
-    assert tones(span, span.residual) == []
+    assert heard_in(np.sin(t), t, np.cos(9 * t)) == []

@@ -184,7 +184,9 @@ def _comment(found: Diagnosis) -> str:
     if not _names_effects(found):
         return "The base with its parameters refitted; no physics was added."
     named = ", ".join(finding.title.lower() for finding in found.findings if finding.answer == "found")
-    return f"Improved by a diagnosis: {named}.\nThe base is refitted; [origin] names the recordings that justify it."
+    said = f"Improved by a diagnosis: {named}.\nThe base is refitted; [origin] names the recordings that justify it."
+    shaken = any(finding.effect == "periodic_disturbance" for finding in found.findings if finding.answer == "found")
+    return said + (f"\nThe phase of the periodic disturbance is that of {found.traces[0].name}." if shaken else "")
 
 
 def _proven_range(found: Diagnosis) -> dict[str, Any]:

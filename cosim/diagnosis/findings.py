@@ -19,6 +19,7 @@ from cosim.diagnosis.shaken import heard
 from cosim.diagnosis.structure import nuisances, projected
 from cosim.diagnosis.trial import LEAST_GAIN, Trial
 from pyfmi_models.effects import CATALOGUE, DriveEffect, Effect, GravityUnbalance
+from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.model import Variable, parameters_of
 from pyfmi_models.mount import LINEAR_UNITS, Mount
 
@@ -97,6 +98,8 @@ def accepted(
     parameters: dict[str, Any] = dict(numbers.values)
     if harmonics:
         parameters["harmonics"] = [numbers_of(other.effect, mount, errors).values for other in harmonics]
+    tones = sorted(other.effect.frequency_hz for other in harmonics if isinstance(other.effect, PeriodicDisturbance))
+    further = f" Further tones: {', '.join(f'{hertz:.4g}' for hertz in tones)} Hz." if tones else ""
     ranges = {n: (numbers.values[n] - Z95 * e, numbers.values[n] + Z95 * e) for n, e in numbers.errors.items()}
     size, size_range = _size(effect, numbers, mount)
     excluded = [rival for rival in place.rivals if rival.effect.id not in rivals]
@@ -112,7 +115,7 @@ def accepted(
         units=_units(effect, mount),
         size=size,
         size_range=size_range,
-        statement=effect.statement("N" if mount.motion == "linear" else "N·m"),
+        statement=effect.statement("N" if mount.motion == "linear" else "N·m") + further,
         where=where(effect, traces),
         ruled_out=tuple(
             f"{rival.effect.title}: removes {rival.gain:.1%} of the error energy, this {place.trial.gain:.1%}"
