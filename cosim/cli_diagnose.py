@@ -59,7 +59,7 @@ def diagnose(
         if fmu:
             box = BlackBox(fmu, {name: Alias(theirs) for name, theirs in pairs_of("--variables", variables).items()})
             base = as_base(box, fitted, held, believed, progress.tell)
-            more["more"] = Correction(box, base.card, *motion_of(recordings[0])).deliver
+            more = {"more": Correction(box, base.card, *motion_of(recordings[0])).deliver, "base": box.told}
             fitted, held, believed = [*base.train], [*base.heldout], base.card
         outcome = find(fitted, held, believed, progress.tell)
         done = deliver(outcome, fitted, held, believed, out, command, progress.tell, **more)

@@ -26,7 +26,7 @@ from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.tables import limits, numbers
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Region, Trace, Where
 from cosim.diagnosis.terminal import summary
-from cosim.pictures.quantities import minus, number
+from cosim.pictures.quantities import minus, number, raised
 from cosim.pictures.style import thin
 
 RATE, SECONDS = 1000, 60
@@ -337,6 +337,32 @@ def test_where_nothing_is_missing_no_effect_is_left_out_of_the_first_screen_and_
     assert all(one.title.lower() in cells for one in whole.findings if one.answer in ("not_seen", "not_testable"))
     assert "so there is no gain to prove" in page("none")
     assert "so there is no gain to prove" not in page("two")
+
+
+def test_beside_another_teams_fmu_its_correction_is_what_to_use() -> None:
+    whole = diagnosis("two")
+    improved = whole.improved | {"correction": "correction.fmu", "ssp": "improved.ssp", "not_in_correction": ["delay"]}
+    beside = replace(whole, provenance=whole.provenance | {"base_fmu": "theirs.fmu (SHA-256 0)"}, improved=improved)
+    html, said = render(beside), " ".join(summary(beside).split())
+    assert "Model <b>theirs.fmu</b>" in html
+    assert "<b>correction.fmu</b> in front of theirs.fmu is proven" in html
+    assert "No torque can give delay: that is in the card only." in html
+    assert "missing from theirs.fmu" in said
+    assert "improved.ssp correction.fmu" in said
+
+
+def test_of_possible_causes_one_is_true_and_the_next_experiment_can_be_done() -> None:
+    point = {"kind": "sine", "frequency": 0.5, "amplitude": 0.35}
+    whole = diagnosis("two")
+    rivals = replace(whole, verdict=("gravity_unbalance",), findings=RIVALS + REST, improved={})
+    html = render(replace(rivals, next_experiment=rivals.next_experiment | {"set_point": point}))
+    assert "That is a sine of 0.5\N{NO-BREAK SPACE}Hz and 20° to each side, up to 63°/s" in html
+    assert "run2.parquet new_recording.parquet --heldout run3.parquet" in html
+    assert "with the likeliest cause" in html
+
+
+def test_units_are_printed_with_powers() -> None:
+    assert raised("N.m.s2/rad2") == "N·m·s²/rad²"
 
 
 def test_numbers_read_well() -> None:

@@ -41,13 +41,15 @@ def deliver(
     command: str,
     say: Callable[[str], None] = lambda _: None,
     more: Callable[[Card, Path], dict[str, Any]] = lambda *_: {},
+    base: str = "",
 ) -> Diagnosis:
     """Write all files of a diagnosis into `out` and return it with provenance and file names filled in.
 
-    Where effects were found, `more` writes what else shall lie beside the better card, and tells it.
+    Where effects were found, `more` writes what else shall lie beside the better card, and tells it. `base` names the
+    FMU in whose place the card stands, if it does.
     """
     directory(out)
-    provenance = _provenance(train, heldout, card, command)
+    provenance = _provenance(train, heldout, card, command) | ({"base_fmu": base} if base else {})
     found = replace(outcome.diagnosis, provenance=provenance)
     better = replace(outcome.card, origin=_origin(found, provenance))
     with replacing(out / "card.toml", True) as partial:

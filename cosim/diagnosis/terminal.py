@@ -6,7 +6,19 @@ import textwrap
 from typing import TextIO
 
 from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.words import Block, blocks, heading, law, lowered, proven_range, shows_from, verdict
+from cosim.diagnosis.report.words import (
+    Block,
+    blocks,
+    delivered,
+    heading,
+    law,
+    left_out,
+    lowered,
+    model,
+    proven_range,
+    shows_from,
+    verdict,
+)
 from cosim.diagnosis.result import Diagnosis, Finding
 
 WIDTH = 80
@@ -45,7 +57,7 @@ def styled(stream: TextIO) -> bool:
 
 
 def _title(diagnosis: Diagnosis) -> str:
-    card = str(diagnosis.provenance.get("card", {}).get("name", "")) or diagnosis.mount
+    card = model(diagnosis) or diagnosis.mount
     found = sum(finding.answer == "found" for finding in diagnosis.findings)
     if verdict(diagnosis) == "found":
         return f"{found} effect{'s are' if found != 1 else ' is'} missing from {card}"
@@ -107,15 +119,18 @@ def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:
 def _next(diagnosis: Diagnosis) -> list[str]:
     """Return the one experiment that would tell more, and its command."""
     plan = diagnosis.next_experiment
-    said = [str(plan[key]) for key in ("description", "scenario", "command") if plan.get(key)]
+    said = [str(plan["description"])] if plan.get("description") else []
+    said += [f"cosim run {plan['scenario']} --out next"] if plan.get("scenario") else []
+    said += [str(plan["command"])] if plan.get("command") else []
     return _wrapped("Next: " + ", then: ".join(said), 0) if said else []
 
 
 def _wrote(diagnosis: Diagnosis, scales: Scales) -> list[str]:
-    files = ["report.html", *(str(diagnosis.improved[key]) for key in ("card", "fmu") if diagnosis.improved.get(key))]
+    files = ["report.html", *reversed(delivered(diagnosis))]
     proven = proven_range(diagnosis, scales)
     suffix = f" (proven {proven.removeprefix('from ')})" if proven and len(files) > 1 else ""
-    return _wrapped(f"Wrote {' '.join(files)}{suffix}", 0)
+    lines = [f"Wrote {' '.join(files)}{suffix}", *left_out(diagnosis)]
+    return [line for text in lines for line in _wrapped(text, 0)]
 
 
 def printable(text: str) -> str:

@@ -55,6 +55,12 @@ def number(value: float, digits: int = 2) -> str:
     return _fixed(round(value, places), max(places, 0))
 
 
+def raised(unit: str) -> str:
+    """Return a unit as it is printed: N.m.s2/rad2 with points and powers."""
+    powers = re.sub(r"(?<=[A-Za-z])\d", lambda found: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(found[0])], unit)
+    return powers.replace(".", "·")
+
+
 def trimmed(text: str) -> str:
     """Return a number without zeros at its end: a limit is no measurement."""
     return text.rstrip("0").rstrip(".") if "." in text and "e" not in text else text

@@ -39,6 +39,7 @@ def block(one: words.Block, diagnosis: Diagnosis, scales: Scales, picture: Pictu
     first = one.first
     said = [words.closed(finding.statement) for finding in one.findings]
     if one.answer == "ambiguous":
+        said = words.either(said)
         said.append("It is not in the improved model.")
     rows = [("Size", _size(first)), ("Where", where(first, scales)), ("Evidence", first.evidence)]
     rows += [("Ruled out", ", ".join(first.ruled_out)), ("Tell apart", _apart(one)), ("Do this", _do(one, diagnosis))]
@@ -80,9 +81,9 @@ def _apart(one: words.Block) -> str:
 def _do(one: words.Block, diagnosis: Diagnosis) -> str:
     """Return the action; rivals ask for the next experiment."""
     if one.answer == "ambiguous" and diagnosis.next_experiment.get("description"):
-        return str(diagnosis.next_experiment["description"])
-    fmu = diagnosis.improved.get("fmu")
-    return one.first.action or (f"use {fmu}" if fmu and one.answer == "found" else "")
+        return words.started(str(diagnosis.next_experiment["description"]))
+    files = words.delivered(diagnosis)
+    return one.first.action or (f"Use {files[0]}" if files and one.answer == "found" else "")
 
 
 def _numbers(finding: Finding) -> Numbers:

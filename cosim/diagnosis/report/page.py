@@ -16,6 +16,7 @@ from cosim.diagnosis.report.figures_proof import looked_for, proof
 from cosim.diagnosis.report.figures_time import WIDE, overlay, recording
 from cosim.diagnosis.report.figures_where import plane, region, strongest
 from cosim.diagnosis.report.findings import block
+from cosim.diagnosis.report.motion import motion
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.result import Diagnosis, Trace
@@ -46,7 +47,7 @@ def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, A
         "unseen": "" if kind == "none" else tables.unseen(diagnosis),
         "proof": proof(diagnosis, rows, scales),
         "parts_table": tables.parts(rows, scales),
-        "added": bool(_added(diagnosis)),
+        "added": words.verdict(diagnosis) == "either" or bool(_added(diagnosis)),
         "with_effects": _with_effects(diagnosis),
         "box": _box(diagnosis, [row.label for row in rows if row.change == "worse"], scales),
         "noun": "torque" if diagnosis.motion == "rotary" else "force",
@@ -60,7 +61,7 @@ def identity(diagnosis: Diagnosis) -> list[dict[str, str]]:
     rates = [entry["rate_hz"] for entry in made.get("recordings", ()) if entry.get("rate_hz")]
     rest = f", {seconds:.0f} s" + (f" at {_rate(rates[0])}" if rates else "")
     told = [("", diagnosis.mount, ""), ("", f"{many} recording{'s' if many != 1 else ''}", rest)]
-    told.append(("Model", str(made.get("card", {}).get("name", "")), ""))
+    told.append(("Model", words.model(diagnosis), ""))
     told.append(("cosim", str(made.get("version", "")), ""))
     return [dict(zip(("label", "value", "rest"), part, strict=True)) for part in told if part[1]]
 
@@ -76,6 +77,8 @@ def _added(diagnosis: Diagnosis) -> int:
 
 def _with_effects(diagnosis: Diagnosis) -> str:
     found = _added(diagnosis)
+    if not found and words.verdict(diagnosis) == "either":
+        return "with the likeliest cause"
     return {0: "after (nothing added)", 1: "with the effect"}.get(
         found, f"with the {words.count(found).lower()} effects"
     )
@@ -83,14 +86,18 @@ def _with_effects(diagnosis: Diagnosis) -> str:
 
 def _box(diagnosis: Diagnosis, worse: list[str], scales: Scales) -> dict[str, str] | None:
     """Say where the improved model is proven and where to keep the old one."""
-    file = str(diagnosis.improved.get("fmu") or diagnosis.improved.get("card") or "")
-    if not file:
+    files = words.delivered(diagnosis)
+    if not files:
         return None
     proven = words.proven_range(diagnosis, scales)
     text = (
         f"is proven {proven}. Elsewhere, keep the delivered model." if proven else "is proven on the unseen runs only."
     )
-    return {"file": file, "text": text + (f" It is worse here: {', '.join(worse)}." if worse else "")}
+    said = [f"in front of {words.model(diagnosis)}"] if "correction" in diagnosis.improved else []
+    said += [text, f"It is worse here: {', '.join(worse)}." if worse else ""]
+    if "ssp" in diagnosis.improved:
+        said.append(f"{diagnosis.improved['ssp']} holds both, wired to a controller.")
+    return {"file": files[0], "text": " ".join(filter(None, [*said, *words.left_out(diagnosis)]))}
 
 
 def _findings(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
@@ -106,12 +113,25 @@ def _experiment(diagnosis: Diagnosis, scales: Scales) -> dict[str, Any] | None:
         return None
     titles = {finding.effect: words.lowered(finding.title) for finding in diagnosis.findings}
     names = [titles.get(str(name), str(name)) for name in plan.get("separates", ())]
-    said = [words.closed(str(plan.get("description", "")))]
+    said = [words.started(words.closed(str(plan.get("description", ""))))]
+    if how := motion(plan.get("set_point", {}), scales):
+        said.append(words.closed(f"That is {how}, measured from the middle of what was visited"))
     said.append(f"It separates {' from '.join(names)}." if len(names) > 1 else "")
     gap = plan.get("expected_difference")
     said.append(f"They will then differ by {scales.torque.text(float(gap))}." if gap and len(names) > 1 else "")
-    command = plan.get("command") or (f"cosim run {plan['scenario']} --out next" if plan.get("scenario") else "")
-    return {"sentences": [text for text in said if text], "command": str(command)}
+    return {"sentences": [text for text in said if text], "steps": list(_steps(diagnosis))}
+
+
+def _steps(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
+    """What to type: try the motion on the model, then diagnose again with the new recording."""
+    plan, command = diagnosis.next_experiment, str(diagnosis.provenance.get("command", ""))
+    if plan.get("command"):
+        yield "Then", str(plan["command"])
+    if plan.get("scenario"):
+        yield "Try it on the model first", f"cosim run {plan['scenario']} --out next"
+    if " --" in command:
+        train, options = command.split(" --", 1)
+        yield "With the new recording", f"{train} new_recording.parquet --{options} --force"
 
 
 def _middle(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
@@ -145,7 +165,7 @@ def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
 def _proof_sentence(diagnosis: Diagnosis, scales: Scales) -> str:
     held, unit = diagnosis.heldout, scales.torque
     kept = f"{held.name} was not used for fitting."
-    if not _added(diagnosis):
+    if not _added(diagnosis) and words.verdict(diagnosis) != "either":
         return f"{kept} Nothing was added to the model, so there is no gain to prove."
     low, high = held.confidence_interval
     sure = "" if low > 0 else " That range includes zero: no clear change." if high >= 0 else " It is worse."

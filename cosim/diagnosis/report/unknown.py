@@ -69,4 +69,5 @@ def _size(diagnosis: Diagnosis, own: Finding | None, scales: Scales) -> str:
 def _action(diagnosis: Diagnosis, own: Finding | None) -> str:
     if own and own.action:
         return own.action
-    return str(diagnosis.next_experiment.get("description", "look at the machine there, then repeat the run"))
+    with_ = f"vary {diagnosis.depends_on[0]} alone" if diagnosis.depends_on else "look at the machine there"
+    return str(diagnosis.next_experiment.get("description", f"{with_}, then repeat the run"))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.result import Diagnosis, Finding
-from cosim.pictures.quantities import joined, number, trimmed
+from cosim.pictures.quantities import joined, number, raised, trimmed
 
 COUNTS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
 ANSWERS = {
@@ -98,6 +98,12 @@ def _block(findings: tuple[Finding, ...]) -> Block:
     return Block(title, first.answer, f"{count(len(findings))} possible causes", findings)
 
 
+def model(diagnosis: Diagnosis) -> str:
+    """Name the file that something is missing from: the FMU that is the base, or the card."""
+    made = diagnosis.provenance
+    return str(made.get("base_fmu", "")).split(" (")[0] or str(made.get("card", {}).get("name", ""))
+
+
 def heading(diagnosis: Diagnosis) -> str:
     """Return the verdict as a heading."""
     found = sum(finding.answer == "found" for finding in diagnosis.findings)
@@ -133,7 +139,10 @@ def _found(diagnosis: Diagnosis, scales: Scales) -> list[str]:
 
 
 def _rival(diagnosis: Diagnosis, scales: Scales) -> list[str]:
-    return [_either(diagnosis, "The error"), _numbers(diagnosis, scales), "No improved model was written."]
+    held, unit = diagnosis.heldout, scales.torque
+    before, after, noise = (unit.number(value) for value in (held.before_rms, held.after_rms, held.floor_rms))
+    error = f"On unseen runs the error is {joined(before, unit.unit)}, with the likeliest cause {after}, noise {noise}."
+    return [_either(diagnosis, "The error"), error, "No improved model was written."]
 
 
 def _either(diagnosis: Diagnosis, subject: str) -> str:
@@ -182,6 +191,22 @@ def improvement(diagnosis: Diagnosis, scales: Scales) -> str:
     return f"On unseen runs the error {verb} from {before} to {unit.text(held.after_rms)}; noise is {noise}."
 
 
+def delivered(diagnosis: Diagnosis) -> tuple[str, ...]:
+    """List the files of the better model, the one to use first: beside an FMU of another team its correction."""
+    made = diagnosis.improved
+    names = ("correction", "ssp") if "correction" in made else ()
+    return tuple(str(made[name]) for name in (*names, "fmu", "card") if made.get(name))
+
+
+def left_out(diagnosis: Diagnosis) -> list[str]:
+    """Say what a correction lacks, and why there is no SSP."""
+    made = diagnosis.improved
+    titles = {finding.effect: lowered(finding.title) for finding in diagnosis.findings}
+    names = [titles.get(name, str(name)) for name in made.get("not_in_correction", ())]
+    said = [f"No torque can give {' and '.join(names)}: that is in the card only."] if names else []
+    return said + ([f"There is no SSP: {closed(str(made['no_ssp']))}"] if made.get("no_ssp") else [])
+
+
 def proven_range(diagnosis: Diagnosis, scales: Scales) -> str:
     """Return where the improved model is proven, for example "from 20 to 90°/s"; empty if unknown."""
     said = []
@@ -204,13 +229,24 @@ def unit_of(finding: Finding) -> str:
     """Return the unit of the main number."""
     text = finding.size.replace("\N{NO-BREAK SPACE}", " ").strip()
     if text:
-        return text.lstrip("+-−0123456789.,e ").strip()
-    return next(iter(finding.units.values()), "").replace("N.m", "N·m").removeprefix("1")
+        return raised(text.lstrip("+-−0123456789.,e ").strip())
+    return raised(next(iter(finding.units.values()), "").removeprefix("1"))
 
 
 def lowered(title: str) -> str:
     """Return a title as it reads inside a sentence; names and abbreviations keep their capitals."""
     return title if len(title) > 1 and title[1].isupper() else title[:1].lower() + title[1:]
+
+
+def started(sentence: str) -> str:
+    """Return a sentence that begins as one."""
+    return sentence[:1].upper() + sentence[1:]
+
+
+def either(sentences: list[str]) -> list[str]:
+    """Return statements of which one is true, if several, as such."""
+    told = [text for text in sentences if text]
+    return [f"Either: {told[0]}", *(f"Or: {text}" for text in told[1:])] if len(told) > 1 else told
 
 
 def closed(sentence: str) -> str:
