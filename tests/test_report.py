@@ -435,3 +435,15 @@ def test_a_proposed_friction_law_is_told_on_page_and_terminal_and_the_bases_own_
     assert said in render(told)
     assert said in " ".join(summary(told).split())
     assert words.law(replace(told, friction_law={"base": "lugre", "proposed": "lugre", "gain": 0.0})) == ""
+
+
+def test_something_unknown_stands_beside_what_is_named() -> None:
+    both = replace(diagnosis("two"), verdict=("cogging", "friction_asymmetry", "unknown"), depends_on=("time",))
+    assert words.heading(both).endswith("effects are missing from the model, and something unknown")
+    lead = " ".join(words.lead(both, Scales.of(both)))
+    assert "24 times per turn" in lead
+    assert "other known effects" in lead
+    assert "The rest goes with: time" in summary(both)
+    rivals = tuple(finding for finding in both.findings if finding.answer != "found")
+    open_question = replace(both, findings=rivals, verdict=("gravity_unbalance", "unknown"))
+    assert "more than one possible cause, and something unknown" in words.heading(open_question)

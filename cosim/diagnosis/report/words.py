@@ -110,7 +110,7 @@ def heading(diagnosis: Diagnosis) -> str:
     many = f"{count(found)} effect{'s are' if found != 1 else ' is'} missing from the model"
     match verdict(diagnosis):
         case "unknown":
-            return f"{many}, and something unknown" if found else _UNKNOWN
+            return f"{many}, and something unknown" if found else _BESIDE_RIVALS if _named(diagnosis) else _UNKNOWN
         case "either":
             return "Something is missing, with more than one possible cause"
         case "none":
@@ -119,6 +119,12 @@ def heading(diagnosis: Diagnosis) -> str:
 
 
 _UNKNOWN = "Something is missing, and it is none of the effects cosim knows"
+_BESIDE_RIVALS = "Something is missing, with more than one possible cause, and something unknown"
+
+
+def _named(diagnosis: Diagnosis) -> bool:
+    """Whether the verdict names an effect, be it one of several rivals."""
+    return any(name != "unknown" for name in diagnosis.verdict)
 
 
 def _these(diagnosis: Diagnosis) -> str:
@@ -167,12 +173,15 @@ def _nothing(diagnosis: Diagnosis, scales: Scales) -> list[str]:
 
 
 def _unknown(diagnosis: Diagnosis, scales: Scales) -> list[str]:
-    """Say what the rest is not, and where it goes."""
-    known = sum(finding.answer != "not_testable" and finding.effect != "unknown" for finding in diagnosis.findings)
+    """Say what was named, that the others are not the rest, and where the rest goes."""
+    named, found = _named(diagnosis), [block for block in blocks(diagnosis) if block.answer == "found"]
+    said = [closed(block.first.statement) for block in found[:3]]
     own = next((finding.statement for finding in diagnosis.findings if finding.effect == "unknown"), "")
-    found = any(finding.answer == "found" for finding in diagnosis.findings)
-    none = f"None of the {known} known effects that could be tested {'explains the rest' if found else 'lowers it'}."
-    return [closed(own), _numbers(diagnosis, scales), none, "" if found else "No improved model was written."]
+    others = [f for f in diagnosis.findings if f.effect != "unknown" and f.answer in ("not_seen", "not_proven")]
+    none = f"None of the {len(others)} {'other ' if named else ''}known effects that could be tested "
+    none += "explains the rest." if named else "lowers it."
+    written = "" if found else "No improved model was written."
+    return [*said, _either(diagnosis, "The error"), closed(own), _numbers(diagnosis, scales), none, written]
 
 
 _LEADS = {"found": _found, "either": _rival, "none": _nothing, "unknown": _unknown}
