@@ -40,7 +40,7 @@ def block(one: words.Block, diagnosis: Diagnosis, scales: Scales, picture: Pictu
     said = [words.closed(finding.statement) for finding in one.findings]
     if one.answer == "ambiguous":
         said = words.either(said)
-        said.append("It is not in the improved model.")
+        said.append("None of these goes into a model." if len(one.findings) > 1 else "It goes into no model.")
     rows = [("Size", _size(first)), ("Where", where(first, scales)), ("Evidence", first.evidence)]
     rows += [("Ruled out", ", ".join(first.ruled_out)), ("Tell apart", _apart(one)), ("Do this", _do(one, diagnosis))]
     closed = tuple(_numbers(finding) for finding in one.findings)

@@ -31,7 +31,7 @@ def looked(diagnosis: Diagnosis) -> Table:
 
 def _from(finding: Finding) -> str:
     if finding.answer != "not_testable":
-        return shows_from(finding) or finding.evidence or "–"
+        return shows_from(finding) or finding.evidence or "no smallest size was worked out"
     said = [finding.evidence, finding.action or CONDITIONS.get(finding.effect, "")]
     return "; ".join(dict.fromkeys(text.rstrip(".") for text in said if text))
 
