@@ -1,0 +1,68 @@
+"""What is behind a play coasts, rubs and is caught; a diagnosis names it, with the width of the gap."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.play import play_torque
+from cosim.proof.generator import make_case, write_case
+from cosim.proof.tool import given
+from pyfmi_models.effects.backlash import Backlash
+
+FAR, DT = 2.0, 1e-3
+
+
+def torque(play: Backlash, v: np.ndarray) -> np.ndarray:
+    """Torque passed on to the far side, the near one moving at v."""
+    a = np.gradient(v, DT)
+    return play_torque(play, FAR, v, a, DT) + FAR * a
+
+
+def test_a_far_side_in_its_gap_takes_no_torque() -> None:
+    v = 0.01 * np.sin(np.linspace(0, 20, 2000))  # 2 s: 6 mrad, less than half of the gap
+    assert np.abs(torque(Backlash(gap_rad=0.02), v)).max() == 0
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_pushed_on_for_long_the_far_side_follows_and_needs_its_inertia_and_its_friction(side: int) -> None:
+    t = DT * np.arange(4000)
+    play = Backlash(gap_rad=1e-3, load_friction=0.3, load_viscous=0.5)
+    passed = torque(play, side * 0.4 * t)
+    np.testing.assert_allclose(passed[-500:], side * (FAR * 0.4 + 0.3 + 0.5 * 0.4 * t[-500:]), rtol=0.01)
+
+
+def test_a_near_side_that_stops_is_left_for_as_long_as_the_gap_is_wide() -> None:
+    """At rest from 1 s on, it is left with 0.1 rad/s; friction takes 0.05 rad/s2, so 20 mrad are crossed in 212 ms."""
+    t = DT * np.arange(3000)
+    v = np.where(t < 1, 0.1, 0.0)
+    passed = torque(Backlash(gap_rad=0.02, load_friction=0.05 * FAR), v)
+    met = t[np.flatnonzero((t > 1.01) & (np.abs(passed) > 1e-3))[0]] - 1
+    assert met == pytest.approx((0.1 - np.sqrt(0.1**2 - 2 * 0.05 * 0.02)) / 0.05, abs=5e-3)
+    caught = t > 1.01
+    # What it still had of speed goes, and does not come back: the contact is well damped.
+    assert DT * passed[caught].sum() == pytest.approx(-FAR * (0.1 - 0.05 * met), rel=0.3)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 5])
+def test_the_momentum_that_is_told_hardly_depends_on_how_dense_the_rows_are(rows: int) -> None:
+    t = 1e-3 * np.arange(20000)
+    v, a = 0.2 * np.sin(3 * t), 0.6 * np.cos(3 * t)
+    play = Backlash(gap_rad=5e-3, load_friction=0.2, load_viscous=0.3)
+    fine = np.cumsum(play_torque(play, FAR, v, a, 1e-3)) * 1e-3
+    coarse = np.cumsum(play_torque(play, FAR, v[::rows], a[::rows], rows * 1e-3)) * rows * 1e-3
+    assert np.std(coarse - fine[::rows]) < 0.05 * np.std(fine)
+
+
+def test_a_concealed_play_is_named_with_its_gap(tmp_path: Path) -> None:
+    case = make_case(5002, ["backlash"], duration=20)
+    write_case(case, tmp_path)
+    card, train, held = given(str(tmp_path))
+    found = diagnose(train, [held], card)
+    assert found.diagnosis.verdict == ("backlash",)
+    assert found.diagnosis.heldout.after_rms < 0.7 * found.diagnosis.heldout.before_rms
+    play = next(effect for effect in found.card.effects if isinstance(effect, Backlash))
+    true = case.truth["effects"][0]["parameters"]
+    assert play.gap_rad == pytest.approx(true["gap_rad"], rel=0.1)
+    assert play.load_share == pytest.approx(true["load_share"], rel=0.2)
