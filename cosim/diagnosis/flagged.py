@@ -35,6 +35,9 @@ MOST = 3.0
 """... and one cell says no more for it than this times log(loud): one spike is no span."""
 SPEEDS = 8
 """Bins of speed, of equal count, in which noise is measured."""
+LEAST, MOST_NOISE = 0.2, 3.0
+"""Noise at one speed differs from that at the others by no more than these factors: few moves are that fast, and what
+is missing may be in most of them."""
 MEDIAN = 0.6745
 """Median of the absolute value of a normal variable of unit standard deviation."""
 ROUNDS = 20
@@ -59,8 +62,8 @@ def noise_at(speed: Array, rest: Array, wanted: Array) -> Array:
     parts = [part for part in np.array_split(np.argsort(np.abs(speed)), SPEEDS) if len(part)]
     centres = [float(np.median(np.abs(speed[part]))) for part in parts]
     sizes = np.array([float(np.median(np.abs(rest[part]))) / MEDIAN for part in parts])
-    floor = 0.2 * float(np.median(sizes)) + 1e-300
-    return np.asarray(np.interp(np.abs(wanted), centres, np.maximum(sizes, floor)))
+    typical = float(np.median(sizes)) + 1e-300
+    return np.asarray(np.interp(np.abs(wanted), centres, np.clip(sizes, LEAST * typical, MOST_NOISE * typical)))
 
 
 def flagged(rests: Sequence[Rest]) -> list[Spans]:
