@@ -126,12 +126,14 @@ def heard_in(q: np.ndarray, t: np.ndarray, residual: np.ndarray) -> list[float]:
     return tones(span_of(BASE, prepared, rest, np.zeros(len(rest))), rest)
 
 
-def test_harmonics_of_a_motion_that_repeats_itself_are_no_tones() -> None:
+def test_what_follows_a_motion_that_repeats_itself_or_turns_steadily_is_no_tone() -> None:
     t, pitch = np.arange(6000) / 125, 0.35
     residual = np.sin(2 * np.pi * 3 * pitch * t) + 0.1 * np.random.default_rng(1).standard_normal(len(t))
     for wild in (0, 9):
         found = heard_in(np.sin(2 * np.pi * pitch * t + 0.5 * wild * np.sin(0.4 * t)), t, residual)
         assert any(abs(hertz - 3 * pitch) < 0.02 for hertz in found) == bool(wild)
+    turning = heard_in(0.6 * t + 1e-3 * np.sin(t), t, residual)
+    assert not any(abs(hertz - 3 * pitch) < 0.02 for hertz in turning)
 
 
 def test_recordings_too_short_for_a_tone_have_none() -> None:

@@ -220,6 +220,8 @@ def _why_not(name: str, mount: Mount, prepared: Prepared) -> str:
         return "the card has it already"
     if name == "stribeck" and getattr(mount.friction, "Fs", None) is not None:
         return "the card's friction law has it already"
+    if name == "periodic_disturbance":
+        return "too short, or the motion repeats itself or turns steadily; record a motion that wanders"
     if not prepared.has_position and name in ("cogging", "position_friction", "gravity_unbalance"):
         return "no position was recorded; record q"
     if name in ("delay", "actuator_lag", "clock_skew") and not any(piece.asked for piece in prepared.pieces):

@@ -45,7 +45,7 @@ def tones(span: Span, signal: Array) -> list[float]:
     """Frequencies [Hz] of the tones that stand out most from their neighbours, at most `PEAKS`, well apart.
 
     Each piece has its own phase, so powers are added, each in units of the level of its neighbours. Where the motion
-    repeats itself, so does all that depends on it: its harmonics are no sign of a disturbance.
+    repeats itself or turns steadily, what depends on it is a tone as well: such tones are no sign of a disturbance.
     """
     pieces = [np.flatnonzero(span.piece == number) for number in np.unique(span.piece)]
     pieces = [own for own in pieces if len(own) >= LEAST_ROWS]
@@ -54,7 +54,9 @@ def tones(span: Span, signal: Array) -> list[float]:
     if not pieces or len(fine) < NEIGHBOURS:
         return []
     standing = np.sum([_standing(span.t[own], signal[own], fine) for own in pieces], axis=0)
-    standing[np.all([_repeated(span.t[own], span.v[own], fine) for own in pieces], axis=0)] = 0.0
+    turned = [_turned(span.t[own], span.angle[own], fine) for own in pieces]
+    repeated = [_repeated(span.t[own], span.v[own], fine) for own in pieces]
+    standing[np.all(np.logical_or(turned, repeated), axis=0)] = 0.0
     found: list[float] = []
     for index in np.argsort(standing)[::-1]:
         if all(abs(fine[index] - other) > 3 / seconds for other in found) and standing[index] > 0:
@@ -62,6 +64,12 @@ def tones(span: Span, signal: Array) -> list[float]:
         if len(found) == PEAKS:
             break
     return found
+
+
+def _turned(t: Array, angle: Array, hertz: Array) -> npt.NDArray[np.bool_]:
+    """Which tones are waves of angle as well: those in phase with a steady turn, within a radian RMS."""
+    speed, start = np.polyfit(t - t[0], angle, 1)
+    return np.asarray(2 * pi * hertz * np.std(angle - start - speed * (t - t[0])) < abs(speed))
 
 
 def _repeated(t: Array, v: Array, hertz: Array) -> npt.NDArray[np.bool_]:
