@@ -15,6 +15,7 @@ from cosim.recording import Recording
 from pyfmi_models.effects import ActuatorLag, Delay, Effect, FrictionAsymmetry, GravityUnbalance, TorqueOffset
 from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.effects.clock_skew import ClockSkew
+from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
@@ -90,6 +91,12 @@ def test_a_clock_that_the_set_point_does_not_see_late_is_a_drive_whether_it_drif
     assert is_another(late, Delay(delay_ms=5.0))
     assert not is_another(in_time, Delay(delay_ms=5.0))
     assert not is_another(in_time, ClockSkew(offset_ms=-0.5, drift_ppm=100.0))
+
+
+def test_a_spring_that_no_card_may_hold_is_no_answer() -> None:
+    swing = problem(np.sin(np.arange(20_000) / 1000))
+    assert is_another(swing, Compliance(antiresonance_hz=30.0, resonance_hz=20.0))
+    assert not is_another(swing, Compliance(antiresonance_hz=20.0, resonance_hz=30.0))
 
 
 def test_a_cable_whose_home_is_many_strokes_away_is_an_offset() -> None:

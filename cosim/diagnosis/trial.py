@@ -169,9 +169,9 @@ def _in_time(problem: Problem, trial: Trial) -> bool:
 
 def is_another(problem: Problem, effect: Effect) -> bool:
     """Whether an effect is really something else: a time-stamp convention, a level, an unbalance, a drift; or at a
-    bound.
+    bound, or what no card may hold.
     """
-    if any(variable.start >= variable.high for variable in parameters_of(effect)):
+    if effect.broken_rule() or any(variable.start >= variable.high for variable in parameters_of(effect)):
         return True
     if isinstance(effect, DriveEffect | ClockEffect):
         return _is_other_timing(problem, effect)
