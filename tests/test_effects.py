@@ -34,7 +34,7 @@ from pyfmi_models.mount import Axis, Mount
 
 CONTRACT = {
     "friction_asymmetry": {"level_asymmetry", "viscous_asymmetry"},
-    "stribeck": {"Fs", "Vs"},
+    "stribeck": {"Fs", "Vs", "delta"},
     "presliding": {"sigma0"},
     "cogging": {"cycles_per_rev", "amplitude", "phase", "harmonics"},
     "position_friction": {"cycles_per_rev", "q_center", "relative_amplitude", "width"},

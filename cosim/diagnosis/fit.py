@@ -22,8 +22,8 @@ from pyfmi_models.mount import Mount
 
 FIXED = (
     "axis.torque_limit",
-    *(f"friction.{name}" for name in ("smoothing", "delta", "n", "spread", "attraction")),
-    *("cycles_per_rev", "onset_s", "warm_up_degC", "hardening", "contact_hz", "backlash.damping_ratio"),
+    *(f"friction.{name}" for name in ("smoothing", "n", "spread", "attraction")),
+    *("delta", "cycles_per_rev", "onset_s", "warm_up_degC", "hardening", "contact_hz", "backlash.damping_ratio"),
 )
 """Parameters that are not fitted here: limits, shapes of laws, and numbers that candidates choose from a grid."""
 BRISTLES = ("friction.sigma0", "friction.sigma1", "friction.Fs", "friction.Vs")

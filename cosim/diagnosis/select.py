@@ -58,7 +58,9 @@ def _best(problem: Problem, trials: Sequence[Trial]) -> Trial | None:
 def starts(screening: Screening) -> list[Effect]:
     """Effects worth a nonlinear fit, strongest first, and their twins."""
     least = max(SCREEN_GAIN, SCREEN_SHARE * screening.best[0][1].gain) if screening.best else 0.0
-    worth = [candidate.start(k) for candidate, score, k in screening.best[:REFINED] if score.gain >= least]
+    refined = list(dict.fromkeys(candidate.effect for candidate, _, _ in screening.best))[:REFINED]
+    strong = [(c, k) for c, score, k in screening.best if c.effect in refined and score.gain >= least]
+    worth = [candidate.start(k) for candidate, k in strong]
     known = {type(effect) for effect in worth}
     return worth + [twin for effect in worth for twin in twins(effect) if type(twin) not in known]
 

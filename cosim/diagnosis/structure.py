@@ -17,7 +17,7 @@ from cosim.diagnosis.families import candidates
 from cosim.diagnosis.fit import BRISTLES, FIXED, Fit, fit
 from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import Array, Prepared
-from pyfmi_models.effects import PeriodicFriction
+from pyfmi_models.effects import Effect, PeriodicFriction
 from pyfmi_models.mount import Mount
 
 WANDER = 0.02
@@ -164,7 +164,7 @@ def projected(target: Array, columns: Array) -> Array:
 
 @dataclass(frozen=True)
 class Screening:
-    """The best member of each effect, with its linear score, strongest first; and the bench they were scored on."""
+    """The best member of each form of an effect, with its linear score, strongest first; and their bench."""
 
     bench: Bench
     best: tuple[tuple[Candidate, Score, Array], ...]
@@ -193,9 +193,11 @@ def screen(found: Fit, prepared: Prepared, blocks: Blocks, nuisance: Nuisances, 
     return Screening(bench, tuple((tried[index], *scores[index]) for index in best))
 
 
-def _best(tried: Sequence[Candidate], scores: Sequence[tuple[Score, Array]]) -> dict[str, int]:
-    best: dict[str, int] = {}
+def _best(tried: Sequence[Candidate], scores: Sequence[tuple[Score, Array]]) -> dict[type[Effect], int]:
+    """The best member of each form: a wave and one spot are the same effect, and yet no wave leads to a spot."""
+    best: dict[type[Effect], int] = {}
     for index, (candidate, (score, _)) in enumerate(zip(tried, scores, strict=True)):
-        if candidate.effect not in best or score.gain > scores[best[candidate.effect]][0].gain:
-            best[candidate.effect] = index
+        form = type(candidate.instances[0])
+        if form not in best or score.gain > scores[best[form]][0].gain:
+            best[form] = index
     return best

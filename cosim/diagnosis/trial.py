@@ -16,7 +16,7 @@ from cosim.diagnosis.fit import FIXED, LEAST_VS, Fit, fit
 from cosim.diagnosis.lateness import blamed
 from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.shaken import heard
-from cosim.diagnosis.structure import Bench
+from cosim.diagnosis.structure import WANDER, Bench
 from pyfmi_models.effects import (
     ActuatorLag,
     ClockEffect,
@@ -26,8 +26,10 @@ from pyfmi_models.effects import (
     Effect,
     StribeckEffect,
 )
+from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.effects.clock_skew import ClockSkew
+from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.model import parameters_of
 from pyfmi_models.mount import Mount
@@ -38,6 +40,8 @@ SURE_GAIN = 0.05
 """... or the share that is enough with a t value of 1."""
 LEAST_PLAIN_GAIN = 0.02
 """Share of the plain residual energy an effect must remove too: whitened evidence alone can be about nothing."""
+LEAST_SIZE = WANDER
+"""An effect at the axis must remove more torque error than the friction level's wandering makes, relative to it."""
 LEAST_DELAY_SAMPLES, LEAST_DELAY = 0.3, 1.5e-4
 """A delay shorter than this many samples, or seconds, is what time stamps cannot be trusted for."""
 LEAST_DRIFT_MS, LEAST_DRIFT = 1.0, 0.3
@@ -46,6 +50,8 @@ LEAST_CYCLES = 1.5
 """A ripple with fewer cycles a turn is an unbalance."""
 WHOLE = 0.01
 """A whole number of cycles is taken if the residual grows by no more than this share."""
+SHARP = 1.0
+"""Exponent of the Stribeck curve of Bo and Pavelescu (Wear 82, 1982); that of Armstrong-Helouvry is 2."""
 LEAST_CHANGES = 0.5
 """Share of the torque's changes from row to row that a model with a delay or a lag must explain: in noise that the
 controller answers, time runs otherwise than in the machine."""
@@ -58,6 +64,8 @@ worse, as the larger family's further number takes up what the friction law leav
 BESIDE = 1.0
 """A cable whose home lies further beside the visited positions than this share of their range is an offset: of its
 energy its change over the range has less than about 1 - `TIE`."""
+UNLIKE_FRICTION = (DriveEffect, ClockEffect, Compliance, Backlash, PeriodicDisturbance)
+"""Effects that a wandering friction level cannot imitate: they change when torque acts, or come by the clock."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +101,8 @@ class Trial:
     score: Score
     plain_gain: float
     """Share of the energy of the plain residual removed."""
+    size: float
+    """RMS of the torque error removed, relative to the RMS of the friction level."""
 
     @property
     def gain(self) -> float:
@@ -115,20 +125,33 @@ def tried(problem: Problem, without: Fit, effect: Effect, bench: Bench) -> Trial
 def judged(effect: Effect, found: Fit, without: Fit, bench: Bench) -> Trial:
     """Judge an effect of a fitted structure against the structure without it."""
     plain = [float(np.sum((bench.weight * one.residual) ** 2)) for one in (found, without)]
-    room = ROOM.get(effect.id, "")
+    room, level = ROOM.get(effect.id, ""), float(np.sum((bench.weight * bench.nuisances.level) ** 2))
     score = Score(bench.energy(without, room), bench.energy(found, room), bench.rows)
-    return Trial(effect, found, score, 1 - plain[0] / plain[1])
+    removed = max(plain[1] - plain[0], 0.0)
+    return Trial(effect, found, score, 1 - plain[0] / plain[1], np.sqrt(removed / level) if level else np.inf)
 
 
 def _tuned(problem: Problem, found: Fit) -> Fit:
-    """Fit what its grid knows only roughly of an effect that was added last: a ripple's cycles, how a cable hardens.
-
-    Slots, teeth and rolling elements come in whole numbers: one that fits as well is taken.
-    """
-    if isinstance(found.mount.effects[-1], CableWrap):
+    """Fit what its grid knows only roughly of an effect that was added last: cycles, how a cable hardens, a shape."""
+    added: Any = found.mount.effects[-1]
+    if isinstance(added, CableWrap):
         return problem.fit(_freed(problem, found, "hardening").mount, 4)
-    if getattr(found.mount.effects[-1], "cycles_per_rev", 0.0) <= 0:
-        return found
+    if isinstance(added, StribeckEffect):
+        return _shaped(problem, found)
+    return _in_cycles(problem, found) if getattr(added, "cycles_per_rev", 0.0) > 0 else found
+
+
+def _shaped(problem: Problem, found: Fit) -> Fit:
+    """Try the sharper Stribeck curve of the literature too, and any shape if that fits clearly better."""
+    gauss: Any = found.mount.effects[-1]
+    sharper = replace(found.mount, effects=(*found.mount.effects[:-1], replace(gauss, delta=SHARP)))
+    best = min((found, problem.fit(sharper, 12)), key=lambda one: one.rms)
+    free = _freed(problem, best, "delta")
+    return free if free.rms * (1 + WHOLE) < best.rms and not _at_bound(free.mount.effects[-1]) else best
+
+
+def _in_cycles(problem: Problem, found: Fit) -> Fit:
+    """Fit the cycles of a ripple; slots, teeth and rolling elements come in whole numbers: one that fits is taken."""
     free = _freed(problem, found, "cycles_per_rev")
     best = min((found, free), key=lambda one: one.rms)
     ripple: Any = best.mount.effects[-1]
@@ -147,6 +170,8 @@ def _freed(problem: Problem, found: Fit, name: str) -> Fit:
 def is_real(problem: Problem, trial: Trial) -> bool:
     """Whether an effect is significant, large enough, and what its name says."""
     if trial.plain_gain < LEAST_PLAIN_GAIN or is_another(problem, trial.effect) or not _in_time(problem, trial):
+        return False
+    if trial.size < LEAST_SIZE and not isinstance(trial.effect, UNLIKE_FRICTION):
         return False
     return (trial.gain > LEAST_GAIN and trial.t > LEAST_T) or (trial.gain > SURE_GAIN and trial.t > 1)
 
@@ -171,7 +196,7 @@ def is_another(problem: Problem, effect: Effect) -> bool:
     """Whether an effect is really something else: a time-stamp convention, a level, an unbalance, a drift; or at a
     bound, or what no card may hold.
     """
-    if effect.broken_rule() or any(variable.start >= variable.high for variable in parameters_of(effect)):
+    if effect.broken_rule() or _at_bound(effect):
         return True
     if isinstance(effect, DriveEffect | ClockEffect):
         return _is_other_timing(problem, effect)
@@ -220,6 +245,10 @@ def _late(problem: Problem, effect: Effect) -> float | None:
     steady = abs(drift) < max(LEAST_DRIFT_MS, LEAST_DRIFT * abs(offset))
     late = -1e-3 * (offset + drift / 2)
     return late if late > (0 if steady else problem.sample_time) else None
+
+
+def _at_bound(effect: Effect) -> bool:
+    return any(variable.start >= variable.high for variable in parameters_of(effect))
 
 
 def winner(trials: Sequence[Trial]) -> Trial | None:

@@ -13,7 +13,7 @@ from pyfmi_models.model import Scalar, parameter
 class _PositionFriction(FrictionEffect):
     id: ClassVar[str] = "position_friction"
     title: ClassVar[str] = "Position-dependent friction"
-    rivals: ClassVar[tuple[str, ...]] = ("cogging", "gravity_unbalance")
+    rivals: ClassVar[tuple[str, ...]] = ("cogging", "gravity_unbalance", "load_dependent_friction")
     told_apart_by: ClassVar[str] = "cogging pushes the same way in both directions; friction always resists"
 
 

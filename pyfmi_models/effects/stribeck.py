@@ -10,9 +10,9 @@ from pyfmi_models.model import Scalar, parameter
 
 @dataclass(frozen=True, kw_only=True)
 class StribeckEffect(FrictionEffect):
-    """Friction level that rises towards break-away at low speed: g + (Fs - g) exp(-(v/Vs)^2).
+    """Friction level that rises towards break-away at low speed: g + (Fs - g) exp(-|v/Vs|^delta).
 
-    Reference: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083, with shape exponent 2.
+    Reference: Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083.
     """
 
     id: ClassVar[str] = "stribeck"
@@ -22,10 +22,11 @@ class StribeckEffect(FrictionEffect):
     action: ClassVar[str] = "Look at lubrication if slow motion is jerky; otherwise use the improved model."
     Fs: Scalar = parameter("N.m", "Break-away level at rest", low=1e-9)
     Vs: Scalar = parameter("rad/s", "Speed over which friction falls", low=1e-7, nominal=0.01)
+    delta: Scalar = parameter("1", "Shape exponent of the curve", default=2.0, low=0.1, high=5)
 
     def level(self, level: Scalar, motion: Motion) -> Scalar:
-        """`level + (Fs - level) exp(-(v/Vs)^2)`."""
-        return level + (self.Fs - level) * stribeck_decay(motion.v, self.Vs, 2.0)
+        """`level + (Fs - level) exp(-|v/Vs|^delta)`."""
+        return level + (self.Fs - level) * stribeck_decay(motion.v, self.Vs, self.delta)
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""

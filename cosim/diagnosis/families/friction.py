@@ -83,7 +83,8 @@ def stribeck(mount: Mount, span: Span) -> Iterator[Candidate]:
         Vs = share * span.top
 
         def start(c: Array, Vs: float = Vs) -> Effect:
-            return StribeckEffect(Fs=max(base + float(c[0]), 0.05 * base), Vs=Vs)
+            # Far from a level at rest the tangent says little: a fit that starts from half to twice finds its way.
+            return StribeckEffect(Fs=float(np.clip(base + c[0], 0.5 * base, 2 * base)), Vs=Vs)
 
         yield Candidate("stribeck", (StribeckEffect(Fs=base, Vs=Vs),), ("Fs",), start)
 
