@@ -21,15 +21,14 @@ from pyfmi_models.effects import (
     ActuatorLag,
     ClockEffect,
     Cogging,
+    Coupling,
     Delay,
     DriveEffect,
     Effect,
     StribeckEffect,
 )
-from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.effects.clock_skew import ClockSkew
-from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.model import parameters_of
 from pyfmi_models.mount import Mount
@@ -64,7 +63,7 @@ worse, as the larger family's further number takes up what the friction law leav
 BESIDE = 1.0
 """A cable whose home lies further beside the visited positions than this share of their range is an offset: of its
 energy its change over the range has less than about 1 - `TIE`."""
-UNLIKE_FRICTION = (DriveEffect, ClockEffect, Compliance, Backlash, PeriodicDisturbance)
+UNLIKE_FRICTION = (DriveEffect, ClockEffect, Coupling, PeriodicDisturbance)
 """Effects that a wandering friction level cannot imitate: they change when torque acts, or come by the clock."""
 
 
