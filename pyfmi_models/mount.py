@@ -78,9 +78,10 @@ class Mount:
     def components(self) -> dict[str, Any]:
         """Return the parts that carry parameters, by the prefix of their names; a repeated effect counts up."""
         parts: dict[str, Any] = {"axis": self.axis, "friction": self.friction}
+        counts: dict[str, int] = {}
         for effect in self.effects:
-            count = sum(name.rstrip("0123456789") == effect.id for name in parts)
-            parts[effect.id + (str(count + 1) if count else "")] = effect
+            count = counts[effect.id] = counts.get(effect.id, 0) + 1
+            parts[effect.id + (str(count) if count > 1 else "")] = effect
         return parts
 
     def parameters(self) -> tuple[Variable, ...]:
