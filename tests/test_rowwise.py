@@ -1,0 +1,37 @@
+"""Expressions evaluated on whole rows mean what CasADi means by them."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from cosim.diagnosis.rowwise import CHUNK, Rowwise
+
+X, P = ca.SX.sym("x", 3), ca.SX.sym("p", 2)
+a, b, c = X[0], X[1], X[2]
+EXPRESSIONS = {
+    "arithmetic": a * b / (c + 3) - 2 * a + P[0] ** 2 - 1 / b,
+    "powers": ca.sqrt(ca.fabs(a)) + ca.fabs(b) ** P[1] + a**3,
+    "waves": ca.sin(a) * ca.cos(b) + ca.tan(c / 4) + ca.atan2(a, b) + ca.atan(c),
+    "curves": ca.exp(-(a**2)) + ca.log(1 + b**2) + ca.tanh(c) + ca.log1p(a**2) + ca.expm1(b / 9) + ca.sinh(c / 9),
+    "choices": ca.if_else(a > 0, b, ca.if_else(b <= 0, c, -a)) + ca.fmin(a, b) + ca.fmax(b, c) + ca.sign(a),
+    "logic": ca.if_else(ca.logic_and(a > 0, b > 0), 1.0, 0.0) + ca.if_else(ca.logic_or(a < 0, c == b), 3.0, 0.0),
+    "a choice of what is undefined": ca.if_else(a > 0, ca.log(a), ca.sqrt(-a)),
+    "rounding": ca.floor(a) + ca.ceil(b) + ca.fmod(c, 2) + ca.copysign(a, b),
+    "parameters only": P[0] * P[1] + 0 * a,
+    "slopes": ca.jacobian(ca.tanh(a / 1e-3) * ca.exp(-((b / P[0]) ** 2)) + ca.fabs(c), ca.vertcat(a, b, c, P)).T,
+}
+
+
+@pytest.mark.parametrize("name", EXPRESSIONS)
+@pytest.mark.parametrize("rows", [0, 1, CHUNK, CHUNK + 7])
+def test_rows_are_what_casadi_says(name: str, rows: int) -> None:
+    expression = EXPRESSIONS[name]
+    columns = np.random.default_rng(rows).normal(0, 2, (3, rows))
+    columns[:, : rows // 3] = np.round(columns[:, : rows // 3])
+    numbers = np.array([1.7, 0.6])
+    found = Rowwise(X, P, expression)(columns, numbers)
+    function = ca.Function("each", [X, P], [ca.densify(expression)])
+    wanted = np.array([np.asarray(function(one, numbers)).ravel() for one in columns.T])
+    assert found.shape == (expression.numel(), rows)
+    if rows:
+        np.testing.assert_allclose(found, wanted.T, rtol=1e-12, atol=1e-12)
