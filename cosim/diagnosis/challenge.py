@@ -17,8 +17,10 @@ from cosim.diagnosis.instruments import DECISIVE, Misfits, excludes, misfits_of,
 from cosim.diagnosis.select import Selection
 from cosim.diagnosis.structure import Bench, projected
 from cosim.diagnosis.trial import (
+    FORETOLD,
     LEAST_GAIN,
     LIMITS,
+    TEMPERATURE,
     TIE,
     Problem,
     Trial,
@@ -34,13 +36,13 @@ from pyfmi_models.effects import Effect
 
 ALIKE = 0.4
 """A rival is refitted in an effect's place if its linear gain there reaches this share of the effect's."""
-TEMPERATURE = 60.0
-"""Divides log-likelihoods before they become probabilities: neighbouring samples are far from independent."""
 NESTED = {"torque_offset": ("friction_asymmetry", "cable_wrap")}
 """Effects that hold another as a special case: they take its place by explaining more, not by explaining as much."""
-ROUNDS = 2
+ROUNDS = 3
 CREDIBLE = 0.05
 """A rival with a smaller share of the probability is not in the set, which is to hold the truth in 95 % of cases."""
+FORETELLS = 0.95
+"""A rival that foretells this share of the plain energy that the winner foretells stays in the set, if credible."""
 NEAR = 0.9
 """A rival with this share of the winner's gain is excluded only if it is clearly worse block by block."""
 
@@ -77,6 +79,12 @@ class Place:
         return max((demanded, *by_gain), key=lambda trial: trial.gain) if demanded is self.trial else demanded
 
     @property
+    def favourite(self) -> Trial:
+        """The most probable member of the set: it is named first."""
+        members = [self.trial, *(rival for rival in self.rivals if self._is_close(rival))]
+        return max(members, key=lambda trial: self.shares[trial.effect.id])
+
+    @property
     def probability(self) -> float:
         """Share of this effect among its rivals and "none"."""
         return self.shares[self.effect.id]
@@ -88,7 +96,7 @@ class Place:
         A parameter more than this effect has costs what it does in BIC, with as many rows as are independent; where
         the set point speaks of both, its chi-squared is the evidence.
         """
-        own = self.trial.score.nats / TEMPERATURE
+        own = self.trial.log_odds
         odds = np.array([0.0, *(self._log_odds(rival) for rival in self.rivals), -own])
         weights = np.exp(odds - odds.max())
         names = [self.effect.id, *(rival.effect.id for rival in self.rivals)]
@@ -101,7 +109,7 @@ class Place:
             return -margin / 2
         more = rival.fit.count - self.trial.fit.count
         price = log(max(float(self.trial.score.rows.sum()) / TEMPERATURE, 1.0)) / 2
-        return (rival.score.nats - self.trial.score.nats) / TEMPERATURE - more * price
+        return rival.log_odds - self.trial.log_odds - more * price
 
 
 @dataclass(frozen=True)
@@ -137,10 +145,12 @@ def _round(problem: Problem, chosen: Fit, bench: Bench, say: Callable[[str], Non
         best = place.better
         if place.trial.gain < LEAST_GAIN and not is_real(problem, best):
             return [], _without(problem, chosen, effect)
-        if best is not place.trial and not simpler_wins(place.trial, best):
+        if place.shares[best.effect.id] > place.probability and not simpler_wins(place.trial, best):
             return [], best.fit
         places.append(place)
-    return places, None
+    favourites = [place.favourite for place in places]
+    changed = [one for one, place in zip(favourites, places, strict=True) if one is not place.trial]
+    return ([], changed[0].fit) if changed else (places, None)
 
 
 def _added(problem: Problem, chosen: Fit) -> tuple[Effect, ...]:
@@ -150,8 +160,11 @@ def _added(problem: Problem, chosen: Fit) -> tuple[Effect, ...]:
 def _too_close(winner: Trial, rival: Trial) -> bool:
     """Whether a rival cannot be excluded: its gain comes near, and block by block it is not clearly worse.
 
-    A rival that the winner becomes in a limit is excluded by its gain alone.
+    A rival that the winner becomes in a limit is excluded by its gain alone; one that foretells as much of the plain
+    residual of each recording left out is not excluded at all.
     """
+    if rival.foretold > FORETOLD and rival.foretold >= FORETELLS * winner.foretold:
+        return True
     is_limit = winner.effect.id in LIMITS.get(rival.effect.id, ())
     return rival.gain >= NEAR * winner.gain and (is_limit or not clearly_worse(rival, winner))
 

@@ -18,6 +18,8 @@ from pyfmi_models.mount import Mount
 
 READING = ("t", "q", "v", "a")
 NEWTON = 3
+LEAST_SLOPE = 1e-2
+"""A drive that gives less than this share of what more is asked for is undone as if it gave this share."""
 
 
 class Equations:
@@ -133,7 +135,8 @@ def _asked(this: Mount, needed: Any) -> Any:
     for _, drive in reversed([(name, one) for name, one in this.of_kind(DriveEffect) if not one.states()]):
         command = ca.SX.sym("command")
         rest = drive.applied((), command) - needed
-        step = ca.Function("step", [command], [command - rest / ca.jacobian(rest, command)], {"allow_free": True})
+        slope = ca.fmax(ca.jacobian(rest, command), LEAST_SLOPE)
+        step = ca.Function("step", [command], [command - rest / slope], {"allow_free": True})
         target = needed
         for _ in range(NEWTON):
             target = step(target)

@@ -32,6 +32,8 @@ LEAST_VS, MOST_FS = 0.005, 5.0
 """Stribeck curves narrower than this share of the top speed, or higher than this times their start, are not fitted."""
 LEAST_KNEE = 0.5
 """A drive that saturates does so above this share of the torque that is hardly ever exceeded (98 %)."""
+LEAST_SLOPE = 0.02
+"""... and gives at least this share of what more is asked for, else no command gives what is needed."""
 ENOUGH = 1e-5
 """A fit ends when a step lowers the sum of squares by less than this share."""
 PRIOR_FACTOR = 2.0
@@ -220,6 +222,8 @@ def _bounds(variable: Variable, top: float, asked: float) -> tuple[float, float]
     """
     if variable.name.endswith(".knee_torque"):
         return LEAST_KNEE * asked, variable.high
+    if variable.name.endswith("saturation.slope"):
+        return LEAST_SLOPE, variable.high
     if variable.name.endswith(".Vs"):
         return min(LEAST_VS * top, variable.start), top
     if variable.name.endswith(".Fs"):

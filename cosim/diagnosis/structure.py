@@ -58,10 +58,10 @@ class Bench:
 
         What the nuisances can explain of a fold is taken off; those that are an effect in question make `room`.
         """
-        grams = self._grams(replace(found, residual=self._crossed(found)), [])
+        grams = self._grams(replace(found, residual=self.left_out(found)), [])
         return grams.energy([], self._others(found, room))
 
-    def _crossed(self, found: Fit) -> Array:
+    def left_out(self, found: Fit) -> Array:
         """Residual of each fold by the structure refitted without it; once for each structure."""
         if id(found) in self.crossed:
             return self.crossed[id(found)][1]
@@ -75,6 +75,15 @@ class Bench:
             residual[rows] = refit.residual[rows]
         self.crossed[id(found)] = found, residual
         return residual
+
+    def foretold(self, found: Fit, without: Fit) -> float:
+        """Share of the plain residual energy of a fold that a structure foretells, the least of all folds."""
+        left, before = (self.weight * self.left_out(one) for one in (found, without))
+        folds = [
+            np.concatenate([r for r, f in zip(self.blocks.rows, self.blocks.fold, strict=True) if f == fold])
+            for fold in np.unique(self.blocks.fold)
+        ]
+        return min(float(1 - left[rows] @ left[rows] / (before[rows] @ before[rows] + 1e-300)) for rows in folds)
 
     @property
     def rows(self) -> Array:

@@ -35,7 +35,8 @@ def clocks(mount: Mount, span: Span) -> Iterator[Candidate]:
     if has(mount, ClockSkew) or not span.asked:
         return
     ways = [ClockSkew(offset_ms=ms) for ms in (1.0, 4.0)]
-    ways += [ClockSkew(drift_ppm=4e3 / span.seconds)]
+    # One drifts from nothing, one through nothing in the middle of a recording: together with an offset, any drift.
+    ways += [ClockSkew(drift_ppm=4e3 / span.seconds, offset_ms=middle) for middle in (0.0, -2.0)]
     for way in ways:
 
         def start(c: Array, way: ClockSkew = way) -> Effect:
