@@ -9,8 +9,11 @@ import pytest
 from cosim.diagnosis.challenge import Place
 from cosim.diagnosis.evidence import Score
 from cosim.diagnosis.fit import Fit
+from cosim.diagnosis.meaning import is_another
 from cosim.diagnosis.prepare import prepare
-from cosim.diagnosis.trial import Problem, Trial, _tuned, clearly_worse, is_another, is_real, winner
+from cosim.diagnosis.problem import Problem
+from cosim.diagnosis.trial import Trial, clearly_worse, is_real, winner
+from cosim.diagnosis.tuning import tuned
 from cosim.recording import Recording
 from pyfmi_models.effects import ActuatorLag, Delay, Effect, FrictionAsymmetry, GravityUnbalance, TorqueOffset
 from pyfmi_models.effects.cable_wrap import CableWrap
@@ -32,7 +35,7 @@ def trial(effect: Effect, gain: float, parameters: int = 1) -> Trial:
     rows = np.full(20, 50.0)
     after = (1 - gain) * (1 + 1e-4 * np.sin(np.arange(20) * (1 + 10 * gain)))
     free = tuple(f"effect.{number}" for number in range(parameters))
-    return Trial(effect, Fit(MOUNT, free, NONE, NONE, NONE, NONE), Score(np.ones(20), after, rows), gain)
+    return Trial(effect, Fit(MOUNT, free, NONE, NONE, NONE, NONE), Score(np.ones(20), after, rows), gain, size=1.0)
 
 
 @pytest.mark.parametrize("larger", [CABLE, UNBALANCE])
@@ -111,7 +114,7 @@ def test_noise_at_constant_speed_tells_no_delay_unless_a_set_point_asks_for_it()
     steady = 1 + 0.02 * np.random.default_rng(1).standard_normal(20_000)
     for found, told in ((problem(steady), False), (problem(steady, q_d=np.arange(20_000) / 1000), True)):
         rest = np.zeros(len(found.prepared.recording_of))
-        explained = Trial(late.effect, Fit(MOUNT, (), NONE, NONE, NONE, rest), late.score, 0.5)
+        explained = Trial(late.effect, Fit(MOUNT, (), NONE, NONE, NONE, rest), late.score, 0.5, size=1.0)
         assert is_real(found, explained) is told
 
 
@@ -121,7 +124,7 @@ def test_how_a_cable_hardens_is_fitted_as_its_grid_knows_it_only_roughly() -> No
     tau = -0.81 * 5 * q + np.sign(v) + 2 * (q - 0.2) * (1 + 0.3 * (q - 0.2) ** 2)
     this = problem(v, tau=tau, q=q)
     rough = replace(MOUNT, effects=(CableWrap(stiffness=1.0, home=0.0, hardening=4 / 9),))
-    found = _tuned(this, this.fit(rough, 12)).mount.effects[-1]
+    found = tuned(this, this.fit(rough, 12), rough.effects[0]).mount.effects[-1]
     assert isinstance(found, CableWrap)
     assert float(found.hardening) == pytest.approx(0.3, rel=0.05)
     assert float(found.home) == pytest.approx(0.2, rel=0.05)

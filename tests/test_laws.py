@@ -6,7 +6,7 @@ import pytest
 
 from cosim.diagnosis.laws import LEAST, proposed_law
 from cosim.diagnosis.prepare import prepare
-from cosim.diagnosis.trial import Problem
+from cosim.diagnosis.problem import Problem
 from cosim.recording import Recording
 from pyfmi_models.friction import Coulomb, Dahl, FrictionLaw, LuGre, MaxwellSlip
 from pyfmi_models.mount import Axis, Mount

@@ -9,9 +9,9 @@ import pytest
 from cosim.diagnosis.closed_loop import loop_errors
 from cosim.diagnosis.loop_bias import loop_bias
 from cosim.diagnosis.prepare import Prepared, choose_cutoff, prepare
+from cosim.diagnosis.problem import Problem
 from cosim.diagnosis.regression import black_box_rms
 from cosim.diagnosis.result import Trace
-from cosim.diagnosis.trial import Problem
 from cosim.proof.generator import make_case, write_case
 from cosim.proof.tool import given
 from cosim.recording import Recording

@@ -6,9 +6,10 @@ import pytest
 from cosim.diagnosis.evidence import Blocks
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.prepare import prepare
+from cosim.diagnosis.problem import Problem
 from cosim.diagnosis.select import starts
 from cosim.diagnosis.structure import Screening, nuisances, screen
-from cosim.diagnosis.trial import Problem, is_real, tried
+from cosim.diagnosis.trial import is_real, tried
 from cosim.recording import Recording
 from pyfmi_models.effects import Cogging, LocalFriction, PeriodicFriction, StribeckEffect
 from pyfmi_models.friction import Coulomb

@@ -14,6 +14,8 @@ from cosim.diagnosis.candidates import ROOM, columns_of
 from cosim.diagnosis.families import candidates
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.instruments import DECISIVE, Misfits, excludes, misfits_of, settled
+from cosim.diagnosis.meaning import is_another
+from cosim.diagnosis.problem import Problem
 from cosim.diagnosis.select import Selection
 from cosim.diagnosis.structure import Bench, projected
 from cosim.diagnosis.trial import (
@@ -22,10 +24,8 @@ from cosim.diagnosis.trial import (
     LIMITS,
     TEMPERATURE,
     TIE,
-    Problem,
     Trial,
     clearly_worse,
-    is_another,
     is_real,
     judged,
     simpler_wins,

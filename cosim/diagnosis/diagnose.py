@@ -17,12 +17,12 @@ from cosim.diagnosis.laws import proposed_law
 from cosim.diagnosis.locate import regions
 from cosim.diagnosis.loop_bias import loop_bias
 from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare, quality
+from cosim.diagnosis.problem import Problem
 from cosim.diagnosis.protocol import Structures, heldout_rms, judge, traces, veto_band, veto_rms
 from cosim.diagnosis.regression import black_box_rms
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
 from cosim.diagnosis.sanity import check_effects, check_recordings
 from cosim.diagnosis.select import select
-from cosim.diagnosis.trial import Problem
 from cosim.recording import Recording
 from pyfmi_models.card import Card
 from pyfmi_models.effects import Effect, GravityUnbalance

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.fft import irfft, next_fast_len, rfft
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solve_banded
 
@@ -25,6 +24,7 @@ from cosim.diagnosis.equations import Equations, equations_of
 from cosim.diagnosis.play import play_torque
 from cosim.diagnosis.prepare import Array, Piece
 from cosim.diagnosis.shaken import Tone, in_phase, phases_of
+from cosim.diagnosis.spectrum import Spectrum
 from pyfmi_models.effects import ClockEffect, DriveEffect, Effect
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.base import Coupling
@@ -243,30 +243,6 @@ class Inverse:
     def _telling(self, piece: Piece) -> npt.NDArray[np.bool_]:
         """Rows whose rest tells a phase."""
         return np.asarray(piece.inside & claimed(self.mount.friction, piece.v))
-
-
-class Spectrum:
-    """Columns in the frequency domain, mirrored at both ends so that a shift does not wrap around.
-
-    What is mirrored fades to zero: a jump from the last row to the first would ring through all of them.
-    """
-
-    def __init__(self, columns: Array, dt: float) -> None:
-        self.rows = len(columns)
-        self.pad = min(self.rows - 1, int(0.5 / dt) + 8)
-        extended = np.pad(columns, ((self.pad, self.pad), (0, 0)), mode="reflect", reflect_type="odd")
-        fade = np.sin(np.pi / 2 * np.arange(self.pad) / self.pad)[:, None] ** 2
-        extended[: self.pad] *= fade
-        extended[len(extended) - self.pad :] *= fade[::-1]
-        # Zeros behind what has faded: a length without large prime factors is transformed several times faster.
-        self.length = next_fast_len(len(extended), real=True)
-        self.omega = 2 * np.pi * np.fft.rfftfreq(self.length, dt)
-        self.values = rfft(extended.T, self.length).T
-
-    def times(self, response: npt.NDArray[np.complex128]) -> Array:
-        """Columns after a frequency response."""
-        whole = irfft(self.values.T * response, self.length)
-        return np.asarray(whole[:, self.pad : self.pad + self.rows].T)
 
 
 def _recurrence(decay: Array, drift: Array) -> Array:

@@ -16,7 +16,7 @@ from cosim.diagnosis.bank import bank
 from cosim.diagnosis.evidence import FOLDS, Blocks
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.prepare import Array
-from cosim.diagnosis.trial import Problem
+from cosim.diagnosis.problem import Problem
 from pyfmi_models.friction import FrictionLaw, LuGre, MaxwellSlip
 
 FITTED: dict[str, type[FrictionLaw]] = {"dahl": LuGre, "maxwell_slip": LuGre}

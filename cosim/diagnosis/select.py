@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from cosim.diagnosis.evidence import Blocks
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.instruments import is_told, misfits_of, settled
+from cosim.diagnosis.problem import Problem
 from cosim.diagnosis.structure import Bench, Screening, nuisances, screen
-from cosim.diagnosis.trial import Problem, Trial, is_real, tried, twins, winner
+from cosim.diagnosis.trial import Trial, is_real, tried, twins, winner
 from pyfmi_models.effects import Effect
 
 SCREEN_GAIN, SCREEN_SHARE = 0.004, 0.3

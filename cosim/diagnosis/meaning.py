@@ -1,0 +1,82 @@
+"""Does a fitted effect mean what its name says, or is it something else in disguise?"""
+
+from cosim.diagnosis.fit import LEAST_VS
+from cosim.diagnosis.lateness import blamed
+from cosim.diagnosis.prepare import Prepared
+from cosim.diagnosis.problem import Problem
+from cosim.diagnosis.shaken import heard
+from pyfmi_models.effects import ActuatorLag, ClockEffect, Cogging, Delay, DriveEffect, Effect, StribeckEffect
+from pyfmi_models.effects.cable_wrap import CableWrap
+from pyfmi_models.effects.clock_skew import ClockSkew
+from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
+from pyfmi_models.model import parameters_of
+
+LEAST_DELAY_SAMPLES, LEAST_DELAY = 0.3, 1.5e-4
+"""A delay shorter than this many samples, or seconds, is what time stamps cannot be trusted for."""
+LEAST_DRIFT_MS, LEAST_DRIFT = 1.0, 0.3
+"""A clock that drifts by less than this, or than this share of its offset, over a recording is late like a delay."""
+LEAST_CYCLES = 1.5
+"""A ripple with fewer cycles a turn is an unbalance."""
+BESIDE = 1.0
+"""A cable whose home lies further beside the visited positions than this share of their range is an offset: of its
+energy its change over the range has less than about 1 - `TIE`."""
+
+
+def is_another(problem: Problem, effect: Effect) -> bool:
+    """Whether an effect is really something else: a time-stamp convention, a level, an unbalance, a drift; or at a
+    bound, or what no card may hold.
+    """
+    if effect.broken_rule() or at_bound(effect):
+        return True
+    if isinstance(effect, DriveEffect | ClockEffect):
+        return _is_other_timing(problem, effect)
+    if isinstance(effect, PeriodicDisturbance):
+        slowest, fastest = heard(problem.prepared)
+        return not bool(slowest <= effect.frequency_hz <= fastest)
+    if isinstance(effect, CableWrap):
+        return _is_far(problem.prepared, effect)
+    if isinstance(effect, Cogging) and problem.mount.motion == "rotary":
+        return bool(effect.cycles_per_rev < LEAST_CYCLES)
+    return isinstance(effect, StribeckEffect) and bool(effect.Vs < LEAST_VS * problem.top_speed)
+
+
+def _is_far(prepared: Prepared, cable: CableWrap) -> bool:
+    low, high = prepared.ranges["q"]
+    room = BESIDE * (high - low)
+    return not low - room <= float(cable.home) <= high + room
+
+
+def _is_other_timing(problem: Problem, effect: Effect) -> bool:
+    """Whether a lateness is too short to be told from the time stamps', or lies in the clocks and not in the drive."""
+    if isinstance(effect, Delay) and effect.delay_ms < 1e3 * max(
+        LEAST_DELAY_SAMPLES * problem.sample_time, LEAST_DELAY
+    ):
+        return True
+    late = _late(problem, effect)
+    if late is None:
+        return False
+    return blamed(problem.prepared, late, problem.sample_time) == (
+        "drive" if isinstance(effect, ClockSkew) else "clock"
+    )
+
+
+def _late(problem: Problem, effect: Effect) -> float | None:
+    """Seconds by which an effect makes the torque late against the reading; None if it is not late.
+
+    Of a clock that drifts it is the middle of a recording that counts, if late by a sample at least.
+    """
+    if isinstance(effect, Delay):
+        return 1e-3 * float(effect.delay_ms)
+    if isinstance(effect, ActuatorLag):
+        return 1e-3 * float(effect.time_constant_ms)
+    if not isinstance(effect, ClockSkew):
+        return None
+    offset, drift = float(effect.offset_ms), 1e-3 * float(effect.drift_ppm) * problem.seconds
+    steady = abs(drift) < max(LEAST_DRIFT_MS, LEAST_DRIFT * abs(offset))
+    late = -1e-3 * (offset + drift / 2)
+    return late if late > (0 if steady else problem.sample_time) else None
+
+
+def at_bound(effect: Effect) -> bool:
+    """Whether a parameter of an effect is at the upper end of its range."""
+    return any(variable.start >= variable.high for variable in parameters_of(effect))

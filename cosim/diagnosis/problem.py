@@ -1,0 +1,32 @@
+"""What all fits of a diagnosis share."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from cosim.diagnosis.fit import FIXED, Fit, fit
+from cosim.diagnosis.prepare import Array, Prepared
+from pyfmi_models.mount import Mount
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What all fits of a diagnosis share: the base as in the card, the training data, the weight of each kept row."""
+
+    mount: Mount
+    prepared: Prepared
+    weight: Array
+    sample_time: float
+
+    @property
+    def seconds(self) -> float:
+        """Length of the longest piece of a recording."""
+        return max(float(piece.t[-1] - piece.t[0]) for piece in self.prepared.pieces)
+
+    @property
+    def top_speed(self) -> float:
+        """Highest speed that was recorded."""
+        return max(abs(edge) for edge in self.prepared.ranges["v"])
+
+    def fit(self, mount: Mount, evaluations: int, fixed: Sequence[str] = FIXED) -> Fit:
+        """Fit a structure, its base held weakly to the card."""
+        return fit(mount, self.prepared.pieces, self.weight, self.mount, evaluations, fixed=fixed)
