@@ -1,9 +1,10 @@
 """Fit the curve of `cosim/diagnosis/calibration.py` to decks that were played with known truth.
 
-python tests/benchmarks/calibration.py DECK/proof.json ... --out results/calibration
+python tests/benchmarks/calibration.py DECK/proof.json ... --played 0 1 --out results/calibration
 
-The decks must be others than the one that is scored. Prints the two numbers to write into the module; the error of
-calibration is cross-validated: each case's probabilities come from a curve fitted to the others.
+`--played` are offset and slope of the package that played the decks: their printed probabilities are turned back into
+shares of the evidence. The decks must be others than the one that is scored. Prints the two numbers to write into the
+module; the error of calibration is cross-validated: each case's probabilities come from a curve fitted to the others.
 """
 
 import argparse
@@ -29,19 +30,20 @@ Pairs = list[tuple[float, bool]]
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("decks", type=Path, nargs="+", metavar="proof.json")
+    parser.add_argument("--played", type=float, nargs=2, default=(OFFSET, SLOPE), metavar=("OFFSET", "SLOPE"))
     parser.add_argument("--out", type=Path)
     options = parser.parse_args()
     decks = [json.loads(path.read_text("utf-8")) for path in options.decks]
-    text = page(decks)
+    text = page(decks, tuple(options.played))
     print(text)
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
         (options.out / "README.md").write_text(text, "utf-8")
 
 
-def raw(row: dict[str, Any]) -> Pairs:
+def raw(row: dict[str, Any], played: tuple[float, float]) -> Pairs:
     """Shares of the evidence that one case printed as probabilities, and whether they came true."""
-    return [(share_of(p), true) for p, true in probabilities(row)]
+    return [(share_of(p, *played), true) for p, true in probabilities(row)]
 
 
 def fitted(pairs: Pairs) -> tuple[float, float]:
@@ -67,10 +69,10 @@ def crossed(cases: list[Pairs]) -> Pairs:
     return found
 
 
-def page(decks: list[dict[str, Any]]) -> str:
+def page(decks: list[dict[str, Any]], was: tuple[float, float]) -> str:
     """The page of results/."""
     rows = [row for deck in decks for row in deck["rows"]]
-    cases = [pairs for row in rows if (pairs := raw(row))]
+    cases = [pairs for row in rows if (pairs := raw(row, was))]
     pairs = [pair for case in cases for pair in case]
     offset, slope = fitted(pairs)
     after = crossed(cases)
@@ -78,10 +80,12 @@ def page(decks: list[dict[str, Any]]) -> str:
     lines = [
         "# Probabilities that come true",
         "",
-        "    python tests/benchmarks/calibration.py DECK/proof.json --out results/calibration",
+        *(f"    cosim prove --cases {len(deck['rows'])} --seed {deck['seed']} --out DECK" for deck in decks),
+        f"    python tests/benchmarks/calibration.py DECK/proof.json --played {was[0]:g} {was[1]:g} "
+        "--out results/calibration",
         "",
         f"mount-cosim {cosim.__version__}. Decks of `cosim prove`: {played}; {len(pairs)} probabilities in "
-        f"{len(cases)} cases. In the package: offset {OFFSET}, slope {SLOPE}; these decks ask for:",
+        f"{len(cases)} cases. The package has offset {OFFSET}, slope {SLOPE}; these decks ask for:",
         "",
         f"    OFFSET, SLOPE = {offset:.2f}, {slope:.2f}",
         "",
