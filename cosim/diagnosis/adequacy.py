@@ -54,6 +54,11 @@ class Rest:
         return self.share > LARGE
 
     @property
+    def follows_something(self) -> bool:
+        """Whether what is missing follows a quantity from recording to recording."""
+        return self.unexplained and max(self.follows.values(), default=0.0) > FOLLOWS
+
+    @property
     def depends_on(self) -> tuple[str, ...]:
         """What an unexplained rest goes with, strongest first; () if there is nothing to explain."""
         if not self.unexplained:

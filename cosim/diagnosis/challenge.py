@@ -10,6 +10,7 @@ from math import log
 
 import numpy as np
 
+from cosim.diagnosis.calibration import calibrated
 from cosim.diagnosis.candidates import ROOM, columns_of
 from cosim.diagnosis.families import candidates
 from cosim.diagnosis.fit import Fit
@@ -19,7 +20,6 @@ from cosim.diagnosis.problem import Problem
 from cosim.diagnosis.select import Selection
 from cosim.diagnosis.structure import Bench, projected
 from cosim.diagnosis.trial import (
-    FORETOLD,
     LEAST_GAIN,
     LIMITS,
     TEMPERATURE,
@@ -41,8 +41,6 @@ NESTED = {"torque_offset": ("friction_asymmetry", "cable_wrap")}
 ROUNDS = 3
 CREDIBLE = 0.05
 """A rival with a smaller share of the probability is not in the set, which is to hold the truth in 95 % of cases."""
-FORETELLS = 0.95
-"""A rival that foretells this share of the plain energy that the winner foretells stays in the set, if credible."""
 NEAR = 0.9
 """A rival with this share of the winner's gain is excluded only if it is clearly worse block by block."""
 
@@ -83,6 +81,12 @@ class Place:
         """The most probable member of the set: it is named first."""
         members = [self.trial, *(rival for rival in self.rivals if self._is_close(rival))]
         return max(members, key=lambda trial: self.shares[trial.effect.id])
+
+    @property
+    def probabilities(self) -> dict[str, float]:
+        """Calibrated probabilities of the members of the set, together one at most."""
+        told = {name: calibrated(self.shares[name]) for name in (self.effect.id, *self.ambiguous_with)}
+        return {name: one / max(1.0, sum(told.values())) for name, one in told.items()}
 
     @property
     def probability(self) -> float:
@@ -160,11 +164,8 @@ def _added(problem: Problem, chosen: Fit) -> tuple[Effect, ...]:
 def _too_close(winner: Trial, rival: Trial) -> bool:
     """Whether a rival cannot be excluded: its gain comes near, and block by block it is not clearly worse.
 
-    A rival that the winner becomes in a limit is excluded by its gain alone; one that foretells as much of the plain
-    residual of each recording left out is not excluded at all.
+    A rival that the winner becomes in a limit is excluded by its gain alone.
     """
-    if rival.foretold > FORETOLD and rival.foretold >= FORETELLS * winner.foretold:
-        return True
     is_limit = winner.effect.id in LIMITS.get(rival.effect.id, ())
     return rival.gain >= NEAR * winner.gain and (is_limit or not clearly_worse(rival, winner))
 

@@ -29,7 +29,8 @@ from pyfmi_models.effects import Effect, GravityUnbalance
 from pyfmi_models.mount import Mount
 
 LARGER = 0.5
-"""Share of the held-out RMS: more of it left by an unknown cause, and no name beside it is believed."""
+"""Share of what is missing: if more is left, and follows a quantity from recording to recording, the effects beside it
+may be imitations of that, and are not believed."""
 Say = Callable[[str], None]
 
 
@@ -74,9 +75,9 @@ def diagnose(
     proposed = verdict.chosen.mount
     verdict, unproven = _proven(problem, verdict, heldout)
     rest = rest_of(verdict.chosen, prepared, verdict.bench)
-    if rest.unexplained and _explains_little(verdict, heldout):
-        verdict, unproven = replace(verdict, chosen=verdict.base, places=()), (*unproven, *verdict.places)
-        rest = rest_of(verdict.chosen, prepared, verdict.bench)
+    whole = rest_of(verdict.base, prepared, verdict.bench) if rest.follows_something else rest
+    if rest.share > LARGER * whole.share and rest is not whole:
+        verdict, unproven, rest = replace(verdict, chosen=verdict.base, places=()), (*unproven, *verdict.places), whole
     models = Structures(mount, verdict.base.mount, verdict.chosen.mount)
     signals = traces(train, heldout, models)
     found = _findings(verdict, unproven, prepared, weight, signals)
@@ -147,12 +148,6 @@ def _proven(problem: Problem, verdict: Verdict, heldout: Sequence[Recording]) ->
     kept = [place for place in verdict.places if place not in out]
     renewed = tuple(replace(p, effect=_same(p, chosen)) for p in kept)
     return replace(verdict, chosen=chosen, places=renewed), tuple(out)
-
-
-def _explains_little(verdict: Verdict, heldout: Sequence[Recording]) -> bool:
-    """Whether something unknown is left that is larger than what the effects took away: then they prove nothing."""
-    before, after = (heldout_rms(heldout, one.mount) for one in (verdict.base, verdict.chosen))
-    return after > LARGER * before
 
 
 def _key(effect: Effect) -> tuple[str, float]:

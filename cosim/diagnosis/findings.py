@@ -108,7 +108,7 @@ def accepted(
         effect=effect.id,
         title=effect.title,
         answer=answer,  # type: ignore[arg-type]
-        probability=calibrated(place.probability),
+        probability=place.probabilities[place.effect.id],
         gain=place.trial.gain,
         parameters=parameters,
         standard_errors=numbers.errors,
@@ -145,7 +145,7 @@ def rival_finding(rival: Trial, place: Place, mount: Mount) -> Finding:
         effect=effect.id,
         title=effect.title,
         answer="ambiguous",
-        probability=calibrated(place.shares[effect.id]),
+        probability=place.probabilities.get(effect.id, calibrated(place.shares[effect.id])),
         gain=rival.gain,
         parameters=values,
         units=_units(effect, mount),

@@ -3,6 +3,8 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from cosim.diagnosis.fit import FIXED, Fit, fit
 from cosim.diagnosis.prepare import Array, Prepared
 from pyfmi_models.mount import Mount
@@ -26,6 +28,10 @@ class Problem:
     def top_speed(self) -> float:
         """Highest speed that was recorded."""
         return max(abs(edge) for edge in self.prepared.ranges["v"])
+
+    def error(self, found: Fit) -> float:
+        """RMS of a fit's residual over the rows that count."""
+        return float(np.linalg.norm(self.weight * found.residual) / np.sqrt(np.count_nonzero(self.weight)))
 
     def fit(self, mount: Mount, evaluations: int, fixed: Sequence[str] = FIXED) -> Fit:
         """Fit a structure, its base held weakly to the card."""

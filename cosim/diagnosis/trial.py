@@ -26,6 +26,7 @@ from pyfmi_models.effects import (
     Effect,
 )
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
+from pyfmi_models.effects.torque_saturation import TorqueSaturation
 
 LEAST_GAIN, LEAST_T = 0.03, 1.8
 """Share of the cross-validated energy, and block t value, that an effect must reach together ..."""
@@ -124,7 +125,7 @@ def _in_time(problem: Problem, trial: Trial) -> bool:
     Only changes that some motion asks for: at constant speed nothing is asked, what changes is noise and ripple, and
     the torque is what a loop answers.
     """
-    if not isinstance(trial.effect, DriveEffect | ClockEffect):
+    if not isinstance(trial.effect, DriveEffect | ClockEffect) or isinstance(trial.effect, TorqueSaturation):
         return True
     pieces = problem.prepared.pieces
     counted = np.concatenate([np.full(len(piece.kept), piece.asked) for piece in pieces]) & (problem.weight > 0)

@@ -1,5 +1,6 @@
 """Fit what the grid of a candidate knows only roughly: cycles, how a cable hardens, a shape, how a contact bends."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +15,8 @@ WHOLE = 0.01
 """A whole number of cycles is taken if the residual grows by no more than this share."""
 SHARP = 1.0
 """Exponent of the Stribeck curve of Bo and Pavelescu (Wear 82, 1982); that of Armstrong-Helouvry is 2."""
+WIDER = (0.25, 4.0)
+"""How many times wider than the fitted one a Stribeck curve is tried."""
 SOFTER = (4.0, 16.0)
 """How many times softer than the start a bending contact is tried."""
 
@@ -23,10 +26,10 @@ def tuned(problem: Problem, found: Fit, start: Effect) -> Fit:
     added: Any = found.mount.effects[-1]
     if isinstance(added, CableWrap):
         return problem.fit(_freed(problem, found, "hardening").mount, 4)
-    if isinstance(added, StribeckEffect):
-        return _shaped(problem, found)
+    if isinstance(start, StribeckEffect):
+        return _shaped(problem, _refound(problem, found, [replace(start, Vs=share * added.Vs) for share in WIDER]))
     if isinstance(start, Presliding):
-        return _softened(problem, found, start)
+        return _refound(problem, found, [replace(start, sigma0=start.sigma0 / softer) for softer in SOFTER])
     return _in_cycles(problem, found) if getattr(added, "cycles_per_rev", 0.0) > 0 else found
 
 
@@ -34,27 +37,30 @@ def _shaped(problem: Problem, found: Fit) -> Fit:
     """Try the sharper Stribeck curve of the literature too, and any shape if that fits clearly better."""
     gauss: Any = found.mount.effects[-1]
     sharper = replace(found.mount, effects=(*found.mount.effects[:-1], replace(gauss, delta=SHARP)))
-    best = min((found, problem.fit(sharper, 12)), key=lambda one: one.rms)
+    best = min((found, problem.fit(sharper, 12)), key=problem.error)
     free = _freed(problem, best, "delta")
-    return free if free.rms * (1 + WHOLE) < best.rms and not at_bound(free.mount.effects[-1]) else best
+    return (
+        free
+        if problem.error(free) * (1 + WHOLE) < problem.error(best) and not at_bound(free.mount.effects[-1])
+        else best
+    )
 
 
-def _softened(problem: Problem, found: Fit, start: Presliding) -> Fit:
-    """Try softer contacts too: the start is known to an order of magnitude at most, and a stiff one stays stiff."""
-    others = [replace(start, sigma0=start.sigma0 / softer) for softer in SOFTER]
+def _refound(problem: Problem, found: Fit, others: Sequence[Effect]) -> Fit:
+    """The best of a fit and those from other starts: a start is known to an order of magnitude at most."""
     tried = [problem.fit(replace(found.mount, effects=(*found.mount.effects[:-1], one)), 12) for one in others]
-    return min((found, *tried), key=lambda one: one.rms)
+    return min((found, *tried), key=problem.error)
 
 
 def _in_cycles(problem: Problem, found: Fit) -> Fit:
     """Fit the cycles of a ripple; slots, teeth and rolling elements come in whole numbers: one that fits is taken."""
     free = _freed(problem, found, "cycles_per_rev")
-    best = min((found, free), key=lambda one: one.rms)
+    best = min((found, free), key=problem.error)
     ripple: Any = best.mount.effects[-1]
     for cycles in (max(1.0, float(round(ripple.cycles_per_rev))), ripple.cycles_per_rev):
         effects = (*best.mount.effects[:-1], replace(ripple, cycles_per_rev=cycles))
         settled = problem.fit(replace(best.mount, effects=effects), 8)
-        if settled.rms < best.rms * (1 + WHOLE):
+        if problem.error(settled) < problem.error(best) * (1 + WHOLE):
             return settled
     return found
 
