@@ -8,7 +8,7 @@ of 1.8 N, all of it artefact.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import ceil
 
 import numpy as np
@@ -94,8 +94,14 @@ def lowpass(columns: Array, dt: float, cutoff: float) -> Array:
     """Fourth-order Butterworth, forward and backward: no phase, -6 dB at the cutoff [Hz]; along the first axis."""
     if cutoff >= 0.45 / dt:
         return columns
-    filtered: Array = sosfiltfilt(butter(4, cutoff, fs=1 / dt, output="sos"), columns, axis=0)
+    filtered: Array = sosfiltfilt(_sections(dt, cutoff), columns, axis=0)
     return filtered
+
+
+@lru_cache(maxsize=64)
+def _sections(dt: float, cutoff: float) -> Array:
+    """Sections of the filter; designing it costs as much as filtering a short piece."""
+    return np.asarray(butter(4, cutoff, fs=1 / dt, output="sos"))
 
 
 def gain(hertz: float, dt: float, cutoff: float) -> float:
