@@ -74,6 +74,27 @@ def test_where_the_set_point_speaks_its_chi_squared_is_the_evidence() -> None:
     assert place.shares["actuator_lag"] == pytest.approx(np.exp(-10) * place.probability)
 
 
+def test_the_most_probable_member_of_a_set_is_named_first() -> None:
+    unbalance, offset = trial(UNBALANCE, 0.9, 3), trial(OFFSET, 0.9)
+    assert Place(UNBALANCE, unbalance, (offset,)).favourite is offset
+    assert Place(OFFSET, offset, (unbalance,)).favourite is offset
+
+
+def test_calibrated_probabilities_of_a_set_add_up_to_one_at_most() -> None:
+    place = Place(OFFSET, trial(OFFSET, 0.9), (trial(UNBALANCE, 0.9, 2),))
+    assert set(place.probabilities) == {"torque_offset", "gravity_unbalance"}
+    assert 0.9 < sum(place.probabilities.values()) <= 1
+
+
+def test_what_foretells_every_recording_left_out_counts_where_whitened_evidence_is_too_little() -> None:
+    slow = replace(trial(OFFSET, 0.01), foretold=0.4)
+    assert slow.is_slow
+    assert slow.gain == 0.4
+    assert slow.log_odds > 3
+    assert not replace(trial(OFFSET, 0.01), foretold=0.1).is_slow
+    assert replace(trial(OFFSET, 0.5), foretold=0.4).gain == pytest.approx(0.5, abs=1e-3)
+
+
 def problem(speed: Array, **columns: Array) -> Problem:
     t = np.arange(len(speed)) / 1000
     given = {"t": t, "tau": speed, "q": np.cumsum(speed) / 1000, **columns}

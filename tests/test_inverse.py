@@ -112,3 +112,12 @@ def test_derivatives_by_the_numbers_of_an_effect_are_finite_differences(effect: 
         up, down = (stacked(inverse, prepared.pieces, values + s * step)[0] for s in (1, -1))
         change = (up - down) / (2 * step[column])
         assert np.abs(change - slopes[:, column]).max() <= 1e-3 * np.abs(change).max() + 1e-9, free[column]
+
+
+def test_a_drive_that_gives_nothing_past_its_knee_still_has_a_finite_need() -> None:
+    bare = read_card("paper_mount").plant()
+    stuck = replace(bare, effects=(TorqueSaturation(knee_torque=1.0, slope=0.0),))
+    inverse = Inverse(stuck, ("axis.inertia", "torque_saturation.slope"))
+    torque, slopes = stacked(inverse, recorded(bare).pieces, inverse.present)
+    assert np.isfinite(torque).all()
+    assert np.isfinite(slopes).all()

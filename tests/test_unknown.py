@@ -109,6 +109,12 @@ def test_a_small_rest_and_noise_are_nothing_to_explain(extra: Extra) -> None:
     assert found.depends_on == ()
 
 
+def test_what_is_missing_follows_a_quantity_only_if_it_is_large_and_predicted_elsewhere() -> None:
+    assert Rest(2 * LARGE, {"position": 0.5}, "time").follows_something
+    assert not Rest(2 * LARGE, {"position": 0.1}, "time").follows_something
+    assert not Rest(LARGE / 2, {"position": 0.5}, "time").follows_something
+
+
 def test_a_turn_counts_once_the_motion_came_back_far_enough() -> None:
     q = np.array([0.0, 1.0, 2.0, 1.95, 2.0, 1.5, 1.0, 1.05, 1.0, 2.0])
     turned, direction = last_reversal(q, 0.1)

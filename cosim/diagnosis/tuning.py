@@ -39,11 +39,8 @@ def _shaped(problem: Problem, found: Fit) -> Fit:
     sharper = replace(found.mount, effects=(*found.mount.effects[:-1], replace(gauss, delta=SHARP)))
     best = min((found, problem.fit(sharper, 12)), key=problem.error)
     free = _freed(problem, best, "delta")
-    return (
-        free
-        if problem.error(free) * (1 + WHOLE) < problem.error(best) and not at_bound(free.mount.effects[-1])
-        else best
-    )
+    better = problem.error(free) * (1 + WHOLE) < problem.error(best)
+    return free if better and not at_bound(free.mount.effects[-1]) else best
 
 
 def _refound(problem: Problem, found: Fit, others: Sequence[Effect]) -> Fit:
