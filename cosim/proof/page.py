@@ -71,7 +71,7 @@ def write(out: Path, found: Mapping[str, Any]) -> None:
     texts = {
         "cases.csv": _cases(found["rows"]),
         "README.md": page(found),
-        "proof.json": json.dumps(found, indent=1, allow_nan=False) + "\n",
+        "proof.json": json.dumps(found, allow_nan=False) + "\n",
     }
     for name, text in texts.items():
         with replacing(out / name, force=True) as partial:
