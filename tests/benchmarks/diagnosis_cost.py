@@ -3,7 +3,7 @@
 python tests/benchmarks/diagnosis_cost.py --out results/diagnosis_cost      (10 to 20 minutes, 1 GB of disk)
 
 Each case is two training recordings and one held out, each of the named length, with a cogging and a delay concealed.
-`noise 0` is the worst case: without encoder noise the analysis takes its widest band.
+`noise 0.01` is the worst case: with hardly any encoder noise the analysis takes its widest band.
 """
 
 import argparse
@@ -36,7 +36,7 @@ class Case(NamedTuple):
 CASES = (
     *(Case(seconds, 1000, 1.0) for seconds in (30, 60, 120, 240)),
     *(Case(seconds, 10_000, 1.0) for seconds in (60, 300)),
-    *(Case(seconds, 10_000, 0.0) for seconds in (60, 300)),
+    *(Case(seconds, 10_000, 0.01) for seconds in (60, 300)),
 )
 
 
@@ -94,7 +94,7 @@ def page(rows: list[dict[str, Any]], seed: int) -> str:
         f"mount-cosim {cosim.__version__}, Python {platform.python_version()}, {os.cpu_count()} cores, "
         f"{platform.machine()}, load {os.getloadavg()[1]:.1f} at the end; seed {seed}. `cosim diagnose` as a process, "
         "from reading the files to the report; two training recordings and one held out, each of this length; a "
-        "cogging and a delay are concealed. Without noise the analysis takes its widest band: the dearest case.\n\n"
+        "cogging and a delay are concealed. With hardly any noise the analysis has its widest band, the dearest.\n\n"
         "| seconds | Hz | noise | million samples | wall [s] | processor [s] | memory [MB] | verdict |\n"
         "| --- | --- | --- | --- | --- | --- | --- | --- |\n"
     )
