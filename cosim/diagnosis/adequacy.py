@@ -9,12 +9,14 @@ Two questions, two measures of what the chosen structure leaves in clear motion:
   What follows none of them comes and goes with time, as a push or as a friction level.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from cosim.diagnosis.claim import least_speed
 from cosim.diagnosis.dictionary import Term, dictionary
+from cosim.diagnosis.evidence import Index
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.structure import Bench, projected
@@ -74,10 +76,8 @@ def rest_of(chosen: Fit, prepared: Prepared, bench: Bench) -> Rest:
     share = _slow(chosen.residual, clear, prepared) / _friction(bench, clear, prepared)
     if not share > LARGE:
         return Rest(share, {}, "time")
-    fold = np.empty(len(clear), int)
-    for rows, number in zip(bench.blocks.rows, bench.blocks.fold, strict=True):
-        fold[rows] = number
-    follows = {name: _predicted(chosen, term, clear, fold) for name, term in dictionary(prepared).items()}
+    folds = bench.blocks.folds
+    follows = {name: _predicted(chosen, term, clear, folds) for name, term in dictionary(prepared).items()}
     return Rest(share, follows, _over_time(chosen.residual * clear, bench.nuisances.level * clear, prepared))
 
 
@@ -105,7 +105,7 @@ def _slow(values: Array, weight: Array, prepared: Prepared) -> float:
     return _rms(total / np.maximum(count, 1e-300), np.asarray(count, float))
 
 
-def _predicted(chosen: Fit, term: Term, weight: Array, fold: Array) -> float:
+def _predicted(chosen: Fit, term: Term, weight: Array, folds: Sequence[Index]) -> float:
     """Share of the rest of each fold that a term fitted to the others predicts, beside what is free in each fold.
 
     Free are the structure's own parameters, and what the term must go beyond.
@@ -113,8 +113,8 @@ def _predicted(chosen: Fit, term: Term, weight: Array, fold: Array) -> float:
     known = np.column_stack([chosen.slopes, term.beyond])
     base, added, rest = (one * weight[:, None] for one in (known, term.columns, chosen.residual[:, None]))
     before, after = 0.0, 0.0
-    for number in np.unique(fold):
-        own, others = fold == number, fold != number
+    for own in folds:
+        others = np.setdiff1d(np.arange(len(rest)), own)
         free = projected(np.column_stack([rest, added])[others], base[others])
         beta = np.linalg.lstsq(free[:, 1:], free[:, 0], rcond=1e-6)[0]
         left = projected(np.column_stack([rest[own, 0], rest[own, 0] - added[own] @ beta]), base[own])

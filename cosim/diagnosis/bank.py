@@ -51,6 +51,13 @@ def last_reversal(q: Array, least: float) -> tuple[Index, Array]:
     return turned, direction
 
 
+def since_reversal(t: Array, v: Array) -> Array:
+    """Seconds since the speed last changed its sign, or since the start, at each row."""
+    turned = np.flatnonzero(np.diff(np.sign(v), prepend=np.sign(v[:1])) != 0)
+    last = np.concatenate([[0], turned])[np.searchsorted(turned, np.arange(len(t)), side="right")]
+    return np.asarray(t - t[last])
+
+
 def speed_shapes(piece: Piece, top: float) -> Array:
     """Friction that falls with speed at three scales, (rows, 3); the sign is smoothed over 1e-3 of the top speed."""
     scales = top * np.array([0.03, 0.1, 0.3])

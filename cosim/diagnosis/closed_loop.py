@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import make_interp_spline
 
 from cosim.diagnosis.prepare import Array, lowpass
-from cosim.diagnosis.protocol import CUTOFF
+from cosim.diagnosis.protocol import CUTOFF, rms
 from cosim.errors import StepError
 from cosim.master import simulate
 from cosim.recording import Recording
@@ -91,7 +91,7 @@ def compare(simulated: Recording, recording: Recording) -> LoopError:
     count, dt = min(len(simulated), len(recording)), recording.sample_time
     inside = slice(int(LEAD / dt), count - int(TAIL / dt))
     both = {n: lowpass(simulated[n][:count] - recording[n][:count], dt, CUTOFF)[inside] for n in ("tau", "q")}
-    return LoopError(*(float(np.sqrt(np.mean(both[name] ** 2))) for name in ("tau", "q")))
+    return LoopError(rms(both["tau"]), rms(both["q"]))
 
 
 def loop_errors(mounts: Mapping[str, Mount], card: Card, recordings: Sequence[Recording]) -> dict[str, LoopError]:
@@ -121,7 +121,4 @@ def _error(plant: Path, controller: Path, card: Card, mount: Mount, recording: R
 
 
 def _together(errors: Sequence[LoopError]) -> LoopError:
-    torque, position = (
-        np.sqrt(np.mean(np.square(one))) for one in zip(*(vars(e).values() for e in errors), strict=True)
-    )
-    return LoopError(float(torque), float(position))
+    return LoopError(*(rms(np.array([getattr(e, name) for e in errors])) for name in ("torque", "position")))

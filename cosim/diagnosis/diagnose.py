@@ -45,6 +45,15 @@ class Outcome:
     experiment: Experiment | None = None
 
 
+@dataclass(frozen=True)
+class Stands:
+    """What stands after the proof, what was proposed and does not, and what is left."""
+
+    verdict: Verdict
+    unproven: tuple[Place, ...]
+    rest: Rest
+
+
 def diagnose(
     train: Sequence[Recording], heldout: Sequence[Recording], card: Card, say: Say = lambda _: None
 ) -> Outcome:
@@ -62,51 +71,58 @@ def diagnose(
         InputError: the card holds an effect that a diagnosis cannot take into account yet.
         RecordingError: the recordings cannot belong to this card (units), or are too short.
     """
-    started, mount = time.perf_counter(), card.plant()
-    check_effects(mount)
-    check_recordings(train, heldout, mount)
-    cutoff = choose_cutoff(train, card.mount.inertia)
-    prepared = prepare(train, cutoff)
-    weight = _weight(mount, prepared)
-    problem = Problem(mount, prepared, weight, max(recording.sample_time for recording in train))
+    started = time.perf_counter()
+    check_effects(card.plant())
+    check_recordings(train, heldout, card.plant())
+    problem = _problem(train, card)
     say("refitting the base")
     verdict = challenge(problem, select(problem, say), say)
     say("proving on the recording that was not fitted")
     proposed = verdict.chosen.mount
-    verdict, unproven = _proven(problem, verdict, heldout)
-    rest = rest_of(verdict.chosen, prepared, verdict.bench)
-    whole = rest_of(verdict.base, prepared, verdict.bench) if rest.follows_something else rest
-    if rest.share > LARGER * whole.share and rest is not whole:
-        verdict, unproven, rest = replace(verdict, chosen=verdict.base, places=()), (*unproven, *verdict.places), whole
-    models = Structures(mount, verdict.base.mount, verdict.chosen.mount)
-    signals = traces(train, heldout, models)
-    found = _findings(verdict, unproven, prepared, weight, signals)
-    experiment = _experiment(verdict, prepared)
-    bias = loop_bias(prepared, verdict.chosen, weight)
-    diagnosis = Diagnosis(
-        verdict=_verdict(found, rest),
-        findings=tuple(found),
-        heldout=replace(
-            judge(heldout, models, cutoff),
-            unvetoed_rms=heldout_rms(heldout, proposed),
-            black_box_rms=black_box_rms(signals),
-        ),
-        traces=signals,
-        regions=regions(signals, False, mount.motion == "linear"),
-        regions_after=regions(signals, True, mount.motion == "linear"),
-        mount=card.mount.name,
-        motion=mount.motion,
-        ambiguous_with=tuple((p.effect.id, *p.ambiguous_with) for p in verdict.places if p.ambiguous_with),
+    stands = _believed(problem, *_proven(problem, verdict, heldout))
+    experiment = _experiment(stands.verdict, problem.prepared)
+    described = _described(problem, stands, train, heldout, card.mount.name)
+    diagnosis = replace(
+        described,
+        heldout=replace(described.heldout, unvetoed_rms=heldout_rms(heldout, proposed)),
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
-        depends_on=rest.depends_on,
+        seconds=time.perf_counter() - started,
+    )
+    mounts = _certain(problem, stands.verdict), proposed, stands.verdict.base.mount
+    certain, first, base = (_improved(card, one) for one in mounts)
+    return Outcome(diagnosis, certain, first, base, experiment)
+
+
+def _problem(train: Sequence[Recording], card: Card) -> Problem:
+    mount, prepared = card.plant(), prepare(train, choose_cutoff(train, card.mount.inertia))
+    return Problem(mount, prepared, _weight(mount, prepared), max(recording.sample_time for recording in train))
+
+
+def _described(
+    problem: Problem, stands: Stands, train: Sequence[Recording], heldout: Sequence[Recording], name: str
+) -> Diagnosis:
+    """What stands, measured on all recordings and put into words."""
+    verdict, prepared, linear = stands.verdict, problem.prepared, problem.mount.motion == "linear"
+    models = Structures(problem.mount, verdict.base.mount, verdict.chosen.mount)
+    signals = traces(train, heldout, models)
+    found = _findings(stands, prepared, problem.weight, signals)
+    bias = loop_bias(prepared, verdict.chosen, problem.weight)
+    return Diagnosis(
+        verdict=_verdict(found, stands.rest),
+        findings=tuple(found),
+        heldout=replace(judge(heldout, models, prepared.cutoff), black_box_rms=black_box_rms(signals)),
+        traces=signals,
+        regions=regions(signals, False, linear),
+        regions_after=regions(signals, True, linear),
+        mount=name,
+        motion=problem.mount.motion,
+        ambiguous_with=tuple((p.effect.id, *p.ambiguous_with) for p in verdict.places if p.ambiguous_with),
+        depends_on=stands.rest.depends_on,
         data_quality=tuple(note for recording in (*train, *heldout) for note in quality(recording, prepared.cutoff)),
         friction_law=proposed_law(problem, verdict.chosen),
         loop_bias=bias.as_json() if bias else {},
         base_parameters=_base_parameters(models),
-        seconds=time.perf_counter() - started,
     )
-    certain, first, base = (_improved(card, one) for one in (_certain(problem, verdict), proposed, verdict.base.mount))
-    return Outcome(diagnosis, certain, first, base, experiment)
 
 
 def _certain(problem: Problem, verdict: Verdict) -> Mount:
@@ -150,6 +166,17 @@ def _proven(problem: Problem, verdict: Verdict, heldout: Sequence[Recording]) ->
     return replace(verdict, chosen=chosen, places=renewed), tuple(out)
 
 
+def _believed(problem: Problem, verdict: Verdict, unproven: tuple[Place, ...]) -> Stands:
+    """Doubt the names beside a larger rest that follows a quantity."""
+    rest = rest_of(verdict.chosen, problem.prepared, verdict.bench)
+    if not rest.follows_something:
+        return Stands(verdict, unproven, rest)
+    whole = rest_of(verdict.base, problem.prepared, verdict.bench)
+    if rest.share <= LARGER * whole.share:
+        return Stands(verdict, unproven, rest)
+    return Stands(replace(verdict, chosen=verdict.base, places=()), (*unproven, *verdict.places), whole)
+
+
 def _key(effect: Effect) -> tuple[str, float]:
     """What stays of an effect when it is fitted again: its kind, and its place in a spectrum."""
     return type(effect).__name__, getattr(effect, "cycles_per_rev", 0.0)
@@ -161,9 +188,8 @@ def _same(place: Place, chosen: Fit) -> Effect:
     return min(alike, key=lambda effect: abs(getattr(effect, "frequency_hz", 0.0) - hertz))
 
 
-def _findings(
-    verdict: Verdict, unproven: Sequence[Place], prepared: Prepared, weight: Array, signals: Sequence[Trace]
-) -> list[Finding]:
+def _findings(stands: Stands, prepared: Prepared, weight: Array, signals: Sequence[Trace]) -> list[Finding]:
+    verdict = stands.verdict
     errors = standard_errors(verdict.chosen, Blocks.of(prepared), weight)
     mount, found, rivals = verdict.chosen.mount, [], []
     for places in merged(verdict.places).values():
@@ -175,7 +201,8 @@ def _findings(
     named = {finding.effect for finding in found}
     rivals = [finding for finding in rivals if finding.effect not in named]
     lost = [
-        replace(rival_finding(p.trial, p, mount), answer="not_proven", probability=1 - p.probability) for p in unproven
+        replace(rival_finding(p.trial, p, mount), answer="not_proven", probability=1 - p.probability)
+        for p in stands.unproven
     ]
     lost = [finding for finding in lost if finding.effect not in named]
     named |= {finding.effect for finding in (*rivals, *lost)}

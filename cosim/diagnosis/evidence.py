@@ -8,6 +8,7 @@ level, and a timing convention of a fraction of a sample are explained away befo
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -52,6 +53,12 @@ class Blocks:
         fold = np.arange(len(rows)) * FOLDS // len(rows) if count == 1 else owner
         fold = owner % FOLDS if count > MOST_FOLDS else fold
         return cls(tuple(rows), fold, owner)
+
+    @cached_property
+    def folds(self) -> list[Index]:
+        """Rows of each fold."""
+        owners = list(zip(self.rows, self.fold.tolist(), strict=True))
+        return [np.concatenate([r for r, owner in owners if owner == fold]) for fold in np.unique(self.fold)]
 
 
 @dataclass(frozen=True)
@@ -237,6 +244,24 @@ class Grams:
             full[used] -= gamma
             penalty = float(gamma**2 @ (1 / self.prior[used - 1])) / fold.sum()
         return np.asarray(np.einsum("i,bij,j->b", full, self.gram[fold], full) + penalty)
+
+
+def sandwich(columns: Array, left: Array, blocks: Blocks, rcond: float) -> Array:
+    """Covariance of least-squares coefficients that holds whatever the noise is like within a block.
+
+        B (sum of s s') B n / (n - 1),   B = (X'X)^+,   s = X_block' left_block
+
+    Args:
+        columns: X, (rows, coefficients).
+        left: what the fit leaves at each row.
+        blocks: n blocks, which count as one observation each.
+        rcond: directions of X'X weaker than this share of the strongest are not estimated.
+
+    Reference: Liang and Zeger, Biometrika 73 (1986) 13.
+    """
+    bread = np.linalg.pinv(columns.T @ columns, rcond=rcond)
+    scores = np.array([columns[rows].T @ left[rows] for rows in blocks.rows])
+    return np.asarray(bread @ (scores.T @ scores) @ bread * len(scores) / max(len(scores) - 1, 1))
 
 
 def _marginal(x: Array, w: Array) -> Array:

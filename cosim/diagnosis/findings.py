@@ -10,7 +10,7 @@ import numpy as np
 from cosim.diagnosis.calibration import calibrated
 from cosim.diagnosis.candidates import columns_of
 from cosim.diagnosis.challenge import Place
-from cosim.diagnosis.evidence import Blocks
+from cosim.diagnosis.evidence import Blocks, sandwich
 from cosim.diagnosis.families import TRIED, candidates
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.locate import where
@@ -70,10 +70,7 @@ def standard_errors(chosen: Fit, blocks: Blocks, weight: Array) -> dict[str, flo
     """Block-robust standard errors of all fitted parameters (sandwich with blocks as clusters)."""
     slopes = chosen.slopes * weight[:, None]
     scale = np.sqrt((slopes**2).sum(0)) + 1e-300
-    scaled, residual = slopes / scale, chosen.residual * weight
-    bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-10)
-    scores = np.array([scaled[rows].T @ residual[rows] for rows in blocks.rows])
-    covariance = bread @ (scores.T @ scores) @ bread * len(scores) / max(len(scores) - 1, 1)
+    covariance = sandwich(slopes / scale, chosen.residual * weight, blocks, rcond=1e-10)
     return dict(zip(chosen.free, (np.sqrt(np.maximum(np.diag(covariance), 0)) / scale).tolist(), strict=True))
 
 

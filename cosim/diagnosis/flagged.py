@@ -2,8 +2,8 @@
 
 Noise is what the better model leaves, or the base where there is none better. What is there only some of the time must
 not set the measure: the base is fitted once more by least absolute deviations, noise is a median, and both come from
-the training recordings. A span is loud where a
-chain of two states says so, noise of the usual size or `loud` times that,
+the training recordings. A span is loud where a chain of two states says so, noise of the usual size or `loud` times
+that,
 
     log p(loud) - log p(quiet) = z^2 (1 - 1 / loud^2) / 2 - log(loud),     z = rest / noise at this speed,
 

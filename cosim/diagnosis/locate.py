@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cosim.diagnosis.bank import since_reversal
 from cosim.diagnosis.claim import least_speed
 from cosim.diagnosis.prepare import Array
 from cosim.diagnosis.result import Region, Trace, Where
@@ -69,7 +70,7 @@ def _of_motion(traces: Sequence[Trace], missing: Array, linear: bool) -> Iterato
 def _of_friction(traces: Sequence[Trace], missing: Array) -> Iterator[Axis]:
     v = np.concatenate([t.v for t in traces])
     resists, moves = missing * np.sign(v), np.abs(v) > least_speed(v)
-    since = np.where(moves, np.concatenate([_since_reversal(t) for t in traces]), np.nan)
+    since = np.where(moves, np.concatenate([since_reversal(t.t, t.v) for t in traces]), np.nan)
     yield "time since reversal", "s", since, resists, np.geomspace(1e-2, max(float(np.nanmax(since)), 1.0), 17)
     rest = np.concatenate([_rest_before(t, least_speed(v)) for t in traces])
     if np.isfinite(rest).any():
@@ -107,13 +108,6 @@ def _powers(t: Array, missing: Array, edges: Array) -> Array:
     scaled = 2 * spectrum / (length * float(window @ window))
     band = np.digitize(np.fft.rfftfreq(length, step), edges) - 1
     return np.column_stack([scaled[:, band == k].sum(1) for k in range(len(edges) - 1)])
-
-
-def _since_reversal(trace: Trace) -> Array:
-    turned = np.flatnonzero(np.diff(np.sign(trace.v), prepend=np.sign(trace.v[0])) != 0)
-    last = np.searchsorted(turned, np.arange(len(trace.v)), side="right") - 1
-    starts = np.where(last >= 0, trace.t[turned[np.maximum(last, 0)]] if len(turned) else trace.t[0], trace.t[0])
-    return np.asarray(trace.t - starts)
 
 
 def _rest_before(trace: Trace, least: float) -> Array:

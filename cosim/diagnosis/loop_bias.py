@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from cosim.diagnosis.evidence import Blocks
+from cosim.diagnosis.evidence import Blocks, sandwich
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.instruments import on_set_point
 from cosim.diagnosis.inverse import Inverse, stacked
@@ -31,6 +31,8 @@ BLOCK_SECONDS = 2.0
 """Longer than the residual remembers, short enough for many."""
 TOLD = 0.5
 """Share of a derivative's energy that the set point must explain, else it says nothing of the parameter."""
+RCOND = 1e-8
+"""Directions weaker than this share of the strongest are not estimated."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +56,8 @@ def loop_bias(prepared: Prepared, found: Fit, weight: Array) -> LoopBias | None:
     """Test a fit for bias by the loop; None where no set point was recorded or it tells of no parameter."""
     if not prepared.has_position or any("q_d" not in piece.extras for piece in prepared.pieces):
         return None
-    along = stacked(Inverse(found.mount, found.free), [on_set_point(piece) for piece in prepared.pieces], found.values)[
-        1
-    ]
+    asked = [on_set_point(piece) for piece in prepared.pieces]
+    _, along = stacked(Inverse(found.mount, found.free), asked, found.values)
     slopes, residual = found.slopes * weight[:, None], found.residual * weight
     explained = _projection(along * weight[:, None], slopes)
     energy = (slopes**2).sum(0)
@@ -71,21 +72,18 @@ def loop_bias(prepared: Prepared, found: Fit, weight: Array) -> LoopBias | None:
 def _projection(instruments: Array, columns: Array) -> Array:
     scale = np.sqrt((instruments**2).sum(0))
     unit = instruments[:, scale > 0] / scale[scale > 0]
-    return np.asarray(unit @ np.linalg.lstsq(unit, columns, rcond=1e-8)[0])
+    return np.asarray(unit @ np.linalg.lstsq(unit, columns, rcond=RCOND)[0])
 
 
 def _tested(slopes: Array, rest: Array, residual: Array, blocks: Blocks, names: list[str], values: Array) -> LoopBias:
     columns = np.column_stack([slopes, rest])
     scale = np.sqrt((columns**2).sum(0)) + 1e-300
     scaled = columns / scale
-    bread = np.linalg.pinv(scaled.T @ scaled, rcond=1e-8)
-    beta = bread @ (scaled.T @ residual)
-    left = residual - scaled @ beta
-    scores = np.array([scaled[rows].T @ left[rows] for rows in blocks.rows])
-    count, many = len(scores), len(names)
-    covariance = bread @ (scores.T @ scores) @ bread * count / (count - 1)
+    beta = np.linalg.pinv(scaled.T @ scaled, rcond=RCOND) @ (scaled.T @ residual)
+    covariance = sandwich(scaled, residual - scaled @ beta, blocks, RCOND)
+    count, many = len(blocks.rows), len(names)
     extra, own = beta[many:], covariance[many:, many:]
-    wald = float(extra @ np.linalg.pinv(own, rcond=1e-8) @ extra) / many
+    wald = float(extra @ np.linalg.pinv(own, rcond=RCOND) @ extra) / many
     errors = np.sqrt(np.maximum(np.diag(covariance)[:many], 1e-300))
     moves = beta[:many] / scale[:many] / np.where(values == 0, 1.0, np.abs(values))
     far = (np.abs(moves) > MOVES) & (np.abs(beta[:many]) > CLEARLY * errors)

@@ -23,8 +23,9 @@ energy its change over the range has less than about 1 - `TIE`."""
 
 
 def is_another(problem: Problem, effect: Effect) -> bool:
-    """Whether an effect is really something else: a time-stamp convention, a level, an unbalance, a drift; or at a
-    bound, or what no card may hold.
+    """Whether an effect is really something else: a time-stamp convention, a level, an unbalance, a drift.
+
+    So is what lies at a bound, and what no card may hold.
     """
     if effect.broken_rule() or at_bound(effect):
         return True

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from cosim.diagnosis.bank import since_reversal
 from cosim.diagnosis.prepare import Array
 from cosim.diagnosis.result import Trace
 
@@ -20,11 +21,8 @@ CENTRES, MOST_ROWS = 800, 20_000
 
 def features(trace: Trace) -> Array:
     """Position, speed, acceleration, direction, logarithm of the time since the last reversal."""
-    direction = np.sign(trace.v)
-    turned = np.flatnonzero(np.diff(direction, prepend=direction[:1]) != 0)
-    last = np.concatenate([[0], turned])[np.searchsorted(turned, np.arange(len(trace.t)), side="right")]
-    since = trace.t - trace.t[last]
-    return np.column_stack([trace.q, trace.v, np.gradient(trace.v, trace.t), direction, np.log(since + 1e-2)])
+    since = np.log(since_reversal(trace.t, trace.v) + 1e-2)
+    return np.column_stack([trace.q, trace.v, np.gradient(trace.v, trace.t), np.sign(trace.v), since])
 
 
 def stacked(traces: Sequence[Trace]) -> tuple[Array, Array]:

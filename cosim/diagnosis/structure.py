@@ -66,8 +66,7 @@ class Bench:
         if id(found) in self.crossed:
             return self.crossed[id(found)][1]
         residual = np.empty_like(found.residual)
-        for fold in np.unique(self.blocks.fold):
-            rows = np.concatenate([r for r, f in zip(self.blocks.rows, self.blocks.fold, strict=True) if f == fold])
+        for rows in self.blocks.folds:
             without = self.weight.copy()
             without[rows] = 0.0
             # The bristles stay: a fold that never dwells would send them anywhere, and the judgement with them.
@@ -79,11 +78,8 @@ class Bench:
     def foretold(self, found: Fit, without: Fit) -> float:
         """Share of the plain residual energy of a fold that a structure foretells, the least of all folds."""
         left, before = (self.weight * self.left_out(one) for one in (found, without))
-        folds = [
-            np.concatenate([r for r, f in zip(self.blocks.rows, self.blocks.fold, strict=True) if f == fold])
-            for fold in np.unique(self.blocks.fold)
-        ]
-        return min(float(1 - left[rows] @ left[rows] / (before[rows] @ before[rows] + 1e-300)) for rows in folds)
+        energies = [(left[rows] @ left[rows], before[rows] @ before[rows]) for rows in self.blocks.folds]
+        return min(float(1 - after / (whole + 1e-300)) for after, whole in energies)
 
     @property
     def rows(self) -> Array:
