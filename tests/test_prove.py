@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import prove_tool
 import pytest
+from report_example import diagnosis
 from test_arrows import imports
-from test_report import diagnosis
 
 from cosim.cli import main
 from cosim.errors import OutputError, ProofError
