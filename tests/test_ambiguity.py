@@ -1,5 +1,6 @@
 """An effect that another becomes in a limit wins by its gain; what cannot be excluded stays in the set."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +16,15 @@ from cosim.diagnosis.problem import Problem
 from cosim.diagnosis.trial import Trial, clearly_worse, is_real, winner
 from cosim.diagnosis.tuning import tuned
 from cosim.recording import Recording
-from pyfmi_models.effects import ActuatorLag, Delay, Effect, FrictionAsymmetry, GravityUnbalance, TorqueOffset
+from pyfmi_models.effects import (
+    ActuatorLag,
+    Delay,
+    Effect,
+    FrictionAsymmetry,
+    GravityUnbalance,
+    StribeckEffect,
+    TorqueOffset,
+)
 from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.effects.clock_skew import ClockSkew
 from pyfmi_models.effects.compliance import Compliance
@@ -149,3 +158,21 @@ def test_how_a_cable_hardens_is_fitted_as_its_grid_knows_it_only_roughly() -> No
     assert isinstance(found, CableWrap)
     assert float(found.hardening) == pytest.approx(0.3, rel=0.05)
     assert float(found.home) == pytest.approx(0.2, rel=0.05)
+
+
+def steady(speeds: list[float], torque: Callable[[float], float]) -> Problem:
+    """One recording a speed."""
+    t = np.arange(300) / 100
+    signals = [{"t": t, "q": v * t, "tau": np.full(300, torque(v))} for v in speeds]
+    prepared = prepare([Recording(f"r{number}", one) for number, one in enumerate(signals)], 10.0)
+    return Problem(MOUNT, prepared, np.ones(len(prepared.recording_of)), 1e-2)
+
+
+def test_a_stribeck_curve_is_found_from_a_start_narrower_than_the_gap_between_the_speeds() -> None:
+    speeds = [side * v for v in (0.1, 3.0, 6.0, 9.0, 12.0, 15.0, 18.0, 21.0) for side in (1, -1)]
+    this = steady(speeds, lambda v: float(np.sign(v) * (1 + 0.2 * np.exp(-abs(v) / 5)) + 0.02 * v))
+    narrow = StribeckEffect(Fs=1.2, Vs=0.1)
+    found = tuned(this, this.fit(replace(MOUNT, effects=(narrow,)), 12), narrow).mount.effects[-1]
+    assert isinstance(found, StribeckEffect)
+    assert float(found.Vs) == pytest.approx(5, rel=0.01)
+    assert float(found.Fs) == pytest.approx(1.2, rel=0.01)

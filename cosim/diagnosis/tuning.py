@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+from cosim.diagnosis.families.friction import CURVES
 from cosim.diagnosis.fit import FIXED, Fit
 from cosim.diagnosis.meaning import at_bound
 from cosim.diagnosis.problem import Problem
@@ -15,8 +16,6 @@ WHOLE = 0.01
 """A whole number of cycles is taken if the residual grows by no more than this share."""
 SHARP = 1.0
 """Exponent of the Stribeck curve of Bo and Pavelescu (Wear 82, 1982); that of Armstrong-Helouvry is 2."""
-WIDER = (0.25, 4.0)
-"""How many times wider than the fitted one a Stribeck curve is tried."""
 SOFTER = (4.0, 16.0)
 """How many times softer than the start a bending contact is tried."""
 
@@ -27,7 +26,7 @@ def tuned(problem: Problem, found: Fit, start: Effect) -> Fit:
     if isinstance(added, CableWrap):
         return problem.fit(_freed(problem, found, "hardening").mount, 4)
     if isinstance(start, StribeckEffect):
-        return _shaped(problem, _refound(problem, found, [replace(start, Vs=share * added.Vs) for share in WIDER]))
+        return _shaped(problem, _refound(problem, found, [replace(start, Vs=s * problem.top_speed) for s in CURVES]))
     if isinstance(start, Presliding):
         return _refound(problem, found, [replace(start, sigma0=start.sigma0 / softer) for softer in SOFTER])
     return _in_cycles(problem, found) if getattr(added, "cycles_per_rev", 0.0) > 0 else found

@@ -26,6 +26,9 @@ from pyfmi_models.mount import Mount
 
 WARM = 10.0
 """Rise of temperature [K] by which a warm-up is counted: only its product with the coefficient can be seen."""
+CURVES = (0.01, 0.03, 0.07, 0.15, 0.3)
+"""Widths of Stribeck curves that are tried, and that fits start from, relative to the top speed. A fit does not cross
+the gap between two recorded speeds: a curve narrower than that is flat at the next speed, and has no slope there."""
 
 
 def asymmetry(mount: Mount, span: Span) -> Iterator[Candidate]:
@@ -78,8 +81,8 @@ def stribeck(mount: Mount, span: Span) -> Iterator[Candidate]:
     law = mount.friction
     if mount.friction.key == "none" or getattr(law, "Fs", None) is not None or has(mount, StribeckEffect):
         return
-    base = _level(mount)
-    for share in (0.01, 0.03, 0.07, 0.15, 0.3):
+    base = contact_level(mount)
+    for share in CURVES:
         Vs = share * span.top
 
         def start(c: Array, Vs: float = Vs) -> Effect:
@@ -105,7 +108,7 @@ def dwell(mount: Mount, span: Span) -> Iterator[Candidate]:
         fresh = DwellBreakaway(torque_per_efold=0.0, onset_s=0.1, memory_rad=share * span.reach)
 
         def start(c: Array, fresh: DwellBreakaway = fresh) -> Effect:
-            return replace(fresh, torque_per_efold=max(float(c[0]), 1e-6 * _level(mount)))
+            return replace(fresh, torque_per_efold=max(float(c[0]), 1e-6 * contact_level(mount)))
 
         yield Candidate("dwell_breakaway", (fresh,), ("torque_per_efold",), start)
 
@@ -134,7 +137,7 @@ def presliding(mount: Mount, span: Span) -> Iterator[Candidate]:
     if mount.friction.key == "none" or mount.law.states():
         return
     for reach in np.geomspace(1e-4, 1e-2, 5) * span.reach:
-        bent = Presliding(sigma0=_level(mount) / float(reach))
+        bent = Presliding(sigma0=contact_level(mount) / float(reach))
 
         def start(_: Array, bent: Presliding = bent) -> Effect:
             return bent
@@ -142,6 +145,7 @@ def presliding(mount: Mount, span: Span) -> Iterator[Candidate]:
         yield Candidate("presliding", (bent,), (), start)
 
 
-def _level(mount: Mount) -> float:
+def contact_level(mount: Mount) -> float:
+    """Coulomb level of a friction law, the mean of both directions [N m]; 0 if it has none."""
     level = getattr(mount.friction, "Fc", None)
     return float(np.mean(level)) if isinstance(level, Pair) else float(level or 0.0)
