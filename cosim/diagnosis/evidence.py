@@ -6,7 +6,7 @@ algebra on those. Nuisances carry a prior: what friction laws cannot agree on (b
 level, and a timing convention of a fraction of a sample are explained away before any effect may earn something.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,6 +23,8 @@ FOLDS = 4
 """Folds of a single training recording; with several, each recording is a fold ..."""
 MOST_FOLDS = 8
 """... up to this many; of more every fourth one shares a fold, so that each fold holds motions of all kinds."""
+NOISE_SHARE = 0.03
+"""Share of a fold's rows that the noise of one coefficient may cost there: what an effect must gain at least."""
 LEAST_ROWS = 10 * AR_ORDER
 """Recordings with fewer kept rows have one noise filter together."""
 
@@ -59,6 +61,16 @@ class Blocks:
         """Rows of each fold."""
         owners = list(zip(self.rows, self.fold.tolist(), strict=True))
         return [np.concatenate([r for r, owner in owners if owner == fold]) for fold in np.unique(self.fold)]
+
+    def untold(self, columns: Array) -> Mask:
+        """Which columns (rows, n) act in one fold nearly alone, as a drive's knee that no other reaches: (folds, n).
+
+        The others, where the column has the energy E, tell its coefficient with the variance 1/E, which costs
+        E_fold / E rows by noise alone: what they never met they can neither foretell nor deny.
+        """
+        own = np.array([(columns[rows] ** 2).sum(0) for rows in self.folds])
+        many = np.array([[len(rows)] for rows in self.folds])
+        return np.asarray((len(own) > 1) & (own > NOISE_SHARE * many * (own.sum(0) - own)))
 
 
 @dataclass(frozen=True)
@@ -197,14 +209,19 @@ class Grams:
         self.rows = np.array([float(len(x)) for x in columns])
         self.folds = [self.fold == fold for fold in np.unique(self.fold)]
 
-    def energy(self, chosen: Sequence[int], nuisance: Sequence[int] | None = None) -> Array:
-        """Cross-validated energy of the target in each block, each fold predicted from the others."""
+    def energy(
+        self, chosen: Sequence[int], nuisance: Sequence[int] | None = None, untold: Collection[int] = ()
+    ) -> Array:
+        """Cross-validated energy of the target in each block, each fold predicted from the others.
+
+        Folds that are `untold` by the others tell themselves too.
+        """
         energy = np.zeros(len(self.gram))
         used = self.nuisance if nuisance is None else np.asarray(nuisance, int)
         totals = [self.gram[fold].sum(0) for fold in self.folds]
         reduced = [self._reduced(total, chosen, used) for total in totals]
         for number, fold in enumerate(self.folds):
-            others = [one for other, one in enumerate(reduced) if other != number] or reduced
+            others = [one for other, one in enumerate(reduced) if other != number or number in untold] or reduced
             beta = self._solved(np.sum(others, axis=0), np.asarray(chosen, int))
             energy[fold] = self._rest(fold, totals[number], chosen, used, beta)
         return energy

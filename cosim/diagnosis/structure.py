@@ -6,7 +6,7 @@ nuisances and the whitening. Energies are per block and cross-validated, so two 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -66,14 +66,21 @@ class Bench:
         if id(found) in self.crossed:
             return self.crossed[id(found)][1]
         residual = np.empty_like(found.residual)
-        for rows in self.blocks.folds:
+        for rows, untold in zip(self.blocks.folds, self._untold(found), strict=True):
             without = self.weight.copy()
             without[rows] = 0.0
             # The bristles stay: a fold that never dwells would send them anywhere, and the judgement with them.
-            refit = fit(found.mount, self.prepared.pieces, without, evaluations=4, fixed=(*FIXED, *BRISTLES))
+            fixed = (*FIXED, *BRISTLES, *untold)
+            refit = fit(found.mount, self.prepared.pieces, without, evaluations=4, fixed=fixed)
             residual[rows] = refit.residual[rows]
         self.crossed[id(found)] = found, residual
         return residual
+
+    def _untold(self, found: Fit) -> list[list[str]]:
+        """Parameters of effects that the other folds do not tell, of each fold: they would go anywhere as well."""
+        names = [name for name in found.free if not name.startswith(("axis.", "friction."))]
+        slopes = found.slopes[:, [found.free.index(name) for name in names]] * self.weight[:, None]
+        return [[name for name, is_so in zip(names, row, strict=True) if is_so] for row in self.blocks.untold(slopes)]
 
     def foretold(self, found: Fit, without: Fit) -> float:
         """Share of the plain residual energy of a fold that a structure foretells, the least of all folds."""
@@ -92,11 +99,12 @@ class Bench:
         `excluded` names for each group the shapes of the bank that make room for it.
         """
         grams, base = self._grams(found, groups), range(1, 1 + len(found.free))
-        before = {room: grams.energy(base, self._others(found, room)) for room in set(excluded)}
         first, scores = 1 + len(found.free) + self.nuisances.columns.shape[1], []
+        before = cache(lambda room, untold: grams.energy(base, self._others(found, room), untold))
         for group, room in zip(groups, excluded, strict=True):
             chosen, used = [*base, *range(first, first + group.shape[1])], self._others(found, room)
-            score = Score(before[room], grams.energy(chosen, used), grams.rows)
+            untold = tuple(np.flatnonzero(self.blocks.untold(group * self.weight[:, None]).all(1)).tolist())
+            score = Score(before(room, untold), grams.energy(chosen, used, untold), grams.rows)
             scores.append((score, grams.fit(chosen, used)[len(base) :]))
             first += group.shape[1]
         return scores
