@@ -31,8 +31,9 @@ BRISTLES = ("friction.sigma0", "friction.sigma1", "friction.Fs", "friction.Vs")
 """Parameters that only the slowest motion tells: a recording that never dwells says nothing about them."""
 LEAST_VS, MOST_FS = 0.005, 5.0
 """Stribeck curves narrower than this share of the top speed, or higher than this times their start, are not fitted."""
-LEAST_KNEE = 0.5
-"""A drive that saturates does so above this share of the torque that is hardly ever exceeded (98 %)."""
+LEAST_KNEE = 0.2
+"""A drive that saturates does so above this share of the command that is hardly ever exceeded (98 %). Past a knee the
+command outgrows the need: a drive that bends at 0.7 of what is needed, with a slope of 0.3, does so at 0.4 of it."""
 LEAST_SLOPE = 0.02
 """... and gives at least this share of what more is asked for, else no command gives what is needed."""
 PRIOR_FACTOR = 2.0
