@@ -39,7 +39,8 @@ def identify(
     deliver.check_out(out, force)
     believed, started = read_card(card), time.perf_counter()
     read = read_recordings(recordings, believed.columns, columns, units, believed.mount.motion)
-    say(f"Read {len(read)} recordings, {sum(one.duration for one in read):.0f} s; card {believed.mount.name}")
+    seconds, several = sum(one.duration for one in read), "s" * (len(read) > 1)
+    say(f"Read {len(read)} recording{several}, {seconds:.0f} s; card {believed.mount.name}")
     with stage("identifying") as progress:
         options = Options(tuple(free or ()), cut, keep_inertia, starts, seed)
         found = find(read, believed, options, progress.tell)

@@ -129,6 +129,16 @@ def test_directions_are_told_apart(quasi_static: Recording) -> None:
     assert fits["negative"].values[0] > 1.3 * fits["positive"].values[0]
 
 
+def test_a_step_in_the_friction_map_ends_at_the_steepest_curve_of_the_law(quasi_static: Recording) -> None:
+    """No exponent is steep enough for a step; beyond the law's limit its powers overflow."""
+    speed = np.gradient(quasi_static["q"], quasi_static.t)
+    stepped = np.sign(speed) * np.where(np.abs(speed) < 0.03, 4.0, 3.0) + 0.1 * speed
+    fits = friction_map([replace(quasi_static, table={**quasi_static.table, "tau": stepped})], 0.0, 4e-3).fits
+    for fit in fits.values():
+        assert np.isfinite(fit.values).all()
+        assert 4 < fit.values[3] <= 5
+
+
 def test_standard_errors_are_those_of_least_squares() -> None:
     rng, x = np.random.default_rng(0), np.linspace(1, 2, 5000)
 

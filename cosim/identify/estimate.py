@@ -76,13 +76,16 @@ class Estimate:
         return (*lost, *pairs)
 
 
-def estimate(names: Sequence[str], start: Array, model: Model, evaluations: int = 60) -> Estimate:
-    """Fit from one start; see the module."""
+def estimate(
+    names: Sequence[str], start: Array, model: Model, limits: Array | None = None, evaluations: int = 60
+) -> Estimate:
+    """Fit from one start; see the module. `limits` (free, 2) are the lowest and highest values that make sense."""
+    low, high = np.log(np.maximum(limits, 1e-300)).T if limits is not None else (-np.inf, np.inf)
     scale = _rms(model(start).residual)
     search = _Search(model, scale)
-    found = _minimum(search, np.log(start), evaluations)
+    found = _minimum(search, np.log(start), low, high, evaluations)
     settled = _Search(model, np.maximum(_rms(model(np.exp(found)).residual), 1e-9 * scale))
-    found = _minimum(settled, found, evaluations)
+    found = _minimum(settled, found, low, high, evaluations)
     values = np.exp(found)
     outputs = model(values)
     counted = search.evaluations + settled.evaluations
@@ -111,11 +114,11 @@ class _Search:
         return np.asarray(-slopes.reshape(-1, len(logs)))
 
 
-def _minimum(search: _Search, logs: Array, evaluations: int) -> Array:
+def _minimum(search: _Search, logs: Array, low: Array | float, high: Array | float, evaluations: int) -> Array:
     wide = np.log(WIDEST)
-    found = least_squares(
-        search.residual, logs, search.jacobian, bounds=(logs - wide, logs + wide), xtol=1e-8, max_nfev=evaluations
-    )
+    bounds = np.maximum(logs - wide, low), np.minimum(logs + wide, high)
+    inside = np.clip(logs, bounds[0] + 1e-9, bounds[1] - 1e-9)
+    found = least_squares(search.residual, inside, search.jacobian, bounds=bounds, xtol=1e-8, max_nfev=evaluations)
     return np.asarray(found.x)
 
 

@@ -21,6 +21,7 @@ from cosim.errors import InputError
 from cosim.identify.estimate import Array, Estimate, Outputs, estimate
 from cosim.recording import Recording
 from pyfmi_models.friction import Stribeck
+from pyfmi_models.model import parameters_of
 
 NAMES = ("Fc", "Fs", "Vs", "delta", "sigma2")
 DIRECTIONS = {"positive": (1.0,), "negative": (-1.0,), "both": (1.0, -1.0)}
@@ -98,7 +99,14 @@ def _fitted(samples: Samples, signs: tuple[float, ...]) -> Estimate:
         torque, *slopes = curve(folded.v[None, :], values)
         return Outputs((folded.friction - torque)[:, None], np.stack(slopes, axis=1)[:, None, :])
 
-    return min((estimate(NAMES, start, model) for start in _starts(folded)), key=lambda fit: fit.rms[0])
+    fits = [estimate(NAMES, start, model, _limits()) for start in _starts(folded)]
+    return min(fits, key=lambda fit: fit.rms[0])
+
+
+def _limits() -> Array:
+    """Lowest and highest value of each parameter, as the law declares them: (parameters, 2)."""
+    declared = {one.name: one for one in parameters_of(Stribeck(Fc=1.0, Fs=1.0, Vs=1.0))}
+    return np.array([(declared[name].low, declared[name].high) for name in NAMES])
 
 
 def _curve() -> Rowwise:

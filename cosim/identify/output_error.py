@@ -114,11 +114,14 @@ def fit_outputs(
     if np.any(own <= 0):
         name = machine.free[int(np.argmin(own))]
         raise InputError(f"{name} = {own.min():g} cannot be identified: output error searches positive numbers.")
+    limits = np.array(
+        [(variable.low, variable.high) for variable in (machine.plant.parameters[k] for k in machine.places)]
+    )
     rng = np.random.default_rng(seed)
     factors = [np.ones_like(own), *(FACTOR ** rng.uniform(-1, 1, len(own)) for _ in range(starts - 1))]
 
     def one(factor: Array) -> Estimate:
-        found = estimate(machine.free, own * factor, model)
+        found = estimate(machine.free, own * factor, model, limits)
         say(f"output error, RMS {', '.join(f'{value:.3g}' for value in found.rms)}")
         return found
 
