@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
-from scipy.linalg import solve_banded
+from scipy.linalg.lapack import dtbtrs
 
 from cosim.diagnosis.claim import claimed
 from cosim.diagnosis.equations import Equations, equations_of
@@ -248,9 +248,11 @@ class Inverse:
 def _recurrence(decay: Array, drift: Array) -> Array:
     """Solve y[k+1] = decay[k] y[k] + drift[k], y[0] = 0, for every column of drift."""
     rows = len(decay) + 1
-    band = np.ones((2, rows))
-    band[1, :-1] = -decay
-    solution: Array = solve_banded((1, 0), band, np.concatenate([np.zeros((1, drift.shape[1])), drift]))
+    band, right = np.ones((2, rows), order="F"), np.zeros((rows, drift.shape[1]), order="F")
+    band[1, :-1], right[1:] = -decay, drift
+    if not right.size:  # LAPACK's wrapper is not safe with nothing to solve for
+        return right
+    solution: Array = dtbtrs(band, right, uplo="L", diag="U", overwrite_b=True)[0]
     return solution
 
 

@@ -17,6 +17,8 @@ EVERY = 4
 """Rows of a trace for each row that is fitted: the trace is filtered at 30 Hz and has eight rows a period of that."""
 CENTRES, MOST_ROWS = 800, 20_000
 """Rows that a kernel is placed at, and rows that it is fitted to."""
+CHUNK = 256
+"""Rows lifted at once: they stay in the cache."""
 
 
 def features(trace: Trace) -> Array:
@@ -39,15 +41,23 @@ def kernel(rows: Array, target: Array, ridge: float = 1e-2) -> Model:
     middle, spread = rows.mean(0), rows.std(0) + 1e-300
     centres = ((rows - middle) / spread)[:: max(1, len(rows) // CENTRES)]
 
+    half = (centres**2).sum(1) / 2
+
     def lifted(others: Array) -> Array:
         x = (others - middle) / spread
-        squares = (x**2).sum(1)[:, None] + (centres**2).sum(1) - 2 * x @ centres.T
-        return np.asarray(np.exp(-squares / 2))
+        powers = x @ centres.T
+        powers -= (x**2).sum(1)[:, None] / 2
+        powers -= half
+        return np.asarray(np.exp(powers, out=powers))
 
-    columns = lifted(rows)
+    columns = np.concatenate([lifted(part) for part in _chunks(rows)])
     normal = columns.T @ columns
     weights = np.linalg.solve(normal + ridge * np.trace(normal) / len(normal) * np.eye(len(normal)), columns.T @ target)
-    return lambda others: np.asarray(lifted(others) @ weights)
+    return lambda others: np.concatenate([lifted(part) @ weights for part in _chunks(others)])
+
+
+def _chunks(rows: Array) -> list[Array]:
+    return [rows[first : first + CHUNK] for first in range(0, len(rows), CHUNK)]
 
 
 def black_box_rms(traces: Sequence[Trace]) -> float:
