@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from cosim.memory import keep_freed_memory
 from cosim.terminal import put, say, stage
 
 
@@ -20,6 +21,7 @@ def demo(
     from cosim.diagnosis.terminal import summary
     from cosim.files import check_free
 
+    keep_freed_memory()
     check_free(out, force)
     started = time.perf_counter()
     with stage("cosim demo") as progress:

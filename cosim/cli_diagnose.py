@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 
 from cosim.errors import InputError
+from cosim.memory import keep_freed_memory
 from cosim.reading import pairs_of, read_recordings
 from cosim.recording import Recording
 from cosim.renamed import Alias
@@ -37,6 +38,7 @@ def diagnose(
 ) -> None:
     """Say which physics a card lacks, and prove it on a recording that was never fitted."""
     from cosim.diagnosis.black_box import BlackBox, as_base
+    from cosim.diagnosis.closed_loop import Loops
     from cosim.diagnosis.corrected import Correction, motion_of
     from cosim.diagnosis.deliver import as_json as to_json
     from cosim.diagnosis.deliver import check_out, deliver
@@ -44,6 +46,7 @@ def diagnose(
     from cosim.diagnosis.terminal import summary
     from pyfmi_models.card import read_card
 
+    keep_freed_memory()
     check_out(out, force)
     believed = read_card(card)
     recordings = read_recordings((*train, *heldout), believed.columns, columns, units, believed.mount.motion)
@@ -61,8 +64,10 @@ def diagnose(
             base = as_base(box, fitted, held, believed, progress.tell)
             more = {"more": Correction(box, base.card, *motion_of(recordings[0])).deliver, "base": box.told}
             fitted, held, believed = [*base.train], [*base.heldout], base.card
-        outcome = find(fitted, held, believed, progress.tell)
-        done = deliver(outcome, fitted, held, believed, out, command, progress.tell, **more)
+        with Loops(believed, held) as loops:
+            loops.close("nominal", believed.plant())
+            outcome = find(fitted, held, believed, progress.tell)
+            done = deliver(outcome, fitted, held, believed, out, command, progress.tell, **more, loops=loops)
     if as_json:
         put_json(to_json(done))
     else:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from cosim.diagnosis.closed_loop import LoopError, close_loop, compare
+from cosim.diagnosis.closed_loop import LoopError, Loops
 from cosim.diagnosis.deliver import deliver
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.result import Diagnosis
@@ -43,18 +43,18 @@ def run_demo(out: Path, command: str, say: Callable[[str], None]) -> Demo:
     train = [Recording.read(out / "night" / f"train_{k}.parquet") for k in (1, 2)]
     heldout = Recording.read(out / "night" / "heldout.parquet")
     say("building FMUs of plant and controller")
-    plant, controller = export_pair(card, out / "fmus")
+    plant, _ = export_pair(card, out / "fmus")
     say("co-simulating plant and controller at 0.1 ms")
-    simulated = close_loop(plant, controller, card, heldout, "simulated")
-    simulated.write(out / "simulated.parquet", force=True)
-    say("checking the stiff integration")
-    table = table_text(compare_integration(card))
-    outcome = diagnose(train, [heldout], card, say)
-    found = deliver(outcome, train, [heldout], card, out / "diagnosis", command, say)
-    better = out / "diagnosis" / found.improved["fmu"] if "fmu" in found.improved else plant
-    improved = close_loop(better, controller, card, heldout, "improved")
-    improved.write(out / "improved.parquet", force=True)
-    return Demo(table, compare(simulated, heldout), compare(improved, heldout), found)
+    with Loops(card, [heldout]) as loops:
+        loops.close("nominal", card.plant(), plant)
+        say("checking the stiff integration")
+        table = table_text(compare_integration(card))
+        outcome = diagnose(train, [heldout], card, say)
+        found = deliver(outcome, train, [heldout], card, out / "diagnosis", command, say, loops=loops)
+        for key, name in (("nominal", "simulated"), ("after", "improved")):
+            replace(*loops.runs(key), name=name).write(out / f"{name}.parquet", force=True)
+        errors = loops.errors()
+    return Demo(table, errors["nominal"], errors["after"], found)
 
 
 def export_pair(card: Card, folder: Path) -> tuple[Path, Path]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from itertools import count
+from threading import Lock
 from typing import Any, Protocol
 from weakref import WeakValueDictionary
 
@@ -18,6 +19,7 @@ class Listener(Protocol):
 
 
 _NUMBERS = count(1)
+_DIRECTORY = Lock()
 _LISTENERS: WeakValueDictionary[str, Listener] = WeakValueDictionary()
 """By instance name; FMPy's logger can serve only one callback a process."""
 
@@ -31,12 +33,16 @@ def registered(listener: Listener, name: str) -> str:
 
 @contextmanager
 def same_directory() -> Iterator[None]:
-    """Come back to the working directory, which FMPy leaves for good when a library does not load."""
-    here = os.getcwd()
-    try:
-        yield
-    finally:
-        os.chdir(here)
+    """Come back to the working directory, which FMPy leaves for good when a library does not load.
+
+    One thread at a time: the directory is that of the whole process.
+    """
+    with _DIRECTORY:
+        here = os.getcwd()
+        try:
+            yield
+        finally:
+            os.chdir(here)
 
 
 def _tell(_: Any, name: bytes | None, status: int, category: bytes, message: bytes | None) -> None:

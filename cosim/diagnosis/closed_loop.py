@@ -5,7 +5,9 @@ controller and a recording with a set point.
 """
 
 from collections.abc import Mapping, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -24,6 +26,8 @@ from pyfmi_models.export import export_fmu
 from pyfmi_models.mount import Mount
 
 LEAD, TAIL = 3.0, 0.5
+AT_ONCE = 2
+"""Loops that are closed beside each other."""
 
 
 @dataclass(frozen=True)
@@ -49,15 +53,17 @@ def close_loop(
     name: str = "simulated",
     reading: str = "q",
     inputs: Sequence[str] = (),
+    asked: Mapping[str, Array] | None = None,
 ) -> Recording:
     """Simulate plant and controller FMUs under the recorded set point; rows at the recording's own rate.
 
-    `reading` is the plant's output that was recorded as position, `inputs` name recorded columns that the plant reads.
+    `reading` is the plant's output that was recorded as position, `inputs` name recorded columns that the plant reads,
+    `asked` is the `set_point` where it is known already.
     """
     assert card.controller is not None
     step = 1 / card.controller.loop_hz
     decimation = max(1, round(recording.sample_time / step))
-    signals = set_point(recording, step)
+    signals = dict(asked or set_point(recording, step))
     given = {
         n: np.interp(recording.t[0] + step * np.arange(len(signals["q_d"])), recording.t, recording[n]) for n in inputs
     }
@@ -94,30 +100,83 @@ def compare(simulated: Recording, recording: Recording) -> LoopError:
     return LoopError(rms(both["tau"]), rms(both["q"]))
 
 
-def loop_errors(mounts: Mapping[str, Mount], card: Card, recordings: Sequence[Recording]) -> dict[str, LoopError]:
-    """Errors of several models in the loop of a card's controller, over all recordings together.
+class Loops:
+    """Models in the loop of a card's controller, over all recordings together, closed beside whatever else is done.
 
-    Empty without a controller in the card or without set point and position in the recordings; a model that the
-    controller cannot hold is left out.
+    C steps them, in threads. Nothing is closed without a controller in the card, or without set point and position in
+    the recordings; a model that the controller cannot hold is left out.
     """
-    if card.controller is None or any(not {"q", "q_d"} <= set(recording.columns) for recording in recordings):
-        return {}
-    found = {}
-    with TemporaryDirectory(prefix="cosim-loop-") as folder:
-        controller = export_fmu(card.controller_model(), Path(folder) / "controller.fmu", fmi=3)
+
+    def __init__(self, card: Card, recordings: Sequence[Recording]) -> None:
+        able = card.controller is not None and all({"q", "q_d"} <= set(one.columns) for one in recordings)
+        self._card, self._recordings = card, tuple(recordings) if able else ()
+        self._begun: dict[str, tuple[Mount, Future[list[Recording]]]] = {}
+
+    def __enter__(self) -> "Loops":
+        self._threads = ThreadPoolExecutor(AT_ONCE, "loop")
+        self._folder = TemporaryDirectory(prefix="cosim-loop-")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._threads.shutdown(cancel_futures=True)
+        self._folder.cleanup()
+
+    def close(self, key: str, mount: Mount, plant: Path | None = None) -> None:
+        """Begin to close a model's loop, if that is not done; `plant` is its FMU where there is one already."""
+        if not self._recordings or key in self._begun:
+            return
+        for other, runs in self._begun.values():
+            if other == mount:
+                self._begun[key] = mount, runs
+                return
+        plant = plant or export_fmu(replace(mount.model(), name="plant"), Path(self._folder.name) / f"{key}.fmu")
+        fmus = plant.absolute(), self._controller
+        self._begun[key] = mount, self._threads.submit(self._runs, *fmus, mount, self._set_points)
+
+    def runs(self, key: str) -> list[Recording]:
+        """What a model did on each recording, none if the controller cannot hold it; waits for it."""
+        try:
+            return self._begun[key][1].result()
+        except StepError:
+            return []
+
+    def errors(self) -> dict[str, LoopError]:
+        """Errors of all models whose loops were closed."""
+        runs = {key: self.runs(key) for key in self._begun}
+        return {key: _together([*map(compare, some, self._recordings)]) for key, some in runs.items() if some}
+
+    @cached_property
+    def _controller(self) -> Path:
+        return export_fmu(self._card.controller_model(), Path(self._folder.name) / "controller.fmu").absolute()
+
+    @cached_property
+    def _set_points(self) -> list[Future[dict[str, Array]]]:
+        """Set points at every tick of the controller, the same for all models."""
+        assert self._card.controller is not None
+        step = 1 / self._card.controller.loop_hz
+        return [self._threads.submit(set_point, one, step) for one in self._recordings]
+
+    def _runs(
+        self, plant: Path, controller: Path, mount: Mount, set_points: Sequence[Future[dict[str, Array]]]
+    ) -> list[Recording]:
+        reading = "q_recorded" if any(mount.of_kind(ClockEffect)) else "q"
+        return [
+            close_loop(
+                *(plant, controller, self._card, one),
+                reading=reading,
+                inputs=[variable.name for variable in mount.inputs() if variable.name in one],
+                asked=asked.result(),
+            )
+            for one, asked in zip(self._recordings, set_points, strict=True)
+        ]
+
+
+def loop_errors(mounts: Mapping[str, Mount], card: Card, recordings: Sequence[Recording]) -> dict[str, LoopError]:
+    """Errors of several models in the loop of a card's controller (see `Loops`)."""
+    with Loops(card, recordings) as loops:
         for key, mount in mounts.items():
-            plant = export_fmu(replace(mount.model(), name="plant"), Path(folder) / f"{key}.fmu", fmi=3)
-            try:
-                found[key] = _together([_error(plant, controller, card, mount, one) for one in recordings])
-            except StepError:
-                continue
-    return found
-
-
-def _error(plant: Path, controller: Path, card: Card, mount: Mount, recording: Recording) -> LoopError:
-    inputs = [one.name for one in mount.inputs() if one.name in recording]
-    reading = "q_recorded" if any(mount.of_kind(ClockEffect)) else "q"
-    return compare(close_loop(plant, controller, card, recording, reading=reading, inputs=inputs), recording)
+            loops.close(key, mount)
+        return loops.errors()
 
 
 def _together(errors: Sequence[LoopError]) -> LoopError:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 import cosim
-from cosim.diagnosis.closed_loop import loop_errors
+from cosim.diagnosis.closed_loop import Loops
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.experiment import SCENARIO, scenario
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut
@@ -42,13 +42,20 @@ def deliver(
     say: Callable[[str], None] = lambda _: None,
     more: Callable[[Card, Path], dict[str, Any]] = lambda *_: {},
     base: str = "",
+    loops: Loops | None = None,
 ) -> Diagnosis:
     """Write all files of a diagnosis into `out` and return it with provenance and file names filled in.
 
     Where effects were found, `more` writes what else shall lie beside the better card, and tells it. `base` names the
-    FMU in whose place the card stands, if it does.
+    FMU in whose place the card stands, if it does. `loops` are the card's on the held-out recordings, where some were
+    begun already.
     """
+    if loops is None:
+        with Loops(card, heldout) as own:
+            return deliver(outcome, train, heldout, card, out, command, say, more, base, own)
     directory(out)
+    loops.close("nominal", card.plant())
+    loops.close("before", outcome.refitted.plant())
     provenance = _provenance(train, heldout, card, command) | ({"base_fmu": base} if base else {})
     found = replace(outcome.diagnosis, provenance=provenance)
     better = replace(outcome.card, origin=_origin(found, provenance))
@@ -58,12 +65,14 @@ def deliver(
         say("building the improved FMU")
         improved = {"card": "card.toml", **_fmus(better, found, out), **_proven_range(found), **more(better, out)}
         found = replace(found, improved=improved)
-    say("closing the loop")
-    found = replace(found, heldout=replace(found.heldout, position=_positions(outcome, card, heldout)))
+    loops.close("after", outcome.card.plant(), out / found.improved["fmu"] if "fmu" in found.improved else None)
     if outcome.experiment and better.controller:
         with replacing(out / SCENARIO, True) as partial:
             partial.write_text(scenario(outcome.experiment, better), "utf-8")
     _missing_torque(found, [*train, *heldout], out / "missing_torque.parquet")
+    say("closing the loop")
+    positions = {key: error.position for key, error in loops.errors().items()}
+    found = replace(found, heldout=replace(found.heldout, position=positions))
     with replacing(out / "diagnosis.json", True) as partial:
         partial.write_text(json.dumps(as_json(found), indent=2, allow_nan=False) + "\n", "utf-8")
     say("writing the report")
@@ -71,13 +80,6 @@ def deliver(
 
     write_report(found, out / "report.html")
     return found
-
-
-def _positions(outcome: Outcome, card: Card, heldout: Sequence[Recording]) -> dict[str, float]:
-    """Closed-loop position error of the model as delivered, refitted, and with the effects."""
-    cards = {"nominal": card, "before": outcome.refitted, "after": outcome.card}
-    errors = loop_errors({key: one.plant() for key, one in cards.items()}, card, heldout)
-    return {key: error.position for key, error in errors.items()}
 
 
 def as_json(found: Diagnosis) -> dict[str, Any]:

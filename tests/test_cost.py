@@ -1,0 +1,82 @@
+"""What makes a diagnosis cheap changes none of its numbers."""
+
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfiltfilt
+
+from cosim.diagnosis import regression
+from cosim.diagnosis.closed_loop import Loops
+from cosim.diagnosis.inverse import _recurrence
+from cosim.diagnosis.prepare import lowpass
+from cosim.diagnosis.regression import kernel
+from cosim.proof.generator import make_case, write_case
+from cosim.recording import Recording
+from pyfmi_models.card import read_card
+
+FAULTS = """
+import resource
+import numpy as np
+from cosim.memory import keep_freed_memory
+if {kept}:
+    keep_freed_memory()
+for _ in range(20):
+    several = [np.ones(1_000_000) for _ in range(8)]
+    del several
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt)
+"""
+
+
+@pytest.mark.parametrize("shape", [(400,), (400, 1), (400, 7)])
+def test_the_filter_has_the_bits_of_scipys(shape: tuple[int, ...]) -> None:
+    columns = np.random.default_rng(1).normal(size=shape)
+    sections = butter(4, 30.0, fs=240.0, output="sos")
+    assert np.array_equal(lowpass(columns, 1 / 240, 30.0), sosfiltfilt(sections, columns, axis=0))
+
+
+@pytest.mark.parametrize("count", [0, 1, 5])
+def test_a_recurrence_is_what_it_says(count: int) -> None:
+    rng = np.random.default_rng(2)
+    decay, drift = rng.uniform(-1, 1, 60), rng.normal(size=(60, count))
+    by_hand = np.zeros((61, count))
+    for k in range(60):
+        by_hand[k + 1] = decay[k] * by_hand[k] + drift[k]
+    np.testing.assert_allclose(_recurrence(decay, drift), by_hand, rtol=0, atol=1e-14)
+
+
+def test_a_black_box_is_the_same_in_chunks_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(3)
+    rows, others = rng.normal(size=(900, 3)), rng.normal(size=(700, 3))
+    found = []
+    for size in (64, 10_000):
+        monkeypatch.setattr(regression, "CHUNK", size)
+        found.append(kernel(rows, np.sin(rows[:, 0]) * rows[:, 1])(others))
+    np.testing.assert_allclose(*found, rtol=1e-9, atol=1e-12)
+    truth = np.sin(others[:, 0]) * others[:, 1]
+    assert np.corrcoef(found[0], truth)[0, 1] > 0.95
+
+
+def test_equal_models_have_their_loop_closed_once(tmp_path: Path) -> None:
+    write_case(make_case(5000, (), duration=15.0), tmp_path)
+    card, held = read_card(tmp_path / "card.toml"), Recording.read(tmp_path / "heldout.parquet")
+    other = replace(card, mount=card.mount.model_copy(update={"inertia": 2 * card.mount.inertia}))
+    with Loops(card, [held]) as loops:
+        for key, one in (("nominal", card), ("same", read_card(tmp_path / "card.toml")), ("other", other)):
+            loops.close(key, one.plant())
+        errors = loops.errors()
+        assert loops.runs("nominal") is loops.runs("same")
+    assert errors["nominal"] == errors["same"] != errors["other"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="glibc's allocator")
+def test_freed_memory_stays_for_the_next_array() -> None:
+    command = [sys.executable, "-c"]
+    faults = [
+        int(subprocess.run([*command, FAULTS.format(kept=kept)], capture_output=True, check=True).stdout)
+        for kept in (True, False)
+    ]
+    assert faults[0] < faults[1] / 2
