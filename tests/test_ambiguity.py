@@ -9,6 +9,7 @@ import pytest
 
 from cosim.diagnosis.challenge import Place
 from cosim.diagnosis.evidence import Score
+from cosim.diagnosis.findings import not_found
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.meaning import is_another
 from cosim.diagnosis.prepare import prepare
@@ -176,3 +177,16 @@ def test_a_stribeck_curve_is_found_from_a_start_narrower_than_the_gap_between_th
     assert isinstance(found, StribeckEffect)
     assert float(found.Vs) == pytest.approx(5, rel=0.01)
     assert float(found.Fs) == pytest.approx(1.2, rel=0.01)
+
+
+def test_of_an_asymmetry_that_looks_like_the_offset_found_it_is_said_that_it_does() -> None:
+    t = np.arange(0, 20, 0.01)
+    v = np.cos(2 * t) + 0.5 * np.cos(0.7 * t)
+    q = np.sin(2 * t) / 2 + np.sin(0.7 * t) / 1.4
+    one = {"t": t, "q": q, "tau": np.sign(v) + 0.2 + 5 * np.gradient(v, t)}
+    prepared = prepare([Recording("r", one)], 10.0)
+    weight = np.ones(len(prepared.recording_of))
+    found = Problem(MOUNT, prepared, weight, 1e-2).fit(replace(MOUNT, effects=(OFFSET,)), 5)
+    absent = {finding.effect: finding for finding in not_found(found, prepared, weight, {}, ["torque_offset"])}
+    assert absent["friction_asymmetry"].answer == "not_testable"
+    assert "torque offset" in absent["friction_asymmetry"].evidence

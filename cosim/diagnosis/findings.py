@@ -21,6 +21,8 @@ from cosim.diagnosis.structure import nuisances, projected
 from cosim.diagnosis.trial import LEAST_GAIN, Trial
 from pyfmi_models.effects import CATALOGUE, DriveEffect, Effect, GravityUnbalance
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
+from pyfmi_models.effects.torque_offset import TorqueOffset
+from pyfmi_models.friction import MemorylessLaw
 from pyfmi_models.model import Variable, parameters_of
 from pyfmi_models.mount import LINEAR_UNITS, Mount
 
@@ -222,6 +224,8 @@ def _why_not(name: str, mount: Mount, prepared: Prepared) -> str:
         return "too short, or the motion repeats itself or turns steadily; record a motion that wanders"
     if not prepared.has_position and name in ("cogging", "position_friction", "gravity_unbalance"):
         return "no position was recorded; record q"
+    if name == "friction_asymmetry" and isinstance(mount.friction, MemorylessLaw) and mount.of_kind(TorqueOffset):
+        return "alike to the torque offset that was found where the law says nothing of rest; take lugre in the card"
     if name in ("delay", "actuator_lag", "clock_skew") and not any(piece.asked for piece in prepared.pieces):
         return "nothing asks for a change of torque; record a speed that changes, and the set point"
     if name in ("delay", "actuator_lag") and any(isinstance(effect, DriveEffect) for effect in mount.effects):
