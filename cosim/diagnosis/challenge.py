@@ -70,6 +70,12 @@ class Place:
         return _too_close(self.trial, rival) and not (holds_it and self.trial.gain >= TIE * rival.gain)
 
     @property
+    def more_general(self) -> tuple[Trial, ...]:
+        """Rivals that hold this effect as a special case and explain as much, but no more: the simpler one stands."""
+        alike = [rival for rival in self.rivals if rival.effect.id in NESTED.get(self.effect.id, ())]
+        return tuple(r for r in alike if r.gain >= TIE * self.trial.gain and not self._is_close(r))
+
+    @property
     def better(self) -> Trial:
         """The trial that should hold this place: by gain, but between delay and lag the set point decides."""
         demanded = settled(self.misfits, self.trial, self.rivals)

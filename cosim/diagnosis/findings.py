@@ -102,7 +102,9 @@ def accepted(
     further = f" Further tones: {', '.join(f'{hertz:.4g}' for hertz in tones)} Hz." if tones else ""
     ranges = {n: (numbers.values[n] - Z95 * e, numbers.values[n] + Z95 * e) for n, e in numbers.errors.items()}
     size, size_range = _size(effect, numbers, mount)
-    excluded = [rival for rival in place.rivals if rival.effect.id not in rivals]
+    general = {rival.effect.id: rival.effect.title.lower() for rival in place.more_general}
+    simpler = f"; {' and '.join(general.values())} can look the same: the simpler one is named" if general else ""
+    excluded = [rival for rival in place.rivals if rival.effect.id not in (*rivals, *general)]
     return Finding(
         effect=effect.id,
         title=effect.title,
@@ -124,7 +126,7 @@ def accepted(
         told_apart_by=effect.told_apart_by,
         action=effect.action,
         evidence=f"removes {place.trial.gain:.0%} of the error energy on data left out of the fit "
-        f"(t = {place.trial.t:.1f} over blocks){NOTES.get(effect.id, '')}",
+        f"(t = {place.trial.t:.1f} over blocks){NOTES.get(effect.id, '')}{simpler}",
         visible_from=_visible_from(effect, numbers),
     )
 
