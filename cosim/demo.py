@@ -4,7 +4,9 @@ The recording comes from `cosim.proof`: a simulation of its own, which shares no
 whose card lacks two effects.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,8 +18,8 @@ from cosim.files import directory
 from cosim.proof.demo import demo_case
 from cosim.proof.generator import write_case
 from cosim.recording import Recording
-from cosim.stiffness import compare as compare_integration
-from cosim.stiffness import table_text
+from cosim.stiffness import compare, table_text
+from cosim.sweep.cell import Cell
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.export import export_fmu
 
@@ -44,17 +46,28 @@ def run_demo(out: Path, command: str, say: Callable[[str], None]) -> Demo:
     heldout = Recording.read(out / "night" / "heldout.parquet")
     say("building FMUs of plant and controller")
     plant, _ = export_pair(card, out / "fmus")
-    say("co-simulating plant and controller at 0.1 ms")
-    with Loops(card, [heldout]) as loops:
+    say("co-simulating plant and controller at 0.1 ms, checking the stiff integration")
+    with Loops(card, [heldout]) as loops, beside(integration, card) as table:
         loops.close("nominal", card.plant(), plant)
-        say("checking the stiff integration")
-        table = table_text(compare_integration(card))
         outcome = diagnose(train, [heldout], card, say)
         found = deliver(outcome, train, [heldout], card, out / "diagnosis", command, say, loops=loops)
         for key, name in (("nominal", "simulated"), ("after", "improved")):
             replace(*loops.runs(key), name=name).write(out / f"{name}.parquet", force=True)
         errors = loops.errors()
-    return Demo(table, errors["nominal"], errors["after"], found)
+        return Demo(table.result(), errors["nominal"], errors["after"], found)
+
+
+def integration(card: Card) -> str:
+    """Table of what the stiff integration inside the FMU is worth."""
+    return table_text(compare(card))
+
+
+@contextmanager
+def beside(function: Callable[[Card], str], card: Card) -> Iterator[Future[str]]:
+    """Call a function in a process of its own, which ends with the block, while this one goes on."""
+    cell = Cell()
+    with ThreadPoolExecutor(1) as thread, closing(cell):
+        yield thread.submit(cell.call, function, card)
 
 
 def export_pair(card: Card, folder: Path) -> tuple[Path, Path]:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
+from cosim.demo import beside
 from cosim.diagnosis import regression
 from cosim.diagnosis.closed_loop import Loops
 from cosim.diagnosis.inverse import _recurrence
@@ -70,6 +71,12 @@ def test_equal_models_have_their_loop_closed_once(tmp_path: Path) -> None:
         errors = loops.errors()
         assert loops.runs("nominal") is loops.runs("same")
     assert errors["nominal"] == errors["same"] != errors["other"]
+
+
+def test_another_process_answers_beside_this_one() -> None:
+    card = read_card("paper_mount")
+    with beside(repr, card) as said:
+        assert said.result() == repr(card)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's allocator")
