@@ -12,11 +12,12 @@ from scipy.signal import butter, sosfiltfilt
 from cosim.demo import beside
 from cosim.diagnosis import regression
 from cosim.diagnosis.closed_loop import Loops
-from cosim.diagnosis.inverse import _recurrence
-from cosim.diagnosis.prepare import lowpass
+from cosim.diagnosis.fit import fit
+from cosim.diagnosis.inverse import Inverse, _recurrence, stacked
+from cosim.diagnosis.prepare import lowpass, prepare
 from cosim.diagnosis.regression import kernel
 from cosim.proof.generator import make_case, write_case
-from cosim.recording import Recording
+from cosim.proof.tool import given
 from pyfmi_models.card import read_card
 
 FAULTS = """
@@ -61,9 +62,21 @@ def test_a_black_box_is_the_same_in_chunks_of_any_size(monkeypatch: pytest.Monke
     assert np.corrcoef(found[0], truth)[0, 1] > 0.95
 
 
+def test_a_fit_reports_the_model_at_the_numbers_it_ended_with(tmp_path: Path) -> None:
+    write_case(make_case(5000, (), duration=15.0), tmp_path)
+    card, train, _ = given(str(tmp_path))
+    prepared = prepare(train, 30.0)
+    weight = np.where(prepared.recording_of == 0, 1.0, 0.0)
+    for weights in (weight, np.ones_like(weight)):
+        found = fit(card.plant(), prepared.pieces, weights, evaluations=4)
+        torque, slopes = stacked(Inverse(card.plant(), found.free), prepared.pieces, found.values)
+        np.testing.assert_allclose(found.torque, torque, rtol=1e-12)
+        np.testing.assert_allclose(found.slopes, slopes, rtol=1e-9, atol=1e-12 * np.abs(slopes).max())
+
+
 def test_equal_models_have_their_loop_closed_once(tmp_path: Path) -> None:
     write_case(make_case(5000, (), duration=15.0), tmp_path)
-    card, held = read_card(tmp_path / "card.toml"), Recording.read(tmp_path / "heldout.parquet")
+    card, _, held = given(str(tmp_path))
     other = replace(card, mount=card.mount.model_copy(update={"inertia": 2 * card.mount.inertia}))
     with Loops(card, [held]) as loops:
         for key, one in (("nominal", card), ("same", read_card(tmp_path / "card.toml")), ("other", other)):

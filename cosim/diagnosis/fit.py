@@ -106,8 +106,9 @@ def fit(
     scale = np.array([_scale(known[name]) for name in free])
     pull = _prior(prior or mount, free, float(np.sqrt(np.mean((weight * tau) ** 2))) * 1e-2 / log(factor))
     # Pieces without weight are only looked at once, at the end.
-    used = _weighted(pieces, weight)
+    used, unused = _weighted(pieces, weight)
     cache: dict[bytes, tuple[Array, Array]] = {}
+    best: list[tuple[Array, Array]] = []
 
     def evaluate(u: Array) -> tuple[Array, Array]:
         key = u.tobytes()
@@ -122,6 +123,7 @@ def fit(
         return np.concatenate([weight_used * (tau_used - evaluate(u)[0]), pull(u * scale)[0]])
 
     def jacobian(u: Array) -> Array:
+        best[:] = [evaluate(u)]  # asked for where the fit goes on from, and so last where it ends
         return np.concatenate([-weight_used[:, None] * evaluate(u)[1] * scale, np.diag(pull(u * scale)[1] * scale)])
 
     top = max(float(np.abs(piece.v).max()) for piece in pieces)
@@ -132,22 +134,30 @@ def fit(
     inner = np.clip(start / scale, np.nextafter(low, 0) + 1e-9, np.nextafter(high, 0) - 1e-9)
     found = least_squares(residuals, jacobian, inner, (low, high), evaluations)
     values = np.clip(found * scale, lowest, highest)
-    torque, slopes = stacked(inverse, pieces, values)
+    torque, slopes = np.empty(len(tau)), np.empty((len(tau), len(free)))
+    torque[used.rows], slopes[used.rows] = best[0]
+    if unused.pieces:
+        torque[unused.rows], slopes[unused.rows] = stacked(inverse, [pieces[k] for k in unused.pieces], values)
     phases = inverse.phases(pieces[0], values)
     fitted = with_values(mount, (*free, *phases), np.array([*values, *phases.values()]))
     return Fit(fitted, free, values, torque, slopes, tau - torque, len(phases) * len(pieces))
 
 
-class _Used(NamedTuple):
+class _Part(NamedTuple):
+    """Some of the pieces, by number, and their kept rows."""
+
     pieces: list[int]
     rows: npt.NDArray[np.int64]
 
 
-def _weighted(pieces: Sequence[Piece], weight: Array) -> _Used:
+def _weighted(pieces: Sequence[Piece], weight: Array) -> tuple[_Part, _Part]:
+    """Pieces with any weight, and the others."""
     edges = np.cumsum([0, *(len(piece.kept) for piece in pieces)])
     spans = [np.arange(first, last) for first, last in pairwise(edges)]
-    numbers = [k for k, rows in enumerate(spans) if np.any(weight[rows] > 0)]
-    return _Used(numbers, np.concatenate([spans[k] for k in numbers]))
+    heavy = [bool(np.any(weight[rows] > 0)) for rows in spans]
+    parts = ([k for k, one in enumerate(heavy) if one is wanted] for wanted in (True, False))
+    used, unused = (_Part(part, np.concatenate([*(spans[k] for k in part), np.arange(0)])) for part in parts)
+    return used, unused
 
 
 def with_values(mount: Mount, names: Sequence[str], values: Array) -> Mount:

@@ -196,7 +196,7 @@ class Inverse:
         for column, name in enumerate(self.free):
             if name.split(".")[0] in drives:
                 other, change = self._bumped(full, name)
-                out[:, 1 + column] += spectrum.times((inverse(other) - now) / change)[:, 0]
+                out[:, 1 + column] += spectrum.times((inverse(other) - now) / change, slice(1))[:, 0]
         return out
 
     def _on_one_clock(self, piece: Piece, columns: Array, full: Array) -> Array:

@@ -25,7 +25,7 @@ class Spectrum:
         self.omega = 2 * np.pi * np.fft.rfftfreq(self.length, dt)
         self.values = rfft(extended.T, self.length).T
 
-    def times(self, response: npt.NDArray[np.complex128]) -> Array:
-        """Columns after a frequency response."""
-        whole = irfft(self.values.T * response, self.length)
+    def times(self, response: npt.NDArray[np.complex128], columns: slice = slice(None)) -> Array:
+        """Some of the columns after a frequency response."""
+        whole = irfft(self.values.T[columns] * response, self.length)
         return np.asarray(whole[:, self.pad : self.pad + self.rows].T)
