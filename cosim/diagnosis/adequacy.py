@@ -72,13 +72,18 @@ class Rest:
 
 def rest_of(chosen: Fit, prepared: Prepared, bench: Bench) -> Rest:
     """Measure the residual of a structure, and on what it depends."""
-    clear = bench.weight * _clear(prepared)
-    share = _slow(chosen.residual, clear, prepared) / _friction(bench, clear, prepared)
+    clear, share = bench.weight * _clear(prepared), share_left(chosen, prepared, bench)
     if not share > LARGE:
         return Rest(share, {}, "time")
     folds = bench.blocks.folds
     follows = {name: _predicted(chosen, term, clear, folds) for name, term in dictionary(prepared).items()}
     return Rest(share, follows, _over_time(chosen.residual * clear, bench.nuisances.level * clear, prepared))
+
+
+def share_left(chosen: Fit, prepared: Prepared, bench: Bench) -> float:
+    """Slow part of what a structure leaves in clear motion, relative to the friction torque (RMS)."""
+    clear = bench.weight * _clear(prepared)
+    return _slow(chosen.residual, clear, prepared) / _friction(bench, clear, prepared)
 
 
 def _clear(prepared: Prepared) -> Array:

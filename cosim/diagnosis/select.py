@@ -3,12 +3,13 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from cosim.diagnosis.adequacy import LARGE, share_left
 from cosim.diagnosis.evidence import Blocks
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.instruments import is_told, misfits_of, settled
 from cosim.diagnosis.problem import Problem
 from cosim.diagnosis.structure import Bench, Screening, nuisances, screen
-from cosim.diagnosis.trial import Trial, is_real, tried, twins, winner
+from cosim.diagnosis.trial import LEAST_GAIN, Trial, is_real, tried, twins, winner
 from pyfmi_models.effects import Effect
 
 SCREEN_GAIN, SCREEN_SHARE = 0.004, 0.3
@@ -37,15 +38,25 @@ def select(problem: Problem, say: Callable[[str], None] = lambda _: None) -> Sel
     while True:
         nuisance = nuisances(current, problem.prepared)
         screening = screen(current, problem.prepared, blocks, nuisance, problem.weight)
-        trials = []
-        for effect in starts(screening):
-            say(effect.title)
-            trials.append(tried(problem, current, effect, screening.bench))
-        looked_at |= {trial.effect.id: trial for trial in trials}
+        trials = _trials(problem, current, starts(screening), screening, say)
         best = _best(problem, trials)
+        if best is None and share_left(current, problem.prepared, screening.bench) > LARGE:
+            trials += _trials(problem, current, others(screening, current, trials), screening, say)
+            best = _best(problem, trials)
+        looked_at |= {trial.effect.id: trial for trial in trials}
         if best is None or _full(best, problem):
             return Selection(base, current, screening.bench, looked_at)
         current = best.fit
+
+
+def _trials(
+    problem: Problem, current: Fit, effects: Sequence[Effect], screening: Screening, say: Callable[[str], None]
+) -> list[Trial]:
+    trials = []
+    for effect in effects:
+        say(effect.title)
+        trials.append(tried(problem, current, effect, screening.bench))
+    return trials
 
 
 def _best(problem: Problem, trials: Sequence[Trial]) -> Trial | None:
@@ -64,6 +75,20 @@ def starts(screening: Screening) -> list[Effect]:
     worth = [candidate.start(k) for candidate, k in strong]
     known = {type(effect) for effect in worth}
     return worth + [twin for effect in worth for twin in twins(effect) if type(twin) not in known]
+
+
+def others(screening: Screening, current: Fit, trials: Sequence[Trial]) -> list[Effect]:
+    """Effects worth a second look before something is called unknown: those that explain most of what they are told.
+
+    Beside another effect that is still missing, a tangent may foretell nothing of an effect that a full fit proves.
+    """
+    known = {type(trial.effect) for trial in trials}
+    strong = [
+        candidate.start(k)
+        for candidate, score, k in screening.explaining(current)
+        if score.gain > LEAST_GAIN and type(candidate.instances[0]) not in known
+    ]
+    return strong[:REFINED]
 
 
 def _full(best: Trial, problem: Problem) -> bool:

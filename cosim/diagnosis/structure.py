@@ -4,7 +4,7 @@ A structure is a fitted mount. `Bench` holds what all comparisons of one stage s
 nuisances and the whitening. Energies are per block and cross-validated, so two structures are compared block by block.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
@@ -93,17 +93,20 @@ class Bench:
         """Rows of each block that count."""
         return np.array([float(np.sum(self.weight[rows] > 0)) for rows in self.blocks.rows])
 
-    def screen(self, found: Fit, groups: Sequence[Array], excluded: Sequence[Room]) -> list[tuple[Score, Array]]:
+    def screen(
+        self, found: Fit, groups: Sequence[Array], excluded: Sequence[Room], known: Collection[int] = ()
+    ) -> list[tuple[Score, Array]]:
         """Score groups of further columns, one at a time; return scores and the coefficients of the group.
 
-        `excluded` names for each group the shapes of the bank that make room for it.
+        `excluded` names for each group the shapes of the bank that make room for it. Each fold is predicted from the
+        others, but `known` ones, and those of which the others cannot tell, from all.
         """
         grams, base = self._grams(found, groups), range(1, 1 + len(found.free))
         first, scores = 1 + len(found.free) + self.nuisances.columns.shape[1], []
         before = cache(lambda room, untold: grams.energy(base, self._others(found, room), untold))
         for group, room in zip(groups, excluded, strict=True):
             chosen, used = [*base, *range(first, first + group.shape[1])], self._others(found, room)
-            untold = tuple(np.flatnonzero(self.blocks.untold(group * self.weight[:, None]).all(1)).tolist())
+            untold = (*known, *np.flatnonzero(self.blocks.untold(group * self.weight[:, None]).all(1)).tolist())
             score = Score(before(room, untold), grams.energy(chosen, used, untold), grams.rows)
             scores.append((score, grams.fit(chosen, used)[len(base) :]))
             first += group.shape[1]
@@ -175,12 +178,23 @@ def projected(target: Array, columns: Array) -> Array:
     return np.asarray(target - unit @ np.linalg.solve(normal, unit.T @ target))
 
 
+Scored = tuple[tuple[Candidate, Score, Array], ...]
+
+
 @dataclass(frozen=True)
 class Screening:
     """The best member of each form of an effect, with its linear score, strongest first; and their bench."""
 
     bench: Bench
-    best: tuple[tuple[Candidate, Score, Array], ...]
+    best: Scored
+    tried: Sequence[Candidate] = ()
+    groups: Sequence[Array] = ()
+
+    def explaining(self, found: Fit) -> Scored:
+        """The same by what they explain of the very recordings that they are fitted to."""
+        excluded = [ROOM.get(candidate.effect, "") for candidate in self.tried]
+        everywhere = range(len(self.bench.blocks.folds))
+        return _ranked(self.tried, self.bench.screen(found, self.groups, excluded, everywhere))
 
 
 def screen(found: Fit, prepared: Prepared, blocks: Blocks, nuisance: Nuisances, weight: Array) -> Screening:
@@ -201,9 +215,12 @@ def screen(found: Fit, prepared: Prepared, blocks: Blocks, nuisance: Nuisances, 
     bench = replace(
         bench, whitening=Whitening.of(projected(found.residual * weight, everything * counted), blocks, speed)
     )
-    scores = bench.screen(found, groups, excluded)
+    return Screening(bench, _ranked(tried, bench.screen(found, groups, excluded)), tried, groups)
+
+
+def _ranked(tried: Sequence[Candidate], scores: Sequence[tuple[Score, Array]]) -> Scored:
     best = sorted(_best(tried, scores).values(), key=lambda index: -scores[index][0].gain)
-    return Screening(bench, tuple((tried[index], *scores[index]) for index in best))
+    return tuple((tried[index], *scores[index]) for index in best)
 
 
 def _best(tried: Sequence[Candidate], scores: Sequence[tuple[Score, Array]]) -> dict[type[Effect], int]:
