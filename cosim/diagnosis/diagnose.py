@@ -18,7 +18,7 @@ from cosim.diagnosis.locate import regions
 from cosim.diagnosis.loop_bias import loop_bias
 from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare, quality
 from cosim.diagnosis.problem import Problem
-from cosim.diagnosis.protocol import Structures, heldout_rms, judge, traces, veto_band, veto_rms
+from cosim.diagnosis.protocol import Structures, heldout_rms, is_proven, judge, traces, veto_band
 from cosim.diagnosis.regression import black_box_rms
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
 from cosim.diagnosis.sanity import check_effects, check_recordings
@@ -157,7 +157,7 @@ def _proven(problem: Problem, verdict: Verdict, heldout: Sequence[Recording]) ->
         gone = {_key(place.effect) for place in places}
         rest = tuple(effect for effect in chosen.mount.effects if _key(effect) not in gone)
         without = problem.fit(replace(chosen.mount, effects=rest), 10)
-        if veto_rms(heldout, without.mount, band) <= veto_rms(heldout, chosen.mount, band):
+        if not is_proven(heldout, without.mount, chosen.mount, band):
             chosen, out = without, [*out, *places]
     if not out:
         return verdict, ()
