@@ -7,11 +7,11 @@ from cosim.diagnosis.evidence import Blocks
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.prepare import prepare
 from cosim.diagnosis.problem import Problem
-from cosim.diagnosis.select import starts
+from cosim.diagnosis.select import others, starts
 from cosim.diagnosis.structure import Screening, nuisances, screen
 from cosim.diagnosis.trial import is_real, tried
 from cosim.recording import Recording
-from pyfmi_models.effects import Cogging, LocalFriction, PeriodicFriction, StribeckEffect
+from pyfmi_models.effects import Cogging, LocalFriction, PeriodicFriction, StribeckEffect, TorqueOffset
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
@@ -51,6 +51,17 @@ def test_one_rough_spot_is_tried_where_a_wave_imitates_it_better_than_a_first_gu
     _, _, screening = screened(lambda q, v: 1.5 * np.exp(-(((q - 0.1) / 0.04) ** 2) / 2) * np.sign(v))
     assert {LocalFriction, PeriodicFriction} <= {type(candidate.instances[0]) for candidate, _, _ in screening.best}
     assert LocalFriction in {type(effect) for effect in starts(screening)}
+
+
+def test_what_no_recording_foretells_of_the_other_is_looked_at_before_the_rest_is_unknown() -> None:
+    levels = iter((0.2, 1.0))
+    problem, base, screening = screened(lambda q, _: next(levels) + 0 * q)
+    offset = next(score.gain for candidate, score, _ in screening.best if candidate.effect == "torque_offset")
+    assert offset < 0
+    assert TorqueOffset not in {type(effect) for effect in starts(screening)}
+    assert TorqueOffset in {type(effect) for effect in others(screening, base, [])}
+    known = tried(problem, base, TorqueOffset(torque=0.6), screening.bench)
+    assert TorqueOffset not in {type(effect) for effect in others(screening, base, [known])}
 
 
 @pytest.mark.parametrize(("share", "real"), [(0.01, False), (0.1, True)])

@@ -111,7 +111,8 @@ def _vetoing(recordings: Sequence[Recording], mount: Mount, cutoff: float) -> li
     t, v, inside = (np.concatenate([getattr(p, name) for p in prepared.pieces]) for name in ("t", "v", "inside"))
     number = np.repeat(np.arange(len(prepared.pieces)), [len(piece.t) for piece in prepared.pieces])
     rows = np.flatnonzero(inside)[claimed(mount.friction, v[inside])]
-    ends = np.flatnonzero(np.diff(np.floor(t[rows] / BLOCK_SECONDS)) + np.diff(number[rows])) + 1
+    cells = np.column_stack([number, np.floor(t / BLOCK_SECONDS)])[rows]
+    ends = np.flatnonzero(np.any(np.diff(cells, axis=0) != 0, axis=1)) + 1
     return np.split(np.concatenate(residuals(prepared, mount))[rows], ends)
 
 
