@@ -15,7 +15,6 @@ from cosim.diagnosis.candidates import ROOM, columns_of
 from cosim.diagnosis.families import candidates
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.instruments import DECISIVE, Misfits, excludes, misfits_of, settled
-from cosim.diagnosis.meaning import is_another
 from cosim.diagnosis.problem import Problem
 from cosim.diagnosis.select import Selection
 from cosim.diagnosis.structure import Bench, projected
@@ -26,6 +25,7 @@ from cosim.diagnosis.trial import (
     TIE,
     Trial,
     clearly_worse,
+    is_meant,
     is_real,
     judged,
     simpler_wins,
@@ -185,7 +185,7 @@ def _place(problem: Problem, effect: Effect, chosen: Fit, bench: Bench) -> Place
     reduced = _without(problem, chosen, effect)
     own = judged(effect, chosen, reduced, bench)
     rivals = [tried(problem, reduced, start, bench) for start in _rivals(effect, reduced, bench, own.gain)]
-    real = [rival for rival in rivals if not is_another(problem, rival.effect)]
+    real = [rival for rival in rivals if is_meant(problem, rival)]
     misfits = misfits_of(problem.prepared, chosen.mount, effect) if real else {}
     return Place(effect, own, tuple(sorted(real, key=lambda trial: -trial.gain)), misfits)
 

@@ -1,15 +1,31 @@
 """Does a fitted effect mean what its name says, or is it something else in disguise?"""
 
+import math
+
+import numpy as np
+
+from cosim.diagnosis.families.friction import contact_level
 from cosim.diagnosis.fit import LEAST_VS
 from cosim.diagnosis.lateness import blamed
-from cosim.diagnosis.prepare import Prepared
+from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.problem import Problem
 from cosim.diagnosis.shaken import heard
-from pyfmi_models.effects import ActuatorLag, ClockEffect, Cogging, Delay, DriveEffect, Effect, StribeckEffect
+from pyfmi_models.effects import (
+    ActuatorLag,
+    ClockEffect,
+    Cogging,
+    Delay,
+    DriveEffect,
+    Effect,
+    PeriodicFriction,
+    StribeckEffect,
+)
 from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.effects.clock_skew import ClockSkew
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
+from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.model import parameters_of
+from pyfmi_models.mount import Mount
 
 LEAST_DELAY_SAMPLES, LEAST_DELAY = 0.3, 1.5e-4
 """A delay shorter than this many samples, or seconds, is what time stamps cannot be trusted for."""
@@ -39,6 +55,30 @@ def is_another(problem: Problem, effect: Effect) -> bool:
     if isinstance(effect, Cogging) and problem.mount.motion == "rotary":
         return bool(effect.cycles_per_rev < LEAST_CYCLES)
     return isinstance(effect, StribeckEffect) and bool(effect.Vs < LEAST_VS * problem.top_speed)
+
+
+def needs_turns(effect: Effect, mount: Mount, prepared: Prepared) -> bool:
+    """Whether a fitted effect of friction needs motion to turn back further than it ever did.
+
+    Friction resists, so only motion that turns tells its level; where it goes one way a level is free to be anything: a
+    contact that bends is then a lagged torque over speed, and friction over position a torque over position, cogging.
+    """
+    return _way_back_needed(effect, mount) > max(_way_back(piece.q[piece.inside]) for piece in prepared.pieces)
+
+
+def _way_back_needed(effect: Effect, mount: Mount) -> float:
+    """How far motion must turn back to show an effect [rad, m]: what a contact bends, half a wave over position."""
+    if isinstance(effect, Presliding):
+        return contact_level(mount) / float(effect.sigma0)
+    if isinstance(effect, PeriodicFriction) and effect.cycles_per_rev > 0:
+        turn = 1.0 if mount.motion == "linear" else 2 * math.pi
+        return turn / (2 * float(effect.cycles_per_rev))
+    return 0.0
+
+
+def _way_back(q: Array) -> float:
+    """Longest way back of a motion, whichever way it goes first."""
+    return float(min((np.maximum.accumulate(q) - q).max(), (q - np.minimum.accumulate(q)).max()))
 
 
 def _is_far(prepared: Prepared, cable: CableWrap) -> bool:

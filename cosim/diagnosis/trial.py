@@ -10,10 +10,11 @@ from math import log
 
 import numpy as np
 
-from cosim.diagnosis.candidates import ROOM
+from cosim.diagnosis.candidates import ROOM, Room
 from cosim.diagnosis.evidence import Score, t_value
 from cosim.diagnosis.fit import Fit
-from cosim.diagnosis.meaning import is_another
+from cosim.diagnosis.meaning import is_another, needs_turns
+from cosim.diagnosis.prepare import Array
 from cosim.diagnosis.problem import Problem
 from cosim.diagnosis.structure import WANDER, Bench
 from cosim.diagnosis.tuning import tuned
@@ -45,6 +46,8 @@ LEAST_SIZE = WANDER
 LEAST_CHANGES = 0.5
 """Share of the torque's changes from row to row that a model with a delay or a lag must explain: in noise that the
 controller answers, time runs otherwise than in the machine."""
+LEAST_FREE = 0.1
+"""Least share of the rows that is counted as left over by phases."""
 CLEARLY = 2.0
 TIE = 0.96
 """A simpler effect wins if it reaches this share of the best gain and is not worse by `CLEARLY` standard errors."""
@@ -103,20 +106,36 @@ def judged(effect: Effect, found: Fit, without: Fit, bench: Bench) -> Trial:
     """Judge an effect of a fitted structure against the structure without it."""
     plain = [float(np.sum((bench.weight * one.residual) ** 2)) for one in (found, without)]
     room, level = ROOM.get(effect.id, ""), float(np.sum((bench.weight * bench.nuisances.level) ** 2))
-    score = Score(bench.energy(without, room), bench.energy(found, room), bench.rows)
+    score = Score(_energy(bench, without, room), _energy(bench, found, room), bench.rows)
     removed = max(plain[1] - plain[0], 0.0)
     size = np.sqrt(removed / level) if level else np.inf
     return Trial(effect, found, score, 1 - plain[0] / plain[1], size, bench.foretold(found, without))
 
 
+def _energy(bench: Bench, found: Fit, room: Room) -> Array:
+    """Cross-validated energy of each block, without what a phase that was found in the fold itself takes of its noise.
+
+    That is as much as a sine and a cosine take, two rows' worth: little in minutes, much in the few rows of a short
+    recording, where a tone would be found in any noise.
+    """
+    taken = 2 * found.phases / float(bench.rows.sum())
+    return bench.energy(found, room) / max(1 - taken, LEAST_FREE)
+
+
 def is_real(problem: Problem, trial: Trial) -> bool:
     """Whether an effect is significant, large enough, and what its name says."""
-    if trial.plain_gain < LEAST_PLAIN_GAIN or is_another(problem, trial.effect) or not _in_time(problem, trial):
+    if trial.plain_gain < LEAST_PLAIN_GAIN or not is_meant(problem, trial) or not _in_time(problem, trial):
         return False
     if trial.size < LEAST_SIZE and not isinstance(trial.effect, UNLIKE_FRICTION):
         return False
     sure = (trial.gain > LEAST_GAIN and trial.t > LEAST_T) or (trial.gain > SURE_GAIN and trial.t > 1)
     return sure or trial.foretold > FORETOLD
+
+
+def is_meant(problem: Problem, trial: Trial) -> bool:
+    """Whether an effect is what its name says, and can be told from this motion."""
+    mount = trial.fit.mount
+    return not is_another(problem, trial.effect) and not needs_turns(trial.effect, mount, problem.prepared)
 
 
 def _in_time(problem: Problem, trial: Trial) -> bool:
