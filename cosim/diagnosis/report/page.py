@@ -16,7 +16,7 @@ from cosim.diagnosis.report.figures_proof import looked_for, proof
 from cosim.diagnosis.report.figures_time import WIDE, overlay, recording
 from cosim.diagnosis.report.figures_where import plane, region, strongest
 from cosim.diagnosis.report.findings import block
-from cosim.diagnosis.report.motion import motion
+from cosim.diagnosis.report.next_experiment import next_experiment
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.result import Diagnosis, Trace
@@ -103,35 +103,7 @@ def _box(diagnosis: Diagnosis, worse: list[str], scales: Scales) -> dict[str, st
 def _findings(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
     found = [one for one in words.blocks(diagnosis) if one.first.effect != "unknown"]
     blocks = [block(one, diagnosis, scales, effect(one.first, chosen, scales)) for one in found]
-    return {"blocks": blocks, "experiment": _experiment(diagnosis, scales)}
-
-
-def _experiment(diagnosis: Diagnosis, scales: Scales) -> dict[str, Any] | None:
-    """Say what one more recording would tell, and how to take it."""
-    plan = diagnosis.next_experiment
-    if not plan:
-        return None
-    titles = {finding.effect: words.lowered(finding.title) for finding in diagnosis.findings}
-    names = [titles.get(str(name), str(name)) for name in plan.get("separates", ())]
-    said = [words.started(words.closed(str(plan.get("description", ""))))]
-    if how := motion(plan.get("set_point", {}), scales):
-        said.append(words.closed(f"That is {how}, measured from the middle of what was visited"))
-    said.append(f"It separates {' from '.join(names)}." if len(names) > 1 else "")
-    gap = plan.get("expected_difference")
-    said.append(f"They will then differ by {scales.torque.text(float(gap))}." if gap and len(names) > 1 else "")
-    return {"sentences": [text for text in said if text], "steps": list(_steps(diagnosis))}
-
-
-def _steps(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
-    """What to type: try the motion on the model, then diagnose again with the new recording."""
-    plan, command = diagnosis.next_experiment, str(diagnosis.provenance.get("command", ""))
-    if plan.get("command"):
-        yield "Then", str(plan["command"])
-    if plan.get("scenario"):
-        yield "Try it on the model first", f"cosim run {plan['scenario']} --out next"
-    if " --" in command:
-        train, options = command.split(" --", 1)
-        yield "With the new recording", f"{train} new_recording.parquet --{options} --force"
+    return {"blocks": blocks, "experiment": next_experiment(diagnosis, scales)}
 
 
 def _middle(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
