@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from cosim.diagnosis.rowwise import CHUNK, Rowwise
+from cosim.diagnosis.rowwise import CHUNK, STRIDE, Rowwise, Stepwise
 
 X, P = ca.SX.sym("x", 3), ca.SX.sym("p", 2)
 a, b, c = X[0], X[1], X[2]
@@ -35,3 +35,16 @@ def test_rows_are_what_casadi_says(name: str, rows: int) -> None:
     assert found.shape == (expression.numel(), rows)
     if rows:
         np.testing.assert_allclose(found, wanted.T, rtol=1e-12, atol=1e-12)
+
+
+@pytest.mark.parametrize("rows", [0, 1, STRIDE - 1, STRIDE, STRIDE + 1, 3 * STRIDE + 5])
+def test_a_state_is_carried_step_by_step(rows: int) -> None:
+    state, column, factor = ca.SX.sym("state", 2), ca.SX.sym("column", 2), ca.SX.sym("factor")
+    following = ca.vertcat(factor * state[0] + column[0], state[0] - state[1] / 2 + column[1])
+    columns = np.random.default_rng(rows).normal(size=(2, rows))
+    by_hand = np.zeros((2, rows + 1))
+    for k, (x, y) in enumerate(columns.T):
+        by_hand[:, k + 1] = 0.5 * by_hand[0, k] + x, by_hand[0, k] - by_hand[1, k] / 2 + y
+    walk = Stepwise(state, column, factor, following)
+    for _ in range(2):  # each walk starts from zero
+        np.testing.assert_allclose(walk(columns, np.array([0.5])), by_hand, rtol=1e-14, atol=1e-14)

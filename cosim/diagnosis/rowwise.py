@@ -123,14 +123,15 @@ class Stepwise:
     def __call__(self, columns: Array, parameters: Array) -> Array:
         """Walk from zero: (inputs, rows) and (parameters,) -> states (states, rows + 1), the start among them."""
         self._parameters[:], self._start[:] = parameters, 0.0
-        out = np.zeros((columns.shape[1] + 1, len(self._start)))
-        for first in range(0, columns.shape[1], STRIDE):
-            count = min(STRIDE, columns.shape[1] - first)
-            self._given[:count] = columns[:, first : first + count].T
+        rows, strides = columns.shape[1], -(-columns.shape[1] // STRIDE)
+        given, out = np.zeros((strides * STRIDE, len(columns))), np.zeros((strides * STRIDE + 1, len(self._start)))
+        given[:rows] = columns.T
+        befores, afters = given.reshape(strides, *self._given.shape), out[1:].reshape(strides, *self._out.shape)
+        for before, after in zip(befores, afters, strict=True):
+            self._given[:] = before
             self._evaluate()
-            out[first + 1 : first + count + 1] = self._out[:count]
-            self._start[:] = self._out[-1]
-        return out.T
+            after[:], self._start[:] = self._out, self._out[-1]
+        return out[: rows + 1].T
 
 
 def _bound(function: ca.Function, given: tuple[Array, ...], out: Array) -> tuple[Any, Callable[[], Any]]:
