@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from cosim.diagnosis.families.friction import CURVES
-from cosim.diagnosis.fit import FIXED, Fit
+from cosim.diagnosis.fit import FIXED, Fit, with_values
 from cosim.diagnosis.meaning import at_bound
 from cosim.diagnosis.problem import Problem
-from pyfmi_models.effects import Effect, StribeckEffect
+from cosim.diagnosis.structure import LINEAR
+from pyfmi_models.effects import Effect, FrictionEffect, StribeckEffect
 from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.effects.presliding import Presliding
 
@@ -20,8 +23,14 @@ SOFTER = (4.0, 16.0)
 """How many times softer than the start a bending contact is tried."""
 
 
+DEAD = 0.1
+"""Share of the card's number below which a friction parameter is tried at the card's number again."""
+
+
 def tuned(problem: Problem, found: Fit, start: Effect) -> Fit:
     """Fit what its grid knows only roughly of an effect that was added last: cycles, how a cable hardens, a shape."""
+    if isinstance(start, FrictionEffect):
+        found = _revived(problem, found, start)
     added: Any = found.mount.effects[-1]
     if isinstance(added, CableWrap):
         return problem.fit(_freed(problem, found, "hardening").mount, 4)
@@ -30,6 +39,21 @@ def tuned(problem: Problem, found: Fit, start: Effect) -> Fit:
     if isinstance(start, Presliding):
         return _refound(problem, found, [replace(start, sigma0=start.sigma0 / softer) for softer in SOFTER])
     return _in_cycles(problem, found) if getattr(added, "cycles_per_rev", 0.0) > 0 else found
+
+
+def _revived(problem: Problem, found: Fit, start: Effect) -> Fit:
+    """Fit again from the card's friction what died while another effect stood in for it, if that fits better.
+
+    Where a friction is nothing, its change with temperature or direction is nothing too, and no step leads away.
+    """
+    card = {variable.name: variable.start for variable in problem.mount.parameters()}
+    levels = {name: value for name, value in found.parameters().items() if name in card and name.endswith(LINEAR)}
+    dead = [name for name, value in levels.items() if abs(value) < DEAD * abs(card[name])]
+    if not dead:
+        return found
+    again = replace(found.mount, effects=(*found.mount.effects[:-1], start))
+    other = problem.fit(with_values(again, dead, np.array([card[name] for name in dead])), 12)
+    return min((found, other), key=problem.error)
 
 
 def _shaped(problem: Problem, found: Fit) -> Fit:
