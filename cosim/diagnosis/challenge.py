@@ -11,7 +11,7 @@ from math import log
 import numpy as np
 
 from cosim.diagnosis.calibration import calibrated
-from cosim.diagnosis.candidates import ROOM, columns_of
+from cosim.diagnosis.candidates import columns_of
 from cosim.diagnosis.families import candidates
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.instruments import DECISIVE, Misfits, excludes, misfits_of, settled
@@ -198,7 +198,7 @@ def _rivals(effect: Effect, reduced: Fit, bench: Bench, gain: float) -> list[Eff
     if not alike:
         return []
     groups = columns_of(reduced.mount, alike, prepared, reduced.values)
-    scores = bench.screen(reduced, groups, [ROOM.get(candidate.effect, "") for candidate in alike])
+    scores = bench.screen(reduced, alike, groups)
     best: dict[str, tuple[float, Effect]] = {}
     for candidate, (score, coefficients) in zip(alike, scores, strict=True):
         if score.gain > max(ALIKE * gain, best.get(candidate.effect, (LEAST_GAIN,))[0]):

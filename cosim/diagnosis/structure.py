@@ -7,6 +7,7 @@ nuisances and the whitening. Energies are per block and cross-validated, so two 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
+from typing import Any
 
 import numpy as np
 
@@ -17,7 +18,7 @@ from cosim.diagnosis.families import candidates
 from cosim.diagnosis.fit import BRISTLES, FIXED, Fit, fit
 from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import Array, Prepared
-from pyfmi_models.effects import Effect, PeriodicFriction
+from pyfmi_models.effects import Effect, FrictionEffect, PeriodicFriction
 from pyfmi_models.mount import Mount
 
 WANDER = 0.02
@@ -77,8 +78,13 @@ class Bench:
         return residual
 
     def _untold(self, found: Fit) -> list[list[str]]:
-        """Parameters of effects that the other folds do not tell, of each fold: they would go anywhere as well."""
-        names = [name for name in found.free if not name.startswith(("axis.", "friction."))]
+        """Parameters of effects that the other folds do not tell, of each fold: they would go anywhere as well.
+
+        Effects of friction must be foretold nevertheless: what an imprecise law leaves of rests and reversals may be in
+        one recording alone as well, and looks like them.
+        """
+        parts = found.mount.components()
+        names = [name for name in found.free if _is_no_friction(parts[name.split(".")[0]])]
         slopes = found.slopes[:, [found.free.index(name) for name in names]] * self.weight[:, None]
         return [[name for name, is_so in zip(names, row, strict=True) if is_so] for row in self.blocks.untold(slopes)]
 
@@ -94,19 +100,20 @@ class Bench:
         return np.array([float(np.sum(self.weight[rows] > 0)) for rows in self.blocks.rows])
 
     def screen(
-        self, found: Fit, groups: Sequence[Array], excluded: Sequence[Room], known: Collection[int] = ()
+        self, found: Fit, candidates: Sequence[Candidate], groups: Sequence[Array], known: Collection[int] = ()
     ) -> list[tuple[Score, Array]]:
-        """Score groups of further columns, one at a time; return scores and the coefficients of the group.
+        """Score the columns of candidates, one group at a time; return scores and the coefficients of the group.
 
-        `excluded` names for each group the shapes of the bank that make room for it. Each fold is predicted from the
-        others, but `known` ones, and those of which the others cannot tell, from all.
+        Each fold is predicted from the others, but `known` ones, and those of which the others cannot tell, from all.
         """
         grams, base = self._grams(found, groups), range(1, 1 + len(found.free))
         first, scores = 1 + len(found.free) + self.nuisances.columns.shape[1], []
         before = cache(lambda room, untold: grams.energy(base, self._others(found, room), untold))
-        for group, room in zip(groups, excluded, strict=True):
+        for candidate, group in zip(candidates, groups, strict=True):
+            room = ROOM.get(candidate.effect, "")
             chosen, used = [*base, *range(first, first + group.shape[1])], self._others(found, room)
-            untold = (*known, *np.flatnonzero(self.blocks.untold(group * self.weight[:, None]).all(1)).tolist())
+            alone = self.blocks.untold(group * self.weight[:, None]).all(1) & _is_no_friction(candidate.instances[0])
+            untold = (*known, *np.flatnonzero(alone).tolist())
             score = Score(before(room, untold), grams.energy(chosen, used, untold), grams.rows)
             scores.append((score, grams.fit(chosen, used)[len(base) :]))
             first += group.shape[1]
@@ -139,6 +146,10 @@ class Bench:
     def _white(self, columns: Array) -> list[Array]:
         white = self.whitening.apply(columns, self.blocks)
         return [one * self.weight[r, None] for one, r in zip(white, self.blocks.rows, strict=True)]
+
+
+def _is_no_friction(part: Any) -> bool:
+    return isinstance(part, Effect) and not isinstance(part, FrictionEffect)
 
 
 def _trust(name: str, value: float) -> float:
@@ -192,9 +203,8 @@ class Screening:
 
     def explaining(self, found: Fit) -> Scored:
         """The same by what they explain of the very recordings that they are fitted to."""
-        excluded = [ROOM.get(candidate.effect, "") for candidate in self.tried]
         everywhere = range(len(self.bench.blocks.folds))
-        return _ranked(self.tried, self.bench.screen(found, self.groups, excluded, everywhere))
+        return _ranked(self.tried, self.bench.screen(found, self.tried, self.groups, everywhere))
 
 
 def screen(found: Fit, prepared: Prepared, blocks: Blocks, nuisance: Nuisances, weight: Array) -> Screening:
@@ -208,14 +218,13 @@ def screen(found: Fit, prepared: Prepared, blocks: Blocks, nuisance: Nuisances, 
     rest = projected(found.residual * weight, known * counted)
     tried = candidates(found.mount, prepared, rest, np.abs(nuisance.level))
     groups = columns_of(found.mount, tried, prepared, found.values)
-    excluded = [ROOM.get(candidate.effect, "") for candidate in tried]
     bench = Bench(prepared, blocks, nuisance, Whitening.of(rest, blocks, speed), weight)
-    first = _best(tried, bench.screen(found, groups, excluded))
+    first = _best(tried, bench.screen(found, tried, groups))
     everything = np.column_stack([known, *(groups[index] for index in first.values())])
     bench = replace(
         bench, whitening=Whitening.of(projected(found.residual * weight, everything * counted), blocks, speed)
     )
-    return Screening(bench, _ranked(tried, bench.screen(found, groups, excluded)), tried, groups)
+    return Screening(bench, _ranked(tried, bench.screen(found, tried, groups)), tried, groups)
 
 
 def _ranked(tried: Sequence[Candidate], scores: Sequence[tuple[Score, Array]]) -> Scored:
