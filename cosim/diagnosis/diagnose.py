@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.diagnosis.adequacy import Rest, rest_of
 from cosim.diagnosis.challenge import Place, Verdict, challenge, merged
-from cosim.diagnosis.claim import claimed
+from cosim.diagnosis.claim import weights
 from cosim.diagnosis.evidence import Blocks
 from cosim.diagnosis.experiment import Experiment, best, told
 from cosim.diagnosis.findings import accepted, not_found, rival_finding, standard_errors
@@ -143,9 +143,8 @@ def _experiment(verdict: Verdict, prepared: Prepared) -> Experiment | None:
 
 
 def _weight(mount: Mount, prepared: Prepared) -> Array:
-    """The rows that count: what the law claims, and all where there is no friction that could hold at rest."""
-    v = prepared.stacked("v")
-    return np.ones(len(v)) if mount.friction.key == "none" else claimed(mount.friction, v).astype(float)
+    """The rows that count, and how much; all where there is no friction that could hold at rest."""
+    return np.ones(len(prepared.recording_of)) if mount.friction.key == "none" else weights(mount.friction, prepared)
 
 
 def _proven(problem: Problem, verdict: Verdict, heldout: Sequence[Recording]) -> tuple[Verdict, tuple[Place, ...]]:

@@ -215,15 +215,14 @@ def screen(found: Fit, prepared: Prepared, blocks: Blocks, nuisance: Nuisances, 
     """
     known, speed = np.column_stack([found.slopes, nuisance.columns]), prepared.stacked("v")
     counted = weight[:, None] > 0
-    rest = projected(found.residual * weight, known * counted)
+    residual = found.residual * counted[:, 0]
+    rest = projected(residual, known * counted)
     tried = candidates(found.mount, prepared, rest, np.abs(nuisance.level))
     groups = columns_of(found.mount, tried, prepared, found.values)
     bench = Bench(prepared, blocks, nuisance, Whitening.of(rest, blocks, speed), weight)
     first = _best(tried, bench.screen(found, tried, groups))
     everything = np.column_stack([known, *(groups[index] for index in first.values())])
-    bench = replace(
-        bench, whitening=Whitening.of(projected(found.residual * weight, everything * counted), blocks, speed)
-    )
+    bench = replace(bench, whitening=Whitening.of(projected(residual, everything * counted), blocks, speed))
     return Screening(bench, _ranked(tried, bench.screen(found, tried, groups)), tried, groups)
 
 

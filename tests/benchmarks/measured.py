@@ -160,18 +160,13 @@ def screws(folder: Path) -> Iterator[Machine]:
                 name=drive.replace("_", " ") + (", halves exchanged" if number else ""),
                 concealed=concealed[drive],
                 card=SCREW,
-                train={name: _start(run) for name, run in train.items()},
+                train=train,
                 heldout=held,
                 score=per_speed,
                 unit="%",
                 bar=1.5 if drive == "lead_screw" else 2.8,
                 first_look=look,
             )
-
-
-def _start(run: pd.DataFrame) -> pd.DataFrame:
-    """Of slow speeds, recorded for up to a minute, what the fast ones have: 6.4 s, or the 100 rows of a recording."""
-    return run[(run.t <= 6.4) | (np.arange(len(run)) < 100)]
 
 
 VOLTS = 12.0 * 3.5555 / 7.1214
