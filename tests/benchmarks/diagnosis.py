@@ -106,11 +106,11 @@ NOTES = {
     "Stribeck curve is named there, as it should be. The servo's Stribeck curve is not named beside its "
     "load-dependent friction: its duty trails its position by an unknown read-out time, and what that costs is "
     "larger; the small unbalance named there may be the angle of -0.014 rad by which its owners' model turns the "
-    "load's gravity. The motor turns one way only, where friction cannot be told from torque: a contact that bends, and "
-    "friction over position, stood beside its cogging and lowered the held-out error to 8.1, but they are not believed "
-    "where motion never turns back far enough. So fewer of the cogging's orders are found than it has, and with the "
-    "neighbour motor turned the model is worse than the base, as the README warns. Real machines leave more than "
-    "simulated ones: `unknown` beside a name says so.",
+    "load's gravity. The motor turns one way only, where friction cannot be told from torque: a contact that bends, "
+    "and friction over position, stood beside its cogging and lowered the held-out error to 8.1, but they are not "
+    "believed where motion never turns back far enough. So fewer of the cogging's orders are found than it has, and "
+    "with the neighbour motor turned the model is worse than the base, as the README warns. Real machines leave "
+    "more than simulated ones: `unknown` beside a name says so.",
     "emps": "Card `emps` (linear, symmetric Coulomb + viscous); trained on estimation.parquet, held out "
     "validation_pulses.parquet. RMS in N. `clear` is clear motion only, |v| > 2 mm/s, 100 Hz on both sides, as in the "
     "recording's README; the other two follow the protocol of 30 Hz over all samples. The held-out recording has a "
