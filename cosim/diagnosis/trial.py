@@ -39,8 +39,8 @@ TEMPERATURE = 60.0
 """Divides log-likelihoods before they become probabilities: neighbouring samples are far from independent."""
 FORETOLD = 0.2
 """Share of the plain residual energy that an effect must foretell of *every* recording left out, where whitened
-evidence is too little: whitening and nuisances take what is slow for noise. No effect tried on 30 nulls foretold more
-than a few per cent, whatever it explained of the recordings it was fitted to."""
+evidence is too little: whitening and nuisances take what is slow for noise. No effect tried on 70 nulls foretold more
+than 0.11, whatever it explained of the recordings it was fitted to."""
 LEAST_SIZE = WANDER
 """An effect at the axis must remove more torque error than the friction level's wandering makes, relative to it."""
 LEAST_CHANGES = 0.5
