@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from cosim.diagnosis.challenge import Place
+from cosim.diagnosis.challenge import CREDIBLE, Place
 from cosim.diagnosis.evidence import Score
 from cosim.diagnosis.findings import not_found
 from cosim.diagnosis.fit import Fit
@@ -91,6 +91,13 @@ def test_where_the_set_point_speaks_its_chi_squared_is_the_evidence() -> None:
     assert place.better.effect is delay
     assert place.ambiguous_with == ()
     assert place.shares["actuator_lag"] == pytest.approx(np.exp(-10) * place.probability)
+
+
+def test_a_credible_rival_is_in_the_set_even_if_it_is_a_little_worse_in_every_block() -> None:
+    place = Place(UNBALANCE, trial(UNBALANCE, 0.9, 2), (trial(OFFSET, 0.87, 2), trial(CABLE, 0.5, 2)))
+    assert clearly_worse(place.rivals[0], place.trial)
+    assert place.shares["torque_offset"] > CREDIBLE > place.shares["cable_wrap"]
+    assert place.ambiguous_with == ("torque_offset",)
 
 
 def test_the_most_probable_member_of_a_set_is_named_first() -> None:

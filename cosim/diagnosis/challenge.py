@@ -20,11 +20,9 @@ from cosim.diagnosis.select import Selection
 from cosim.diagnosis.structure import Bench, projected
 from cosim.diagnosis.trial import (
     LEAST_GAIN,
-    LIMITS,
     TEMPERATURE,
     TIE,
     Trial,
-    clearly_worse,
     is_meant,
     is_real,
     judged,
@@ -41,8 +39,6 @@ NESTED = {"torque_offset": ("friction_asymmetry", "cable_wrap")}
 ROUNDS = 3
 CREDIBLE = 0.05
 """A rival with a smaller share of the probability is not in the set, which is to hold the truth in 95 % of cases."""
-NEAR = 0.9
-"""A rival with this share of the winner's gain is excluded only if it is clearly worse block by block."""
 
 
 @dataclass(frozen=True)
@@ -65,9 +61,8 @@ class Place:
         if margin is not None:
             return margin < DECISIVE
         holds_it = rival.effect.id in NESTED.get(self.effect.id, ())
-        if self.shares[rival.effect.id] < CREDIBLE:
-            return False
-        return _too_close(self.trial, rival) and not (holds_it and self.trial.gain >= TIE * rival.gain)
+        simpler = holds_it and self.trial.gain >= TIE * rival.gain
+        return self.shares[rival.effect.id] >= CREDIBLE and not simpler
 
     @property
     def more_general(self) -> tuple[Trial, ...]:
@@ -165,15 +160,6 @@ def _round(problem: Problem, chosen: Fit, bench: Bench, say: Callable[[str], Non
 
 def _added(problem: Problem, chosen: Fit) -> tuple[Effect, ...]:
     return chosen.mount.effects[len(problem.mount.effects) :]
-
-
-def _too_close(winner: Trial, rival: Trial) -> bool:
-    """Whether a rival cannot be excluded: its gain comes near, and block by block it is not clearly worse.
-
-    A rival that the winner becomes in a limit is excluded by its gain alone.
-    """
-    is_limit = winner.effect.id in LIMITS.get(rival.effect.id, ())
-    return rival.gain >= NEAR * winner.gain and (is_limit or not clearly_worse(rival, winner))
 
 
 def _without(problem: Problem, chosen: Fit, effect: Effect) -> Fit:
