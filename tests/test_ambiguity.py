@@ -98,6 +98,11 @@ def test_a_credible_rival_is_in_the_set_even_if_it_is_a_little_worse_in_every_bl
     assert clearly_worse(place.rivals[0], place.trial)
     assert place.shares["torque_offset"] > CREDIBLE > place.shares["cable_wrap"]
     assert place.ambiguous_with == ("torque_offset",)
+    short = replace(trial(OFFSET, 0.7, 2), score=Score(np.ones(3), np.array([0.29, 0.3, 0.31]), np.full(3, 9.0)))
+    other = replace(trial(UNBALANCE, 0.8, 2), score=Score(np.ones(3), np.array([0.19, 0.2, 0.21]), np.full(3, 9.0)))
+    place = Place(UNBALANCE, other, (short,))
+    assert place.shares["torque_offset"] > CREDIBLE
+    assert place.ambiguous_with == ()
 
 
 def test_the_most_probable_member_of_a_set_is_named_first() -> None:

@@ -23,6 +23,7 @@ from cosim.diagnosis.trial import (
     TEMPERATURE,
     TIE,
     Trial,
+    clearly_worse,
     is_meant,
     is_real,
     judged,
@@ -39,6 +40,8 @@ NESTED = {"torque_offset": ("friction_asymmetry", "cable_wrap")}
 ROUNDS = 3
 CREDIBLE = 0.05
 """A rival with a smaller share of the probability is not in the set, which is to hold the truth in 95 % of cases."""
+NEAR = 0.9
+"""A rival with less than this share of the effect's gain, and clearly worse block by block, is not in it either."""
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,8 @@ class Place:
             return margin < DECISIVE
         holds_it = rival.effect.id in NESTED.get(self.effect.id, ())
         simpler = holds_it and self.trial.gain >= TIE * rival.gain
-        return self.shares[rival.effect.id] >= CREDIBLE and not simpler
+        far = rival.gain < NEAR * self.trial.gain and clearly_worse(rival, self.trial)
+        return self.shares[rival.effect.id] >= CREDIBLE and not simpler and not far
 
     @property
     def more_general(self) -> tuple[Trial, ...]:
