@@ -13,9 +13,10 @@ import numpy as np
 
 from cosim.diagnosis.bank import bank
 from cosim.diagnosis.candidates import ROOM, Candidate, Room, columns_of
-from cosim.diagnosis.evidence import Blocks, Grams, Score, Whitening
+from cosim.diagnosis.evidence import Blocks, Score, Whitening
 from cosim.diagnosis.families import candidates
 from cosim.diagnosis.fit import BRISTLES, FIXED, Fit, fit
+from cosim.diagnosis.grams import Grams
 from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import Array, Prepared
 from pyfmi_models.effects import Effect, FrictionEffect, PeriodicFriction
