@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.diagnosis.closed_loop import loop_errors
+from cosim.diagnosis.closed_loop import LoopError, Loops
 from cosim.diagnosis.loop_bias import loop_bias
 from cosim.diagnosis.prepare import Prepared, choose_cutoff, prepare
 from cosim.diagnosis.problem import Problem
@@ -17,6 +17,7 @@ from cosim.proof.tool import given
 from cosim.recording import Recording
 from pyfmi_models.card import Card
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag
+from pyfmi_models.mount import Mount
 
 
 @pytest.fixture(scope="module")
@@ -33,13 +34,20 @@ def fitted(card: Card, train: list[Recording], drag: float) -> tuple[Problem, Pr
     return Problem(mount, prepared, np.ones(len(prepared.recording_of)), 1e-3), prepared
 
 
+def loop_errors(card: Card, recordings: list[Recording], **mounts: Mount) -> dict[str, LoopError]:
+    with Loops(card, recordings) as loops:
+        for key, mount in mounts.items():
+            loops.close(key, mount)
+        return loops.errors()
+
+
 def test_the_true_model_follows_the_recorded_set_point_better(
     case: tuple[Card, list[Recording], Recording, float],
 ) -> None:
     card, train, held, drag = case
     problem, _ = fitted(card, train, drag)
     better = problem.fit(problem.mount, 25).mount
-    found = loop_errors({"nominal": card.plant(), "after": better}, card, [held])
+    found = loop_errors(card, [held], nominal=card.plant(), after=better)
     assert found["after"].position < 0.6 * found["nominal"].position
     assert found["after"].torque < 0.6 * found["nominal"].torque
 
@@ -49,8 +57,8 @@ def test_no_loop_is_closed_without_a_controller_or_a_set_point(
 ) -> None:
     card, _, held, _ = case
     blind = replace(held, table={name: values for name, values in held.table.items() if name != "q_d"})
-    assert loop_errors({"nominal": card.plant()}, card, [blind]) == {}
-    assert loop_errors({"nominal": card.plant()}, replace(card, controller=None), [held]) == {}
+    assert loop_errors(card, [blind], nominal=card.plant()) == {}
+    assert loop_errors(replace(card, controller=None), [held], nominal=card.plant()) == {}
 
 
 def test_the_loop_does_not_bias_a_right_model_and_a_planted_bias_is_seen(

@@ -171,13 +171,5 @@ class Loops:
         ]
 
 
-def loop_errors(mounts: Mapping[str, Mount], card: Card, recordings: Sequence[Recording]) -> dict[str, LoopError]:
-    """Errors of several models in the loop of a card's controller (see `Loops`)."""
-    with Loops(card, recordings) as loops:
-        for key, mount in mounts.items():
-            loops.close(key, mount)
-        return loops.errors()
-
-
 def _together(errors: Sequence[LoopError]) -> LoopError:
     return LoopError(*(rms(np.array([getattr(e, name) for e in errors])) for name in ("torque", "position")))
