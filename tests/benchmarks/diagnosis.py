@@ -3,7 +3,6 @@
     python tests/benchmarks/diagnosis.py emps --data FOLDER --out results/emps        measured, not in the project
     python tests/benchmarks/diagnosis.py measured --data FOLDER --out results/measured    four measured machines
     python tests/benchmarks/diagnosis.py null --cases 10 --out results/null           the card's own physics, 15 % off
-    python tests/benchmarks/diagnosis.py concealed --cases 3 --out results/concealed  one hidden effect, all eight
 
 Each writes table.csv and README.md with version, seeds and inputs.
 """
@@ -24,38 +23,27 @@ import numpy as np
 import cosim
 from cosim.diagnosis.closed_loop import close_loop
 from cosim.diagnosis.diagnose import diagnose
-from cosim.proof.generator import make_case, to_toml, write_case
 from cosim.recording import Recording
-from pyfmi_models.card import Card, parse_card, read_card
+from pyfmi_models.card import Card, read_card
 from pyfmi_models.export import export_fmu
 
 sys.path.append(str(Path(__file__).parent))
 from measured import machines, moving
 from measured import rows as machine_rows
 
-EFFECTS = (
-    "friction_asymmetry",
-    "torque_offset",
-    "delay",
-    "actuator_lag",
-    "cogging",
-    "stribeck",
-    "gravity_unbalance",
-    "position_friction",
-)
 ROWS = 1000
 """Rows a second of the simulated recordings."""
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("what", choices=("emps", "measured", "null", "concealed"))
+    parser.add_argument("what", choices=("emps", "measured", "null"))
     parser.add_argument("--data", type=Path, default=None, help="folder of the measured recordings")
     parser.add_argument("--cases", type=int, default=3)
     parser.add_argument("--seed", type=int, default=1000)
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
-    makers = {"emps": emps, "measured": measured, "null": null, "concealed": concealed}
+    makers = {"emps": emps, "measured": measured, "null": null}
     started = time.perf_counter()
     rows = list(makers[given.what](given))
     write(given, rows, time.perf_counter() - started)
@@ -91,7 +79,6 @@ TITLES = {
     "measured": "Measured machines: physics that the card conceals, and the error on recordings that were not fitted",
     "emps": "EMPS: a measured ball-screw axis whose standard model lacks direction-dependent friction and a delay",
     "null": "Null: recordings made by exactly the card's physics, its numbers 15 % off",
-    "concealed": "One concealed effect in a mount that shares no equations with the candidates",
 }
 NOTES = {
     "measured": "Held-out RMS by the protocol of each recording's README; `first look` is what that README found by "
@@ -120,7 +107,6 @@ NOTES = {
     "delay; the recording's documentation does not exclude that.",
     "null": "Plant and controller FMUs of the paper's card; inertia and friction drawn within 15 %, encoder noise as "
     "stated, three set points. The right answer is none.",
-    "concealed": "`cosim.proof.generator`, size 1; the truth is drawn from the seed. RMS in N m, held out.",
 }
 
 
@@ -199,30 +185,6 @@ def simulated(
     table = dict(made.table)
     table["q"] = table["q"] + noise * rng.standard_normal(len(table["q"]))
     return Recording(made.name, table, made.units)
-
-
-def concealed(given: argparse.Namespace) -> Iterator[dict[str, Any]]:
-    for effect in EFFECTS:
-        for seed in range(given.seed, given.seed + given.cases):
-            case = make_case(seed, [effect])
-            with tempfile.TemporaryDirectory() as folder:
-                write_case(case, Path(folder))
-                names = ("train_1", "train_2", "heldout")
-                *train, held = (Recording.read(Path(folder) / f"{name}.parquet") for name in names)
-            found = diagnose(train, [held], parse_card(to_toml(case.card), "card.toml")).diagnosis
-            sets = {group[0]: " or ".join(group) for group in found.ambiguous_with}
-            in_the_set = any(effect in group for group in found.ambiguous_with) and len(found.verdict) == 1
-            alone = list(found.verdict) == [effect] and not sets
-            yield {
-                "concealed": effect,
-                "seed": seed,
-                "verdict": " + ".join(sets.get(name, name) for name in found.verdict) or "none",
-                "right": "yes" if alone else "in the set" if in_the_set else "no",
-                "refitted": f"{found.heldout.before_rms:.4g}",
-                "with effects": f"{found.heldout.after_rms:.4g}",
-                "floor": f"{found.heldout.floor_rms:.4g}",
-                "seconds": f"{found.seconds:.1f}",
-            }
 
 
 if __name__ == "__main__":
