@@ -126,18 +126,12 @@ def fit(
         best[:] = [evaluate(u)]  # asked for where the fit goes on from, and so last where it ends
         return np.concatenate([-weight_used[:, None] * evaluate(u)[1] * scale, np.diag(pull(u * scale)[1] * scale)])
 
-    top = max(float(np.abs(piece.v).max()) for piece in pieces)
-    asked = float(np.quantile(np.abs(np.concatenate([piece.tau for piece in pieces])), 0.98))
-    edges = [_bounds(known[name], top, asked) for name in free]
-    lowest, highest = (np.array(column) for column in zip(*edges, strict=True))
+    lowest, highest = _edges([known[name] for name in free], pieces)
     low, high = lowest / scale, highest / scale
     inner = np.clip(start / scale, np.nextafter(low, 0) + 1e-9, np.nextafter(high, 0) - 1e-9)
     found = least_squares(residuals, jacobian, inner, (low, high), evaluations)
     values = np.clip(found * scale, lowest, highest)
-    torque, slopes = np.empty(len(tau)), np.empty((len(tau), len(free)))
-    torque[used.rows], slopes[used.rows] = best[0]
-    if unused.pieces:
-        torque[unused.rows], slopes[unused.rows] = stacked(inverse, [pieces[k] for k in unused.pieces], values)
+    torque, slopes = _joined(used, best[0], unused, lambda rest: stacked(inverse, [pieces[k] for k in rest], values))
     phases = inverse.phases(pieces[0], values)
     fitted = with_values(mount, (*free, *phases), np.array([*values, *phases.values()]))
     return Fit(fitted, free, values, torque, slopes, tau - torque, len(phases) * len(pieces))
@@ -160,6 +154,18 @@ def _weighted(pieces: Sequence[Piece], weight: Array) -> tuple[_Part, _Part]:
     return used, unused
 
 
+def _joined(
+    used: _Part, known: tuple[Array, Array], unused: _Part, look: Callable[[list[int]], tuple[Array, Array]]
+) -> tuple[Array, Array]:
+    """Torque and slopes at all rows: known where there was weight, looked at only now elsewhere."""
+    count = len(used.rows) + len(unused.rows)
+    torque, slopes = np.empty(count), np.empty((count, known[1].shape[1]))
+    torque[used.rows], slopes[used.rows] = known
+    if unused.pieces:
+        torque[unused.rows], slopes[unused.rows] = look(unused.pieces)
+    return torque, slopes
+
+
 def with_values(mount: Mount, names: Sequence[str], values: Array) -> Mount:
     """Return the mount with new numbers for the named parameters."""
     numbers = {variable.name: variable.start for variable in mount.parameters()}
@@ -176,6 +182,15 @@ def _filled(part: Any, prefix: str, numbers: dict[str, float]) -> Any:
         sides = [numbers.get(f"{full}.{side}") for side in Pair._fields]
         changes[name] = numbers[full] if full in numbers else Pair(*sides)  # type: ignore[arg-type]
     return replace(part, **changes)
+
+
+def _edges(variables: Sequence[Variable], pieces: Sequence[Piece]) -> tuple[Array, Array]:
+    """Lowest and highest values of some parameters in a fit to these pieces."""
+    top = max(float(np.abs(piece.v).max()) for piece in pieces)
+    asked = float(np.quantile(np.abs(np.concatenate([piece.tau for piece in pieces])), 0.98))
+    edges = [_bounds(variable, top, asked) for variable in variables]
+    lowest, highest = (np.array(column) for column in zip(*edges, strict=True))
+    return lowest, highest
 
 
 def _bounds(variable: Variable, top: float, asked: float) -> tuple[float, float]:

@@ -21,8 +21,6 @@ SHARP = 1.0
 """Exponent of the Stribeck curve of Bo and Pavelescu (Wear 82, 1982); that of Armstrong-Helouvry is 2."""
 SOFTER = (4.0, 16.0)
 """How many times softer than the start a bending contact is tried."""
-
-
 DEAD = 0.1
 """Share of the card's number below which a friction parameter is tried at the card's number again."""
 
