@@ -72,6 +72,16 @@ def test_a_ring_that_is_full_keeps_the_end_and_says_that_the_beginning_is_gone(t
         replay(found)
 
 
+def test_a_session_whose_first_cycle_came_late_replays_from_there(tmp_path: Path) -> None:
+    with session(tmp_path) as one:
+        one.advance(100)
+    found = recorded(tmp_path)
+    late = np.zeros(100)
+    late[0] = 3
+    shifted = {"machine.tick": found["machine.tick"] + 3, "machine.late": late}
+    assert replay(replace(found, table=found.table | shifted)).cycles == 100
+
+
 LIVE = """
 import sys
 from pathlib import Path

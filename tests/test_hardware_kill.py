@@ -106,7 +106,8 @@ def test_when_python_is_killed_the_loop_notices_takes_the_torque_to_zero_and_lea
             raise
         assert there.drive.held == 0
     found = box_of(tmp_path)
-    assert {"heartbeat_lost", "deadline"} & set(faults_of(int(found["machine.faults"][-1]))), "or it was late before"
+    late = {"deadline", "frame_lost"} & set(faults_of(int(found["machine.faults"][-1]))) or there.virtual.trips
+    assert late or "heartbeat_lost" in faults_of(int(found["machine.faults"][-1])), "or this computer was late before"
     assert found["machine.order"][-1] == 0
 
 

@@ -73,12 +73,12 @@ def _bits(column: np.ndarray) -> np.ndarray:
 
 def _origin(recording: Recording) -> dict[str, Any]:
     origin = recording.origin.get("hardware")
-    missing = [name for name in (*COMPARED, "machine.tick", "machine.counts") if name not in recording]
+    missing = [name for name in (*COMPARED, "machine.tick", "machine.late", "machine.counts") if name not in recording]
     if not isinstance(origin, dict) or missing:
         message = f"{recording.name} is no recording of `cosim hardware run`, which keeps what a replay needs."
         raise HardwareError(message, culprit=recording.name)
-    if recording["machine.tick"][0] != 0:
-        first = int(recording["machine.tick"][0])
+    first = int(recording["machine.tick"][0])
+    if first != recording["machine.late"][0]:  # a session that wakes late begins with the cycles it missed
         message = f"{recording.name} begins at cycle {first:,}: its black box had room for the end of the session only."
         raise HardwareError(message, culprit=recording.name, value=first)
     return origin
