@@ -13,10 +13,10 @@ from cosim.diagnosis.sanity import is_held
 from cosim.identify.machine import Machine
 from cosim.recording import Recording
 from pyfmi_models.card import read_card
-from pyfmi_models.effects import ClockEffect, Effect, GravityUnbalance, LocalFriction
+from pyfmi_models.effects import ClockEffect, Effect, GravityUnbalance, LocalFriction, PeriodicFriction
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.torque_saturation import TorqueSaturation
-from pyfmi_models.friction import Stribeck
+from pyfmi_models.friction import LuGre, Stribeck
 from pyfmi_models.mount import Mount
 
 HELD = [one for one in EXAMPLES if is_held(one)]
@@ -121,3 +121,20 @@ def test_a_drive_that_gives_nothing_past_its_knee_still_has_a_finite_need() -> N
     torque, slopes = stacked(inverse, recorded(bare).pieces, inverse.present)
     assert np.isfinite(torque).all()
     assert np.isfinite(slopes).all()
+
+
+def test_sliding_over_a_rough_track_costs_no_damping_of_the_bristles() -> None:
+    """In fast sliding the bristles follow the level; rows that lie far apart must not make them lag behind it."""
+    law = LuGre(sigma0=4e4, sigma1=600.0, sigma2=0.0, Fc=4.0)
+    rough = PeriodicFriction(cycles_per_rev=2.0, relative_amplitude=0.3, phase=0.0)
+    t = np.arange(20_000) / 1000
+    q = 1.5 * np.sin(2 * np.pi * 0.15 * t)
+    prepared = prepare([Recording("r", {"t": t, "tau": np.zeros_like(t), "q": q})], 15.0)
+    base = read_card("paper_mount").plant()
+    mount = replace(base, axis=replace(base.axis, inertia=1e-9), friction=law, effects=(rough,))
+    torque, _ = stacked(Inverse(mount, ()), prepared.pieces, np.zeros(0))
+    v, at = prepared.stacked("v"), prepared.stacked("q")
+    fast = np.abs(v) > 0.7
+    level = 4.0 * (1 + 0.3 * np.cos(2 * at[fast]))
+    assert prepared.pieces[0].dt > 5e-3
+    assert np.abs(torque[fast] - level * np.sign(v[fast])).max() < 0.1

@@ -43,6 +43,7 @@ class Equations:
         p, symbols = symbols_of(self._mount.parameters())
         found: dict[str, Any] = {name: ca.SX.sym(name) for name in (*READING, "dt", *self._inputs)}
         found |= {"p": p, "state": ca.SX.sym("state", self.count), "symbols": symbols}
+        found["end"] = ca.SX.sym("end", len(READING) + len(self._inputs))
         return found | {"free": ca.vertcat(*[symbols[name] for name in self._free])}
 
     @cached_property
@@ -92,15 +93,26 @@ class Equations:
         s, (this, motion, own) = self._symbols, self._known
         remembering = [(own[name], part) for name, part in this.of_kind(MotionEffect) if name in own]
         parts = [_advanced(part, motion._replace(state=state), s["dt"]) for state, part in remembering]
-        if this.law.states():
-            parts.append(this.law.advance(own["friction"], motion.v, this.level(motion, own), s["dt"]))
-        return self._true(ca.vertcat(*parts))
+        effects = self._true(ca.vertcat(ca.SX(0, 1), *parts))
+        if not this.law.states():
+            return effects
+        # Sliding friction is the level of the row: with that of the middle of the step, a level that changes along
+        # the way would leave the state behind, and sigma1 times the speed would magnify what it lacks.
+        level = ca.substitute(self._true(this.level(motion, own)), self._column, s["end"])
+        level = ca.substitute(level, s["state"], ca.vertcat(effects, own["friction"]))
+        speed = self._true(motion.v)
+        return ca.vertcat(effects, this.law.advance(own["friction"], speed, level, s["dt"]))
+
+    @cached_property
+    def _step_column(self) -> Any:
+        """Columns in the middle of a step and at its end, and dt."""
+        return ca.vertcat(self._column, self._symbols["end"], self._symbols["dt"])
 
     @cached_property
     def step(self) -> Stepwise:
         """States along the rows, from columns and dt: effects by their rates, friction by the law's closed form."""
         s = self._symbols
-        return Stepwise(s["state"], ca.vertcat(self._column, s["dt"]), s["p"], self._following)
+        return Stepwise(s["state"], self._step_column, s["p"], self._following)
 
     @cached_property
     def step_slopes(self) -> Rowwise:
@@ -108,7 +120,7 @@ class Equations:
         s = self._symbols
         by_state = ca.vec(ca.jacobian(self._following, s["state"]).T)
         by_free = ca.vec(ca.jacobian(self._following, s["free"]).T)
-        return Rowwise(ca.vertcat(self._column, s["dt"], s["state"]), s["p"], ca.vertcat(by_state, by_free))
+        return Rowwise(ca.vertcat(self._step_column, s["state"]), s["p"], ca.vertcat(by_state, by_free))
 
     @cached_property
     def feeds(self) -> list[list[int]]:

@@ -116,7 +116,8 @@ class Inverse:
         equations, count = self._equations, self._equations.count
         if count == 0:
             return np.zeros((0, len(piece.t))), []
-        steps = np.vstack([(rows[:, 1:] + rows[:, :-1]) / 2, np.full(len(piece.t) - 1, piece.dt)])
+        middle, end = (rows[:, 1:] + rows[:, :-1]) / 2, rows[:, 1:]
+        steps = np.vstack([middle, end, np.full(len(piece.t) - 1, piece.dt)])
         state = equations.step(steps, full)
         out = equations.step_slopes(np.vstack([steps, state[:, :-1]]), full)
         steps_count = len(piece.t) - 1
