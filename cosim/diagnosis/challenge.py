@@ -36,7 +36,7 @@ from pyfmi_models.effects import Effect
 ALIKE = 0.4
 """A rival is refitted in an effect's place if its linear gain there reaches this share of the effect's."""
 NESTED = {"torque_offset": ("friction_asymmetry", "cable_wrap")}
-"""Effects that hold another as a special case: they take its place by explaining more, not by explaining as much."""
+"""Effects that hold another as a special case, and so explain as much."""
 ROUNDS = 3
 CREDIBLE = 0.05
 """A rival with a smaller share of the probability is not in the set, which is to hold the truth in 95 % of cases."""
@@ -63,10 +63,8 @@ class Place:
         margin = excludes(self.misfits, self.effect, rival.effect)
         if margin is not None:
             return margin < DECISIVE
-        holds_it = rival.effect.id in NESTED.get(self.effect.id, ())
-        simpler = holds_it and self.trial.gain >= TIE * rival.gain
         far = rival.gain < NEAR * self.trial.gain and clearly_worse(rival, self.trial)
-        return self.shares[rival.effect.id] >= CREDIBLE and not simpler and not far
+        return self.shares[rival.effect.id] >= CREDIBLE and not far
 
     @property
     def more_general(self) -> tuple[Trial, ...]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cosim.diagnosis.adequacy import Rest, rest_of
+from cosim.diagnosis.adequacy import Rest, rest_of, rest_there
 from cosim.diagnosis.challenge import Place, Verdict, challenge, merged
 from cosim.diagnosis.claim import weights
 from cosim.diagnosis.evidence import Blocks
@@ -79,7 +79,7 @@ def diagnose(
     verdict = challenge(problem, select(problem, say), say)
     say("proving on the recording that was not fitted")
     proposed = verdict.chosen.mount
-    stands = _believed(problem, *_proven(problem, verdict, heldout))
+    stands = _surprised(problem, _believed(problem, *_proven(problem, verdict, heldout)), heldout)
     experiment = _experiment(stands.verdict, problem.prepared)
     described = _described(problem, stands, train, heldout, card.mount.name)
     diagnosis = replace(
@@ -174,6 +174,15 @@ def _believed(problem: Problem, verdict: Verdict, unproven: tuple[Place, ...]) -
     if rest.share <= LARGER * whole.share:
         return Stands(verdict, unproven, rest)
     return Stands(replace(verdict, chosen=verdict.base, places=()), (*unproven, *verdict.places), whole)
+
+
+def _surprised(problem: Problem, stands: Stands, heldout: Sequence[Recording]) -> Stands:
+    """Where training leaves nothing large, ask the held-out recording."""
+    prepared = problem.prepared
+    if stands.rest.unexplained:
+        return stands
+    there = rest_there(stands.verdict.chosen, prepared, stands.verdict.bench, prepare(heldout, prepared.cutoff))
+    return replace(stands, rest=there) if there.unexplained else stands
 
 
 def _key(effect: Effect) -> tuple[str, float]:

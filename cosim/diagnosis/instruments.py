@@ -23,7 +23,7 @@ from cosim.diagnosis.fit import free_parameters
 from cosim.diagnosis.inverse import Inverse
 from cosim.diagnosis.prepare import Array, Piece, Prepared, derivative
 from cosim.diagnosis.shaken import still
-from cosim.diagnosis.trial import Trial
+from cosim.diagnosis.trial import FORETOLD, Trial
 from pyfmi_models.effects import ActuatorLag, Delay, Effect
 from pyfmi_models.mount import Mount
 
@@ -74,16 +74,18 @@ def settled(misfits: Misfits, best: Trial, rivals: Sequence[Trial]) -> Trial:
     return best
 
 
-def is_told(misfits: Misfits, effect: Effect) -> bool:
+def is_told(misfits: Misfits, trial: Trial) -> bool:
     """Whether what follows the set point is late at all: noise that the controller answers looks late by itself.
 
     Being late must explain most of what the set point sees of a model without it: friction that meets a noisy speed
-    is late as well, but explains little.
+    is late as well, but explains little, of the recordings left out too. What is foretold of each of those may leave
+    the set point more to see: something else is missing beside it.
     """
-    if effect.id not in misfits:
+    if trial.effect.id not in misfits:
         return True
-    explained = misfits["none"] - misfits[effect.id]
-    return explained > max(DECISIVE, TOLD * misfits["none"])
+    explained = misfits["none"] - misfits[trial.effect.id]
+    least = 0.0 if trial.foretold > FORETOLD else TOLD * misfits["none"]
+    return explained > max(DECISIVE, least)
 
 
 def misfits_of(prepared: Prepared, fitted: Mount, drive: Effect) -> Misfits:

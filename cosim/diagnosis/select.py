@@ -63,7 +63,7 @@ def _best(problem: Problem, trials: Sequence[Trial]) -> Trial | None:
     """The trial to go on with, if any is real; between delay and lag the set point decides."""
     real = [trial for trial in trials if is_real(problem, trial)]
     misfits = {trial.effect.id: misfits_of(problem.prepared, trial.fit.mount, trial.effect) for trial in real}
-    best = winner([trial for trial in real if is_told(misfits[trial.effect.id], trial.effect)])
+    best = winner([trial for trial in real if is_told(misfits[trial.effect.id], trial)])
     return settled(misfits[best.effect.id], best, trials) if best else None
 
 
