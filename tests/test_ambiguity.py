@@ -63,9 +63,7 @@ def test_an_offset_that_is_clearly_worse_loses_to_an_asymmetry_which_is_none_at_
 
 
 def test_an_asymmetry_that_explains_as_much_as_the_offset_is_in_its_set_unless_it_is_improbable() -> None:
-    near, less, far = (
-        Place(OFFSET, trial(OFFSET, 0.89), (trial(ASYMMETRY, gain, 2),)) for gain in (0.89, 0.86, 0.70)
-    )
+    near, less, far = (Place(OFFSET, trial(OFFSET, 0.89), (trial(ASYMMETRY, gain, 2),)) for gain in (0.89, 0.86, 0.70))
     assert near.ambiguous_with == ("friction_asymmetry",)
     assert (less.ambiguous_with, bool(less.more_general)) == ((), True)
     assert (far.ambiguous_with, bool(far.more_general)) == ((), False)

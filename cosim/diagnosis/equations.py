@@ -13,6 +13,7 @@ from cosim.diagnosis.prepare import Array, Piece
 from cosim.diagnosis.rowwise import Rowwise, Stepwise
 from cosim.diagnosis.shaken import still
 from pyfmi_models.effects import DriveEffect, MotionEffect, SensorEffect
+from pyfmi_models.effects.presliding import LEAST_LEVEL
 from pyfmi_models.model import structure_of, symbols_of
 from pyfmi_models.mount import Mount
 
@@ -96,12 +97,20 @@ class Equations:
         effects = self._true(ca.vertcat(ca.SX(0, 1), *parts))
         if not this.law.states():
             return effects
-        # Sliding friction is the level of the row: with that of the middle of the step, a level that changes along
-        # the way would leave the state behind, and sigma1 times the speed would magnify what it lacks.
-        level = ca.substitute(self._true(this.level(motion, own)), self._column, s["end"])
-        level = ca.substitute(level, s["state"], ca.vertcat(effects, own["friction"]))
-        speed = self._true(motion.v)
-        return ca.vertcat(effects, this.law.advance(own["friction"], speed, level, s["dt"]))
+        # Rows lie so far apart that the level changes in a step. Where sliding leaves the state behind it, sigma1
+        # times the speed magnifies what it lacks.
+        law, bristles, speed = this.law, own["friction"], self._true(motion.v)
+        middle, end = self._levels(effects)
+        bent = ca.fabs(ca.sum1(law.rate(ca.DM.zeros(bristles.numel()), speed, middle))) * s["dt"]
+        late = _late(bent / ca.fmax(middle, LEAST_LEVEL))
+        return ca.vertcat(effects, law.advance(bristles, speed, middle + (end - middle) * late, s["dt"]))
+
+    def _levels(self, effects: Any) -> tuple[Any, Any]:
+        """Friction level in the middle of a step, and at its end, where the effects have these states."""
+        s, (this, motion, own) = self._symbols, self._known
+        level = self._true(this.level(motion, own))
+        later = ca.vertcat(self._column, s["state"]), ca.vertcat(s["end"], effects, own["friction"])
+        return level, ca.substitute(level, *later)
 
     @cached_property
     def _step_column(self) -> Any:
@@ -163,6 +172,16 @@ def _advanced(effect: MotionEffect, motion: Any, dt: Any) -> Any:
     drive, x = ca.substitute(rate, motion.state, ca.DM.zeros(motion.state.numel())), pull * dt
     growth = ca.if_else(ca.fabs(x) < 1e-6, 1 + x / 2, (ca.exp(x) - 1) / (x + 1e-300))
     return ca.exp(x) * motion.state + dt * drive * growth
+
+
+def _late(x: Any) -> Any:
+    """Where between the middle (0) and the end (1) of a step lies the level that counts, if it is reached x times.
+
+    A state that follows a level, z' = (level - z) x/dt, while that goes straight from g - d to g + d, ends where it
+    does under the constant level g + w d, w = coth(x/2) - 2/x.
+    """
+    safe = ca.fmax(x, 1e-2)
+    return ca.if_else(x < safe, x / 6, 1 / ca.tanh(safe / 2) - 2 / safe)
 
 
 _KNOWN: dict[tuple[Any, ...], Equations] = {}
