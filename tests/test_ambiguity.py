@@ -14,6 +14,7 @@ from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.meaning import is_another
 from cosim.diagnosis.prepare import prepare
 from cosim.diagnosis.problem import Problem
+from cosim.diagnosis.result import is_special
 from cosim.diagnosis.trial import Trial, clearly_worse, is_real, winner
 from cosim.diagnosis.tuning import tuned
 from cosim.recording import Recording
@@ -62,11 +63,19 @@ def test_an_offset_that_is_clearly_worse_loses_to_an_asymmetry_which_is_none_at_
     assert winner([trial(OFFSET, 0.88), other]) is other
 
 
-def test_an_asymmetry_that_explains_as_much_as_the_offset_is_in_its_set_unless_it_is_improbable() -> None:
-    near, less, far = (Place(OFFSET, trial(OFFSET, 0.89), (trial(ASYMMETRY, gain, 2),)) for gain in (0.89, 0.86, 0.70))
-    assert near.ambiguous_with == ("friction_asymmetry",)
-    assert (less.ambiguous_with, bool(less.more_general)) == ((), True)
-    assert (far.ambiguous_with, bool(far.more_general)) == ((), False)
+@pytest.mark.parametrize(("gain", "alike"), [(0.89, True), (0.70, False)])
+def test_an_asymmetry_that_explains_no_more_than_the_offset_is_not_said_to_be_ruled_out(
+    gain: float, alike: bool
+) -> None:
+    place = Place(OFFSET, trial(OFFSET, 0.89), (trial(ASYMMETRY, gain, 2),))
+    assert place.ambiguous_with == ()
+    assert bool(place.more_general) is alike
+
+
+def test_an_asymmetry_that_foretells_more_than_an_offset_which_explains_as_much_is_in_the_set() -> None:
+    better = replace(trial(ASYMMETRY, 0.89, 2), foretold=0.9)
+    place = Place(OFFSET, replace(trial(OFFSET, 0.89), foretold=0.8), (better,))
+    assert place.ambiguous_with == ("friction_asymmetry",)
 
 
 def test_the_set_holds_an_unbalance_over_a_short_stroke_whichever_of_the_two_stands() -> None:
@@ -209,3 +218,9 @@ def test_of_an_asymmetry_that_looks_like_the_offset_found_it_is_said_that_it_doe
     absent = {finding.effect: finding for finding in not_found(found, prepared, weight, {}, ["torque_offset"])}
     assert absent["friction_asymmetry"].answer == "not_testable"
     assert "torque offset" in absent["friction_asymmetry"].evidence
+
+
+def test_only_a_special_case_of_all_its_rivals_goes_into_a_model_beside_them() -> None:
+    assert is_special("torque_offset", ("friction_asymmetry",))
+    assert not is_special("torque_offset", ("friction_asymmetry", "gravity_unbalance"))
+    assert not is_special("friction_asymmetry", ("torque_offset",))

@@ -16,6 +16,7 @@ from cosim.diagnosis.families import candidates
 from cosim.diagnosis.fit import Fit
 from cosim.diagnosis.instruments import DECISIVE, Misfits, excludes, misfits_of, settled
 from cosim.diagnosis.problem import Problem
+from cosim.diagnosis.result import SPECIAL
 from cosim.diagnosis.select import Selection
 from cosim.diagnosis.structure import Bench, projected
 from cosim.diagnosis.trial import (
@@ -35,8 +36,6 @@ from pyfmi_models.effects import Effect
 
 ALIKE = 0.4
 """A rival is refitted in an effect's place if its linear gain there reaches this share of the effect's."""
-NESTED = {"torque_offset": ("friction_asymmetry", "cable_wrap")}
-"""Effects that hold another as a special case, and so explain as much."""
 ROUNDS = 3
 CREDIBLE = 0.05
 """A rival with a smaller share of the probability is not in the set, which is to hold the truth in 95 % of cases."""
@@ -64,12 +63,17 @@ class Place:
         if margin is not None:
             return margin < DECISIVE
         far = rival.gain < NEAR * self.trial.gain and clearly_worse(rival, self.trial)
-        return self.shares[rival.effect.id] >= CREDIBLE and not far
+        return self.shares[rival.effect.id] >= CREDIBLE and not far and not self._holds_for(rival)
+
+    def _holds_for(self, rival: Trial) -> bool:
+        """Whether this effect is a special case of a rival that explains no more, and foretells no more."""
+        special = rival.effect.id in SPECIAL.get(self.effect.id, ())
+        return special and self.trial.gain >= TIE * rival.gain and self.trial.foretold >= rival.foretold
 
     @property
     def more_general(self) -> tuple[Trial, ...]:
         """Rivals that hold this effect as a special case and explain as much, but no more: the simpler one stands."""
-        alike = [rival for rival in self.rivals if rival.effect.id in NESTED.get(self.effect.id, ())]
+        alike = [rival for rival in self.rivals if rival.effect.id in SPECIAL.get(self.effect.id, ())]
         return tuple(r for r in alike if r.gain >= TIE * self.trial.gain and not self._is_close(r))
 
     @property

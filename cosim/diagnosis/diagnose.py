@@ -20,7 +20,7 @@ from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare, qua
 from cosim.diagnosis.problem import Problem
 from cosim.diagnosis.protocol import Structures, heldout_rms, is_proven, judge, traces, veto_band
 from cosim.diagnosis.regression import black_box_rms
-from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
+from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace, is_special
 from cosim.diagnosis.sanity import check_effects, check_recordings
 from cosim.diagnosis.select import select
 from cosim.recording import Recording
@@ -126,8 +126,8 @@ def _described(
 
 
 def _certain(problem: Problem, verdict: Verdict) -> Mount:
-    """The structure without effects that have a rival: neither of two possible causes goes into a model."""
-    open_keys = {_key(place.effect) for place in verdict.places if place.ambiguous_with}
+    """The structure without effects that have a rival which would predict otherwise: neither goes into a model."""
+    open_keys = {_key(p.effect) for p in verdict.places if not is_special(p.effect.id, p.ambiguous_with)}
     mount = verdict.chosen.mount
     rest = tuple(effect for effect in mount.effects if _key(effect) not in open_keys)
     return mount if len(rest) == len(mount.effects) else problem.fit(replace(mount, effects=rest), 15).mount

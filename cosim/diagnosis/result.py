@@ -4,6 +4,7 @@ Torques are in N m (forces in N for a linear axis), times in s, positions in rad
 `residual.py`; "before" is the base with its parameters refitted, "after" the base with the missing physics.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -12,6 +13,13 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Answer = Literal["found", "ambiguous", "not_proven", "not_seen", "not_testable"]
+SPECIAL = {"torque_offset": ("friction_asymmetry", "cable_wrap")}
+"""Effects that are a special case of others: what both explain, the special one predicts alike."""
+
+
+def is_special(effect: str, rivals: Sequence[str]) -> bool:
+    """Whether an effect is a special case of all its rivals: then it goes into a model, whichever is the cause."""
+    return set(rivals) <= set(SPECIAL.get(effect, ()))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -84,7 +84,7 @@ NOTES = {
     "measured": "Held-out RMS by the protocol of each recording's README; `first look` is what that README found by "
     "hand. How each is read stands in tests/benchmarks/measured.py: columns, units, card, what is held out. `refitted` "
     "is the base of the card with its numbers fitted, `with effects` the delivered model, `no veto` what training "
-    "alone proposed. A set is not put into a model.\n\n"
+    "alone proposed. A set is not put into a model, unless its first member is a special case of the others.\n\n"
     "Of the screws each recording holds one speed, for 3 to 128 s. They count alike however long they last, as the "
     "mean torques of the README do: rows that repeat one operating point say little that is new. Counted by seconds, "
     "and cut to the first 6.4 s, the lead screw's halves ended at 2.1 and 1.4 %.\n\n"

@@ -6,7 +6,7 @@ from cosim.diagnosis.report import tables, words
 from cosim.diagnosis.report.equations import EQUATIONS
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture
-from cosim.diagnosis.result import Diagnosis, Finding
+from cosim.diagnosis.result import Diagnosis, Finding, is_special
 from cosim.pictures.quantities import minus
 
 
@@ -40,7 +40,7 @@ def block(one: words.Block, diagnosis: Diagnosis, scales: Scales, picture: Pictu
     said = [words.closed(finding.statement) for finding in one.findings]
     if one.answer == "ambiguous":
         said = words.either(said)
-        said.append("None of these goes into a model." if len(one.findings) > 1 else "It goes into no model.")
+        said.append(_in_model(*one.findings))
     rows = [("Size", _size(first)), ("Where", where(first, scales)), ("Evidence", first.evidence)]
     rows += [("Ruled out", ", ".join(first.ruled_out)), ("Tell apart", _apart(one)), ("Do this", _do(one, diagnosis))]
     closed = tuple(_numbers(finding) for finding in one.findings)
@@ -54,6 +54,15 @@ def block(one: words.Block, diagnosis: Diagnosis, scales: Scales, picture: Pictu
         _do(one, diagnosis),
         *map(minus, (first.size, first.size_range)),
     )
+
+
+def _in_model(first: Finding, *rivals: Finding) -> str:
+    """Say which of the possible causes goes into the improved model."""
+    if not rivals:
+        return "It goes into no model."
+    if is_special(first.effect, [rival.effect for rival in rivals]):
+        return f"{first.title} goes into the model: it is a special case of the other and predicts alike."
+    return "None of these goes into a model."
 
 
 def _size(finding: Finding) -> str:

@@ -17,7 +17,12 @@ ANSWERS = {
 }
 MEANINGS = (
     ("found", "Found", "The 95 % range excludes zero, the error on unseen runs falls, and every rival fits worse."),
-    ("ambiguous", "Two possible causes", "The rivals are too close to separate. Neither goes into the improved model."),
+    (
+        "ambiguous",
+        "Two possible causes",
+        "The rivals are too close to separate. Neither goes into the improved model, unless one is a special case of "
+        "the other, which predicts alike.",
+    ),
     ("not_proven", "Not proven", "It fits better, but not on runs the fit never saw."),
     ("not_seen", "Not seen", "It would have shown from the size given."),
     ("not_testable", "Cannot be tested", "The recordings lack the condition given; it says how to record it."),
