@@ -42,6 +42,7 @@ LINEAR_UNITS = {
     "N.m.s/rad": "N.s/m",
     "N.m.s2/rad2": "N.s2/m2",
     "1/rad2": "1/m2",
+    "K/rad": "K/m",
 }
 Kind = TypeVar("Kind", bound=Effect)
 Seen = TypeVar("Seen", bound=MotionEffect)

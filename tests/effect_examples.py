@@ -27,6 +27,7 @@ NUMBERS: dict[str, dict[str, Any]] = {
     "TorqueOffset": {"torque": 0.7},
     "ThermalViscosity": {"viscous_per_degC": -0.04, "coulomb_per_degC": -0.02},
     "WarmingViscosity": {"viscous_per_degC": -0.04, "warm_up_degC": 15.0, "warm_up_s": 30.0},
+    "RubbedViscosity": {"viscous_per_degC": -0.04, "heat_degC_per_rad": 8.0, "cooling_s": 30.0},
     "DwellBreakaway": {"torque_per_efold": 0.3},
     "Compliance": {"antiresonance_hz": 20.0, "resonance_hz": 25.0},
     "ActuatorLag": {"time_constant_ms": 4.0},

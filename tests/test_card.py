@@ -10,7 +10,7 @@ from effect_examples import EXAMPLES
 from pyfmi_models.card import Card, parse_card, read_card, shipped_cards
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.effects import CATALOGUE, Cogging, Effect, GravityUnbalance, LocalFriction, PeriodicFriction
-from pyfmi_models.effects.thermal_viscosity import ThermalViscosity, WarmingViscosity
+from pyfmi_models.effects.thermal_viscosity import RubbedViscosity, ThermalViscosity, WarmingViscosity
 from pyfmi_models.errors import CardError
 from pyfmi_models.friction import LAWS, Coulomb, LuGre
 from pyfmi_models.model import Pair
@@ -142,7 +142,14 @@ def test_all_effects_together_can_be_written_and_read_and_make_a_plant() -> None
     assert card.plant().model().states
 
 
-@pytest.mark.parametrize(("numbers", "form"), [("", ThermalViscosity), ("warm_up_degC = 9.0\n", WarmingViscosity)])
+@pytest.mark.parametrize(
+    ("numbers", "form"),
+    [
+        ("", ThermalViscosity),
+        ("warm_up_degC = 9.0\n", WarmingViscosity),
+        ("heat_degC_per_rad = 9.0\n", RubbedViscosity),
+    ],
+)
 def test_a_form_is_found_by_its_parameters(numbers: str, form: type[Effect]) -> None:
     text = f'{SMALL}[[effects]]\neffect = "thermal_viscosity"\nviscous_per_degC = -0.03\n{numbers}'
     assert [type(one) for one in parse_card(text, "c").effects] == [form]

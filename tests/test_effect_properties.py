@@ -37,6 +37,7 @@ NEUTRAL = {
     "TorqueOffset": {"torque": 0.0},
     "ThermalViscosity": {"viscous_per_degC": 0.0, "coulomb_per_degC": 0.0},
     "WarmingViscosity": {"viscous_per_degC": 0.0},
+    "RubbedViscosity": {"viscous_per_degC": 0.0},
     "DwellBreakaway": {"torque_per_efold": 0.0},
     "EncoderEccentricity": {"amplitude_rad": 0.0},
     "QuadraticDrag": {"coefficient": 0.0},

@@ -18,7 +18,7 @@ from pyfmi_models.effects import (
 from pyfmi_models.effects.dwell_breakaway import DwellBreakaway
 from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction
 from pyfmi_models.effects.presliding import Presliding
-from pyfmi_models.effects.thermal_viscosity import ThermalViscosity, WarmingViscosity
+from pyfmi_models.effects.thermal_viscosity import RubbedViscosity, ThermalViscosity, WarmingViscosity
 from pyfmi_models.friction import Coulomb, Frictionless, LuGre
 
 
@@ -93,6 +93,15 @@ def test_a_bearing_warms_up_with_its_time_constant() -> None:
     rise = run["thermal_viscosity.rise"]
     np.testing.assert_allclose(rise, 15 * (1 - np.exp([0, -1, -20])), rtol=1e-6)
     assert run["v"][-1] == pytest.approx((4.0 - 1.0) / (3.0 * np.exp(-0.04 * (10 + 15 - 20))), rel=1e-6)
+
+
+def test_rubbing_heats_a_bearing_and_rest_cools_it() -> None:
+    """Rise to h |v| tau at constant speed; a balanced torque keeps the speed of 1 rad/s."""
+    effect = RubbedViscosity(viscous_per_degC=0.0, heat_degC_per_rad=0.5, cooling_s=20.0)
+    run = simulate(mount(effect).model(), np.array([0.0, 20.0, 400.0]), lambda t: 4.0)
+    speed = (4.0 - 1.0) / 3.0
+    assert run["v"][-1] == pytest.approx(speed, rel=1e-6)
+    assert run["thermal_viscosity.rise"][-1] == pytest.approx(0.5 * speed * 20.0, rel=1e-3)
 
 
 # Rest

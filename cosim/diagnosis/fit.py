@@ -24,7 +24,8 @@ from pyfmi_models.mount import Mount
 FIXED = (
     "axis.torque_limit",
     *(f"friction.{name}" for name in ("smoothing", "n", "spread", "attraction")),
-    *("delta", "cycles_per_rev", "onset_s", "warm_up_degC", "hardening", "contact_hz", "backlash.damping_ratio"),
+    *("delta", "cycles_per_rev", "onset_s", "warm_up_degC", "heat_degC_per_rad", "hardening", "contact_hz"),
+    "backlash.damping_ratio",
 )
 """Parameters that are not fitted here: limits, shapes of laws, and numbers that candidates choose from a grid."""
 BRISTLES = ("friction.sigma0", "friction.sigma1", "friction.Fs", "friction.Vs")
@@ -36,6 +37,8 @@ LEAST_KNEE = 0.2
 command outgrows the need: a drive that bends at 0.7 of what is needed, with a slope of 0.3, does so at 0.4 of it."""
 LEAST_SLOPE = 0.02
 """... and gives at least this share of what more is asked for, else no command gives what is needed."""
+LEAST_WARMING = 2.0
+"""Seconds in which a bearing warms or cools at the fastest: faster, a warm-up is a friction that depends on speed."""
 PRIOR_FACTOR = 2.0
 
 
@@ -201,6 +204,8 @@ def _bounds(variable: Variable, top: float, asked: float) -> tuple[float, float]
     """
     if variable.name.endswith(".knee_torque"):
         return LEAST_KNEE * asked, variable.high
+    if variable.name.endswith(("warm_up_s", "cooling_s")):
+        return LEAST_WARMING, variable.high
     if variable.name.endswith("saturation.slope"):
         return LEAST_SLOPE, variable.high
     if variable.name.endswith(".Vs"):

@@ -79,5 +79,31 @@ class WarmingViscosity(ThermalViscosity):
         return super().warmth(motion) + motion.state[0]
 
 
+@dataclass(frozen=True, kw_only=True)
+class RubbedViscosity(ThermalViscosity):
+    """The same where rubbing heats the bearing, and rest lets it cool: T = `temperature` + rise.
+
+        rise' = heat_degC_per_rad |v| - rise / cooling_s
+
+    `rise` starts cold, at 0. The power of friction is taken to go with the speed, as that of dry friction does.
+    Reference: first-order heat balance of Incropera, Fundamentals of Heat and Mass Transfer, chapter 5.1.
+    """
+
+    heat_degC_per_rad: Scalar = parameter("K/rad", "Rise of temperature per angle rubbed", low=0, high=1e6)
+    cooling_s: Scalar = parameter("s", "Time constant of cooling down", default=600.0, low=1e-3)
+
+    def states(self) -> tuple[Variable, ...]:
+        """One state: how much warmer than `temperature` the bearing is."""
+        return (Variable(name="rise", unit="K", description="Rise of temperature by rubbing"),)
+
+    def rate(self, motion: Motion) -> Any:
+        """`heat |v| - rise / cooling_s`."""
+        return self.heat_degC_per_rad * ca.fabs(motion.v) - motion.state[0] / self.cooling_s
+
+    def warmth(self, motion: Motion) -> Scalar:
+        """`temperature + rise - 20 degC`."""
+        return super().warmth(motion) + motion.state[0]
+
+
 def _change(per_degree: float) -> str:
     return f"{'grows' if per_degree > 0 else 'falls'} by {100 * abs(per_degree):.2g} %"

@@ -20,7 +20,7 @@ from pyfmi_models.effects import (
 from pyfmi_models.effects.dwell_breakaway import DwellBreakaway
 from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction
 from pyfmi_models.effects.presliding import Presliding
-from pyfmi_models.effects.thermal_viscosity import ThermalViscosity, WarmingViscosity
+from pyfmi_models.effects.thermal_viscosity import RubbedViscosity, ThermalViscosity, WarmingViscosity
 from pyfmi_models.model import Pair
 from pyfmi_models.mount import Mount
 
@@ -114,15 +114,12 @@ def dwell(mount: Mount, span: Span) -> Iterator[Candidate]:
 
 
 def thermal(mount: Mount, span: Span) -> Iterator[Candidate]:
-    """By the recorded temperature; without one by the time since a cold start."""
+    """By the recorded temperature; without one by the time since a cold start, or by rubbing."""
     if mount.friction.key == "none" or has(mount, ThermalViscosity):
         return
     forms: list[ThermalViscosity] = [ThermalViscosity(viscous_per_degC=0.0)]
     if "temperature" not in span.extras:
-        forms = [
-            WarmingViscosity(viscous_per_degC=0.0, warm_up_degC=WARM, warm_up_s=share * span.seconds)
-            for share in (0.25, 1.0)
-        ]
+        forms = [form for share in (0.25, 1.0) for form in _warming(share * span.seconds, span)]
     for form in forms:
 
         def start(c: Array, form: ThermalViscosity = form) -> Effect:
@@ -130,6 +127,15 @@ def thermal(mount: Mount, span: Span) -> Iterator[Candidate]:
             return replace(form, viscous_per_degC=viscous, coulomb_per_degC=level)
 
         yield Candidate("thermal_viscosity", (form,), ("viscous_per_degC", "coulomb_per_degC"), start)
+
+
+def _warming(seconds: float, span: Span) -> tuple[ThermalViscosity, ...]:
+    """Warm-ups of this time constant, by time and by rubbing."""
+    heat = WARM / (seconds * float(np.mean(np.abs(span.v))))
+    return (
+        WarmingViscosity(viscous_per_degC=0.0, warm_up_degC=WARM, warm_up_s=seconds),
+        RubbedViscosity(viscous_per_degC=0.0, heat_degC_per_rad=heat, cooling_s=seconds),
+    )
 
 
 def presliding(mount: Mount, span: Span) -> Iterator[Candidate]:
