@@ -10,7 +10,7 @@ import casadi as ca
 import numpy as np
 
 from cosim.diagnosis.prepare import Array, Piece
-from cosim.diagnosis.rowwise import Rowwise, Stepwise
+from cosim.diagnosis.rowwise import Rowwise, Stepwise, recurrence
 from cosim.diagnosis.shaken import still
 from pyfmi_models.effects import DriveEffect, MotionEffect, SensorEffect
 from pyfmi_models.effects.presliding import LEAST_LEVEL
@@ -117,25 +117,66 @@ class Equations:
         """Columns in the middle of a step and at its end, and dt."""
         return ca.vertcat(self._column, self._symbols["end"], self._symbols["dt"])
 
+    def states(self, steps: Array, full: Array) -> tuple[Array, list[Array]]:
+        """States along the rows from zero on, (states, rows + 1), and their derivatives, (free, rows + 1) each.
+
+        Effects go by their rates, friction by the law's closed form. A step that is linear in its own state is a
+        recurrence, solved for all rows at once; others are walked. `steps` are the columns of each step.
+        """
+        return self._at_once(steps, full) if self._affine else self._walked(steps, full)
+
+    def _at_once(self, steps: Array, full: Array) -> tuple[Array, list[Array]]:
+        states, slopes = np.zeros((self.count, steps.shape[1] + 1)), list[Array]()
+        for k, affine in enumerate(self._affine):
+            out = affine(np.vstack([steps, states[:, :-1]]), full)
+            states[k] = recurrence(out[0], out[1][:, None])[:, 0]
+            kept, added = out[2:].reshape(2, k + len(self._free), steps.shape[1])
+            change = kept * states[k, :-1] + added
+            drift = change[k:] + sum((change[j] * slopes[j][:, :-1] for j in range(k)), start=0.0)
+            slopes.append(recurrence(out[0], drift.T).T)
+        return states, slopes
+
     @cached_property
-    def step(self) -> Stepwise:
-        """States along the rows, from columns and dt: effects by their rates, friction by the law's closed form."""
+    def _affine(self) -> list[Rowwise]:
+        """For each state what its step keeps of it, what it adds, and how both change; [] where one is not linear."""
+        state = self._symbols["state"]
+        kept = [ca.jacobian(self._following[k], state[k]) for k in range(self.count)]
+        if any(ca.depends_on(one, state[k]) for k, one in enumerate(kept)):
+            return []
+        added = [ca.substitute(self._following[k], state[k], 0.0) for k in range(self.count)]
+        return [self._changing(k, *both) for k, both in enumerate(zip(kept, added, strict=True))]
+
+    def _changing(self, k: int, kept: Any, added: Any) -> Rowwise:
+        """Both parts of a step, and their derivatives by the states before and the free parameters."""
+        s = self._symbols
+        by = ca.vertcat(ca.SX(0, 1), *(s["state"][j] for j in range(k)), s["free"])
+        rows = ca.vertcat(kept, added, ca.jacobian(kept, by).T, ca.jacobian(added, by).T)
+        return Rowwise(ca.vertcat(self._step_column, s["state"]), s["p"], rows)
+
+    def _walked(self, steps: Array, full: Array) -> tuple[Array, list[Array]]:
+        """A state's step may depend on itself and on those before it, so their derivatives are carried one by one."""
+        states, rows = self._step(steps, full), steps.shape[1]
+        out = self._step_slopes(np.vstack([steps, states[:, :-1]]), full)
+        between = out[: self.count**2].reshape(self.count, self.count, rows)
+        by_free = out[self.count**2 :].reshape(self.count, len(self._free), rows)
+        slopes: list[Array] = []
+        for k in range(self.count):
+            drift = by_free[k] + sum((between[k, j] * slopes[j][:, :-1] for j in range(k)), start=0.0)
+            slopes.append(recurrence(between[k, k], drift.T).T)
+        return states, slopes
+
+    @cached_property
+    def _step(self) -> Stepwise:
         s = self._symbols
         return Stepwise(s["state"], self._step_column, s["p"], self._following)
 
     @cached_property
-    def step_slopes(self) -> Rowwise:
+    def _step_slopes(self) -> Rowwise:
         """Derivatives of each state's step by all states and by the free parameters, from columns, dt and states."""
         s = self._symbols
         by_state = ca.vec(ca.jacobian(self._following, s["state"]).T)
         by_free = ca.vec(ca.jacobian(self._following, s["free"]).T)
         return Rowwise(ca.vertcat(self._step_column, s["state"]), s["p"], ca.vertcat(by_state, by_free))
-
-    @cached_property
-    def feeds(self) -> list[list[int]]:
-        """For each state those before it that its step depends on."""
-        pattern = ca.jacobian(self._following, self._symbols["state"]).sparsity()
-        return [[j for j in range(k) if pattern.has_nz(k, j)] for k in range(self.count)]
 
     def motion(self, piece: Piece, full: Array) -> Array:
         """True speed and acceleration at all rows of a piece, (2, rows)."""

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
-from scipy.linalg.lapack import dtbtrs
 
 from cosim.diagnosis.claim import claimed
 from cosim.diagnosis.equations import Equations, equations_of
@@ -109,25 +108,12 @@ class Inverse:
         return torque, by_free.T
 
     def _states(self, piece: Piece, rows: Array, full: Array) -> tuple[Array, list[Array]]:
-        """States of effects and friction along the motion, (states, rows), and their derivatives (free, rows) each.
-
-        A state's step may depend on itself and on those before it, so their derivatives are carried one by one.
-        """
-        equations, count = self._equations, self._equations.count
-        if count == 0:
+        """States of effects and friction along the motion, (states, rows), and their derivatives (free, rows) each."""
+        if self._equations.count == 0:
             return np.zeros((0, len(piece.t))), []
         middle, end = (rows[:, 1:] + rows[:, :-1]) / 2, rows[:, 1:]
         steps = np.vstack([middle, end, np.full(len(piece.t) - 1, piece.dt)])
-        state = equations.step(steps, full)
-        out = equations.step_slopes(np.vstack([steps, state[:, :-1]]), full)
-        steps_count = len(piece.t) - 1
-        between = out[: count * count].reshape(count, count, steps_count)
-        by_free = out[count * count :].reshape(count, len(self.free), steps_count)
-        slopes: list[Array] = []
-        for k in range(count):
-            drift = by_free[k] + sum((between[k, j] * slopes[j][:, :-1] for j in equations.feeds[k]), start=0.0)
-            slopes.append(_recurrence(between[k, k], np.asarray(drift).T).T)
-        return state, slopes
+        return self._equations.states(steps, full)
 
     def _parts(self, kind: type[Effect]) -> list[str]:
         return [name for name, part in self.mount.components().items() if isinstance(part, kind)]
@@ -244,17 +230,6 @@ class Inverse:
     def _telling(self, piece: Piece) -> npt.NDArray[np.bool_]:
         """Rows whose rest tells a phase."""
         return np.asarray(piece.inside & claimed(self.mount.friction, piece.v))
-
-
-def _recurrence(decay: Array, drift: Array) -> Array:
-    """Solve y[k+1] = decay[k] y[k] + drift[k], y[0] = 0, for every column of drift."""
-    rows = len(decay) + 1
-    band, right = np.ones((2, rows), order="F"), np.zeros((rows, drift.shape[1]), order="F")
-    band[1, :-1], right[1:] = -decay, drift
-    if not right.size:  # LAPACK's wrapper is not safe with nothing to solve for
-        return right
-    solution: Array = dtbtrs(band, right, uplo="L", diag="U", overwrite_b=True)[0]
-    return solution
 
 
 def stacked(inverse: Inverse, pieces: Sequence[Piece], values: Array) -> tuple[Array, Array]:

@@ -5,6 +5,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from scipy.linalg.lapack import dtbtrs
 
 from cosim.diagnosis.prepare import Array
 
@@ -141,3 +142,14 @@ def _bound(function: ca.Function, given: tuple[Array, ...], out: Array) -> tuple
         buffer.set_arg(index, memoryview(array))  # type: ignore[call-arg, arg-type]
     buffer.set_res(0, memoryview(out))  # type: ignore[call-arg, arg-type]
     return buffer, evaluate
+
+
+def recurrence(decay: Array, drift: Array) -> Array:
+    """Solve y[k+1] = decay[k] y[k] + drift[k], y[0] = 0, for every column of drift."""
+    rows = len(decay) + 1
+    band, right = np.ones((2, rows), order="F"), np.zeros((rows, drift.shape[1]), order="F")
+    band[1, :-1], right[1:] = -decay, drift
+    if not right.size:  # LAPACK's wrapper is not safe with nothing to solve for
+        return right
+    solution: Array = dtbtrs(band, right, uplo="L", diag="U", overwrite_b=True)[0]
+    return solution
