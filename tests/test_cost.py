@@ -13,9 +13,10 @@ from cosim.demo import beside
 from cosim.diagnosis import regression
 from cosim.diagnosis.closed_loop import Loops
 from cosim.diagnosis.fit import fit
-from cosim.diagnosis.inverse import Inverse, _recurrence, stacked
+from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import lowpass, prepare
 from cosim.diagnosis.regression import kernel
+from cosim.diagnosis.rowwise import recurrence
 from cosim.proof.generator import make_case, write_case
 from cosim.proof.tool import given
 from pyfmi_models.card import read_card
@@ -47,7 +48,7 @@ def test_a_recurrence_is_what_it_says(count: int) -> None:
     by_hand = np.zeros((61, count))
     for k in range(60):
         by_hand[k + 1] = decay[k] * by_hand[k] + drift[k]
-    np.testing.assert_allclose(_recurrence(decay, drift), by_hand, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(recurrence(decay, drift), by_hand, rtol=0, atol=1e-14)
 
 
 def test_a_black_box_is_the_same_in_chunks_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:
