@@ -51,7 +51,6 @@ def impatient(one: Session, milliseconds: int = 10) -> Session:
     return one
 
 
-PATIENT = changed(
-    read_machine("virtual"), "test", reactions=read_machine("virtual").reactions.model_dump() | {"heartbeat_ms": 500.0}
-)
+LATER = {"heartbeat_ms": 500.0, "late_in_a_row": 1000, "window_ms": 5.0}
+PATIENT = changed(read_machine("virtual"), "test", reactions=read_machine("virtual").reactions.model_dump() | LATER)
 """A machine whose reactions wait for a computer that has more to do."""

@@ -7,6 +7,7 @@ from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
+import casadi as ca
 import jsonschema
 import numpy as np
 import pyarrow.parquet as pq
@@ -16,6 +17,7 @@ from friction_laws import EXAMPLES, WITH_MEMORY, numeric
 
 from cosim.cli import main
 from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.equations import _late
 from cosim.diagnosis.evidence import Blocks, Score, Whitening
 from cosim.diagnosis.fit import fit
 from cosim.diagnosis.inverse import Inverse, stacked
@@ -126,6 +128,22 @@ class TestPreparation:
         check_recordings([run], [run], axis(inertia=5.0))
 
 
+def walked(law: FrictionLaw, v: np.ndarray, dt: float) -> np.ndarray:
+    """States at each row: the law's own step at the speed of its middle, at the level that a straight one amounts to.
+
+    That level lies coth(x/2) - 2/x of the way from the middle to the end, x how often a step would build it up.
+    """
+    x, speed, level = ca.SX.sym("x", len(law.states())), ca.SX.sym("v"), ca.SX.sym("level")
+    step = ca.Function("step", [x, speed, level], [law.advance(x, speed, level, dt), law.rate(0 * x, speed, level)])
+    middle, states = (v[1:] + v[:-1]) / 2, [np.zeros(len(law.states()))]
+    for now, end in zip(middle, v[1:], strict=True):
+        here, there = float(law.level(now)), float(law.level(end))
+        times = abs(step(states[-1], now, here)[1].full().sum()) * dt / here
+        late = times / 6 if times < 1e-3 else 1 / np.tanh(times / 2) - 2 / times
+        states.append(step(states[-1], now, here + (there - here) * late)[0].full().ravel())
+    return np.array(states).T
+
+
 class TestInverse:
     @pytest.mark.parametrize("law", [law for law in EXAMPLES.values() if law.key != "none"], ids=lambda law: law.key)
     def test_derivatives_equal_finite_differences(self, law: FrictionLaw) -> None:
@@ -144,6 +162,22 @@ class TestInverse:
             up, down = (stacked(inverse, pieces, values + s * step)[0] for s in (1, -1))
             change = (up - down) / (2 * step[column])
             assert np.abs(change - slopes[:, column]).max() < 5e-4 * np.abs(change).max() + 1e-9, free[column]
+
+    @pytest.mark.parametrize("law", WITH_MEMORY.values(), ids=WITH_MEMORY.keys())
+    def test_friction_states_follow_the_recorded_speed_by_the_laws_own_step(self, law: FrictionLaw) -> None:
+        t, q, _v, a = wander()
+        mount = replace(read_card("paper_mount").plant(), friction=law)
+        piece = prepare([recorded(a, t, q)], 20.0).pieces[0]
+        inverse = Inverse(mount, ())
+        states = inverse._states(piece, inverse._equations.columns(piece), inverse.start)[0]
+        np.testing.assert_allclose(states, walked(law, piece.v, piece.dt), rtol=1e-9, atol=1e-9)
+
+    @pytest.mark.parametrize("times", [1e-3, 0.0099, 0.0101, 0.3, 3.0, 40.0, 1e4])
+    def test_a_level_that_goes_straight_counts_as_one_that_is_constant_but_later(self, times: float) -> None:
+        """The exact solution of z' = times (level(t) - z) over one second, with a level from 1 to 3."""
+        start, decay = -0.7, np.exp(-times)
+        exact = 3 - 2 / times + (start - 1 + 2 / times) * decay
+        assert (2 + float(_late(times))) * (1 - decay) + start * decay == pytest.approx(exact, abs=1e-10)
 
     @pytest.mark.parametrize("law", WITH_MEMORY.values(), ids=WITH_MEMORY.keys())
     def test_friction_states_are_as_near_to_those_of_fine_steps_as_with_the_level_of_the_middle(

@@ -102,6 +102,8 @@ def test_rubbing_heats_a_bearing_and_rest_cools_it() -> None:
     speed = (4.0 - 1.0) / 3.0
     assert run["v"][-1] == pytest.approx(speed, rel=1e-6)
     assert run["thermal_viscosity.rise"][-1] == pytest.approx(0.5 * speed * 20.0, rel=1e-3)
+    at_rest = simulate(mount(effect).model(), np.array([0.0, 20.0, 60.0]), start={"thermal_viscosity.rise": 10.0})
+    np.testing.assert_allclose(at_rest["thermal_viscosity.rise"], 10.0 * np.exp([0.0, -1.0, -3.0]), rtol=1e-6)
 
 
 # Rest

@@ -21,6 +21,8 @@ from cosim.hardware.session import Session
 from cosim.hardware.words import STATES, faults_of
 from cosim.recording import Recording
 
+ATTEMPTS = 5
+
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 
 
@@ -94,9 +96,10 @@ def line_of(process: subprocess.Popen[bytes]) -> bytes:
     return process.stdout.readline()
 
 
-def test_when_python_is_killed_the_loop_notices_takes_the_torque_to_zero_and_leaves(tmp_path: Path) -> None:
+def faults_when_python_is_killed(folder: Path) -> set[str]:
+    """Kill the Python of a session in operation: the loop leaves, without torque, its record replays; its faults."""
     with drive(PATIENT, lockstep=False) as there:
-        code = SUPERVISOR.format(tests=str(Path(__file__).parent), url=there.url, box=str(tmp_path / "box"))
+        code = SUPERVISOR.format(tests=str(Path(__file__).parent), url=there.url, box=str(folder / "box"))
         with spawned("-c", code) as process:
             loop = int(line_of(process) or pytest.skip("this computer was never in time"))
         try:
@@ -105,10 +108,19 @@ def test_when_python_is_killed_the_loop_notices_takes_the_torque_to_zero_and_lea
             os.kill(loop, signal.SIGKILL)
             raise
         assert there.drive.held == 0
-    found = box_of(tmp_path)
-    late = {"deadline", "frame_lost"} & set(faults_of(int(found["machine.faults"][-1]))) or there.virtual.trips
-    assert late or "heartbeat_lost" in faults_of(int(found["machine.faults"][-1])), "or this computer was late before"
+    found = box_of(folder)
     assert found["machine.order"][-1] == 0
+    return set(faults_of(int(found["machine.faults"][-1])))
+
+
+def test_when_python_is_killed_the_loop_notices_takes_the_torque_to_zero_and_leaves(tmp_path: Path) -> None:
+    """A frame can be late on a busy computer before the heart stops: then the session is played again."""
+    faults: set[str] = set()
+    for attempt in range(ATTEMPTS):
+        faults = faults_when_python_is_killed(tmp_path / str(attempt))
+        if "heartbeat_lost" in faults:
+            break
+    assert {"heartbeat_lost", "deadline"} & faults, "or it was late before"
 
 
 @contextmanager

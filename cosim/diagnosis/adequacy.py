@@ -81,7 +81,8 @@ class Rest:
 
 def rest_of(chosen: Fit, prepared: Prepared, bench: Bench) -> Rest:
     """Measure the residual of a structure, and on what it depends."""
-    clear, share = bench.weight * _clear(prepared), share_left(chosen, prepared, bench)
+    clear = bench.weight * _clear(prepared)
+    share = _share(chosen, clear, prepared, bench)
     if not share > LARGE:
         return Rest(share, {}, "time")
     folds = bench.blocks.folds
@@ -99,7 +100,10 @@ def rest_there(chosen: Fit, prepared: Prepared, bench: Bench, there: Prepared) -
 
 def share_left(chosen: Fit, prepared: Prepared, bench: Bench) -> float:
     """Slow part of what a structure leaves in clear motion, relative to the friction torque (RMS)."""
-    clear = bench.weight * _clear(prepared)
+    return _share(chosen, bench.weight * _clear(prepared), prepared, bench)
+
+
+def _share(chosen: Fit, clear: Array, prepared: Prepared, bench: Bench) -> float:
     return _slow(chosen.residual, clear, prepared) / _friction(bench, clear, prepared)
 
 

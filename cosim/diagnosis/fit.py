@@ -205,7 +205,7 @@ def _bounds(variable: Variable, top: float, asked: float) -> tuple[float, float]
     if variable.name.endswith(".knee_torque"):
         return LEAST_KNEE * asked, variable.high
     if variable.name.endswith(("warm_up_s", "cooling_s")):
-        return LEAST_WARMING, variable.high
+        return min(LEAST_WARMING, variable.start), variable.high
     if variable.name.endswith("saturation.slope"):
         return LEAST_SLOPE, variable.high
     if variable.name.endswith(".Vs"):

@@ -53,8 +53,20 @@ class ThermalViscosity(FrictionEffect):
         return " and ".join([*said[:1], *(text.lower() for text in said[1:])] or ["Friction keeps its size"]) + "."
 
 
+class _HeatedViscosity(ThermalViscosity):
+    """The same where use heats the bearing: its own temperature is that of its surroundings and a rise."""
+
+    def states(self) -> tuple[Variable, ...]:
+        """One state: how much warmer than `temperature` the bearing is."""
+        return (Variable(name="rise", unit="K", description="Rise of temperature in use"),)
+
+    def warmth(self, motion: Motion) -> Scalar:
+        """`temperature + rise - 20 degC`."""
+        return super().warmth(motion) + motion.state[0]
+
+
 @dataclass(frozen=True, kw_only=True)
-class WarmingViscosity(ThermalViscosity):
+class WarmingViscosity(_HeatedViscosity):
     """The same where friction heats the bearing above its surroundings: T = `temperature` + rise.
 
         rise' = (warm_up_degC - rise) / warm_up_s
@@ -66,21 +78,13 @@ class WarmingViscosity(ThermalViscosity):
     warm_up_degC: Scalar = parameter("K", "Rise of temperature once warm", low=0, high=200)
     warm_up_s: Scalar = parameter("s", "Time constant of warming up", default=600.0, low=1e-3)
 
-    def states(self) -> tuple[Variable, ...]:
-        """One state: how much warmer than `temperature` the bearing is."""
-        return (Variable(name="rise", unit="K", description="Rise of temperature in use"),)
-
     def rate(self, motion: Motion) -> Any:
         """`(warm_up_degC - rise) / warm_up_s`."""
         return (self.warm_up_degC - motion.state[0]) / self.warm_up_s
 
-    def warmth(self, motion: Motion) -> Scalar:
-        """`temperature + rise - 20 degC`."""
-        return super().warmth(motion) + motion.state[0]
-
 
 @dataclass(frozen=True, kw_only=True)
-class RubbedViscosity(ThermalViscosity):
+class RubbedViscosity(_HeatedViscosity):
     """The same where rubbing heats the bearing, and rest lets it cool: T = `temperature` + rise.
 
         rise' = heat_degC_per_rad |v| - rise / cooling_s
@@ -92,17 +96,9 @@ class RubbedViscosity(ThermalViscosity):
     heat_degC_per_rad: Scalar = parameter("K/rad", "Rise of temperature per angle rubbed", low=0, high=1e6)
     cooling_s: Scalar = parameter("s", "Time constant of cooling down", default=600.0, low=1e-3)
 
-    def states(self) -> tuple[Variable, ...]:
-        """One state: how much warmer than `temperature` the bearing is."""
-        return (Variable(name="rise", unit="K", description="Rise of temperature by rubbing"),)
-
     def rate(self, motion: Motion) -> Any:
         """`heat |v| - rise / cooling_s`."""
         return self.heat_degC_per_rad * ca.fabs(motion.v) - motion.state[0] / self.cooling_s
-
-    def warmth(self, motion: Motion) -> Scalar:
-        """`temperature + rise - 20 degC`."""
-        return super().warmth(motion) + motion.state[0]
 
 
 def _change(per_degree: float) -> str:

@@ -61,7 +61,8 @@ def _in_model(first: Finding, *rivals: Finding) -> str:
     if not rivals:
         return "It goes into no model."
     if is_special(first.effect, [rival.effect for rival in rivals]):
-        return f"{first.title} goes into the model: it is a special case of the other and predicts alike."
+        other = "the other" if len(rivals) == 1 else "each of the others"
+        return f"{first.title} goes into the model: it is a special case of {other} and predicts alike."
     return "None of these goes into a model."
 
 
