@@ -66,7 +66,7 @@ def diagnose(
             fitted, held, believed = [*base.train], [*base.heldout], base.card
         with Loops(believed, held) as loops:
             loops.close("nominal", believed.plant())
-            outcome = find(fitted, held, believed, progress.tell)
+            outcome = find(fitted, held, believed, progress.tell, loops.close)
             done = deliver(outcome, fitted, held, believed, out, command, progress.tell, **more, loops=loops)
     if as_json:
         put_json(to_json(done))

@@ -49,7 +49,7 @@ def run_demo(out: Path, command: str, say: Callable[[str], None]) -> Demo:
     say("co-simulating plant and controller at 0.1 ms, checking the stiff integration")
     with Loops(card, [heldout]) as loops, beside(integration, card) as table:
         loops.close("nominal", card.plant(), plant)
-        outcome = diagnose(train, [heldout], card, say)
+        outcome = diagnose(train, [heldout], card, say, loops.close)
         found = deliver(outcome, train, [heldout], card, out / "diagnosis", command, say, loops=loops)
         for key, name in (("nominal", "simulated"), ("after", "improved")):
             replace(*loops.runs(key), name=name).write(out / f"{name}.parquet", force=True)

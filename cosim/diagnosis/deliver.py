@@ -70,14 +70,14 @@ def deliver(
         with replacing(out / SCENARIO, True) as partial:
             partial.write_text(scenario(outcome.experiment, better), "utf-8")
     _missing_torque(found, [*train, *heldout], out / "missing_torque.parquet")
+    from cosim.diagnosis.report import write_report  # takes a second, in which the loops go on
+
     say("closing the loop")
     positions = {key: error.position for key, error in loops.errors().items()}
     found = replace(found, heldout=replace(found.heldout, position=positions))
     with replacing(out / "diagnosis.json", True) as partial:
         partial.write_text(json.dumps(as_json(found), indent=2, allow_nan=False) + "\n", "utf-8")
     say("writing the report")
-    from cosim.diagnosis.report import write_report
-
     write_report(found, out / "report.html")
     return found
 

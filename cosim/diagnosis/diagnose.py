@@ -55,7 +55,11 @@ class Stands:
 
 
 def diagnose(
-    train: Sequence[Recording], heldout: Sequence[Recording], card: Card, say: Say = lambda _: None
+    train: Sequence[Recording],
+    heldout: Sequence[Recording],
+    card: Card,
+    say: Say = lambda _: None,
+    stood: Callable[[str, Mount], None] = lambda *_: None,
 ) -> Outcome:
     """Find what physics a card lacks.
 
@@ -66,6 +70,8 @@ def diagnose(
             `HeldOut.unvetoed_rms` is the error of what training alone proposed.
         card: the model as delivered.
         say: told, in a few words, what is being done.
+        stood: told the refitted base ("before") and the model it ends with ("after") as soon as they stand, so that
+            something can be done with them beside the rest.
 
     Raises:
         InputError: the card holds an effect that a diagnosis cannot take into account yet.
@@ -76,10 +82,15 @@ def diagnose(
     check_recordings(train, heldout, card.plant())
     problem = _problem(train, card)
     say("refitting the base")
-    verdict = challenge(problem, select(problem, say), say)
+    selection = select(problem, say)
+    base = _improved(card, selection.base.mount)
+    stood("before", base.plant())
+    verdict = challenge(problem, selection, say)
     say("proving on the recording that was not fitted")
     proposed = verdict.chosen.mount
     stands = _surprised(problem, _believed(problem, *_proven(problem, verdict, heldout)), heldout)
+    certain, first = (_improved(card, one) for one in (_certain(problem, stands.verdict), proposed))
+    stood("after", certain.plant())
     experiment = _experiment(stands.verdict, problem.prepared)
     described = _described(problem, stands, train, heldout, card.mount.name)
     diagnosis = replace(
@@ -88,8 +99,6 @@ def diagnose(
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,
     )
-    mounts = _certain(problem, stands.verdict), proposed, stands.verdict.base.mount
-    certain, first, base = (_improved(card, one) for one in mounts)
     return Outcome(diagnosis, certain, first, base, experiment)
 
 
