@@ -1,9 +1,14 @@
 """An effect is proven on the held-out recording if it helps there by a share that counts, or by more than chance."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from cosim.diagnosis.protocol import is_proven
+from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.protocol import is_misleading, is_proven
+from cosim.proof.generator import make_case, write_case
+from cosim.proof.tool import given
 from cosim.recording import Recording
 from pyfmi_models.effects import TorqueOffset
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag
@@ -61,3 +66,23 @@ def test_what_acts_in_one_second_of_a_minute_is_proven_by_its_share() -> None:
 def test_what_raises_the_held_out_error_is_not_proven() -> None:
     recording = held_out(white(3), np.ones(SECONDS * RATE))
     assert not is_proven([recording], axis(), axis(TorqueOffset(torque=0.02)), 30.0)
+
+
+@pytest.mark.parametrize(("held", "misleading"), [(0.3, False), (0.05, True), (-0.3, True)])
+def test_what_is_worse_than_the_base_as_a_whole_misleads(held: float, misleading: bool) -> None:
+    recording = held_out(white(4) + held, np.ones(SECONDS * RATE))
+    assert is_misleading([recording], axis(), axis(TorqueOffset(torque=0.3)), 10.0) == misleading
+
+
+def test_the_base_does_not_mislead() -> None:
+    assert not is_misleading([held_out(white(5), np.ones(SECONDS * RATE))], axis(), axis(), 30.0)
+
+
+def test_a_diagnosis_never_ends_with_a_model_that_is_worse_than_the_base(tmp_path: Path) -> None:
+    """A dwell that had a warm-up beside it was left alone when that was taken out, and misled."""
+    write_case(make_case(1755486916, ("thermal_viscosity",)), tmp_path)
+    card, train, held = given(str(tmp_path))
+    found = diagnose(train, [held], card).diagnosis
+    assert found.heldout.after_rms <= found.heldout.before_rms
+    assert "dwell_breakaway" not in found.verdict
+    assert {one.answer for one in found.findings if one.effect == "dwell_breakaway"} == {"not_proven"}

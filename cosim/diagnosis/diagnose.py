@@ -18,7 +18,7 @@ from cosim.diagnosis.locate import regions
 from cosim.diagnosis.loop_bias import loop_bias
 from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare, quality
 from cosim.diagnosis.problem import Problem
-from cosim.diagnosis.protocol import Structures, heldout_rms, is_proven, judge, traces, veto_band
+from cosim.diagnosis.protocol import Structures, heldout_rms, is_misleading, is_proven, judge, traces, veto_band
 from cosim.diagnosis.regression import black_box_rms
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace, is_special
 from cosim.diagnosis.sanity import check_effects, check_recordings
@@ -157,7 +157,10 @@ def _weight(mount: Mount, prepared: Prepared) -> Array:
 
 
 def _proven(problem: Problem, verdict: Verdict, heldout: Sequence[Recording]) -> tuple[Verdict, tuple[Place, ...]]:
-    """Take out effects that do not help on the held-out recording; return what stands, and those taken out."""
+    """Take out effects that do not help on the held-out recording; return what stands, and those taken out.
+
+    What is worse than the base there when all that is done is taken out as a whole.
+    """
     chosen = verdict.chosen
     out: list[Place] = []
     band = veto_band(heldout, verdict.base.mount, problem.prepared.cutoff)
@@ -167,6 +170,8 @@ def _proven(problem: Problem, verdict: Verdict, heldout: Sequence[Recording]) ->
         without = problem.fit(replace(chosen.mount, effects=rest), 10)
         if not is_proven(heldout, without.mount, chosen.mount, band):
             chosen, out = without, [*out, *places]
+    if is_misleading(heldout, verdict.base.mount, chosen.mount, band):
+        return replace(verdict, chosen=verdict.base, places=()), verdict.places
     if not out:
         return verdict, ()
     kept = [place for place in verdict.places if place not in out]

@@ -105,6 +105,15 @@ def is_proven(recordings: Sequence[Recording], without: Mount, mount: Mount, cut
     return share > LEAST_PLAIN_GAIN or (share > 0 and t_value(better) > SURE)
 
 
+def is_misleading(recordings: Sequence[Recording], base: Mount, mount: Mount, cutoff: float) -> bool:
+    """Whether a model is worse than the base on held-out recordings, in the band of the veto and in the protocol's.
+
+    Effects can each help beside the others, or beside a base that was bent to them, and still do so together.
+    """
+    bands = sorted({cutoff, CUTOFF})
+    return all(veto_rms(recordings, mount, band) > veto_rms(recordings, base, band) for band in bands)
+
+
 def _vetoing(recordings: Sequence[Recording], mount: Mount, cutoff: float) -> list[Array]:
     """Torque residual over what the model claims, in blocks of `BLOCK_SECONDS`."""
     prepared = prepare(recordings, cutoff)
