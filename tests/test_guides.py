@@ -4,12 +4,14 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from cosim.cli_cache import with_fmus
 from cosim.diagram import draw
 from cosim.master import run
 from cosim.scenario import read_scenario
+from cosim.sweep import conduct, read_sweep
 
 GUIDE = (Path(__file__).parents[1] / "docs" / "scenarios.md").read_text("utf-8")
 BLOCKS = re.findall(r"```(\w+)\n(.*?)```", GUIDE, re.DOTALL)
@@ -42,3 +44,13 @@ def test_the_scenario_of_the_guide_tracks_and_its_encoder_hangs(scenario: Path) 
     assert 0.02 < noise[t >= 0.05].std() < 0.1
     assert np.abs(done.recording["q"] - done.recording["q_d"])[(t > 1.0) & (t < 1.5)].max() < 1e-6
     assert "camera is a Python function: each of its steps costs microseconds." in done.statistics["notes"]
+
+
+def test_the_sweep_of_the_guide_runs(scenario: Path) -> None:
+    path = scenario.parent / "many.toml"
+    sweep = read_sweep(path)
+    done = conduct(sweep, with_fmus(read_scenario(sweep.scenario)), path.parent / "many", workers=2)
+    table = pd.read_parquet(done.table)
+    assert list(table["status"]) == ["ok"] * 8
+    assert table["reference.frequency"].isin([0.1, 0.2]).all()
+    assert table["rms_error"].between(0.001, 10.0).all()
