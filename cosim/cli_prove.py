@@ -58,7 +58,6 @@ def _telling(title: str) -> Iterator[Callable[[int, int, str], None]]:
 
 def _line(score: dict[str, object]) -> str:
     """One score on one line."""
-    from cosim.proof.page import estimate
+    from cosim.proof.page import estimate, met
 
-    met = {True: "met", False: "MISSED", None: ""}[score["met"]]  # type: ignore[index]
-    return f"{score['title']:<64} {estimate(score):<22} {score['asked']:<8} {met}".rstrip()
+    return f"{score['title']:<64} {estimate(score):<22} {score['asked']:<8} {met(score, 'MISSED')}".rstrip()

@@ -11,6 +11,7 @@ from report_example import diagnosis
 from test_arrows import imports
 
 from cosim.cli import main
+from cosim.cli_prove import _line
 from cosim.errors import OutputError, ProofError
 from cosim.proof import baselines, marks, score
 from cosim.proof.ceiling import ceiling, in_card_words, true_effect
@@ -334,6 +335,15 @@ def test_wrong_wishes_end_with_one_sentence(wrong, message, tmp_path, capsys) ->
     assert ended.value.code == 2
     assert message in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("met", "sure", "said"),
+    [(True, True, "met"), (True, False, "met, not sure"), (False, True, "MISSED"), (False, False, "MISSED, not sure")],
+)
+def test_the_terminal_says_whether_more_cases_could_turn_a_bar(met: bool, sure: bool, said: str) -> None:
+    score = {"title": "right", "value": 0.9, "low": 0.8, "high": 1.0, "asked": ">= 0.9", "met": met, "sure": sure}
+    assert _line(score).endswith(f">= 0.9   {said}")
 
 
 def test_the_page_says_every_score_and_every_miss() -> None:

@@ -124,14 +124,14 @@ def page(found: Mapping[str, Any]) -> str:
         least_removable=marks.LEAST_REMOVABLE,
         lines=[_line(row) for row in found["rows"] if not marks.exact(row)],
         number=estimate,
-        met=_met,
+        met=met,
         short=_short,
     )
 
 
-def _met(one: Mapping[str, Any]) -> str:
+def met(one: Mapping[str, Any], missed: str = "**missed**") -> str:
     """Whether the bar is met, and whether more cases could change that."""
-    word = {True: "met", False: "**missed**", None: ""}[one["met"]]
+    word = {True: "met", False: missed, None: ""}[one["met"]]
     return word if one["sure"] or not word else f"{word}, not sure"
 
 
