@@ -19,7 +19,7 @@ from cosim.cli import main
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.equations import _late
 from cosim.diagnosis.evidence import Blocks, Score, Whitening
-from cosim.diagnosis.fit import fit
+from cosim.diagnosis.fit import _bounds, fit
 from cosim.diagnosis.inverse import Inverse, stacked
 from cosim.diagnosis.prepare import choose_cutoff, derivative, noise_of, prepare, quality
 from cosim.diagnosis.protocol import Structures, judge, traces
@@ -30,7 +30,9 @@ from cosim.proof.generator import make_case, to_toml, write_case
 from cosim.recording import Recording
 from pyfmi_models.card import Card, parse_card, read_card
 from pyfmi_models.effects import ActuatorLag, Delay, FrictionAsymmetry
+from pyfmi_models.effects.thermal_viscosity import RubbedViscosity
 from pyfmi_models.friction import Coulomb, FrictionLaw
+from pyfmi_models.model import parameters_of
 from pyfmi_models.mount import Axis, Mount
 
 
@@ -194,6 +196,12 @@ class TestInverse:
         middle = numeric(law).along((piece.v[1:] + piece.v[:-1]) / 2, piece.dt)
         wrong, rough = (float(np.sqrt(np.mean((one - exact) ** 2))) for one in (states[:, 1:], middle))
         assert wrong < min(0.06, 1.001 * rough)
+
+    @pytest.mark.parametrize(("given", "low"), [(600.0, 2.0), (0.5, 0.5)])
+    def test_a_warm_up_that_the_card_gives_is_not_moved_by_a_bound(self, given: float, low: float) -> None:
+        effect = RubbedViscosity(viscous_per_degC=0.0, heat_degC_per_rad=1.0, cooling_s=given)
+        (variable,) = [one for one in parameters_of(effect) if one.name == "cooling_s"]
+        assert _bounds(variable, 1.0, 1.0) == (low, variable.high)
 
     def test_a_fit_recovers_what_made_the_torque(self) -> None:
         t, q, v, a = wander()

@@ -159,8 +159,10 @@ def _weight(mount: Mount, prepared: Prepared) -> Array:
 def _proven(problem: Problem, verdict: Verdict, heldout: Sequence[Recording]) -> tuple[Verdict, tuple[Place, ...]]:
     """Take out effects that do not help on the held-out recording; return what stands, and those taken out.
 
-    What is worse than the base there when all that is done is taken out as a whole.
+    What is then still worse than the base there is taken out as a whole.
     """
+    if not verdict.places:
+        return verdict, ()
     chosen = verdict.chosen
     out: list[Place] = []
     band = veto_band(heldout, verdict.base.mount, problem.prepared.cutoff)

@@ -19,6 +19,7 @@ LARGEST = 2**30
 _BASE = "http://ssp-standard.org/SSP1/SystemStructure"
 _SPACES = {"ssd": "Description", "ssc": "Common", "ssv": "ParameterValues", "ssm": "ParameterMapping"}
 _DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError)
+"""What `zipfile` raises at a member it cannot unpack: damaged, packed in a way it does not know, or with a password."""
 
 
 class Archive:
