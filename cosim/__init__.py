@@ -1,6 +1,80 @@
 """Run a mount as co-simulation, record it, compare it with a recording, find what is missing, deploy the controller.
 
-SI units inside, other units only where files come in. Time is counted in integer ticks, never summed.
+    read        a file, data frame or dict of arrays  ->  Recording
+    run         a scenario                            ->  RunResult, with its recording
+    diagnose    recordings and a card                 ->  DiagnosisResult: what the card lacks, and a better card
+    identify    recordings and a card                 ->  IdentifyResult: the card's numbers with standard errors
+    export      a card                                ->  Exported: FMUs, SSP, Modelica
+    show        any file of this project              ->  Shown: what it holds
+
+SI units inside, other units only where files come in. Time is counted in integer ticks, never summed. Results print
+themselves on a terminal and show themselves in a notebook. A name is loaded when it is first used: `import cosim` alone
+costs next to nothing. What these raise on purpose is a `CosimError` or a `ModelError`, and its text is one sentence.
 """
 
-__version__ = "0.1.0"
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from cosim.support.version import __version__
+
+if TYPE_CHECKING:
+    from cosim.api.diagnose import DiagnosisResult, diagnose
+    from cosim.api.export import Exported, export
+    from cosim.api.identify import IdentifyResult, identify
+    from cosim.api.recordings import read
+    from cosim.api.run import run
+    from cosim.api.show import Shown, show
+    from cosim.data.recording import Recording
+    from cosim.master.result import RunResult
+    from cosim.support.errors import CosimError, InputError, StepError
+    from pyfmi_models.card import Card, read_card
+    from pyfmi_models.errors import ModelError
+
+_HOMES = {
+    "cosim.api.diagnose": ("DiagnosisResult", "diagnose"),
+    "cosim.api.export": ("Exported", "export"),
+    "cosim.api.identify": ("IdentifyResult", "identify"),
+    "cosim.api.recordings": ("read",),
+    "cosim.api.run": ("run",),
+    "cosim.master.result": ("RunResult",),
+    "cosim.api.show": ("Shown", "show"),
+    "cosim.data.recording": ("Recording",),
+    "cosim.support.errors": ("CosimError", "InputError", "StepError"),
+    "pyfmi_models.card": ("Card", "read_card"),
+    "pyfmi_models.errors": ("ModelError",),
+}
+_HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
+
+__all__ = [
+    "Card",
+    "CosimError",
+    "DiagnosisResult",
+    "Exported",
+    "IdentifyResult",
+    "InputError",
+    "ModelError",
+    "Recording",
+    "RunResult",
+    "Shown",
+    "StepError",
+    "__version__",
+    "diagnose",
+    "export",
+    "identify",
+    "read",
+    "read_card",
+    "run",
+    "show",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name from its home, once."""
+    if name not in _HOME_OF:
+        raise AttributeError(f"module 'cosim' has no attribute {name!r}; it offers: {', '.join(__all__)}")
+    globals()[name] = found = getattr(import_module(_HOME_OF[name]), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -3,8 +3,15 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from cosim.errors import InputError
-from cosim.recording import Recording
+from cosim.data.recording import Recording
+from cosim.support.errors import InputError, UnitError
+from cosim.support.units import unit
+
+LAYOUT = ("separator", "decimal", "header", "encoding", "period")
+"""What `--layout` may say of a text."""
+TORQUE = {"linear": "N", "rotary": "N.m"}
+SUITED = {"linear": {"q": "m", "v": "m/s"}, "rotary": {"q": "rad", "v": "rad/s"}}
+"""Units in which position and speed of an axis are kept."""
 
 
 def read_recordings(
@@ -13,23 +20,42 @@ def read_recordings(
     given: Sequence[str] | None,
     units: Sequence[str] | None,
     motion: str,
+    layout: Sequence[str] | None = None,
 ) -> list[Recording]:
     """Read recordings of an axis that is "rotary" or "linear".
 
     Args:
         paths: the files.
         columns: names of a card, {"tau": "force"}.
-        given: what `--columns` was given, ["tau=force", ...]; it comes before the card's.
-        units: what `--units` was given, ["q=deg", ...].
+        given: what `--columns` was given, ["tau=force", "run3.csv:tau=current", ...]; it comes before the card's, and
+            what is said of one file before what is said of all.
+        units: what `--units` was given, ["q=deg", "run3.csv:q=arcsec", ...].
         motion: kind of the axis.
+        layout: what `--layout` was given, ["decimal=comma", "run3.txt:header=4", ...].
 
     Raises:
-        InputError: a pair is malformed, a unit does not fit the axis, or a recording is bad (`Recording.read`).
+        InputError: a pair is malformed or of no file, a unit does not fit the axis, or a recording is bad
+            (`Recording.read`).
     """
-    names = dict(columns) | pairs_of("--columns", given)
-    recordings = [Recording.read(path, names, pairs_of("--units", units)) for path in paths]
-    _check_kind(recordings, motion)
+    names, scales, written = (
+        _by_file(*one, paths) for one in (("--columns", given), ("--units", units), ("--layout", layout))
+    )
+    for one in written:
+        _check_layout(one)
+    read = zip(paths, names, scales, written, strict=True)
+    recordings = [Recording.read(path, dict(columns) | name, scale, layout=text) for path, name, scale, text in read]
+    check_kind(recordings, motion)
     return recordings
+
+
+def options_of(
+    path: Path, columns: Sequence[str] | None, units: Sequence[str] | None, layout: Sequence[str] | None
+) -> dict[str, dict[str, str]]:
+    """Return what the options say of one file: {"columns": {...}, "units": {...}, "layout": {...}} (InputError)."""
+    given = {"columns": columns, "units": units, "layout": layout}
+    options = {name: _by_file(f"--{name}", texts, [path])[0] for name, texts in given.items()}
+    _check_layout(options["layout"])
+    return options
 
 
 def pairs_of(option: str, given: Sequence[str] | None) -> dict[str, str]:
@@ -41,12 +67,61 @@ def pairs_of(option: str, given: Sequence[str] | None) -> dict[str, str]:
     return {name: value for name, _, value in pairs}
 
 
-def _check_kind(recordings: Sequence[Recording], motion: str) -> None:
-    """Units stated for q or v must be those of the card's kind of axis."""
-    fitting = {"q": "m", "v": "m/s"} if motion == "linear" else {"q": "rad", "v": "rad/s"}
+def _by_file(option: str, given: Sequence[str] | None, paths: Sequence[Path]) -> list[dict[str, str]]:
+    """Return the pairs for each file: those without a file's name, then those with its own."""
+    pairs = pairs_of(option, given)
+    for_all = {name: value for name, value in pairs.items() if ":" not in name}
+    own: list[dict[str, str]] = [{} for _ in paths]
+    for name, value in pairs.items():
+        file, colon, ours = name.rpartition(":")
+        if colon:
+            for place in _places(option, file, paths):
+                own[place][ours] = value
+    return [for_all | one for one in own]
+
+
+def _places(option: str, file: str, paths: Sequence[Path]) -> list[int]:
+    """Return which of the files is meant: by its path, its name, or its name without suffixes."""
+    names = [{str(path), path.name, path.name.partition(".")[0]} for path in paths]
+    places = [place for place, one in enumerate(names) if file in one]
+    if not places:
+        have = tuple(dict.fromkeys(path.name for path in paths))
+        text = f'{option} names the file "{file}", which is not among: {", ".join(have)}.'
+        raise InputError(text, culprit=file, choices=have)
+    return places
+
+
+def _check_layout(layout: Mapping[str, str]) -> None:
+    for key in layout:
+        if key not in LAYOUT:
+            text = f'--layout {key}={layout[key]}: "{key}" is no key; keys there are: {", ".join(LAYOUT)}.'
+            raise InputError(text, culprit=key, choices=LAYOUT)
+
+
+def check_kind(recordings: Sequence[Recording], motion: str) -> None:
+    """Units stated for tau, q or v must be those of the card's kind of axis."""
     for recording in recordings:
-        for name, unit in fitting.items():
-            stated = recording.units.get(name, unit) if name in recording else unit
-            if stated not in (unit, "1"):
-                rule = f"{name} of a {motion} axis is in {unit} or a unit that becomes it"
+        for name, wanted in SUITED[motion].items():
+            stated = recording.units.get(name, wanted) if name in recording else wanted
+            if stated not in (wanted, "1"):
+                rule = f"{name} of a {motion} axis is in {wanted} or a unit that becomes it"
                 raise InputError(f'{recording.name}: the unit of "{name}" becomes {stated}; {rule}.', culprit=name)
+        _check_torque(recording, TORQUE[motion])
+
+
+def _check_torque(recording: Recording, wanted: str) -> None:
+    """A unit stated for tau must be one of torque or force, whichever of the two; a current needs its constant."""
+    stated = recording.units.get("tau", "")
+    try:
+        if not stated or unit(stated).dimension in (
+            unit("1").dimension,
+            *(unit(one).dimension for one in TORQUE.values()),
+        ):
+            return
+    except UnitError:
+        return
+    if stated == "A":
+        rule = f'a current becomes one with the constant of the motor, --units "tau=KT {wanted}", KT in {wanted}/A'
+    else:
+        rule = f"it is a torque or force, in {wanted} or a unit that becomes it"
+    raise InputError(f'{recording.name}: the unit of "tau" becomes {stated}; {rule}.', culprit="tau")

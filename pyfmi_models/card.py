@@ -10,37 +10,37 @@ from dataclasses import MISSING, dataclass, field, fields
 from dataclasses import Field as Declared
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeVar, get_args
 
 from pydantic import Field, ValidationError
 
-from pyfmi_models.controller_section import ControllerSection, Section, Table, compose
+from pyfmi_models.controller_section import ControllerSection, Section, compose
 from pyfmi_models.effects import CATALOGUE, Effect, GravityUnbalance
 from pyfmi_models.errors import CardError
 from pyfmi_models.friction import LAWS, FrictionLaw
 from pyfmi_models.model import Model, Pair, Variable
 from pyfmi_models.mount import Axis, Mount
+from pyfmi_models.near import did_you_mean
+from pyfmi_models.numbers import LARGEST, LARGEST_GIVEN, LEAST, LONGEST_NAME, MOST_COUNTS, Table, parsed, shown
 
 Part = TypeVar("Part")
-LARGEST = 1e300
-"""Beyond this a number in a card is no number: it would overflow in the first product."""
 
 
 class MountSection(Section):
     """`[mount]`: name, motion, inertia [kg m2 or kg], torque limit [N m or N]."""
 
-    name: str = "mount"
+    name: str = Field(default="mount", max_length=LONGEST_NAME)
     motion: Literal["rotary", "linear"] = "rotary"
-    inertia: float = Field(gt=0)
-    torque_limit: float = Field(default=1e6, gt=0)
+    inertia: float = Field(ge=LEAST, le=LARGEST_GIVEN)
+    torque_limit: float = Field(default=1e6, ge=LEAST, le=LARGEST_GIVEN)
 
 
 class EncoderSection(Section):
     """`[encoder]`: counts per turn (0: no quantisation), white noise RMS [rad], encoder turns per axis turn."""
 
-    counts_per_rev: float = Field(default=0.0, ge=0)
-    noise_rms: float = Field(default=0.0, ge=0)
-    ratio: float = Field(default=1.0, gt=0)
+    counts_per_rev: float = Field(default=0.0, ge=0, le=MOST_COUNTS)
+    noise_rms: float = Field(default=0.0, ge=0, le=LARGEST_GIVEN)
+    ratio: float = Field(default=1.0, ge=LEAST, le=LARGEST_GIVEN)
 
 
 class _Card(Section):
@@ -84,6 +84,12 @@ class Card:
             motion=self.mount.motion,
         )
 
+    def remarks(self) -> tuple[str, ...]:
+        """Say what is legal in this card but should be known; the report of a diagnosis and `cosim show` print it."""
+        broken = self.plant().law.broken_passivity()
+        meaning = "Some fast motions would take more energy from the friction than they gave (it is not passive)"
+        return (f'[friction]: {broken}. {meaning}; model = "lugre_passive" without Vd has none.',) if broken else ()
+
     def controller_model(self) -> Model:
         """Make the controller; the card must have a `[controller]` section."""
         if self.controller is None:
@@ -108,7 +114,9 @@ def read_card(source: str | Path) -> Card:
     except IsADirectoryError:
         raise CardError(f"{source} is a folder, not a card.") from None
     except OSError:
-        raise CardError(f"{source}: no such card. Shipped cards are: {', '.join(shipped_cards())}.") from None
+        names = shipped_cards()
+        meant = did_you_mean(str(source), names)
+        raise CardError(f"{source}: no such card. Shipped cards are: {', '.join(names)}.{meant}") from None
     except UnicodeDecodeError:
         raise CardError(f"{source} is not a card: it is not UTF-8 text.") from None
     return parse_card(text, str(source))
@@ -122,7 +130,7 @@ def shipped_cards() -> list[str]:
 def parse_card(text: str, path: str) -> Card:
     """Check the text of a card; `path` is its name in errors."""
     try:
-        raw = _Card.model_validate(tomllib.loads(text))
+        raw = _Card.model_validate(parsed(text))
     except tomllib.TOMLDecodeError as error:
         raise CardError(f"{path} is not valid TOML: {error}.") from None
     except ValidationError as error:
@@ -143,15 +151,30 @@ def parse_card(text: str, path: str) -> Card:
 
 
 def _sentence(error: ValidationError) -> str:
-    first = error.errors()[0]
+    errors = error.errors()  # a misspelt key comes first: it leaves another one missing
+    first = next((one for one in errors if one["type"] == "extra_forbidden"), errors[0])
     *section, key = [str(part) for part in first["loc"]]
     where = f"[{'.'.join(section)}] {key}" if section else f"[{key}]"
     if first["type"] == "extra_forbidden":
-        return f"{where} is not a key of a card."
+        return f"{where} is not a key of a card{_there(section, key)}"
     if first["type"] == "missing":
         return f"{where} is missing."
     rule = first["msg"][:1].lower() + first["msg"][1:]
-    return f"{where} = {first['input']!r} breaks the rule: {rule}."
+    return f"{where} = {shown(first['input'])} breaks the rule: {rule}."
+
+
+def _there(section: list[str], key: str) -> str:
+    """List the keys that a section has, and the one that may have been meant."""
+    part: Any = _Card
+    for name in section:
+        part = part.model_fields[name].annotation if name in part.model_fields else None
+        part = next(
+            (one for one in (part, *get_args(part)) if isinstance(one, type) and issubclass(one, Section)), None
+        )
+        if part is None:
+            return "."
+    keys = tuple(part.model_fields)
+    return f"; keys are: {', '.join(keys)}.{did_you_mean(key, keys)}"
 
 
 def _friction(table: Table, where: str) -> FrictionLaw:
@@ -178,7 +201,7 @@ def _word(table: Table, key: str, choices: Collection[str], where: str) -> str:
     if word is None:
         raise CardError(f"{where} {key} is missing; {key}s are: {listed}.")
     if not isinstance(word, str) or word not in choices:
-        raise CardError(f"{where} {key} = {word!r} is unknown; {key}s are: {listed}.")
+        raise CardError(f"{where} {key} = {word!r} is unknown; {key}s are: {listed}.{did_you_mean(str(word), choices)}")
     return word
 
 
@@ -190,7 +213,9 @@ def _build(part: type[Part], table: Table, where: str) -> Part:
     keys = _keys(part)
     for key, value in table.items():
         if key not in keys:
-            raise CardError(f'{where}: "{key}" is not a key here; keys are: {", ".join(keys)}.')
+            raise CardError(
+                f'{where}: "{key}" is not a key here; keys are: {", ".join(keys)}.{did_you_mean(key, keys)}'
+            )
         table[key] = _value(value, keys[key], issubclass(part, FrictionLaw), f"{where}: {key}")
     for one, other, meaning in (("Fs", "Vs", "speed over which friction falls"), ("Vs", "Fs", "level at rest")):
         if one in table and other in keys and other not in table:
@@ -202,10 +227,14 @@ def _build(part: type[Part], table: Table, where: str) -> Part:
 
 
 def _value(value: Any, item: Declared[Any], by_direction: bool, where: str) -> Any:
-    """Check one value: a list of numbers that shape the equations, a pair by direction, or a number."""
+    """Check one value: what shapes the equations (a word, a list of numbers), a pair by direction, or a number."""
+    if "word" in item.metadata:
+        if not isinstance(value, str):
+            raise CardError(f"{where} = {shown(value)} is not a text.")
+        return value
     if "structure" in item.metadata:
         if not isinstance(value, list):
-            raise CardError(f"{where} = {value!r} is not a list of numbers.")
+            raise CardError(f"{where} = {shown(value)} is not a list of numbers.")
         return tuple(_number(one, item.metadata["structure"], f"{where}[{k}]") for k, one in enumerate(value, 1))
     return (_number_or_pair if by_direction else _number)(value, item.metadata["variable"], where)
 
@@ -213,14 +242,14 @@ def _value(value: Any, item: Declared[Any], by_direction: bool, where: str) -> A
 def _number_or_pair(value: Any, variable: Variable, where: str) -> float | Pair:
     if isinstance(value, dict):
         if set(value) != set(Pair._fields):
-            raise CardError(f"{where} = {value!r} is no pair; a pair is {{ positive = ..., negative = ... }}.")
+            raise CardError(f"{where} = {shown(value)} is no pair; a pair is {{ positive = ..., negative = ... }}.")
         return Pair(**{side: _number(value[side], variable, f"{where}.{side}") for side in Pair._fields})
     return _number(value, variable, where)
 
 
 def _number(value: Any, variable: Variable, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < LARGEST:
-        raise CardError(f"{where} = {value!r} is not a number.")
+        raise CardError(f"{where} = {shown(value)} is not a number.")
     if not variable.low <= value <= variable.high:
         raise CardError(f"{where} = {value:g} is outside {variable.low:g} .. {variable.high:g}.")
     return float(value)

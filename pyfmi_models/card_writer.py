@@ -7,6 +7,7 @@ from typing import Any
 from pyfmi_models.card import Card
 from pyfmi_models.effects import Effect
 from pyfmi_models.model import Pair, parameters_of, structure_of
+from pyfmi_models.numbers import Table
 
 _NUMERICAL = (("smoothing", 1e-5),)
 """Numbers of the solver, not of the machine: left out of a card while they have their default."""
@@ -31,23 +32,23 @@ def card_text(card: Card, comment: str = "") -> str:
     return "\n".join(lines).lstrip("\n") + "\n"
 
 
-def effect_table(effect: Effect) -> dict[str, Any]:
+def effect_table(effect: Effect) -> Table:
     """Return an effect as the table that stands for it in a card."""
     return {"effect": effect.id, **_numbers(effect)}
 
 
-def _numbers(part: Any) -> dict[str, Any]:
+def _numbers(part: Any) -> Table:
     names = [variable.name.split(".")[0] for variable in parameters_of(part)]
     shown = [name for name in dict.fromkeys(names) if (name, getattr(part, name)) not in _NUMERICAL]
     shaping = {name: numbers for name, numbers in structure_of(part).items() if numbers}
     return {name: getattr(part, name) for name in shown} | shaping
 
 
-def _section(name: str, table: dict[str, Any]) -> list[str]:
+def _section(name: str, table: Table) -> list[str]:
     return ["", f"[{name}]", *_pairs(table)]
 
 
-def _pairs(table: dict[str, Any]) -> list[str]:
+def _pairs(table: Table) -> list[str]:
     return [f"{_key(key)} = {_value(value)}" for key, value in table.items() if value is not None]
 
 

@@ -1,6 +1,6 @@
 """The `[controller]` section of a card, and the controller it is composed into."""
 
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -16,8 +16,7 @@ from pyfmi_models.adrc import (
 )
 from pyfmi_models.errors import CardError
 from pyfmi_models.friction import FrictionLaw, LuGre
-
-Table = dict[str, Any]
+from pyfmi_models.numbers import FASTEST, LARGEST_GIVEN, SLOWEST, Table
 
 
 class Section(BaseModel):
@@ -52,11 +51,11 @@ class ControllerSection(Section):
     """
 
     type: Literal["adrc"] = "adrc"
-    kp: float = Field(gt=0)
-    kd: float = Field(gt=0)
-    loop_hz: float = Field(default=10_000.0, gt=0)
-    record_hz: float = Field(default=1_000.0, gt=0)
-    observer_bandwidth: float = Field(default=220.0, gt=0)
+    kp: float = Field(gt=0, le=LARGEST_GIVEN)
+    kd: float = Field(gt=0, le=LARGEST_GIVEN)
+    loop_hz: float = Field(default=10_000.0, ge=SLOWEST, le=FASTEST)
+    record_hz: float = Field(default=1_000.0, ge=SLOWEST, le=FASTEST)
+    observer_bandwidth: float = Field(default=220.0, gt=0, le=FASTEST)
     observer_order: Literal[3, 4] = 3
     velocity: Literal["observer", "difference"] = "observer"
     compensation: Literal["C1", "C2a", "C2b", "C3a", "C3b", "C2a+C3a"] = "C1"

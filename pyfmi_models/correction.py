@@ -63,7 +63,7 @@ class _Side:
     """One of the two mounts in symbols: what it needs at a motion that the plant tells."""
 
     def __init__(self, name: str, mount: Mount) -> None:
-        owners: dict[str, Any] = {"friction": mount.law, **dict(mount.of_kind(Effect))}
+        owners: dict[str, Scalar] = {"friction": mount.law, **dict(mount.of_kind(Effect))}
         listed = {owner: [_of(mount, name, owner, one) for one in part.states()] for owner, part in owners.items()}
         self.states = tuple(state for states in listed.values() for state in states)
         self.parameters = tuple(replace(one, name=f"{name}.{one.name}") for one in mount.parameters())

@@ -7,7 +7,7 @@ Each part of the mount, and the mount itself, is replaced by a listening copy, w
 from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import wraps
-from typing import Any
+from typing import Any, Self
 
 import casadi as ca
 
@@ -67,7 +67,7 @@ def _note(heard: dict[str, tuple[Variable, Any]], name: str, variable: Variable,
 
 def _listening_mount(mount: Mount, hear: Hear) -> Mount:
     class Listening(Mount):
-        def with_symbols(self, symbols: dict[str, Any], v: Scalar) -> Mount:
+        def with_symbols(self, symbols: dict[str, Scalar], v: Scalar) -> Self:
             this = super().with_symbols(symbols, v)
             _hear_pairs(mount, this, hear)
             axis, *rest = (_listening(part, f"{prefix}.", hear) for prefix, part in this.components().items())

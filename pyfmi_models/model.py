@@ -94,6 +94,21 @@ class Derivation:
 Component = TypeVar("Component")
 
 
+class Recorded(NamedTuple):
+    """What recordings reach: highest speed [rad/s], and the torque command that is hardly ever exceeded [N m]."""
+
+    speed: float
+    torque: float
+
+
+class Part:
+    """What carries parameters: an axis, a friction law, an effect."""
+
+    def fit_bounds(self, variable: Variable, recorded: Recorded) -> tuple[float, float]:
+        """Bounds of a parameter in a fit: its own, and what the recordings can tell; `variable` without prefix."""
+        return variable.low, variable.high
+
+
 def parameter(
     unit: str,
     description: str,
@@ -103,20 +118,27 @@ def parameter(
     high: float = inf,
     nominal: float = 1.0,
     tunable: bool = True,
+    fitted: bool = True,
 ) -> Any:
     """Declare a physical parameter of a component: unit, meaning and the bounds every user of it respects.
 
     Say `tunable=False` where a change in a run would change what the states mean, and so make torque out of nothing.
+    Say `fitted=False` of what a fit to recordings leaves as it is: a limit, the shape of a law, a number of a grid.
     """
     numbers = {"low": low, "high": high, "nominal": nominal}
     variable = Variable(name="", unit=unit, description=description, tunable=tunable, **numbers)
-    return field(default=default, metadata={"variable": variable})
+    return field(default=default, metadata={"variable": variable, "fitted": fitted})
 
 
 def structure(unit: str, description: str, *, low: float = -inf, high: float = inf) -> Any:
     """Declare a tuple of numbers that shapes the equations themselves: a card key, but no FMU variable and no fit."""
     variable = Variable(name="", unit=unit, description=description, low=low, high=high)
     return field(default=(), metadata={"structure": variable})
+
+
+def word(description: str, *, default: Any = MISSING) -> Any:
+    """Declare a text that shapes the equations: a card key, but no FMU variable and no fit."""
+    return field(default=default, metadata={"word": description})
 
 
 def parameters_of(component: Any, prefix: str = "") -> tuple[Variable, ...]:
@@ -134,12 +156,12 @@ def parameters_of(component: Any, prefix: str = "") -> tuple[Variable, ...]:
     return tuple(found)
 
 
-def with_symbols(component: Component, symbols: dict[str, Any], direction: Any, prefix: str = "") -> Component:
+def with_symbols(component: Component, symbols: dict[str, Scalar], direction: Any, prefix: str = "") -> Component:
     """Return the component with a symbol in the place of each number; `symbols` maps full names to them.
 
     A `Pair` becomes the symbol of the side that `direction` (a signed speed) points to.
     """
-    changes: dict[str, Any] = {}
+    changes: dict[str, Scalar] = {}
     for name, _, value in _declared(component):
         full = f"{prefix}.{name}" if prefix else name
         if isinstance(value, Pair):
@@ -149,7 +171,7 @@ def with_symbols(component: Component, symbols: dict[str, Any], direction: Any, 
     return replace(component, **changes)  # type: ignore[type-var]
 
 
-def symbols_of(variables: tuple[Variable, ...]) -> tuple[Any, dict[str, Any]]:
+def symbols_of(variables: tuple[Variable, ...]) -> tuple[Any, dict[str, Scalar]]:
     """Make one CasADi column of symbols for the variables, and a dictionary from name to entry."""
     column = ca.SX.sym("p", len(variables))
     return column, {variable.name: column[index] for index, variable in enumerate(variables)}
@@ -160,9 +182,15 @@ def _declared(component: Any) -> list[tuple[str, Variable, Any]]:
     return [(name, variable, value) for name, variable, value in declared if variable is not None and value is not None]
 
 
-def structure_of(component: Any) -> dict[str, tuple[float, ...]]:
-    """Numbers of a component that shape its equations, by field; see `structure`."""
-    return {item.name: getattr(component, item.name) for item in fields(component) if "structure" in item.metadata}
+def unfitted_of(component: Any) -> tuple[str, ...]:
+    """Names of the parameters of a component that a fit leaves as they are."""
+    return tuple(item.name for item in fields(component) if not item.metadata.get("fitted", True))
+
+
+def structure_of(component: Any) -> dict[str, tuple[float, ...] | str]:
+    """Numbers and words of a component that shape its equations, by field; see `structure` and `word`."""
+    shaping = [item.name for item in fields(component) if item.metadata.keys() & {"structure", "word"}]
+    return {name: getattr(component, name) for name in shaping}
 
 
 def chapter_of(part: Any, prefix: str, place: str, onto: str = "", title: str = "") -> Chapter:

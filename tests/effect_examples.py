@@ -22,6 +22,7 @@ NUMBERS: dict[str, dict[str, Any]] = {
     "Presliding": {"sigma0": 2e4, "sigma1": 90.0},
     "Cogging": {"cycles_per_rev": 24, "amplitude": 0.5, "phase": 0.3, "harmonics": (0.4, -0.2)},
     "PeriodicFriction": {"cycles_per_rev": 3, "relative_amplitude": 0.2, "phase": 0.4},
+    "LoadScaledFriction": {"coulomb_per_Nm": 0.1, "at_level": 2.0},
     "LocalFriction": {"q_center": 1.0, "width": 0.05, "relative_amplitude": 0.3},
     "GravityUnbalance": {"mgl": 1.5, "phase": 0.2},
     "TorqueOffset": {"torque": 0.7},
@@ -30,6 +31,7 @@ NUMBERS: dict[str, dict[str, Any]] = {
     "RubbedViscosity": {"viscous_per_degC": -0.04, "heat_degC_per_rad": 8.0, "cooling_s": 30.0},
     "DwellBreakaway": {"torque_per_efold": 0.3},
     "Compliance": {"antiresonance_hz": 20.0, "resonance_hz": 25.0},
+    "LoadSideCompliance": {"resonance_hz": 60.0, "encoder_share": 0.6},
     "ActuatorLag": {"time_constant_ms": 4.0},
     "Delay": {"delay_ms": 4.0},
     "Backlash": {"gap_rad": 1e-2, "load_friction": 0.1},
@@ -42,6 +44,18 @@ NUMBERS: dict[str, dict[str, Any]] = {
     "LoadDependentFriction": {"coulomb_per_Nm": 0.2},
     "TorqueSaturation": {"knee_torque": 5.0, "slope": 0.4},
     "PeriodicDisturbance": {"frequency_hz": 3.0, "amplitude": 0.6, "phase": 0.2},
+    "LearnedTorque": {"over": "position", "seen": (-1.0, 1.2), "torque": (0.3, 0.5, -0.2, 0.1)},
+    "LearnedFriction": {
+        "over": "position",
+        "seen": (-1.0, 1.2),
+        "by": "temperature",
+        "by_seen": (15.0, 35.0),
+        "waves": (2, 1),
+        "level_change": (0.1, 0.2, -0.1, 0.05, 0.1, -0.2),
+    },
+    "LearnedDrive": {"command_seen": (-20.0, 20.0), "missing": (0.0, 0.1, 0.0, -0.2)},
+    "LearnedHysteresis": {"strokes": (0.1, 0.4), "torque": (0.2, 0.3)},
+    "LearnedAfterReversal": {"times": (0.1, 0.4), "level_change": (0.2, -0.1)},
     "ClockSkew": {"drift_ppm": 100.0, "offset_ms": 4.0},
 }
 LAW = Coulomb(Fc=1.0, sigma2=3.0)
@@ -58,7 +72,9 @@ def inside(variable: Variable) -> float:
 def example(form: type[Effect]) -> Effect:
     """Return an effect with the numbers above where there are any."""
     required = {item.name: item for item in fields(form) if item.default is MISSING}
-    guessed = {name: inside(item.metadata["variable"]) for name, item in required.items()}
+    guessed = {
+        name: inside(item.metadata["variable"]) for name, item in required.items() if "variable" in item.metadata
+    }
     return form(**(guessed | NUMBERS.get(form.__name__, {})))
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from export_models import Driver
 
-from cosim.cli_firmware import INPUT, OUTPUT, quantum_of
+from cosim.cli.firmware import INPUT, OUTPUT, quantum_of
 from pyfmi_models.card import Card
 from pyfmi_models.export import build_library
 from pyfmi_models.export.build import compile_shared

@@ -8,15 +8,15 @@ import numpy as np
 from typer.testing import CliRunner
 
 from cosim.cli import application
-from cosim.cli_cache import with_fmus
+from cosim.data.recording import Recording
 from cosim.hardware.blackbox import read_black_box, recording_of
 from cosim.hardware.machine import Inject, Machine, read_machine
 from cosim.hardware.session import Session
 from cosim.hardware.words import FAULTS
-from cosim.master import run
-from cosim.recording import Recording
-from cosim.scenario import Scenario, parse_scenario
-from cosim.wiring import Record
+from cosim.master.simulate import run
+from cosim.models.cache import with_fmus
+from cosim.system.scenario import Scenario, parse_scenario
+from cosim.system.wire import Record
 
 SCENARIO = """
 name = "hardware"

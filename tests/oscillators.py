@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from simulating import simulate
 from tiny_fmu import described, description, tiny
 
-from cosim.master import Run, simulate
+from cosim.master.result import RunResult
 
 __all__ = ["tiny"]
 
@@ -26,7 +27,7 @@ def plain(tiny: Tiny, tmp_path_factory: pytest.TempPathFactory) -> Tiny:
     return {version: described(tiny[version], folder / f"plain{version}.fmu", texts[version]) for version in tiny}
 
 
-def oscillator(fmu: Path, algorithm: Any, ticks: int = 400, step: float = H, **options: Any) -> Run:
+def oscillator(fmu: Path, algorithm: Any, ticks: int = 400, step: float = H, **options: Any) -> RunResult:
     """Simulate v' = 1 - x and x' = v, from rest, as two FMUs: x = 1 - cos t."""
     return simulate(
         {"mass": fmu, "spring": fmu},

@@ -56,8 +56,8 @@ def region(axis: str, unit: str, traces: tuple[Trace, ...], after: bool) -> Regi
 FOUND = (
     Finding(
         effect="cogging", title="Cogging", answer="found", probability=0.97, gain=0.62,
-        parameters={"cycles_per_rev": 24.0, "amplitude": 0.42, "phase": 0.4, "harmonics": [
-            {"cycles_per_rev": 48.0, "amplitude": 0.125, "phase": -0.3}]},
+        parameters={"cycles_per_rev": 24.0, "amplitude": 0.42, "phase": 0.4},
+        harmonics=({"cycles_per_rev": 48.0, "amplitude": 0.125, "phase": -0.3},),
         units={"amplitude": "N·m", "phase": "rad"},
         standard_errors={"amplitude": 0.015, "phase": 0.03}, ranges={"amplitude": (0.39, 0.45), "phase": (0.34, 0.46)},
         size="0.42 N·m", size_range="0.39 to 0.45", visible_from=0.05,

@@ -7,8 +7,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 import pytest
+from simulating import simulate
 
-from cosim.master import simulate
 from pyfmi_models.adrc import (
     Adaptation,
     Adrc,

@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from oscillators import BOND, BOTH, Tiny, oscillator, plain
+from simulating import simulate
 from tiny_fmu import described, description, tiny
 
-from cosim.algorithm import Energy, GaussSeidel, Iterated, Jacobi
-from cosim.errors import StepError, WiringError
-from cosim.master import Run, simulate
-from cosim.wiring import Wire
+from cosim.master.result import RunResult
+from cosim.support.errors import StepError, WiringError
+from cosim.system.algorithm import Energy, GaussSeidel, Iterated, Jacobi
+from cosim.system.wire import Wire
 
 __all__ = ["plain", "tiny"]
 
@@ -24,7 +25,7 @@ def direct(tiny: Tiny, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return described(tiny[3], tmp_path_factory.mktemp("direct") / "direct.fmu", description(3, direct=True))
 
 
-def amplifiers(fmu: Path, algorithm: Any, **options: Any) -> Run:
+def amplifiers(fmu: Path, algorithm: Any, **options: Any) -> RunResult:
     """y1 = 4 (1 - y2), y2 = 3 y1, both at once: y1 = 4/13."""
     wires = [Wire("r", "one.a"), Wire("two.y", "one.b", **options.pop("wire", {})), Wire("one.y", "two.a")]
     parameters = {"one": {"mode": 2.0, "k": 4.0}, "two": {"mode": 2.0, "k": 3.0}}

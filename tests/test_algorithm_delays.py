@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 from oscillators import BOTH, Tiny
+from simulating import simulate
 from tiny_fmu import tiny
 
-from cosim.algorithm import GaussSeidel, Iterated, Jacobi
-from cosim.errors import StepError
-from cosim.master import simulate
-from cosim.schedule import delays
-from cosim.wiring import Wire
+from cosim.support.errors import StepError
+from cosim.system.algorithm import GaussSeidel, Iterated, Jacobi
+from cosim.system.schedule import delays
+from cosim.system.wire import Wire
 
 __all__ = ["tiny"]
 

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 from oscillators import BOND, BOTH, VERSIONS, H, Tiny, oscillator, plain
+from simulating import simulate
 from tiny_fmu import tiny
 from two_mass import START, export
 
-from cosim.algorithm import Energy, GaussSeidel, Iterated, Jacobi
-from cosim.errors import StepError
-from cosim.master import simulate
+from cosim.support.errors import StepError
+from cosim.system.algorithm import Energy, GaussSeidel, Iterated, Jacobi
 
 __all__ = ["plain", "tiny"]
 

@@ -14,7 +14,7 @@ import master_step
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_runners_of_the_step_benchmark_take_their_steps(tmp_path: Path, fmi: int) -> None:
     folder = master_step.pair(tmp_path, fmi)
-    for name in ("c", "cosim", "gauss_seidel", "interpreted", "fmpy"):
+    for name in ("c", "cosim", "gauss_seidel", "isolated", "interpreted", "fmpy"):
         assert isfinite(master_runners.RUNNERS[name](folder, fmi, 30)), name
 
 

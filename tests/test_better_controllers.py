@@ -7,17 +7,17 @@ from pathlib import Path
 
 import pytest
 
-from cosim.errors import InputError
-from cosim.paper.comparison import A, B, Comparison, Plan, compare
-from cosim.paper.comparison_figures import comparison_figures
-from cosim.paper.comparison_tables import better, frontier_text, rows_csv, tables
-from cosim.paper.conditions import condition
-from cosim.paper.frontier import Design, choice, designs, frontier
-from cosim.paper.margins import Margins
-from cosim.paper.options import REFERENCE, Option, options, repeating, settled
-from cosim.paper.report import rendered
-from cosim.paper.robustness import Stress, stresses
-from cosim.paper.workshop import Workshop
+from cosim.support.errors import InputError
+from cosim_studies.paper.comparison import A, B, Comparison, Plan, compare
+from cosim_studies.paper.comparison_figures import comparison_figures
+from cosim_studies.paper.comparison_tables import better, frontier_text, rows_csv, tables
+from cosim_studies.paper.conditions import condition
+from cosim_studies.paper.frontier import Design, choice, designs, frontier
+from cosim_studies.paper.margins import Margins
+from cosim_studies.paper.options import REFERENCE, Option, options, repeating, settled
+from cosim_studies.paper.report import rendered
+from cosim_studies.paper.robustness import Stress, stresses
+from cosim_studies.paper.workshop import Workshop
 from pyfmi_models.card import parse_card
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.effects import FrictionWander

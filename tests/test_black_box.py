@@ -6,18 +6,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 from foreign_fmu import foreign
+from simulating import simulate
 
+from cosim.data.recording import Recording
+from cosim.data.signals import Multisine
 from cosim.diagnosis.black_box import Base, BlackBox, as_base
-from cosim.diagnosis.corrected import Correction
-from cosim.diagnosis.prepare import prepare
+from cosim.diagnosis.correction_fmu import Correction
 from cosim.diagnosis.protocol import residuals
-from cosim.errors import InputError, WiringError
-from cosim.master import run, simulate
-from cosim.recording import Recording
-from cosim.renamed import Alias
-from cosim.scenario import read_scenario
-from cosim.signals import Multisine
-from cosim.wiring import Record
+from cosim.estimation.prepare import prepare
+from cosim.fmi.renamed import Alias
+from cosim.master.simulate import run
+from cosim.support.errors import InputError, WiringError
+from cosim.system.scenario import read_scenario
+from cosim.system.wire import Record
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.correction import correction, left_out
 from pyfmi_models.effects import ActuatorLag, Cogging, FrictionAsymmetry

@@ -194,13 +194,19 @@ COGGING = 'effect = "cogging"\ncycles_per_rev = 3\namplitude = 0.1\n'
 MISTAKES = {
     "no TOML": ("[mount", "bad.toml is not valid TOML: Expected ']'"),
     "key twice": (SMALL + "Fc = 2\n", "bad.toml is not valid TOML: Cannot overwrite a value"),
-    "unknown section": (SMALL + "[fricton]\n", "bad.toml: [fricton] is not a key of a card."),
-    "unknown key": (SMALL + "[encoder]\ncounts = 3\n", "bad.toml: [encoder] counts is not a key of a card."),
+    "unknown section": (
+        SMALL + "[fricton]\n",
+        "bad.toml: [fricton] is not a key of a card; keys are: mount, friction,",
+    ),
+    "unknown key": (
+        SMALL + "[encoder]\ncounts = 3\n",
+        "bad.toml: [encoder] counts is not a key of a card; keys are: counts_per_rev,",
+    ),
     "no friction": ("[mount]\ninertia = 2\n", "bad.toml: [friction] is missing."),
     "no inertia": (SMALL.replace("inertia = 2.0", ""), "bad.toml: [mount] inertia is missing."),
     "negative inertia": (
         SMALL.replace("2.0", "-2.0"),
-        "bad.toml: [mount] inertia = -2.0 breaks the rule: input should be greater than 0.",
+        "bad.toml: [mount] inertia = -2.0 breaks the rule: input should be greater than or equal to 0.000000001.",
     ),
     "infinite inertia": (
         SMALL.replace("2.0", "inf"),
@@ -216,7 +222,7 @@ MISTAKES = {
     ),
     "unknown key of the adaptation": (
         SMALL + "[controller]\nkp = 1\nkd = 1\n[controller.adaptation]\nspeed = 1\n",
-        "bad.toml: [controller.adaptation] speed is not a key of a card.",
+        "bad.toml: [controller.adaptation] speed is not a key of a card; keys are: memory, slowest,",
     ),
     "unknown law in the controller": (
         SMALL + '[controller]\nkp = 1\nkd = 1\n[controller.friction]\nmodel = "sand"\n',
@@ -310,7 +316,7 @@ def test_a_card_that_is_not_there_lists_those_that_are() -> None:
     with pytest.raises(CardError) as caught:
         read_card("paper_mont")
     names = "altaz_altitude, altaz_azimuth, emps, paper_mount, paper_mount_directional"
-    assert str(caught.value) == f"paper_mont: no such card. Shipped cards are: {names}."
+    assert str(caught.value) == f'paper_mont: no such card. Shipped cards are: {names}. Did you mean "paper_mount"?'
 
 
 def test_a_folder_is_no_card(tmp_path: Path) -> None:

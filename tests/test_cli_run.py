@@ -13,13 +13,13 @@ import pytest
 from test_scenario import TEXT
 from tiny_fmu import tiny
 
-import cosim.cli_cache
+import cosim.models.cache
 from cosim.cli import main
-from cosim.recording import Recording
+from cosim.data.recording import Recording
 
 __all__ = ["tiny"]
 
-ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(cosim.cli_cache.__file__).parents[1]), "NO_COLOR": "1"}
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(Path(cosim.models.cache.__file__).parents[2]), "NO_COLOR": "1"}
 
 
 @pytest.fixture
@@ -32,7 +32,7 @@ def scenario(tiny: dict[int, Path], tmp_path: Path) -> Path:
 @pytest.fixture(autouse=True)
 def cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
     home = tmp_path_factory.mktemp("cache")
-    monkeypatch.setattr(cosim.cli_cache, "_home", lambda: home)
+    monkeypatch.setattr(cosim.models.cache, "_home", lambda: home)
     return home
 
 
@@ -86,7 +86,7 @@ def test_a_mistake_is_one_sentence_and_exit_code_2(tmp_path: Path, capsys: pytes
 
 
 def test_debug_shows_where_it_came_from(tmp_path: Path) -> None:
-    from cosim.errors import ScenarioError
+    from cosim.support.errors import ScenarioError
 
     with pytest.raises(ScenarioError):
         main(["run", "none.toml", "--out", str(tmp_path), "--debug"])
@@ -128,9 +128,10 @@ def test_ctrl_c_and_termination_leave_a_complete_file(
     command = [sys.executable, "-c", start, "run", str(scenario), "--out", str(tmp_path / "out")]
     with subprocess.Popen(command, env=ENVIRONMENT, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
         until = time.monotonic() + 60
-        while not list(tmp_path.glob("out/.*.partial")) and time.monotonic() < until:
-            time.sleep(0.05)
-        time.sleep(0.3)
+        while time.monotonic() < until and not any(
+            one.stat().st_size > 1000 for one in tmp_path.glob("out/.*.partial")
+        ):
+            time.sleep(0.05)  # until the first group of rows is in the file
         process.send_signal(number)
         _, said = process.communicate(timeout=60)
     assert process.returncode == code
@@ -144,12 +145,12 @@ def test_ctrl_c_and_termination_leave_a_complete_file(
 def test_a_long_run_says_how_long_and_an_absurd_one_is_refused(
     scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import cosim.cli_run
+    import cosim.cli.run
 
     told: list[str] = []
     with monkeypatch.context() as clock:
-        clock.setattr(cosim.cli_run, "perf_counter", iter([0.0, 2.0, 4.0]).__next__)
-        progress = cosim.cli_run.foretold(lambda done, of: None, 2_000_000_000, told.append)
+        clock.setattr(cosim.cli.run, "perf_counter", iter([0.0, 2.0, 4.0]).__next__)
+        progress = cosim.cli.run.foretold(lambda done, of: None, 2_000_000_000, told.append)
         progress(1000, 7_201_000)
         progress(2000, 7_201_000)
     assert told == ["about 4 h to go; the recording grows to 2 GB"]
@@ -210,7 +211,7 @@ def test_export_writes_plant_and_controller_for_both_versions(
         ),
         ("paper_mount", ["card: paper_mount", "friction.sigma0", "kg.m2", "controller: C2a"]),
         ("loop.toml", ["scenario: loop", "x 2; quantum 1e-06; + n", "r.position"]),
-        ("tiny3.fmu", ["FMI: 3.0", "model: tiny", "output     rad"]),
+        ("tiny3.fmu", ["FMI: 3.0", "model: tiny", "output     Float64  rad"]),
         ("run.csv", ["rows: 200", "rate: 1000 Hz", "least", "gaps: 0"]),
     ],
 )

@@ -9,22 +9,22 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from cosim.demo import beside
 from cosim.diagnosis import regression
 from cosim.diagnosis.closed_loop import Loops
-from cosim.diagnosis.fit import fit
-from cosim.diagnosis.inverse import Inverse, stacked
-from cosim.diagnosis.prepare import lowpass, prepare
 from cosim.diagnosis.regression import kernel
-from cosim.diagnosis.rowwise import recurrence
-from cosim.proof.generator import make_case, write_case
-from cosim.proof.tool import given
+from cosim.estimation.fit import fit
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.prepare import lowpass, prepare
+from cosim.estimation.rowwise import recurrence
+from cosim_studies.demo import beside
+from cosim_studies.proof.generator import make_case, write_case
+from cosim_studies.proof.tool import given
 from pyfmi_models.card import read_card
 
 FAULTS = """
 import resource
 import numpy as np
-from cosim.memory import keep_freed_memory
+from cosim.support.memory import keep_freed_memory
 if {kept}:
     keep_freed_memory()
 for _ in range(20):

@@ -1,7 +1,8 @@
 """Plant and concealed truth mean the same by an effect: signs, phases, units, where it acts.
 
-`cosim/proof/truth.c` shares no equation and no integrator with the plant. Its loop is run with the effect; the plant
-gets the recorded command, once with and once without the effect. What the effect did must be explained.
+`cosim_studies/proof/truth.c` shares no code and no integrator with the plant; most effects are the same formula,
+and that is what is tested. Its loop is run with the effect; the plant gets the recorded command, once with and once
+without the effect. What the effect did must be explained.
 """
 
 from typing import Any
@@ -11,11 +12,11 @@ import numpy as np
 import pytest
 from effect_examples import mount
 
-from cosim.proof import truth
-from cosim.proof.bench import draw_bench
-from cosim.proof.families import periodic_disturbance
-from cosim.proof.recorder import columns_of
-from cosim.proof.truth import BLOCKS, TICK, Drive
+from cosim_studies.proof import truth
+from cosim_studies.proof.bench import draw_bench
+from cosim_studies.proof.families import periodic_disturbance
+from cosim_studies.proof.recorder import columns_of
+from cosim_studies.proof.truth import BLOCKS, TICK, Drive
 from pyfmi_models.effects import (
     ActuatorLag,
     Cogging,

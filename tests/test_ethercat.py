@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 from on_hardware import SIMULATED, assert_safe, recorded, scenario
 
-from cosim.errors import HardwareError, MissingPackageError
 from cosim.hardware.ethercat import CHECKED_EVERY
 from cosim.hardware.machine import Machine, changed, parse_machine
 from cosim.hardware.mapping import Entry, Ethercat, Layout
 from cosim.hardware.replay import replay
 from cosim.hardware.session import Session, run_session
+from cosim.support.errors import HardwareError, MissingPackageError
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 

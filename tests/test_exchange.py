@@ -10,13 +10,14 @@ import export_models as models
 import fmpy
 import numpy as np
 import pytest
+from simulating import simulate
 from tiny_fmu import tiny
 
-from cosim.errors import FmuError, StepError
-from cosim.exchange import ExchangeComponent, open_fmu
-from cosim.fmu import FmuComponent
-from cosim.master import run, simulate
-from cosim.scenario import parse_scenario
+from cosim.fmi.fmu import FmuComponent
+from cosim.master.exchange import ExchangeComponent, open_fmu
+from cosim.master.simulate import run
+from cosim.support.errors import FmuError, StepError
+from cosim.system.scenario import parse_scenario
 from pyfmi_models.export import export_fmu
 
 __all__ = ["tiny"]
@@ -224,6 +225,6 @@ def test_a_model_that_leaves_its_domain_says_so(fmus: dict[tuple[str, int], Path
 def test_without_the_compiled_loop_there_is_no_solver(
     fmus: dict[tuple[str, int], Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cosim.exchange.library", lambda: None)
+    monkeypatch.setattr("cosim.master.exchange.library", lambda: None)
     with pytest.raises(FmuError, match="its solver needs the compiled loop, which is missing here"):
         ExchangeComponent(fmus["lugre", 3])

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim.data.recording import Recording
 from cosim.diagnosis.experiment import best, motions, scenario, told
-from cosim.diagnosis.prepare import Prepared, prepare
-from cosim.recording import Recording
-from cosim.scenario import read_scenario
+from cosim.estimation.prepare import Prepared, prepare
+from cosim.system.scenario import read_scenario
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import ActuatorLag, Cogging, Delay, TorqueOffset
 

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
+from simulating import simulate
 from tiny_fmu import tiny
 
-from cosim.errors import ScenarioError, WiringError
-from cosim.faults import Fault
-from cosim.master import simulate
-from cosim.recording import Recording
-from cosim.scenario import parse_scenario
-from cosim.wiring import Wire
+from cosim.data.recording import Recording
+from cosim.support.errors import ScenarioError, WiringError
+from cosim.system.faults import Fault
+from cosim.system.scenario import parse_scenario
+from cosim.system.wire import Wire
 
 __all__ = ["tiny"]
 
@@ -130,7 +130,7 @@ signals = ["one.a"]
 
 
 def test_faults_are_read_from_a_scenario_and_kept_in_the_recording(tiny: Tiny) -> None:
-    from cosim.master import run as run_scenario
+    from cosim.master.simulate import run as run_scenario
 
     done = run_scenario(parse_scenario(TEXT, "x.toml", tiny[3].parent)).recording
     np.testing.assert_allclose(done["one.a"], np.where(RAMP < 20, RAMP * 1e-3, 7.0), atol=1e-15)

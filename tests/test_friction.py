@@ -119,6 +119,18 @@ def test_with_its_default_spread_maxwell_slip_loads_like_dahl() -> None:
     assert np.abs(torque / 2.322 - (1 - np.exp(-x / BEND))).max() < 0.062
 
 
+@pytest.mark.parametrize("v", [-0.3, -1e-3, 1e-5, 0.05])
+def test_the_damping_of_maxwell_slip_is_sigma1_for_the_elements_that_stick(v: float) -> None:
+    """Written out by hand: stuck elements all give sigma1 v; each that slips takes its share of the stiffness away."""
+    law = replace(SHARP, sigma2=0.0)
+    this, k, level = numeric(law), ca.DM(law.stiffness()).full().ravel(), float(law.level(v))
+    assert this("torque", np.zeros(law.elements), v)[0] == pytest.approx(law.sigma1 * v, rel=1e-12)
+    for slipping in (1, 5, law.elements):
+        state = np.where(np.arange(law.elements) < slipping, np.sign(v) * level / law.elements, 0.0)
+        damping = law.sigma1 * k[slipping:].sum() / law.sigma0
+        assert this("torque", state, v)[0] == pytest.approx(state.sum() + damping * v, rel=1e-9)
+
+
 @pytest.mark.parametrize("reached", [0.2, 0.8, 2.0, 6.0])
 @pytest.mark.parametrize(("attraction", "tolerance"), [(50.0, 4e-3), (200.0, 1e-3), (1000.0, 2e-4)])
 def test_maxwell_slip_obeys_masings_rule(reached: float, attraction: float, tolerance: float) -> None:

@@ -6,12 +6,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from simulating import simulate
 from tiny_fmu import tiny
 
-from cosim.errors import ScenarioError, StepError, WiringError
-from cosim.function import FunctionComponent
-from cosim.master import Run, run, simulate
-from cosim.scenario import parse_scenario
+from cosim.fmi.function import FunctionComponent
+from cosim.master.result import RunResult
+from cosim.master.simulate import run
+from cosim.support.errors import ScenarioError, StepError, WiringError
+from cosim.system.scenario import parse_scenario
 
 __all__ = ["tiny"]
 
@@ -24,7 +26,7 @@ def proportional(t: float, a: float, b: float, k: float = 5.0) -> float:
     return k * (a - b)
 
 
-def control_loop(plant: Path, controller: Any, parameters: Any, **options: Any) -> Run:
+def control_loop(plant: Path, controller: Any, parameters: Any, **options: Any) -> RunResult:
     return simulate(
         {"plant": plant, "controller": controller},
         [("controller.y", "plant.a"), ("plant.y", "controller.b"), ("r", "controller.a")],

@@ -7,11 +7,11 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from cosim.cli_cache import with_fmus
-from cosim.diagram import draw
-from cosim.master import run
-from cosim.scenario import read_scenario
+from cosim.master.simulate import run
+from cosim.models.cache import with_fmus
 from cosim.sweep import conduct, read_sweep
+from cosim.system.diagram import draw
+from cosim.system.scenario import read_scenario
 
 GUIDE = (Path(__file__).parents[1] / "docs" / "scenarios.md").read_text("utf-8")
 BLOCKS = re.findall(r"```(\w+)\n(.*?)```", GUIDE, re.DOTALL)

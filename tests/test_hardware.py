@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from on_hardware import SCENARIO, invoke, recorded, scenario, session, simulated
 
-from cosim.errors import HardwareError
+from cosim.data.recording import Recording
 from cosim.hardware.machine import parse_machine
 from cosim.hardware.replay import replay
 from cosim.hardware.session import run_session
 from cosim.hardware.words import LIMITS
-from cosim.master import run
-from cosim.recording import Recording
+from cosim.master.simulate import Options, run
+from cosim.support.errors import HardwareError
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 
@@ -183,7 +183,7 @@ def test_the_command_runs_replays_and_says_no(tmp_path: Path) -> None:
     bad = replace(found, table=found.table | {"machine.order": order}).write(tmp_path / "bad.parquet")
     assert invoke("replay", str(bad)).exit_code == 1
     simulation = tmp_path / "simulation.parquet"
-    run(scenario(), simulation)
+    run(scenario(), Options(path=simulation))
     assert invoke("replay", str(simulation)).exit_code == 2
     looked = invoke("check", str(path), "--seconds", "0.05")
     assert looked.exit_code == 0, looked.output

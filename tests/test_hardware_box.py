@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 from on_hardware import SIMULATED, recorded, scenario, session
 
-from cosim.errors import HardwareError
+from cosim.data.recording import Recording
 from cosim.hardware.blackbox import HEADER, read_black_box
 from cosim.hardware.replay import replay
 from cosim.hardware.session import Session, run_session
 from cosim.hardware.structures import RECORD
-from cosim.master import run
-from cosim.recording import Recording
-from cosim.wiring import Record
+from cosim.master.simulate import run
+from cosim.support.errors import HardwareError
+from cosim.system.wire import Record
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 

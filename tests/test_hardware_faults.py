@@ -9,12 +9,12 @@ import pytest
 from on_hardware import AT, INJECTED, SCENARIO, SIMULATED, assert_safe, machine, recorded, scenario, session
 from tiny_fmu import described, description, tiny
 
-from cosim.cli_cache import with_fmus
-from cosim.errors import HardwareError
 from cosim.hardware.replay import replay
 from cosim.hardware.session import Session, run_session
 from cosim.hardware.words import FAULTS
-from cosim.scenario import parse_scenario
+from cosim.models.cache import with_fmus
+from cosim.support.errors import HardwareError
+from cosim.system.scenario import parse_scenario
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from on_hardware import SCENARIO, SIMULATED, assert_safe, invoke, recorded, scenario
 
-from cosim.errors import CosimError
 from cosim.hardware.machine import changed, read_machine
 from cosim.hardware.replay import replay
 from cosim.hardware.session import Session, run_session
+from cosim.support.errors import CosimError
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 

@@ -10,15 +10,15 @@ import pytest
 from on_hardware import SCENARIO, SIMULATED, invoke, recorded, scenario
 from over_udp import drive, over, session
 
-from cosim.cli_cache import fmu_of_card
-from cosim.cli_drive import _plant
-from cosim.errors import HardwareError
-from cosim.exchange import open_fmu
+from cosim.cli.drive import _plant
 from cosim.hardware.loops import bare_clock
-from cosim.hardware.machine import changed
+from cosim.hardware.machine import changed, read_machine
 from cosim.hardware.move import try_move
 from cosim.hardware.session import Session
 from cosim.hardware.virtual import plant_of
+from cosim.master.exchange import open_fmu
+from cosim.models.cache import fmu_of_card
+from cosim.support.errors import HardwareError
 
 sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
 import hardware_faults
@@ -121,3 +121,9 @@ def test_a_bare_clock_counts_its_edges() -> None:
     assert edges >= 50
     assert 0 <= late <= edges
     assert worst > 0
+
+
+def test_a_machine_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "m.toml").write_bytes(b'name = "\x98"')
+    with pytest.raises(HardwareError, match=r"m\.toml is not text in UTF-8 \(at byte 8\)"):
+        read_machine(tmp_path / "m.toml")

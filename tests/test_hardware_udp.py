@@ -2,7 +2,6 @@
 
 import socket
 import sys
-import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -12,15 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 from on_hardware import INJECTED, SIMULATED, assert_safe, recorded, scenario, simulated
-from over_udp import AT, drive, faulty, impatient, over, session
+from over_udp import AT, SESSION, drive, faulty, frame, impatient, over, session, talking
 
-from cosim.errors import HardwareError
 from cosim.hardware.machine import changed
 from cosim.hardware.replay import replay
 from cosim.hardware.session import Session, run_session
-from cosim.hardware.udp import FRAME, opened, sealed
+from cosim.hardware.udp import FRAME, HELLO, MAGIC, WELCOME, closed, key_of, sealed, session_key
 from cosim.hardware.virtual import parse_injection
 from cosim.hardware.words import LINK
+from cosim.support.errors import HardwareError
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 
@@ -88,23 +87,14 @@ def test_what_is_late_out_of_order_or_doubled_is_never_acted_upon(tmp_path: Path
     assert replay(found).identical
 
 
-def frame(sequence: int, session: int, word: int = 0, torque: float = 1.0) -> bytes:
-    body = FRAME.pack(0x3143534D, 4, session, sequence, sequence, word, 0, 0, 0, torque, 0)
-    return body + zlib.crc32(body).to_bytes(4, "little")
-
-
 def test_a_drive_obeys_each_order_once_and_in_order_and_its_own_loop_only() -> None:
-    with drive() as there, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as loop:
-        loop.settimeout(5)
-        loop.connect((there.host, there.port))
-        loop.send(sealed(1, 77, 1e-4))
-        assert opened(loop.recv(256), 77) == (2, 0, 1e-4)
-        whole = frame(3, 77)
-        for one in (frame(1, 77), whole, whole, frame(2, 77), frame(4, 78), whole[:-1], whole[:20] + b"?" + whole[21:]):
+    with drive() as there, talking(there) as loop:
+        whole, other = loop.order(3), frame(4, SESSION + 1, loop.key)
+        for one in (loop.order(1), whole, whole, loop.order(2), other, whole[:-1], flipped(whole)):
             loop.send(one)
-        answered = [FRAME.unpack(loop.recv(256)[:-4])[3] for _ in range(2)]
-        loop.send(frame(5, 77))
-        answered.append(FRAME.unpack(loop.recv(256)[:-4])[3])
+        answered = [loop.number() for _ in range(2)]
+        loop.send(loop.order(5))
+        answered.append(loop.number())
         orders = there.statistics["orders"]
     assert answered == [1, 3, 5]
     assert (orders["duplicated"], orders["reordered"], orders["foreign"], orders["corrupted"]) == (1, 1, 1, 2)
@@ -113,31 +103,30 @@ def test_a_drive_obeys_each_order_once_and_in_order_and_its_own_loop_only() -> N
 
 @pytest.mark.parametrize(("torque", "held", "state"), [(1.0, 1.0, 4), (np.nan, 0.0, 7), (-np.inf, 0.0, 7)])
 def test_a_drive_gives_no_torque_that_is_no_number(torque: float, held: float, state: int) -> None:
-    with drive() as there, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as loop:
-        loop.settimeout(5)
-        loop.connect((there.host, there.port))
-        loop.send(sealed(1, 77, 1e-4))
-        assert opened(loop.recv(256), 77) == (2, 0, 1e-4)
-        for sequence, word in enumerate((0, 6, 7, 15, 15), 1):
-            loop.send(frame(sequence, 77, word, torque if sequence == 5 else 0.0))
-            loop.recv(256)
+    with drive() as there, talking(there) as loop:
+        loop.enable()
+        loop.obeyed(5, 15, torque)
         assert (there.drive.held, there.drive.state) == (held, state)
 
 
 @contextmanager
-def answering(make: Callable[[int, int], bytes]) -> Iterator[str]:
-    """A drive made of Python that answers an order by what `make` returns for its session and number."""
+def answering(make: Callable[[int, int, bytes], bytes]) -> Iterator[str]:
+    """A drive made of Python that answers an order by what `make` returns for its session, number and key."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there:
         there.bind(("127.0.0.1", 0))
         there.settimeout(0.02)
-        over = Event()
+        over, nonce, key = Event(), b"n" * 16, [b""]
 
         def serve() -> None:
             while not over.is_set():
                 with suppress(TimeoutError):
                     raw, back = there.recvfrom(256)
-                    kind, who, number = FRAME.unpack(raw[:-4])[1:4]
-                    there.sendto(sealed(2, who, 1e-4) if kind == 1 else make(who, number), back)
+                    values = FRAME.unpack(raw[:-4])
+                    if values[1] == HELLO:
+                        key[0] = session_key(key_of(""), values[10], nonce)
+                        there.sendto(sealed(WELCOME, values[2], 1e-4, nonce, key[0]), back)
+                    else:
+                        there.sendto(make(values[2], values[3], key[0]), back)
 
         thread = Thread(target=serve)
         thread.start()
@@ -146,25 +135,29 @@ def answering(make: Callable[[int, int], bytes]) -> Iterator[str]:
         thread.join()
 
 
-def answer(who: int, number: int, age: int = 0) -> bytes:
-    body = FRAME.pack(0x3143534D, 5, who, number, 0, 0x40, 7, number, age, 0.0, 0)
-    return body + zlib.crc32(body).to_bytes(4, "little")
+def flipped(raw: bytes) -> bytes:
+    return raw[:-1] + bytes([raw[-1] ^ 1])
+
+
+def answer(who: int, number: int, key: bytes, age: int = 0) -> bytes:
+    return closed((MAGIC, 5, who, number, 0, 0x40, 7, number, age, 0.0, b""), key)
 
 
 @pytest.mark.parametrize(
     ("make", "noticed"),
     [
         (answer, "good"),
-        (lambda who, number: answer(who, number, age=100_000), "late"),
-        (lambda who, number: answer(who, number + 1), "foreign"),
-        (lambda who, number: answer(who ^ 2, number), "foreign"),
-        (lambda who, number: answer(who, number)[:-1] + b"?", "corrupted"),
-        (lambda who, number: answer(who, number) + b"?", "corrupted"),
-        (lambda who, number: b"", "corrupted"),
+        (lambda who, number, key: answer(who, number, key, age=100_000), "late"),
+        (lambda who, number, key: answer(who, number + 1, key), "foreign"),
+        (lambda who, number, key: answer(who ^ 2, number, key), "foreign"),
+        (lambda who, number, key: answer(who, number, key_of("")), "foreign"),
+        (lambda who, number, key: flipped(answer(who, number, key)), "corrupted"),
+        (lambda who, number, key: answer(who, number, key) + b"?", "corrupted"),
+        (lambda who, number, key: b"", "corrupted"),
     ],
 )
 def test_an_answer_is_a_sample_only_if_it_is_whole_fresh_and_to_this_very_order(
-    tmp_path: Path, make: Callable[[int, int], bytes], noticed: str
+    tmp_path: Path, make: Callable[[int, int, bytes], bytes], noticed: str
 ) -> None:
     with answering(make) as url, impatient(session(tmp_path, url), 90) as one:
         one.advance(5)
@@ -208,7 +201,7 @@ def test_what_is_no_drive_is_refused_in_a_sentence(tmp_path: Path, answer: bytes
 
         thread = Thread(target=echo)
         thread.start()
-        sentence = "no answer within 1 s" if answer == b"" else "is no drive: it does not speak this protocol"
+        sentence = "no answer within 1.6 s" if answer == b"" else "is no drive: it does not speak this protocol"
         try:
             with pytest.raises(HardwareError, match=sentence):
                 session(tmp_path, f"udp://127.0.0.1:{other.getsockname()[1]}")

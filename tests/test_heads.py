@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from on_hardware import SCENARIO, SIMULATED, recorded, scenario, session
 
-from cosim.cli_cache import with_fmus
-from cosim.errors import HardwareError
+from cosim.data.recording import Recording
 from cosim.hardware.blackbox import unwrapped
 from cosim.hardware.library import library
 from cosim.hardware.machine import Encoder, Inject, Machine, changed
@@ -18,8 +17,9 @@ from cosim.hardware.replay import replay
 from cosim.hardware.session import run_session
 from cosim.hardware.structures import CFeedback, CHeads
 from cosim.hardware.words import heads_of
-from cosim.recording import Recording
-from cosim.scenario import Scenario, parse_scenario
+from cosim.models.cache import with_fmus
+from cosim.support.errors import HardwareError
+from cosim.system.scenario import Scenario, parse_scenario
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 QUANTUM, ECCENTRIC, APART = 1.4629180792671596e-9, 2e-5, 1e-4

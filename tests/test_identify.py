@@ -1,7 +1,7 @@
 """Identification gives back the numbers a machine was simulated with, says how sure it is, and shows known biases."""
 
 import json
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -9,18 +9,19 @@ import pytest
 from benchmarks.identification import POSITIVE, multisine, the_card
 
 from cosim.cli import main
-from cosim.errors import InputError
-from cosim.identify.deliver import summary
-from cosim.identify.estimate import Outputs, estimate
-from cosim.identify.friction_map import friction_map
-from cosim.identify.identify import Options, free_names, identify, with_numbers
-from cosim.identify.machine import Machine
-from cosim.identify.presliding import presliding
-from cosim.paper.benches import moved, step_response
-from cosim.recording import Recording
+from cosim.data.recording import Recording
+from cosim.estimation.identify.deliver import summary
+from cosim.estimation.identify.estimate import Outputs, estimate, explore, settle
+from cosim.estimation.identify.friction_map import friction_map
+from cosim.estimation.identify.identify import Options, free_names, identify, with_numbers
+from cosim.estimation.identify.machine import Machine
+from cosim.estimation.identify.presliding import presliding
+from cosim.support.errors import InputError
+from cosim_studies.paper.benches import moved, step_response
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.effects.thermal_viscosity import ThermalViscosity
 from pyfmi_models.friction import Coulomb
+from pyfmi_models.friction.lugre_passive import PassiveLuGre
 from pyfmi_models.mount import Axis, Mount
 
 
@@ -91,10 +92,40 @@ def test_what_a_recording_does_not_excite_is_said_to_be_unknown() -> None:
     assert not any("sigma0" in warning for warning in found.best.warnings)
 
 
+def test_a_start_is_looked_at_and_only_the_best_is_settled() -> None:
+    """Three starts of a Stribeck curve: the others stop early, the best ends at the truth of noiseless data."""
+    v = np.linspace(0.01, 2.0, 500)
+    truth = np.array([3.0, 4.0, 0.3])
+
+    def curve(p: np.ndarray) -> np.ndarray:
+        return np.asarray(p[0] + (p[1] - p[0]) * np.exp(-v / p[2]))
+
+    def model(p: np.ndarray) -> Outputs:
+        fall = np.exp(-v / p[2])
+        slopes = np.stack([1 - fall, fall, (p[1] - p[0]) * fall * v / p[2] ** 2], axis=1)
+        return Outputs((curve(truth) - curve(p))[:, None], slopes[:, None, :])
+
+    names, starts = ("Fc", "Fs", "Vs"), np.array([[2.0, 6.0, 0.9], [5.0, 5.5, 0.1], [1.0, 9.0, 1.5]])
+    looked = [explore(names, start, model, None, 25) for start in starts]
+    best = settle(min(looked, key=lambda one: one.rms[0]), model)
+    assert all(one.evaluations <= 25 for one in looked)
+    np.testing.assert_allclose(best.values, truth, rtol=1e-6)
+    assert best.evaluations > min(one.evaluations for one in looked)
+
+
 def test_the_linear_presliding_fit_is_biased_as_published_and_the_direct_one_is_not(step: Recording) -> None:
     wrong = half(the_card(**POSITIVE), "sigma0", "sigma1")
     found = presliding(wrong, step)
     assert found.linear.values / [POSITIVE["sigma0"], POSITIVE["sigma1"]] == pytest.approx([0.56, 3.5], rel=0.02)
+    assert found.direct.values[:2] / [POSITIVE["sigma0"], POSITIVE["sigma1"]] == pytest.approx([1, 1], rel=0.003)
+
+
+def test_a_law_whose_damping_fades_is_identified_from_a_step_as_its_own_kind() -> None:
+    base = the_card(**POSITIVE)
+    numbers = {one.name: getattr(base.friction, one.name) for one in fields(base.friction)}
+    card = replace(base, friction=PassiveLuGre(**numbers))
+    step = step_response(card, 1.0, 1e-7, 3)
+    found = presliding(half(card, "sigma0", "sigma1"), step)
     assert found.direct.values[:2] / [POSITIVE["sigma0"], POSITIVE["sigma1"]] == pytest.approx([1, 1], rel=0.003)
 
 

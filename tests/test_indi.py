@@ -11,14 +11,14 @@ from time import monotonic, sleep
 
 import pytest
 
-from cosim.cli_cache import with_fmus
-from cosim.errors import OutputError
-from cosim.scenario import read_scenario
-from cosim.supervisor.indi import CLIENTS, IndiServer
-from cosim.supervisor.mount import Limits, SimulatedMount
-from cosim.supervisor.pointing import DeviceError, Pointing
-from cosim.supervisor.properties import number
-from cosim.supervisor.telescope import Telescope
+from cosim.models.cache import with_fmus
+from cosim.observatory.indi import CLIENTS, IndiServer
+from cosim.observatory.mount import Limits, SimulatedMount
+from cosim.observatory.pointing import DeviceError, Pointing
+from cosim.observatory.properties import number
+from cosim.observatory.telescope import Telescope
+from cosim.support.errors import OutputError
+from cosim.system.scenario import read_scenario
 
 DEVICE, ARCSEC = "mount-cosim simulated mount", 1 / 3600
 QUICK = Limits(velocity=radians(10), acceleration=radians(10))

@@ -6,17 +6,18 @@ import numpy as np
 import pytest
 from effect_examples import EXAMPLES
 
-from cosim.diagnosis.closed_loop import set_point
-from cosim.diagnosis.inverse import Inverse, stacked
-from cosim.diagnosis.prepare import Prepared, prepare
-from cosim.diagnosis.sanity import is_held
-from cosim.identify.machine import Machine
-from cosim.recording import Recording
+from cosim.data.recording import Recording
+from cosim.diagnosis.sanity.admission import is_held
+from cosim.estimation.identify.machine import Machine
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.prepare import Prepared, prepare
+from cosim.estimation.set_point import set_point
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import ClockEffect, Effect, GravityUnbalance, LocalFriction, PeriodicFriction
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.torque_saturation import TorqueSaturation
 from pyfmi_models.friction import LuGre, Stribeck
+from pyfmi_models.friction.lugre_passive import PassiveLuGre
 from pyfmi_models.mount import Mount
 
 HELD = [one for one in EXAMPLES if is_held(one)]
@@ -78,6 +79,25 @@ def test_the_plant_with_an_effect_needs_the_torque_that_the_inverse_says(effect:
     assert silent or size["with"] < 0.5 * size["without"]
 
 
+def test_bristles_whose_damping_fades_are_a_base_like_any() -> None:
+    """A plant with this law needs the torque that its inverse says, and less well the one that LuGre's says."""
+    numbers = {"sigma0": 9.23e4, "sigma1": 3e3, "sigma2": 32.77, "Fc": 2.322, "Fs": 3.322, "Vs": 0.04129}
+    base = read_card("paper_mount").plant()
+    prepared = recorded(replace(base, friction=PassiveLuGre(**numbers, Vd=1e-3)))
+    laws = {law.key: law for law in (PassiveLuGre(**numbers, Vd=1e-3), LuGre(**numbers))}
+    rest = {
+        key: float(
+            np.std(
+                prepared.stacked("tau")
+                - stacked(Inverse(replace(base, friction=law), ()), prepared.pieces, np.zeros(0))[0]
+            )
+        )
+        for key, law in laws.items()
+    }
+    assert rest["lugre_passive"] < 0.15
+    assert rest["lugre"] > 1.2 * rest["lugre_passive"]
+
+
 @pytest.mark.parametrize("gap", [1e-3, 1e-2])
 def test_behind_a_play_most_of_the_torque_is_told(gap: float) -> None:
     """How the far side is caught within a row is not told; when it is caught, and with how much momentum, is."""
@@ -90,7 +110,7 @@ def test_behind_a_play_most_of_the_torque_is_told(gap: float) -> None:
         return float(np.std(prepared.stacked("tau") - stacked(inverse, prepared.pieces, np.zeros(0))[0]))
 
     rigid = size()
-    assert size(play) < 0.17 * rigid
+    assert size(play) < 0.23 * rigid  # .215 over all rows; every tenth row, as were kept once, showed .16 by chance
     assert size(replace(play, gap_rad=1.5 * gap)) > 2 * size(play)
     assert size(replace(play, load_friction=0.0, load_viscous=0.0)) > 2 * size(play)
 

@@ -9,14 +9,15 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
+from simulating import simulate
 from tiny_fmu import described, description, tiny
 
-from cosim.algorithm import GaussSeidel, Iterated, Jacobi
-from cosim.errors import StepError
-from cosim.faults import Fault
-from cosim.fmu import FmuComponent
-from cosim.master import Run, simulate
-from cosim.wiring import Record, Wire
+from cosim.fmi.fmu import FmuComponent
+from cosim.master.result import RunResult
+from cosim.support.errors import StepError
+from cosim.system.algorithm import GaussSeidel, Iterated, Jacobi
+from cosim.system.faults import Fault
+from cosim.system.wire import Record, Wire
 
 __all__ = ["tiny"]
 
@@ -98,7 +99,7 @@ def test_any_plan_gives_the_same_bits_in_c_and_in_python(three: Any, system: dic
         np.testing.assert_array_equal(first.recording[name], second.recording[name])
 
 
-def outcome(*args: Any, **options: Any) -> Run | str:
+def outcome(*args: Any, **options: Any) -> RunResult | str:
     """Return the run, or the sentence of its failure: iteration need not converge on any plan."""
     try:
         return simulate(*args, **options)

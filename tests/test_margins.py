@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cosim.paper.conditions import condition, tuned
-from cosim.paper.margins import Linear, feedback, held, margins
-from cosim.paper.options import ADAPTING, REFERENCE, options
-from cosim.paper.price import loops, price
+from cosim_studies.paper.conditions import condition, tuned
+from cosim_studies.paper.margins import Linear, feedback, held, margins
+from cosim_studies.paper.options import ADAPTING, REFERENCE, options
+from cosim_studies.paper.price import loops, price
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import ActuatorLag
 from pyfmi_models.effects.compliance import Compliance

@@ -13,15 +13,16 @@ from typing import Any
 
 import numpy as np
 import pytest
+from simulating import simulate
 from tiny_fmu import description, tiny
 
-import cosim.execution
-import cosim.loop
-from cosim.errors import FmuError, OutputError, SignalError, StepError, WiringError
-from cosim.fmu import FmuComponent
-from cosim.master import Run, simulate
-from cosim.recording import Recording
-from cosim.wiring import Record, Wire
+import cosim.master.execution
+import cosim.master.loop
+from cosim.data.recording import Recording
+from cosim.fmi.fmu import FmuComponent
+from cosim.master.result import RunResult
+from cosim.support.errors import FmuError, OutputError, SignalError, StepError, WiringError
+from cosim.system.wire import Record, Wire
 
 __all__ = ["tiny"]
 
@@ -30,7 +31,7 @@ CONTROL = {"controller": {"mode": 1.0, "k": 5.0}}
 Tiny = dict[int, Path]
 
 
-def control_loop(fmu: Path, ticks: int = 500, **changes: Any) -> Run:
+def control_loop(fmu: Path, ticks: int = 500, **changes: Any) -> RunResult:
     """An integrator under proportional control, with a quantised noisy sensor."""
     wires = [
         ("controller.y", "plant.a"),
@@ -75,7 +76,7 @@ def test_an_impulse_takes_one_tick_through_each_component(tiny: Tiny, version: i
 
 @pytest.mark.parametrize("decimation", [1, 2, 3, 10])
 def test_fmi_2_and_3_and_the_loops_in_c_and_python_give_the_same_bits(tiny: Tiny, decimation: int) -> None:
-    assert cosim.loop.library() is not None, "run `python cosim/loop/build_hook.py` first"
+    assert cosim.master.loop.library() is not None, "run `python cosim/master/loop/build_hook.py` first"
     cases = [(version, compiled) for version in (2, 3) for compiled in (True, False)]
     runs = [control_loop(tiny[version], compiled=compiled, decimation=decimation) for version, compiled in cases]
     assert [run.statistics["loop"] for run in runs] == ["compiled", "interpreted"] * 2
@@ -99,7 +100,7 @@ def test_a_mean_is_over_the_sample_interval_centred_at_the_row(tiny: Tiny, decim
 
 def test_time_is_counted_not_summed_and_chunks_do_not_matter(tiny: Tiny, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = control_loop(tiny[3], ticks=3000)
-    monkeypatch.setattr(cosim.execution, "CHUNK", 16)
+    monkeypatch.setattr(cosim.master.execution, "CHUNK", 16)
     pieces = control_loop(tiny[3], ticks=3000)
     np.testing.assert_array_equal(whole.recording.t, np.arange(3000) * 1e-3)
     for name in whole.recording:
@@ -135,7 +136,7 @@ def test_a_component_can_be_used_again_and_starts_all_over(tiny: Tiny, version: 
 
 
 def test_units_of_one_kind_are_converted(tiny: Tiny) -> None:
-    from cosim.signals import Samples
+    from cosim.data.signals import Samples
 
     run = simulate(
         {"one": tiny[3]},
@@ -156,7 +157,7 @@ def test_statistics_name_inputs_that_nothing_feeds(tiny: Tiny) -> None:
 
 
 def test_without_the_compiled_loop_it_runs_in_python_and_says_so(tiny: Tiny, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cosim.loop, "library", lambda: None)
+    monkeypatch.setattr(cosim.master.loop, "library", lambda: None)
     statistics = control_loop(tiny[3], ticks=50).statistics
     assert statistics["loop"] == "interpreted"
     assert statistics["notes"] == [
@@ -165,9 +166,9 @@ def test_without_the_compiled_loop_it_runs_in_python_and_says_so(tiny: Tiny, mon
 
 
 def test_a_loop_that_cannot_be_loaded_counts_as_missing(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    (tmp_path / f"_loop{cosim.loop.SUFFIX}").write_text("no library")
-    monkeypatch.setattr(cosim.loop, "__file__", str(tmp_path / "__init__.py"))
-    assert cosim.loop.library.__wrapped__() is None
+    (tmp_path / f"_loop{cosim.master.loop.SUFFIX}").write_text("no library")
+    monkeypatch.setattr(cosim.master.loop, "__file__", str(tmp_path / "__init__.py"))
+    assert cosim.master.loop.library.__wrapped__() is None
 
 
 @VERSIONS
@@ -290,7 +291,7 @@ def test_names_that_do_not_fit_are_refused(tiny: Tiny, changes: dict[str, Any], 
 
 
 def test_noise_in_another_unit_is_refused(tiny: Tiny) -> None:
-    from cosim.signals import Samples
+    from cosim.data.signals import Samples
 
     with pytest.raises(WiringError, match='its noise "n" is not in rad'):
         control_loop(tiny[3], signals={"r": 1.0, "n": Samples(0.0, "arcsec")})
@@ -361,8 +362,8 @@ def test_a_file_that_is_no_fmu_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_run_imports_neither_casadi_nor_the_compiler_nor_pictures() -> None:
-    program = "import sys, cosim.master, cosim.scenario; print(*sys.modules)"
-    path = {"PYTHONPATH": str(Path(cosim.loop.__file__).parents[2])}
+    program = "import sys, cosim.master.simulate, cosim.system.scenario; print(*sys.modules)"
+    path = {"PYTHONPATH": str(Path(cosim.master.loop.__file__).parents[3])}
     command = [sys.executable, "-c", program]
     done = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | path)
     assert not {"casadi", "ziglang", "matplotlib", "pyfmi_models", "pandas"} & set(done.stdout.split())

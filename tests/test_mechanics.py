@@ -128,6 +128,22 @@ def test_after_a_reversal_the_far_side_waits_for_the_gap() -> None:
     assert np.abs(run["backlash.twist"]).max() < 5e-3 + 2e-4
 
 
+def test_in_the_gap_the_far_side_is_slowed_by_its_own_oil() -> None:
+    """Closed form: w = w0 exp(-t load_viscous / J_far); the near side, alone and without friction, keeps its speed."""
+    play = Backlash(gap_rad=1.0, load_share=0.4, load_viscous=0.5)
+    run = simulate(mount(play, friction=FREE).model(), np.linspace(0, 1, 50), start={"speed": 0.2})
+    far = run["v"] - run["backlash.twist_rate"]
+    np.testing.assert_allclose(far, 0.2 * np.exp(-run["t"] * 0.5 / (0.4 * INERTIA)), rtol=1e-5)
+    np.testing.assert_allclose(run["v"], 0.2, rtol=1e-9)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_pushed_through_the_play_oil_and_dry_friction_of_the_far_side_are_felt(side: int) -> None:
+    play = Backlash(gap_rad=1e-2, load_share=0.4, load_friction=0.2, load_viscous=1.5)
+    run = simulate(mount(play, friction=FREE).model(), np.linspace(0, 12, 400), lambda t: side * 0.5)
+    assert run["v"][-1] == pytest.approx(side * (0.5 - 0.2) / 1.5, rel=1e-2)  # J / load_viscous is less than a second
+
+
 def test_a_damped_contact_never_gives_energy() -> None:
     model, t = mount(PLAY, friction=FREE).model(), np.linspace(0, 0.4, 400)
     run = simulate(model, t, start={"speed": 0.1, "backlash.twist_rate": 0.1})

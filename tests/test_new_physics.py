@@ -1,5 +1,6 @@
-"""docs/adding_physics.md holds: its two files in a copy of the package, and nothing else, are a law and an effect."""
+"""docs/adding_physics.md holds: its three files in a copy of the packages make a law and an effect, nothing else."""
 
+import json
 import os
 import re
 import shutil
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from fmpy import simulate_fmu
 
+import cosim
 import pyfmi_models
 
 ROOT = Path(__file__).parents[1]
@@ -24,6 +26,7 @@ card = read_card("tube.toml")
 assert parse_card(card_text(card), "tube.toml") == card
 export_fmu(card.plant().model(), "tube.fmu")
 """
+QUICKLY = ("--out", "found", "--quick", "--json")
 
 
 def blocks(language: str) -> list[str]:
@@ -45,10 +48,11 @@ def run(folder: Path, *arguments: str) -> str:
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with a copy of the package, the guide's files in it, and the guide's card."""
+    """A folder with a copy of the packages, the guide's files in it, and the guide's card."""
     folder = tmp_path_factory.mktemp("copy")
-    source = Path(str(pyfmi_models.__file__)).parent
-    shutil.copytree(source, folder / "pyfmi_models", ignore=shutil.ignore_patterns("__pycache__"))
+    for package in (pyfmi_models, cosim):
+        source = Path(str(package.__file__)).parent
+        shutil.copytree(source, folder / source.name, ignore=shutil.ignore_patterns("__pycache__"))
     for block in blocks("python"):
         name = block.partition("\n")[0].removeprefix("# ")
         assert not (folder / name).exists()
@@ -74,3 +78,33 @@ def test_the_property_tests_meet_them_by_themselves(copy: Path) -> None:
     files = [str(ROOT / "tests" / name) for name in ("test_effect_properties.py", "test_friction_properties.py")]
     out = run(copy, "-m", "pytest", "-p", "no:cacheprovider", "-k", chosen, *files)
     assert int(re.findall(r"(\d+) passed", out)[-1]) >= 10
+
+
+def in_the_wind(seed: int, gusts: float) -> str:
+    """20 s of the guide's tube under a gusty wind, by the guide's own equations, as the text of a CSV."""
+    t = np.arange(4000) / 200
+    tones = [(0.5, 0.11, seed), (0.1, 0.37, 1.0 + seed), (0.03, 0.9, 2.0)]
+    angles = [(a, 2 * np.pi * f, 2 * np.pi * f * t + phase) for a, f, phase in tones]
+    q = sum(a * np.sin(x) for a, _, x in angles)
+    v = sum(a * w * np.cos(x) for a, w, x in angles)
+    acceleration = sum(-a * w**2 * np.sin(x) for a, w, x in angles)
+    wind = 9.0 + 4.0 * np.sin(2 * np.pi * gusts * t)
+    tau = 30.0 * acceleration + (2.0 + 12.0 * np.sqrt(np.abs(v))) * np.sign(v) + 0.02 * wind**2 * np.sin(q - 0.4)
+    noisy = tau + 0.02 * np.random.default_rng(seed).standard_normal(len(t))
+    rows = (f"{a:.4f},{b:.9g},{c:.12g},{d:.9g}" for a, b, c, d in zip(t, noisy, q, wind, strict=True))
+    return "\n".join(["t [s],tau [N.m],q [rad],wind", *rows, ""])
+
+
+def test_a_diagnosis_finds_the_effect_in_recordings(copy: Path) -> None:
+    names = ["one.csv", "two.csv", "three.csv"]
+    for seed, name in enumerate(names):
+        (copy / name).write_text(in_the_wind(seed, 0.07 + 0.05 * seed), "utf-8")
+    calm = blocks("toml")[0].partition("[[effects]]")[0]
+    (copy / "calm.toml").write_text(calm, "utf-8")
+    told = run(copy, "-m", "cosim", "diagnose", *names[:2], "--heldout", names[2], "--card", "calm.toml", *QUICKLY)
+    found = json.loads(told)
+    assert found["verdict"] == ["wind_load"]
+    (wind,) = [one for one in found["effects"] if one["effect"] == "wind_load"]
+    assert wind["parameters"]["coefficient"] == pytest.approx(0.02, rel=0.05)
+    assert wind["parameters"]["direction"] == pytest.approx(0.4, abs=0.1)
+    assert 'effect = "wind_load"' in (copy / "found" / "card.toml").read_text("utf-8")

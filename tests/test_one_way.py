@@ -6,13 +6,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from cosim.diagnosis.evidence import Blocks
-from cosim.diagnosis.meaning import needs_turns
-from cosim.diagnosis.prepare import Prepared, prepare
-from cosim.diagnosis.problem import Problem
-from cosim.diagnosis.structure import nuisances, screen
-from cosim.diagnosis.trial import tried
-from cosim.recording import Recording
+from cosim.data.recording import Recording
+from cosim.diagnosis.admissibility import needs_turns
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.search import refitted
+from cosim.estimation.prepare import Prepared, prepare
+from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Cogging, Effect, PeriodicFriction, TorqueOffset
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.effects.presliding import Presliding
@@ -60,7 +60,7 @@ def test_a_tone_is_not_found_in_the_noise_of_many_short_recordings_by_a_phase_in
     weight = np.ones(len(prepared.recording_of))
     problem = Problem(MOUNT, prepared, weight, 1e-2)
     base = problem.fit(MOUNT, 12)
-    bench = screen(base, prepared, Blocks.of(prepared), nuisances(base, prepared), weight).bench
-    trial = tried(problem, base, PeriodicDisturbance(frequency_hz=3.0, amplitude=0.02), bench)
-    assert trial.plain_gain > 0.05
-    assert trial.gain < 0.03
+    comparison = Comparison.of(problem, base, POLICY)
+    one = refitted(comparison, base, PeriodicDisturbance(frequency_hz=3.0, amplitude=0.02), 1)
+    assert one.plain_gain > 0.05
+    assert one.evidence < POLICY.least_evidence / 2

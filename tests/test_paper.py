@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 
 from cosim.cli import main
-from cosim.paper.checks import Check, checks
-from cosim.paper.conditions import CASES, Condition, condition, conditions, definitions, scaled
-from cosim.paper.experiment import Outcome, run
-from cosim.paper.identification import Identification, identification, spread
-from cosim.paper.identification_tables import table2, table3
-from cosim.paper.report import Results, Written, write
-from cosim.paper.study import Study, Trial, everywhere, job, study
-from cosim.paper.tables import PAPER, in_order, statistics
-from cosim.paper.workshop import Workshop
+from cosim_studies.paper.checks import Check, checks
+from cosim_studies.paper.conditions import CASES, Condition, condition, conditions, definitions, scaled
+from cosim_studies.paper.experiment import Outcome, run
+from cosim_studies.paper.identification import Identification, identification, spread
+from cosim_studies.paper.identification_tables import table2, table3
+from cosim_studies.paper.report import Results, Written, write
+from cosim_studies.paper.study import Study, Trial, everywhere, job, study
+from cosim_studies.paper.tables import PAPER, in_order, statistics
+from cosim_studies.paper.workshop import Workshop
 from pyfmi_models.card import read_card
 from pyfmi_models.friction import LuGre
 from pyfmi_models.model import Pair

@@ -5,10 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.play import play_torque
-from cosim.proof.generator import make_case, write_case
-from cosim.proof.tool import given
+from cosim.estimation.play import SEARCHED, far_torques, play_torque
+from cosim.estimation.prepare import prepare
+from cosim_studies.proof.generator import make_case, write_case
+from cosim_studies.proof.tool import given
 from pyfmi_models.effects.backlash import Backlash
 
 FAR, DT = 2.0, 1e-3
@@ -53,6 +55,20 @@ def test_the_momentum_that_is_told_hardly_depends_on_how_dense_the_rows_are(rows
     fine = np.cumsum(play_torque(play, FAR, v, a, 1e-3)) * 1e-3
     coarse = np.cumsum(play_torque(play, FAR, v[::rows], a[::rows], rows * 1e-3)) * rows * 1e-3
     assert np.std(coarse - fine[::rows]) < 0.05 * np.std(fine)
+
+
+def test_a_search_slows_the_far_side_by_dry_and_by_viscous_friction() -> None:
+    """What the search offers for a gap is the play's own torque, its oil included, in the band of the diagnosis."""
+    t = DT * np.arange(20000)
+    prepared = prepare([Recording("r", {"t": t, "tau": np.zeros_like(t), "q": 0.1 * np.sin(3 * t)})], 20.0)
+    piece, dry, ratio = prepared.pieces[0], 0.02, 10.0
+    step = max(1, int(1 / (SEARCHED * piece.dt)))
+    play = Backlash(gap_rad=5e-3, load_friction=dry, load_viscous=ratio * dry)
+    exact = play_torque(play, 1.0, piece.v[::step], piece.a[::step], step * piece.dt)
+    told = far_torques(prepared, ((5e-3, dry),), ratio)[:, 0]
+    expected = piece.lowpass(np.interp(piece.t, piece.t[::step], exact))[piece.kept]
+    np.testing.assert_allclose(told, expected, atol=1e-12)
+    assert np.std(told - far_torques(prepared, ((5e-3, dry),), 0.0)[:, 0]) > 0.05 * np.std(told)
 
 
 def test_a_concealed_play_is_named_with_its_gap(tmp_path: Path) -> None:

@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 import cosim
+import cosim_studies
 import pyfmi_models
-from cosim.diagnosis.families import TRIED
+from cosim.diagnosis.hypotheses import TRIED
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import CATALOGUE
 
@@ -21,7 +22,7 @@ README = (ROOT / "README.md").read_text("utf-8")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 START = "python3 -m venv .venv && .venv/bin/pip install . && .venv/bin/cosim demo"
 TEST = ".venv/bin/pip install '.[test]' && .venv/bin/pytest"
-PACKAGES = {"cosim": cosim, "pyfmi_models": pyfmi_models}
+PACKAGES = {"cosim": cosim, "cosim_studies": cosim_studies, "pyfmi_models": pyfmi_models}
 SOURCES = [path for name in PACKAGES for path in (ROOT / name).rglob("*")]
 CALLED = {"sklearn": "scikit-learn"}
 """Optional packages that are installed by another name than they are imported by."""
@@ -43,7 +44,7 @@ def test_readme_states_the_two_commands_and_ci_runs_the_second() -> None:
 def test_every_verb_that_readme_types_exists() -> None:
     typed = set(re.findall(r"(?:^|/|\s|`)cosim ([a-z]+)\b", "\n".join(fenced("sh")), re.MULTILINE))
     assert typed
-    missing = sorted(verb for verb in typed if find_spec(f"cosim.cli_{verb}") is None)
+    missing = sorted(verb for verb in typed if find_spec(f"cosim.cli.{verb}") is None)
     assert not missing, f"README types verbs that do not exist: {', '.join(missing)}"
 
 
@@ -89,10 +90,13 @@ def test_every_file_of_the_packages_is_installed() -> None:
             assert (home / Path(*relative.parts[1:])).is_file(), f"{relative} is not in the installed package"
 
 
-@pytest.mark.parametrize("library", ["loop/_loop", "proof/_truth"])
+@pytest.mark.parametrize("library", ["cosim/master/loop/_loop", "cosim_studies/proof/_machine"])
 def test_the_compiled_libraries_are_installed(library: str) -> None:
-    path = Path(str(cosim.__file__)).parent / library
-    assert list(path.parent.glob(f"{path.name}.*")), f"{library} is missing: python cosim/loop/build_hook.py builds it"
+    package, _, rest = library.partition("/")
+    path = Path(str(PACKAGES[package].__file__)).parent / rest
+    assert list(path.parent.glob(f"{path.name}.*")), (
+        f"{library} is missing: python cosim/master/loop/build_hook.py builds it"
+    )
 
 
 def test_what_is_imported_is_required() -> None:

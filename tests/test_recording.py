@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.errors import InputError, MissingPackageError, OutputError, RecordingError, UnitError
-from cosim.recording import Recording
-from cosim.units import conversion, unit
-from cosim.writer import StreamWriter
+from cosim.data.recording import Recording
+from cosim.data.writer import StreamWriter
+from cosim.support.errors import InputError, MissingPackageError, OutputError, RecordingError, UnitError
+from cosim.support.units import conversion, unit
 
 ROWS = 200
 
@@ -224,7 +224,7 @@ def test_a_stream_that_finds_the_disk_full_says_so_and_leaves_nothing(
     def full(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr("cosim.writer.GROUP", 1)
+    monkeypatch.setattr("cosim.data.writer.GROUP", 1)
     monkeypatch.setattr("pyarrow.parquet.ParquetWriter.write_table", full)
     stream = StreamWriter(tmp_path / "run.parquet", {"t": "s", "tau": "", "q": "rad"}, {})
     stream.write(columns())

@@ -7,16 +7,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from foreign_fmu import foreign
+from mirror_fmu import mirror
 from test_scenario import TEXT
 from tiny_fmu import tiny
 
-from cosim.cli_cache import with_fmus
-from cosim.description import describe, ports_of
-from cosim.errors import FmuError, ScenarioError, WiringError
-from cosim.master import run
-from cosim.scenario import parse_scenario
+from cosim.fmi.description import describe
+from cosim.fmi.variables import ports_of
+from cosim.master.simulate import run
+from cosim.models.cache import with_fmus
+from cosim.support.errors import FmuError, ScenarioError, WiringError
+from cosim.system.scenario import parse_scenario
 
-__all__ = ["tiny"]
+__all__ = ["mirror", "tiny"]
 
 MAPPING = 'variables = { a = "Motor.torque", b = "Brake.torque", y = "Encoder.angle" }'
 
@@ -108,3 +110,24 @@ def test_the_shipped_scenario_runs_with_a_plant_of_other_names(interface: str, t
     ours, found = run(wanted).recording, run(theirs).recording
     for name in ours:
         np.testing.assert_allclose(found[name], ours[name], rtol=0, atol=tolerance * np.abs(ours[name]).max())
+
+
+def test_an_array_has_our_name_whole_and_by_element(mirror: dict[int, Path]) -> None:
+    text = f"""
+    step = 0.1
+    stop = 0.4
+    [components.one]
+    fmu = "{mirror[3]}"
+    variables = {{ force = "u", reply = "y", size = "n" }}
+    parameters = {{ size = 2, force = [3, 4] }}
+    [components.two]
+    fmu = "{mirror[3]}"
+    variables = {{ force = {{ name = "u", unit = "N" }} }}
+    [[connections]]
+    from = "one.reply[2]"
+    to = "two.force[1]"
+    [record]
+    signals = {{ reply = "one.reply", y = "two.y[1]" }}
+    """
+    recording = run(parse_scenario(text, "x.toml", Path())).recording
+    assert [recording[name][-1] for name in ("reply[1]", "reply[2]", "y")] == [3, 4, 4]

@@ -18,16 +18,16 @@ import numpy as np
 import pytest
 from report_example import FOUND, REST, RIVALS, diagnosis
 
-from cosim.diagnosis.report import render, words, write_report
-from cosim.diagnosis.report.derive import part, samples
+from cosim.diagnosis.breakdown import part, samples
+from cosim.diagnosis.hypotheses import TRIED
+from cosim.diagnosis.report import lead, render, words, write_report
 from cosim.diagnosis.report.explorer import payload
-from cosim.diagnosis.report.figures_dynamic import VIEWS
 from cosim.diagnosis.report.figures_proof import relative
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.tables import limits, numbers
 from cosim.diagnosis.terminal import summary
-from cosim.pictures.quantities import minus, number, raised
-from cosim.pictures.style import thin
+from cosim.plots.quantities import minus, number, raised
+from cosim.plots.style import thin
 
 
 @cache
@@ -134,12 +134,12 @@ def test_report_is_reproducible_and_quick(tmp_path: Path) -> None:
     assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
 
 
-@pytest.mark.parametrize("effect", [*sorted(VIEWS), "unheard_of"])
+@pytest.mark.parametrize("effect", [*sorted(TRIED), "unheard_of"])
 def test_every_effect_has_a_figure(effect: str) -> None:
     import matplotlib
 
     from cosim.diagnosis.report.figures_dynamic import effect as draw
-    from cosim.pictures.style import STYLE
+    from cosim.plots.style import STYLE
 
     finding = replace(FOUND[0], effect=effect, parameters={"delay_ms": 3.0, "cycles_per_rev": 24.0})
     with matplotlib.rc_context(STYLE):
@@ -191,7 +191,7 @@ def test_further_waves_of_a_ripple_stand_in_its_table() -> None:
 
 def test_where_nothing_is_missing_no_effect_is_left_out_of_the_first_screen_and_no_gain_is_claimed() -> None:
     whole = diagnosis("none")
-    cells = " ".join(row[0] for row in limits(whole).rows).lower()
+    cells = " ".join(row[0] for row in limits(whole, Scales.of(whole)).rows).lower()
     assert all(one.title.lower() in cells for one in whole.findings if one.answer in ("not_seen", "not_testable"))
     assert "so there is no gain to prove" in page("none")
     assert "so there is no gain to prove" not in page("two")
@@ -305,11 +305,11 @@ def test_a_proposed_friction_law_is_told_on_page_and_terminal_and_the_bases_own_
 
 def test_something_unknown_stands_beside_what_is_named() -> None:
     both = replace(diagnosis("two"), verdict=("cogging", "friction_asymmetry", "unknown"), depends_on=("time",))
-    assert words.heading(both).endswith("effects are missing from the model, and something unknown")
-    lead = " ".join(words.lead(both, Scales.of(both)))
-    assert "24 times per turn" in lead
-    assert "other known effects" in lead
+    assert lead.heading(both).endswith("effects are missing from the model, and something unknown")
+    said = " ".join(lead.lead(both, Scales.of(both)))
+    assert "24 times per turn" in said
+    assert "other known effects" in said
     assert "The rest goes with: time" in summary(both)
     rivals = tuple(finding for finding in both.findings if finding.answer != "found")
     open_question = replace(both, findings=rivals, verdict=("gravity_unbalance", "unknown"))
-    assert "more than one possible cause, and something unknown" in words.heading(open_question)
+    assert "more than one possible cause, and something unknown" in lead.heading(open_question)

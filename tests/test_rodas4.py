@@ -84,7 +84,7 @@ def test_divisions_by_parameters_are_done_once_a_step():
 
 
 def test_the_loop_integrates_foreign_models_with_the_same_numbers():
-    text = (Path(__file__).parents[1] / "cosim" / "loop" / "rodas4.c").read_text("utf-8")
+    text = (Path(__file__).parents[1] / "cosim" / "master" / "loop" / "rodas4.c").read_text("utf-8")
     tables = {name: body for name, body in re.findall(r"double (\w+)(?:\[\w+\])+ = \{(.*?)\};", text, re.S)}
     found = {name: [float(one) for one in re.findall(r"-?\d+\.?\d*", body)] for name, body in tables.items()}
     numbers = {"alpha": ALPHA, "gamma_time": GAMMA_TIME, "a": sum(A, (0,)), "c": sum(C, (0,))}

@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from cosim.diagnosis.rowwise import CHUNK, STRIDE, Rowwise, Stepwise
+from cosim.estimation.rowwise import CHUNK, STRIDE, Rowwise, Stepwise
 
 X, P = ca.SX.sym("x", 3), ca.SX.sym("p", 2)
 a, b, c = X[0], X[1], X[2]

@@ -12,12 +12,12 @@ from test_cli_run import call, scenario
 from test_scenario import TEXT
 from tiny_fmu import tiny
 
-from cosim.pictures.chart import Chart, Ruler
-from cosim.pictures.digest import BUCKETS, DOTS, Digest, axes_of, condense
-from cosim.pictures.run_page import write_page
-from cosim.recording import Recording
-from cosim.scenario import parse_scenario
-from cosim.writer import StreamWriter
+from cosim.data.recording import Recording
+from cosim.data.writer import StreamWriter
+from cosim.plots.chart import Chart, Ruler
+from cosim.plots.digest import BUCKETS, DOTS, Digest, axes_of, condense
+from cosim.plots.run_page import write_page
+from cosim.system.scenario import parse_scenario
 
 __all__ = ["scenario", "tiny"]
 
@@ -192,7 +192,7 @@ def test_short_and_constant_recordings_have_a_page_too(tmp_path: Path, rows: int
 def test_a_recording_is_looked_at_piece_by_piece(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import pyarrow
 
-    from cosim.pictures import digest as module
+    from cosim.plots import digest as module
 
     rows, held = 1 << 20, []
     with StreamWriter(tmp_path / "long.parquet", {"t": "s", "a": "", "b": ""}, {}) as writer:

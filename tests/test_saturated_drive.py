@@ -3,14 +3,13 @@
 import numpy as np
 import pytest
 
-from cosim.diagnosis.evidence import Blocks
-from cosim.diagnosis.fit import Fit
-from cosim.diagnosis.prepare import prepare
-from cosim.diagnosis.problem import Problem
-from cosim.diagnosis.select import starts
-from cosim.diagnosis.structure import Screening, nuisances, screen
-from cosim.diagnosis.trial import Trial, is_real, tried
-from cosim.recording import Recording
+from cosim.data.recording import Recording
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.search import CandidateFit, is_admissible, refitted, starts
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import prepare
+from cosim.estimation.problem import Problem
 from pyfmi_models.effects.torque_saturation import TorqueSaturation
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
@@ -29,7 +28,7 @@ def motion(size: float, phase: float) -> tuple[Array, Array, Array, Array]:
     return t, q, v, sum(-a * w**2 * np.sin(x) for a, w, x in waves)
 
 
-def saturated(knee: float, sizes: tuple[float, float]) -> tuple[Problem, Fit, Screening]:
+def saturated(knee: float, sizes: tuple[float, float]) -> tuple[Comparison, Fit]:
     """Two motions of different size by a drive that gives `SLOPE` of what is asked for past a knee (N m)."""
     recordings, rng = [], np.random.default_rng(1)
     for phase, size in enumerate(sizes):
@@ -44,39 +43,30 @@ def saturated(knee: float, sizes: tuple[float, float]) -> tuple[Problem, Fit, Sc
     weight = (np.abs(prepared.stacked("v")) > 0.02).astype(float)
     problem = Problem(mount, prepared, weight, 0.002)
     base = problem.fit(mount, 25)
-    return problem, base, screen(base, prepared, Blocks.of(prepared), nuisances(base, prepared), weight)
+    return Comparison.of(problem, base, POLICY), base
 
 
-def found(problem: Problem, base: Fit, screening: Screening) -> Trial:
-    """The trial of the saturation that screening proposes."""
-    (start,) = (effect for effect in starts(screening) if isinstance(effect, TorqueSaturation))
-    return tried(problem, base, start, screening.bench)
+def found(comparison: Comparison, base: Fit) -> CandidateFit:
+    """The refitted structure with the saturation that screening proposes."""
+    worth = starts(comparison.screen(base), POLICY)
+    fits = [refitted(comparison, base, one, many) for one, many in worth if isinstance(one, TorqueSaturation)]
+    return max(fits, key=lambda one: one.evidence)
 
 
 @pytest.mark.parametrize("knee", [5.6, 7.0])
 def test_a_knee_that_one_recording_alone_reaches_is_tried_and_is_real(knee: float) -> None:
-    problem, base, screening = saturated(knee, (0.5, 1.2))
-    trial = found(problem, base, screening)
-    assert is_real(problem, trial)
-    assert isinstance(trial.effect, TorqueSaturation)
-    assert trial.effect.knee_torque == pytest.approx(knee, rel=0.03)
-    assert trial.effect.slope == pytest.approx(SLOPE, rel=0.03)
+    comparison, base = saturated(knee, (0.5, 1.2))
+    one = found(comparison, base)
+    assert is_admissible(comparison, one)
+    assert one.evidence > POLICY.least_evidence
+    assert isinstance(one.effect, TorqueSaturation)
+    assert one.effect.knee_torque == pytest.approx(knee, rel=0.03)
+    assert one.effect.slope == pytest.approx(SLOPE, rel=0.03)
 
 
 def test_a_knee_is_found_far_below_the_command_that_it_swells() -> None:
-    problem, base, screening = saturated(3.5, (1.0, 1.0))
-    trial = found(problem, base, screening)
-    assert 0.4 * np.quantile(np.abs(problem.prepared.stacked("tau")), 0.98) > 3.5
-    assert isinstance(trial.effect, TorqueSaturation)
-    assert trial.effect.knee_torque == pytest.approx(3.5, rel=0.03)
-
-
-def test_a_column_is_untold_where_it_acts_in_one_fold_nearly_alone() -> None:
-    t, q, _, _ = motion(1.0, 0.0)
-    prepared = prepare([Recording(name, {"t": t, "tau": q, "q": q}) for name in "abc"], 20.0)
-    blocks, first = Blocks.of(prepared), prepared.recording_of == 0
-    everywhere, dust, nowhere = np.ones(len(first)), np.where(first, 1.0, 1e-3), np.zeros(len(first))
-    told = blocks.untold(np.column_stack([everywhere, dust, nowhere]))
-    np.testing.assert_array_equal(told, [[False, True, False], [False] * 3, [False] * 3])
-    one = prepare([Recording("a", {"t": t[:2000], "tau": q[:2000], "q": q[:2000]})], 20.0)
-    assert not Blocks.of(one).untold(np.ones((len(one.recording_of), 1))).any()
+    comparison, base = saturated(3.5, (1.0, 1.0))
+    one = found(comparison, base)
+    assert 0.4 * np.quantile(np.abs(comparison.problem.prepared.stacked("tau")), 0.98) > 3.5
+    assert isinstance(one.effect, TorqueSaturation)
+    assert one.effect.knee_torque == pytest.approx(3.5, rel=0.03)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from tiny_fmu import tiny
 
-from cosim.errors import RecordingError, ScenarioError, SignalError
-from cosim.master import run
-from cosim.scenario import parse_scenario, read_scenario, shipped_scenarios
-from cosim.wiring import Record, Wire
+from cosim.master.simulate import Options, run
+from cosim.support.errors import RecordingError, ScenarioError, SignalError
+from cosim.system.scenario import parse_scenario, read_scenario, shipped_scenarios
+from cosim.system.wire import Record, Wire
 
 __all__ = ["tiny"]
 
@@ -67,7 +67,7 @@ def test_a_scenario_is_read_as_written(tmp_path: Path) -> None:
 
 def test_a_scenario_runs_and_its_text_is_in_the_recording(tiny: dict[int, Path], tmp_path: Path) -> None:
     scenario = parse_scenario(TEXT, "loop.toml", tiny[2].parent)
-    first, second = (run(scenario, tmp_path / f"{number}.parquet") for number in (1, 2))
+    first, second = (run(scenario, Options(tmp_path / f"{number}.parquet")) for number in (1, 2))
     assert first.recording.columns == ("t", "q", "tau", "q_d")
     assert len(first.recording) == 250
     assert first.recording.origin["scenario"] == TEXT
@@ -90,7 +90,7 @@ def test_algorithm_and_steps_are_read_and_kept_in_the_recording(tiny: dict[int, 
     scenario = parse_scenario(RATES, "loop.toml", tiny[2].parent)
     assert (scenario.every, scenario.algorithm.kind) == ({"controller": 10}, "gauss-seidel")
     assert parse_scenario(RATES.replace("step = 0.01", "every = 10"), "loop.toml", Path()).every == {"controller": 10}
-    done = run(scenario, tmp_path / "run.parquet")
+    done = run(scenario, Options(tmp_path / "run.parquet"))
     assert done.recording.origin["algorithm"] == {"kind": "gauss-seidel", "order": ["controller", "plant"]}
     assert done.recording.origin["every"] == {"controller": 10}
     assert len(set(done.recording["q"])) > 200  # the plant goes on between the commands
@@ -119,7 +119,7 @@ def test_a_mistake_in_algorithm_or_step_is_one_sentence(old: str, new: str, sent
 
 
 def test_the_wiring_is_drawn_with_its_delays() -> None:
-    from cosim.diagram import draw
+    from cosim.system.diagram import draw
 
     lines = draw(parse_scenario(RATES, "loop.toml", Path()))
     assert "└─ y ─────────▶ plant.a       9 to 18 ticks, 9 to 18 ms" in lines

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from cosim.errors import RecordingError, SignalError
-from cosim.recording import Recording
-from cosim.signals import (
-    SIDEREAL_RATE,
+from cosim.data.recording import Recording
+from cosim.data.signals import (
     Chirp,
     Constant,
     Generator,
@@ -25,6 +23,8 @@ from cosim.signals import (
     Slews,
     Steps,
 )
+from cosim.data.star import SIDEREAL_RATE
+from cosim.support.errors import RecordingError, SignalError
 
 STEP = 1e-4
 SLEWS: dict[str, Any] = {"kind": "slews", "max_velocity": 0.5, "max_acceleration": 2.0, "max_jerk": 20.0}

@@ -1,5 +1,6 @@
 """The SSP of a card: valid, the same bytes again, and the same motion in every tool that runs it."""
 
+import hashlib
 import importlib
 import subprocess
 import sys
@@ -16,12 +17,13 @@ from lxml import etree
 from ssp_tools import SIGNALS, TOOLS
 
 from cosim.cli import main
-from cosim.cli_system import system_of
-from cosim.master import run
-from cosim.scenario import read_scenario
-from cosim.signals import Sine
+from cosim.data.signals import Sine
+from cosim.master.simulate import run
+from cosim.models.system import system_of
+from cosim.system.scenario import read_scenario
 from pyfmi_models.card import parse_card, read_card
 from pyfmi_models.errors import CardError, ExportError
+from pyfmi_models.export import srmd
 from pyfmi_models.export.ssp import Connection, System, export_ssp
 from pyfmi_models.setpoint import Sine as SetPoint
 
@@ -52,6 +54,30 @@ def test_the_structure_and_the_parameter_sets_are_valid_ssp_1_0(ssp: Path) -> No
         for name in checked:
             validate_tree(etree.fromstring(archive.read(name)), schemas[Path(name).suffix])
     assert len(checked) == 4
+
+
+def test_the_metadata_say_what_a_model_was_identified_from_and_how_well(tmp_path: Path) -> None:
+    origin = {
+        "recordings": [{"name": "run1.csv", "sha256": "ab" * 32, "role": "train"}],
+        "evidence": "held-out RMS 0.79 refitted, 0.10 with the effects",
+    }
+    card = replace(read_card("paper_mount"), origin=origin)
+    with zipfile.ZipFile(export_ssp(system_of(card), tmp_path / "a.ssp")) as archive:
+        root = etree.fromstring(archive.read("resources/mount.srmd"))
+        content = archive.read("resources/mount.fmu")
+        assert "resources/reference.srmd" not in archive.namelist()
+    assert root.tag == f"{{{srmd.NAMESPACES['srmd']}}}SimulationResourceMetaData"
+    assert (root.get("version"), root.get("data"), root.get("checksumType")) == ("1.0.0", "mount.fmu", "SHA3-256")
+    assert root.get("checksum") == hashlib.sha3_256(content).hexdigest()
+    entries = {one.get("keyword"): one.text for one in root.iter(f"{{{srmd.NAMESPACES['stc']}}}ClassificationEntry")}
+    assert entries["recordings.0.name"] == "run1.csv"
+    assert entries["recordings.0.sha256"] == "ab" * 32
+    assert entries["evidence"] == origin["evidence"]
+
+
+def test_a_card_that_nothing_was_identified_from_says_so(ssp: Path) -> None:
+    with zipfile.ZipFile(ssp) as archive:
+        assert b"none: the numbers are those of the card" in archive.read("resources/controller.srmd")
 
 
 def test_two_exports_have_the_same_bytes(ssp: Path, tmp_path: Path) -> None:

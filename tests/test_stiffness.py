@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from cosim.errors import InputError, OutputError
-from cosim.stiffness import FMU, REGIMES, STEP, Regime, Row, compare, comparison, errata, limits, table_text
-from cosim.stiffness.__main__ import CVODE, STEPS, main
-from cosim.stiffness.archive import co_simulation, model_exchange
-from cosim.stiffness.figure import LOOK, SPEEDS, draw
-from cosim.stiffness.methods import EXPLICIT, METHODS, exact, iterate, stability_limit
-from cosim.stiffness.motion import FASTEST, sine
-from cosim.stiffness.pages import whole_text, write
-from cosim.stiffness.readme import readme
+from cosim.support.errors import InputError, OutputError
+from cosim_studies.stiffness import FMU, REGIMES, STEP, Regime, Row, compare, comparison, errata, limits, table_text
+from cosim_studies.stiffness.__main__ import CVODE, STEPS, main
+from cosim_studies.stiffness.archive import co_simulation, model_exchange
+from cosim_studies.stiffness.figure import LOOK, SPEEDS, draw
+from cosim_studies.stiffness.methods import EXPLICIT, METHODS, exact, iterate, stability_limit
+from cosim_studies.stiffness.motion import FASTEST, sine
+from cosim_studies.stiffness.pages import whole_text, write
+from cosim_studies.stiffness.readme import readme
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.friction import LuGre
 from pyfmi_models.model import Pair

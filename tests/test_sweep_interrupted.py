@@ -15,7 +15,7 @@ from test_cli_run import ENVIRONMENT
 from tiny_fmu import tiny
 
 import cosim.sweep.pool
-from cosim.errors import OutputError, SweepError
+from cosim.support.errors import OutputError, SweepError
 
 __all__ = ["folder", "tiny"]
 

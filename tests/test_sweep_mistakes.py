@@ -8,7 +8,7 @@ from sweeps import SCENARIO, K, R, folder, run, written
 from test_cli_run import call
 from tiny_fmu import tiny
 
-from cosim.errors import FmuError, SweepError, WiringError
+from cosim.support.errors import FmuError, SweepError, WiringError
 from cosim.sweep import read_sweep
 
 __all__ = ["folder", "tiny"]

@@ -10,7 +10,7 @@ from hypothesis import strategies as some
 from sweeps import K, folder, written
 from tiny_fmu import tiny
 
-from cosim.recording import Recording
+from cosim.data.recording import Recording
 from cosim.sweep import read_sweep
 from cosim.sweep.statistics import KINDS, Statistic
 from cosim.sweep.variation import Normal, Range, Values, Variation

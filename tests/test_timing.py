@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cosim.diagnosis.instruments import DECISIVE, misfits_of
-from cosim.diagnosis.inverse import Inverse
-from cosim.diagnosis.lateness import blamed, lateness
-from cosim.diagnosis.prepare import Prepared, prepare
-from cosim.recording import Recording
+from cosim.data.recording import Recording
+from cosim.diagnosis.instrumental_variable import DECISIVE, misfits_of
+from cosim.diagnosis.timing_attribution import blamed, lateness
+from cosim.estimation.inverse import Inverse
+from cosim.estimation.prepare import Prepared, prepare
 from pyfmi_models.effects import ActuatorLag, Delay
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount

@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 from scipy.signal import butter, filtfilt
 
-from cosim.proof import truth
-from cosim.proof.demo import demo_case
-from cosim.proof.generator import FAMILIES, OUTSIDE, Case, make_case, write_case
-from cosim.proof.truth import BLOCKS, TICK, Array, Drive
+from cosim_studies.proof import truth
+from cosim_studies.proof.demo import demo_case
+from cosim_studies.proof.generator import FAMILIES, OUTSIDE, Case, make_case, write_case
+from cosim_studies.proof.truth import BLOCKS, TICK, Array, Drive
 
 FRICTION = {
     **{"coulomb": 2.0, "breakaway": 3.0, "stribeck_speed": 0.02, "stribeck_power": 2.0, "viscous": 5.0},

@@ -1,13 +1,17 @@
 """What a start knows only roughly of an effect is found by further fits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from cosim.diagnosis.fit import with_values
-from cosim.diagnosis.prepare import prepare
-from cosim.diagnosis.problem import Problem
-from cosim.diagnosis.tuning import tuned
-from cosim.recording import Recording
+from cosim.data.recording import Recording
+from cosim.diagnosis.hypotheses import hypothesis_of
+from cosim.diagnosis.tuning import in_cycles
+from cosim.estimation.fit import with_values
+from cosim.estimation.prepare import prepare
+from cosim.estimation.problem import Problem
+from pyfmi_models.effects.inertia_variation import InertiaVariation
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag
 from pyfmi_models.effects.thermal_viscosity import ThermalViscosity
 from pyfmi_models.friction import Coulomb
@@ -29,6 +33,22 @@ def warmed(name: str, coldest: float, phase: float) -> Recording:
     return Recording(name, {"t": t, "tau": tau + noise, "q": q, "temperature": temperature})
 
 
+def test_a_metre_knows_no_whole_numbers_of_waves() -> None:
+    t = np.arange(4000) / 200
+    q, v, a = (0.1 * f for f in (np.sin(2 * t), 2 * np.cos(2 * t), -4 * np.sin(2 * t)))
+    wave = 2 * np.pi * 0.6
+    needed = 5 * (1 + 0.1 * np.cos(wave * q)) * a - 2.5 * 0.1 * wave * np.sin(wave * q) * v**2
+    noise = 0.05 * np.random.default_rng(1).standard_normal(len(t))  # in which a whole number fits as well
+    prepared = prepare([Recording("r", {"t": t, "tau": needed + 2 * np.sign(v) + 3 * v + noise, "q": q})], 20.0)
+    card = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=3.0), motion="linear")
+    problem = Problem(card, prepared, (np.abs(prepared.stacked("v")) > 0.01).astype(float), 0.005)
+    start = InertiaVariation(relative_amplitude=0.05, cycles_per_rev=0.7)
+    grown = problem.fit(replace(card, effects=(start,)), 12)
+    found = in_cycles(problem, grown).mount.effects[-1]
+    assert isinstance(found, InertiaVariation)
+    assert found.cycles_per_rev != 1.0
+
+
 def test_grease_is_found_to_thin_where_a_drag_had_taken_its_place() -> None:
     card = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=3.0))
     prepared = prepare([warmed("cold", 8.0, 0.0), warmed("warm", 16.0, 2.0)], 20.0)
@@ -37,6 +57,6 @@ def test_grease_is_found_to_thin_where_a_drag_had_taken_its_place() -> None:
     drag = Mount(name="axis", axis=card.axis, friction=card.friction, effects=(QuadraticDrag(coefficient=6.0), start))
     stuck = problem.fit(with_values(drag, ("friction.sigma2",), np.array([1e-3])), 12)
     assert stuck.parameters()["friction.sigma2"] < 0.3
-    found = tuned(problem, stuck, start).parameters()
+    found = hypothesis_of(start).tuned(problem, stuck, start, lambda fit: -problem.error(fit)).parameters()
     assert found["thermal_viscosity.viscous_per_degC"] == pytest.approx(-0.04, rel=0.05)
     assert found["friction.sigma2"] == pytest.approx(3.0, rel=0.05)

@@ -13,14 +13,15 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as some
 from pydantic import ValidationError
 from scipy.integrate import solve_ivp
+from simulating import simulate
 from tiny_fmu import tiny
 
-import cosim.cli_cache
-from cosim.errors import FmuError, ScenarioError
-from cosim.master import run, simulate
-from cosim.scenario import parse_scenario, read_scenario
-from cosim.signals import Star
-from cosim.star import SIDEREAL_RATE, path
+import cosim.models.cache
+from cosim.data.signals import Star
+from cosim.data.star import SIDEREAL_RATE, path
+from cosim.master.simulate import run
+from cosim.support.errors import FmuError, ScenarioError
+from cosim.system.scenario import parse_scenario, read_scenario
 from pyfmi_models.card import read_card
 from pyfmi_models.effects.alt_az import AltitudeInertia, AzimuthCentrifugal
 from pyfmi_models.export import export_fmu
@@ -266,8 +267,8 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_shipped_scenario_keeps_the_star_within_four_arcsec_of_gusts(
     cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cosim.cli_cache, "_home", lambda: cache)
-    scenario = replace(cosim.cli_cache.with_fmus(read_scenario("two_axis")), ticks=50_000, decimation=1)
+    monkeypatch.setattr(cosim.models.cache, "_home", lambda: cache)
+    scenario = replace(cosim.models.cache.with_fmus(read_scenario("two_axis")), ticks=50_000, decimation=1)
     done = run(scenario)
     table, begun = done.recording, slice(10_000, None)
     assert done.statistics["unconnected"] == []

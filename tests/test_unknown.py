@@ -5,15 +5,18 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cosim.diagnosis.adequacy import LARGE, Rest, rest_of
-from cosim.diagnosis.bank import last_reversal
-from cosim.diagnosis.evidence import Blocks, Whitening
-from cosim.diagnosis.fit import fit
+from cosim.data.recording import Recording
+from cosim.diagnosis.adequacy import over_time, share_left, share_there
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.decision import Decision, RestScores, decide
 from cosim.diagnosis.flagged import Rest as Pieces
 from cosim.diagnosis.flagged import flagged, loud_states, noise_at
-from cosim.diagnosis.prepare import prepare
-from cosim.diagnosis.structure import Bench, nuisances
-from cosim.recording import Recording
+from cosim.diagnosis.flexible import flexible_terms
+from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.predictive import Predictive
+from cosim.estimation.discrepancy_basis import last_reversal
+from cosim.estimation.prepare import Prepared, prepare
+from cosim.estimation.problem import Problem
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
@@ -36,20 +39,28 @@ def night(seed: int) -> dict[str, Array]:
     return {**table, "temperature": warm, "run": np.full_like(t, float(seed))}
 
 
-def rest(extra: Extra) -> Rest:
-    """What the refitted base of two nights leaves of a torque that it lacks."""
+def recorded(extra: Extra, *seeds: int) -> Prepared:
+    """Nights whose torque has something that the base lacks."""
     recordings = []
-    for seed in (1, 2):
+    for seed in seeds:
         now = night(seed)
         tau = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"] + extra(now)
         recordings.append(Recording(f"night_{seed}", {n: now[n] for n in ("t", "q", "temperature")} | {"tau": tau}))
+    return prepare(recordings, 10.0)
+
+
+def left(extra: Extra) -> tuple[RestScores, Decision]:
+    """What the base, refitted to two nights, leaves of a torque that it lacks; nothing is named."""
     mount = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=FC, sigma2=1.0), effects=())
-    prepared = prepare(recordings, 10.0)
+    prepared, there = recorded(extra, 1, 2), recorded(extra, 3)
     v = np.abs(prepared.stacked("v"))
-    weight = np.asarray(v > 0.02 * v.max(), float)
-    found, blocks = fit(mount, prepared.pieces, weight), Blocks.of(prepared)
-    whitening = Whitening.of(found.residual, blocks, v)
-    return rest_of(found, prepared, Bench(prepared, blocks, nuisances(found, prepared), whitening, weight))
+    problem = Problem(mount, prepared, np.asarray(v > 0.02 * v.max(), float), 0.01)
+    base = problem.fit(mount, 25)
+    comparison = Comparison.of(problem, base, POLICY)
+    held = Predictive.of(comparison, there, base.mount, there)
+    sizes = share_left(comparison, base), share_there(comparison, held.residual(base.mount), held)
+    rest = RestScores(*sizes, flexible_terms(comparison, base, held), over_time(comparison, base))
+    return rest, decide([], rest, POLICY)
 
 
 def kick(now: dict[str, Array]) -> Array:
@@ -89,9 +100,9 @@ def rubs(now: dict[str, Array]) -> Array:
     ids=["acceleration", "kick", "iron", "tilt", "warmth", "teeth", "once", "rubbing"],
 )
 def test_a_large_rest_is_unknown_and_goes_with_what_makes_it(extra: Extra, goes_with: str) -> None:
-    found = rest(extra)
-    assert found.unexplained
-    assert found.depends_on[0] == goes_with
+    _, decision = left(extra)
+    assert decision.is_unknown
+    assert goes_with in decision.depends_on
 
 
 @pytest.mark.parametrize(
@@ -104,15 +115,10 @@ def test_a_large_rest_is_unknown_and_goes_with_what_makes_it(extra: Extra, goes_
     ids=["nothing", "wandering level", "noise"],
 )
 def test_a_small_rest_and_noise_are_nothing_to_explain(extra: Extra) -> None:
-    found = rest(extra)
-    assert found.share < LARGE
-    assert found.depends_on == ()
-
-
-def test_what_is_missing_follows_a_quantity_only_if_it_is_large_and_predicted_elsewhere() -> None:
-    assert Rest(2 * LARGE, {"position": 0.5}, "time").follows_something
-    assert not Rest(2 * LARGE, {"position": 0.1}, "time").follows_something
-    assert not Rest(LARGE / 2, {"position": 0.5}, "time").follows_something
+    rest, decision = left(extra)
+    assert rest.share < POLICY.large_rest
+    assert not decision.is_unknown
+    assert decision.depends_on == ()
 
 
 def test_a_turn_counts_once_the_motion_came_back_far_enough() -> None:

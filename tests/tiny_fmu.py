@@ -2,7 +2,8 @@
 
 mode 0: y' = k (a - b); mode 1: y = k (a - b) a step later; mode 2: y = k (a - b) at once.
 From fail_at on a step returns the number `status`; 11 crashes the process, 12 never returns,
-13 prints a line and goes on.
+13 prints a line and goes on, 14 ends the process with exit code 0, 15 aborts, 16 starts a process that stays,
+17 asks to end the simulation.
 """
 
 import subprocess
@@ -22,7 +23,7 @@ SOURCE = r"""
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, STATUS, COUNT, CRASH = 11, HANG, CHATTER };
+enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, STATUS, COUNT, CRASH = 11, HANG, CHATTER, LEAVE, ABORT, SPAWN, END };
 typedef struct { double v[COUNT]; char name[99]; void *log; } M;
 typedef void Log2(void *, const char *, int, const char *, const char *, ...);
 typedef void Log3(void *, int, const char *, const char *);
@@ -45,6 +46,9 @@ static int step(M *m, double t, double h) {
   if (t + h / 2 <= m->v[FAIL_AT]) return 0;
   if (m->v[STATUS] == CRASH) raise(SIGSEGV);
   while (m->v[STATUS] == HANG) sleep(1);
+  if (m->v[STATUS] == LEAVE) exit(0);
+  if (m->v[STATUS] == ABORT) abort();
+  if (m->v[STATUS] == SPAWN) { if (!fork()) { for (;;) sleep(1); } exit(3); }
   if (m->v[STATUS] == CHATTER) return printf("chatter\n"), 0;
   return (int)m->v[STATUS];
 }
@@ -69,7 +73,10 @@ API int fmi3FreeFMUState(M *m, M **s) { free(*s); *s = NULL; return 0; }
 API int fmi2SetReal(M *m, const unsigned *r, size_t n, const double *x) { return set(m, r, n, x); }
 API int fmi2GetReal(M *m, const unsigned *r, size_t n, double *x) { return get(m, r, n, x); }
 API int fmi2DoStep(M *m, double t, double h, int p) {
-  int s = step(m, t, h); if (s) ((Log2 *)m->log)(NULL, m->name, 3, "error", "the %s broke", "shaft"); return s; }
+  int s = step(m, t, h); if (s == END) return 2;
+  if (s) ((Log2 *)m->log)(NULL, m->name, 3, "error", "the %s broke", "shaft"); return s; }
+API int fmi2GetBooleanStatus(M *m, int kind, int *value) {
+  return *value = kind == 3 && m->v[STATUS] == END, m->v[STATUS] == END ? 0 : 3; }
 API const char *fmi2GetVersion(void) { return "2.0"; }
 API const char *fmi2GetTypesPlatform(void) { return "default"; }
 API void *fmi3InstantiateCoSimulation(const char *n, const char *g, const char *r, bool a, bool b, bool c, bool d,
@@ -81,7 +88,8 @@ API void fmi3FreeInstance(void *m) { noted('F'); free(m); }
 API int fmi3SetFloat64(M *m, const unsigned *r, size_t n, const double *x, size_t k) { return set(m, r, n, x); }
 API int fmi3GetFloat64(M *m, const unsigned *r, size_t n, double *x, size_t k) { return get(m, r, n, x); }
 API int fmi3DoStep(M *m, double t, double h, bool p, bool *e, bool *x, bool *y, double *l) {
-  int s = step(m, t, h); if (s) ((Log3 *)m->log)(NULL, 3, "error", "the shaft broke"); return s; }
+  int s = step(m, t, h); if (s == END) return *x = true, 0;
+  if (s) ((Log3 *)m->log)(NULL, 3, "error", "the shaft broke"); return s; }
 API const char *fmi3GetVersion(void) { return "3.0"; }
 """
 

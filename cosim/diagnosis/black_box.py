@@ -20,16 +20,17 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.interpolate import BPoly, make_interp_spline
 
-from cosim.diagnosis.fit import fit
-from cosim.diagnosis.inverse import Inverse
-from cosim.diagnosis.prepare import Array, Piece, choose_cutoff, derivative, lowpass, prepare
-from cosim.diagnosis.protocol import rms
-from cosim.errors import InputError, StepError
-from cosim.files import sha256
-from cosim.master import simulate
-from cosim.recording import Recording
-from cosim.renamed import Alias
-from cosim.wiring import Record
+from cosim.data.recording import Recording
+from cosim.estimation.fit import fit
+from cosim.estimation.inverse import Inverse
+from cosim.estimation.prepare import Array, Piece, choose_cutoff, derivative, lowpass, prepare
+from cosim.fmi.renamed import Alias
+from cosim.master.simulate import simulate
+from cosim.support.errors import InputError, StepError
+from cosim.support.files import sha256
+from cosim.support.statistics import rms
+from cosim.system.system import System
+from cosim.system.wire import Record, Wire
 from pyfmi_models.card import Card
 from pyfmi_models.controller_section import ControllerSection
 from pyfmi_models.export import export_fmu
@@ -155,18 +156,18 @@ class _Follower:
         return piece.q - run["q"][rows], run["tau"][rows]
 
     def _simulate(self, step: float, ticks: int, signals: Mapping[str, Array], decimation: int) -> Recording:
-        wires = [("controller.tau", "plant.tau"), ("plant.q", "controller.q")]
-        run = simulate(
-            {"plant": self.box.fmu, "controller": self._loop(step)},
-            [*wires, *((name, f"controller.{name}") for name in signals)],
-            record={"tau": Record("plant.tau", "mean"), "q": Record("plant.q")},
+        wires = [Wire("controller.tau", "plant.tau"), Wire("plant.q", "controller.q")]
+        system = System(
+            components={"plant": self.box.fmu, "controller": self._loop(step)},
+            wires=[*wires, *(Wire(name, f"controller.{name}") for name in signals)],
+            records={"tau": Record("plant.tau", "mean"), "q": Record("plant.q")},
             step=step,
             ticks=ticks,
             signals=signals,
             variables={"plant": self.box.variables},
             decimation=decimation,
         )
-        return run.recording
+        return simulate(system).recording
 
     def _loop(self, step: float) -> Path:
         path = self.folder / f"loop_{self.bandwidth:.0f}_{1e12 * step:.0f}.fmu"
@@ -181,16 +182,16 @@ class _Follower:
 
 def _start(box: BlackBox) -> float:
     """Position at which an FMU starts."""
-    run = simulate(
-        {"plant": box.fmu},
-        [("none", "plant.tau")],
-        record={"q": Record("plant.q")},
+    system = System(
+        components={"plant": box.fmu},
+        wires=[Wire("none", "plant.tau")],
+        records={"q": Record("plant.q")},
         step=LONGEST_TICK,
         ticks=1,
         signals={"none": np.zeros(1)},
         variables={"plant": box.variables},
     )
-    return float(run.recording["q"][0])
+    return float(simulate(system).recording["q"][0])
 
 
 def _path(piece: Piece, step: float, before: int, ticks: int, start: float) -> dict[str, Array]:

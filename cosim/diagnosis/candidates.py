@@ -3,25 +3,22 @@
 A `Candidate` is one effect with its nonlinear numbers (a frequency, a place, a speed, a time) fixed by a grid or a
 periodogram; its linear numbers start at zero, so its columns are the exact derivatives of the plant's own equations.
 Where an effect has no linear number (a delay, a spring) its column is what a middling size of it changes. `start` turns
-fitted coefficients into an effect from which a joint nonlinear fit goes on. The folder `families` makes them.
+fitted coefficients into an effect from which a joint nonlinear fit goes on. The folder `hypotheses` makes them.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from cosim.diagnosis.inverse import Inverse, stacked
-from cosim.diagnosis.prepare import Array, Prepared
-from cosim.diagnosis.shaken import heard
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.tonal_disturbance import detectable_band
 from pyfmi_models.effects import ClockEffect, Effect, MotionEffect, SensorEffect
+from pyfmi_models.model import Pair
 from pyfmi_models.mount import Mount
-
-Room = Literal["", "speeds", "stops"]
-ROOM: dict[str, Room] = {"stribeck": "speeds", "presliding": "stops"}
-"""Shapes of the bank that must make room for an effect, because they are this effect."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +32,8 @@ class Candidate:
     instances: tuple[Effect, ...]
     linear: tuple[str, ...]
     start: Callable[[Array], Effect]
+    positive: bool = False
+    """Whether a coefficient below zero is none of its effects, so that nothing may start from there."""
 
     @property
     def finite(self) -> bool:
@@ -56,7 +55,7 @@ class Span:
     level: Array
     residual: Array
     cutoff: float
-    heard: tuple[float, float]
+    detectable: tuple[float, float]
     """Lowest and highest frequency [Hz] of a tone over time that could be told."""
     seconds: float
     extras: frozenset[str]
@@ -76,7 +75,14 @@ class Span:
         return float(np.ptp(self.q))
 
 
-Maker = Callable[[Mount, Span], Iterable[Candidate]]
+def of_both_ways(value: float | Pair | None) -> float:
+    """A number of a law, the mean of both directions; 0 if it has none."""
+    return float(np.mean(value)) if isinstance(value, Pair) else float(value or 0.0)
+
+
+def contact_level(mount: Mount) -> float:
+    """Coulomb level of a friction law, the mean of both directions [N m]; 0 if it has none."""
+    return of_both_ways(getattr(mount.friction, "Fc", None))
 
 
 def has(mount: Mount, kind: type[Any]) -> bool:
@@ -98,7 +104,7 @@ def span_of(mount: Mount, prepared: Prepared, residual: Array, level: Array) -> 
         level=level,
         residual=residual,
         cutoff=prepared.cutoff,
-        heard=heard(prepared),
+        detectable=detectable_band(prepared),
         seconds=max(float(piece.t[-1] - piece.t[0]) for piece in prepared.pieces),
         extras=common,
         asked=any(piece.asked for piece in prepared.pieces),

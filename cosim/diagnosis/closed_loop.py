@@ -12,14 +12,17 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
-from cosim.diagnosis.prepare import Array, lowpass
-from cosim.diagnosis.protocol import CUTOFF, rms
-from cosim.errors import StepError
-from cosim.master import simulate
-from cosim.recording import Recording
-from cosim.wiring import Record
+from cosim.data.recording import Recording
+from cosim.data.single_readings import cleaned
+from cosim.diagnosis.protocol import CUTOFF
+from cosim.estimation.prepare import Array, lowpass
+from cosim.estimation.set_point import set_point
+from cosim.master.simulate import simulate
+from cosim.support.errors import StepError
+from cosim.support.statistics import rms
+from cosim.system.system import System
+from cosim.system.wire import Record, Wire
 from pyfmi_models.card import Card
 from pyfmi_models.effects import ClockEffect
 from pyfmi_models.export import export_fmu
@@ -36,13 +39,6 @@ class LoopError:
 
     torque: float
     position: float
-
-
-def set_point(recording: Recording, step: float) -> dict[str, Array]:
-    """Set point at every tick from a recorded one: a quintic spline, so that its acceleration is smooth."""
-    spline = make_interp_spline(recording.t, recording["q_d"], k=5)
-    t = recording.t[0] + step * np.arange(int(np.floor(recording.duration / step)))
-    return {"q_d": spline(t), "v_d": spline(t, 1), "a_d": spline(t, 2)}
 
 
 def close_loop(
@@ -68,14 +64,14 @@ def close_loop(
         n: np.interp(recording.t[0] + step * np.arange(len(signals["q_d"])), recording.t, recording[n]) for n in inputs
     }
     start = {"position": float(signals["q_d"][0]), "speed": float(signals["v_d"][0])}
-    run = simulate(
-        {"plant": plant, "controller": controller},
-        [
-            *(("controller.tau", "plant.tau"), ("plant.q", "controller.q")),
-            *((n, f"controller.{n}") for n in signals),
-            *((n, f"plant.{n}") for n in given),
+    system = System(
+        components={"plant": plant, "controller": controller},
+        wires=[
+            *(Wire("controller.tau", "plant.tau"), Wire("plant.q", "controller.q")),
+            *(Wire(n, f"controller.{n}") for n in signals),
+            *(Wire(n, f"plant.{n}") for n in given),
         ],
-        record={
+        records={
             "tau": Record("plant.tau", "mean"),
             "q": Record(f"plant.{reading}"),
             "q_d": Record("q_d"),
@@ -88,8 +84,7 @@ def close_loop(
         decimation=decimation,
         name=name,
     )
-    assert run.recording is not None
-    return run.recording
+    return simulate(system).recording
 
 
 def compare(simulated: Recording, recording: Recording) -> LoopError:
@@ -109,7 +104,7 @@ class Loops:
 
     def __init__(self, card: Card, recordings: Sequence[Recording]) -> None:
         able = card.controller is not None and all({"q", "q_d"} <= set(one.columns) for one in recordings)
-        self._card, self._recordings = card, tuple(recordings) if able else ()
+        self._card, self._recordings = card, tuple(map(cleaned, recordings)) if able else ()
         self._begun: dict[str, tuple[Mount, Future[list[Recording]]]] = {}
 
     def __enter__(self) -> "Loops":

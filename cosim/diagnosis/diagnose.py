@@ -6,31 +6,41 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cosim.diagnosis.adequacy import Rest, rest_of, rest_there
-from cosim.diagnosis.challenge import Place, Verdict, challenge, merged
-from cosim.diagnosis.claim import weights
-from cosim.diagnosis.evidence import Blocks
+from cosim.data.recording import Recording
+from cosim.data.single_readings import cleaned
+from cosim.diagnosis.absent import not_found
+from cosim.diagnosis.adequacy import over_time, share_left, share_there
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.decision import Decision, EffectScores, RestScores, decide
+from cosim.diagnosis.delivered import standing
 from cosim.diagnosis.experiment import Experiment, best, told
-from cosim.diagnosis.findings import accepted, not_found, rival_finding, standard_errors
-from cosim.diagnosis.fit import Fit
-from cosim.diagnosis.laws import proposed_law
+from cosim.diagnosis.findings import accepted, rival_finding, standard_errors
+from cosim.diagnosis.flexible import flexible_terms
+from cosim.diagnosis.global_test import global_test
+from cosim.diagnosis.law_selection import proposed_law
+from cosim.diagnosis.learned.learn import Learned, learn
 from cosim.diagnosis.locate import regions
 from cosim.diagnosis.loop_bias import loop_bias
-from cosim.diagnosis.prepare import Array, Prepared, choose_cutoff, prepare, quality
-from cosim.diagnosis.problem import Problem
-from cosim.diagnosis.protocol import Structures, heldout_rms, is_misleading, is_proven, judge, traces, veto_band
+from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.predictive import Predictive
+from cosim.diagnosis.proof import Proof, prove
+from cosim.diagnosis.protocol import CUTOFF, Structures, heldout_rms, judge, traces
 from cosim.diagnosis.regression import black_box_rms
-from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace, is_special
-from cosim.diagnosis.sanity import check_effects, check_recordings
-from cosim.diagnosis.select import select
-from cosim.recording import Recording
+from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
+from cosim.diagnosis.rivals import Examined, examine, explains, margins
+from cosim.diagnosis.sanity.admission import check_effects, check_recordings
+from cosim.diagnosis.sanity.doubts import doubts, of_base, single_readings
+from cosim.diagnosis.search import search
+from cosim.diagnosis.withheld import without_names
+from cosim.estimation.blocks import Blocks
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import Array, Prepared, choose_cutoff, prepare, quality
+from cosim.estimation.problem import Problem
+from cosim.estimation.row_weights import weights
 from pyfmi_models.card import Card
-from pyfmi_models.effects import Effect, GravityUnbalance
+from pyfmi_models.effects import GravityUnbalance
 from pyfmi_models.mount import Mount
 
-LARGER = 0.5
-"""Share of what is missing: if more is left, and follows a quantity from recording to recording, the effects beside it
-may be imitations of that, and are not believed."""
 Say = Callable[[str], None]
 
 
@@ -46,12 +56,19 @@ class Outcome:
 
 
 @dataclass(frozen=True)
-class Stands:
-    """What stands after the proof, what was proposed and does not, and what is left."""
+class Answer:
+    """What a diagnosis ends with: the comparison, what stands and what does not, what is left, what is decided."""
 
-    verdict: Verdict
-    unproven: tuple[Place, ...]
-    rest: Rest
+    comparison: Comparison
+    base: Fit
+    proof: Proof
+    decision: Decision
+    held: Predictive
+
+    @property
+    def chosen(self) -> Fit:
+        """The structure that is delivered."""
+        return self.proof.chosen
 
 
 def diagnose(
@@ -66,7 +83,7 @@ def diagnose(
     Args:
         train: recordings that may be fitted.
         heldout: recordings that nothing is fitted to. They prove the result, and they have a veto: an effect that
-            does not lower their error is taken out as not proven. So their error after it is a little optimistic;
+            they do not predict is taken out as not proven. So their error after it is a little optimistic;
             `HeldOut.unvetoed_rms` is the error of what training alone proposed.
         card: the model as delivered.
         say: told, in a few words, what is being done.
@@ -78,46 +95,83 @@ def diagnose(
         RecordingError: the recordings cannot belong to this card (units), or are too short.
     """
     started = time.perf_counter()
+    given, train, heldout = (*train, *heldout), [*map(cleaned, train)], [*map(cleaned, heldout)]
     check_effects(card.plant())
-    check_recordings(train, heldout, card.plant())
+    check_recordings(train, heldout)
+    sanity = (*doubts(train, heldout, card), *single_readings(given, (*train, *heldout)))
     problem = _problem(train, card)
     say("refitting the base")
-    selection = select(problem, say)
-    base = _improved(card, selection.base.mount)
-    stood("before", base.plant())
-    verdict = challenge(problem, selection, say)
+    base = problem.fit(problem.mount, 25)
+    sanity = (*sanity, *of_base(problem, base.mount, train, heldout))
+    refitted = _improved(card, base.mount)
+    stood("before", refitted.plant())
+    if any(one.blocks_naming for one in sanity):
+        withheld = without_names(problem, base.mount, train, heldout, sanity)
+        numbers = _base_parameters(Structures(problem.mount, base.mount, base.mount))
+        seconds = time.perf_counter() - started
+        return Outcome(replace(withheld, base_parameters=numbers, seconds=seconds), refitted, refitted, refitted)
+    comparison = Comparison.of(problem, base, POLICY)
+    examined = examine(comparison, search(comparison, base, say), say)
     say("proving on the recording that was not fitted")
-    proposed = verdict.chosen.mount
-    stands = _surprised(problem, _believed(problem, *_proven(problem, verdict, heldout)), heldout)
-    certain, first = (_improved(card, one) for one in (_certain(problem, stands.verdict), proposed))
-    stood("after", certain.plant())
-    experiment = _experiment(stands.verdict, problem.prepared)
-    described = _described(problem, stands, train, heldout, card.mount.name)
+    answer = _answer(comparison, examined, heldout)
+    learned = learn(comparison, answer.chosen, answer.held) if answer.decision.is_unknown else None
+    model = learned.mount if learned else answer.chosen.mount
+    delivered, first = (_improved(card, one) for one in (model, examined.chosen.mount))
+    stood("after", delivered.plant())
+    experiment = _experiment(answer)
+    described = _with_learned(_described(answer, train, heldout, card.mount.name), answer, learned, train, heldout)
     diagnosis = replace(
         described,
-        heldout=replace(described.heldout, unvetoed_rms=heldout_rms(heldout, proposed)),
+        sanity=sanity,
+        global_test=global_test(comparison, base).as_json(),
+        heldout=replace(
+            described.heldout, unvetoed_rms=heldout_rms(heldout, examined.chosen.mount, described.heldout.cutoff_hz)
+        ),
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,
     )
-    return Outcome(diagnosis, certain, first, base, experiment)
+    return Outcome(diagnosis, delivered, first, refitted, experiment)
 
 
 def _problem(train: Sequence[Recording], card: Card) -> Problem:
     mount, prepared = card.plant(), prepare(train, choose_cutoff(train, card.mount.inertia))
-    return Problem(mount, prepared, _weight(mount, prepared), max(recording.sample_time for recording in train))
+    slowest = max(recording.sample_time for recording in train)
+    return Problem(mount, prepared, _weight(mount, prepared), slowest)
 
 
-def _described(
-    problem: Problem, stands: Stands, train: Sequence[Recording], heldout: Sequence[Recording], name: str
-) -> Diagnosis:
+def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Recording]) -> Answer:
+    """Prove, measure what is left, decide."""
+    prepared = prepare(heldout, comparison.problem.prepared.cutoff)
+    held = Predictive.of(comparison, prepared, examined.base.mount, prepare(heldout, CUTOFF))
+    proof = prove(comparison, examined, held)
+    rest, policy = _rest(comparison, proof, held), comparison.policy
+    return Answer(comparison, examined.base, proof, decide(_scores(proof), rest, policy), held)
+
+
+def _scores(proof: Proof) -> list[EffectScores]:
+    return [
+        EffectScores(one.effect.id, one.own.evidence, margins(one), explains(one), proof.predicted[one.effect.id])
+        for one in proof.standing
+    ]
+
+
+def _rest(comparison: Comparison, proof: Proof, held: Predictive) -> RestScores:
+    left, there = share_left(comparison, proof.chosen), held.residual(proof.chosen.mount)
+    terms = flexible_terms(comparison, proof.chosen, held)
+    shown = over_time(comparison, proof.chosen)
+    return RestScores(left, share_there(comparison, there, held), terms, shown)
+
+
+def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Recording], name: str) -> Diagnosis:
     """What stands, measured on all recordings and put into words."""
-    verdict, prepared, linear = stands.verdict, problem.prepared, problem.mount.motion == "linear"
-    models = Structures(problem.mount, verdict.base.mount, verdict.chosen.mount)
+    problem, decision = answer.comparison.problem, answer.decision
+    prepared, linear = problem.prepared, problem.mount.motion == "linear"
+    models = Structures(problem.mount, answer.base.mount, answer.chosen.mount)
     signals = traces(train, heldout, models)
-    found = _findings(stands, prepared, problem.weight, signals)
-    bias = loop_bias(prepared, verdict.chosen, problem.weight)
+    found = _findings(answer, signals)
+    bias = loop_bias(prepared, answer.chosen, problem.weight)
     return Diagnosis(
-        verdict=_verdict(found, stands.rest),
+        verdict=_verdict(found, decision),
         findings=tuple(found),
         heldout=replace(judge(heldout, models, prepared.cutoff), black_box_rms=black_box_rms(signals)),
         traces=signals,
@@ -125,29 +179,41 @@ def _described(
         regions_after=regions(signals, True, linear),
         mount=name,
         motion=problem.mount.motion,
-        ambiguous_with=tuple((p.effect.id, *p.ambiguous_with) for p in verdict.places if p.ambiguous_with),
-        depends_on=stands.rest.depends_on,
+        ambiguous_with=tuple((name, *members) for name, members in decision.sets.items() if members),
+        depends_on=decision.depends_on,
         data_quality=tuple(note for recording in (*train, *heldout) for note in quality(recording, prepared.cutoff)),
-        friction_law=proposed_law(problem, verdict.chosen),
+        friction_law=proposed_law(problem, answer.chosen),
         loop_bias=bias.as_json() if bias else {},
         base_parameters=_base_parameters(models),
     )
 
 
-def _certain(problem: Problem, verdict: Verdict) -> Mount:
-    """The structure without effects that have a rival which would predict otherwise: neither goes into a model."""
-    open_keys = {_key(p.effect) for p in verdict.places if not is_special(p.effect.id, p.ambiguous_with)}
-    mount = verdict.chosen.mount
-    rest = tuple(effect for effect in mount.effects if _key(effect) not in open_keys)
-    return mount if len(rest) == len(mount.effects) else problem.fit(replace(mount, effects=rest), 15).mount
+def _with_learned(
+    named: Diagnosis, answer: Answer, learned: Learned | None, train: Sequence[Recording], heldout: Sequence[Recording]
+) -> Diagnosis:
+    """Let what describes the delivered model hold the learned term too; names and answers stay as they are."""
+    if not learned:
+        return named
+    problem = answer.comparison.problem
+    models = Structures(problem.mount, answer.base.mount, learned.mount)
+    signals, held = traces(train, heldout, models), judge(heldout, models, problem.prepared.cutoff)
+    return replace(
+        named,
+        learned=learned.as_json(),
+        heldout=replace(held, black_box_rms=named.heldout.black_box_rms),
+        traces=signals,
+        regions_after=regions(signals, True, problem.mount.motion == "linear"),
+        base_parameters=_base_parameters(models),
+    )
 
 
-def _experiment(verdict: Verdict, prepared: Prepared) -> Experiment | None:
+def _experiment(answer: Answer) -> Experiment | None:
     """What would settle the first open question."""
-    for place in verdict.places:
-        for rival in place.rivals:
-            if rival.effect.id in place.ambiguous_with:
-                return best(place.trial.fit.mount, rival.fit.mount, (place.effect.id, rival.effect.id), prepared)
+    for one in answer.proof.standing:
+        for rival in one.rivals:
+            if rival.effect.id in answer.decision.sets[one.effect.id]:
+                pair = one.effect.id, rival.effect.id
+                return best(one.own.fit.mount, rival.fit.mount, pair, answer.comparison.problem.prepared)
     return None
 
 
@@ -156,86 +222,29 @@ def _weight(mount: Mount, prepared: Prepared) -> Array:
     return np.ones(len(prepared.recording_of)) if mount.friction.key == "none" else weights(mount.friction, prepared)
 
 
-def _proven(problem: Problem, verdict: Verdict, heldout: Sequence[Recording]) -> tuple[Verdict, tuple[Place, ...]]:
-    """Take out effects that do not help on the held-out recording; return what stands, and those taken out.
-
-    What is then still worse than the base there is taken out as a whole.
-    """
-    if not verdict.places:
-        return verdict, ()
-    chosen = verdict.chosen
-    out: list[Place] = []
-    band = veto_band(heldout, verdict.base.mount, problem.prepared.cutoff)
-    for places in merged(verdict.places).values():
-        gone = {_key(place.effect) for place in places}
-        rest = tuple(effect for effect in chosen.mount.effects if _key(effect) not in gone)
-        without = problem.fit(replace(chosen.mount, effects=rest), 10)
-        if not is_proven(heldout, without.mount, chosen.mount, band):
-            chosen, out = without, [*out, *places]
-    if is_misleading(heldout, verdict.base.mount, chosen.mount, band):
-        return replace(verdict, chosen=verdict.base, places=()), verdict.places
-    if not out:
-        return verdict, ()
-    kept = [place for place in verdict.places if place not in out]
-    renewed = tuple(replace(p, effect=_same(p, chosen)) for p in kept)
-    return replace(verdict, chosen=chosen, places=renewed), tuple(out)
-
-
-def _believed(problem: Problem, verdict: Verdict, unproven: tuple[Place, ...]) -> Stands:
-    """Doubt the names beside a larger rest that follows a quantity."""
-    rest = rest_of(verdict.chosen, problem.prepared, verdict.bench)
-    if not rest.follows_something:
-        return Stands(verdict, unproven, rest)
-    whole = rest_of(verdict.base, problem.prepared, verdict.bench)
-    if rest.share <= LARGER * whole.share:
-        return Stands(verdict, unproven, rest)
-    return Stands(replace(verdict, chosen=verdict.base, places=()), (*unproven, *verdict.places), whole)
-
-
-def _surprised(problem: Problem, stands: Stands, heldout: Sequence[Recording]) -> Stands:
-    """Where training leaves nothing large, ask the held-out recording."""
-    prepared = problem.prepared
-    if stands.rest.unexplained:
-        return stands
-    there = rest_there(stands.verdict.chosen, prepared, stands.verdict.bench, prepare(heldout, prepared.cutoff))
-    return replace(stands, rest=there) if there.unexplained else stands
-
-
-def _key(effect: Effect) -> tuple[str, float]:
-    """What stays of an effect when it is fitted again: its kind, and its place in a spectrum."""
-    return type(effect).__name__, getattr(effect, "cycles_per_rev", 0.0)
-
-
-def _same(place: Place, chosen: Fit) -> Effect:
-    alike = [effect for effect in chosen.mount.effects if _key(effect) == _key(place.effect)]
-    hertz = getattr(place.effect, "frequency_hz", 0.0)
-    return min(alike, key=lambda effect: abs(getattr(effect, "frequency_hz", 0.0) - hertz))
-
-
-def _findings(stands: Stands, prepared: Prepared, weight: Array, signals: Sequence[Trace]) -> list[Finding]:
-    verdict = stands.verdict
-    errors = standard_errors(verdict.chosen, Blocks.of(prepared), weight)
-    mount, found, rivals = verdict.chosen.mount, [], []
-    for places in merged(verdict.places).values():
-        main = max(places, key=lambda place: getattr(place.effect, "amplitude", 0.0))
-        others = [place for place in places if place is not main]
-        found.append(accepted(main, others, mount, errors, signals, proven=True))
-        rivals += [rival_finding(r, main, mount) for r in main.rivals if r.effect.id in main.ambiguous_with]
-    found.sort(key=lambda finding: -finding.gain)
+def _findings(answer: Answer, signals: Sequence[Trace]) -> list[Finding]:
+    comparison, decision, mount = answer.comparison, answer.decision, answer.chosen.mount
+    errors = standard_errors(answer.chosen, Blocks.of(comparison.problem.prepared), comparison.problem.weight)
+    found, rivals = [], []
+    for one in standing(comparison, answer.proof):
+        name = one.effect.id
+        shares, members, predicted = decision.probabilities[name], decision.sets[name], answer.proof.predicted[name]
+        one_found = accepted(one, mount, errors, signals, members, shares[name], predicted)
+        found.append(replace(one_found, answer="ambiguous") if name in decision.doubtful else one_found)
+        rivals += [rival_finding(r, shares[r.effect.id], mount) for r in one.rivals if r.effect.id in members]
     named = {finding.effect for finding in found}
     rivals = [finding for finding in rivals if finding.effect not in named]
-    lost = [
-        replace(rival_finding(p.trial, p, mount), answer="not_proven", probability=1 - p.probability)
-        for p in stands.unproven
-    ]
-    lost = [finding for finding in lost if finding.effect not in named]
+    lost = [replace(rival_finding(one.own, 0.0, mount), answer="not_proven") for one in answer.proof.unproven]
     named |= {finding.effect for finding in (*rivals, *lost)}
-    return [*found, *rivals, *lost, *not_found(verdict.chosen, prepared, weight, verdict.looked_at, sorted(named))]
+    largest = max((one.own.evidence for one in answer.proof.standing), default=0.0)
+    return [*found, *rivals, *lost, *not_found(comparison, answer.chosen, sorted(named), largest)]
 
 
-def _verdict(found: Sequence[Finding], rest: Rest) -> tuple[str, ...]:
-    named = tuple(f.effect for f in found if f.answer in ("found", "ambiguous") and f.where is not None)
-    return (*named, *(("unknown",) if rest.unexplained else ()))
+def _verdict(found: Sequence[Finding], decision: Decision) -> tuple[str, ...]:
+    named = [f.effect for f in found if f.answer in ("found", "ambiguous") and f.where is not None]
+    sure = [name for name in named if name not in decision.doubtful]
+    doubtful = [name for name in named if name in decision.doubtful]
+    return (*sure, *(("unknown",) if decision.is_unknown else ()), *doubtful)
 
 
 def _base_parameters(models: Structures) -> dict[str, tuple[float, float, float]]:

@@ -10,9 +10,15 @@ from functools import partial
 
 import numpy as np
 
-from cosim.diagnosis.bank import last_reversal, stop_operators
-from cosim.diagnosis.prepare import Array, Piece, Prepared
+from cosim.estimation.discrepancy_basis import last_reversal, stop_operators
+from cosim.estimation.prepare import Array, Piece, Prepared
 
+PRODUCT_WAVES = 4
+"""Waves over the range of positions in a product with another quantity."""
+OF_LAW = ("speed", "rate of torque")
+"""Terms that say nothing of the unknown: a friction law's own misfit, and time stamps a fraction of a sample off."""
+REPEATS = 0.02
+"""Share of a column's energy that torque and motion must leave for it to be a quantity of its own."""
 TURN = 5e-4
 """Share of the range of positions by which a motion must come back to count as reversed."""
 
@@ -22,10 +28,16 @@ Maker = Callable[[Piece], list[Array]]
 
 @dataclass(frozen=True)
 class Term:
-    """Shapes of one quantity at the kept rows, (rows, n), and what they must go `beyond`."""
+    """Shapes of one quantity, and what they must go `beyond`; both made from any piece, scaled as in training."""
 
-    columns: Array
-    beyond: Array
+    make: Maker
+    beyond: Maker
+    scale: Array
+    """RMS of each shape in training."""
+
+    def columns(self, prepared: Prepared) -> Array:
+        """Shapes at the kept rows, (rows, n)."""
+        return made(prepared, self.make) / self.scale
 
 
 def dictionary(prepared: Prepared) -> dict[str, Term]:
@@ -33,8 +45,14 @@ def dictionary(prepared: Prepared) -> dict[str, Term]:
     makers = {**_of_speed(prepared), **_of_time(prepared), **_of_columns(prepared)}
     if prepared.has_position:
         makers |= {**_of_position(prepared), **_of_reversals(prepared)}
-    terms = {name: Term(_columns(prepared, make), _columns(prepared, _nothing)) for name, make in makers.items()}
-    return terms | (_products(prepared) if prepared.has_position else {})
+    pairs = {name: (make, _nothing) for name, make in makers.items()}
+    if prepared.has_position:
+        pairs |= _products(prepared)
+    return {name: Term(make, beyond, _scale(prepared, make)) for name, (make, beyond) in pairs.items()}
+
+
+def _scale(prepared: Prepared, make: Maker) -> Array:
+    return np.asarray(np.sqrt(np.mean(made(prepared, make) ** 2, axis=0)) + 1e-300)
 
 
 def _of_position(prepared: Prepared) -> dict[str, Maker]:
@@ -47,6 +65,8 @@ def _of_position(prepared: Prepared) -> dict[str, Maker]:
 
 def _of_speed(prepared: Prepared) -> dict[str, Maker]:
     top = max(abs(edge) for edge in prepared.ranges["v"])
+    needed = _needed(prepared)
+    most = max(float(np.abs(needed(piece)).max()) for piece in prepared.pieces) + 1e-300
     hard = max(float(np.abs(piece.a).max()) for piece in prepared.pieces)
     return {
         "speed": lambda p: [np.tanh(p.v / (s * top)) for s in (0.01, 0.05, 0.2, 1.0)] + [p.v * np.abs(p.v)],
@@ -54,7 +74,23 @@ def _of_speed(prepared: Prepared) -> dict[str, Maker]:
         "acceleration": lambda p: [p.a * np.abs(p.a) / hard**2, np.abs(p.a) / hard, np.tanh(4 * p.a / hard)],
         "acceleration and speed": lambda p: [p.a * np.abs(p.v), p.a * p.v, p.v * np.abs(p.a)],
         "rate of torque": lambda p: [np.gradient(p.tau, p.dt)],
+        "torque": lambda p: [np.tanh(needed(p) / (s * most)) for s in (0.02, 0.05, 0.1, 0.2)],
     }
+
+
+def _needed(prepared: Prepared) -> Column:
+    """Torque that the motion needs, by least squares on inertia, friction and a constant.
+
+    Not the recorded torque: what is missing is in that one, and would seem to follow it.
+    """
+    sign = _sign(prepared)
+
+    def columns(p: Piece) -> Array:
+        return np.column_stack([p.a, sign(p), p.v, np.ones_like(p.v)])
+
+    rows = np.concatenate([columns(piece)[piece.kept] for piece in prepared.pieces])
+    beta = np.linalg.lstsq(rows, prepared.stacked("tau"), rcond=1e-9)[0]
+    return lambda p: np.asarray(columns(p) @ beta)
 
 
 def _of_time(prepared: Prepared) -> dict[str, Maker]:
@@ -90,37 +126,49 @@ def _of_reversals(prepared: Prepared) -> dict[str, Maker]:
 def _of_columns(prepared: Prepared) -> dict[str, Maker]:
     """User columns, offered as causes: alone, as a friction level, and with the speed."""
     sign = _sign(prepared)
-    return {name: partial(_by_column, column, sign) for name, column in _user_columns(prepared).items()}
+    return {name: partial(_by_column, column, sign) for name, column in user_columns(prepared).items()}
 
 
 def _by_column(column: Column, sign: Column, p: Piece) -> list[Array]:
     return [column(p), column(p) * sign(p), column(p) * p.v]
 
 
-def _products(prepared: Prepared) -> dict[str, Term]:
+def _products(prepared: Prepared) -> dict[str, tuple[Maker, Maker]]:
     """Products of position and user columns, beyond either of the two alone."""
-    sign, place, terms = _sign(prepared), _place(prepared), dict[str, Term]()
-    for name, column in _user_columns(prepared).items():
+    sign, place, pairs = _sign(prepared), _place(prepared), dict[str, tuple[Maker, Maker]]()
+    for name, column in user_columns(prepared).items():
         alone, product = partial(_alone, place, column, sign), partial(_product, place, column, sign)
-        terms[f"position and {name}"] = Term(_columns(prepared, product), _columns(prepared, alone))
-    return terms
+        pairs[f"position and {name}"] = product, alone
+    return pairs
 
 
-def _alone(one: Column, other: Column, sign: Column, p: Piece) -> list[Array]:
-    return [one(p), other(p), one(p) * sign(p), other(p) * sign(p)]
+def _alone(place: Column, other: Column, sign: Column, p: Piece) -> list[Array]:
+    waves = _waves(place(p), PRODUCT_WAVES)
+    return [other(p), other(p) * sign(p), *waves, *(wave * sign(p) for wave in waves)]
 
 
-def _product(one: Column, other: Column, sign: Column, p: Piece) -> list[Array]:
-    return [one(p) * other(p), one(p) * other(p) * sign(p)]
+def _product(place: Column, other: Column, sign: Column, p: Piece) -> list[Array]:
+    waves = _waves(place(p), PRODUCT_WAVES)
+    return [*(wave * other(p) for wave in waves), *(wave * other(p) * sign(p) for wave in waves)]
 
 
 def _nothing(_: Piece) -> list[Array]:
     return []
 
 
-def _user_columns(prepared: Prepared) -> dict[str, Column]:
+def user_columns(prepared: Prepared) -> dict[str, Column]:
+    """Columns that are neither torque nor motion under another name, centred, of unit size."""
     common = set.intersection(*(set(piece.extras) for piece in prepared.pieces)) - {"q_d", "v"}
-    return {name: _centred(prepared, name) for name in sorted(common)}
+    return {name: _centred(prepared, name) for name in sorted(common) if not _repeats(prepared, name)}
+
+
+def _repeats(prepared: Prepared, name: str) -> bool:
+    """Whether a column is the torque, or the motion, under another name or in another unit: then it is no cause."""
+    column = np.concatenate([piece.lowpass(piece.extras[name])[piece.kept] for piece in prepared.pieces])
+    known = np.column_stack([*(prepared.stacked(one) for one in ("tau", "q", "v", "a")), np.ones(len(column))])
+    own = column - column.mean()
+    left = own - known @ np.linalg.lstsq(known, own, rcond=1e-9)[0]
+    return bool(left @ left <= REPEATS * (own @ own))
 
 
 def _centred(prepared: Prepared, name: str) -> Column:
@@ -144,11 +192,11 @@ def _waves(x: Array, count: int = 8) -> list[Array]:
     return [np.cos(np.pi * k * x) for k in range(1, count + 1)]
 
 
-def _columns(prepared: Prepared, make: Maker) -> Array:
+def made(prepared: Prepared, make: Maker) -> Array:
+    """What a maker makes at the kept rows of all pieces, filtered."""
     parts = []
     for piece in prepared.pieces:
-        made = make(piece)
-        rows = piece.lowpass(np.column_stack(made))[piece.kept] if made else np.empty((len(piece.kept), 0))
+        shapes = make(piece)
+        rows = piece.lowpass(np.column_stack(shapes))[piece.kept] if shapes else np.empty((len(piece.kept), 0))
         parts.append(rows)
-    columns = np.concatenate(parts)
-    return np.asarray(columns / (columns.std(0) + 1e-300))
+    return np.concatenate(parts)

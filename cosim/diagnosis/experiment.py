@@ -12,11 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from cosim.diagnosis.fit import free_parameters
-from cosim.diagnosis.inverse import Inverse
-from cosim.diagnosis.prepare import Array, Piece, Prepared, lowpass
-from cosim.diagnosis.structure import projected
-from cosim.signals import Chirp, Multisine, Sine, Slews
+from cosim.data.signals import Chirp, Multisine, Sine, Slews
+from cosim.diagnosis.entries import NextExperiment
+from cosim.estimation.fit import free_parameters
+from cosim.estimation.inverse import Inverse
+from cosim.estimation.least_squares import projected
+from cosim.estimation.prepare import Array, Piece, Prepared, lowpass
+from cosim.support.statistics import rms
 from pyfmi_models.card import Card
 from pyfmi_models.mount import Mount
 
@@ -81,15 +83,15 @@ def best(main: Mount, rival: Mount, separates: tuple[str, ...], prepared: Prepar
     return found if found.difference > 0 else None
 
 
-def told(experiment: Experiment, has_controller: bool) -> dict[str, Any]:
+def told(experiment: Experiment, has_controller: bool) -> NextExperiment:
     """The experiment as it stands in diagnosis.json; without a controller in the card there is no scenario to run."""
-    words = {
+    words: NextExperiment = {
         "separates": list(experiment.separates),
         "expected_difference": experiment.difference,
         "description": f"record {experiment.title}, {SECONDS:.0f} s",
         "set_point": experiment.signal.model_dump(exclude_none=True),
     }
-    return words | ({"scenario": SCENARIO} if has_controller else {})
+    return words | NextExperiment(scenario=SCENARIO) if has_controller else words
 
 
 def motions(visited: Visited) -> Iterator[tuple[str, SetPoint]]:
@@ -128,7 +130,7 @@ def _difference(main: Mount, rival: Mount, signal: SetPoint, visited: Visited) -
     inverse = Inverse(rival, free_parameters(rival))
     other, slopes = inverse.torque(replace(piece, tau=torque), inverse.present)
     rest = projected((torque - other)[piece.inside], slopes[piece.inside])
-    return float(np.sqrt(np.mean(rest**2)))
+    return rms(rest)
 
 
 def _piece(signal: SetPoint, visited: Visited) -> Piece:

@@ -1,63 +1,28 @@
-"""From structures to sentences: one finding for every effect that was looked for."""
+"""From structures to sentences: findings of effects that stand, that rival them, or that were not proven."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, replace
-from math import sqrt
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.diagnosis.calibration import calibrated
-from cosim.diagnosis.candidates import columns_of
-from cosim.diagnosis.challenge import Place
-from cosim.diagnosis.evidence import Blocks, sandwich
-from cosim.diagnosis.families import TRIED, candidates
-from cosim.diagnosis.fit import Fit
+from cosim.diagnosis.advice import advice
+from cosim.diagnosis.hypotheses import hypothesis_of
 from cosim.diagnosis.locate import where
-from cosim.diagnosis.prepare import Array, Prepared
 from cosim.diagnosis.result import Finding, Trace
-from cosim.diagnosis.shaken import heard
-from cosim.diagnosis.structure import nuisances, projected
-from cosim.diagnosis.trial import LEAST_GAIN, Trial
-from pyfmi_models.effects import CATALOGUE, DriveEffect, Effect, GravityUnbalance
-from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
-from pyfmi_models.effects.torque_offset import TorqueOffset
-from pyfmi_models.friction import MemorylessLaw
+from cosim.diagnosis.rivals import AcceptedEffect
+from cosim.diagnosis.search import CandidateFit
+from cosim.estimation.blocks import Blocks, sandwich
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import Array
+from pyfmi_models.effects import Effect
 from pyfmi_models.model import Variable, parameters_of
 from pyfmi_models.mount import LINEAR_UNITS, Mount
 
 Z95 = 1.96
-MAIN = {
-    "friction_asymmetry": ("level_asymmetry", 200.0, "%"),
-    "torque_offset": ("torque", 1.0, "N.m"),
-    "delay": ("delay_ms", 1.0, "ms"),
-    "actuator_lag": ("time_constant_ms", 1.0, "ms"),
-    "cogging": ("amplitude", 1.0, "N.m"),
-    "stribeck": ("Fs", 1.0, "N.m"),
-    "gravity_unbalance": ("mgl", 1.0, "N.m"),
-    "position_friction": ("relative_amplitude", 100.0, "%"),
-    "load_dependent_friction": ("coulomb_per_Nm", 100.0, "% of the load"),
-    "dwell_breakaway": ("torque_per_efold", 1.0, "N.m"),
-    "thermal_viscosity": ("viscous_per_degC", 100.0, "%/K"),
-    "presliding": ("sigma0", 1.0, "N.m/rad"),
-    "cable_wrap": ("stiffness", 1.0, "N.m/rad"),
-    "quadratic_drag": ("coefficient", 1.0, "N.m.s2/rad2"),
-    "torque_saturation": ("knee_torque", 1.0, "N.m"),
-    "periodic_disturbance": ("amplitude", 1.0, "N.m"),
-    "clock_skew": ("offset_ms", 1.0, "ms"),
-    "inertia_variation": ("relative_amplitude", 100.0, "%"),
-    "compliance": ("resonance_hz", 1.0, "Hz"),
-    "backlash": ("gap_rad", 1.0, "rad"),
-    "encoder_eccentricity": ("amplitude_rad", 1.0, "rad"),
-}
-"""The number that says how large an effect is: parameter, factor and unit of the text."""
-NOTES = {
-    "periodic_disturbance": "; its phase is that of each recording, told by the recording itself, by the one not "
-    "fitted too; card and FMU hold that of the first"
-}
-"""What must be said beside the evidence."""
-PLACES = ("stribeck", "presliding", "torque_saturation", "clock_skew", "compliance", "backlash")
-"""Effects whose number says where they set in, not how large they are: no smallest size can be told."""
+
+EXCLUDED_NATS, EXCLUDED_SHARE = 10.0, 0.02
+"""Evidence (odds of 20 000 to 1) and share of the error energy by which a rival must be behind to be called ruled out:
+one that fits as well is only less likely, however the noise is counted."""
 
 
 @dataclass(frozen=True)
@@ -84,61 +49,83 @@ def numbers_of(effect: Effect, mount: Mount, errors: Mapping[str, float]) -> Num
 
 
 def accepted(
-    place: Place,
-    harmonics: Sequence[Place],
+    one: AcceptedEffect,
     mount: Mount,
     errors: Mapping[str, float],
     traces: Sequence[Trace],
-    proven: bool,
+    members: Sequence[str],
+    probability: float,
+    predicted: float,
 ) -> Finding:
-    """Describe an effect that stands; its further harmonics are told with it."""
-    numbers, effect = numbers_of(place.effect, mount, errors), place.effect
-    rivals = place.ambiguous_with
-    answer = "not_proven" if not proven else "ambiguous" if rivals else "found"
-    parameters: dict[str, Any] = dict(numbers.values)
-    if harmonics:
-        parameters["harmonics"] = [numbers_of(other.effect, mount, errors).values for other in harmonics]
-    tones = sorted(other.effect.frequency_hz for other in harmonics if isinstance(other.effect, PeriodicDisturbance))
-    further = f" Further tones: {', '.join(f'{hertz:.4g}' for hertz in tones)} Hz." if tones else ""
+    """Describe an effect that stands, with the further waves of a ripple; `members` are rivals that stay open."""
+    alike = [effect for effect in mount.effects if effect.id == one.effect.id][-len(one.effects) :]
+    effect = max(alike, key=lambda own: float(getattr(own, "amplitude", 0.0)))
+    harmonics = [other for other in alike if other is not effect]
+    numbers = numbers_of(effect, mount, errors)
+    own = hypothesis_of(effect)
     ranges = {n: (numbers.values[n] - Z95 * e, numbers.values[n] + Z95 * e) for n, e in numbers.errors.items()}
     size, size_range = _size(effect, numbers, mount)
-    general = {rival.effect.id: rival.effect.title.lower() for rival in place.more_general}
-    simpler = f"; {' and '.join(general.values())} can look the same: the simpler one is named" if general else ""
-    excluded = [rival for rival in place.rivals if rival.effect.id not in (*rivals, *general)]
     return Finding(
         effect=effect.id,
         title=effect.title,
-        answer=answer,  # type: ignore[arg-type]
-        probability=place.probabilities[place.effect.id],
-        gain=place.trial.gain,
-        parameters=parameters,
+        answer="ambiguous" if members or not is_told(effect, numbers, mount) else "found",
+        probability=probability,
+        gain=one.own.plain_gain,
+        parameters=numbers.values,
+        harmonics=tuple(numbers_of(other, mount, errors).values for other in harmonics),
         standard_errors=numbers.errors,
         ranges=ranges,
         units=_units(effect, mount),
         size=size,
         size_range=size_range,
-        statement=effect.statement("N" if mount.motion == "linear" else "N·m") + further,
+        statement=effect.statement("N" if mount.motion == "linear" else "N·m") + own.further(harmonics),
         where=where(effect, traces),
-        ruled_out=tuple(
-            f"{rival.effect.title}: removes {rival.gain:.1%} of the error energy, this {place.trial.gain:.1%}"
-            for rival in excluded
-        ),
+        ruled_out=tuple(_behind(one, members, True)),
+        less_likely=tuple(_behind(one, members, False)),
         told_apart_by=effect.told_apart_by,
         action=effect.action,
-        evidence=f"removes {place.trial.gain:.0%} of the error energy on data left out of the fit "
-        f"(t = {place.trial.t:.1f} over blocks){NOTES.get(effect.id, '')}{simpler}",
+        evidence=f"removes {one.own.plain_gain:.0%} of the error energy in training (evidence {one.own.evidence:.0f} "
+        f"nats; {predicted:.0f} nats on the held-out recordings){own.caveat}",
         visible_from=_visible_from(effect, numbers),
     )
 
 
+def _behind(one: AcceptedEffect, members: Sequence[str], far: bool) -> Iterator[str]:
+    """Say by how much the rivals outside the set are behind: those far behind by both measures, or the others."""
+    for rival in one.rivals:
+        margin, lead = one.margin(rival), one.own.plain_gain - rival.plain_gain
+        if rival.effect.id not in one.effect.rivals or rival.effect.id in members:
+            continue
+        if (margin >= EXCLUDED_NATS and lead >= EXCLUDED_SHARE) == far:
+            both = f"{rival.plain_gain:.1%} of the error energy, this {one.own.plain_gain:.1%}"
+            yield f"{rival.effect.title}: removes {both} ({margin:.0f} nats behind)"
+
+
+def is_told(effect: Effect, numbers: Numbers, mount: Mount) -> bool:
+    """Whether the recordings tell the size of an effect: its 95 % range holds neither "none" nor all that it may be.
+
+    Of several sizes (a level and a viscosity, an offset and a drift) one is enough. At a bound nothing is told.
+    """
+    own, known = hypothesis_of(effect), {variable.name: variable for variable in parameters_of(effect)}
+    sizes = [name for name in own.sizes or (effect.main.parameter,) if name in numbers.errors]
+    return not sizes or any(_excludes(numbers, name, own.none(mount), known[name]) for name in sizes)
+
+
+def _excludes(numbers: Numbers, name: str, none: float, known: Variable) -> bool:
+    value, half = numbers.values[name], Z95 * numbers.errors[name]
+    whole = value - half <= known.low and value + half >= known.high
+    return abs(value - none) > half and not whole and known.low < value < known.high
+
+
 def _visible_from(effect: Effect, numbers: Numbers) -> float | None:
     """Size that would still stand out three standard errors from nothing."""
-    name, factor, _ = MAIN[effect.id]
-    return 3 * factor * numbers.errors[name] if name in numbers.errors and effect.id not in PLACES else None
+    main = effect.main
+    told = main.parameter in numbers.errors and main.is_size
+    return 3 * main.factor * numbers.errors[main.parameter] if told else None
 
 
-def rival_finding(rival: Trial, place: Place, mount: Mount) -> Finding:
-    """Describe a rival that could not be excluded."""
+def rival_finding(rival: CandidateFit, probability: float, mount: Mount) -> Finding:
+    """Describe a rival that could not be excluded, or an effect that the held-out recordings do not confirm."""
     effect = rival.effect
     values = {variable.name: float(variable.start) for variable in parameters_of(effect)}
     size, _ = _size(effect, Numbers(values, {}), mount)
@@ -146,101 +133,21 @@ def rival_finding(rival: Trial, place: Place, mount: Mount) -> Finding:
         effect=effect.id,
         title=effect.title,
         answer="ambiguous",
-        probability=place.probabilities.get(effect.id, calibrated(place.shares[effect.id])),
-        gain=rival.gain,
+        probability=probability,
+        gain=rival.plain_gain,
         parameters=values,
         units=_units(effect, mount),
         size=size,
         statement=effect.statement("N" if mount.motion == "linear" else "N·m"),
         told_apart_by=effect.told_apart_by,
-        action=effect.action,
+        action=advice(effect, False),
     )
-
-
-def not_found(
-    chosen: Fit, prepared: Prepared, weight: Array, looked_at: Mapping[str, Trial], named: Sequence[str]
-) -> list[Finding]:
-    """One finding for each effect that is tried and not named: not seen from which size, or not testable."""
-    nuisance = nuisances(chosen, prepared)
-    tried = candidates(chosen.mount, prepared, chosen.residual, np.abs(nuisance.level))
-    columns = columns_of(chosen.mount, tried, prepared, chosen.values)
-    known = np.column_stack([chosen.slopes, nuisance.columns]) * weight[:, None]
-    smallest: dict[str, float] = {}
-    for candidate, column in zip(tried, columns, strict=True):
-        size = _smallest(chosen, column[:, 0] * weight, known)
-        if candidate.finite:
-            size *= abs(getattr(candidate.instances[0], MAIN[candidate.effect][0]))
-        smallest[candidate.effect] = min(size, smallest.get(candidate.effect, np.inf))
-    rest = [name for name in TRIED if name not in named]
-    return [_absent(name, smallest.get(name), looked_at.get(name), chosen.mount, prepared) for name in rest]
-
-
-def _smallest(chosen: Fit, column: Array, known: Array) -> float:
-    """Size whose column would hold `LEAST_GAIN` of the residual energy beyond what the structure can imitate."""
-    own = float(np.sum(projected(column, known) ** 2))
-    rest = float(np.sum(chosen.residual**2))
-    return sqrt(LEAST_GAIN / (1 - LEAST_GAIN) * rest / own) if own > 0 else float("inf")
-
-
-def _absent(name: str, smallest: float | None, trial: Trial | None, mount: Mount, prepared: Prepared) -> Finding:
-    form = CATALOGUE[name][0]
-    _, factor, unit = MAIN[name]
-    high = next(v.high for v in _parameters(form) if v.name == MAIN[name][0])
-    torque = float(np.abs(prepared.stacked("tau")).max())
-    most = min(high, 10 * torque if unit == "N.m" else np.inf)
-    testable = smallest is not None and smallest < most
-    reason = _where_looked(name, prepared) if testable else _why_not(name, mount, prepared)
-    return Finding(
-        effect=name,
-        title=form.title,
-        answer="not_seen" if testable else "not_testable",
-        probability=0.0,
-        gain=max(0.0, trial.gain) if trial else 0.0,
-        units={MAIN[name][0]: _unit(unit, mount)},
-        visible_from=factor * smallest if testable and smallest is not None and name not in PLACES else None,
-        evidence=reason,
-        action="" if testable else reason,
-    )
-
-
-def _parameters(form: type[Effect]) -> list[Variable]:
-    return [replace(f.metadata["variable"], name=f.name) for f in fields(form) if "variable" in f.metadata]
-
-
-def _where_looked(name: str, prepared: Prepared) -> str:
-    """Where an effect would have been seen, if not everywhere."""
-    if name != "periodic_disturbance":
-        return ""
-    slowest, fastest = heard(prepared)
-    return f"between {slowest:.2g} and {fastest:.3g} Hz"
-
-
-def _why_not(name: str, mount: Mount, prepared: Prepared) -> str:
-    if name == "gravity_unbalance" and mount.motion == "linear":
-        return "a linear axis has no unbalance"
-    if name == "gravity_unbalance" and any(isinstance(effect, GravityUnbalance) for effect in mount.effects):
-        return "the card has it already"
-    if name == "stribeck" and getattr(mount.friction, "Fs", None) is not None:
-        return "the card's friction law has it already"
-    if name == "periodic_disturbance":
-        return "too short, or the motion repeats itself or turns steadily; record a motion that wanders"
-    if not prepared.has_position and name in ("cogging", "position_friction", "gravity_unbalance"):
-        return "no position was recorded; record q"
-    if name == "friction_asymmetry" and isinstance(mount.friction, MemorylessLaw) and mount.of_kind(TorqueOffset):
-        return "alike to the torque offset that was found where the law says nothing of rest; take lugre in the card"
-    if name in ("delay", "actuator_lag", "clock_skew") and not any(piece.asked for piece in prepared.pieces):
-        return "nothing asks for a change of torque; record a speed that changes, and the set point"
-    if name in ("delay", "actuator_lag") and any(isinstance(effect, DriveEffect) for effect in mount.effects):
-        return "alike to what was found in the drive; record faster reversals to tell them apart"
-    return "the model has it already, or these recordings do not excite it"
 
 
 def _size(effect: Effect, numbers: Numbers, mount: Mount) -> tuple[str, str]:
-    name, factor, unit = MAIN[effect.id]
-    if effect.id == "friction_asymmetry" and abs(numbers.values["viscous_asymmetry"]) > abs(numbers.values[name]):
-        name, unit = "viscous_asymmetry", "% viscous"
+    name, factor, unit, _ = effect.leading()
     value, error = factor * numbers.values[name], factor * numbers.errors.get(name, float("nan"))
-    text = f"{abs(value):.3g} {_unit(unit, mount)}"
+    text = f"{abs(value):.3g} {unit_on(unit, mount)}"
     ends = sorted((abs(value) - Z95 * error, abs(value) + Z95 * error))
     return text, f"{ends[0]:.3g} to {ends[1]:.3g}" if np.isfinite(error) else ""
 
@@ -249,5 +156,6 @@ def _units(effect: Effect, mount: Mount) -> dict[str, str]:
     return {v.name: mount.in_axis_units(v).unit for v in parameters_of(effect)}
 
 
-def _unit(unit: str, mount: Mount) -> str:
+def unit_on(unit: str, mount: Mount) -> str:
+    """A unit as it is printed: that of force and length on a linear axis."""
     return (LINEAR_UNITS.get(unit, unit) if mount.motion == "linear" else unit).replace("N.m", "N·m")

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from cosim.diagnosis.claim import CLEAR_MOTION
-from cosim.diagnosis.prepare import Array
+from cosim.estimation.prepare import Array
+from cosim.estimation.row_weights import CLEAR_MOTION
+from cosim.support.statistics import rms
 
 Mask = npt.NDArray[np.bool_]
 Spans = tuple[tuple[float, float], ...]
@@ -81,7 +82,7 @@ def flagged(rests: Sequence[Rest]) -> list[Spans]:
 
     sizes = np.abs(rest) / noise(speed)
     beyond = sizes[sizes > LEAST_LOUD]
-    loud = max(LEAST_LOUD, float(np.sqrt(np.mean(beyond**2)))) if len(beyond) else LEAST_LOUD
+    loud = max(LEAST_LOUD, rms(beyond)) if len(beyond) else LEAST_LOUD
     return [_spans(cell, noise(cell["speed"]), loud) for cell in cells]
 
 

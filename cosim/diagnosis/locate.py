@@ -10,22 +10,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from cosim.diagnosis.bank import since_reversal
-from cosim.diagnosis.claim import least_speed
-from cosim.diagnosis.prepare import Array
+from cosim.diagnosis.hypotheses import hypothesis_of
+from cosim.diagnosis.hypotheses.base import Reach
 from cosim.diagnosis.result import Region, Trace, Where
-from pyfmi_models.effects import (
-    Cogging,
-    DriveEffect,
-    Effect,
-    FrictionAsymmetry,
-    GravityUnbalance,
-    LocalFriction,
-    PeriodicFriction,
-    StribeckEffect,
-)
-from pyfmi_models.effects.backlash import Backlash
-from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
+from cosim.estimation.discrepancy_basis import since_reversal
+from cosim.estimation.prepare import Array
+from cosim.estimation.row_weights import least_speed
+from cosim.support.statistics import hann
+from pyfmi_models.effects import Effect
 
 BINS = 40
 Z95 = 1.96
@@ -103,7 +95,7 @@ def _powers(t: Array, missing: Array, edges: Array) -> Array:
     step = float(np.median(np.diff(t)))
     length = int(SEGMENT / step)
     whole = missing[: len(missing) // length * length].reshape(-1, length)
-    window = np.hanning(length)
+    window = hann(length)
     spectrum = np.abs(np.fft.rfft((whole - whole.mean(1, keepdims=True)) * window, axis=1)) ** 2
     scaled = 2 * spectrum / (length * float(window @ window))
     band = np.digitize(np.fft.rfftfreq(length, step), edges) - 1
@@ -145,20 +137,4 @@ def where(effect: Effect, traces: Sequence[Trace]) -> Where:
     """Say where an effect acts, within what was visited."""
     q, v = (np.concatenate([getattr(t, name) for t in traces]) for name in ("q", "v"))
     low, high, top = float(q.min()), float(q.max()), float(np.abs(v).max())
-    if isinstance(effect, LocalFriction):
-        span = (effect.q_center - 2 * effect.width, effect.q_center + 2 * effect.width)
-        return Where(axis="position", description=f"around {effect.q_center:.4g}", regions=(span,))
-    if isinstance(effect, StribeckEffect):
-        edge = min(2 * effect.Vs, top)
-        return Where(axis="speed", description=f"slower than {edge:.2g}", regions=((-edge, edge),))
-    if isinstance(effect, FrictionAsymmetry):
-        return Where(axis="direction", description="both directions, differently", regions=((-1, -1), (1, 1)))
-    if isinstance(effect, Cogging | PeriodicFriction | GravityUnbalance):
-        return Where(axis="position", description="everywhere that was visited", regions=((low, high),))
-    if isinstance(effect, Backlash):
-        return Where(axis="time since reversal", description="after each reversal, until the play is crossed")
-    if isinstance(effect, PeriodicDisturbance):
-        return Where(axis="frequency", description=f"everywhere, at {effect.frequency_hz:.4g} Hz", regions=())
-    if isinstance(effect, DriveEffect):
-        return Where(axis="frequency", description="wherever the torque changes quickly", regions=())
-    return Where(axis="everywhere", description="everywhere", regions=())
+    return hypothesis_of(effect).where(effect, Reach(low, high, top))

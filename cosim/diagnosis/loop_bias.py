@@ -12,16 +12,16 @@ Reference: Wooldridge, Introductory Econometrics, section 15.5.
 """
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.stats import f as f_distribution
 
-from cosim.diagnosis.evidence import Blocks, sandwich
-from cosim.diagnosis.fit import Fit
-from cosim.diagnosis.instruments import on_set_point
-from cosim.diagnosis.inverse import Inverse, stacked
-from cosim.diagnosis.prepare import Array, Prepared
+from cosim.diagnosis.entries import BiasEntry
+from cosim.diagnosis.instrumental_variable import on_set_point
+from cosim.estimation.blocks import Blocks, sandwich
+from cosim.estimation.fit import Fit
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.prepare import Array, Prepared
 
 SIGNIFICANT = 0.01
 MOVES = 0.05
@@ -47,7 +47,7 @@ class LoopBias:
         """Whether the estimates move, significantly and by much."""
         return self.p_value < SIGNIFICANT and bool(self.moved)
 
-    def as_json(self) -> dict[str, Any]:
+    def as_json(self) -> BiasEntry:
         """The members under their names."""
         return {"biased": self.is_biased, "p_value": self.p_value, "moved": self.moved}
 

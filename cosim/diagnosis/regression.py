@@ -1,15 +1,15 @@
 """What a black box would do with the missing torque: no names, no equations, only smooth functions of the motion.
 
-A ceiling to compare named physics with, and one of the baselines of `cosim.proof`.
+A ceiling to compare named physics with, and one of the baselines of `cosim_studies.proof`.
 """
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cosim.diagnosis.bank import since_reversal
-from cosim.diagnosis.prepare import Array
 from cosim.diagnosis.result import Trace
+from cosim.estimation.discrepancy_basis import since_reversal
+from cosim.estimation.prepare import Array
 
 Model = Callable[[Array], Array]
 """From features (rows, features) to torque (rows,)."""

@@ -1,25 +1,30 @@
 """What a diagnosis finds: plain data, the same for the JSON file, the terminal and the report.
 
 Torques are in N m (forces in N for a linear axis), times in s, positions in rad (m). Residuals follow the protocol of
-`residual.py`; "before" is the base with its parameters refitted, "after" the base with the missing physics.
+`protocol.py`; "before" is the base with its parameters refitted, "after" the base with the missing physics.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from cosim.diagnosis import policy
+from cosim.diagnosis.entries import BiasEntry, Improved, LawProposal, LearnedEntry, NextExperiment, Provenance
+from cosim.diagnosis.sanity.entry import Sanity
+from pyfmi_models.effects import CATALOGUE, Effect
+
 Array = npt.NDArray[np.float64]
 Answer = Literal["found", "ambiguous", "not_proven", "not_seen", "not_testable"]
-SPECIAL = {"torque_offset": ("friction_asymmetry", "cable_wrap")}
-"""Effects that are a special case of others: what both explain, the special one predicts alike."""
+POLICY = f"evidence {policy.POLICY.version}"
+"""Name and version of the constants by which is decided."""
 
 
 def is_special(effect: str, rivals: Sequence[str]) -> bool:
     """Whether an effect is a special case of all its rivals: then it goes into a model, whichever is the cause."""
-    return set(rivals) <= set(SPECIAL.get(effect, ()))
+    return all(set(rivals) <= set(form.special_case_of) for form in CATALOGUE.get(effect, (Effect,)))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +37,22 @@ class Where:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Bound:
+    """How large an effect may be that was not seen: concealed in these recordings at `value`, it is found."""
+
+    value: float | None
+    """Of the main number, in `unit`; None where no size is found."""
+    unit: str
+    band_hz: tuple[float, float]
+    range: dict[str, tuple[float, float]]
+    """What the bound holds for: cycles, frequencies, positions, speeds."""
+    power: float | None = None
+    """Share of the concealed effects that were found at it, in all phases and signs."""
+    reason: str = ""
+    """Why there is no value, or what cannot be tested beside it."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Finding:
     """One effect that was looked for, and the answer."""
 
@@ -41,11 +62,12 @@ class Finding:
     probability: float
     gain: float
     """Share of the cross-validated residual energy that this effect removes (0..1), on training data."""
-    parameters: dict[str, Any] = field(default_factory=dict)
-    """Numbers by name; those of the further waves of a ripple as a list under "harmonics"."""
+    parameters: dict[str, float] = field(default_factory=dict)
+    harmonics: tuple[dict[str, float], ...] = ()
+    """Parameters of the further waves of a ripple."""
     standard_errors: dict[str, float] = field(default_factory=dict)
     ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
-    """95 % ranges of the parameters, from a block bootstrap."""
+    """95 % ranges of the parameters: 1.96 standard errors either way, robust to blocks (sandwich estimate)."""
     units: dict[str, str] = field(default_factory=dict)
     size: str = ""
     """Main number with unit, for example "0.42 N·m"; `size_range` its 95 % range, "0.39 to 0.45"."""
@@ -53,11 +75,16 @@ class Finding:
     statement: str = ""
     where: Where | None = None
     ruled_out: tuple[str, ...] = ()
+    """Rivals that are far behind, in evidence and in the error that they remove ..."""
+    less_likely: tuple[str, ...] = ()
+    """... and those that the evidence is against, but that remove nearly as much."""
     told_apart_by: str = ""
     action: str = ""
     evidence: str = ""
     visible_from: float | None = None
     """Smallest size of the main parameter that these recordings would have shown (unit as in `size`)."""
+    bound: Bound | None = None
+    """Of an effect that was not seen or cannot be tested."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +100,8 @@ class HeldOut:
     """95 % range of before_rms - after_rms from a block bootstrap."""
     sliding: dict[str, float] = field(default_factory=dict)
     """The same RMS values over samples in clear motion only, with the cutoff and the least speed used."""
+    cutoff_hz: float = 30.0
+    """Cutoff of the low-pass in front of these RMS values [Hz]."""
     unvetoed_rms: float | None = None
     """RMS with all effects that training alone proposed, before this recording's veto."""
     black_box_rms: float | None = None
@@ -134,16 +163,27 @@ class Diagnosis:
     mount: str
     motion: Literal["rotary", "linear"]
     ambiguous_with: tuple[tuple[str, ...], ...] = ()
-    next_experiment: dict[str, Any] = field(default_factory=dict)
+    next_experiment: NextExperiment = field(default_factory=NextExperiment)
     depends_on: tuple[str, ...] = ()
+    learned: LearnedEntry = field(default_factory=LearnedEntry)
+    """The term that was learned for what has no name; {} where there is none or it is not proven."""
     data_quality: tuple[str, ...] = ()
-    friction_law: dict[str, Any] = field(default_factory=dict)
-    loop_bias: dict[str, Any] = field(default_factory=dict)
-    """Whether the loop biased the fit: {"biased", "p_value", "moved": {parameter: relative move}}; {} if untested."""
+    sanity: tuple[Sanity, ...] = ()
+    """Doubts about the recordings themselves, gravest first."""
+    global_test: dict[str, float] = field(default_factory=dict)
+    """Is anything missing at all: {"statistic", "threshold", "p"}; {} where it was not asked."""
+    policy: str = POLICY
+    friction_law: LawProposal = field(default_factory=LawProposal)
+    loop_bias: BiasEntry = field(default_factory=BiasEntry)
     base_parameters: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     """Per base parameter: as delivered, refitted, with the missing physics."""
-    provenance: dict[str, Any] = field(default_factory=dict)
-    """version, command, date, recordings [{name, sha256, role, seconds, rate_hz}], card {name, sha256}."""
-    improved: dict[str, Any] = field(default_factory=dict)
-    """File names, and the range they are proven in: {"card", "fmu", "speed": [lo, hi], "position": [lo, hi]}."""
+    provenance: Provenance = field(default_factory=Provenance)
+    improved: Improved = field(default_factory=Improved)
+    files: tuple[str, ...] = ("report.html",)
+    """Files for the reader that are written beside those in `improved`."""
     seconds: float = 0.0
+
+    @property
+    def in_model(self) -> tuple[Finding, ...]:
+        """Effects that the delivered model holds: those found, and the first member of each set."""
+        return tuple(one for one in self.findings if one.answer in ("found", "ambiguous") and one.where is not None)

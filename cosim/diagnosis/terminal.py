@@ -3,44 +3,82 @@
 import os
 import sys
 import textwrap
+from pathlib import Path
 from typing import TextIO
 
+from cosim.diagnosis.report.findings import do, where
+from cosim.diagnosis.report.lead import heading
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.words import (
     Block,
     blocks,
     delivered,
-    heading,
     law,
     left_out,
     lowered,
     model,
     proven_range,
     shows_from,
+    sized,
+    unseen_torque,
     verdict,
 )
 from cosim.diagnosis.result import Diagnosis, Finding
 
 WIDTH = 80
+REPORT = "report.html"
 WORDS = {"found": "FOUND", "not_proven": "unproven", "ambiguous": "MAYBE"}
 NAME, SIZE, RANGE = 21, 12, 16
+ORDER = 10
+"""Columns of what to do, before the text."""
 
 
-def summary(diagnosis: Diagnosis, bold: bool = False) -> str:
-    """Return the whole answer as lines of at most 80 columns; `bold` marks the verdict with an ANSI code."""
+def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -> str:
+    """Return the whole answer as lines of at most 80 columns: the verdict, what to do, which file to open, the rest.
+
+    Args:
+        diagnosis: the answer.
+        bold: mark the verdict with an ANSI code.
+        out: folder of its files, where they were written.
+    """
     scales = Scales.of(diagnosis)
     title = printable(_title(diagnosis))
     parts = [
         [f"\033[1m{line}\033[0m" if bold else line for line in textwrap.wrap(title, WIDTH)],
-        [line for block in blocks(diagnosis) for line in _block(block)],
+        [line for one in diagnosis.sanity for line in _ordered("Careful", one.statement)],
+        [line for block in blocks(diagnosis) for line in _to_do(block, diagnosis)],
+        _files(diagnosis, scales, out),
+        [""],
+        [line for block in blocks(diagnosis) for line in _block(block, scales)],
         _goes_with(diagnosis),
-        _rest(diagnosis),
+        _rest(diagnosis, scales),
+        _wrapped(diagnosis.learned.get("statement", ""), 0),
         _wrapped(law(diagnosis), 0),
         _error(diagnosis, scales),
         _next(diagnosis),
-        _wrote(diagnosis, scales),
+        _wrote(diagnosis),
     ]
     return "\n".join(line for part in parts for line in part)
+
+
+def _ordered(word: str, text: str) -> list[str]:
+    """Return a word and what it is about, set off to the right of it."""
+    margin = " " * ORDER
+    return textwrap.wrap(printable(f"{word:<{ORDER}}{text}"), WIDTH, subsequent_indent=margin)
+
+
+def _to_do(block: Block, diagnosis: Diagnosis) -> list[str]:
+    """Return what to do about a finding."""
+    action = do(block, diagnosis)
+    return _ordered("Do", f"{block.title}: {action[:1].lower()}{action[1:]}") if action else []
+
+
+def _files(diagnosis: Diagnosis, scales: Scales, out: Path | None) -> list[str]:
+    """Return which file to open, and which model to use where."""
+    lines = _ordered("Open", str(out / REPORT)) if out and REPORT in diagnosis.files else []
+    proven, files = proven_range(diagnosis, scales), delivered(diagnosis)
+    suffix = f" (proven {proven})" if proven else ""
+    return lines + (_ordered("Use", files[0] + suffix) if files else [])
 
 
 def print_summary(diagnosis: Diagnosis, stream: TextIO | None = None) -> None:
@@ -64,19 +102,25 @@ def _title(diagnosis: Diagnosis) -> str:
     return f"{heading(diagnosis)} ({card})"
 
 
-def _block(block: Block) -> list[str]:
+def _block(block: Block, scales: Scales) -> list[str]:
     """Return one row, or one a rival, joined by "or"."""
     if len(block.findings) == 1:
-        return _row(WORDS.get(block.answer, block.answer), block.first)
-    first = _row("EITHER", block.first)
-    return first + [line for rival in block.findings[1:] for line in _wrapped(f"or {lowered(rival.title)}", 12)]
+        return _row(WORDS.get(block.answer, block.answer), block.first, scales)
+    first = _row("EITHER", block.first, scales)
+    return first + [line for rival in block.findings[1:] for line in _wrapped(_rival(rival), 12)]
 
 
-def _row(word: str, finding: Finding) -> list[str]:
-    name = lowered(finding.title)
-    where = finding.where.description if finding.where else ""
-    columns = f"  {word:<9} {name:<{NAME}} {finding.size:<{SIZE}} {finding.size_range:<{RANGE}} {where}"
-    return textwrap.wrap(printable(columns.rstrip()), WIDTH, subsequent_indent=" " * 12, drop_whitespace=True) or [""]
+def _rival(finding: Finding) -> str:
+    return f"or {lowered(finding.title)}, probability {finding.probability:.2f}"
+
+
+def _row(word: str, finding: Finding, scales: Scales) -> list[str]:
+    """Return answer, name and size with its range of a finding, and below it probability and place."""
+    told = f"probability {finding.probability:.2f}" if finding.answer in ("found", "ambiguous") else ""
+    size, size_range = sized(finding)
+    columns = f"  {word:<9} {lowered(finding.title):<{NAME}} {size:<{SIZE}} {size_range:<{RANGE}}"
+    first = textwrap.wrap(printable(columns.rstrip()), WIDTH, subsequent_indent=" " * 12) or [""]
+    return first + _wrapped(", ".join(text for text in (told, where(finding, scales)) if text), 12)
 
 
 def _wrapped(text: str, indent: int) -> list[str]:
@@ -89,28 +133,31 @@ def _goes_with(diagnosis: Diagnosis) -> list[str]:
     return _wrapped(f"The rest goes with: {', '.join(diagnosis.depends_on)}", 2) if diagnosis.depends_on else []
 
 
-def _rest(diagnosis: Diagnosis) -> list[str]:
+def _rest(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     """Return what was not seen, with the size that would have shown, and what could not be tested."""
     lines: list[str] = []
+    least = unseen_torque(diagnosis, scales)
     for answer, word in (("not_seen", "not seen"), ("not_testable", "no test")):
         chosen = [finding for finding in diagnosis.findings if finding.answer == answer]
-        text = ", ".join(_limit(finding) for finding in chosen)
+        text = ", ".join(_limit(finding, least) for finding in chosen)
         if text:
             lines += textwrap.wrap(f"  {word:<9} {printable(text)}", WIDTH, subsequent_indent=" " * 12)
     return lines
 
 
-def _limit(finding: Finding) -> str:
-    from_size = shows_from(finding).replace("\N{NO-BREAK SPACE}", " ")
+def _limit(finding: Finding, least: str) -> str:
+    """Return a name with the size from which it would have shown, as a torque where its number is no size."""
+    from_size = shows_from(finding) or (least if finding.answer == "not_seen" else "")
     limit = f"< {from_size}" if from_size else finding.evidence if finding.answer == "not_testable" else ""
+    limit = limit.replace("\N{NO-BREAK SPACE}", " ")
     return lowered(finding.title) + (f" ({limit.rstrip('.')})" if limit else "")
 
 
 def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     held, unit = diagnosis.heldout, scales.torque
     before, after, noise = (unit.number(x) for x in (held.before_rms, held.after_rms, held.floor_rms))
-    found = sum(finding.answer == "found" for finding in diagnosis.findings)
-    improved = f" with the effect{'s' if found > 1 else ''} {after}," if found else ""
+    added = len({finding.effect for finding in diagnosis.in_model})
+    improved = f" with the effect{'s' if added > 1 else ''} {after}," if added else ""
     return _wrapped(
         f"Error on the recording not fitted, RMS [{unit.unit}]: refitted {before},{improved} noise {noise}", 0
     )
@@ -125,11 +172,8 @@ def _next(diagnosis: Diagnosis) -> list[str]:
     return _wrapped("Next: " + ", then: ".join(said), 0) if said else []
 
 
-def _wrote(diagnosis: Diagnosis, scales: Scales) -> list[str]:
-    files = ["report.html", *reversed(delivered(diagnosis))]
-    proven = proven_range(diagnosis, scales)
-    suffix = f" (proven {proven.removeprefix('from ')})" if proven and len(files) > 1 else ""
-    lines = [f"Wrote {' '.join(files)}{suffix}", *left_out(diagnosis)]
+def _wrote(diagnosis: Diagnosis) -> list[str]:
+    lines = [f"Wrote {' '.join([*diagnosis.files, *reversed(delivered(diagnosis))])}", *left_out(diagnosis)]
     return [line for text in lines for line in _wrapped(text, 0)]
 
 

@@ -1,17 +1,16 @@
 """The axis of a session, made from a scenario and a machine file, and what a replay must know of both."""
 
-from typing import Any
-
 import numpy as np
 
-import cosim
-from cosim.errors import HardwareError
 from cosim.hardware.library import library, part_of, shared
 from cosim.hardware.machine import Machine
 from cosim.hardware.structures import CAxis, CHeads
 from cosim.hardware.wired import REFERENCE, Wired
 from cosim.hardware.words import LIMITS
-from cosim.scenario import Scenario
+from cosim.support.errors import HardwareError
+from cosim.support.plain import JsonObject
+from cosim.support.version import __version__
+from cosim.system.scenario import Scenario
 
 
 def cycles_of(milliseconds: float, step: float) -> int:
@@ -50,11 +49,11 @@ def make_axis(wired: Wired, machine: Machine, step: float) -> tuple[CAxis, tuple
     return shared(axis), arrays
 
 
-def story_of(scenario: Scenario, machine: Machine, wired: Wired) -> dict[str, Any]:
+def story_of(scenario: Scenario, machine: Machine, wired: Wired) -> JsonObject:
     """Say all that a replay needs beside the records."""
     name = wired.controller.name
     return {
-        "version": f"mount-cosim {cosim.__version__}",
+        "version": f"mount-cosim {__version__}",
         "step": scenario.step,
         "quantum": wired.quantum,
         "inputs": list(wired.inputs),

@@ -11,16 +11,19 @@ import zlib
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cosim.errors import HardwareError
-from cosim.files import check_free, check_room, directory
+from cosim.data.recording import Recording
 from cosim.hardware.library import shared
-from cosim.hardware.structures import HEADS, RECORD, CBox, CRecord
-from cosim.recording import Recording
+from cosim.hardware.story import seal_of
+from cosim.hardware.structures import HEADS, INPUTS, RECORD, CBox, CRecord
+from cosim.support.errors import HardwareError
+from cosim.support.files import check_free, check_room, directory
+from cosim.support.plain import Parsed
 
 MAGIC = b"mount-cosim black box 1\n"
 HEADER = 65_536
@@ -39,11 +42,15 @@ class BlackBox:
         if len(head) > HEADER:
             raise HardwareError(f"{path}: what the scenario says of itself is longer than {HEADER} bytes.")
         partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-        with partial.open("w+b") as file:
-            file.write(head.ljust(HEADER, b"\n"))
-            file.truncate(size)
-            self._map = mmap.mmap(file.fileno(), size)
-        os.replace(partial, path)
+        try:
+            with partial.open("w+b") as file:
+                _reserve(file.fileno(), size)
+                file.write(head.ljust(HEADER, b"\n"))
+                file.flush()
+                self._map = mmap.mmap(file.fileno(), size)
+            os.replace(partial, path)
+        finally:
+            partial.unlink(missing_ok=True)
         self.path, self._drained = path, 0
         self._records = np.frombuffer(self._map, RECORD, capacity, HEADER)
         self.box = shared(CBox(record=self._records.ctypes.data, capacity=capacity))
@@ -68,6 +75,14 @@ class BlackBox:
             self._map.close()
 
 
+def _reserve(file: int, size: int) -> None:
+    """Give a file its size, with room on the disk: writing to mapped memory for which there is none is a crash."""
+    if hasattr(os, "posix_fallocate"):
+        os.posix_fallocate(file, 0, size)
+    else:
+        os.ftruncate(file, size)
+
+
 @dataclass(frozen=True)
 class Kept:
     """What a black box holds: whole records in their order, how many are torn, and where they come from.
@@ -77,7 +92,7 @@ class Kept:
 
     records: np.ndarray
     torn: int
-    origin: dict[str, Any]
+    origin: Parsed
 
 
 def read_black_box(path: Path) -> Kept:
@@ -89,7 +104,7 @@ def read_black_box(path: Path) -> Kept:
     raw = path.read_bytes() if path.is_file() else b""
     if not raw.startswith(MAGIC) or len(raw) < HEADER:
         raise HardwareError(f"{path} is no black box of this version.", culprit=str(path))
-    origin = json.loads(raw[len(MAGIC) : raw.index(b"\n", len(MAGIC))])
+    origin = _head(raw, path)
     records = np.frombuffer(raw, RECORD, origin["capacity"], HEADER)
     numbers = records["sequence"]
     place = np.arange(len(records)) + 1
@@ -101,6 +116,29 @@ def read_black_box(path: Path) -> Kept:
     expected = newest if newest < len(records) else len(records) - (0 if whole[oldest] else 1)
     kept = records[whole & (numbers.astype(np.int64) > newest - len(records))]
     return Kept(kept[np.argsort(kept["sequence"])], expected - len(kept), origin)
+
+
+def _head(raw: bytes, path: Path) -> Parsed:
+    """Read the line that says where the records come from, and how many there is room for."""
+    try:
+        origin = json.loads(raw[len(MAGIC) : HEADER].partition(b"\n")[0])
+        capacity = origin["capacity"]
+        fits = type(capacity) is int and capacity > 0 and len(raw) == HEADER + capacity * RECORD.itemsize
+        fits = fits and _is_whole(origin)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        fits = False
+    if not fits:
+        raise HardwareError(f"{path} is a black box whose head is damaged, or that is cut short.", culprit=str(path))
+    return dict(origin)
+
+
+def _is_whole(origin: Parsed) -> bool:
+    """Whether a head has what a recording needs of it (KeyError, TypeError or AttributeError: no)."""
+    inputs, units, numbers = origin["inputs"], origin["units"], (origin["step"], origin["quantum"])
+    named = type(inputs) is list and len(inputs) <= INPUTS and all(type(one) is str for one in inputs)
+    scaled = all(type(one) is float and isfinite(one) and one > 0 for one in numbers)
+    said = all(type(one) is str for one in (origin["encoder"], *units.values()))
+    return named and scaled and said and origin["machine"]["encoder"]["heads"] in (0, HEADS)
 
 
 def recording_of(kept: Kept, name: str) -> Recording:
@@ -129,7 +167,7 @@ def recording_of(kept: Kept, name: str) -> Recording:
     units = {"t": "s", "tau": "N.m", "q": "rad", "machine.command": "N.m", "machine.order": "N.m"}
     units |= {name: unit for name, unit in origin["units"].items() if name in table and unit}
     columns = {key: np.ascontiguousarray(column, dtype=np.float64) for key, column in table.items()}
-    return Recording(name, columns, units, {"hardware": origin, "torn": kept.torn})
+    return Recording(name, columns, units, {"hardware": origin, "torn": kept.torn, "seal": seal_of(columns)})
 
 
 def unwrapped(counts: np.ndarray) -> np.ndarray:

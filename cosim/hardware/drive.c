@@ -19,6 +19,7 @@ const Injection *injected(const Drive *drive, int64_t kind)
 static void advance(Drive *drive)
 {
     const Part *plant = &drive->plant;
+    double before = plant->output[0];
     plant->input[drive->torque_input] = drive->held;
     int status = set_inputs(plant);
     if (status <= FMI_WARNING) {
@@ -29,6 +30,10 @@ static void advance(Drive *drive)
     }
     drive->failed = finite_outputs(plant, status) > FMI_WARNING;
     drive->tick++;
+    if (fabs(plant->output[0] - before) > drive->speed * drive->step && drive->state > SWITCH_ON_DISABLED) {
+        drive->overspeeds += drive->state != FAULT;
+        drive_let_go(drive);
+    }
 }
 
 void drive_let_go(Drive *drive)
@@ -60,10 +65,29 @@ static double saturated(const Drive *drive, double torque)
     return fault && fabs(torque) > fault->size ? copysign(fault->size, torque) : torque;
 }
 
+static double within(double value, double limit)
+{
+    return value > limit ? limit : value < -limit ? -limit : value;
+}
+
+/* The torque of an order within the drive's own limits; towards zero it may change at once. `ticks`: since the order before. */
+static double bounded(Drive *drive, double ordered, int64_t ticks)
+{
+    double torque = within(ordered, drive->torque);
+    bool down = torque * drive->held >= 0.0 && fabs(torque) <= fabs(drive->held);
+    double most = drive->slew * drive->step * (double)(ticks > 1 ? ticks : 1);
+    if (!down && fabs(torque - drive->held) > most) {
+        torque = drive->held + within(torque - drive->held, most);
+    }
+    drive->limited += torque != ordered;
+    return torque;
+}
+
 static int drive_write(void *self, const Order *order)
 {
     Drive *drive = self;
-    catch_up(drive, drive->epoch + order->tick, true);
+    int64_t tick = drive->epoch + order->tick, ticks = tick - drive->tick;
+    catch_up(drive, tick, true);
     drive->silent = 0;
     if (injected(drive, DEAD)) {
         drive->state = NOT_READY;
@@ -75,7 +99,7 @@ static int drive_write(void *self, const Order *order)
     }
     drive->state = cia402_next(drive->state, order->controlword, drive->control, false, true);
     drive->control = order->controlword;
-    drive->held = drive->state == OPERATION_ENABLED ? saturated(drive, order->torque) : 0.0;
+    drive->held = drive->state == OPERATION_ENABLED ? saturated(drive, bounded(drive, order->torque, ticks)) : 0.0;
     return 0;
 }
 

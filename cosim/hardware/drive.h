@@ -20,10 +20,12 @@ typedef struct {
     int64_t torque_input, watchdog, injections;
     const Injection *injection;
     double step, quantum;
+    double torque, slew, speed; /* its own limits: N m, N m/s, rad/s */
     /* what is remembered */
     int64_t tick, state, failed, epoch, silent; /* `epoch`: tick at which the session began; ticks without an order */
     uint32_t control, counts, encoder, reserved;
     double held;
+    int64_t limited, overspeeds; /* orders beyond its limits; how often it was too fast under power */
     int64_t heads; /* read heads of the encoder; 0: it is without error */
     double eccentricity; /* rad; that of its disc */
     uint32_t shown[HEADS];

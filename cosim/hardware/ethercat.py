@@ -11,10 +11,10 @@ import struct
 from contextlib import suppress
 from typing import Any
 
-from cosim.errors import HardwareError, MissingPackageError
 from cosim.hardware.machine import Machine
 from cosim.hardware.mapping import Entry, Layout
 from cosim.hardware.python_adapter import Order, PythonAdapter, Reading
+from cosim.support.errors import HardwareError, MissingPackageError
 
 TORQUE_MODE = 10
 """Cyclic synchronous torque, object 0x6060."""

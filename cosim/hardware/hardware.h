@@ -126,6 +126,7 @@ typedef struct {
     int64_t setpoints, tick, period, spin, heartbeat_limit; /* ns; ticks */
     int64_t next, late, worst, beat, beaten;                /* ns of the next edge; cycles; ns; of the heartbeat */
     int64_t locked, fifo;                                   /* what the system allowed */
+    int64_t waits, waited; /* whether the machine stands still while no cycle runs; edges at which it did */
     _Atomic int64_t heartbeat, stop, lose; /* `lose`: edges to miss where there is no clock that could */
     _Atomic uint32_t request, change; /* `change` is taken back to 0 when a cycle has taken it */
     _Atomic double value;

@@ -3,18 +3,18 @@
 import ctypes
 import mmap
 import sys
-from ctypes import POINTER, Structure, c_int64
+from ctypes import POINTER, Structure, c_char_p, c_int64
 from functools import cache
 from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
 
-from cosim.component import Component, Functions
-from cosim.errors import HardwareError
+from cosim.fmi.component import Component, Functions
 from cosim.hardware.structures import LAYOUT, CAdapter, CAxis, CDrive, CRecord, CSample, CSession, CUdp, CVirtual
-from cosim.loop.shared import declare, opened, part
-from cosim.loop.structures import CPart
+from cosim.master.loop.shared import declare, opened, part
+from cosim.master.loop.structures import CPart
+from cosim.support.errors import HardwareError
 
 Kind = TypeVar("Kind", bound=Structure)
 
@@ -48,8 +48,10 @@ def library() -> ctypes.CDLL:
         hardware_bare=[POINTER(CSession), c_int64],
         hardware_release=[POINTER(CSession)],
         hardware_replay=[POINTER(CAxis), POINTER(CRecord), c_int64],
-        udp_open=[POINTER(CUdp), POINTER(CAdapter)],
-        virtual_run=[POINTER(CVirtual), POINTER(CAdapter)],
+        udp_open=[POINTER(CUdp), POINTER(CAdapter), c_char_p],
+        udp_bye=[POINTER(CUdp)],
+        virtual_run=[POINTER(CVirtual), POINTER(CAdapter), c_char_p],
+        hardware_mac=[c_char_p, c_int64, c_char_p, c_int64, c_char_p],
     )
     return found
 
@@ -66,12 +68,16 @@ def part_of(component: Component, inputs: list[str], outputs: list[str]) -> tupl
     """Return a component as the C loops see it, and the arrays that must live as long as it is used.
 
     Raises:
-        HardwareError: only Python can step it.
+        HardwareError: only Python can step it, or a variable is of another type than double.
     """
     functions = component.functions
     if not isinstance(functions, Functions):
         message = f"{component.name} can only be stepped by Python; a machine needs an FMU."
         raise HardwareError(message, culprit=component.name)
+    for name in (*inputs, *outputs):
+        if not component.ports[name].real:
+            message = f'"{component.name}.{name}" is no single double, and loops on a machine carry nothing else.'
+            raise HardwareError(message, culprit=f"{component.name}.{name}")
     read, written = (
         np.array([component.ports[name].reference for name in names], np.uint32) for names in (inputs, outputs)
     )

@@ -2,20 +2,20 @@
 
 import tempfile
 from pathlib import Path
-from typing import Any
 
-from cosim.errors import HardwareError
 from cosim.hardware.blackbox import read_black_box, recording_of
 from cosim.hardware.machine import Machine
 from cosim.hardware.session import Session
 from cosim.hardware.words import LIMITS
-from cosim.scenario import Scenario
+from cosim.support.errors import HardwareError
+from cosim.support.plain import JsonObject
+from cosim.system.scenario import Scenario
 
 SHOWN = ("cycles", "late_cycles", "worst_wake_up_us", "fifo", "memory_locked", "link")
 """Of the statistics of a session."""
 
 
-def look(scenario: Scenario, machine: Machine, seconds: float) -> dict[str, Any]:
+def look(scenario: Scenario, machine: Machine, seconds: float) -> JsonObject:
     """Watch a machine that is never enabled for some seconds of real time; returns what was seen, SI.
 
     Raises:

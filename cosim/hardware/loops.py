@@ -11,9 +11,9 @@ from threading import Thread
 from time import sleep
 from typing import Protocol
 
-from cosim.errors import HardwareError
 from cosim.hardware.library import library
 from cosim.hardware.structures import CSample, CSession
+from cosim.support.errors import HardwareError
 
 POLL = 0.002
 """Seconds between two looks at a loop in real time."""

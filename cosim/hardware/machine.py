@@ -10,11 +10,17 @@ from urllib.parse import urlsplit
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from cosim.complaint import complaint
-from cosim.errors import HardwareError
 from cosim.hardware.mapping import Entry, Ethercat
+from cosim.support.complaint import complaint
+from cosim.support.errors import HardwareError
+from cosim.support.plain import Parsed
+from cosim.support.toml import parsed
 
-Positive = Annotated[float, Field(gt=0)]
+MILLISECONDS, CYCLES, LARGEST = 1e9, 10**9, 1e12
+"""Most of what a machine may be given: eleven days, as many cycles as 32 bits count, limits in SI units."""
+Positive = Annotated[float, Field(gt=0, le=LARGEST)]
+Milliseconds = Annotated[float, Field(gt=0, le=MILLISECONDS)]
+Cycles = Annotated[int, Field(ge=0, le=CYCLES)]
 
 
 class _Section(BaseModel):
@@ -35,16 +41,16 @@ class Limits(_Section):
 class Reactions(_Section):
     """`[reactions]`: how long is too long. `ramp_ms`: of the torque limit from zero; `stop_slew`: N m/s, quick stop."""
 
-    ramp_ms: Positive = 20.0
+    ramp_ms: Milliseconds = 20.0
     stop_slew: Positive = 5000.0
-    patience_ms: Positive = 100.0
-    lost_cycles: int = Field(default=2, ge=0)
-    stale_cycles: int = Field(default=2, ge=0)
-    mismatch_cycles: int = Field(default=10, ge=0)
-    late_in_a_row: int = Field(default=3, ge=1)
+    patience_ms: Milliseconds = 100.0
+    lost_cycles: Cycles = 2
+    stale_cycles: Cycles = 2
+    mismatch_cycles: Cycles = 10
+    late_in_a_row: int = Field(default=3, ge=1, le=CYCLES)
     late_in_window: int = Field(default=10, ge=1, le=64)
-    window_ms: Positive = 1000.0
-    heartbeat_ms: Positive = 500.0
+    window_ms: Milliseconds = 1000.0
+    heartbeat_ms: Milliseconds = 500.0
 
 
 class Clock(_Section):
@@ -54,7 +60,7 @@ class Clock(_Section):
     """
 
     spin_us: float = Field(default=20.0, ge=0, le=1000)
-    answer_us: Positive = 60.0
+    answer_us: float = Field(default=60.0, gt=0, le=1e6)
     answer_spin_us: float = Field(default=50.0, ge=0, le=1000)
 
 
@@ -80,7 +86,7 @@ class Inject(_Section):
         "lost", "stale", "jump", "saturated", "dead", "tripped", "late", "duplicated", "reordered", "corrupted",
         "silent_head", "frozen_head", "stray_head",
     ]  # fmt: skip
-    at: float = Field(ge=0)
+    at: float = Field(ge=0, le=LARGEST)
     lasts: Positive = 1e9
     size: float = 0.0
     head: int = Field(default=0, ge=0, le=3)
@@ -98,12 +104,13 @@ def _adapter(value: str) -> str:
 
 
 class Machine(_Section):
-    """A whole machine file."""
+    """A whole machine file; `key_file` has the key that the loop and a drive behind a network share."""
 
     name: str
     adapter: Annotated[str, AfterValidator(_adapter)]
-    watchdog_ms: Positive = 2.0
-    black_box_seconds: Positive = 120.0
+    key_file: str = ""
+    watchdog_ms: Milliseconds = 2.0
+    black_box_seconds: float = Field(default=120.0, gt=0, le=86_400)
     limits: Limits
     reactions: Reactions = Reactions()
     clock: Clock = Clock()
@@ -126,7 +133,7 @@ def read_machine(source: str | Path) -> Machine:
     """
     path, shipped = Path(source), files("cosim.hardware") / "machines" / f"{source}.toml"
     if path.is_file():
-        return _located(parse_machine(path.read_text("utf-8"), str(source)), path.parent)
+        return _located(parse_machine(_text(path), str(source)), path.parent)
     if shipped.is_file():
         return parse_machine(shipped.read_text("utf-8"), str(source))
     names = (one.name.removesuffix(".toml") for one in (files("cosim.hardware") / "machines").iterdir())
@@ -135,17 +142,23 @@ def read_machine(source: str | Path) -> Machine:
     raise HardwareError(f"{source}: no such machine; {rule}", culprit=str(source), choices=choices)
 
 
+def _text(path: Path) -> str:
+    try:
+        return path.read_text("utf-8")
+    except UnicodeDecodeError as error:
+        raise HardwareError(f"{path} is not text in UTF-8 (at byte {error.start}).", culprit=str(path)) from error
+
+
 def _located(machine: Machine, folder: Path) -> Machine:
-    """Take the file of an adapter in Python from where the machine file is."""
-    if ".py:" not in machine.adapter:
-        return machine
-    return machine.model_copy(update={"adapter": str(folder.resolve() / machine.adapter)})
+    """Take the file of an adapter in Python, and that of a key, from where the machine file is."""
+    files = {"adapter": machine.adapter if ".py:" in machine.adapter else "", "key_file": machine.key_file}
+    return machine.model_copy(update={key: str(folder.resolve() / file) for key, file in files.items() if file})
 
 
 def parse_machine(text: str, path: str) -> Machine:
     """Check the text of a machine file; `path` is its name in errors."""
     try:
-        return _checked(tomllib.loads(text), path)
+        return _checked(parsed(text), path)
     except tomllib.TOMLDecodeError as error:
         raise HardwareError(f"{path} is not valid TOML: {error}.", culprit=path) from error
 
@@ -155,7 +168,7 @@ def changed(machine: Machine, where: str, **changes: Any) -> Machine:
     return _checked(machine.model_dump() | changes, where)
 
 
-def _checked(values: dict[str, Any], where: str) -> Machine:
+def _checked(values: Parsed, where: str) -> Machine:
     try:
         return Machine.model_validate(values)
     except ValidationError as error:

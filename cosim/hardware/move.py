@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from cosim.errors import HardwareError
+from cosim.data.recording import Recording
 from cosim.hardware.blackbox import read_black_box, recording_of
 from cosim.hardware.machine import Machine
 from cosim.hardware.session import Session
 from cosim.hardware.words import ENTERED
-from cosim.recording import Recording
-from cosim.scenario import Scenario
+from cosim.support.errors import HardwareError
+from cosim.system.scenario import Scenario
 
 FREQUENCY, PERIODS, SETTLING = 10.0, 6, 2
 """Hz; periods in all; those before the ones that count."""

@@ -18,9 +18,10 @@ from ctypes import POINTER, c_int, c_void_p
 from dataclasses import dataclass
 from typing import Any
 
-from cosim.errors import HardwareError
-from cosim.function import load_function
+from cosim.fmi.function import load_function
 from cosim.hardware.structures import CAdapter, CFeedback, COrder
+from cosim.support.errors import HardwareError
+from cosim.support.plain import JsonObject
 
 READ_OK, READ_STALE, READ_ERROR = 0, 1, 2
 _READ = ctypes.CFUNCTYPE(c_int, c_void_p, POINTER(CFeedback))
@@ -85,7 +86,7 @@ class PythonTransport:
         read, write, status = (ctypes.cast(function, c_void_p) for function in self._functions)
         self.adapter = CAdapter(read=read, write=write, status=status)
 
-    def statistics(self) -> dict[str, Any]:
+    def statistics(self) -> JsonObject:
         """Return what the adapter raised first, if it did."""
         return {"adapter_error": self._error} if self._error else {}
 

@@ -15,11 +15,9 @@ from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
-from cosim.errors import HardwareError
 from cosim.hardware.axis import cycles_of, make_axis, story_of
 from cosim.hardware.blackbox import BlackBox
 from cosim.hardware.library import library, shared
@@ -41,7 +39,9 @@ from cosim.hardware.words import (
     faults_of,
     heads_of,
 )
-from cosim.scenario import Scenario
+from cosim.support.errors import HardwareError
+from cosim.support.plain import JsonObject, Parsed
+from cosim.system.scenario import Scenario
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class Session:
         *,
         fast: bool = False,
         force: bool = False,
-        origin: dict[str, Any] | None = None,
+        origin: JsonObject | None = None,
     ) -> None:
         self.scenario, self.machine, self._fast = scenario, machine, fast
         self._library, self._stack = library(), ExitStack()
@@ -119,12 +119,12 @@ class Session:
         return Status(self._session.tick, STATES[axis.state], faults, axis.torque, bool(axis.running), axis.ran)
 
     @property
-    def statistics(self) -> dict[str, Any]:
+    def statistics(self) -> JsonObject:
         """Cycles, those that were late, the worst wake-up, and what the system allowed."""
         session = self._session
         return {
             "cycles": session.tick - session.late,
-            "late_cycles": session.late,
+            "late_cycles": session.late + session.waited,
             "worst_wake_up_us": session.worst / 1000,
             "real_time": not self._fast,
             "fifo": bool(session.fifo),
@@ -237,11 +237,12 @@ class Session:
             setpoints=wired.setpoints.shape[1],
             period=0 if self._fast else round(step * 1e9),
             spin=round(self.machine.clock.spin_us * 1000),
+            waits=self.machine.adapter == "simulated",
             heartbeat_limit=cycles_of(reactions.heartbeat_ms, step),
         )
 
 
-def run_session(session: Session) -> dict[str, Any]:
+def run_session(session: Session) -> Parsed:
     """Enable, follow the set points to their end, and come to rest; returns how it went."""
     begun = perf_counter()
     session.enable()

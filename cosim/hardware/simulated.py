@@ -1,19 +1,19 @@
 """The simulated drive: a plant behind CiA 402 and an encoder, in the loop's own process."""
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from cosim.component import Component
-from cosim.errors import HardwareError
+from cosim.fmi.component import Component
 from cosim.hardware.axis import cycles_of
 from cosim.hardware.library import library, part_of
 from cosim.hardware.machine import Inject, Machine
 from cosim.hardware.structures import CAdapter, CDrive, CInjection
 from cosim.hardware.wired import Wired
 from cosim.hardware.words import INJECTIONS, OF_FRAMES
-from cosim.scenario import Scenario
+from cosim.support.errors import HardwareError
+from cosim.support.plain import JsonObject
+from cosim.system.scenario import Scenario
 
 
 class SimulatedDrive:
@@ -34,7 +34,7 @@ class SimulatedDrive:
         plant = Plant(wired.plant, wired.torque, wired.position)
         self.drive, self._kept = make_drive(plant, machine, scenario.step, wired.quantum, self.adapter)
 
-    def statistics(self) -> dict[str, Any]:
+    def statistics(self) -> JsonObject:
         """Nothing: no frame is ever lost in a process."""
         return {}
 
@@ -58,7 +58,7 @@ def make_drive(
 
     Args:
         plant: what it moves.
-        machine: its watchdog and faults.
+        machine: its limits, watchdog and faults.
         step: cycle in s.
         quantum: rad a count of its encoder.
         adapter: becomes the table of its functions.
@@ -75,6 +75,9 @@ def make_drive(
         injection=(CInjection * len(faults))(*faults),
         step=step,
         quantum=quantum,
+        torque=machine.limits.torque,
+        slew=machine.limits.slew,
+        speed=machine.limits.speed,
         heads=machine.encoder.heads,
         eccentricity=machine.encoder.eccentricity,
     )

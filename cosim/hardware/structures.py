@@ -4,9 +4,10 @@ from ctypes import POINTER, Structure, c_byte, c_double, c_int64, c_uint32, c_ui
 
 import numpy as np
 
-from cosim.loop.structures import CPart
+from cosim.master.loop.structures import CPart
 
 INPUTS, MISSES, LIMITS, HEADS = 8, 64, 6, 4
+NONCE, TAG, KEY = 16, 16, 32
 
 
 class CFeedback(Structure):
@@ -124,6 +125,7 @@ class CSession(Structure):
         ("setpoint", c_void_p),
         *((name, c_int64) for name in ("setpoints", "tick", "period", "spin", "heartbeat_limit")),
         *((name, c_int64) for name in ("next", "late", "worst", "beat", "beaten", "locked", "fifo")),
+        *((name, c_int64) for name in ("waits", "waited")),
         ("heartbeat", c_int64),
         ("stop", c_int64),
         ("lose", c_int64),
@@ -150,6 +152,7 @@ class CDrive(Structure):
         ("injection", POINTER(CInjection)),
         ("step", c_double),
         ("quantum", c_double),
+        *((name, c_double) for name in ("torque", "slew", "speed")),
         ("tick", c_int64),
         ("state", c_int64),
         ("failed", c_int64),
@@ -157,13 +160,15 @@ class CDrive(Structure):
         ("silent", c_int64),
         *((name, c_uint32) for name in ("control", "counts", "encoder", "reserved")),
         ("held", c_double),
+        ("limited", c_int64),
+        ("overspeeds", c_int64),
         ("heads", c_int64),
         ("eccentricity", c_double),
         ("shown", c_uint32 * HEADS),
     ]
 
 
-COUNTED = ("sent", "good", "lost", "late", "duplicated", "reordered", "corrupted", "foreign")
+COUNTED = ("sent", "good", "lost", "late", "duplicated", "reordered", "corrupted", "foreign", "early")
 """What is counted of the frames of a link."""
 
 
@@ -178,6 +183,12 @@ class CLink(Structure):
     ]
 
 
+class CMac(Structure):
+    """A key, as HMAC-SHA256 takes it."""
+
+    _fields_ = [("inner", c_uint32 * 8), ("outer", c_uint32 * 8)]
+
+
 class CUdp(Structure):
     """The adapter of process data over UDP."""
 
@@ -186,6 +197,7 @@ class CUdp(Structure):
         ("session", c_uint32),
         ("sequence", c_uint32),
         ("link", CLink),
+        ("mac", CMac),
     ]
 
 
@@ -194,13 +206,19 @@ class CVirtual(Structure):
 
     _fields_ = [
         ("drive", POINTER(CDrive)),
-        *((name, c_int64) for name in ("socket", "period", "watchdog")),
+        *((name, c_int64) for name in ("socket", "period", "watchdog", "lease", "ahead")),
         *((name, c_uint32) for name in ("address", "port", "session", "waiting")),
-        *((name, c_int64) for name in ("begun", "heard", "trips", "let_go", "silence")),
+        *((name, c_int64) for name in ("begun", "heard", "alive", "trips", "let_go", "silence")),
         ("taken", c_double),
         ("stop", c_int64),
         ("link", CLink),
-        ("delayed", c_byte * (64 * 72)),
+        ("greetings", c_int64),
+        ("secret", c_byte * KEY),
+        ("hello", c_byte * NONCE),
+        ("welcome", c_byte * NONCE),
+        ("given", CMac),
+        ("mac", CMac),
+        ("delayed", c_byte * (64 * 104)),
     ]
 
 

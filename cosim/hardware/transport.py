@@ -1,6 +1,6 @@
 """What carries orders and answers between the loop and a drive: the choice of a machine file's `adapter`."""
 
-from typing import Any, Protocol
+from typing import Protocol
 
 from cosim.hardware.ethercat import EthercatDrive
 from cosim.hardware.machine import Machine
@@ -9,7 +9,8 @@ from cosim.hardware.simulated import SimulatedDrive
 from cosim.hardware.structures import CAdapter
 from cosim.hardware.udp import UdpDrive
 from cosim.hardware.wired import Wired
-from cosim.scenario import Scenario
+from cosim.support.plain import JsonObject
+from cosim.system.scenario import Scenario
 
 
 class Transport(Protocol):
@@ -19,7 +20,7 @@ class Transport(Protocol):
     python: bool
     """Whether its functions need the interpreter, so that the loop must be a thread of this process."""
 
-    def statistics(self) -> dict[str, Any]:
+    def statistics(self) -> JsonObject:
         """Return what was counted on the way."""
 
     def close(self) -> None:

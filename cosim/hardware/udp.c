@@ -7,18 +7,46 @@
 #include <sys/socket.h>
 #include <time.h>
 
-enum { COVERED = offsetof(Frame, crc) };
+enum { COVERED = offsetof(Frame, crc), TAGGED = offsetof(Frame, tag), AT_ONCE = 64 };
 
-void frame_close(Frame *frame)
+static void tag_of(const Frame *frame, const Mac *mac, unsigned char tag[MAC_SIZE])
 {
+    mac_of(mac, frame, TAGGED, tag);
+}
+
+/* Makes a frame ready to be sent; without a key it bears no tag. */
+void frame_close(Frame *frame, const Mac *mac)
+{
+    unsigned char tag[MAC_SIZE] = {0};
     frame->magic = MAGIC;
     frame->reserved = 0;
+    if (mac) {
+        tag_of(frame, mac, tag);
+    }
+    memcpy(frame->tag, tag, TAG);
     frame->crc = crc32_of(frame, COVERED);
 }
 
 bool frame_whole(const Frame *frame, int64_t size)
 {
     return size == (int64_t)sizeof *frame && frame->magic == MAGIC && frame->crc == crc32_of(frame, COVERED);
+}
+
+/* Whether a whole frame comes from who holds the key. */
+bool frame_true(const Frame *frame, const Mac *mac)
+{
+    unsigned char tag[MAC_SIZE];
+    tag_of(frame, mac, tag);
+    return mac_same(frame->tag, tag, TAG);
+}
+
+void session_key(Mac *session, const Mac *given, const unsigned char *hello, const unsigned char *welcome)
+{
+    unsigned char nonces[2 * NONCE], key[MAC_SIZE];
+    memcpy(nonces, hello, NONCE);
+    memcpy(nonces + NONCE, welcome, NONCE);
+    mac_of(given, nonces, sizeof nonces, key);
+    mac_key(session, key, sizeof key);
 }
 
 /* Notes a frame by its sequence number: 0 if it is newer than all before it, else how it comes. */
@@ -45,7 +73,7 @@ static int udp_write(void *self, const Order *order)
     Udp *udp = self;
     Frame frame = {.kind = ORDER, .session = udp->session, .sequence = ++udp->sequence, .tick = order->tick,
                    .word = order->controlword, .value = order->torque};
-    frame_close(&frame);
+    frame_close(&frame, &udp->mac);
     udp->sent_at = now();
     udp->link.sent++;
     /* A refusal (nobody listens any more) is as good as a lost frame: the read will find no answer. */
@@ -57,7 +85,8 @@ static int udp_write(void *self, const Order *order)
 static bool accept_answer(Udp *udp, const Frame *frame, Feedback *feedback)
 {
     Link *link = &udp->link;
-    if (frame->kind != ANSWER || frame->session != udp->session || (int32_t)(frame->sequence - udp->sequence) > 0) {
+    if (frame->kind != ANSWER || frame->session != udp->session || (int32_t)(frame->sequence - udp->sequence) > 0 ||
+        !frame_true(frame, &udp->mac)) {
         link->foreign++;
         feedback->link |= FOREIGN_FRAME;
         return false;
@@ -82,12 +111,15 @@ static bool accept_answer(Udp *udp, const Frame *frame, Feedback *feedback)
     return true;
 }
 
-/* Takes all frames that are there, up to the awaited one. */
+/* Takes frames that are there, up to the awaited one. */
 static bool take(Udp *udp, Feedback *feedback)
 {
     Frame frame;
-    ssize_t size;
-    while ((size = recv((int)udp->socket, &frame, sizeof frame, MSG_DONTWAIT | MSG_TRUNC)) >= 0) {
+    for (int i = 0; i < AT_ONCE; i++) { /* whoever floods the socket does not keep the loop from its clock */
+        ssize_t size = recv((int)udp->socket, &frame, sizeof frame, MSG_DONTWAIT | MSG_TRUNC);
+        if (size < 0) {
+            return false;
+        }
         if (!frame_whole(&frame, size)) {
             udp->link.corrupted++;
             feedback->link |= CORRUPT_FRAME;
@@ -122,7 +154,17 @@ static int udp_status(void *self)
     return (int)((Udp *)self)->failed;
 }
 
-EXPORT void udp_open(Udp *udp, Adapter *adapter)
+/* `key` is that of the session. */
+EXPORT void udp_open(Udp *udp, Adapter *adapter, const void *key)
 {
+    mac_key(&udp->mac, key, KEY);
     *adapter = (Adapter){udp, udp_read, udp_write, udp_status};
+}
+
+/* Ends the session: the drive lets go and is free. */
+EXPORT void udp_bye(Udp *udp)
+{
+    Frame frame = {.kind = BYE, .session = udp->session, .sequence = ++udp->sequence};
+    frame_close(&frame, &udp->mac);
+    (void)send((int)udp->socket, &frame, sizeof frame, MSG_DONTWAIT | MSG_NOSIGNAL);
 }

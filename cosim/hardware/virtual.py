@@ -2,24 +2,29 @@
 
 import ctypes
 import errno
+import os
 import socket
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from threading import Thread
 from time import sleep
-from typing import Any
 
-from cosim.errors import HardwareError
-from cosim.fmu import FmuComponent
+from cosim.fmi.component import FATAL
+from cosim.fmi.fmu import FmuComponent
 from cosim.hardware.library import library
 from cosim.hardware.machine import Machine
 from cosim.hardware.simulated import Plant, make_drive
-from cosim.hardware.structures import COUNTED, CAdapter, CVirtual
+from cosim.hardware.structures import COUNTED, KEY, CAdapter, CVirtual
+from cosim.hardware.udp import key_of
 from cosim.hardware.words import STATES
+from cosim.support.errors import HardwareError
+from cosim.support.plain import JsonObject
 
-POLL = 0.01
-"""Seconds between two looks at the drive."""
+POLL, LONGEST = 0.01, 5.0
+"""Seconds between two looks at the drive; seconds that its plant may take to end a step."""
+LEASE, AHEAD = 1e9, 1000
+"""Least ns without an order after which a drive is free; least ticks that an order may be ahead, or its watchdog."""
 
 
 @dataclass(frozen=True)
@@ -36,14 +41,14 @@ class VirtualDrive:
 
     Args:
         plant: its FMU, started.
-        machine: watchdog and faults.
+        machine: limits, watchdog, key and faults.
         step: cycle in s, also that of the loop.
         quantum: rad a count of its encoder; the loop may believe another one.
         host, port: where it listens; port 0: any that is free.
         lockstep: its time is that of the orders; no clock, and no watchdog but in ticks of the orders.
 
     Raises:
-        HardwareError: the port is taken, or the plant does not start.
+        HardwareError: the port is taken, the key is none, or the plant does not start.
     """
 
     def __init__(
@@ -57,7 +62,7 @@ class VirtualDrive:
         port: int = 0,
         lockstep: bool = False,
     ) -> None:
-        self._adapter = CAdapter()
+        self._adapter, self._plant, key = CAdapter(), plant, key_of(machine.key_file)
         self.drive, self._kept = make_drive(plant, machine, step, quantum, self._adapter)
         self._socket = listen(host, port)
         self.host, self.port = self._socket.getsockname()
@@ -66,8 +71,12 @@ class VirtualDrive:
             socket=self._socket.fileno(),
             period=0 if lockstep else round(step * 1e9),
             watchdog=round(machine.watchdog_ms * 1e6),
+            lease=round(max(machine.watchdog_ms * 1e6, LEASE)),
+            ahead=max(self.drive.watchdog, AHEAD),
+            secret=(ctypes.c_byte * KEY).from_buffer_copy(os.urandom(KEY)),
         )
-        self._thread = Thread(target=library().virtual_run, args=(self.virtual, self._adapter))
+        arguments = (self.virtual, self._adapter, key)
+        self._thread = Thread(target=library().virtual_run, args=arguments, daemon=True)
 
     def __enter__(self) -> "VirtualDrive":
         self._thread.start()
@@ -75,7 +84,10 @@ class VirtualDrive:
 
     def __exit__(self, *_: object) -> None:
         self.virtual.stop = 1
-        self._thread.join()
+        self._thread.join(LONGEST)
+        if self._thread.is_alive():  # it ends with the process; who frees what it works with now crashes
+            self._plant.component.failed(FATAL)
+            raise HardwareError("The plant of the drive does not end its step; the drive ends without it.")
         self._socket.close()
 
     @property
@@ -84,10 +96,12 @@ class VirtualDrive:
         return f"udp://{self.host}:{self.port}"
 
     @property
-    def statistics(self) -> dict[str, Any]:
-        """Count the orders of this session: good, lost, late, duplicated, reordered; and trips of the watchdog."""
+    def statistics(self) -> JsonObject:
+        """Count the orders of this session by what became of them; trips of the watchdog; what its limits met."""
         link = {name: int(getattr(self.virtual.link, name)) for name in COUNTED if name != "sent"}
-        return {"orders": link, "watchdog_trips": int(self.virtual.trips), "torque": float(self.drive.held)}
+        own = {"beyond_limits": int(self.drive.limited), "overspeeds": int(self.drive.overspeeds)}
+        trips = {"watchdog_trips": int(self.virtual.trips), "torque": float(self.drive.held)}
+        return {"orders": link, **trips, **own}
 
     def events(self) -> Iterator[Event]:
         """Yield what happens to it, without an end: changes of state, and torques that its watchdog took away."""
@@ -139,7 +153,7 @@ def plant_of(component: FmuComponent, torque: str = "tau", position: str = "q") 
     return Plant(component, torque, position)
 
 
-def parse_injection(text: str) -> dict[str, Any]:
+def parse_injection(text: str) -> JsonObject:
     """Read KIND[:AT[:LASTS[:SIZE]]] as an entry of `[[inject]]`.
 
     Raises:
@@ -149,5 +163,5 @@ def parse_injection(text: str) -> dict[str, Any]:
     with suppress(ValueError):
         values = dict(zip(("at", "lasts", "size"), map(float, numbers), strict=False))
         if len(numbers) <= 3:
-            return {"kind": kind, "at": 0.0} | values
+            return {"kind": kind, "at": 0.0, **values}
     raise HardwareError(f'"{text}" is no fault to inject; the form is KIND[:AT[:LASTS[:SIZE]]].', culprit=text)

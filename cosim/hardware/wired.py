@@ -7,15 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from cosim.algorithm import Jacobi
-from cosim.description import describe
-from cosim.errors import HardwareError
-from cosim.exchange import open_fmu
-from cosim.fmu import FmuComponent
+from cosim.fmi.description import describe
+from cosim.fmi.fmu import FmuComponent
 from cosim.hardware.structures import INPUTS
-from cosim.planning import make_plan, make_streams
-from cosim.scenario import Scenario
-from cosim.wiring import Wire, Wiring
+from cosim.master.exchange import open_fmu
+from cosim.master.planning import make_plan, make_streams
+from cosim.support.errors import HardwareError
+from cosim.system.algorithm import Jacobi
+from cosim.system.scenario import Scenario
+from cosim.system.wire import Wire
+from cosim.system.wiring import Wiring
 
 REFERENCE = "q_d"
 """The controller's input that the following error is measured from."""
@@ -54,18 +55,18 @@ def wire_up(scenario: Scenario, stack: ExitStack) -> Wired:
     make_plan(wiring, scenario.step, 1)
     for name, component in opened.items():
         component.start(scenario.components[name].parameters)
-    plant, _, position = encoder.source.partition(".")
-    controller, _, measured = encoder.target.partition(".")
+    plant, position = encoder.source.parts
+    controller, measured = encoder.target.parts
     fed = [wire for wire in scenario.wires if wire.target.startswith(f"{controller}.")]
-    inputs = tuple(wire.target.partition(".")[2] for wire in fed)
+    inputs = tuple(wire.target.port for wire in fed)
     _check_controller(scenario, controller, opened[controller], inputs)
     return Wired(
         controller=opened[controller],
         plant=opened[plant],
         inputs=inputs,
         encoder=measured,
-        command=command.source.partition(".")[2],
-        torque=command.target.partition(".")[2],
+        command=command.source.port,
+        torque=command.target.port,
         position=position,
         quantum=encoder.quantum,
         setpoints=_setpoints(wiring, fed, scenario),
@@ -80,6 +81,8 @@ def refuse_what_has_no_machine(scenario: Scenario) -> None:
         raise _no(scenario, f"a machine takes one controller and replaces one plant, and this has: {have}")
     if scenario.every or not isinstance(scenario.algorithm, Jacobi):
         raise _no(scenario, "on a machine both components step at each tick, by Jacobi's algorithm")
+    if scenario.start:
+        raise _no(scenario, f"a machine begins at 0 s, and this starts at {scenario.start:g} s")
     if scenario.faults:
         raise _no(scenario, "faults on wires belong to a simulation; a machine file injects its own")
 
@@ -90,11 +93,11 @@ def _no(scenario: Scenario, reason: str) -> HardwareError:
 
 def _ends(scenario: Scenario) -> tuple[Wire, Wire]:
     """Find the wire of the encoder (that with a quantum) and that of the torque, which goes the other way."""
-    between = [wire for wire in scenario.wires if wire.source.partition(".")[0] in scenario.components]
+    between = [wire for wire in scenario.wires if wire.source.owner in scenario.components]
     encoders = [wire for wire in between if wire.quantum > 0]
     if len(encoders) != 1:
         raise _no(scenario, f"one wire must have the quantum of the encoder, and {len(encoders)} have one")
-    plant = encoders[0].source.partition(".")[0]
+    plant = encoders[0].source.owner
     commands = [wire for wire in between if wire.target.startswith(f"{plant}.")]
     if len(between) != 2 or len(commands) != 1:
         raise _no(scenario, "the plant gives one position to the controller and takes one torque from it")

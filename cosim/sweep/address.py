@@ -12,12 +12,15 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from cosim.complaint import complaint
-from cosim.component import Port
-from cosim.description import describe, ports_of
-from cosim.errors import ScenarioError, SweepError
-from cosim.scenario import ComponentSection, Scenario
+from cosim.fmi.component import Port
+from cosim.fmi.description import describe
+from cosim.fmi.variables import ports_of
+from cosim.support.complaint import complaint
+from cosim.support.errors import ScenarioError, SweepError
 from cosim.sweep.variation import Value
+from cosim.system.ports import PortRef
+from cosim.system.scenario import Scenario
+from cosim.system.sections import ComponentSection
 
 WIRE_KEYS = {"gain": "1", "offset": "", "quantum": ""}
 
@@ -67,9 +70,9 @@ def find(name: str, known: Mapping[str, Address], where: str) -> Address:
     """
     if name in known:
         return known[name]
-    owner = name.partition(".")[0]
+    owner = PortRef(name).owner
     near = tuple(one for one in known if one.startswith(f"{owner}."))
-    owners = tuple(dict.fromkeys(one.partition(".")[0] for one in known))
+    owners = tuple(dict.fromkeys(PortRef(one).owner for one in known))
     rule = f"of {owner} can be varied: {', '.join(near)}" if near else f"there are: {', '.join(owners)}"
     raise SweepError(f'{where}: "{name}" is nothing that can be varied; {rule}.', culprit=name, choices=near or owners)
 
@@ -82,8 +85,8 @@ def _ports(component: ComponentSection) -> dict[str, Port]:
 
 
 def _wires(scenario: Scenario, name: str, ports: Mapping[str, Port]) -> dict[str, Address]:
-    targets = [wire.target for wire in scenario.wires if wire.target.partition(".")[0] == name]
-    units = {target: ports[port].unit if (port := target.partition(".")[2]) in ports else "" for target in targets}
+    targets = [wire.target for wire in scenario.wires if wire.target.owner == name]
+    units = {target: ports[port].unit if (port := PortRef(target).port) in ports else "" for target in targets}
     return {
         f"{target}.{key}": Address(target, key, unit or units[target], _wire)
         for target in targets

@@ -7,17 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-import cosim
-from cosim.errors import SweepError
-from cosim.files import sha256
-from cosim.scenario import Scenario
-from cosim.sweep.cell import LostError
+from cosim.support.cell import LostError
+from cosim.support.errors import SweepError
+from cosim.support.files import sha256
+from cosim.support.version import __version__
 from cosim.sweep.file import Sweep
 from cosim.sweep.job import Job, Row, job_of, rehearse
 from cosim.sweep.journal import Journal
-from cosim.sweep.parcel import files_of
 from cosim.sweep.pool import Numbered, Pool, close_cells, cluster, cores, free, local, new_cell, warm
+from cosim.sweep.portable_job import files_of
 from cosim.sweep.table import write_table
+from cosim.system.scenario import Scenario
 
 Told = Callable[[int, int, int], None]
 """Called after each run with runs done, runs in all, and runs that came to nothing."""
@@ -110,7 +110,7 @@ def _table(out: Path, sweep: Sweep, journal: Journal, units: dict[str, str], ori
 
 
 def _origin(sweep: Sweep, scenario: Scenario, command: str) -> dict[str, str]:
-    made = {"version": f"mount-cosim {cosim.__version__}", "command": command}
+    made = {"version": f"mount-cosim {__version__}", "command": command}
     return made | {"scenario": scenario.text, "sweep": sweep.content, "runs": str(sweep.design.runs)}
 
 
@@ -129,4 +129,4 @@ def _identity(sweep: Sweep, scenario: Scenario) -> dict[str, str]:
     texts = {"sweep file": sweep.content, "scenario": scenario.text}
     hashes = {name: hashlib.sha256(text.encode()).hexdigest() for name, text in texts.items()}
     files = {f"file of {name}": sha256(path) for name, path in files_of(scenario).items()}
-    return {"version": cosim.__version__} | hashes | files
+    return {"version": __version__} | hashes | files

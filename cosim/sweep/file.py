@@ -9,14 +9,14 @@ from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from cosim.complaint import Location, complaint
-from cosim.errors import SweepError
+from cosim.support.complaint import Location, complaint
+from cosim.support.errors import SweepError
+from cosim.support.numbers import Count, Seconds
+from cosim.support.toml import parsed
 from cosim.sweep.design import Design, grid, latin_hypercube, monte_carlo
 from cosim.sweep.statistics import Statistic
-from cosim.sweep.variation import Variation, kind_of
+from cosim.sweep.variation import LIMIT, Variation, kind_of
 
-LIMIT = 1_000_000
-"""More runs than this are a slip of the pen."""
 OWN = ("run", "seconds", "status", "reason")
 """Columns of every table."""
 
@@ -28,8 +28,8 @@ class _File(BaseModel):
     method: Literal["grid", "latin_hypercube", "monte_carlo"] = "grid"
     runs: int | None = Field(default=None, ge=1)
     seed: int = Field(default=0, ge=0)
-    decimation: int | None = Field(default=None, ge=1)
-    timeout: float | None = Field(default=None, gt=0)
+    decimation: Count | None = None
+    timeout: Seconds | None = None
     record: bool = False
     vary: dict[str, Any] = Field(min_length=1)
     statistics: dict[str, Statistic] = Field(min_length=1)
@@ -63,7 +63,7 @@ def read_sweep(path: Path) -> Sweep:
         SweepError: one sentence that names file, key, value and rule.
     """
     try:
-        raw = _File.model_validate(tomllib.loads(path.read_text("utf-8")))
+        raw = _File.model_validate(parsed(path.read_text("utf-8")))
     except OSError as error:
         raise SweepError(f"{path}: no such sweep; a sweep is a .toml file.", culprit=str(path)) from error
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

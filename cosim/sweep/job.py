@@ -5,19 +5,19 @@ from dataclasses import dataclass, replace
 from math import nan
 from pathlib import Path
 from time import perf_counter
-from typing import Any
 
-from cosim.errors import CosimError, StepError
-from cosim.master import run
-from cosim.recording import Recording
-from cosim.scenario import Scenario
+from cosim.data.recording import Recording
+from cosim.master.simulate import run
+from cosim.support.errors import CosimError, StepError
+from cosim.support.plain import Parsed
 from cosim.sweep.address import Address, addresses, find
 from cosim.sweep.design import Point
 from cosim.sweep.file import Sweep
 from cosim.sweep.statistics import Statistic
-from cosim.wiring import Record
+from cosim.system.scenario import Scenario
+from cosim.system.wire import Record
 
-Row = dict[str, Any]
+Row = Parsed
 """Column to value: run, what was varied, statistics, seconds, status ("ok", "failed", "crashed", "timeout"), reason."""
 
 

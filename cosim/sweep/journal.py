@@ -11,11 +11,12 @@ import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
-from cosim.errors import OutputError
-from cosim.files import check_free, directory, replacing
-from cosim.interrupts import uninterrupted
+from cosim.support.errors import OutputError
+from cosim.support.files import check_free, directory, replacing
+from cosim.support.interrupts import uninterrupted
+from cosim.support.plain import Parsed
 from cosim.sweep.job import Row
 
 RUNS = "runs.jsonl"
@@ -79,7 +80,7 @@ class Journal:
         if not self._identity.exists():
             _check_free(self.folder, made)
             return
-        before: dict[str, Any] = json.loads(self._identity.read_text("utf-8"))
+        before: Parsed = json.loads(self._identity.read_text("utf-8"))
         changed = [name for name in {**before, **identity} if before.get(name) != identity.get(name)]
         if changed:
             rule = "give another --out, or --force to start over"

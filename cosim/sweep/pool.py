@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
-from cosim.errors import MissingPackageError, SweepError
-from cosim.sweep.cell import Cell, LostError
+from cosim.support.cell import Cell, LostError
+from cosim.support.errors import MissingPackageError, SweepError
 from cosim.sweep.design import Point
 from cosim.sweep.job import Job, Row, work
-from cosim.sweep.parcel import Parcel
+from cosim.sweep.portable_job import PortableJob
 
 Numbered = tuple[int, Point]
 
@@ -125,7 +125,7 @@ def cluster(job: Job, address: str) -> Iterator[Pool]:
         if not threads:
             raise SweepError(f"The cluster at {address} has no workers.", culprit=address)
         _check_versions(client, address)
-        parcel = client.scatter(Parcel.of(job), broadcast=True, hash=False)
+        parcel = client.scatter(PortableJob.of(job), broadcast=True, hash=False)
         executor = client.get_executor(pure=False)
         yield Pool(lambda number, point: executor.submit(_remote, parcel, number, point), threads, 2 * threads)
     finally:
@@ -134,7 +134,7 @@ def cluster(job: Job, address: str) -> Iterator[Pool]:
         client.close()
 
 
-def _remote(parcel: Parcel, number: int, point: Point) -> Row:
+def _remote(parcel: PortableJob, number: int, point: Point) -> Row:
     return isolated(parcel.job_here(), number, point)
 
 
@@ -152,20 +152,20 @@ def _client(address: str) -> Any:
 
 
 def _check_versions(client: Any, address: str) -> None:
-    import cosim
+    from cosim.support.version import __version__
 
     try:
         there = set(client.run(version).values())
     except Exception as error:  # what a worker raises when it cannot import this comes in many shapes
         raise SweepError(f"The workers at {address} do not have mount-cosim: {error}.", culprit=address) from error
-    if there != {cosim.__version__}:
+    if there != {__version__}:
         found = ", ".join(sorted(there))
-        message = f"The workers at {address} have mount-cosim {found}; this is {cosim.__version__}."
+        message = f"The workers at {address} have mount-cosim {found}; this is {__version__}."
         raise SweepError(message, culprit=address, value=found)
 
 
 def version() -> str:
     """Return the version of mount-cosim where this is called."""
-    import cosim
+    from cosim.support.version import __version__
 
-    return cosim.__version__
+    return __version__

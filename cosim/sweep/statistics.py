@@ -19,9 +19,9 @@ from typing import Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from cosim.errors import SweepError, UnitError
-from cosim.recording import Recording
-from cosim.units import conversion
+from cosim.data.recording import Recording
+from cosim.support.errors import SweepError, UnitError
+from cosim.support.units import conversion
 
 KINDS: Mapping[str, Callable[[np.ndarray, float], float]] = {
     "mean": lambda x, dt: float(np.mean(x)),

@@ -8,8 +8,8 @@ from typing import Any
 import pyarrow as pa
 from pyarrow import parquet
 
-from cosim.files import replacing
-from cosim.formats import ORIGIN_KEY, UNIT_KEY
+from cosim.data.formats import ORIGIN_KEY, UNIT_KEY
+from cosim.support.files import replacing
 from cosim.sweep.job import Row
 
 TYPES = {"run": pa.int64(), "status": pa.string(), "reason": pa.string()}

@@ -9,13 +9,15 @@ The key is the parameter, or any name where `of` lists the parameters that all t
 """
 
 from abc import abstractmethod
-from math import exp, floor, inf, log
+from math import exp, floor, inf, isfinite, log
 from statistics import NormalDist
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 Value = float | bool
+LIMIT = 1_000_000
+"""Most runs of one sweep."""
 
 
 class Variation(BaseModel):
@@ -61,10 +63,12 @@ class Range(Variation):
     low: float
     high: float
     scale: Literal["linear", "log", "integer"] = "linear"
-    count: int | None = Field(default=None, ge=1)
+    count: int | None = Field(default=None, ge=1, le=LIMIT)
 
     @model_validator(mode="after")
     def _fits(self) -> "Range":
+        if not isfinite(self.high - self.low):
+            raise ValueError(f"low = {self.low:g} and high = {self.high:g} are too far apart")
         if self.low >= self.high:
             raise ValueError(f"low = {self.low:g} must be below high = {self.high:g}")
         if self.scale == "log" and self.low <= 0:
@@ -84,9 +88,9 @@ class Range(Variation):
     def grid(self) -> tuple[Value, ...]:
         """`count` values; all whole numbers where none is given for them."""
         if self.scale == "integer":
-            every = [self.low + k for k in range(int(self.high - self.low) + 1)]
-            count = min(self.count or len(every), len(every))
-            return tuple(every[round(k * (len(every) - 1) / max(count - 1, 1))] for k in range(count))
+            last = int(self.high - self.low)
+            count = min(self.count or last + 1, last + 1, LIMIT + 1)
+            return tuple(self.low + round(k * last / max(count - 1, 1)) for k in range(count))
         if self.count is None:
             return ()
         inner = tuple(self.at(k / (self.count - 1)) for k in range(1, self.count - 1))

@@ -75,7 +75,9 @@ class Adaptation(Estimate):
         """Say what is estimated, and how."""
         return chapter_of(self, PREFIX, "Friction as estimated", onto, "On-line identification")
 
-    def advance(self, symbols: dict[str, Any], state: list[Any], seen: Seen, period: float) -> tuple[list[Any], Scalar]:
+    def advance(
+        self, symbols: dict[str, Scalar], state: list[Any], seen: Seen, period: float
+    ) -> tuple[list[Any], Scalar]:
         """Return the states after this tick and the torque expected now."""
         now = getattr(seen, self.source)
         this, law = with_symbols(self, symbols, now, PREFIX), with_symbols(self.law, symbols, now, LAW)

@@ -46,7 +46,9 @@ class Compensation(Estimate):
         speed = {"observed": "observed", "reference": "desired"}[self.source]
         return chapter_of(self.law, PREFIX, f"Friction from the {speed} speed", onto)
 
-    def advance(self, symbols: dict[str, Any], state: list[Any], seen: Seen, period: float) -> tuple[list[Any], Scalar]:
+    def advance(
+        self, symbols: dict[str, Scalar], state: list[Any], seen: Seen, period: float
+    ) -> tuple[list[Any], Scalar]:
         """Return the states after this tick and the friction torque now."""
         now = getattr(seen, self.source)
         law = with_symbols(self.law, symbols, now, PREFIX)

@@ -117,7 +117,7 @@ OUTPUTS = (
 )
 
 
-def _tick(adrc: Adrc, x: Any, u: Any, symbols: dict[str, Any]) -> tuple[Any, Any]:
+def _tick(adrc: Adrc, x: Any, u: Any, symbols: dict[str, Scalar]) -> tuple[Any, Any]:
     q, q_d, v_d, a_d = ca.vertsplit(u)
     memory, zeta, noted, *notes = _split(x, [len(part) for part in adrc.states()])
     started, last, acted, expected = memory
@@ -135,7 +135,7 @@ def _tick(adrc: Adrc, x: Any, u: Any, symbols: dict[str, Any]) -> tuple[Any, Any
     return ca.vertcat(*following), ca.vertcat(tau, friction, *zeta[:3])
 
 
-def _estimate(adrc: Adrc, symbols: dict[str, Any], states: list[Any], seen: Seen) -> tuple[list[Any], Scalar]:
+def _estimate(adrc: Adrc, symbols: dict[str, Scalar], states: list[Any], seen: Seen) -> tuple[list[Any], Scalar]:
     """Advance all estimates; return their states and the sum of their torques."""
     parts = zip(adrc.estimates, states, strict=True)
     done = [one.advance(symbols, state, seen, adrc.period) for one, state in parts]

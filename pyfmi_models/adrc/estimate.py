@@ -33,6 +33,8 @@ class Estimate:
         """Say what it is; `onto` is the place that it works on."""
         raise TypeError(f"{type(self).__name__} has no chapter")
 
-    def advance(self, symbols: dict[str, Any], state: list[Any], seen: Seen, period: float) -> tuple[list[Any], Scalar]:
+    def advance(
+        self, symbols: dict[str, Scalar], state: list[Any], seen: Seen, period: float
+    ) -> tuple[list[Any], Scalar]:
         """Return the states after this tick and the torque expected now [N m]; `symbols` are the parameters."""
         raise TypeError(f"{type(self).__name__} predicts no torque")

@@ -47,7 +47,9 @@ class Learning(Estimate):
         """Say what is learned."""
         return chapter_of(self, PREFIX, "Torque of the pass before", onto, "Iterative learning")
 
-    def advance(self, symbols: dict[str, Any], state: list[Any], seen: Seen, period: float) -> tuple[list[Any], Scalar]:
+    def advance(
+        self, symbols: dict[str, Scalar], state: list[Any], seen: Seen, period: float
+    ) -> tuple[list[Any], Scalar]:
         """Return the states after this tick and the torque learned for this phase."""
         this = with_symbols(self, symbols, seen.reference, PREFIX)
         clock, *points = state

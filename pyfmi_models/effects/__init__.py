@@ -18,6 +18,7 @@ from pyfmi_models.effects.base import (
     MotionEffect,
     PayloadEffect,
     SensorEffect,
+    Transmission,
 )
 from pyfmi_models.effects.cogging import Cogging
 from pyfmi_models.effects.delay import Delay
@@ -59,4 +60,5 @@ __all__ = [
     "SensorEffect",
     "StribeckEffect",
     "TorqueOffset",
+    "Transmission",
 ]

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from pyfmi_models.effects.base import DriveEffect
+from pyfmi_models.effects.base import DriveEffect, Main
 from pyfmi_models.model import Scalar, Variable, parameter
 
 
@@ -16,6 +16,8 @@ class ActuatorLag(DriveEffect):
 
     id: ClassVar[str] = "actuator_lag"
     title: ClassVar[str] = "Actuator lag"
+    equation: ClassVar[str] = "τ_applied = τ / (1 + s T)"
+    main: ClassVar[Main] = Main("time_constant_ms", unit="ms")
     rivals: ClassVar[tuple[str, ...]] = ("delay", "clock_skew", "backlash")
     told_apart_by: ClassVar[str] = "a lag takes amplitude away at high frequency; a delay turns phase only"
     action: ClassVar[str] = "Check the bandwidth of the current loop and any torque filter in the drive."

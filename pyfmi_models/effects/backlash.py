@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import Coupling
+from pyfmi_models.effects.base import Coupling, Main
 from pyfmi_models.model import Scalar, parameter
 
 BUILD_UP = 1e-3
@@ -30,6 +30,9 @@ class Backlash(Coupling):
 
     id: ClassVar[str] = "backlash"
     title: ClassVar[str] = "Backlash"
+    equation: ClassVar[str] = "no torque inside the gap"
+    main: ClassVar[Main] = Main("gap_rad", unit="rad", is_size=False)
+    to_record: ClassVar[str] = "record slow reversals under light load"
     rivals: ClassVar[tuple[str, ...]] = ("compliance", "presliding", "friction_asymmetry", "actuator_lag", "delay")
     told_apart_by: ClassVar[str] = "after each reversal the motor runs free over the same distance, at any speed"
     action: ClassVar[str] = "Preload the gear or the nut; check the key and the coupling."
@@ -38,9 +41,9 @@ class Backlash(Coupling):
         "1", "Share of the inertia behind the play", default=0.5, low=0.01, high=0.99, tunable=False
     )
     contact_hz: Scalar = parameter(
-        "Hz", "Frequency of the far mass on the contact", default=50.0, low=1, high=1e4, tunable=False
+        "Hz", "Frequency of the far mass on the contact", default=50.0, low=1, high=1e4, tunable=False, fitted=False
     )
-    damping_ratio: Scalar = parameter("1", "Damping of the contact", default=0.75, low=0, high=5)
+    damping_ratio: Scalar = parameter("1", "Damping of the contact", default=0.75, low=0, high=5, fitted=False)
     load_friction: Scalar = parameter("N.m", "Friction level of the far mass itself", default=0.0, low=0)
     load_viscous: Scalar = parameter("N.m.s/rad", "Viscous friction of the far mass itself", default=0.0, low=0)
 

@@ -9,6 +9,7 @@ a reading:
     LoadEffect       a torque that resists, beside friction; a PayloadEffect also presses on the bearings
     InertiaEffect    on the inertia
     Coupling         splits the inertia in two, with something between that is not rigid
+    Transmission     a coupling in front of the axis: only the drive is on its other side
     SensorEffect     sensor path: between true position and encoder reading
     ClockEffect      on the time stamps of a recording
 
@@ -25,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from pyfmi_models.friction.base import FrictionLaw
-from pyfmi_models.model import Scalar, Variable
+from pyfmi_models.model import Part, Scalar, Variable
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
 
@@ -52,16 +53,40 @@ def times(count: float) -> str:
     return "once" if count == 1 else f"{count:.4g} times"
 
 
+class Main(NamedTuple):
+    """The number of an effect that texts give: its parameter, and the factor to and the unit of the text.
+
+    `is_size` says whether it grows with the effect. A speed, a frequency or a knee says where the effect sets in: of
+    that no smallest size can be told.
+    """
+
+    parameter: str
+    factor: float = 1.0
+    unit: str = "N.m"
+    is_size: bool = True
+
+
 @dataclass(frozen=True, kw_only=True)
-class Effect:
+class Effect(Part):
     """One kind of missing physics: what a mechanic would call it, and what tells it from its rivals."""
 
     place: ClassVar[str] = "Mechanics"
     id: ClassVar[str]
     title: ClassVar[str]
+    equation: ClassVar[str] = ""
+    """The equation as a reader of a report knows it."""
+    main: ClassVar[Main]
     rivals: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
     action: ClassVar[str] = ""
+    to_record: ClassVar[str] = ""
+    """What to record where recordings cannot test the effect."""
+    special_case_of: ClassVar[tuple[str, ...]] = ()
+    """Effects that include this one: what both explain, the special one predicts alike."""
+    is_determined: ClassVar[bool] = True
+    """Whether motion and inputs determine it; not what is drawn by chance."""
+    ordered: ClassVar[tuple[tuple[str, str, float], ...]] = ()
+    """Parameters of which the second is above the first, and the least factor between them that a fit keeps."""
 
     def states(self) -> tuple[Variable, ...]:
         """Name the effect's own states."""
@@ -74,6 +99,14 @@ class Effect:
     def broken_rule(self) -> str:
         """Say which rule between the parameters these numbers break; empty if none."""
         return ""
+
+    def learned_in(self, linear: bool = False) -> str:
+        """Say over which range of what the effect was learned from data; empty for an effect with an equation."""
+        return ""
+
+    def leading(self) -> Main:
+        """The number that says how large the effect with these numbers is."""
+        return self.main
 
     def statement(self, unit: str = "N·m") -> str:
         """Say what the effect with these numbers is, in one plain sentence; `unit` is the torque or force unit."""
@@ -182,6 +215,19 @@ class Coupling(Effect):
     def drag(self, speed: Scalar) -> Scalar:
         """Friction torque on the far side [N m] at its speed, resists."""
         return 0 * speed
+
+
+@dataclass(frozen=True, kw_only=True)
+class Transmission(Coupling):
+    """A coupling in front of the axis: the drive turns a motor that passes its torque on to the axis.
+
+    The near side is the motor, on which the torque of the drive acts and nothing else; the far side is the axis with
+    friction, loads and encoder. `share()` is that of the axis, so the motor has 1 - `share()` of the inertia.
+    """
+
+    def demand(self, omega: npt.NDArray[np.float64]) -> npt.NDArray[np.complex128]:
+        """Torque on the motor per torque on the axis, which is held still, at angular frequencies omega [rad/s]."""
+        raise TypeError(f"{type(self).__name__} has no demand")
 
 
 @dataclass(frozen=True, kw_only=True)

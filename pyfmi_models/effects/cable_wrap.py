@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from pyfmi_models.effects.base import LoadEffect, Motion
+from pyfmi_models.effects.base import LoadEffect, Main, Motion
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -17,12 +17,16 @@ class CableWrap(LoadEffect):
 
     id: ClassVar[str] = "cable_wrap"
     title: ClassVar[str] = "Cable wrap"
+    equation: ClassVar[str] = "k x (1 + h x²), x = q − q₀"
+    main: ClassVar[Main] = Main("stiffness", unit="N.m/rad")
     rivals: ClassVar[tuple[str, ...]] = ("gravity_unbalance", "torque_offset")
     told_apart_by: ClassVar[str] = "a cable pulls harder turn after turn; an unbalance repeats once per turn"
     action: ClassVar[str] = "Give the cable more slack, or bring home to the middle of its travel."
     stiffness: Scalar = parameter("N.m/rad", "Stiffness at home", low=0)
     home: Scalar = parameter("rad", "Position without torque", default=0.0)
-    hardening: Scalar = parameter("1/rad2", "Relative rise of the stiffness with distance squared", default=0.0, low=0)
+    hardening: Scalar = parameter(
+        "1/rad2", "Relative rise of the stiffness with distance squared", default=0.0, low=0, fitted=False
+    )
 
     def load(self, motion: Motion) -> Scalar:
         """`k x (1 + h x^2)`."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from pyfmi_models.effects.base import ClockEffect, Motion
+from pyfmi_models.effects.base import ClockEffect, Main, Motion
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -20,6 +20,9 @@ class ClockSkew(ClockEffect):
 
     id: ClassVar[str] = "clock_skew"
     title: ClassVar[str] = "Clock skew"
+    equation: ClassVar[str] = "t_q = t_τ (1 + drift) + offset"
+    main: ClassVar[Main] = Main("offset_ms", unit="ms", is_size=False)
+    to_record: ClassVar[str] = "record 10 min in one piece"
     rivals: ClassVar[tuple[str, ...]] = ("delay",)
     told_apart_by: ClassVar[str] = (
         "a clock may drift, or run ahead, or trail the set point; a delay is constant, and the loop makes up for it"

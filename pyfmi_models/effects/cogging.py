@@ -1,14 +1,14 @@
 """Torque ripple locked to position."""
 
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from math import pi
 from typing import ClassVar
 
 import casadi as ca
 import numpy as np
 
-from pyfmi_models.effects.base import LoadEffect, Motion
+from pyfmi_models.effects.base import LoadEffect, Main, Motion
 from pyfmi_models.model import Scalar, parameter, structure
 
 
@@ -26,10 +26,12 @@ class Cogging(LoadEffect):
 
     id: ClassVar[str] = "cogging"
     title: ClassVar[str] = "Cogging"
+    equation: ClassVar[str] = "a cos(N q + φ)"
+    main: ClassVar[Main] = Main("amplitude")
     rivals: ClassVar[tuple[str, ...]] = ("position_friction", "gravity_unbalance", "encoder_eccentricity")
     told_apart_by: ClassVar[str] = "friction that depends on position changes sign with the direction; cogging does not"
     action: ClassVar[str] = "Nothing needs repair: motors with slots and magnets do this. Use the improved model."
-    cycles_per_rev: Scalar = parameter("1", "Ripple cycles per turn (per metre of a linear axis)", low=0)
+    cycles_per_rev: Scalar = parameter("1", "Ripple cycles per turn (per metre of a linear axis)", low=0, fitted=False)
     amplitude: Scalar = parameter("N.m", "Half the peak-to-peak torque", low=0)
     phase: Scalar = parameter("rad", "Phase at position zero", default=0.0)
     harmonics: tuple[float, ...] = structure(
@@ -52,7 +54,7 @@ def _wave(turn: Scalar, harmonics: tuple[float, ...]) -> Scalar:
     return ca.cos(turn) + sum(overtones)
 
 
-@cache
+@lru_cache(maxsize=256)
 def _half(harmonics: tuple[float, ...]) -> float:
     """Half the peak-to-peak value of the wave."""
     turns = np.linspace(0, 2 * pi, 1024 * (len(harmonics) + 1), endpoint=False)

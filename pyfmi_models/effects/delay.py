@@ -7,7 +7,7 @@ import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from pyfmi_models.effects.base import DriveEffect
+from pyfmi_models.effects.base import DriveEffect, Main
 from pyfmi_models.model import Scalar, Variable, parameter
 
 PADE_ORDER = 3
@@ -27,6 +27,8 @@ class Delay(DriveEffect):
 
     id: ClassVar[str] = "delay"
     title: ClassVar[str] = "Delay"
+    equation: ClassVar[str] = "τ_applied(t) = τ(t − T)"
+    main: ClassVar[Main] = Main("delay_ms", unit="ms")
     rivals: ClassVar[tuple[str, ...]] = ("actuator_lag", "clock_skew", "backlash")
     told_apart_by: ClassVar[str] = (
         "a delay turns phase only; a lag also takes amplitude away at high frequency; a late clock trails the set point"

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Motion
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion
 from pyfmi_models.model import Scalar, Variable, parameter
 
 
@@ -21,11 +21,14 @@ class DwellBreakaway(FrictionEffect):
 
     id: ClassVar[str] = "dwell_breakaway"
     title: ClassVar[str] = "Dwell break-away"
+    equation: ClassVar[str] = "F + c ln(1 + age / t₀)"
+    main: ClassVar[Main] = Main("torque_per_efold")
+    to_record: ClassVar[str] = "record stops of 1, 10 and 100 s before the same move"
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "presliding")
     told_apart_by: ClassVar[str] = "the same move costs more after a longer rest; a Stribeck curve knows no rest"
     action: ClassVar[str] = "Move the axis a little before fine positioning after a long rest."
     torque_per_efold: Scalar = parameter("N.m", "Rise of the break-away torque per e-fold of rest time", low=0)
-    onset_s: Scalar = parameter("s", "Rest time at which the rise begins", default=0.1, low=1e-6)
+    onset_s: Scalar = parameter("s", "Rest time at which the rise begins", default=0.1, low=1e-6, fitted=False)
     memory_rad: Scalar = parameter("rad", "Slip that renews the contact", default=1e-3, low=1e-9, nominal=1e-3)
 
     def states(self) -> tuple[Variable, ...]:

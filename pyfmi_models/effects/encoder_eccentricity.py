@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import Motion, SensorEffect, times
+from pyfmi_models.effects.base import Main, Motion, SensorEffect, times
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -22,10 +22,15 @@ class EncoderEccentricity(SensorEffect):
 
     id: ClassVar[str] = "encoder_eccentricity"
     title: ClassVar[str] = "Encoder eccentricity"
+    equation: ClassVar[str] = "reading = q + e₁ sin(N q + φ) + e₂ sin 2(N q + φ)"
+    main: ClassVar[Main] = Main("amplitude_rad", unit="rad")
+    to_record: ClassVar[str] = "record at least one whole turn at two speeds"
     rivals: ClassVar[tuple[str, ...]] = ("cogging", "inertia_variation", "gravity_unbalance")
     told_apart_by: ClassVar[str] = "its torque grows with the square of the speed; that of cogging does not"
     action: ClassVar[str] = "Centre the encoder disc, or add a second read head opposite the first."
-    cycles_per_rev: Scalar = parameter("1", "Encoder turns per axis turn (per metre of a linear axis)", low=0)
+    cycles_per_rev: Scalar = parameter(
+        "1", "Encoder turns per axis turn (per metre of a linear axis)", low=0, fitted=False
+    )
     amplitude_rad: Scalar = parameter("rad", "Amplitude of the error once per encoder turn", low=0, nominal=1e-4)
     phase: Scalar = parameter("rad", "Phase at position zero", default=0.0)
     second: Scalar = parameter("1", "Error twice per encoder turn, relative", default=0.0, low=-10, high=10)

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Motion
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -15,6 +15,9 @@ class FrictionAsymmetry(FrictionEffect):
 
     id: ClassVar[str] = "friction_asymmetry"
     title: ClassVar[str] = "Friction asymmetry"
+    equation: ClassVar[str] = "F (1 + a sign v) + σ₂ v (1 + b sign v)"
+    main: ClassVar[Main] = Main("level_asymmetry", 200.0, "%")
+    to_record: ClassVar[str] = "record the same speeds in both directions"
     rivals: ClassVar[tuple[str, ...]] = ("torque_offset", "gravity_unbalance")
     told_apart_by: ClassVar[str] = "an offset also acts at standstill and does not grow with speed"
     action: ClassVar[str] = "Check the clamp brake for drag, and the lip seal and bearing preload for tilt."
@@ -30,6 +33,11 @@ class FrictionAsymmetry(FrictionEffect):
     def viscous(self, viscous: Scalar, motion: Motion) -> Scalar:
         """`viscous (1 + b sign v)`."""
         return viscous * (1 + self.viscous_asymmetry * ca.sign(motion.v))
+
+    def leading(self) -> Main:
+        """The larger of the two."""
+        viscous = abs(self.viscous_asymmetry) > abs(self.level_asymmetry)
+        return self.main._replace(parameter="viscous_asymmetry", unit="% viscous") if viscous else self.main
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""

@@ -39,6 +39,7 @@ class FrictionWander(FrictionEffect):
     title: ClassVar[str] = "Wandering friction"
     rivals: ClassVar[tuple[str, ...]] = ("position_friction", "thermal_viscosity")
     told_apart_by: ClassVar[str] = "the same motion twice gives another friction torque, without order"
+    is_determined: ClassVar[bool] = False
     action: ClassVar[str] = (
         "Look for grease that moves, a loose seal or particles in the bearing; average over many runs."
     )

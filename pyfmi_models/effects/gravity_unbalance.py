@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import Motion, PayloadEffect
+from pyfmi_models.effects.base import Main, Motion, PayloadEffect
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -15,6 +15,9 @@ class GravityUnbalance(PayloadEffect):
 
     id: ClassVar[str] = "gravity_unbalance"
     title: ClassVar[str] = "Gravity unbalance"
+    equation: ClassVar[str] = "mgl sin(q + φ)"
+    main: ClassVar[Main] = Main("mgl")
+    to_record: ClassVar[str] = "record at least half a turn, slowly, with stops"
     rivals: ClassVar[tuple[str, ...]] = ("torque_offset", "encoder_eccentricity", "cable_wrap", "cogging")
     told_apart_by: ClassVar[str] = (
         "an off-centre load needs holding torque at standstill; an off-centre encoder does not"

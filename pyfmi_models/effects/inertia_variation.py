@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import InertiaEffect, Motion, times
+from pyfmi_models.effects.base import InertiaEffect, Main, Motion, times
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -19,11 +19,15 @@ class InertiaVariation(InertiaEffect):
 
     id: ClassVar[str] = "inertia_variation"
     title: ClassVar[str] = "Inertia variation"
+    equation: ClassVar[str] = "J (1 + r cos(N q + φ))"
+    main: ClassVar[Main] = Main("relative_amplitude", 100.0, "%")
     rivals: ClassVar[tuple[str, ...]] = ("encoder_eccentricity", "compliance", "torque_saturation")
     told_apart_by: ClassVar[str] = "it scales with the acceleration at a place; an eccentric encoder with speed squared"
     action: ClassVar[str] = "Nothing needs repair: a payload off the axis does this. Use the improved model."
     relative_amplitude: Scalar = parameter("1", "Relative amplitude of the inertia", low=0, high=0.95)
-    cycles_per_rev: Scalar = parameter("1", "Cycles per turn (per metre of a linear axis)", default=1.0, low=0)
+    cycles_per_rev: Scalar = parameter(
+        "1", "Cycles per turn (per metre of a linear axis)", default=1.0, low=0, fitted=False
+    )
     phase: Scalar = parameter("rad", "Phase at position zero", default=0.0)
 
     def inertia(self, inertia: Scalar, motion: Motion) -> Scalar:

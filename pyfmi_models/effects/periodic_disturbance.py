@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import LoadEffect, Motion, times
+from pyfmi_models.effects.base import LoadEffect, Main, Motion, times
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -16,6 +16,8 @@ class PeriodicDisturbance(LoadEffect):
 
     id: ClassVar[str] = "periodic_disturbance"
     title: ClassVar[str] = "Periodic disturbance"
+    equation: ClassVar[str] = "a sin(2π f t + φ)"
+    main: ClassVar[Main] = Main("amplitude")
     rivals: ClassVar[tuple[str, ...]] = ("cogging", "position_friction", "compliance")
     told_apart_by: ClassVar[str] = "its frequency stays when the speed changes; that of cogging follows the speed"
     action: ClassVar[str] = "Look for fans, pumps or a machine next door that runs at this frequency."

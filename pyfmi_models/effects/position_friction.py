@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Motion, times
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion, times
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -13,6 +13,8 @@ from pyfmi_models.model import Scalar, parameter
 class _PositionFriction(FrictionEffect):
     id: ClassVar[str] = "position_friction"
     title: ClassVar[str] = "Position-dependent friction"
+    equation: ClassVar[str] = "F (1 + r cos(N q + φ)), or F (1 + r) near one place"
+    main: ClassVar[Main] = Main("relative_amplitude", 100.0, "%")
     rivals: ClassVar[tuple[str, ...]] = ("cogging", "gravity_unbalance", "load_dependent_friction")
     told_apart_by: ClassVar[str] = "cogging pushes the same way in both directions; friction always resists"
 
@@ -22,7 +24,7 @@ class PeriodicFriction(_PositionFriction):
     """Friction level times 1 + r cos(cycles angle + phase)."""
 
     action: ClassVar[str] = "Check the bearing ring and the gear for run-out."
-    cycles_per_rev: Scalar = parameter("1", "Cycles per turn (per metre of a linear axis)", low=0)
+    cycles_per_rev: Scalar = parameter("1", "Cycles per turn (per metre of a linear axis)", low=0, fitted=False)
     relative_amplitude: Scalar = parameter("1", "Relative amplitude of the level", low=0, high=0.95)
     phase: Scalar = parameter("rad", "Phase at position zero", default=0.0)
 

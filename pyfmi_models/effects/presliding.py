@@ -5,13 +5,15 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect
-from pyfmi_models.friction.base import FrictionLaw
+from pyfmi_models.effects.base import FrictionEffect, Main
+from pyfmi_models.friction.base import FrictionLaw, each_way
 from pyfmi_models.friction.lugre import LuGre
 from pyfmi_models.model import Scalar, Variable, parameter
 
 LEAST_LEVEL = 1e-9
 """Friction level [N m] below which a bristle is as good as none."""
+FAST = 1e9
+"""Speed [rad/s] at which no Stribeck term is left."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +28,8 @@ class Presliding(FrictionEffect):
 
     id: ClassVar[str] = "presliding"
     title: ClassVar[str] = "Presliding"
+    equation: ClassVar[str] = "dz/dt = v − σ₀ |v| z / g(v)"
+    main: ClassVar[Main] = Main("sigma0", unit="N.m/rad", is_size=False)
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "dwell_breakaway", "backlash", "compliance")
     told_apart_by: ClassVar[str] = "below break-away the axis springs back when released; with play it does not"
     action: ClassVar[str] = "Nothing needs repair: contacts bend. For fine tracking use the improved model."
@@ -66,3 +70,13 @@ class _Bristled(FrictionLaw):
 
     def contact(self, state: Any, v: Scalar, level: Scalar) -> Scalar:
         return self.bristles.contact(state, v, ca.fmax(level, LEAST_LEVEL))
+
+    def broken_passivity(self) -> str:
+        """Say where a level that falls with speed lets the damping of the bristles give energy back, see `LuGre`."""
+        for law in each_way(self.law):
+            peak, low, viscous = (float(value) for value in (law.level(0.0), law.level(FAST), law.viscous(1.0)))
+            needed = self.bristles.sigma1 * (peak / max(low, LEAST_LEVEL) - 1)
+            if viscous < needed:
+                rule = f"the viscous coefficient, {viscous:.3g}, would need to be {needed:.3g} N.m.s/rad"
+                return f"sigma1 = {self.bristles.sigma1:.3g} of presliding: {rule}"
+        return ""

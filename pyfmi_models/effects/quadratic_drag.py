@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import LoadEffect, Motion
+from pyfmi_models.effects.base import LoadEffect, Main, Motion
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -18,6 +18,9 @@ class QuadraticDrag(LoadEffect):
 
     id: ClassVar[str] = "quadratic_drag"
     title: ClassVar[str] = "Quadratic drag"
+    equation: ClassVar[str] = "c v |v|"
+    main: ClassVar[Main] = Main("coefficient", unit="N.m.s2/rad2")
+    to_record: ClassVar[str] = "record the highest speed that is allowed"
     rivals: ClassVar[tuple[str, ...]] = ("thermal_viscosity", "stribeck")
     told_apart_by: ClassVar[str] = "drag is the same early and late; friction that warms up is not"
     action: ClassVar[str] = "Look at covers, fans and oil that is churned; at high speed use the improved model."

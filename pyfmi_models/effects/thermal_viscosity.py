@@ -5,11 +5,13 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Motion
-from pyfmi_models.model import Scalar, Variable, parameter
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion
+from pyfmi_models.model import Recorded, Scalar, Variable, parameter
 
 REFERENCE = 20.0
 """Temperature [degC] at which the card's friction holds."""
+LEAST_WARMING = 2.0
+"""Seconds in which a bearing warms or cools at the fastest."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,6 +24,9 @@ class ThermalViscosity(FrictionEffect):
 
     id: ClassVar[str] = "thermal_viscosity"
     title: ClassVar[str] = "Thermal friction"
+    equation: ClassVar[str] = "F exp(k₁ (T − 20 °C)) + σ₂ v exp(k₂ (T − 20 °C))"
+    main: ClassVar[Main] = Main("viscous_per_degC", 100.0, "%/K")
+    to_record: ClassVar[str] = "record 20 min from cold, with the temperature"
     rivals: ClassVar[tuple[str, ...]] = ("quadratic_drag",)
     told_apart_by: ClassVar[str] = "the same fast move differs early and late, cold and warm; drag does not"
     action: ClassVar[str] = "Warm the axis up before identification, or record the temperature with it."
@@ -64,6 +69,11 @@ class _HeatedViscosity(ThermalViscosity):
         """`temperature + rise - 20 degC`."""
         return super().warmth(motion) + motion.state[0]
 
+    def fit_bounds(self, variable: Variable, recorded: Recorded) -> tuple[float, float]:
+        """Faster than `LEAST_WARMING`, a warm-up is a friction that depends on speed; a card's own time is kept."""
+        warms = variable.name in ("warm_up_s", "cooling_s")
+        return (min(LEAST_WARMING, variable.start) if warms else variable.low), variable.high
+
 
 @dataclass(frozen=True, kw_only=True)
 class WarmingViscosity(_HeatedViscosity):
@@ -75,7 +85,7 @@ class WarmingViscosity(_HeatedViscosity):
     taken to be in use all the while.
     """
 
-    warm_up_degC: Scalar = parameter("K", "Rise of temperature once warm", low=0, high=200)
+    warm_up_degC: Scalar = parameter("K", "Rise of temperature once warm", low=0, high=200, fitted=False)
     warm_up_s: Scalar = parameter("s", "Time constant of warming up", default=600.0, low=1e-3)
 
     def rate(self, motion: Motion) -> Any:
@@ -93,7 +103,9 @@ class RubbedViscosity(_HeatedViscosity):
     Reference: first-order heat balance of Incropera, Fundamentals of Heat and Mass Transfer, chapter 5.1.
     """
 
-    heat_degC_per_rad: Scalar = parameter("K/rad", "Rise of temperature per angle rubbed", low=0, high=1e6)
+    heat_degC_per_rad: Scalar = parameter(
+        "K/rad", "Rise of temperature per angle rubbed", low=0, high=1e6, fitted=False
+    )
     cooling_s: Scalar = parameter("s", "Time constant of cooling down", default=600.0, low=1e-3)
 
     def rate(self, motion: Motion) -> Any:

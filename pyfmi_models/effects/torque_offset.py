@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from pyfmi_models.effects.base import LoadEffect, Motion
+from pyfmi_models.effects.base import LoadEffect, Main, Motion
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -13,8 +13,11 @@ class TorqueOffset(LoadEffect):
 
     id: ClassVar[str] = "torque_offset"
     title: ClassVar[str] = "Torque offset"
+    equation: ClassVar[str] = "τ₀"
+    main: ClassVar[Main] = Main("torque")
     rivals: ClassVar[tuple[str, ...]] = ("friction_asymmetry", "gravity_unbalance", "cable_wrap")
     told_apart_by: ClassVar[str] = "friction asymmetry vanishes at standstill; unbalance changes with position"
+    special_case_of: ClassVar[tuple[str, ...]] = ("friction_asymmetry", "cable_wrap")
     action: ClassVar[str] = "Zero the torque sensor or the current offset of the drive; look for a constant load."
     torque: Scalar = parameter("N.m", "Constant resisting torque")
 

@@ -5,11 +5,16 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import DriveEffect
-from pyfmi_models.model import Scalar, parameter
+from pyfmi_models.effects.base import DriveEffect, Main
+from pyfmi_models.model import Recorded, Scalar, Variable, parameter
 
 SOFTNESS = 0.02
 """Width of the knee, as a share of the knee torque."""
+LEAST_KNEE = 0.2
+"""A drive that saturates does so above this share of the command that is hardly ever exceeded (98 %). Past a knee the
+command outgrows the need: a drive that bends at 0.7 of what is needed, with a slope of 0.3, does so at 0.4 of it."""
+LEAST_SLOPE = 0.02
+"""... and gives at least this share of what more is asked for, else no command gives what is needed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +30,9 @@ class TorqueSaturation(DriveEffect):
 
     id: ClassVar[str] = "torque_saturation"
     title: ClassVar[str] = "Torque saturation"
+    equation: ClassVar[str] = "the drive gives less above the knee"
+    main: ClassVar[Main] = Main("knee_torque", is_size=False)
+    to_record: ClassVar[str] = "record the hardest acceleration that is allowed"
     rivals: ClassVar[tuple[str, ...]] = ("inertia_variation", "quadratic_drag")
     told_apart_by: ClassVar[str] = "torque is missing only where much is asked for, at any speed and position"
     action: ClassVar[str] = "Check current limit, supply voltage and torque constant of the drive at high current."
@@ -35,6 +43,11 @@ class TorqueSaturation(DriveEffect):
         """The equation above."""
         over, under = (_soft(side * command - self.knee_torque, SOFTNESS * self.knee_torque) for side in (1, -1))
         return command - (1 - self.slope) * (over - under)
+
+    def fit_bounds(self, variable: Variable, recorded: Recorded) -> tuple[float, float]:
+        """Else a model that needs no torque at all would fit a drive that gives none."""
+        low = {"knee_torque": LEAST_KNEE * recorded.torque, "slope": LEAST_SLOPE}.get(variable.name, variable.low)
+        return low, variable.high
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""

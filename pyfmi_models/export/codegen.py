@@ -14,7 +14,7 @@ from pyfmi_models.errors import ExportError
 from pyfmi_models.export.c_code import c_function, number
 from pyfmi_models.export.layout import Layout, Row, layout_of
 from pyfmi_models.export.rodas4 import step_functions
-from pyfmi_models.model import Model
+from pyfmi_models.model import Model, Scalar
 
 SHIM = Path(__file__).parent / "c"
 TOLERANCE = 1e-8
@@ -76,7 +76,7 @@ def _scalar(model: Model) -> ca.Function:
         raise ExportError(f'the equations of model "{model.name}" cannot be written out in scalars: {error}') from error
 
 
-def _derivatives(point: dict[str, Any], rates: Any, outputs: Any) -> dict[str, list[ca.Function]]:
+def _derivatives(point: dict[str, Scalar], rates: Any, outputs: Any) -> dict[str, list[ca.Function]]:
     """Directional derivatives, from changes of the point to changes of the results, and adjoint ones, backwards."""
     seeds = {f"d{name}": ca.SX.sym(f"d{name}", part.numel()) for name, part in point.items()}
     weights = {"dr": ca.SX.sym("dr", rates.numel()), "dy": ca.SX.sym("dy", outputs.numel())}
@@ -91,7 +91,7 @@ def _derivatives(point: dict[str, Any], rates: Any, outputs: Any) -> dict[str, l
     }
 
 
-def _function(given: dict[str, Any], results: dict[str, Any]) -> ca.Function:
+def _function(given: dict[str, Scalar], results: dict[str, Scalar]) -> ca.Function:
     dense = {name: ca.densify(part) for name, part in results.items()}
     return ca.Function("role", given | dense, [*given], [*dense], {"cse": True})
 

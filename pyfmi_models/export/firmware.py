@@ -8,7 +8,6 @@ out from the compiled code, before anything runs.
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from jinja2 import Environment, StrictUndefined
 
@@ -98,7 +97,7 @@ def firmware(model: Model, target: Target, *, encoder: str, quantum: float, comm
     return Project(files | {"README.md": _render("README.md.j2", names | page)}, size)
 
 
-def sources(model: Model, names: dict[str, Any]) -> dict[str, bytes]:
+def sources(model: Model, names: dict[str, object]) -> dict[str, bytes]:
     """Return every C file of the project, name to content; `names` are what the templates name."""
     fixed = {path.name: path.read_bytes() for path in (*FOLDER.glob("*.[ch]"), *SHIM.glob("detmath*"))}
     written = {name: _render(f"{name}.j2", names) for name in ("controller.h", "controller.c")}
@@ -114,7 +113,7 @@ def measure(files: dict[str, bytes], target: Target) -> Footprint:
     return footprint(objects, "main")
 
 
-def _names(model: Model, encoder: str, quantum: float, command: str) -> dict[str, Any]:
+def _names(model: Model, encoder: str, quantum: float, command: str) -> dict[str, object]:
     if not model.period:
         raise ExportError(f'model "{model.name}" is not sampled, so there is no step for a firmware to take')
     inputs, outputs = ({one.name: one for one in group} for group in (model.inputs, model.outputs))
@@ -135,7 +134,7 @@ def _names(model: Model, encoder: str, quantum: float, command: str) -> dict[str
     }
 
 
-def _render(name: str, values: dict[str, Any]) -> bytes:
+def _render(name: str, values: dict[str, object]) -> bytes:
     environment = Environment(
         undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
     )

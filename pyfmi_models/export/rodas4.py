@@ -17,6 +17,7 @@ from typing import Any
 import casadi as ca
 
 from pyfmi_models.export.arrange import arranged
+from pyfmi_models.model import Scalar
 
 GAMMA = 0.25
 ALPHA = (0, 0.386, 0.21, 0.63, 1, 1)
@@ -109,7 +110,9 @@ def step_functions(rates: ca.Function, nominals: Sequence[float]) -> tuple[ca.Fu
     )
 
 
-def _stages(rates: ca.Function, given: dict[str, Any], start: Any, factors: _Factors, keep: _Kept) -> tuple[Any, Any]:
+def _stages(
+    rates: ca.Function, given: dict[str, Scalar], start: Any, factors: _Factors, keep: _Kept
+) -> tuple[Any, Any]:
     """Return the point of the last stage and the last U, whose sum is the result."""
     t, x, u, p, c, h = (given[name] for name in "txupch")
     per_h, first, by_time = keep(1 / h), keep.each(start), keep.each(h * ca.jacobian(start, t))

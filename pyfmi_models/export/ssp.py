@@ -8,7 +8,7 @@ every connector it finds. Reference: System Structure and Parameterization 1.0, 
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
 from typing import Literal
@@ -18,6 +18,7 @@ from jinja2 import Environment, StrictUndefined
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export.archive import export_fmu, write_zip
 from pyfmi_models.export.description import xml_text
+from pyfmi_models.export.srmd import metadata
 from pyfmi_models.export.units import BASE, parse_unit
 from pyfmi_models.model import Model, Variable
 
@@ -60,6 +61,8 @@ class Archive:
 class System:
     """Models or FMUs by the name of their component, the wires between them, and step and stop [s] of a run.
 
+    `origins` says of components what they were identified from and how well (see `srmd`).
+
     Raises ExportError if a wire joins what does not exist, or other units.
     """
 
@@ -69,6 +72,7 @@ class System:
     connections: tuple[Connection, ...]
     step: float
     stop: float
+    origins: Mapping[str, Mapping[str, object]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for connection in self.connections:
@@ -106,8 +110,9 @@ def export_ssp(
 ) -> Path:
     """Write the system as an SSP 1.0 archive and return its path.
 
-    The archive holds the structure, an FMU and a parameter set a component under `resources/`, and a page of
-    documentation. FMI 2 by default: FMPy's SSP runner and libcosim know no other. Equal systems give equal bytes.
+    The archive holds the structure, an FMU, a parameter set and where known its metadata a component under
+    `resources/`, and a page of documentation. FMI 2 by default: FMPy's SSP runner and libcosim know no other. Equal
+    systems give equal bytes.
     Raises ExportError if the file exists and `force` is not given, or a model cannot be exported.
     """
     path = Path(path)
@@ -115,7 +120,9 @@ def export_ssp(
         raise ExportError(f"{path} exists; use force to replace it")
     found = {"SystemStructure.ssd": _structure(system), "documentation/index.html": _page(system)}
     for name, model in system.components.items():
-        found[f"resources/{name}.fmu"] = _fmu(model, fmi, platforms)
+        found[f"resources/{name}.fmu"] = fmu = _fmu(model, fmi, platforms)
+        if name in system.origins:
+            found[f"resources/{name}.srmd"] = metadata(name, f"{name}.fmu", fmu, system.origins[name])
         if model.parameters:
             found[f"resources/{name}.ssv"] = _parameters(model)
     write_zip(path, found)

@@ -8,16 +8,19 @@ Effects change the level and the viscous torque from outside (by position, tempe
 law. Signs: tau_f resists, so it has the sign of v in steady sliding.
 """
 
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass, fields, replace
+from typing import Any, ClassVar, TypeVar
 
 import casadi as ca
 
-from pyfmi_models.model import Scalar, Variable, parameter
+from pyfmi_models.model import Pair, Part, Recorded, Scalar, Variable, parameter
+
+LEAST_VS, MOST_FS = 0.005, 5.0
+"""Stribeck curves narrower than this share of the top speed, or higher than this times their start, are not fitted."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class FrictionLaw:
+class FrictionLaw(Part):
     """A friction law; subclasses state their equation, their limits and their reference."""
 
     place: ClassVar[str] = "Friction"
@@ -51,6 +54,14 @@ class FrictionLaw:
         """Return the law's own static map: its torque in steady sliding."""
         raise TypeError(f"{type(self).__name__} has no static map")
 
+    def fit_bounds(self, variable: Variable, recorded: Recorded) -> tuple[float, float]:
+        """Those of a Stribeck curve, if it has one."""
+        return stribeck_bounds(variable, recorded)
+
+    def broken_passivity(self) -> str:
+        """Say which rule lets some motion take more energy from the contact than it gave; "" where none does."""
+        return ""
+
 
 @dataclass(frozen=True, kw_only=True)
 class MemorylessLaw(FrictionLaw):
@@ -63,6 +74,7 @@ class MemorylessLaw(FrictionLaw):
         low=1e-9,
         nominal=1e-5,
         tunable=False,
+        fitted=False,
     )
 
     def contact(self, state: Any, v: Scalar, level: Scalar) -> Scalar:
@@ -72,6 +84,16 @@ class MemorylessLaw(FrictionLaw):
     def steady(self) -> "MemorylessLaw":
         """Return the law itself."""
         return self
+
+
+Law = TypeVar("Law", bound=FrictionLaw)
+
+
+def each_way(law: Law) -> tuple[Law, Law]:
+    """Return the law of either direction, the positive one first: each `Pair` becomes the number of that side."""
+    pairs = {one.name: value for one in fields(law) if isinstance(value := getattr(law, one.name), Pair)}
+    positive, negative = ({name: getattr(pair, side) for name, pair in pairs.items()} for side in Pair._fields)
+    return replace(law, **positive), replace(law, **negative)
 
 
 def stribeck_decay(v: Scalar, Vs: Scalar, delta: Scalar) -> Scalar:
@@ -85,3 +107,12 @@ def stribeck_level(v: Scalar, Fc: Scalar, Fs: Scalar, Vs: Scalar, delta: Scalar)
     if Fs is None or Vs is None:
         return Fc
     return Fc + (Fs - Fc) * stribeck_decay(v, Vs, delta)
+
+
+def stribeck_bounds(variable: Variable, recorded: Recorded) -> tuple[float, float]:
+    """Bounds in a fit: a Stribeck curve needs recorded speeds beside its own; other parameters have their own."""
+    if variable.name == "Vs":
+        return min(LEAST_VS * recorded.speed, variable.start), recorded.speed
+    if variable.name == "Fs":
+        return variable.low, max(MOST_FS * variable.start, variable.low)
+    return variable.low, variable.high

@@ -27,7 +27,9 @@ class Dahl(FrictionLaw):
     key: ClassVar[str] = "dahl"
     sigma0: Scalar = parameter("N.m/rad", "Stiffness of the contact at zero torque", low=1e-6, nominal=1e4)
     Fc: Scalar = parameter("N.m", "Friction level in sliding", low=1e-9)
-    n: Scalar = parameter("1", "Shape exponent: how early the contact softens", default=1.0, low=0.5, high=5)
+    n: Scalar = parameter(
+        "1", "Shape exponent: how early the contact softens", default=1.0, low=0.5, high=5, fitted=False
+    )
     sigma2: Scalar = parameter("N.m.s/rad", "Viscous friction coefficient", default=0.0, low=0)
 
     def states(self) -> tuple[Variable, ...]:

@@ -1,11 +1,12 @@
 """Generalised Maxwell slip: many elements side by side, each elastic until it slips."""
 
 from dataclasses import dataclass
+from math import tanh
 from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.friction.base import FrictionLaw, stribeck_level
+from pyfmi_models.friction.base import FrictionLaw, each_way, stribeck_level
 from pyfmi_models.friction.stribeck import Stribeck
 from pyfmi_models.model import Scalar, Variable, parameter
 
@@ -25,6 +26,8 @@ class MaxwellSlip(FrictionLaw):
     the first: with the default the first loading follows Dahl's exponential within 6 % of the level.
 
     Hysteresis obeys Masing's rules, and inner loops close (non-local memory), both within 1.5 level / (N attraction).
+    The elements are passive; their damping sigma1 is only with sigma2 >= sigma1 tanh(attraction (Fs - Fc) / Fc), see
+    `LuGre`.
     Reference: Al-Bender, Lampaert, Swevers, IEEE Trans. Autom. Control 50 (2005) 1883.
     """
 
@@ -37,12 +40,18 @@ class MaxwellSlip(FrictionLaw):
     Fc: Scalar = parameter("N.m", "Coulomb level at high speed", low=1e-9)
     Fs: Scalar = parameter("N.m", "Break-away level at rest; none: Fc, no Stribeck term", default=None, low=1e-9)
     Vs: Scalar = parameter("rad/s", "Stribeck speed", default=None, low=1e-9, nominal=0.01)
-    delta: Scalar = parameter("1", "Shape exponent of the Stribeck curve", default=2.0, low=0.1, high=5)
+    delta: Scalar = parameter("1", "Shape exponent of the Stribeck curve", default=2.0, low=0.1, high=5, fitted=False)
     spread: Scalar = parameter(
-        "1", "Slip displacement of the last element over the first", default=18.0, low=1, high=1e6, tunable=False
+        "1",
+        "Slip displacement of the last element over the first",
+        default=18.0,
+        low=1,
+        high=1e6,
+        tunable=False,
+        fitted=False,
     )
     attraction: Scalar = parameter(
-        "1", "Sharpness of the passage to slip", default=50.0, low=20, high=1000, tunable=False
+        "1", "Sharpness of the passage to slip", default=50.0, low=20, high=1000, tunable=False, fitted=False
     )
 
     def states(self) -> tuple[Variable, ...]:
@@ -87,6 +96,15 @@ class MaxwellSlip(FrictionLaw):
     def steady(self) -> Stribeck:
         """Return the law's own steady sliding map."""
         return Stribeck(Fc=self.Fc, Fs=self.Fs, Vs=self.Vs, delta=self.delta, sigma2=self.sigma2)
+
+    def broken_passivity(self) -> str:
+        """Say where, in either direction, elements that fall from Fs to Fc give back by damping what sigma2 leaves."""
+        for law in each_way(self):
+            needed = 0.0 if law.Fs is None else law.sigma1 * tanh(law.attraction * (law.Fs - law.Fc) / law.Fc)
+            if law.sigma2 < needed:
+                rule = f"it would need sigma1 tanh(attraction (Fs - Fc) / Fc) = {needed:.3g} N.m.s/rad"
+                return f"sigma2 = {law.sigma2:.3g}: {rule}"
+        return ""
 
 
 def _decayed(x: Scalar, distance: Scalar) -> Scalar:

@@ -21,7 +21,7 @@ class Stribeck(MemorylessLaw):
     Fc: Scalar = parameter("N.m", "Coulomb level at high speed", low=0)
     Fs: Scalar = parameter("N.m", "Break-away level at rest; none: Fc, no Stribeck term", default=None, low=0)
     Vs: Scalar = parameter("rad/s", "Stribeck speed", default=None, low=1e-9)
-    delta: Scalar = parameter("1", "Shape exponent of the Stribeck curve", default=2.0, low=0.1, high=5)
+    delta: Scalar = parameter("1", "Shape exponent of the Stribeck curve", default=2.0, low=0.1, high=5, fitted=False)
     sigma2: Scalar = parameter("N.m.s/rad", "Viscous friction coefficient", default=0.0, low=0)
 
     def level(self, v: Scalar) -> Scalar:

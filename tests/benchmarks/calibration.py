@@ -9,6 +9,7 @@ module; the error of calibration is cross-validated: each case's probabilities c
 
 import argparse
 import json
+from math import exp
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +18,9 @@ import numpy.typing as npt
 from scipy.optimize import minimize
 
 import cosim
-from cosim.diagnosis.calibration import OFFSET, SLOPE, calibrated, log_odds, share_of
-from cosim.proof.marks import probabilities
-from cosim.proof.score import bins, calibration_error_of
+from cosim.diagnosis.calibration import OFFSET, SLOPE, calibrated, log_odds
+from cosim_studies.proof.marks import probabilities
+from cosim_studies.proof.score import bins, calibration_error_of
 
 PRIOR = 4.0
 """Variance of the prior of both numbers about "as it is": offset 0, slope 1."""
@@ -39,6 +40,11 @@ def main() -> None:
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
         (options.out / "README.md").write_text(text, "utf-8")
+
+
+def share_of(probability: float, offset: float = OFFSET, slope: float = SLOPE) -> float:
+    """The share that `calibrated` made a probability of, within its limits."""
+    return 1 / (1 + exp(-(log_odds(probability) - offset) / slope))
 
 
 def raw(row: dict[str, Any], played: tuple[float, float]) -> Pairs:

@@ -20,12 +20,13 @@ from typing import Any
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from simulating import simulate
 from two_mass import SPRING, START, export  # beside the tests
 
 import cosim
-from cosim.algorithm import Algorithm, Energy, GaussSeidel, Iterated, Jacobi
-from cosim.errors import StepError
-from cosim.master import Run, simulate
+from cosim.master.result import RunResult
+from cosim.support.errors import StepError
+from cosim.system.algorithm import Algorithm, Energy, GaussSeidel, Iterated, Jacobi
 
 COMMAND = "python tests/benchmarks/coupling.py --out results/coupling"
 TORQUE, SECONDS = 10.0, 0.3
@@ -78,7 +79,7 @@ def main() -> None:
     print(page(rows, limits))
 
 
-def together(fmus: Mapping[str, Path], algorithm: Algorithm, step: float, seconds: float = SECONDS) -> Run:
+def together(fmus: Mapping[str, Path], algorithm: Algorithm, step: float, seconds: float = SECONDS) -> RunResult:
     return simulate(
         {"near": fmus["near"], "far": fmus["far"]},
         WIRES,
@@ -91,7 +92,7 @@ def together(fmus: Mapping[str, Path], algorithm: Algorithm, step: float, second
     )
 
 
-def alone(fmus: Mapping[str, Path], step: float) -> Run:
+def alone(fmus: Mapping[str, Path], step: float) -> RunResult:
     return simulate(
         {"whole": fmus["whole"]},
         [("tau", "whole.tau")],
@@ -183,7 +184,7 @@ def _limit(step: float) -> str:
     return f"{1e3 * step:.2g}" if step < LARGEST else f"{1e3 * LARGEST:g} or more"
 
 
-def draw(rows: list[Row], traces: Mapping[str, Run], reference: Run, path: Path) -> None:
+def draw(rows: list[Row], traces: Mapping[str, RunResult], reference: RunResult, path: Path) -> None:
     import matplotlib
 
     matplotlib.use("Agg")

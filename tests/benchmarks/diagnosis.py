@@ -1,7 +1,7 @@
 """Proof of the diagnosis, rebuilt by one command each.
 
     python tests/benchmarks/diagnosis.py emps --data FOLDER --out results/emps        measured, not in the project
-    python tests/benchmarks/diagnosis.py measured --data FOLDER --out results/measured    four measured machines
+    python tests/benchmarks/diagnosis.py measured --data FOLDER --out results/measured    six measured machines
     python tests/benchmarks/diagnosis.py null --cases 10 --out results/null           the card's own physics, 15 % off
 
 Each writes table.csv and README.md with version, seeds and inputs.
@@ -21,9 +21,9 @@ from typing import Any
 import numpy as np
 
 import cosim
+from cosim.data.recording import Recording
 from cosim.diagnosis.closed_loop import close_loop
 from cosim.diagnosis.diagnose import diagnose
-from cosim.recording import Recording
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.export import export_fmu
 
@@ -84,27 +84,25 @@ NOTES = {
     "measured": "Held-out RMS by the protocol of each recording's README; `first look` is what that README found by "
     "hand. How each is read stands in tests/benchmarks/measured.py: columns, units, card, what is held out. `refitted` "
     "is the base of the card with its numbers fitted, `with effects` the delivered model, `no veto` what training "
-    "alone proposed. A set is not put into a model, unless its first member is a special case of the others.\n\n"
-    "Of the screws each recording holds one speed, for 3 to 128 s. They count alike however long they last, as the "
-    "mean torques of the README do: rows that repeat one operating point say little that is new. Counted by seconds, "
-    "and cut to the first 6.4 s, the lead screw's halves ended at 2.1 and 1.4 %.\n\n"
-    "Not reached, and why: the anti-backlash screw's payload, a small constant beside a torque that ripples by more, "
-    "is not named: its rest is larger than 7 % of the friction and is called unknown, so one half misses the bar; no "
-    "Stribeck curve is named there, as it should be. The servo's Stribeck curve is not named beside its "
-    "load-dependent friction: its duty trails its position by an unknown read-out time, and what that costs is "
-    "larger; the small unbalance named there may be the angle of -0.014 rad by which its owners' model turns the "
-    "load's gravity. The motor turns one way only, where friction cannot be told from torque: a contact that bends, "
-    "and friction over position, stood beside its cogging and lowered the held-out error to 8.1, but they are not "
-    "believed where motion never turns back far enough. So fewer of the cogging's orders are found than it has, and "
-    "with the neighbour motor turned the model is worse than the base, as the README warns. Real machines leave "
-    "more than simulated ones: `unknown` beside a name says so.",
+    "alone proposed. Of a set the model holds the first member. The official protocol of EMPS simulates the position "
+    "in open loop from the force, with 20 samples to start from (tests/benchmarks/official.py). Copies of two machines "
+    "with one mistake each: `python tests/benchmarks/corrupted.py --data FOLDER --out results/measured`.\n\n"
+    "Of the screws each recording holds one speed, for 3 to 128 s. Their means are judged against each other, as those "
+    "of the README are: rows that repeat one operating point say little that is new.\n\n"
+    "Not reached, and why: EMPS misses its bar of 2.0 N: what falls toward rest there (Fs < Fc) is not called Stribeck "
+    "friction any more, and the catalogue has no other name for it that has evidence; the ripple of 400 cycles/m is "
+    "found in training and does not hold on the other day. The anti-backlash screw's payload, a small constant beside "
+    "a torque that ripples by more, is not named: its rest is larger than 7 % of the friction and is called unknown; "
+    "no Stribeck curve is named there, as it should be. The motor turns one way only, where friction cannot be told "
+    "from torque: fewer of the cogging's orders are found than it has, and with the neighbour motor turned the model "
+    "is worse than the base, as the README warns. Real machines leave more than simulated ones: `unknown` beside a "
+    "name says so.",
     "emps": "Card `emps` (linear, symmetric Coulomb + viscous); trained on estimation.parquet, held out "
     "validation_pulses.parquet. RMS in N. `clear` is clear motion only, |v| > 2 mm/s, 100 Hz on both sides, as in the "
     "recording's README; the other two follow the protocol of 30 Hz over all samples. The held-out recording has a "
     "veto: a ripple of 400 cycles/m is found in training and dropped, as its phase does not hold on the other day; `no "
-    "veto` is the error with it. Nothing in the tool is "
-    "special to this axis. Commands stamped at the start of their hold would read as half a sample (0.5 ms) of "
-    "delay; the recording's documentation does not exclude that.",
+    "veto` is the error with it. Nothing in the tool is special to this axis. Commands stamped at the start of their "
+    "hold would read as half a sample (0.5 ms) of delay; the recording's documentation does not exclude that.",
     "null": "Plant and controller FMUs of the paper's card; inertia and friction drawn within 15 %, encoder noise as "
     "stated, three set points. The right answer is none.",
 }

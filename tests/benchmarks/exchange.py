@@ -1,6 +1,9 @@
 """How far apart other tools are on what this project exports: the SSP in FMPy, ecos and libcosim, the Modelica text.
 
 python tests/benchmarks/exchange.py --out results/exchange
+
+With --copies DIR, a folder of fetched copies of other projects with a copies.toml, also what becomes of their archives
+here (`exchange_archives`). The folder is no part of this project; without it that part is left as it is.
 """
 
 import argparse
@@ -16,20 +19,22 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 import cosim
-from cosim.cli_cache import with_fmus
-from cosim.cli_system import system_of
-from cosim.master import run
-from cosim.scenario import read_scenario
+from cosim.master.simulate import run
+from cosim.models.cache import with_fmus
+from cosim.models.system import system_of
+from cosim.system.scenario import read_scenario
 from pyfmi_models.card import read_card
 from pyfmi_models.derivation import derivation_of
 from pyfmi_models.export.modelica import modelica_text
 from pyfmi_models.export.ssp import export_ssp
 
 sys.path.append(str(Path(__file__).parents[1]))
+from exchange_archives import page, rows_of
 from ssp_tools import SIGNALS, TOOLS
 
 CARD, STEP = "paper_mount", 1e-4
 PACKAGES = {"fmpy": "fmpy", "ecos": "ecospy", "libcosim": "libcosimpy"}
+OTHERS = ["", "What becomes of archives of others here: [archives.md](archives.md)."]
 CAUSES = {
     "fmpy": "adds up the time step by step, so the set point is late by the rounding of the sum",
     "ecos": "adds up the time step by step, as FMPy does",
@@ -42,15 +47,29 @@ SCENARIO = {"mount.q": "position", "mount.v": "v", "mount.friction": "friction",
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, required=True)
-    out = parser.parse_args().out
+    parser.add_argument("--copies", type=Path, default=Path("nowhere"), help="folder with copies.toml")
+    parser.add_argument("--only-archives", action="store_true", help="leave out what others make of our exports")
+    given = parser.parse_args()
+    if not given.only_archives:
+        exported(given.out)
+    if (given.copies / "copies.toml").is_file():
+        write(given.out / "archives.md", page(list(rows_of(given.copies))))
+    else:
+        print(f"Archives of others: skipped, because there is no {given.copies / 'copies.toml'}.", file=sys.stderr)
+
+
+def exported(out: Path) -> None:
     with tempfile.TemporaryDirectory() as folder:
         ssp = export_ssp(system_of(read_card(CARD)), Path(folder) / "paper_mount.ssp")
         own = columns(read_scenario(ssp), {name: name for name in SIGNALS})
         rows = [(tool, apart(own, in_tool(tool, ssp, len(own) - 1))) for tool in TOOLS if present(TOOLS[tool])]
         rows.append(("sidereal", apart(own, columns(with_fmus(read_scenario("sidereal")), SCENARIO))))
-    text = report(rows, np.ptp(own, axis=0)) + modelica()
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "README.md").write_text("\n".join(text) + "\n", "utf-8")
+    write(out / "README.md", report(rows, np.ptp(own, axis=0)) + modelica() + OTHERS)
+
+
+def write(path: Path, text: list[str]) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text("\n".join(text) + "\n", "utf-8")
     print("\n".join(text))
 
 

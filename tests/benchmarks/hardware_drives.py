@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from cosim.cli_cache import with_fmus
 from cosim.hardware.blackbox import read_black_box, recording_of
 from cosim.hardware.machine import Machine, changed, read_machine
 from cosim.hardware.replay import replay
 from cosim.hardware.simulated import Plant
 from cosim.hardware.virtual import VirtualDrive
 from cosim.hardware.wired import wire_up
-from cosim.scenario import Scenario, read_scenario
+from cosim.models.cache import with_fmus
+from cosim.system.scenario import Scenario, read_scenario
 
 STEP = 1e-4
 PATIENT = read_machine("virtual")

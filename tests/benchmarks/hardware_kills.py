@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from hardware_drives import PATIENT, STEP, drive, kept, lively, over
 
-from cosim.errors import HardwareError
 from cosim.hardware.blackbox import read_black_box
 from cosim.hardware.loops import Forked
 from cosim.hardware.machine import Machine, changed
 from cosim.hardware.session import Session
 from cosim.hardware.virtual import VirtualDrive
+from cosim.support.errors import HardwareError
 
 
 def kills(trials: int) -> dict[str, Any]:

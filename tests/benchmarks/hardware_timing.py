@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from hardware_drives import PATIENT, STEP, kept, over, sidereal
 
-from cosim.errors import HardwareError
 from cosim.hardware.loops import bare_clock
 from cosim.hardware.session import Session
+from cosim.support.errors import HardwareError
 
 
 @contextmanager

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 import cosim
-from cosim.identify.deliver import deliver
-from cosim.identify.friction_map import friction_map
-from cosim.identify.identify import Identified, Options, identify, with_numbers
-from cosim.identify.presliding import presliding
-from cosim.paper.benches import moved, step_response
-from cosim.paper.comparison_tables import rows_csv
+from cosim.estimation.identify.deliver import deliver
+from cosim.estimation.identify.friction_map import friction_map
+from cosim.estimation.identify.identify import Identified, Options, identify, with_numbers
+from cosim.estimation.identify.presliding import presliding
+from cosim_studies.paper.benches import moved, step_response
+from cosim_studies.paper.comparison_tables import rows_csv
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.friction import LuGre
 

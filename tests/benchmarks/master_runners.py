@@ -33,7 +33,7 @@ class Side(ctypes.Structure):
 
 
 def c(folder: Path, fmi: int, steps: int) -> float:
-    from cosim.fmu import FmuComponent
+    from cosim.fmi.fmu import FmuComponent
     from pyfmi_models.export.build import FLAGS, compile_shared
     from pyfmi_models.export.platforms import PLATFORMS, host
 
@@ -58,24 +58,28 @@ def c(folder: Path, fmi: int, steps: int) -> float:
 
 def cosim(folder: Path, fmi: int, steps: int, compiled: bool = True, algorithm: Any = None) -> float:
     """All of `simulate` with six signals streamed to Parquet, file closed; minus the same for one step."""
-    from cosim.fmu import FmuComponent
-    from cosim.master import simulate
+    from cosim.fmi.fmu import FmuComponent
+    from cosim.master.simulate import Options, simulate
+    from cosim.system.algorithm import JACOBI
+    from cosim.system.system import System
+    from cosim.system.wire import Record, Wire
 
-    wires = [("controller.tau", "plant.tau"), ("plant.q", "controller.q")]
+    wires = [Wire("controller.tau", "plant.tau"), Wire("plant.q", "controller.q")]
+    told: dict[str, Any] = {"wires": wires, "records": {name: Record(one) for name, one in RECORD.items()}}
+    told |= {"step": STEP, "parameters": START, "algorithm": algorithm or JACOBI}
     seconds = []
     with tempfile.TemporaryDirectory() as out, ExitStack() as stack:
         components = {name: stack.enter_context(FmuComponent(folder / f"{name}.fmu")) for name in WIRES}
         for ticks in (1, steps):
             begun = perf_counter()
             path = Path(out) / f"{ticks}.parquet"
-            options: dict[str, Any] = {"step": STEP, "parameters": START, "compiled": compiled, "algorithm": algorithm}
-            simulate(components, wires, record=RECORD, ticks=ticks, path=path, **options)
+            simulate(System(components=components, ticks=ticks, **told), Options(path, compiled=compiled))
             seconds.append(perf_counter() - begun)
     return seconds[1] - seconds[0]
 
 
 def gauss_seidel(folder: Path, fmi: int, steps: int) -> float:
-    from cosim.algorithm import GaussSeidel
+    from cosim.system.algorithm import GaussSeidel
 
     return cosim(folder, fmi, steps, algorithm=GaussSeidel(kind="gauss-seidel"))
 
@@ -84,9 +88,31 @@ def interpreted(folder: Path, fmi: int, steps: int) -> float:
     return cosim(folder, fmi, steps, compiled=False)
 
 
+def isolated(folder: Path, fmi: int, steps: int) -> float:
+    """As `cosim`, in a process of its own; minus the same for one step, so its start is not counted either."""
+    from cosim.master.isolated import run_isolated
+    from cosim.master.simulate import Options
+    from cosim.system.scenario import parse_scenario
+
+    parameters = {name: ", ".join(f"{key} = {value}" for key, value in START[name].items()) for name in WIRES}
+    parts = [f'[components.{name}]\nfmu = "{name}.fmu"\nparameters = {{ {parameters[name]} }}\n' for name in WIRES]
+    wires = [("controller.tau", "plant.tau"), ("plant.q", "controller.q")]
+    parts += [f'[[connections]]\nfrom = "{source}"\nto = "{target}"\n' for source, target in wires]
+    parts += ["[record.signals]\n", *(f'{name} = "{signal}"\n' for name, signal in RECORD.items())]
+    seconds = []
+    with tempfile.TemporaryDirectory() as out:
+        for ticks in (1, steps):
+            text = f"step = {STEP}\nstop = {ticks * STEP}\n" + "".join(parts)
+            scenario = parse_scenario(text, "isolated", folder.absolute())
+            begun = perf_counter()
+            run_isolated(scenario, Options(Path(out) / f"{ticks}.parquet"))
+            seconds.append(perf_counter() - begun)
+    return seconds[1] - seconds[0]
+
+
 def fmpy(folder: Path, fmi: int, steps: int) -> float:
     """The loop that FMPy's users write: get, set and doStep of its slaves."""
-    from cosim.fmu import FmuComponent
+    from cosim.fmi.fmu import FmuComponent
 
     with ExitStack() as stack:
         plant, controller = (stack.enter_context(FmuComponent(folder / f"{name}.fmu")) for name in WIRES)
@@ -133,7 +159,8 @@ def libcosimpy(folder: Path, fmi: int, steps: int) -> float:
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
     from libcosimpy.CosimSlave import CosimLocalSlave
 
-    from cosim.description import describe, ports_of
+    from cosim.fmi.description import describe
+    from cosim.fmi.variables import ports_of
 
     log_output_level(CosimLogLevel.ERROR)
     execution = CosimExecution.from_step_size(STEP * 1e9)
@@ -156,7 +183,7 @@ def libcosimpy(folder: Path, fmi: int, steps: int) -> float:
 
 
 RUNNERS: dict[str, Callable[[Path, int, int], float]] = {
-    one.__name__: one for one in (c, cosim, gauss_seidel, interpreted, fmpy, ecospy, libcosimpy)
+    one.__name__: one for one in (c, cosim, gauss_seidel, isolated, interpreted, fmpy, ecospy, libcosimpy)
 }
 
 if __name__ == "__main__":

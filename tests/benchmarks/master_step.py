@@ -28,6 +28,7 @@ STEPS = {
     "c": 150_000,
     "cosim": 150_000,
     "gauss_seidel": 150_000,
+    "isolated": 150_000,
     "ecospy": 150_000,
     "libcosimpy": 20_000,
     "fmpy": 20_000,
@@ -37,6 +38,7 @@ TITLES = {
     "c": "plain C loop",
     "cosim": "cosim, 6 signals to Parquet",
     "gauss_seidel": "cosim, Gauss-Seidel, 6 signals to Parquet",
+    "isolated": "cosim --isolate, 6 signals to Parquet",
     "ecospy": "ecospy step(N), nothing recorded",
     "libcosimpy": "libcosimpy step(N), nothing recorded",
     "fmpy": "FMPy: get, set, doStep in Python",
@@ -128,7 +130,7 @@ def process(folder: Path) -> dict[str, dict[str, float]]:
     programs = {
         "bare Python": [sys.executable, "-c", "pass"],
         "import cosim": [sys.executable, "-c", "import cosim"],
-        "import cosim.master": [sys.executable, "-c", "import cosim.master"],
+        "import cosim.master.simulate": [sys.executable, "-c", "import cosim.master.simulate"],
         "cosim run sidereal (15 s at 0.1 ms), warm": sidereal,
     }
     subprocess.run(sidereal, check=True, capture_output=True)

@@ -1,8 +1,9 @@
-"""Measured recordings of four machines: how each is read, and how its README judges it. The tool knows none of this.
+"""Measured recordings of six machines: how each is read, and how its README judges it. The tool knows none of this.
 
 A machine conceals physics from the card below; recordings, columns and units go through the public interface.
 """
 
+import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -13,13 +14,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.inverse import Inverse
-from cosim.diagnosis.prepare import Piece, prepare
+from cosim.data.recording import Recording
+from cosim.diagnosis.diagnose import Outcome, diagnose
+from cosim.estimation.inverse import Inverse
+from cosim.estimation.prepare import Piece, prepare
 from cosim.reading import read_recordings
-from cosim.recording import Recording
 from pyfmi_models.card import parse_card
 from pyfmi_models.mount import Mount
+
+sys.path.append(str(Path(__file__).parent))
+from official import position_error
 
 Rows = list[tuple[Piece, np.ndarray]]
 """Pieces with their torque residual."""
@@ -42,6 +46,10 @@ class Machine:
     units: tuple[str, ...] = ()
     elsewhere: dict[str, dict[str, pd.DataFrame]] = field(default_factory=dict)
     """Further recordings that only judge: what does the model say of them?"""
+    otherwise: dict[str, tuple[Callable[[Mount, Sequence[Recording]], float], str]] = field(default_factory=dict)
+    """Further judges of the held-out recordings, each with its unit."""
+    derived: Callable[[Outcome], str] = lambda outcome: ""
+    """What its README asks of the answer beside an error."""
 
 
 def rows(machine: Machine) -> Iterator[dict[str, Any]]:
@@ -54,17 +62,21 @@ def rows(machine: Machine) -> Iterator[dict[str, Any]]:
     models = {"refitted": outcome.refitted.plant(), "with effects": outcome.card.plant()}
     models["no veto"] = outcome.proposed.plant()
     found = outcome.diagnosis
-    for name, recordings in {"": held, **others}.items():
-        numbers = {key: f"{machine.score(mount, recordings):.3g}" for key, mount in models.items()}
+    judged = [("", held, machine.score, machine.unit)]
+    judged += [(name, recordings, machine.score, machine.unit) for name, recordings in others.items()]
+    judged += [(name, held, score, unit) for name, (score, unit) in machine.otherwise.items()]
+    for name, recordings, score, unit in judged:
+        numbers = {key: f"{score(mount, recordings):.3g}" for key, mount in models.items()}
         yield {
             "machine": f"{machine.name}{', ' if name else ''}{name}",
             "concealed": machine.concealed if not name else "",
             "verdict": " + ".join(found.verdict) or "none" if not name else "",
             "sets": "; ".join(" or ".join(group) for group in found.ambiguous_with) if not name else "",
             **numbers,
-            "unit": machine.unit,
+            "unit": unit,
             "first look": machine.first_look if not name else "",
             "bar": f"{machine.bar:g}" if not name else "",
+            "asked besides": machine.derived(outcome) if not name else "",
             "seconds": f"{found.seconds:.0f}" if not name else "",
         }
 
@@ -113,7 +125,10 @@ def per_speed(mount: Mount, recordings: Sequence[Recording]) -> float:
 
 def machines(data: Path) -> Iterator[Machine]:
     """All machines whose folder is there."""
+    from measured_later import anticogging, pendulum
+
     makers = {"emps": emps, "screw_drives": screws, "servo_pendulum_sts3215": servo, "bldc_cogging": motor}
+    makers |= {"quasi_direct_pendulum": pendulum, "anticogging_motor": anticogging}
     for folder, make in makers.items():
         if (data / folder).exists():
             yield from make(data / folder)
@@ -132,6 +147,7 @@ def emps(folder: Path) -> Iterator[Machine]:
         unit="N",
         bar=2.1,
         first_look="5.35 -> 2.06",
+        otherwise={"official protocol: open loop from the force": (position_error, "mm")},
     )
 
 

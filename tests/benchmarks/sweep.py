@@ -94,9 +94,9 @@ def ratio(slow: list[float], fast: list[float]) -> dict[str, Any]:
 
 def swept(folder: Path, runs: int, seed: int, workers: int | None = None, address: str = "") -> float:
     """Return the seconds of a whole sweep into a folder of its own; a run that fails is no measurement."""
-    from cosim.cli_cache import with_fmus
-    from cosim.scenario import read_scenario
+    from cosim.models.cache import with_fmus
     from cosim.sweep import conduct, read_sweep
+    from cosim.system.scenario import read_scenario
 
     file = folder / "sweep.toml"
     file.write_text(SWEEP.format(runs=runs, seed=seed))
@@ -183,8 +183,8 @@ def write(found: dict[str, Any], out: Path, folder: Path) -> None:
     import matplotlib
     from matplotlib.figure import Figure
 
-    from cosim.pictures.style import AFTER, BEFORE, GREY, STYLE
-    from cosim.pictures.sweep import draw
+    from cosim.plots.style import AFTER, BEFORE, GREY, STYLE
+    from cosim.plots.sweep import draw
 
     out.mkdir(parents=True, exist_ok=True)
     (out / "README.md").write_text(page(found), "utf-8")

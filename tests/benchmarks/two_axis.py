@@ -18,13 +18,13 @@ import numpy as np
 import pandas as pd
 
 import cosim
-from cosim.cli_cache import with_fmus
-from cosim.master import run
-from cosim.recording import Recording
-from cosim.scenario import Scenario, read_scenario
-from cosim.signals import Slews
-from cosim.star import SIDEREAL_RATE
+from cosim.data.recording import Recording
+from cosim.data.signals import Slews
+from cosim.data.star import SIDEREAL_RATE
+from cosim.master.simulate import run
+from cosim.models.cache import with_fmus
 from cosim.sweep import conduct, read_sweep
+from cosim.system.scenario import Scenario, read_scenario
 
 COMMAND = "python tests/benchmarks/two_axis.py --out results/two_axis"
 ARCSEC = pi / 648000
@@ -199,7 +199,7 @@ def write(found: dict[str, Any], tracked: Recording, blind: pd.DataFrame, out: P
     import matplotlib
     from matplotlib.figure import Figure
 
-    from cosim.pictures.style import AFTER, BEFORE, GREY, MEASURED, STYLE, thin
+    from cosim.plots.style import AFTER, BEFORE, GREY, MEASURED, STYLE, thin
 
     out.mkdir(parents=True, exist_ok=True)
     (out / "README.md").write_text(page(found), "utf-8")

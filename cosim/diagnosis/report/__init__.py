@@ -15,7 +15,7 @@ def render(diagnosis: Diagnosis) -> str:
     from markupsafe import Markup
 
     from cosim.diagnosis.report.page import context
-    from cosim.pictures.style import STYLE
+    from cosim.plots.style import STYLE
 
     loader = PackageLoader("cosim.diagnosis.report", "")
     pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)

@@ -2,7 +2,11 @@
 (async () => {
   const box = document.getElementById("explorer"), canvas = box.querySelector("canvas");
   const data = JSON.parse(document.getElementById("recordings").textContent);
-  const ink = { tau: "#1A1A1A", before: "#CC6A00", after: "#00558C", q: "#1A1A1A", grey: "#5A6068", line: "#E3E6E8" };
+  const ink = {};
+  function colours() { // of the page, light or dark
+    const style = getComputedStyle(document.documentElement);
+    for (const name of ["ink", "before", "after", "grey", "grid", "shade", "paper"]) ink[name] = style.getPropertyValue(`--${name}`).trim();
+  }
   if (!window.DecompressionStream || !data.recordings.length) return;
   let record, view, drag;
 
@@ -29,10 +33,12 @@
 
   const index = (t) => ((t - record.start) / record.length) * record.count;
 
-  function ticks(low, high, room) {
-    const raw = (high - low) / Math.max(2, room), power = 10 ** Math.floor(Math.log10(raw));
-    const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= raw), out = [];
-    for (let k = Math.ceil(low / step); k * step <= high + 1e-9 * step; k++) out.push(k * step);
+  function ticks(low, high, room) { // round numbers, at least three of them
+    const raw = (high - low) / Math.max(3, room), power = 10 ** Math.floor(Math.log10(raw)), out = [];
+    const fits = (step) => step >= raw && Math.floor(high / step + 1e-9) - Math.ceil(low / step - 1e-9) >= 2;
+    const steps = [10, 5, 2, 1, 0.5, 0.2].map((m) => m * power);
+    const step = steps.filter(fits).pop() || steps.find((s) => Math.floor(high / s + 1e-9) - Math.ceil(low / s - 1e-9) >= 2);
+    for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) out.push(k * step);
     return [out, Math.max(0, -Math.floor(Math.log10(step) + 1e-9))];
   }
 
@@ -47,12 +53,12 @@
     if (!(high > low)) { low -= 1; high += 1; }
     const x = (t) => frame.x + ((t - view[0]) / (view[1] - view[0])) * frame.w;
     const y = (v) => frame.y + frame.h - ((v - low) / (high - low)) * frame.h;
-    g.fillStyle = record.heldout ? "#EEF0F1" : "#fff";
+    g.fillStyle = record.heldout ? ink.shade : ink.paper;
     g.fillRect(frame.x, frame.y, frame.w, frame.h);
     const [marks, places] = ticks(low, high, frame.h / 38);
     g.textAlign = "right";
     for (const mark of marks) {
-      g.fillStyle = ink.line; g.fillRect(frame.x, y(mark), frame.w, 1);
+      g.fillStyle = ink.grid; g.fillRect(frame.x, y(mark), frame.w, 1);
       g.fillStyle = ink.grey; g.fillText(mark.toFixed(places).replace("-", "−"), frame.x - 6, y(mark) + 4);
     }
     g.textAlign = "left"; g.fillStyle = ink.grey; g.fillText(title, 0, frame.y - 9);
@@ -74,6 +80,7 @@
   }
 
   function draw() {
+    colours();
     const ratio = window.devicePixelRatio || 1, w = canvas.clientWidth, h = canvas.clientHeight;
     canvas.width = w * ratio; canvas.height = h * ratio;
     const g = canvas.getContext("2d");
@@ -82,9 +89,9 @@
     const heights = [free * 0.45, free * 0.32, free * 0.23];
     let top = 24, x;
     const sheets = [
-      [[["tau", ink.tau, []], ["before", ink.before, [6, 3]], ["after", ink.after, []]], `${box.dataset.noun} [${data.torque}]`],
+      [[["tau", ink.ink, []], ["before", ink.before, [6, 3]], ["after", ink.after, []]], `${box.dataset.noun} [${data.torque}]`],
       [[["lost", ink.before, []], ["left", ink.after, []]], `error: measured minus model [${data.torque}]`],
-      [[["q", ink.q, []]], `position [${data.position}]`],
+      [[["q", ink.ink, []]], `position [${data.position}]`],
     ];
     sheets.forEach(([lines, title], row) => {
       x = panel(g, { x: left, y: top, w: width, h: heights[row] }, lines, title);
@@ -132,6 +139,7 @@
   select.addEventListener("change", () => open(+select.value));
   const buttons = { before: () => show(...record.worst[0]), after: () => show(...record.worst[1]), all: () => show(record.start, record.start + record.length) };
   for (const button of box.querySelectorAll("button")) button.addEventListener("click", buttons[button.dataset.to]);
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => view && draw());
   new ResizeObserver(() => view && draw()).observe(canvas);
   box.hidden = false;
   await open(data.open);

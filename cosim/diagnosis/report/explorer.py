@@ -2,14 +2,14 @@
 
 import base64
 import zlib
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from cosim.diagnosis.report.derive import worst
+from cosim.diagnosis.breakdown import worst
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.result import Array, Diagnosis, Trace
+from cosim.support.plain import JsonObject
 
 Index = npt.NDArray[np.intp]
 BUCKETS = 10_000
@@ -18,7 +18,7 @@ LEVELS = 65_000
 MISSING = 65_535
 
 
-def payload(diagnosis: Diagnosis, scales: Scales) -> dict[str, Any]:
+def payload(diagnosis: Diagnosis, scales: Scales) -> JsonObject:
     """Return what `explorer.js` reads: units and, per recording, base64 of zlib-compressed uint16 deltas."""
     traces = [trace for trace in diagnosis.traces if trace.t.size > 1]
     seconds = sum(float(trace.t[-1] - trace.t[0]) for trace in traces) or 1.0
@@ -30,7 +30,7 @@ def payload(diagnosis: Diagnosis, scales: Scales) -> dict[str, Any]:
     }
 
 
-def _packed(trace: Trace, scales: Scales, seconds: float) -> dict[str, Any]:
+def _packed(trace: Trace, scales: Scales, seconds: float) -> JsonObject:
     length = float(trace.t[-1] - trace.t[0])
     buckets = int(np.clip(BUCKETS * length / seconds, 50, max(50, trace.t.size // 4)))
     edges = np.searchsorted(trace.t, trace.t[0] + length / buckets * np.arange(buckets + 1))

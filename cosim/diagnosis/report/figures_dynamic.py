@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from cosim.diagnosis.report.derive import Samples, slow
+from cosim.diagnosis.breakdown import Samples, slow
+from cosim.diagnosis.hypotheses import named
+from cosim.diagnosis.hypotheses.base import View
 from cosim.diagnosis.report.figures_effect import (
     Draw,
     blank,
@@ -20,7 +22,8 @@ from cosim.diagnosis.report.figures_effect import (
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture, heading
 from cosim.diagnosis.result import Array, Finding
-from cosim.pictures.style import AFTER, BEFORE, GREY, MEASURED
+from cosim.plots.style import AFTER, BEFORE, GREY, MEASURED
+from cosim.support.statistics import hann
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -38,7 +41,7 @@ def spectra(chosen: Samples, *signals: Array) -> tuple[Array, list[Array]]:
     """Return frequencies and windowed transforms of each signal, one row a segment of 4 s."""
     size = min(int(4 * rate(chosen)), len(chosen.t))
     starts = range(0, len(chosen.t) - size + 1, max(size // 2, 1))
-    window = np.hanning(size)
+    window = hann(size)
     out = [np.fft.rfft([window * (y[s : s + size] - y[s : s + size].mean()) for s in starts]) for y in signals]
     return np.asarray(np.fft.rfftfreq(size, 1 / rate(chosen)), dtype=float), [
         np.asarray(rows) / (0.5 * window.sum()) for rows in out
@@ -157,33 +160,24 @@ def _starts(chosen: Samples) -> tuple[npt.NDArray[np.intp], Array]:
     return high[keep], rest[keep]
 
 
-VIEWS: dict[str, Draw] = {
-    "friction_asymmetry": keep_turning,
-    "stribeck": keep_turning,
-    "quadratic_drag": keep_turning,
-    "presliding": since_reversal,
-    "backlash": since_reversal,
-    "cogging": folded,
-    "position_friction": folded,
-    "gravity_unbalance": rest_and_motion,
-    "encoder_eccentricity": rest_and_motion,
-    "torque_offset": position,
-    "cable_wrap": position,
-    "inertia_variation": position,
-    "thermal_viscosity": elapsed,
-    "dwell_breakaway": breakaway,
-    "compliance": spectrum,
-    "periodic_disturbance": spectrum,
-    "actuator_lag": phase,
-    "delay": phase,
-    "clock_skew": clock,
-    "load_dependent_friction": load,
-    "torque_saturation": load,
+VIEWS: dict[View, Draw] = {
+    "position": position,
+    "one pitch": folded,
+    "slow and fast": rest_and_motion,
+    "keep turning": keep_turning,
+    "since reversal": since_reversal,
+    "rest before a start": breakaway,
+    "time": elapsed,
+    "spectrum": spectrum,
+    "phase": phase,
+    "clock": clock,
+    "load": load,
 }
+"""How each view of a hypothesis is drawn."""
 
 
 def effect(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
     """Return the figure of a finding, or None where the recordings hold too little for it."""
     if chosen.t.size < 200:
         return None
-    return VIEWS.get(finding.effect, position)(finding, chosen, scales)
+    return VIEWS[named(finding.effect).view](finding, chosen, scales)

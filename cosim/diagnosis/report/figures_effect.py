@@ -5,11 +5,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cosim.diagnosis.report.derive import Curve, Mask, Samples, curve, slow
+from cosim.diagnosis.breakdown import Curve, Mask, Samples, curve, slow
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture, Sheet, degrees, heading
 from cosim.diagnosis.result import Array, Finding
-from cosim.pictures.style import AFTER, BEFORE, GREY
+from cosim.plots.quantities import ANGLE, LENGTH, handy
+from cosim.plots.style import AFTER, BEFORE, GREY, Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -49,14 +50,19 @@ def folded(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
     cycles = finding.parameters.get("cycles_per_rev", 0.0)
     if cycles <= 0:
         return position(finding, chosen, scales)
-    pitch = 2 * np.pi / cycles * scales.position.factor
-    x = np.mod(chosen.q * scales.position.factor, pitch)
-    axis = f"position within one pitch [{scales.position.unit}]"
+    length = scales.turn / cycles
+    unit = handy(ANGLE if scales.turn != 1.0 else LENGTH, length)
+    pitch = length * unit.factor
+    x = np.mod(chosen.q * unit.factor, pitch)
+    axis = f"position within one pitch [{unit.unit}]"
     sheet, axes = error_over(finding, x, (chosen.before, chosen.after), np.linspace(0, pitch, 41), axis, scales)
     dots(axes, x, chosen.before * scales.torque.factor)
     axes.set_xlim(0, pitch)
     shown = min(600, len(x))
-    caption = f"All recordings folded onto one pitch. Lines: mean. Dots: {shown} of {len(x):,} samples before."
+    caption = (
+        f"All recordings folded onto one pitch of {unit.text(length, 3)}. Lines: mean, dashed before, solid after. "
+        f"Dots: {shown} of {len(x):,} samples before."
+    )
     return sheet.picture(f"{finding.title}, error over one pitch. {caption}", caption)
 
 
@@ -72,35 +78,68 @@ def dots(axes: "Axes", x: Array, y: Array, most: int = 600) -> None:
 
 
 def keep_turning(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:
-    """Draw the torque that keeps the machine moving over speed, both directions, with the model before and after."""
-    steady = chosen.where(_steady(chosen))
+    """Draw the torque that keeps the machine moving over speed, both directions, with the model before and after.
+
+    Where friction falls with speed, its own speeds are drawn: on a logarithmic axis, from a tenth of the speed over
+    which it falls.
+    """
+    falls = float(finding.parameters.get("Vs", 0.0)) if finding.effect == "stribeck" else 0.0
+    steady = chosen.where(_steady(chosen, 0.1 * falls))
     if steady.v.size < 200:
         return None
     sheet = blank(finding)
     axes = sheet.axes()
-    top = float(np.quantile(np.abs(steady.v), 0.995)) * scales.speed.factor
+    edges = _speeds(steady, falls) * scales.speed.factor
     for sign, mark, fill in ((1.0, "^", AFTER), (-1.0, "v", "white")):
-        _side(axes, steady.where(steady.v * sign > 0), sign, (mark, fill), np.linspace(0, top, 10), scales)
+        _side(axes, steady.where(steady.v * sign > 0), sign, (mark, fill), edges, scales)
     axes.set_xlabel(f"speed [{scales.speed.unit}]")
-    axes.set_xlim(0, top)
+    axes.set_xlim(edges[0], edges[-1])
+    if falls:
+        _logarithmic(axes, falls * scales.speed.factor)
     heading(axes, f"to keep moving [{scales.torque.unit}]")
     caption = "▲ measured forward, ▽ backward, bars 95 %. Dashed: model before; solid: after. Steady motion only."
+    caption += f" Dotted: {scales.speed.text(falls)}, over which friction falls." if falls else ""
     return sheet.picture(f"{finding.title}. {caption}", caption)
 
 
-def _steady(chosen: Samples) -> Mask:
-    """Return where the machine moves and hardly accelerates; gaps between recordings count as acceleration."""
+def _speeds(steady: Samples, falls: float) -> Array:
+    """Return edges of bins of speed [rad/s, m/s]; in equal ratios where friction falls over a small speed."""
+    speed = np.abs(steady.v)
+    top = float(np.quantile(speed, 0.995))
+    if not falls:
+        return np.linspace(0, top, 10)
+    low = max(float(np.quantile(speed, 0.005)), 0.1 * falls)
+    return np.geomspace(min(low, 0.5 * top), max(top, 3 * falls), 12)
+
+
+def _logarithmic(axes: "Axes", falls: float) -> None:
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1, 3)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.axvline(falls, color=GREY, lw=1, ls=(0, (1, 2)))
+
+
+def _steady(chosen: Samples, least: float) -> Mask:
+    """Return where the machine moves and hardly accelerates; gaps between recordings count as acceleration.
+
+    `least`, where given, is the speed from which it counts as moving.
+    """
     step = np.gradient(chosen.t) if chosen.t.size > 2 else np.ones_like(chosen.t)
     with np.errstate(invalid="ignore", divide="ignore"):
         acceleration = np.abs(np.gradient(chosen.v) / step) if chosen.t.size > 2 else np.ones_like(chosen.t)
-    moving = (np.abs(chosen.v) > slow(chosen.v)) & np.isfinite(acceleration) & (step > 0)
+    moving = (
+        (np.abs(chosen.v) > (min(least, slow(chosen.v)) or slow(chosen.v))) & np.isfinite(acceleration) & (step > 0)
+    )
     limit = np.quantile(acceleration[moving], 0.6) if moving.any() else 0.0
     return moving & (acceleration <= limit)
 
 
 def _side(axes: "Axes", side: Samples, sign: float, mark: tuple[str, str], edges: Array, scales: Scales) -> None:
     speed, unit = np.abs(side.v) * scales.speed.factor, scales.torque.factor * sign
-    style: dict[str, Any] = {
+    style: Style = {
         "ls": "",
         "marker": mark[0],
         "ms": 8,
@@ -109,11 +148,19 @@ def _side(axes: "Axes", side: Samples, sign: float, mark: tuple[str, str], edges
         "elinewidth": 1.4,
         "zorder": 4,
     }
-    measured = curve(speed, side.tau * unit, edges)
+    measured = _over_speed(speed, side.tau * unit, edges)
     axes.errorbar(measured.x, measured.mean, yerr=measured.half, **style)
     for error, colour, dashes in ((side.before, BEFORE, (4, 2)), (side.after, AFTER, (None, None))):
-        model = curve(speed, (side.tau - error) * unit, edges)
+        model = _over_speed(speed, (side.tau - error) * unit, edges)
         axes.plot(model.x, model.mean, color=colour, dashes=dashes, lw=1.5)
+
+
+def _over_speed(speed: Array, y: Array, edges: Array) -> Curve:
+    """Bin over speed, in equal steps or, where the first edge is above zero, in equal ratios."""
+    if edges[0] <= 0:
+        return curve(speed, y, edges)
+    binned = curve(np.log(np.maximum(speed, 1e-300)), y, np.log(edges))
+    return Curve(np.exp(binned.x), binned.mean, binned.half)
 
 
 def position(finding: Finding, chosen: Samples, scales: Scales) -> Picture | None:

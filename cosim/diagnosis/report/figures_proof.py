@@ -1,13 +1,13 @@
 """The two figures that decide: the error on runs the fit never saw, and the size of everything looked for."""
 
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from cosim.diagnosis.report.derive import Part
+from cosim.diagnosis.breakdown import Part
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture, Sheet
 from cosim.diagnosis.result import Diagnosis, Finding
-from cosim.pictures.style import AFTER, BEFORE, GREY, LINE, MEASURED, SHADE
+from cosim.plots.style import AFTER, BEFORE, GREY, MEASURED, SHADE, Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,7 +34,7 @@ def proof(diagnosis: Diagnosis, rows: tuple[Part, ...], scales: Scales) -> Pictu
     return sheet.picture(proof_words(rows), proof_words(rows))
 
 
-_OVER: dict[str, Any] = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "color": GREY}
+_OVER: Style = {"xycoords": ("data", "axes fraction"), "textcoords": "offset points", "color": GREY}
 
 
 def _pair(axes: "Axes", place: int, row: Part, factor: float) -> None:
@@ -87,41 +87,34 @@ def proof_words(rows: tuple[Part, ...]) -> str:
     return " ".join(words)
 
 
-def looked_for(findings: tuple[Finding, ...], groups: tuple[tuple[str, ...], ...]) -> Picture:
-    """Draw size over the smallest visible size, one row an effect; hatched where it cannot be tested."""
-    sheet = Sheet("looked", 74 + 22 * len(findings))
+def looked_for(findings: tuple[Finding, ...], groups: tuple[tuple[str, ...], ...]) -> Picture | None:
+    """Draw size over the smallest visible size, a row for each effect that has both; None without any."""
+    sized = tuple(finding for finding in findings if relative(finding)[0] is not None)
+    if not sized:
+        return None
+    sheet = Sheet("looked", 74 + 26 * len(sized))
     axes = sheet.axes(left=150, right=10, top=24, bottom=46)
     axes.set_xscale("log")
     axes.set_xlim(LEAST, MOST)
     axes.axvspan(LEAST, 1, color=SHADE, lw=0)
     axes.axvline(1, color=GREY, lw=1.2, dashes=(2, 2))
     axes.annotate("smallest visible size", (1, 1), (0, 6), **_OVER, ha="center")
-    for place, finding in enumerate(findings):
+    for place, finding in enumerate(sized):
         _sized(axes, place, finding)
-    _rows(axes, [_short(finding.title, 21) for finding in findings])
-    _either(axes, findings, groups)
+    _rows(axes, [_short(finding.title, 21) for finding in sized])
+    _either(axes, sized, groups)
     axes.set_xticks([0.1, 1, 10], ["0.1×", "1×", "10×"])
     axes.minorticks_off()
     axes.set_xlabel("size ÷ smallest size that shows")
-    caption = "Right of the dashed line: large enough for these recordings to show. Hatched: cannot be tested."
-    return sheet.picture("Size of every effect that was looked for. " + caption, caption)
+    caption = "Right of the dashed line: large enough for these recordings to show. Dots: found; rings: not sure."
+    return sheet.picture("Size of what was found, or may be there. " + caption, caption)
 
 
 def _sized(axes: "Axes", place: int, finding: Finding) -> None:
-    if finding.answer == "not_testable":
-        axes.barh(place, MOST, left=LEAST, height=0.5, fc="white", ec=LINE, hatch="////", lw=0)
-        axes.annotate("cannot be tested", (1.7, place), (0, -4), textcoords="offset points", ha="center", bbox=_PLATE)
-        return
     size, low, high = relative(finding)
-    if size is None:
-        axes.annotate("", (LEAST * 1.15, place), (0.95, place), arrowprops={"arrowstyle": "->", "color": GREY})
-        return
     axes.plot([_inside(low), _inside(high)], [place, place], color=MEASURED, lw=1.6)
     found = finding.answer == "found"
-    axes.plot(_inside(size), place, "o", ms=8, mfc=AFTER if found else "white", mec=AFTER if found else MEASURED)
-
-
-_PLATE: dict[str, Any] = {"boxstyle": "square,pad=0.15", "fc": "white", "ec": "none"}
+    axes.plot(_inside(size or 0), place, "o", ms=8, mfc=AFTER if found else "white", mec=AFTER if found else MEASURED)
 
 
 def _inside(value: float) -> float:

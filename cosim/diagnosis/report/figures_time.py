@@ -1,19 +1,21 @@
 """When: missing torque and its band over time, RMS by the second, and the worst seconds as lines."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cosim.diagnosis.report.derive import bars
+from cosim.diagnosis.breakdown import bars
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import COLUMN, Picture, Sheet, heading
 from cosim.diagnosis.result import Array, Trace
-from cosim.pictures.style import AFTER, BEFORE, GREY, MEASURED, SHADE, thin
+from cosim.plots.style import AFTER, BAND, BEFORE, GREY, MEASURED, SHADE, Style, thin
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 BUCKETS = 260
+MOSTLY = 0.5
+"""Share of a recording from which a mark of what is outside the band tells nothing any more: a number does."""
 WIDE = 738
 """Two columns of a desk, the whole width of a printed page."""
 
@@ -44,13 +46,14 @@ def _missing(axes: "Axes", trace: Trace, factor: float) -> None:
     rows = len(trace.t) // size
     t, band = (x[: rows * size].reshape(rows, size).mean(axis=1) for x in (trace.t, trace.band))
     axes.plot(*thin(trace.t, trace.missing * factor, BUCKETS), color=BEFORE, lw=0.8)
-    axes.fill_between(t, -band * factor, band * factor, color="#8A939B", alpha=0.55, lw=0, zorder=3)
+    axes.fill_between(t, -band * factor, band * factor, color=BAND, alpha=0.55, lw=0, zorder=3)
 
 
 def _times(strips: "tuple[Axes, ...]", trace: Trace) -> None:
     for axes in strips:
         axes.set_xlim(trace.t[0], trace.t[-1])
-        axes.set_facecolor(SHADE if trace.heldout else "white")
+        if trace.heldout:  # a background of its own would be left out where the page shines through
+            axes.axvspan(trace.t[0], trace.t[-1], color=SHADE, lw=0, zorder=-1)
         axes.locator_params(axis="y", nbins=4 if axes is strips[0] else 1)
         axes.tick_params(labelbottom=axes is strips[-1])
 
@@ -62,14 +65,22 @@ def _width(edges: Array) -> str:
 
 def _flags(axes: "Axes", trace: Trace) -> None:
     bottom = axes.get_ylim()[0]
+    if flagged_share(trace) > MOSTLY:
+        return
     for low, high in trace.intervals:
         axes.plot([low, high], [bottom * 0.96] * 2, color=MEASURED, lw=4, solid_capstyle="butt")
 
 
+def flagged_share(trace: Trace) -> float:
+    """Return the share of a recording in which the missing torque is outside the noise band for long."""
+    return sum(high - low for low, high in trace.intervals) / float(trace.t[-1] - trace.t[0])
+
+
 def _flagged(trace: Trace) -> str:
-    if not trace.intervals:
-        return ""
-    return "Black line: outside the band for long."
+    share = flagged_share(trace)
+    if share > MOSTLY:
+        return f"Outside the band for long during {100 * min(share, 1):.0f} % of the time."
+    return "Black line: outside the band for long." if share > 0 else ""
 
 
 def overlay(trace: Trace, span: tuple[float, float], scales: Scales, width: int = COLUMN) -> Picture:
@@ -95,7 +106,7 @@ def overlay(trace: Trace, span: tuple[float, float], scales: Scales, width: int 
     return sheet.picture(words, words)
 
 
-_LINES: tuple[dict[str, Any], ...] = (
+_LINES: tuple[Style, ...] = (
     {"color": MEASURED, "lw": 1.4},
     {"color": BEFORE, "lw": 1.6, "dashes": (4, 2)},
     {"color": AFTER, "lw": 1.6},

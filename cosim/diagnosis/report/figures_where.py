@@ -1,14 +1,14 @@
 """Where: missing torque over position, speed, direction; and over angle and speed together."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cosim.diagnosis.report.derive import Samples, grid, slow
+from cosim.diagnosis.breakdown import Samples, grid, slow
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture, Sheet, degrees, heading
 from cosim.diagnosis.result import Array, Region
-from cosim.pictures.style import AFTER, BEFORE, GREY, LINE, MEASURED
+from cosim.plots.style import AFTER, BEFORE, GREY, LINE, MEASURED, Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -78,7 +78,7 @@ def _sides(axes: "Axes", before: Region, after: Region | None, scales: Scales) -
         if side is None:
             continue
         fill = "white" if mark == "s" else colour
-        style: dict[str, Any] = {
+        style: Style = {
             "ms": 8,
             "mfc": fill,
             "mec": colour,
@@ -103,7 +103,7 @@ def plane(name: str, chosen: Samples, residual: Array, scales: Scales, most: flo
     q = np.linspace(float(chosen.q.min()), float(chosen.q.max()) + 1e-12, CELLS[0] + 1)
     v = np.linspace(slow(chosen.v), float(np.quantile(np.abs(chosen.v), 0.999)) + 1e-12, CELLS[1] + 1)
     mean = grid(chosen, residual, q, v)
-    sheet = Sheet(f"plane-{name}", 220)
+    sheet = Sheet(f"plane-{name}", 220, plate=True)
     axes = sheet.axes()
     top = most or float(np.nanmax(np.abs(mean)))
     _cells(axes, mean, q * scales.position.factor, v * scales.speed.factor, top, BEFORE if before else AFTER)

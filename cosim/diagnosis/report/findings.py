@@ -1,13 +1,14 @@
 """The block of one finding: plain sentence, what the mechanic needs, and closed numbers for the engineer."""
 
+import re
 from dataclasses import dataclass
 
 from cosim.diagnosis.report import tables, words
-from cosim.diagnosis.report.equations import EQUATIONS
+from cosim.diagnosis.report.equations import equation
+from cosim.diagnosis.report.lead import led
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.result import Diagnosis, Finding, is_special
-from cosim.pictures.quantities import minus
 
 
 @dataclass(frozen=True)
@@ -30,57 +31,56 @@ class Shown:
     numbers: tuple[Numbers, ...]
     picture: Picture | None
     do: str
+    likely: str
     size: str
     size_range: str
 
 
 def block(one: words.Block, diagnosis: Diagnosis, scales: Scales, picture: Picture | None) -> Shown:
-    """Return what is printed of one finding."""
+    """Return what is printed of one finding; what the first screen says of it is not said again."""
     first = one.first
-    said = [words.closed(finding.statement) for finding in one.findings]
+    said = [words.stated(finding) for finding in one.findings if finding.effect not in led(diagnosis)]
     if one.answer == "ambiguous":
-        said = words.either(said)
-        said.append(_in_model(*one.findings))
-    rows = [("Size", _size(first)), ("Where", where(first, scales)), ("Evidence", first.evidence)]
-    rows += [("Ruled out", ", ".join(first.ruled_out)), ("Tell apart", _apart(one)), ("Do this", _do(one, diagnosis))]
+        said = [*words.either(said), _in_model(diagnosis, *one.findings)]
+    rows = [("Where", where(first, scales)), ("Tell apart", _apart(one))]
+    rows += [("Ruled out", "; ".join(first.ruled_out)), ("Less likely", "; ".join(first.less_likely))]
     closed = tuple(_numbers(finding) for finding in one.findings)
     filled = tuple((name, text) for name, text in rows if text)
-    return Shown(
-        one,
-        tuple(filter(None, said)),
-        filled,
-        closed,
-        picture,
-        _do(one, diagnosis),
-        *map(minus, (first.size, first.size_range)),
-    )
+    sizes = words.sized(first)
+    return Shown(one, tuple(filter(None, said)), filled, closed, picture, do(one, diagnosis), _likely(first), *sizes)
 
 
-def _in_model(first: Finding, *rivals: Finding) -> str:
-    """Say which of the possible causes goes into the improved model."""
+def _likely(first: Finding) -> str:
+    return f"probability {first.probability:.2f}" if first.answer in ("found", "ambiguous") else ""
+
+
+def _in_model(diagnosis: Diagnosis, first: Finding, *rivals: Finding) -> str:
+    """Say which of the possible causes the improved model holds."""
+    if first not in diagnosis.in_model:
+        return "No model holds it." if not rivals else "No model holds any of these."
     if not rivals:
-        return "It goes into no model."
+        return "The improved model holds it, though it is not certain."
     if is_special(first.effect, [rival.effect for rival in rivals]):
         other = "the other" if len(rivals) == 1 else "each of the others"
-        return f"{first.title} goes into the model: it is a special case of {other} and predicts alike."
-    return "None of these goes into a model."
-
-
-def _size(finding: Finding) -> str:
-    span = f", 95 % range {finding.size_range}" if finding.size_range else ""
-    return minus(f"{finding.size}{span}") if finding.size else ""
+        return f"The improved model holds {words.lowered(first.title)}: it is a special case of {other}."
+    return f"The improved model holds the likelier, {words.lowered(first.title)}."
 
 
 def where(finding: Finding, scales: Scales) -> str:
     """Return the description and, where given, the regions in the units of the page."""
     if finding.where is None:
         return ""
-    scale = scales.of_axis(finding.where.axis)
-    spans = [scale.span(low, high) for low, high in finding.where.regions[:4]]
-    if len(finding.where.regions) > 4:
-        spans.append(f"{len(finding.where.regions) - 4} more")
-    named = f" ({', '.join(spans)})" if spans and finding.where.description else ", ".join(spans)
-    return finding.where.description + named
+    if finding.where.axis == "direction":
+        return finding.where.description
+    scale, regions = scales.of_axis(finding.where.axis), finding.where.regions
+    if finding.where.axis == "speed" and len(regions) == 1 and regions[0][0] == -regions[0][1]:
+        return f"slower than {scale.text(regions[0][1])}"
+    spans = [scale.span(low, high) for low, high in regions[:4]]
+    if len(regions) > 4:
+        spans.append(f"{len(regions) - 4} more")
+    described = re.sub(r"^around [-−\d.e+]+$", "around one place", finding.where.description)
+    named = f" ({', '.join(spans)})" if spans and described else ", ".join(spans)
+    return described + named
 
 
 def _apart(one: words.Block) -> str:
@@ -88,7 +88,7 @@ def _apart(one: words.Block) -> str:
     return "; ".join(texts)
 
 
-def _do(one: words.Block, diagnosis: Diagnosis) -> str:
+def do(one: words.Block, diagnosis: Diagnosis) -> str:
     """Return the action; rivals ask for the next experiment."""
     if one.answer == "ambiguous" and diagnosis.next_experiment.get("description"):
         return words.started(str(diagnosis.next_experiment["description"]))
@@ -97,13 +97,10 @@ def _do(one: words.Block, diagnosis: Diagnosis) -> str:
 
 
 def _numbers(finding: Finding) -> Numbers:
-    lines = [f"Share of the cross-validated training error it removes: {100 * finding.gain:.0f} %."]
+    lines = [words.started(words.closed(finding.evidence))] if finding.evidence else []
     if finding.answer in ("found", "ambiguous"):
-        lines.append(
-            f"Probability {finding.probability:.2f}: its share of the evidence among its rivals, "
-            "calibrated on simulated cases."
-        )
+        lines.append("The probability is its share of the evidence among its rivals, calibrated on simulated cases.")
     limit = words.shows_from(finding)
     lines += [f"Would have shown from {limit}."] if limit else []
-    lines.append("Ranges: block bootstrap, 95 %.")
-    return Numbers(finding.title, EQUATIONS.get(finding.effect, ""), tables.numbers(finding), tuple(lines))
+    lines.append("Ranges: 95 %, robust to errors that are alike within a block.")
+    return Numbers(finding.title, equation(finding.effect), tables.numbers(finding), tuple(lines))

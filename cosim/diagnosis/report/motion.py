@@ -5,7 +5,7 @@ from math import pi
 from typing import Any
 
 from cosim.diagnosis.report.quantities import Scales
-from cosim.pictures.quantities import joined, number, trimmed
+from cosim.plots.quantities import joined, number, trimmed
 
 
 def motion(point: Mapping[str, Any], scales: Scales) -> str:

@@ -1,7 +1,6 @@
 """What one more recording would tell, and how to take it."""
 
 from collections.abc import Iterator
-from typing import Any
 
 from cosim.diagnosis.report import words
 from cosim.diagnosis.report.motion import motion
@@ -12,7 +11,7 @@ SMALL = 0.1
 """A difference below this share of the noise takes longer to show than a recording lasts."""
 
 
-def next_experiment(diagnosis: Diagnosis, scales: Scales) -> dict[str, Any] | None:
+def next_experiment(diagnosis: Diagnosis, scales: Scales) -> dict[str, object] | None:
     """Return its sentences and what to type; None where nothing is open."""
     plan = diagnosis.next_experiment
     if not plan:

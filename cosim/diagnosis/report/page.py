@@ -4,28 +4,28 @@ import base64
 import hashlib
 from collections.abc import Iterator
 from importlib.resources import files as resources
-from typing import Any
 
 import numpy as np
 
+from cosim.diagnosis.breakdown import Samples, bars, parts, samples, worst
 from cosim.diagnosis.report import tables, unknown, words
-from cosim.diagnosis.report.derive import Samples, bars, parts, samples, worst
 from cosim.diagnosis.report.explorer import payload
 from cosim.diagnosis.report.figures_dynamic import effect
 from cosim.diagnosis.report.figures_proof import looked_for, proof
 from cosim.diagnosis.report.figures_time import WIDE, overlay, recording
 from cosim.diagnosis.report.figures_where import plane, region, strongest
 from cosim.diagnosis.report.findings import block
+from cosim.diagnosis.report.lead import heading, lead
 from cosim.diagnosis.report.next_experiment import next_experiment
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.result import Diagnosis, Trace
-from cosim.pictures.quantities import joined
+from cosim.plots.quantities import joined
 
 MOST_RECORDINGS, MOST_REGIONS = 6, 12
 
 
-def context(diagnosis: Diagnosis) -> dict[str, Any]:
+def context(diagnosis: Diagnosis) -> dict[str, object]:
     """Return the values of the template."""
     scales = Scales.of(diagnosis)
     chosen = samples(diagnosis.traces)
@@ -33,21 +33,22 @@ def context(diagnosis: Diagnosis) -> dict[str, Any]:
     return {name: value for section in sections for name, value in section(diagnosis, scales, chosen).items()}
 
 
-def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
+def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
     """Return the first screen."""
     kind = words.verdict(diagnosis)
     rows = parts(diagnosis, scales.speed.span)
     return {
-        "heading": words.heading(diagnosis),
+        "heading": heading(diagnosis),
         "mount": diagnosis.mount,
+        "careful": [one.statement for one in diagnosis.sanity],
         "identity": identity(diagnosis),
-        "lead": words.lead(diagnosis, scales),
+        "lead": lead(diagnosis, scales),
         "facts": unknown.facts(diagnosis, scales) if kind == "unknown" else None,
-        "limits": tables.limits(diagnosis) if kind == "none" else None,
+        "limits": tables.limits(diagnosis, scales) if kind == "none" else None,
         "unseen": "" if kind == "none" else tables.unseen(diagnosis),
         "proof": proof(diagnosis, rows, scales),
         "parts_table": tables.parts(rows, scales),
-        "added": words.verdict(diagnosis) == "either" or bool(_added(diagnosis)),
+        "added": bool(diagnosis.in_model),
         "with_effects": _with_effects(diagnosis),
         "box": _box(diagnosis, [row.label for row in rows if row.change == "worse"], scales),
         "noun": "torque" if diagnosis.motion == "rotary" else "force",
@@ -57,7 +58,8 @@ def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, A
 def identity(diagnosis: Diagnosis) -> list[dict[str, str]]:
     """Return machine, recordings, model and version."""
     made, many = diagnosis.provenance, len(diagnosis.traces)
-    seconds = sum(float(trace.t[-1] - trace.t[0]) for trace in diagnosis.traces if trace.t.size)
+    recorded = [float(entry["seconds"]) for entry in made.get("recordings", ()) if entry.get("seconds")]
+    seconds = sum(recorded) or sum(float(trace.t[-1] - trace.t[0]) for trace in diagnosis.traces if trace.t.size)
     rates = [entry["rate_hz"] for entry in made.get("recordings", ()) if entry.get("rate_hz")]
     rest = f", {seconds:.0f} s" + (f" at {_rate(rates[0])}" if rates else "")
     told = [("", diagnosis.mount, ""), ("", f"{many} recording{'s' if many != 1 else ''}", rest)]
@@ -67,21 +69,14 @@ def identity(diagnosis: Diagnosis) -> list[dict[str, str]]:
 
 
 def _rate(hertz: float) -> str:
-    return joined(f"{hertz / 1000:.4g}", "kHz") if hertz >= 1000 else joined(f"{hertz:.4g}", "Hz")
-
-
-def _added(diagnosis: Diagnosis) -> int:
-    """Count the effects that are in the improved model."""
-    return sum(finding.answer == "found" for finding in diagnosis.findings)
+    return joined(f"{hertz / 1000:.4g}", "kHz") if round(hertz) >= 1000 else joined(f"{hertz:.4g}", "Hz")
 
 
 def _with_effects(diagnosis: Diagnosis) -> str:
-    found = _added(diagnosis)
-    if not found and words.verdict(diagnosis) == "either":
+    held = len({finding.effect for finding in diagnosis.in_model})
+    if held and words.verdict(diagnosis) == "either":
         return "with the likeliest cause"
-    return {0: "after (nothing added)", 1: "with the effect"}.get(
-        found, f"with the {words.count(found).lower()} effects"
-    )
+    return {0: "after (nothing added)", 1: "with the effect"}.get(held, f"with the {words.count(held).lower()} effects")
 
 
 def _box(diagnosis: Diagnosis, worse: list[str], scales: Scales) -> dict[str, str] | None:
@@ -100,16 +95,16 @@ def _box(diagnosis: Diagnosis, worse: list[str], scales: Scales) -> dict[str, st
     return {"file": files[0], "text": " ".join(filter(None, [*said, *words.left_out(diagnosis)]))}
 
 
-def _findings(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
+def _findings(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
     found = [one for one in words.blocks(diagnosis) if one.first.effect != "unknown"]
     blocks = [block(one, diagnosis, scales, effect(one.first, chosen, scales)) for one in found]
     return {"blocks": blocks, "experiment": next_experiment(diagnosis, scales)}
 
 
-def _middle(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
+def _middle(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
     """Return everything looked for, what stays, proof, and where."""
     return {
-        "looked": tables.looked(diagnosis),
+        "looked": tables.looked(diagnosis, scales),
         "looked_picture": looked_for(diagnosis.findings, diagnosis.ambiguous_with),
         "meanings": words.MEANINGS,
         "unexplained": unexplained(diagnosis, scales),
@@ -137,7 +132,7 @@ def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
 def _proof_sentence(diagnosis: Diagnosis, scales: Scales) -> str:
     held, unit = diagnosis.heldout, scales.torque
     kept = f"{held.name} was not used for fitting."
-    if not _added(diagnosis) and words.verdict(diagnosis) != "either":
+    if not diagnosis.in_model:
         return f"{kept} Nothing was added to the model, so there is no gain to prove."
     low, high = held.confidence_interval
     sure = "" if low > 0 else " That range includes zero: no clear change." if high >= 0 else " It is worse."
@@ -163,7 +158,7 @@ def _places(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> Iterator[P
         yield plane("after", chosen, chosen.after, scales, top)
 
 
-def _time(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
+def _time(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
     """Return when, and the worst seconds."""
     traces = sorted((t for t in diagnosis.traces if t.t.size > 1), key=lambda trace: not trace.heldout)
     shown, hidden = traces[:MOST_RECORDINGS], traces[MOST_RECORDINGS:]
@@ -187,7 +182,7 @@ def _most(trace: Trace) -> tuple[float, float]:
     return 1.15 * max(tall, float(np.nanmax(trace.band))), 1.05 * float(np.nanmax(bars(trace)[1:]))
 
 
-def _end(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, Any]:
+def _end(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
     """Return parameters, quality, provenance, explorer."""
     made, here = diagnosis.provenance, resources("cosim.diagnosis.report")
     script = here.joinpath("explorer.js").read_text("utf-8")

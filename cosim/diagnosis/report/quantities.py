@@ -1,11 +1,12 @@
 """The display units of one report."""
 
 from dataclasses import dataclass
+from math import pi
 
 import numpy as np
 
 from cosim.diagnosis.result import Diagnosis
-from cosim.pictures.quantities import ANGLE, FORCE, LENGTH, MOVING, TORQUE, TURNING, Scale, handy
+from cosim.plots.quantities import ANGLE, FORCE, LENGTH, MOVING, TORQUE, TURNING, Scale, handy
 
 
 @dataclass(frozen=True)
@@ -15,6 +16,8 @@ class Scales:
     torque: Scale
     position: Scale
     speed: Scale
+    turn: float = 2 * pi
+    """What cycles are counted per: a turn [rad], or a metre of a linear axis."""
 
     @classmethod
     def of(cls, diagnosis: Diagnosis) -> "Scales":
@@ -27,6 +30,7 @@ class Scales:
             handy(TORQUE if rotary else FORCE, torque),
             handy(ANGLE if rotary else LENGTH, position),
             handy(TURNING if rotary else MOVING, speed),
+            2 * pi if rotary else 1.0,
         )
 
     def of_unit(self, unit: str) -> Scale:

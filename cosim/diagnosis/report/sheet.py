@@ -12,11 +12,14 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from cosim.pictures.style import GREY
+from cosim.plots.style import AFTER, BAND, BEFORE, GREY, LINE, MEASURED, SHADE
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+INKS = {MEASURED: "ink", BEFORE: "before", AFTER: "after", GREY: "grey", LINE: "line", SHADE: "shade", BAND: "band"}
+INKS |= {"#E3E6E8": "grid", "#A9B0B6": "hatch", "#FFFFFF": "paper"}
+"""Colours that change with the reader's light or dark page, by their name in report.css."""
 COLUMN = 356
 """Width of a figure: the width of a phone, and a third of a desk."""
 
@@ -33,10 +36,11 @@ class Picture:
 class Sheet:
     """A figure of fixed size; `name` makes the ids of its parts unique in the page."""
 
-    def __init__(self, name: str, height: int, width: int = COLUMN) -> None:
+    def __init__(self, name: str, height: int, width: int = COLUMN, plate: bool = False) -> None:
+        """Make an empty figure; on a plate it keeps its colours, and white paper, on a dark page too."""
         from matplotlib.figure import Figure
 
-        self.name, self.width, self.height = name, width, height
+        self.name, self.width, self.height, self.plate = name, width, height, plate
         self.figure = Figure(figsize=(width / 72, height / 72), dpi=72)
 
     def axes(self, *, left: int = 44, right: int = 10, top: int = 26, bottom: int = 42) -> "Axes":
@@ -56,9 +60,11 @@ class Sheet:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", message="Glyph")
             self.figure.savefig(buffer, format="svg", metadata=nothing, transparent=True)
-        size = f'class="w{self.width}" width="{self.width}" height="{self.height}"'
+        kind = f"w{self.width} plate" if self.plate else f"w{self.width}"
+        size = f'class="{kind}" width="{self.width}" height="{self.height}"'
         head = f'<svg role="img" aria-label="{Markup.escape(label)}" {size} viewBox="0 0 {self.width} {self.height}">'
-        return Markup(head + small(buffer.getvalue(), self.name))
+        body = small(buffer.getvalue(), self.name)
+        return Markup(head + (body if self.plate else inked(body)))
 
 
 def heading(axes: "Axes", text: str) -> None:
@@ -86,6 +92,12 @@ def small(svg: str, name: str) -> str:
     body = re.sub(r' id="([^"]*)"', lambda m: f' id="{name}-{m[1]}"' if m[1] in used else "", body)
     body = re.sub(r'(url\(#|href="#)', rf"\g<1>{name}-", body)
     return re.sub(r">\s+<", "><", re.sub(r"\s*\n\s*", " ", body))
+
+
+def inked(svg: str) -> str:
+    """Name the colours of an SVG, so that the page decides what they are."""
+    names = {colour.lower(): name for colour, name in INKS.items()}
+    return re.sub("|".join(names), lambda found: f"var(--{names[found[0]]})", svg)
 
 
 def _rounded(match: "re.Match[str]") -> str:

@@ -5,12 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.diagnosis.report.derive import Part, bars
-from cosim.diagnosis.report.equations import CONDITIONS
+from cosim.diagnosis.breakdown import Part, bars
+from cosim.diagnosis.entries import Source
+from cosim.diagnosis.report.equations import to_record
 from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.words import ANSWERS, lowered, shows_from, unit_of
+from cosim.diagnosis.report.words import ANSWERS, lowered, shows_from, sized, unit_of, unseen_torque
 from cosim.diagnosis.result import Diagnosis, Finding, Trace
-from cosim.pictures.quantities import decimals, minus, number
+from cosim.plots.quantities import decimals, number, scale_of
 
 
 @dataclass(frozen=True)
@@ -23,30 +24,35 @@ class Table:
     style: str = "stack named"
 
 
-def looked(diagnosis: Diagnosis) -> Table:
+def looked(diagnosis: Diagnosis, scales: Scales) -> Table:
     """List every effect with its answer and what it would have shown from, or why it cannot be tested."""
-    rows = tuple((f.title, ANSWERS.get(f.answer, f.answer), minus(f.size), _from(f)) for f in diagnosis.findings)
+    least = unseen_torque(diagnosis, scales)
+    rows = tuple((f.title, ANSWERS.get(f.answer, f.answer), sized(f)[0], _from(f, least)) for f in diagnosis.findings)
     return Table(("Effect", "Answer", "Size", "Shows from, or why not"), rows, (), "stack named tight")
 
 
-def _from(finding: Finding) -> str:
+def _from(finding: Finding, least: str) -> str:
+    """Say from which size an effect shows; where its own number is no size, from which torque."""
+    if finding.answer in ("found", "ambiguous", "not_proven"):
+        return shows_from(finding)
     if finding.answer != "not_testable":
-        return shows_from(finding) or finding.evidence or "no smallest size was worked out"
-    said = [finding.evidence, finding.action or CONDITIONS.get(finding.effect, "")]
+        return shows_from(finding) or finding.evidence or f"a torque of {least}" * bool(least)
+    said = [finding.evidence, finding.action or to_record(finding.effect)]
     return "; ".join(dict.fromkeys(text.rstrip(".") for text in said if text))
 
 
-def limits(diagnosis: Diagnosis) -> Table:
+def limits(diagnosis: Diagnosis, scales: Scales) -> Table:
     """Group effects that were not seen or cannot be tested, for the first screen of "nothing is missing"."""
+    least = unseen_torque(diagnosis, scales)
     groups: dict[tuple[str, str], list[Finding]] = {}
     for finding in diagnosis.findings:
         if finding.answer == "not_seen":
-            key = unit_of(finding) if finding.visible_from is not None else _from(finding)
+            key = unit_of(finding) if finding.visible_from is not None else _from(finding, least)
             groups.setdefault((finding.answer, key), []).append(finding)
     for finding in diagnosis.findings:
         if finding.answer == "not_testable":
-            groups.setdefault((finding.answer, _from(finding)), []).append(finding)
-    rows = [(_titles(group), ANSWERS[answer], _limits(group)) for (answer, _), group in groups.items()]
+            groups.setdefault((finding.answer, _from(finding, least)), []).append(finding)
+    rows = [(_titles(group), ANSWERS[answer], _limits(group, least)) for (answer, _), group in groups.items()]
     return Table(("Effect", "Answer", "Would have shown from"), tuple(rows))
 
 
@@ -54,9 +60,9 @@ def _titles(group: Sequence[Finding]) -> str:
     return ", ".join([group[0].title, *(lowered(finding.title) for finding in group[1:])])
 
 
-def _limits(group: Sequence[Finding]) -> str:
+def _limits(group: Sequence[Finding], least: str) -> str:
     """The limits of effects in their order, or what is the same for all of them."""
-    texts = [_from(finding) for finding in group]
+    texts = [_from(finding, least) for finding in group]
     return ", ".join(texts) if len(set(texts)) > 1 else texts[0]
 
 
@@ -67,15 +73,14 @@ def numbers(finding: Finding) -> Table:
         error, ends = finding.standard_errors.get(name), finding.ranges.get(name)
         span = " to ".join(decimals(ends, 3)) if ends else ""
         rows.append((name, number(value, 4), number(error) if error is not None else "", span, unit))
-    return filled(Table(("Parameter", "Value", "Standard error", "95 % range", "Unit"), tuple(rows), (1, 2, 3), ""))
+    return filled(Table(("Parameter", "Value", "Standard error", "95 % range", "Unit"), tuple(rows), (1, 2, 3)))
 
 
 def _values(finding: Finding) -> Iterator[tuple[str, str, float]]:
     """Name, unit and value of each parameter; of the further waves of a ripple with their number before it."""
     for name, value in finding.parameters.items():
-        if name != "harmonics":
-            yield name, finding.units.get(name, ""), value
-    for number_, wave in enumerate(finding.parameters.get("harmonics", ()), 2):
+        yield name, finding.units.get(name, ""), value
+    for number_, wave in enumerate(finding.harmonics, 2):
         for name, value in wave.items():
             yield f"{name}, wave {number_}", finding.units.get(name, ""), value
 
@@ -98,8 +103,8 @@ def proof(diagnosis: Diagnosis, scales: Scales) -> Table:
         cells = _cells(held.sliding, names, unit.factor)
         rows.append((f"RMS, clear motion only [{unit.unit}]", *cells))
     if held.position:
-        cells = _cells(held.position, names, scales.position.factor)
-        rows.append((f"Position, closed loop [{scales.position.unit}]", *cells))
+        unit = scale_of("rad" if diagnosis.motion == "rotary" else "m", max(map(abs, held.position.values())))
+        rows.append((f"Position, closed loop [{unit.unit}]", *_cells(held.position, names, unit.factor)))
     return Table(
         ("Held-out recording", "As delivered", "Refitted", "With the effects", "Noise"), tuple(rows), (1, 2, 3, 4)
     )
@@ -147,13 +152,11 @@ def parameters(diagnosis: Diagnosis) -> Table:
 
 def files(diagnosis: Diagnosis) -> Table:
     """List the recordings and the card with their hashes."""
-    rows = []
-    for entry in (
-        *diagnosis.provenance.get("recordings", ()),
-        {**diagnosis.provenance.get("card", {}), "role": "model card"},
-    ):
+    made = diagnosis.provenance.get("card", {})
+    rows, card = [], Source(name=made.get("name", ""), role="model card", sha256=made.get("sha256", ""))
+    for entry in (*diagnosis.provenance.get("recordings", ()), card):
         seconds, rate = entry.get("seconds"), entry.get("rate_hz")
-        size = f"{seconds:g} s at {rate:g} Hz" if seconds and rate else ""
+        size = f"{seconds:.4g} s at {rate:.4g} Hz" if seconds and rate else ""
         if entry.get("name"):
             rows.append((str(entry["name"]), str(entry.get("role", "")), size, str(entry.get("sha256", ""))))
     return Table(("File", "Role", "Length", "SHA-256"), tuple(rows), (), "stack named hash")

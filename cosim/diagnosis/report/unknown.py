@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cosim.diagnosis.report.derive import bars
+from cosim.diagnosis.breakdown import bars
 from cosim.diagnosis.report.figures_where import NAMES, runs
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.tables import Table

@@ -1,10 +1,13 @@
 """The sentences of the report and the terminal: mechanic first, one meaning a word."""
 
+import re
 from dataclasses import dataclass
+
+import numpy as np
 
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.result import Diagnosis, Finding
-from cosim.pictures.quantities import joined, number, raised, trimmed
+from cosim.plots.quantities import decimals, joined, minus, number, raised, scale_of, trimmed
 
 COUNTS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
 ANSWERS = {
@@ -16,12 +19,11 @@ ANSWERS = {
     "unknown": "Unknown",
 }
 MEANINGS = (
-    ("found", "Found", "The 95 % range excludes zero, the error on unseen runs falls, and every rival fits worse."),
+    ("found", "Found", "The error on unseen runs falls, and every rival fits worse; its probability stands beside it."),
     (
         "ambiguous",
         "Two possible causes",
-        "The rivals are too close to separate. Neither goes into the improved model, unless one is a special case of "
-        "the other, which predicts alike.",
+        "The rivals are too close to separate. The improved model holds the one named first, which is the likelier.",
     ),
     ("not_proven", "Not proven", "It fits better, but not on runs the fit never saw."),
     ("not_seen", "Not seen", "It would have shown from the size given."),
@@ -50,6 +52,10 @@ class Block:
         return "finding-" + "".join(letter for letter in self.first.effect if letter.isalnum() or letter == "_")
 
 
+SEEN = 0.05
+"""Share of the residual energy that an effect must hold to be seen."""
+
+
 def count(number: int) -> str:
     """Return a small number as a word that starts a sentence."""
     return COUNTS[number] if number < len(COUNTS) else str(number)
@@ -68,7 +74,9 @@ def law(diagnosis: Diagnosis) -> str:
 
 
 def verdict(diagnosis: Diagnosis) -> str:
-    """Return "found", "either" (only rivals), "unknown" or "none"."""
+    """Return "withheld", "found", "either" (only rivals), "unknown" or "none"."""
+    if any(one.blocks_naming for one in diagnosis.sanity):
+        return "withheld"
     if "unknown" in diagnosis.verdict:
         return "unknown"
     answers = {finding.answer for finding in diagnosis.findings}
@@ -109,107 +117,11 @@ def model(diagnosis: Diagnosis) -> str:
     return str(made.get("base_fmu", "")).split(" (")[0] or str(made.get("card", {}).get("name", ""))
 
 
-def heading(diagnosis: Diagnosis) -> str:
-    """Return the verdict as a heading."""
-    found = sum(finding.answer == "found" for finding in diagnosis.findings)
-    many = f"{count(found)} effect{'s are' if found != 1 else ' is'} missing from the model"
-    match verdict(diagnosis):
-        case "unknown":
-            return f"{many}, and something unknown" if found else _BESIDE_RIVALS if _named(diagnosis) else _UNKNOWN
-        case "either":
-            return "Something is missing, with more than one possible cause"
-        case "none":
-            return f"Nothing missing that {_these(diagnosis)} can show"
-    return many
-
-
-_UNKNOWN = "Something is missing, and it is none of the effects cosim knows"
-_BESIDE_RIVALS = "Something is missing, with more than one possible cause, and something unknown"
-
-
-def _named(diagnosis: Diagnosis) -> bool:
-    """Whether the verdict names an effect, be it one of several rivals."""
-    return any(name != "unknown" for name in diagnosis.verdict)
-
-
-def _these(diagnosis: Diagnosis) -> str:
-    return "this recording" if len(diagnosis.traces) == 1 else "these recordings"
-
-
-def lead(diagnosis: Diagnosis, scales: Scales) -> list[str]:
-    """Return two to four plain sentences below the heading."""
-    return [sentence for sentence in _LEADS[verdict(diagnosis)](diagnosis, scales) if sentence]
-
-
-def _found(diagnosis: Diagnosis, scales: Scales) -> list[str]:
-    found = [block for block in blocks(diagnosis) if block.answer == "found"]
-    said = [closed(block.first.statement or f"{block.title} acts on the machine") for block in found[:3]]
-    has = "The simulation does not have it." if len(found) == 1 else "The simulation has neither."
-    has = has if len(found) < 3 else "The simulation has none of them."
-    return [*said, has, _either(diagnosis, "A further error"), improvement(diagnosis, scales)]
-
-
-def _rival(diagnosis: Diagnosis, scales: Scales) -> list[str]:
-    held, unit = diagnosis.heldout, scales.torque
-    before, after, noise = (unit.number(value) for value in (held.before_rms, held.after_rms, held.floor_rms))
-    error = f"On unseen runs the error is {joined(before, unit.unit)}, with the likeliest cause {after}, noise {noise}."
-    return [_either(diagnosis, "The error"), error, "No improved model was written."]
-
-
-def _either(diagnosis: Diagnosis, subject: str) -> str:
-    """Name the first set of rivals."""
-    sets = [block for block in blocks(diagnosis) if block.answer == "ambiguous"]
-    if not sets:
-        return ""
-    causes = " or ".join(lowered(rival.title) for rival in sets[0].findings)
-    if len(sets[0].findings) == 1:
-        return f"{subject} may come from {causes}; that is not certain."
-    return f"{subject} has {count(len(sets[0].findings)).lower()} possible causes: {causes}."
-
-
-def _nothing(diagnosis: Diagnosis, scales: Scales) -> list[str]:
-    held = diagnosis.heldout
-    error, noise = scales.torque.text(held.before_rms), scales.torque.text(held.floor_rms)
-    near = "to within the noise" if held.before_rms <= 1.25 * held.floor_rms else "as well as any known effect can"
-    proven = [block.title for block in blocks(diagnosis) if block.answer == "not_proven"]
-    fits = f"{' and '.join(proven)}: fits better, but not on unseen runs." if proven else ""
-    first = f"The refitted simulation matches the machine {near} on runs it never saw ({error} error, {noise} noise)."
-    return [first, fits, "No improved model was written."]
-
-
-def _unknown(diagnosis: Diagnosis, scales: Scales) -> list[str]:
-    """Say what was named, that the others are not the rest, and where the rest goes."""
-    named, found = _named(diagnosis), [block for block in blocks(diagnosis) if block.answer == "found"]
-    said = [closed(block.first.statement) for block in found[:3]]
-    own = next((finding.statement for finding in diagnosis.findings if finding.effect == "unknown"), "")
-    others = [f for f in diagnosis.findings if f.effect != "unknown" and f.answer in ("not_seen", "not_proven")]
-    none = f"None of the {len(others)} {'other ' if named else ''}known effects that could be tested "
-    none += "explains the rest." if named else "lowers it."
-    written = "" if found else "No improved model was written."
-    return [*said, _either(diagnosis, "The error"), closed(own), _numbers(diagnosis, scales), none, written]
-
-
-_LEADS = {"found": _found, "either": _rival, "none": _nothing, "unknown": _unknown}
-
-
-def _numbers(diagnosis: Diagnosis, scales: Scales) -> str:
-    held, unit = diagnosis.heldout, scales.torque
-    return f"The error on unseen runs is {unit.text(held.after_rms)} against {unit.text(held.floor_rms)} of noise."
-
-
-def improvement(diagnosis: Diagnosis, scales: Scales) -> str:
-    """Return the held-out proof in one sentence."""
-    held, unit = diagnosis.heldout, scales.torque
-    before, noise = unit.number(held.before_rms), unit.number(held.floor_rms)
-    verb = "falls" if held.confidence_interval[0] > 0 else "does not clearly fall:"
-    return f"On unseen runs the error {verb} from {before} to {unit.text(held.after_rms)}; noise is {noise}."
-
-
 def delivered(diagnosis: Diagnosis) -> tuple[str, ...]:
     """List the files of the better model, the one to use first: beside an FMU of another team its correction."""
     made = diagnosis.improved
-    names = ("correction", "ssp") if "correction" in made else ()
-    return tuple(str(made[name]) for name in (*names, "fmu", "card") if made.get(name))
+    beside = (made["correction"], made.get("ssp", "")) if "correction" in made else ()
+    return tuple(name for name in (*beside, made.get("fmu", ""), made.get("card", "")) if name)
 
 
 def left_out(diagnosis: Diagnosis) -> list[str]:
@@ -224,19 +136,54 @@ def left_out(diagnosis: Diagnosis) -> list[str]:
 def proven_range(diagnosis: Diagnosis, scales: Scales) -> str:
     """Return where the improved model is proven, for example "from 20 to 90°/s"; empty if unknown."""
     said = []
-    for name, scale in (("speed", scales.speed), ("position", scales.position)):
-        ends = diagnosis.improved.get(name)
-        if isinstance(ends, (list, tuple)) and len(ends) == 2:
-            said.append(f"from {scale.span(float(ends[0]), float(ends[1]))}")
+    made = diagnosis.improved
+    for ends, scale in ((made.get("speed"), scales.speed), (made.get("position"), scales.position)):
+        if ends:
+            said.append(f"from {scale.span(*ends)}")
     return " and ".join(said)
+
+
+def sized(finding: Finding) -> tuple[str, str]:
+    """Return size and its 95 % range as they are printed: angles and lengths in a unit that needs no zeros."""
+    size = re.fullmatch(r"([-−\d.e+]+) (rad|m)", finding.size)
+    if not size:
+        return minus(finding.size), minus(finding.size_range)
+    scale = scale_of(size[2], abs(_value(size[1])))
+    ends = tuple(_value(end) * scale.factor for end in finding.size_range.split(" to ") if end)
+    return scale.text(_value(size[1]), 3), " to ".join(decimals(ends, 3))
+
+
+def in_handy_units(text: str) -> str:
+    """Return a sentence whose angles, lengths and speeds in SI units are in units that need no zeros."""
+    return re.sub(r"(?<![\w.])(\d[\d.]*(?:e[-+]?\d+)?) (rad/s|m/s|rad|m)(?![\w·/])", _handy, text)
+
+
+def _handy(found: re.Match[str]) -> str:
+    value = _value(found[1])
+    return scale_of(found[2], abs(value)).text(value)
+
+
+def stated(finding: Finding) -> str:
+    """Return the plain sentence of a finding."""
+    return closed(in_handy_units(finding.statement))
+
+
+def _value(text: str) -> float:
+    return float(text.replace("−", "-"))
 
 
 def shows_from(finding: Finding) -> str:
     """Return the smallest size that would have shown, with the unit of the size."""
     if finding.visible_from is None:
         return ""
-    size = joined(trimmed(number(finding.visible_from)), unit_of(finding))
+    size = _limit(finding.visible_from, unit_of(finding))
     return f"{size} {finding.evidence}" if finding.answer == "not_seen" and finding.evidence else size
+
+
+def _limit(value: float, unit: str) -> str:
+    if unit in ("rad", "m"):
+        return scale_of(unit, abs(value)).text(value)
+    return joined(trimmed(number(value)), unit)
 
 
 def unit_of(finding: Finding) -> str:
@@ -255,6 +202,14 @@ def lowered(title: str) -> str:
 def started(sentence: str) -> str:
     """Return a sentence that begins as one."""
     return sentence[:1].upper() + sentence[1:]
+
+
+def unseen_torque(diagnosis: Diagnosis, scales: Scales) -> str:
+    """Return the torque, RMS, with which any effect would have been seen, whatever its own number means."""
+    left = [trace.tau - trace.after for trace in diagnosis.traces if not trace.heldout]
+    judged = np.concatenate(left) if left else np.empty(0)
+    size = float(np.sqrt(np.nanmean(judged**2) * SEEN / (1 - SEEN))) if judged.size else 0.0
+    return f"{scales.torque.text(size)} RMS" if size else ""
 
 
 def either(sentences: list[str]) -> list[str]:

@@ -1,0 +1,178 @@
+"""`cosim.diagnose`: recordings and a card to what the card lacks, and a better card."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from cosim.api.recordings import Source, read_all
+from cosim.data.recording import Recording
+from cosim.diagnosis.black_box import BlackBox, as_base
+from cosim.diagnosis.closed_loop import Loops
+from cosim.diagnosis.correction_fmu import Correction, motion_of
+from cosim.diagnosis.deliver import FILES, QUICK, as_json, check_out, deliver, deliver_quickly
+from cosim.diagnosis.diagnose import diagnose as find
+from cosim.diagnosis.entries import Improved
+from cosim.diagnosis.result import Diagnosis, Finding
+from cosim.diagnosis.terminal import summary
+from cosim.fmi.renamed import Alias
+from cosim.reading import check_kind
+from cosim.support.errors import InputError
+from cosim.support.html import table as html_table
+from cosim.support.html import text as html_text
+from cosim.support.plain import JsonObject
+from pyfmi_models.card import Card, read_card
+
+
+@dataclass(frozen=True)
+class DiagnosisResult:
+    """The answer of a diagnosis, and the better card."""
+
+    diagnosis: Diagnosis
+    card: Card
+    """The card refitted, with the effects that were found and stand."""
+    refitted: Card
+    """The card refitted, without any effect."""
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """() nothing is missing; ("unknown",) something is, and has no name; or ids of effects, largest first."""
+        return self.diagnosis.verdict
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """All effects that were looked for, each with its answer, size, 95 % range and sentences."""
+        return self.diagnosis.findings
+
+    def as_json(self) -> JsonObject:
+        """Return everything as plain data, as diagnosis.json holds it."""
+        return as_json(self.diagnosis)
+
+    def __str__(self) -> str:
+        return summary(self.diagnosis)
+
+    def _repr_html_(self) -> str:
+        rows = [
+            {"effect": one.title, "answer": one.answer.replace("_", " "), "size": one.size, "95 %": one.size_range}
+            for one in self.findings
+            if one.answer in ("found", "ambiguous", "not_proven")
+        ]
+        return html_table("Missing physics", rows) + html_text(str(self))
+
+
+def diagnose(
+    train: Source | Sequence[Source],
+    heldout: Source | Sequence[Source],
+    card: str | Path | Card,
+    out: str | Path | None = None,
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    fmu: str | Path | None = None,
+    variables: Mapping[str, str] | None = None,
+    quick: bool = False,
+    force: bool = False,
+    say: Callable[[str], None] = lambda text: None,
+    answered: Callable[[Diagnosis], None] = lambda found: None,
+    command: str = "cosim.diagnose",
+) -> DiagnosisResult:
+    """Say which physics a card lacks, and prove it on a recording that was never fitted.
+
+    Args:
+        train: recordings that may be fitted, one or several, each a path, data frame, mapping of arrays or `Recording`
+            (see `cosim.read`).
+        heldout: recordings that prove the result and may veto an effect; nothing is fitted to them.
+        card: the model as delivered: its path, the name of a shipped one, or a `Card`.
+        out: folder for diagnosis.json, card.toml, the improved FMUs, missing_torque.parquet and report.html; None
+            writes nothing and closes no loop.
+        columns: our name to the source's, as in `cosim.read`; they come before the card's.
+        units: our name to the unit in the source, as in `cosim.read`.
+        fmu: anyone's plant FMU as the base; the card then says roughly what it is.
+        variables: our name to the FMU's, where they differ: {"tau": "Motor.torque"}.
+        quick: write diagnosis.json and card.toml alone, and close no loop.
+        force: overwrite what is there.
+        say: told in a few words what is being done.
+        answered: told the answer as soon as it stands, before FMUs and report are made from it.
+        command: what the files shall name as what made them.
+
+    Returns:
+        `DiagnosisResult`. Torques are in N.m (N on a linear axis), positions in rad (m), times in s.
+
+    Raises:
+        InputError: a recording is held out and among the training recordings, or the card holds what a diagnosis
+            cannot take into account.
+        RecordingError, UnitError: as `cosim.read`; or the recordings cannot belong to this card, or are too short.
+        CardError: the card is not good.
+        WiringError, FmuError: the FMU has no such variables, or cannot be run.
+        OutputError: a file is there already; nothing was diagnosed then.
+    """
+    folder = None if out is None else Path(out)
+    if folder:
+        check_out(folder, force, QUICK if quick else FILES)
+    believed = card if isinstance(card, Card) else read_card(card)
+    names = dict(believed.columns) | dict(columns or {})
+    fitted, held = read_all(train, "train", names, units), read_all(heldout, "heldout", names, units)
+    check_kind([*fitted, *held], believed.mount.motion)
+    check_split(fitted, held)
+    given = _Given(fitted, held, believed)
+    if fmu is not None:
+        given = _beside(BlackBox(Path(fmu), {name: Alias(own) for name, own in (variables or {}).items()}), given, say)
+    telling = _Telling(say, answered)
+    return (
+        _delivered(given, folder, command, telling) if folder and not quick else _found(given, folder, command, telling)
+    )
+
+
+@dataclass(frozen=True)
+class _Given:
+    """What is diagnosed; beside somebody's FMU its name, and what writes the correction for it."""
+
+    train: Sequence[Recording]
+    heldout: Sequence[Recording]
+    card: Card
+    more: Callable[[Card, Path], Improved] = lambda *_: Improved()
+    base: str = ""
+
+
+class _Telling(NamedTuple):
+    """Whom to tell what is being done, and the answer."""
+
+    say: Callable[[str], None]
+    answered: Callable[[Diagnosis], None]
+
+
+def _beside(box: BlackBox, given: _Given, say: Callable[[str], None]) -> _Given:
+    """Put the card that is most like an FMU in its place."""
+    base = as_base(box, given.train, given.heldout, given.card, say)
+    correction = Correction(box, base.card, *motion_of(given.train[0]))
+    return _Given(base.train, base.heldout, base.card, correction.deliver, box.told)
+
+
+def _found(given: _Given, out: Path | None, command: str, telling: _Telling) -> DiagnosisResult:
+    """Diagnose, and write the answer and the card where there is a folder."""
+    outcome = find(given.train, given.heldout, given.card, telling.say)
+    telling.answered(outcome.diagnosis)
+    done = outcome.diagnosis
+    if out:
+        done = deliver_quickly(outcome, given.train, given.heldout, given.card, out, command, given.base)
+    return DiagnosisResult(done, outcome.card, outcome.refitted)
+
+
+def _delivered(given: _Given, out: Path, command: str, telling: _Telling) -> DiagnosisResult:
+    """Diagnose with the loops closed beside it, and write all files."""
+    train, heldout, card = given.train, given.heldout, given.card
+    with Loops(card, heldout) as loops:
+        loops.close("nominal", card.plant())
+        outcome = find(train, heldout, card, telling.say, loops.close)
+        telling.answered(outcome.diagnosis)
+        done = deliver(outcome, train, heldout, card, out, command, loops, telling.say, given.more, given.base)
+    return DiagnosisResult(done, outcome.card, outcome.refitted)
+
+
+def check_split(train: Sequence[Recording], heldout: Sequence[Recording]) -> None:
+    """Refuse a recording that is fitted and held out (raises InputError)."""
+    hashes = {recording.sha256 for recording in train} - {""}
+    for one in heldout:
+        if one.sha256 in hashes or any(one is other for other in train):
+            text = f"{one.name} is held out and among the training recordings; a proof needs a recording of its own."
+            raise InputError(text, culprit=one.name)

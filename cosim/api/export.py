@@ -1,0 +1,170 @@
+"""`cosim.export`: a card to FMUs, and on wish to an SSP and to Modelica text."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from cosim.support.files import check_free, directory
+from cosim.support.html import table as html_table
+from pyfmi_models.card import Card, read_card
+from pyfmi_models.export import export_fmu
+from pyfmi_models.export.platforms import platforms_of
+from pyfmi_models.model import Model
+
+Fmi = Literal[2, 3]
+Writer = Callable[[Path, bool], object]
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written: the FMUs, the SSP and the Modelica package (None where they were not asked for)."""
+
+    fmus: tuple[Path, ...]
+    ssp: Path | None = None
+    modelica: Path | None = None
+
+    @property
+    def paths(self) -> tuple[Path, ...]:
+        """All files in the order in which they were written."""
+        return (*self.fmus, *(path for path in (self.ssp, self.modelica) if path))
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.paths))
+
+    def _repr_html_(self) -> str:
+        return html_table("Exported", [{"file": path, "bytes": f"{path.stat().st_size:,}"} for path in self.paths])
+
+
+@dataclass(frozen=True)
+class _Archive:
+    path: Path
+    model: Model
+    fmi: Fmi
+    machines: tuple[str, ...]
+
+
+def export(
+    card: str | Path | Card,
+    out: str | Path,
+    *,
+    fmi: Fmi | Literal["both"] = "both",
+    platform: str = "host",
+    ssp: bool = False,
+    modelica: bool = False,
+    force: bool = False,
+    progress: Progress = lambda done, of: None,
+) -> Exported:
+    """Write the plant of a card and, where it has one, its controller as FMUs for co-simulation and model exchange.
+
+    Args:
+        card: a model card: its path, the name of a shipped one ("paper_mount"), or a `Card`.
+        out: folder for the files, NAME_plant_fmi3.fmu and so on; it is made where it is not there.
+        fmi: version of the standard: 2, 3 or "both".
+        platform: "host", "all", or names with commas between ("x86_64-linux,aarch64-linux").
+        ssp: also wire plant, controller and a set point as one SSP 1.0, NAME.ssp.
+        modelica: also write the plant as a Modelica package.
+        force: overwrite what is there.
+        progress: told how many FMUs are done, and of how many.
+
+    Returns:
+        `Exported`: the paths.
+
+    Raises:
+        CardError: the card is not good, or cannot have what is asked for.
+        OutputError: a file is there already; nothing was written then.
+    """
+    return planned(card, out, fmi, platform, ssp, modelica, force).write(progress)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What will be written, all of it checked."""
+
+    archives: tuple[_Archive, ...]
+    ssp: tuple[Path, Writer] | None
+    modelica: tuple[Path, Writer] | None
+    force: bool
+
+    def write(self, progress: Progress = lambda done, of: None) -> Exported:
+        """Write everything; `progress` is told how many FMUs are done, and of how many."""
+        for done, one in enumerate(self.archives):
+            progress(done, len(self.archives))
+            directory(one.path.parent)
+            export_fmu(one.model, one.path, fmi=one.fmi, force=self.force, platforms=one.machines)
+        for path, write in self._others():
+            write(path, self.force)
+        ssp, modelica = (one[0] if one else None for one in (self.ssp, self.modelica))
+        return Exported(tuple(one.path for one in self.archives), ssp, modelica)
+
+    def check(self) -> None:
+        """Refuse to write over what is there (raises OutputError)."""
+        for path in (*(one.path for one in self.archives), *(path for path, _ in self._others())):
+            check_free(path, self.force)
+
+    def _others(self) -> list[tuple[Path, Writer]]:
+        return [one for one in (self.ssp, self.modelica) if one]
+
+
+def planned(
+    card: str | Path | Card,
+    out: str | Path,
+    fmi: Fmi | Literal["both"],
+    platform: str,
+    ssp: bool,
+    modelica: bool,
+    force: bool,
+) -> Plan:
+    """Check everything that `export` was given, and return what will be written; arguments and errors are its own."""
+    platforms, folder = platforms_of(platform), Path(out)
+    read = card if isinstance(card, Card) else read_card(card)
+    stem = Path(read.path).stem or read.plant().name
+    versions: tuple[Fmi, ...] = (2, 3) if fmi == "both" else (fmi,)
+    plan = Plan(
+        archives=tuple(_archives(read, folder, stem, versions, platforms)),
+        ssp=(folder / f"{stem}.ssp", _system_writer(read, versions[0], platforms)) if ssp else None,
+        modelica=_modelica_writer(read, folder, stem) if modelica else None,
+        force=force,
+    )
+    plan.check()
+    return plan
+
+
+def _archives(
+    card: Card, out: Path, stem: str, versions: tuple[Fmi, ...], platforms: tuple[str, ...]
+) -> list[_Archive]:
+    models = {"plant": card.plant().model()}
+    if card.controller is not None:
+        models["controller"] = card.controller_model()
+    return [
+        _Archive(out / folder / f"{stem}_{part}_fmi{version}.fmu", model, version, machines)
+        for part, model in models.items()
+        for version in versions
+        for folder, machines in _folders(version, platforms).items()
+    ]
+
+
+def _folders(version: Fmi, platforms: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+    """Subfolders for archives and the machines of each: FMI 2 has one place for two kinds of Linux."""
+    both = {"x86_64-linux", "aarch64-linux"} <= set(platforms)
+    return {"": platforms} | ({"aarch64-linux": ("aarch64-linux",)} if version == 2 and both else {})
+
+
+def _system_writer(card: Card, fmi: Fmi, platforms: tuple[str, ...]) -> Writer:
+    """Return what writes the SSP of a card to a path, by force or not; refuse a card that cannot have one."""
+    from cosim.models.system import system_of
+    from pyfmi_models.export.ssp import export_ssp
+
+    system = system_of(card)
+    return lambda path, force: export_ssp(system, path, fmi=fmi, force=force, platforms=platforms)
+
+
+def _modelica_writer(card: Card, out: Path, stem: str) -> tuple[Path, Writer]:
+    """Return the path of the Modelica package of a card's plant and what writes it."""
+    from pyfmi_models.derivation import derivation_of
+    from pyfmi_models.export.modelica import export_modelica, package_name
+
+    plant = card.plant()
+    path = out / f"{package_name(stem)}.mo"
+    return path, lambda path, force: export_modelica(plant.model(), path, derivation_of(plant), force=force)

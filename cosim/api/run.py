@@ -1,0 +1,110 @@
+"""`cosim.run`: a scenario to a recording, its statistics and a page of pictures."""
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from cosim.master.isolated import CALL_TIMEOUT, run_isolated
+from cosim.master.result import RunResult, Statistics
+from cosim.master.simulate import Options, Progress
+from cosim.master.simulate import run as run_here
+from cosim.models.cache import with_fmus
+from cosim.support.files import check_free, replacing
+from cosim.support.lock import claimed
+from cosim.system.scenario import Scenario, read_scenario
+
+RECORDING, STATISTICS, PAGE = "recording.parquet", "run.json", "run.html"
+
+
+def run(
+    scenario: str | Path | Scenario,
+    out: str | Path | None = None,
+    *,
+    page: bool = True,
+    force: bool = False,
+    compiled: bool = True,
+    isolate: bool | None = None,
+    call_timeout: float = CALL_TIMEOUT,
+    command: str = "cosim.run",
+    progress: Progress | None = None,
+    say: Callable[[str], None] = lambda text: None,
+) -> RunResult:
+    """Run a scenario; FMUs of its cards are built where the cache does not have them.
+
+    Args:
+        scenario: a scenario (.toml) or SSP: its path, the name of a shipped one ("sidereal"), or a `Scenario`.
+        out: folder for recording.parquet, run.json and run.html; None keeps the recording in memory and writes nothing.
+        page: write run.html, the page of pictures.
+        force: overwrite what is there.
+        compiled: False asks for the loop in Python, which is slow and gives the same bits.
+        isolate: run in a process of its own, which may crash; None does so where there is a folder and the scenario
+            has FMUs or functions that are given.
+        call_timeout: seconds that one call of an isolated component may take.
+        command: what the recording shall say it was made by.
+        progress: called between chunks with ticks done and ticks in all.
+        say: told of each FMU that is built.
+
+    Returns:
+        `RunResult`.
+
+    Raises:
+        ScenarioError, WiringError, FmuError, SignalError, OutputError: before the first step; one sentence each.
+        StepError: a component failed; what was recorded before is in the file.
+        LostComponentError: an isolated component ended, crashed or blocked its process.
+    """
+    wanted = scenario if isinstance(scenario, Scenario) else read_scenario(str(scenario))
+    folder = None if out is None else Path(out)
+    for path in files_of(folder, page).values():
+        check_free(path, force)
+    ready = with_fmus(wanted, say)
+    options = Options(None, force, progress, compiled, command)
+    if folder is None:
+        done = run_here(ready, options)
+        return replace(done, statistics={**done.statistics, "scenario": wanted.name})
+    return Delivery(folder, options, is_foreign(wanted) if isolate is None else isolate, call_timeout, page).of(ready)
+
+
+@dataclass(frozen=True)
+class Delivery:
+    """A run into a folder: how it is carried out, here or in a process of its own, and what is written; see `run`."""
+
+    folder: Path
+    options: Options
+    isolate: bool
+    call_timeout: float = CALL_TIMEOUT
+    page: bool = True
+
+    def of(self, scenario: Scenario) -> RunResult:
+        """Run a scenario whose FMUs are there; its process inherits the lock of the folder."""
+        with claimed(self.folder, "run") as lock:
+            return self._written(scenario, self._carried_out(scenario, lock))
+
+    def _carried_out(self, scenario: Scenario, lock: int) -> RunResult:
+        options = replace(self.options, path=self.folder / RECORDING)
+        if self.isolate:
+            return run_isolated(scenario, options, call_timeout=self.call_timeout, keep=(lock,))
+        return run_here(scenario, options)
+
+    def _written(self, scenario: Scenario, done: RunResult) -> RunResult:
+        """Write the page and the statistics beside the recording."""
+        files, force = files_of(self.folder, self.page), self.options.force
+        told: Statistics = {**done.statistics, "scenario": scenario.name, "recording": str(files["recording"])}
+        if self.page:
+            from cosim.plots.run_page import write_page
+
+            told["page"] = str(write_page(files["page"], files["recording"], scenario, done.statistics, force))
+        with replacing(files["statistics"], force) as partial:
+            partial.write_text(json.dumps(told, indent=2) + "\n", "utf-8")
+        return replace(done, statistics=told, files=files)
+
+
+def is_foreign(scenario: Scenario) -> bool:
+    """Whether a scenario runs what was not built here from a card: FMUs and functions that are given."""
+    return any(one.fmu is not None or one.python is not None for one in scenario.components.values())
+
+
+def files_of(out: Path | None, page: bool = True) -> dict[str, Path]:
+    """Return the files of a run by kind; none where nothing is written."""
+    names = {"recording": RECORDING, "statistics": STATISTICS} | ({"page": PAGE} if page else {})
+    return {} if out is None else {kind: out / name for kind, name in names.items()}

@@ -1,0 +1,247 @@
+"""`cosim.show`: any file of this project, told as facts and tables."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from cosim.data.preview import preview
+from cosim.data.recording import Recording
+from cosim.plots import recording as told
+from cosim.support.errors import InputError
+from cosim.support.html import facts as html_facts
+from cosim.support.html import table as html_table
+from cosim.support.html import text as html_text
+from cosim.support.plain import Json
+
+Facts = Mapping[str, Json]
+Row = Mapping[str, Json]
+Tables = Mapping[str, Sequence[Row]]
+NO_RECORDINGS = (".fmu", ".ssp", ".ssd", ".toml", "")
+"""Suffixes of what is no recording; a name without one is that of what is shipped."""
+WIRES = "wires"
+"""The table that is drawn on a screen."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What a file holds: facts by name, tables by name as rows, and the drawing of a scenario's wires as lines."""
+
+    facts: Facts
+    tables: Tables
+    drawing: tuple[str, ...] = field(default=())
+
+    def __str__(self) -> str:
+        lines = [f"{name}: {value}" for name, value in self.facts.items()]
+        for name, rows in self.tables.items():
+            lines += ["", *self.drawing] if name == WIRES else ["", name, *_lines(rows)]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        first = next(iter(self.facts.values()), "")
+        tables = (html_table(name, rows) for name, rows in self.tables.items() if name != WIRES)
+        drawn = html_text("\n".join(self.drawing)) if self.drawing else ""
+        return html_facts(str(first), self.facts) + drawn + "".join(tables)
+
+
+def show(
+    source: str | Path | Recording,
+    *,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    layout: Mapping[str, str] | None = None,
+    picture: str | Path | None = None,
+    force: bool = False,
+) -> Shown:
+    """Tell what a recording, FMU, SSP, scenario or card holds; one that is shipped is given by its name.
+
+    Args:
+        source: a path, the name of a shipped scenario or card, or a `Recording`.
+        columns: of a recording's file, our name to its name.
+        units: of a recording's file, our name to the unit in it.
+        layout: how a text is written; see `Recording.read`.
+        picture: an SVG or PNG file into which a recording is drawn.
+        force: overwrite the picture.
+
+    Returns:
+        `Shown`: facts and tables; values are texts with their units. Of a recording's file the facts hold the options
+        that it needs.
+
+    Raises:
+        InputError: the file is nothing that can be shown, or breaks its own rules.
+    """
+    if isinstance(source, Recording):
+        return _of_recording(source, picture, force)
+    if Path(source).suffix in NO_RECORDINGS:
+        facts, tables = describe(str(source))
+        return Shown(facts, tables, tuple(drawing(str(source))) if WIRES in tables else ())
+    options = {"columns": columns or {}, "units": units or {}, "layout": layout or {}}
+    return _of_file(Path(source), options, picture, force)
+
+
+def _lines(rows: Sequence[Row]) -> list[str]:
+    """Rows as lines, their columns under each other."""
+    cells = [[str(value) for value in row.values()] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    padded = ([text.ljust(width) for text, width in zip(row, widths, strict=True)] for row in cells)
+    return ["  " + "  ".join(row).rstrip() for row in padded]
+
+
+def drawing(file: str) -> list[str]:
+    """Return the wiring of a scenario as lines of text, with the delay of each wire."""
+    from cosim.system.diagram import draw
+    from cosim.system.scenario import read_scenario
+
+    return draw(read_scenario(file))
+
+
+def describe(file: str) -> tuple[Facts, Tables]:
+    """Return facts by name, and tables by name as lists of rows.
+
+    Raises:
+        InputError: the file is nothing that can be shown, or breaks its own rules.
+    """
+    path = Path(file)
+    if path.suffix == ".fmu":
+        return _fmu(path)
+    if path.suffix in (".ssp", ".ssd"):
+        return _scenario(file)
+    return _toml(file)
+
+
+def _of_file(path: Path, options: Mapping[str, Mapping[str, str]], picture: str | Path | None, force: bool) -> Shown:
+    seen = preview(path, options)
+    drawn = {"picture": str(told.draw(seen.recording, seen.sources, Path(picture), force))} if picture else {}
+    return Shown(
+        {"recording": str(path)} | told.facts(seen) | drawn, {"columns": told.rows(seen.recording, seen.sources)}
+    )
+
+
+def _of_recording(recording: Recording, picture: str | Path | None, force: bool) -> Shown:
+    drawn = {"picture": str(told.draw(recording, {}, Path(picture), force))} if picture else {}
+    tables: dict[str, Sequence[Row]] = {"columns": told.rows(recording)}
+    if recording.others:
+        tables["text"] = [_of_text(recording, name) for name in recording.others]
+    return Shown({"recording": recording.name} | told.facts_of(recording) | drawn, tables)
+
+
+def _of_text(recording: Recording, name: str) -> Row:
+    """Tell of a column that is no number how often it changes, and its first and last value."""
+    changes = recording.changes(name)
+    shown = [f"{len(one)} bytes" if isinstance(one, bytes) else f"{one}" for one in (changes[0][1], changes[-1][1])]
+    return {"column": name, "changes": len(changes) - 1, "first": shown[0], "last": shown[1]}
+
+
+def _fmu(path: Path) -> tuple[Facts, Tables]:
+    from cosim.fmi.description import describe as read
+    from cosim.fmi.variables import ports_of
+
+    description = read(path)
+    kinds = {"co-simulation": description.coSimulation, "model exchange": description.modelExchange}
+    facts = {
+        "FMU": str(path),
+        "model": description.modelName,
+        "description": description.description or "",
+        "FMI": description.fmiVersion,
+        "kinds": ", ".join(name for name, kind in kinds.items() if kind is not None),
+        "made by": description.generationTool or "?",
+    }
+    order = ("input", "output", "parameter", "structuralParameter", "calculatedParameter", "local", "independent")
+    ports = sorted(ports_of(description).values(), key=lambda port: order.index(port.causality))
+    variables = [
+        {
+            "variable": port.name,
+            "causality": port.causality,
+            "type": _type(port),
+            "unit": port.unit,
+            "start": "" if port.start is None else f"{port.start:g}" if isinstance(port.start, float) else port.start,
+            "description": port.description,
+        }
+        for port in ports
+        if not port.array
+    ]
+    return facts, {"variables": variables}
+
+
+def _type(port: Any) -> str:
+    """Write a type with the size of an array and the items of an enumeration."""
+    items = ", ".join(f"{value} {name}" for value, name in port.items.items())
+    size = f" {' x '.join(map(str, port.shape))}" if port.shape else ""
+    return f"{port.type}{size}" + (f" ({items})" if items else "")
+
+
+def _toml(file: str) -> tuple[Facts, Tables]:
+    import tomllib
+
+    from cosim.support.toml import parsed
+    from cosim.system.scenario import shipped_scenarios
+
+    path = Path(file)
+    if file in shipped_scenarios():
+        return _scenario(file)
+    if path.suffix == ".toml" and path.is_file():
+        try:
+            keys = parsed(path.read_text("utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise InputError(f"{file} is not valid TOML: {error}.", culprit=file) from error
+        return _card(file) if "mount" in keys else _scenario(file)
+    from pyfmi_models.card import shipped_cards
+
+    if file in shipped_cards():
+        return _card(file)
+    if path.exists():
+        raise InputError(f"{file} is nothing that can be shown: a recording, FMU, scenario or card.", culprit=file)
+    choices = (*shipped_scenarios(), *shipped_cards())
+    raise InputError(f"{file} does not exist; shipped are: {', '.join(choices)}.", culprit=file, choices=choices)
+
+
+def _scenario(file: str) -> tuple[Facts, Tables]:
+    from cosim.system.diagram import in_short, on_the_way, origin, wire_delays
+    from cosim.system.scenario import read_scenario
+
+    scenario = read_scenario(file)
+    stated = wire_delays(scenario)
+    facts = {
+        "scenario": scenario.name,
+        "description": scenario.description,
+        "step": f"{scenario.step:g} s",
+        "stop": f"{scenario.stop:g} s ({scenario.ticks:,} steps)",
+        "algorithm": in_short(scenario),
+        "rows": f"one in {scenario.decimation} steps",
+    }
+    components = [
+        {"component": name, "from": origin(one), "steps every": f"{scenario.every.get(name, 1) * scenario.step:g} s"}
+        for name, one in scenario.components.items()
+    ]
+    wires = [
+        {
+            "from": wire.source,
+            "to": wire.target,
+            "delay in ticks": str(stated[wire.target]),
+            "on the way": on_the_way(wire).removeprefix("; "),
+        }
+        for wire in scenario.wires
+    ]
+    records = [{"column": name, "signal": one.signal, "mode": one.mode} for name, one in scenario.records.items()]
+    return facts, {"components": components, WIRES: wires, "recorded": records}
+
+
+def _card(file: str) -> tuple[Facts, Tables]:
+    from pyfmi_models.card import read_card
+
+    card = read_card(file)
+    model = card.plant().model()
+    facts = {
+        "card": file,
+        "name": card.mount.name,
+        "motion": card.mount.motion,
+        "friction": card.friction.key,
+        "effects": ", ".join(effect.id for effect in card.effects) or "none",
+        "controller": card.controller.compensation if card.controller else "none",
+    }
+    facts |= {f"note {number}": note for number, note in enumerate(card.remarks(), 1)}
+    parameters = [
+        {"parameter": v.name, "value": f"{v.start:.6g}", "unit": v.unit, "description": v.description}
+        for v in model.parameters
+    ]
+    return facts, {"parameters": parameters}

@@ -1,0 +1,145 @@
+"""The command `cosim`: verbs that take files to files.
+
+A verb `x` is the function `x` in the module `cosim.cli.x`, or the typer `app` there if it has verbs of its own. Only
+the module of the verb that is called is imported, and it imports what is heavy inside its functions: so a run needs
+neither CasADi nor a compiler.
+
+Exit codes: 0 done, 1 only where a yes or no was asked, 2 wrong use or bad input (one sentence), 130 interrupted (143 by
+SIGTERM).
+"""
+
+import errno
+import functools
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Annotated, Any, NoReturn
+
+import typer
+
+from cosim.support.errors import CosimError
+from cosim.support.interrupts import Terminated, end_well
+from cosim.support.terminal import abandon_stdout, finish_stdout, keep_stdout, put, say
+from cosim.support.version import __version__
+from pyfmi_models.errors import ModelError
+
+SEVERAL = ("--columns", "--units", "--layout", "--variables")
+"""Options that may be followed by several name=value pairs."""
+LONGEST = 300
+"""Characters of a name, or of a reason of the system, in a message."""
+VERBS = ("demo", "export", "run", "identify", "diagnose", "prove", "paper", "sweep", "hardware", "show", "serve")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and leave with its exit code."""
+    end_well()
+    keep_stdout()
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    debug = "--debug" in given
+    rest = repeated([argument for argument in given if argument != "--debug"])
+    try:
+        application(rest, debug)(rest, prog_name="cosim")
+    except KeyboardInterrupt as error:  # while a verb was loaded, or after it had ended
+        if debug:
+            raise
+        leave(error)
+
+
+def leave(error: KeyboardInterrupt) -> NoReturn:
+    """Say that a signal ended the command, and leave with its exit code."""
+    ended = isinstance(error, Terminated)
+    say(f"cosim: {'terminated' if ended else 'interrupted'}")
+    sys.exit(143 if ended else 130)
+
+
+def repeated(arguments: Sequence[str]) -> list[str]:
+    """Let `--columns a=b c=d` (all of `SEVERAL`) take several values: repeat the option before each further one."""
+    out: list[str] = []
+    option = ""
+    for argument in arguments:
+        if argument.startswith("-"):
+            option = argument if argument in SEVERAL else ""
+        elif option and out[-1] != option:
+            if "=" in argument:
+                out.append(option)
+            else:
+                option = ""
+        out.append(argument)
+    return out
+
+
+def application(arguments: Sequence[str], debug: bool = False) -> typer.Typer:
+    """Make the command with the verb that is called, or with all that there are."""
+    app = typer.Typer(
+        name="cosim",
+        no_args_is_help=True,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback()(_options)
+    present = [verb for verb in VERBS if find_spec(f"cosim.cli.{verb}")]
+    called = [argument for argument in arguments if not argument.startswith("-")][:1]
+    for verb in [verb for verb in present if [verb] == called] or present:
+        module = import_module(f"cosim.cli.{verb}")
+        if isinstance(getattr(module, "app", None), typer.Typer):
+            for command in module.app.registered_commands:
+                command.callback = guarded(command.callback, debug) if command.callback else None
+            app.add_typer(module.app, name=verb)
+        else:
+            app.command(verb)(guarded(getattr(module, verb), debug))
+    return app
+
+
+def guarded(verb: Callable[..., Any], debug: bool) -> Callable[..., Any]:
+    """Turn what this project raises on purpose, and what the system refuses, into one sentence; Ctrl-C into 130."""
+
+    @functools.wraps(verb)
+    def call(*args: Any, **kwargs: Any) -> Any:
+        try:
+            done = verb(*args, **kwargs)
+            finish_stdout()
+            return done
+        except (CosimError, ModelError) as error:
+            if debug:
+                raise
+            say(f"cosim: {error}")
+            sys.exit(2)
+        except (OSError, MemoryError) as error:
+            if debug or (isinstance(error, OSError) and error.errno == errno.EPIPE):
+                raise
+            abandon_stdout()
+            say(f"cosim: {surroundings(error)}")
+            sys.exit(2)
+        except KeyboardInterrupt as error:
+            if debug:
+                raise
+            leave(error)
+
+    return call
+
+
+def surroundings(error: OSError | MemoryError) -> str:
+    """Say what the system refused: a full disk, a folder that is read-only, a name that is too long."""
+    if isinstance(error, MemoryError):
+        return "There is not enough memory for this."
+    reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
+    if len(reason) > LONGEST:
+        reason = f"{reason[:LONGEST]}..."
+    place = f"{str(error.filename)[:LONGEST]}: " if error.filename else ""
+    return f"{place}{reason[0].lower()}{reason[1:].rstrip('.')}."
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        put(f"mount-cosim {__version__}")
+        raise typer.Exit
+
+
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Show the version.")
+    ] = False,
+    debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks; may stand anywhere.")] = False,
+) -> None:
+    """Co-simulation of a telescope mount that finds the physics its model left out."""

@@ -1,0 +1,39 @@
+"""`cosim demo`: the whole chain on an embedded example."""
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cosim.support.memory import keep_freed_memory
+from cosim.support.terminal import put, say, stage
+
+
+def demo(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for everything the demo makes.")] = Path(
+        "cosim_demo"
+    ),
+    force: Annotated[bool, typer.Option("--force", help="Overwrite an earlier demo.")] = False,
+    verbose: Annotated[
+        bool, typer.Option("--verbose", "-v", help="Also print how exact the integration inside the FMU is.")
+    ] = False,
+) -> None:
+    """Export, co-simulate, meet a recording with concealed physics, find it, prove it, write the better FMU."""
+    from cosim.diagnosis.terminal import summary
+    from cosim.support.files import check_free
+    from cosim_studies.demo import TABLE, run_demo
+
+    keep_freed_memory()
+    check_free(out, force)
+    started = time.perf_counter()
+    with stage("cosim demo: a night's recordings of a mount that has physics its card does not know") as progress:
+        done = run_demo(out, f"cosim demo --out {out}", progress.tell)
+    put(summary(done.diagnosis, out=out / "diagnosis"))
+    put(
+        f"\nIn closed loop on the held-out set point, simulated against recorded torque, RMS [N·m]:\n"
+        f"{done.before.torque:.3g} with the card's FMU, {done.after.torque:.3g} with the improved one"
+    )
+    if verbose:
+        put(f"\n{done.table}")
+    say(f"{time.perf_counter() - started:.1f} s; everything is in {out}, the check of the integration in {TABLE}")

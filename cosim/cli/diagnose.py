@@ -1,0 +1,87 @@
+"""`cosim diagnose`: recordings and a card to what the card lacks, and a better card and FMU."""
+
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from shlex import join
+from typing import Annotated
+
+import typer
+
+from cosim.cli.complete import cards
+from cosim.reading import pairs_of, read_recordings
+from cosim.support.memory import keep_freed_memory
+from cosim.support.terminal import put, put_json, say, stage
+
+
+def diagnose(
+    train: Annotated[list[Path], typer.Argument(help="Recordings that may be fitted.", metavar="TRAIN...")],
+    heldout: Annotated[
+        list[Path], typer.Option("--heldout", help="Recordings that prove the result, and may veto an effect.")
+    ],
+    card: Annotated[
+        str, typer.Option("--card", help="Model card (.toml), or the name of a shipped one.", autocompletion=cards)
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
+    columns: Annotated[
+        list[str] | None, typer.Option("--columns", help="Our name = the file's: tau=force run3.csv:tau=current ...")
+    ] = None,
+    units: Annotated[
+        list[str] | None, typer.Option("--units", help="Units in the files: q=deg run3.csv:t=ms ...")
+    ] = None,
+    layout: Annotated[
+        list[str] | None, typer.Option("--layout", help="How texts are written: decimal=comma header=4 period=1ms ...")
+    ] = None,
+    fmu: Annotated[
+        Path | None,
+        typer.Option("--fmu", help="Anyone's plant FMU as the base; the card says roughly what it is."),
+    ] = None,
+    variables: Annotated[
+        list[str] | None, typer.Option("--variables", help="Our name = the FMU's: tau=Motor.torque q=Encoder.angle ...")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
+    check: Annotated[bool, typer.Option("--check", help="Exit with 1 if something is missing.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="The answer and the card alone: no FMU, no report.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+) -> None:
+    """Say which physics a card lacks, and prove it on a recording that was never fitted."""
+    from cosim.api.diagnose import diagnose as find
+    from cosim.diagnosis.deliver import FILES, QUICK, check_out
+    from cosim.diagnosis.terminal import summary
+    from pyfmi_models.card import read_card
+
+    keep_freed_memory()
+    check_out(out, force, QUICK if quick else FILES)
+    believed = read_card(card)
+    recordings = read_recordings((*train, *heldout), believed.columns, columns, units, believed.mount.motion, layout)
+    seconds = sum(recording.duration for recording in recordings)
+    say(f"Read {len(recordings)} recordings, {seconds:.0f} s; card {believed.mount.name}")
+    given: dict[str, Sequence[object]] = {"--heldout": heldout, "--card": [card], "--out": [out]}
+    given |= {"--columns": columns or (), "--units": units or (), "--layout": layout or ()}
+    given |= {"--fmu": [fmu] if fmu else (), "--variables": variables or ()}
+    command = _command(train, given) + (" --quick" if quick else "")
+    with stage("looking for what the model lacks") as progress:
+        found = find(
+            recordings[: len(train)],
+            recordings[len(train) :],
+            believed,
+            out,
+            fmu=fmu,
+            variables=pairs_of("--variables", variables),
+            quick=quick,
+            force=force,
+            command=command,
+            say=progress.tell,
+        )
+    if as_json:
+        put_json(found.as_json())
+    else:
+        put(summary(found.diagnosis, out=out))
+    if check and found.missing:
+        sys.exit(1)
+
+
+def _command(train: Sequence[Path], options: Mapping[str, Sequence[object]]) -> str:
+    """The command line that does the same again."""
+    told = [word for name, values in options.items() for value in values for word in (name, str(value))]
+    return join(["cosim", "diagnose", *map(str, train), *told])

@@ -1,0 +1,72 @@
+"""`cosim prove`: how often the diagnosis finds physics that was concealed from it."""
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cosim.support.terminal import put, put_json, say, stage
+
+
+def prove(
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the proof; one begun there is continued.")],
+    cases: Annotated[int, typer.Option("--cases", help="Cases in all.")] = 60,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the deck.")] = 1,
+    seconds: Annotated[float, typer.Option("--seconds", help="Length of each recording [s].")] = 60.0,
+    workers: Annotated[
+        int | None, typer.Option("--workers", help="Cases at a time; the cores of this machine.")
+    ] = None,
+    purpose: Annotated[
+        str, typer.Option("--purpose", help="scoring, or tuning: whether the code may be shaped by it.")
+    ] = "scoring",
+    decks: Annotated[
+        Path | None, typer.Option("--decks", help="List of all decks to which this one is added, for example decks.md.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print proof.json instead of the scores.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Start over, whatever is there.")] = False,
+) -> None:
+    """Conceal effects in simulated recordings, seal the truth, diagnose, open, and score against the bars."""
+    from cosim_studies.proof.conduct import GENERATOR, Benchmark, code, conduct
+    from cosim_studies.proof.decks import enlist
+
+    if decks is not None:
+        enlist(decks, GENERATOR, seed, cases, purpose, code())
+    command = f"cosim prove --cases {cases} --seed {seed} --seconds {seconds:g} --out {out}"
+    try:
+        with _telling(f"{cases} concealed cases") as told:
+            deck = Benchmark(seed, cases, seconds)
+            found = conduct(deck, out, workers=workers, force=force, say=say, told=told, command=command)
+    except KeyboardInterrupt:
+        say(f"what was done until then is scored in {out / 'README.md'}; the same command goes on from there")
+        raise
+    if as_json:
+        put_json(found)
+    else:
+        put("\n".join(_line(score) for score in found["scores"]))
+    say(f"read {out / 'README.md'}")
+
+
+@contextmanager
+def _telling(title: str) -> Iterator[Callable[[int, int, str], None]]:
+    """Yield what tells the progress: a bar on a terminal, and for each case a line with the time to go."""
+    with stage(title) as bar:
+        begun, before = time.monotonic(), -1
+
+        def told(done: int, of: int, last: str) -> None:
+            nonlocal before
+            before = done - 1 if before < 0 else before
+            bar(done, of)
+            left = (of - done) * (time.monotonic() - begun) / (done - before)
+            say(f"{last}; {done} of {of}, about {left:.0f} s left")
+
+        yield told
+
+
+def _line(score: dict[str, object]) -> str:
+    """One score on one line."""
+    from cosim_studies.proof.page import estimate, met
+
+    return f"{score['title']:<64} {estimate(score):<22} {score['asked']:<8} {met(score, 'MISSED')}".rstrip()

@@ -1,0 +1,113 @@
+"""`cosim run`: a scenario to a recording."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from cosim.cli.complete import scenarios
+from cosim.support.files import in_bytes
+from cosim.support.terminal import put, put_json, say, stage
+
+if TYPE_CHECKING:
+    from cosim.api.run import Delivery
+    from cosim.master.result import RunResult
+    from cosim.system.scenario import Scenario
+
+Progress = Callable[[int, int], None]
+SURE, LONG = 1.0, 30.0
+"""Seconds after which the speed of a run is known well enough, and time to go that is worth a word."""
+
+
+def run(
+    scenario: Annotated[
+        str,
+        typer.Argument(
+            help="A scenario (.toml), an SSP, or the name of a shipped one: sidereal.", autocompletion=scenarios
+        ),
+    ],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Directory for the recording.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print the statistics as JSON.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+    interpreted: Annotated[
+        bool, typer.Option("--interpreted", help="Use the loop in Python: slow, same bits.")
+    ] = False,
+    page: Annotated[bool, typer.Option(help="Write the page of pictures.")] = True,
+    outside: Annotated[
+        bool, typer.Option("--outside", help="Read files beside an SSP that it names outside of itself.")
+    ] = False,
+    isolate: Annotated[
+        bool | None,
+        typer.Option(help="Run in a process of its own, which may crash; so it is where FMUs or functions are given."),
+    ] = None,
+    call_timeout: Annotated[
+        float, typer.Option("--call-timeout", help="Seconds that one call of an isolated component may take.", min=0.1)
+    ] = 60.0,
+) -> None:
+    """Run a scenario and write DIR/recording.parquet, DIR/run.json (its statistics) and DIR/run.html (its pictures)."""
+    from cosim.api.run import Delivery, files_of, is_foreign
+    from cosim.master.simulate import Options
+    from cosim.models.cache import with_fmus
+    from cosim.support.files import check_free
+    from cosim.system.scenario import read_scenario
+
+    wanted, files = read_scenario(scenario, outside), files_of(out, page)
+    for one in files.values():
+        check_free(one, force)
+    if Path(scenario).suffix in (".ssp", ".ssd"):
+        say(wanted.description)
+    ready = with_fmus(wanted, say)
+    options = Options(None, force, None, not interpreted, f"cosim run {scenario} --out {out}")
+    apart = is_foreign(wanted) if isolate is None else isolate
+    done = _run(ready, Delivery(out, options, apart, call_timeout, page))
+    for line in str(done).removeprefix(f"{done.name}: ").splitlines():
+        say(line)
+    if as_json:
+        put_json(done.statistics)
+    else:
+        put(str(files["recording"]))
+
+
+def _run(scenario: "Scenario", delivery: "Delivery") -> "RunResult":
+    """Run, and show how it goes."""
+    from cosim.api.run import RECORDING
+    from cosim.support.errors import StepError
+
+    title = f"{scenario.name}: {scenario.ticks:,} steps of {scenario.step:g} s"
+    size = 8 * (scenario.ticks // scenario.decimation) * (len(scenario.records) + 1)
+    recording = delivery.folder / RECORDING
+    try:
+        with stage(title) as shown:
+            options = replace(delivery.options, progress=foretold(shown, size, say))
+            return replace(delivery, options=options).of(scenario)
+    except (StepError, KeyboardInterrupt):
+        if recording.exists():
+            say(f"what was recorded until then is in {recording}")
+        raise
+
+
+def foretold(shown: Progress, size: int, say: Callable[[str], None]) -> Progress:
+    """Return a progress that also says once how long a long run will take, and how large its recording gets."""
+    begun, told = perf_counter(), [False]
+
+    def progress(done: int, of: int) -> None:
+        shown(done, of)
+        spent = perf_counter() - begun
+        if not told[0] and spent > SURE:
+            told[0] = True
+            left = spent * (of - done) / done
+            if left > LONG:
+                say(f"about {in_time(left)} to go; the recording grows to {in_bytes(size)}")
+
+    return progress
+
+
+def in_time(seconds: float) -> str:
+    """Write a time for people."""
+    for limit, divisor, unit in ((120, 1, "s"), (7200, 60, "min"), (172_800, 3600, "h"), (6.3e7, 86_400, "days")):
+        if seconds < limit:
+            return f"{seconds / divisor:.0f} {unit}"
+    return f"{seconds / 3.156e7:.3g} years"

@@ -1,0 +1,34 @@
+"""`cosim serve`: the local page."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cosim.support.errors import MissingPackageError
+from cosim.support.terminal import put, say
+
+
+def serve(
+    port: Annotated[int, typer.Option("--port", help="Port on 127.0.0.1; 0: any that is free.")] = 0,
+    browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
+    data: Annotated[
+        Path | None, typer.Option("--data", help="Folder of what was diagnosed; by default the user's own.")
+    ] = None,
+) -> None:
+    """Open a page on this machine: drop recordings and a card, get the report. Nothing is uploaded anywhere."""
+    try:
+        from cosim.serve.server import serve as run
+        from cosim.serve.server import show
+    except ModuleNotFoundError as error:
+        text = f"cosim serve needs the package {error.name}: pip install 'mount-cosim[serve]'"
+        raise MissingPackageError(text) from error
+    from platformdirs import user_data_path
+
+    def ready(address: str) -> None:
+        put(address)
+        say("This address holds the key to the page: keep it to yourself. Ctrl-C ends it.")
+        if browser:
+            show(address)
+
+    run(data or user_data_path("mount-cosim") / "serve", port, ready)

@@ -1,0 +1,57 @@
+"""`cosim show`: any file of this project on one screen."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from cosim.cli.complete import anything
+from cosim.support.plain import Json
+from cosim.support.terminal import put_json
+
+
+def show(
+    file: Annotated[
+        str,
+        typer.Argument(
+            help="A recording, FMU, SSP, scenario or card, or the name of a shipped one.", autocompletion=anything
+        ),
+    ],
+    columns: Annotated[list[str] | None, typer.Option("--columns", help="Recording: our name = the file's.")] = None,
+    units: Annotated[list[str] | None, typer.Option("--units", help="Recording: units in the file.")] = None,
+    layout: Annotated[list[str] | None, typer.Option("--layout", help="Recording: how the text is written.")] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Recording: a picture of it, .svg or .png.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print it as JSON.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Overwrite the picture.")] = False,
+) -> None:
+    """Show a recording and the options to use it with, an FMU, a scenario or a card."""
+    from cosim.api.show import WIRES
+    from cosim.api.show import show as shown_of
+    from cosim.reading import options_of
+
+    options = options_of(Path(file), columns, units, layout)
+    shown = shown_of(file, **options, picture=out, force=force)
+    if as_json:
+        put_json({**shown.facts, **shown.tables})
+        return
+    console = Console(highlight=False, soft_wrap=not Console().is_terminal)
+    for name, value in shown.facts.items():
+        console.print(f"{name}: {value}", markup=False)
+    for name, table in shown.tables.items():
+        if name == WIRES:
+            console.print("\n".join(["", *shown.drawing, ""]), markup=False, soft_wrap=True)
+        else:
+            console.print(_table(name, table))
+
+
+def _table(title: str, rows: Iterable[Mapping[str, Json]]) -> Table:
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    listed = list(rows)
+    for name in listed[0] if listed else ():
+        table.add_column(name, overflow="fold", no_wrap=name == "over time")
+    for row in listed:
+        table.add_row(*(str(value) for value in row.values()))
+    return table

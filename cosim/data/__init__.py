@@ -1,0 +1,1 @@
+"""Recordings, their formats and checks, set-point signals and motion profiles."""

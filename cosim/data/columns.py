@@ -1,0 +1,44 @@
+"""What a file holds before anything is judged: columns by name, units and origin where they are stated."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cosim.support.plain import JsonObject
+
+ORIGIN_KEY = b"cosim.origin"
+"""Key of a Parquet file's metadata under which the origin stands, as JSON."""
+UNIT_KEY = b"unit"
+"""Key of a field's metadata under which the unit of a column stands."""
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Columns of equal length by name, as a file has them.
+
+    A column is float64; int64 where a double would lose digits; datetime64 or timedelta64 for time stamps; object
+    where the file holds text.
+
+    Args:
+        values: the columns, in the order of the file.
+        units: units that the file states for columns by name, as it writes them.
+        origin: what the file says of where it comes from.
+        format: name of the tool that wrote the file, where its export was recognised ("TwinCAT Scope").
+        layout: how a text was read, in words; empty for a binary file.
+        start: time of the first sample as an ISO text, where the file states one.
+        roles: columns whose meaning the format fixes, {"q": "POSITION"}; they need no guess.
+        lacks: why there is no column of a meaning, {"tau": "a guide log holds no torque"}.
+        notes: sentences on what was left out.
+        numbered: the file names no columns; they are called #1, #2 ...
+    """
+
+    values: dict[str, np.ndarray]
+    units: dict[str, str] = field(default_factory=dict)
+    origin: JsonObject = field(default_factory=dict)
+    format: str = ""
+    layout: str = ""
+    start: str = ""
+    roles: dict[str, str] = field(default_factory=dict)
+    lacks: dict[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    numbered: bool = False

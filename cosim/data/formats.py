@@ -1,0 +1,87 @@
+"""File formats of recordings: bytes to named columns, nothing judged yet.
+
+Text of any layout (also .gz), Parquet, MAT (v5; v7.3 is HDF5), HDF5, MDF4, MCAP and bags of ROS 2. Units come along
+where a file states them; see `Columns`.
+"""
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+from cosim.data.binary import hdf5, matlab, mcap, mdf, parquet, rosbag
+from cosim.data.columns import ORIGIN_KEY, UNIT_KEY, Columns
+from cosim.data.limits import short
+from cosim.data.text.reader import read_text
+from cosim.support.errors import CosimError, RecordingError
+
+__all__ = ["ORIGIN_KEY", "UNIT_KEY", "Columns", "read_columns", "suffix_of"]
+
+REASON = 200
+"""Characters of a reader's own message that are shown."""
+
+
+def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns:
+    """Read every column of a file; `layout` is what `--layout` says of a text.
+
+    Raises:
+        RecordingError: the file is missing, empty, too large, of an unknown kind, or cannot be read.
+        MissingPackageError: its format needs an optional package.
+    """
+    _check_file(path)
+    suffix = suffix_of(path)
+    reader = _READERS.get(suffix)
+    if reader is None:
+        raise RecordingError(f"{path} is of no known kind; known are: {', '.join(_READERS)}.", culprit=str(path))
+    try:
+        columns = read_text(path, layout) if reader is read_text else reader(path)
+    except CosimError:
+        raise
+    except Exception as error:  # every reader has its own exceptions; each means the same to the user
+        reason = str(error).splitlines()[0].rstrip(".")[:REASON] if str(error).strip() else type(error).__name__
+        raise RecordingError(f"{path} cannot be read as {suffix}: {reason}.", culprit=str(path)) from error
+    if not any(len(values) for values in columns.values.values()):
+        raise RecordingError(f"{path} holds no samples.", culprit=str(path))
+    return columns
+
+
+def _check_file(path: Path) -> None:
+    try:
+        if not path.exists():
+            raise RecordingError(f"{path} does not exist.", culprit=str(path))
+    except (OSError, ValueError) as error:  # a name that is too long, or holds a zero byte
+        reason = getattr(error, "strerror", None) or str(error)
+        raise RecordingError(f"{short(str(path))!r} cannot be opened: {reason}.", culprit=str(path)) from error
+    if not path.is_file():
+        raise RecordingError(f"{path} is not a file{_inside(path)}.", culprit=str(path))
+    if path.stat().st_size == 0:
+        raise RecordingError(f"{path} is empty.", culprit=str(path))
+
+
+def _inside(path: Path) -> str:
+    """Name the recording in the folder of a bag."""
+    bags = sorted(one.name for one in path.glob("*.*") if one.suffix in (".mcap", ".db3")) if path.is_dir() else []
+    return f" but the folder of a bag; give {path / bags[0]}" if bags else ""
+
+
+def suffix_of(path: Path) -> str:
+    """Return the suffix that tells the kind of a file: `.csv`, `.csv.gz`."""
+    return "".join(path.suffixes[-2:]).lower() if path.suffix.lower() == ".gz" else path.suffix.lower()
+
+
+_READERS: dict[str, Callable[..., Columns]] = {
+    ".csv": read_text,
+    ".csv.gz": read_text,
+    ".parquet": parquet.read,
+    ".mat": matlab.read,
+    ".h5": hdf5.read,
+    ".hdf5": hdf5.read,
+    ".mf4": mdf.read,
+    ".mcap": mcap.read,
+    ".db3": rosbag.read,
+    ".txt": read_text,
+    ".txt.gz": read_text,
+    ".tsv": read_text,
+    ".dat": read_text,
+    ".log": read_text,
+    ".asc": read_text,
+    ".lvm": read_text,
+}

@@ -1,0 +1,84 @@
+"""What a file holds before it is used: its columns, what they serve as, and the options with which it can be read."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from shlex import quote
+
+from cosim.data.assign import assign
+from cosim.data.columns import Columns
+from cosim.data.formats import read_columns
+from cosim.data.questions import PERIOD
+from cosim.data.recording import REQUIRED, Recording
+from cosim.data.spacing import with_time
+from cosim.support.errors import RecordingError, UndecidedError
+from cosim.support.files import sha256
+
+TRIES = 8
+"""Questions that a file may leave open: one for each column of ours, and its time."""
+Options = dict[str, dict[str, str]]
+
+
+@dataclass(frozen=True)
+class Preview:
+    """A file as it can be read.
+
+    Args:
+        recording: the file with `options`, as an axis if it can be one, else as a table with a time.
+        found: its columns as they are.
+        sources: our names to the file's.
+        options: what has to be said to read it, by option; an example where `undecided` says so.
+        undecided: why something has to be said, one sentence each.
+        refused: why it is no recording of an axis, whatever is said; empty if it can be one.
+    """
+
+    recording: Recording
+    found: Columns
+    sources: dict[str, str]
+    options: Options
+    undecided: tuple[str, ...]
+    refused: str
+
+    @property
+    def said(self) -> str:
+        """The options as they are typed."""
+        pairs = {name: [quote(f"{ours}={value}") for ours, value in one.items()] for name, one in self.options.items()}
+        return " ".join(f"--{name} {' '.join(texts)}" for name, texts in pairs.items() if texts)
+
+
+def preview(path: Path, options: Mapping[str, Mapping[str, str]] | None = None) -> Preview:
+    """Read a file with the options that it needs, asked of the reader one after the other.
+
+    Args:
+        path: the file.
+        options: what the user says already: {"columns": ..., "units": ..., "layout": ...}.
+
+    Raises:
+        RecordingError: it is not even a table with a time.
+    """
+    said: Options = {name: dict((options or {}).get(name, {})) for name in ("columns", "units", "layout")}
+    layout = {key: text for key, text in said["layout"].items() if key != PERIOD}
+    found = read_columns(path, layout)
+    undecided: list[str] = []
+    own = sha256(path)
+    for _ in range(TRIES):
+        try:
+            return _judged(path, own, found, said, tuple(undecided))
+        except UndecidedError as error:
+            undecided.append(str(error))
+            said = {name: error.decided_by.get(name, {}) | pairs for name, pairs in said.items()}
+    raise RecordingError(undecided[-1], culprit=str(path))
+
+
+def _judged(path: Path, own: str, found: Columns, said: Options, undecided: tuple[str, ...]) -> Preview:
+    timed, refused = with_time(found, said["layout"]), ""
+    required: tuple[str, ...] = REQUIRED
+    try:
+        recording = Recording.judged(path, path.stem, timed, own, said["columns"], said["units"], REQUIRED)
+    except UndecidedError:
+        raise
+    except RecordingError as error:
+        refused, required = str(error), ()
+        recording = Recording.judged(path, path.stem, timed, own, said["columns"], said["units"], ())
+    served = assign(path, timed, said["columns"], said["units"], required)
+    return Preview(recording, timed, served.sources, said, undecided, refused)

@@ -1,0 +1,88 @@
+"""What a file leaves open: each question is a refusal in one sentence that names the option which decides it."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from shlex import quote
+
+import numpy as np
+
+from cosim.data.columns import Columns
+from cosim.data.limits import listed, short
+from cosim.data.roles import Guess
+from cosim.support.errors import UndecidedError
+
+PERIOD = "period"
+"""Key of `--layout` for rows without a time: their distance, `1ms`."""
+
+
+def ambiguous(path: Path, told: Guess) -> UndecidedError:
+    """Ask which of several columns it is."""
+    option = f"--columns {quote(f'{told.role}={told.among[0]}')}"
+    text = f"{path}: {told.role} may be any of {listed(told.among)}; say which, for example {option}."
+    deciding = {"columns": {told.role: told.among[0]}}
+    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=told.role, choices=told.among)
+
+
+def current(path: Path, told: Guess) -> UndecidedError:
+    """Ask for the torque constant of a motor whose current was recorded."""
+    name = told.among[0]
+    text = (
+        f'{path} has no torque but a current, "{short(name)}". With the torque constant KT of the motor [N.m/A] it '
+        f'becomes one: --columns {quote(f"tau={name}")} --units "tau=KT N.m", for example "tau=0.12 N.m".'
+    )
+    deciding = {"columns": {"tau": name}, "units": {"tau": "1 N.m"}}
+    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=name, choices=told.among)
+
+
+def counted(path: Path, name: str) -> UndecidedError:
+    """Ask how large a count of an encoder is."""
+    text = (
+        f'{path}: "{short(name)}" is in counts; say how large one is, for example --units "q=0.0055 deg" where a turn '
+    )
+    deciding = {"units": {"q": "1 rad"}}
+    return UndecidedError(f"{text}has 65,536 of them.", decided_by=deciding, culprit=str(path), value=name)
+
+
+def unnamed(path: Path, found: Columns, lacking: Sequence[str]) -> UndecidedError:
+    """Ask for the names of columns without any; the first that grows is offered as time."""
+    growing = next((name for name, column in found.values.items() if _grows(column)), "")
+    rest = [name for name in found.values if name != growing]
+    ours = [rule.split("|")[0] for rule in lacking if rule != "t" or growing]
+    columns = dict(zip(ours, [growing, *rest] if "t" in ours else rest, strict=False))
+    pairs = " ".join(f"{our}={theirs}" for our, theirs in columns.items())
+    layout = {} if growing or "t" not in lacking else {PERIOD: "1ms"}
+    period = "".join(f" --layout {key}={value}" for key, value in layout.items())
+    text = f"{path} does not name its {len(found.values)} columns; say which is which, for example --columns {pairs}"
+    names, deciding = tuple(found.values), {"columns": columns, "layout": layout}
+    return UndecidedError(f"{text}{period}.", decided_by=deciding, culprit=str(path), value=len(names), choices=names)
+
+
+def counting(path: Path, name: str, step: float) -> UndecidedError:
+    """Ask what a column without a name counts that grows by whole numbers: samples, or a unit of time."""
+    text = (
+        f"{path}: {name} steps by {step:.6g}; say what one is, for example --units t=ms, or for samples that are 0.5 "
+    )
+    deciding = {"units": {"t": "ms"}}
+    return UndecidedError(f'{text}ms apart --units "t=0.5 ms".', decided_by=deciding, culprit=str(path), value=step)
+
+
+def rates(path: Path, name: str, step: float, fitting: Sequence[str], said: str) -> UndecidedError:
+    """Ask for the unit of a time that may count in several, or in none that is known."""
+    unit = (*fitting, "ms")[0]
+    text = f'{path}: "{short(name)}" steps by {step:.6g}, which is {said}. Say which with --units t={unit}.'
+    deciding = {"units": {"t": unit}}
+    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=step, choices=tuple(fitting))
+
+
+def untimed(path: Path, values: Mapping[str, np.ndarray], message: str) -> UndecidedError:
+    """Ask which column is the time, or how far apart the rows are; `message` says what there is."""
+    growing = next((name for name, column in values.items() if name and _grows(column)), "")
+    deciding = {"columns": {"t": growing}} if growing else {"layout": {PERIOD: "1ms"}}
+    text = f"{message} or, if its rows are evenly spaced, say --layout {PERIOD}=1ms."
+    return UndecidedError(text, decided_by=deciding, culprit=str(path), value="t", choices=tuple(values))
+
+
+def _grows(column: np.ndarray) -> bool:
+    if column.dtype == object or len(column) < 2:
+        return column.dtype.kind in "mM"
+    return bool(np.all(np.diff(column.astype(np.float64)) > 0)) if column.dtype.kind in "if" else True

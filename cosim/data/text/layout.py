@@ -1,0 +1,185 @@
+"""How a table is laid out as text: found out from its first lines, or stated.
+
+Every pair of separator and decimal sign is tried; the one that cuts most of the lines into equally many values wins.
+The first such line is the first sample; the line of words above it names the columns, and a line of units may stand
+between. What is above that is a preamble.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from cosim.data.text.fields import is_value, split
+from cosim.data.text.names import is_unit
+from cosim.support.errors import RecordingError
+
+SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "blank": " ", "bar": "|"}
+DECIMALS = {"point": ".", "comma": ","}
+DIALECTS = (
+    (",", "."),
+    (";", "."),
+    (";", ","),
+    ("\t", "."),
+    ("\t", ","),
+    ("|", "."),
+    ("|", ","),
+    (" ", "."),
+    (" ", ","),
+)
+COMMENTS = ("#", "%", "//")
+CLOCK_FORMAT = re.compile(r"(?:[hHmMsSdDyYfF]+[:./ -])+[hHmMsSdDyYfF]+")
+"""How a row of units says what a time stamp looks like: hh:mm:ss."""
+WINDOW = 6
+"""Lines of which all but one are samples where the samples begin; a preamble may hold a line or two like them."""
+NAMED = 1.5
+"""Advantage of a dialect in which a line of as many words names the columns."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the columns of a text are: `first` is the line of the first sample, counted from 0."""
+
+    separator: str
+    decimal: str
+    count: int
+    first: int
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        separator = next(name for name, sign in SEPARATORS.items() if sign == self.separator)
+        decimal = next(name for name, sign in DECIMALS.items() if sign == self.decimal)
+        above = self.first - bool(self.names) - bool(self.units)
+        parts = [f"separator {separator}, decimal {decimal}", f"{above} lines above the names" if above > 0 else ""]
+        parts += ["" if self.names else "no names of columns", "a row of units" if self.units else ""]
+        return ", ".join(part for part in parts if part)
+
+
+def find_layout(path: Path, lines: Sequence[str], stated: Mapping[str, str]) -> Layout | None:
+    """Find out how a table is laid out.
+
+    Args:
+        path: the file, for messages.
+        lines: its first lines.
+        stated: what `--layout` says: separator, decimal, header (line of the names from 1, 0 for none).
+
+    Returns:
+        The layout, or None if no line holds two values.
+
+    Raises:
+        RecordingError: what is stated is not known, or the text can be read in two ways.
+    """
+    tried = [_judged(lines, *dialect, stated.get("header", "")) for dialect in _dialects(stated)]
+    score, layout = max(tried, key=lambda one: one[0])
+    if layout and not layout.names and layout.separator == "," and "header" not in stated:
+        _check_decimal_commas(path, lines, layout)
+    return layout if score else None
+
+
+def _dialects(stated: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Return the pairs of separator and decimal sign that are left by what was stated."""
+    separator = _named(stated, "separator", SEPARATORS)
+    decimal = _named(stated, "decimal", DECIMALS)
+    left = [one for one in DIALECTS if separator in ("", one[0]) and decimal in ("", one[1])]
+    return left or [(separator, decimal)]
+
+
+def _named(stated: Mapping[str, str], key: str, choices: Mapping[str, str]) -> str:
+    value = stated.get(key, "")
+    sign = choices.get(value, value)
+    if sign and sign not in choices.values():
+        text = f'--layout {key}={value}: "{value}" is none; choices are: {", ".join(choices)}.'
+        raise RecordingError(text, culprit=key, value=value, choices=tuple(choices))
+    return sign
+
+
+def _judged(lines: Sequence[str], separator: str, decimal: str, header: str) -> tuple[float, Layout | None]:
+    """Return how well the lines fit a dialect, and the layout that they then have."""
+    rows = [split(line, separator) for line in lines]
+    values = [[is_value(field, decimal) for field in row] for row in rows]
+    sizes = Counter(len(row) for row, found in zip(rows, values, strict=True) if len(row) > 1 and any(found))
+    if not sizes:
+        return 0.0, None
+    count = max(sizes, key=lambda size: (sizes[size] * size, size))
+    body = [index for index, row in enumerate(rows) if len(row) == count and any(values[index])]
+    score = sum(sum(values[index]) ** 2 / max(1, sum(map(bool, rows[index]))) for index in body)
+    first = _first(rows, values, body)
+    if header == "0":
+        return score, Layout(separator, decimal, count, first)
+    if header:
+        return score, _stated(rows, Layout(separator, decimal, count, first), header)
+    names, units = _above(lines, rows, first, separator, count)
+    return score * (NAMED if names else 1.0), Layout(separator, decimal, count, first, names, units)
+
+
+def _first(rows: Sequence[list[str]], values: Sequence[list[bool]], body: Sequence[int]) -> int:
+    """Return the first line that has values where most lines have them, and is followed by such lines."""
+    usual = [sum(values[index][place] for index in body) > len(body) / 2 for place in range(len(values[body[0]]))]
+    places = [place for place, often in enumerate(usual) if often]
+    full = {index for index in body if sum(values[index][place] for place in places) > len(places) / 2}
+    written = [index for index, row in enumerate(rows) if any(row)]
+    for start, index in enumerate(written):
+        window = written[start : start + WINDOW]
+        if index in full and sum(one in full for one in window) >= len(window) - 1:
+            return index
+    return min(full, default=body[0])
+
+
+def _above(
+    lines: Sequence[str], rows: Sequence[list[str]], first: int, separator: str, count: int
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return names and units of the columns as the lines above the first sample state them."""
+    over = [index for index in range(first) if any(one.isalnum() for one in lines[index])][-2:]
+    words = [_words(lines[index], rows[index], separator, count) for index in over]
+    if not words or not words[-1]:
+        return (), ()
+    if len(words) == 2 and words[0] and is_row_of_units(words[1]):
+        return words[0], words[1]
+    return words[-1], ()
+
+
+def _words(line: str, row: Sequence[str], separator: str, count: int) -> tuple[str, ...]:
+    """Return the fields of a line that may name `count` columns; a sign of a comment before them is taken off."""
+    sign = next((sign for sign in COMMENTS if line.lstrip().startswith(sign)), "")
+    fields = split(line.lstrip().removeprefix(sign), separator) if sign else list(row)
+    if len(fields) == count + 1 and not fields[-1]:
+        fields = fields[:-1]
+    if len(fields) == count - 1:
+        fields = [*fields, ""]
+    fits = len(fields) == count and not any(is_value(field, ".") for field in fields)
+    return tuple(fields) if fits and sum(map(bool, fields)) * 2 >= count else ()
+
+
+def is_row_of_units(fields: Sequence[str]) -> bool:
+    """Whether every field is a unit or says that there is none, and one is a unit."""
+    bare = [field.strip("[]() ") for field in fields]
+    bare = ["" if CLOCK_FORMAT.fullmatch(field) else field for field in bare]
+    return any(map(is_unit, bare)) and all(
+        not field or field in ("-", "--", "1", "none") or is_unit(field) for field in bare
+    )
+
+
+def _stated(rows: Sequence[list[str]], found: Layout, header: str) -> Layout:
+    """Lay out with the line of names as stated, counted from 1."""
+    if not header.isdigit() or int(header) > len(rows):
+        text = f"--layout header={header}: it is the line of the names, from 1 to {len(rows)}, or 0 for none."
+        raise RecordingError(text, culprit="header", value=header)
+    line = int(header)
+    names = tuple((rows[line - 1] + [""] * found.count)[: found.count])
+    has_units = line < len(rows) and len(rows[line]) == found.count and is_row_of_units(rows[line])
+    first = max(found.first, line + has_units)
+    return replace(found, first=first, names=names, units=tuple(rows[line]) if has_units else ())
+
+
+def _check_decimal_commas(path: Path, lines: Sequence[str], layout: Layout) -> None:
+    """Refuse a table whose commas may be decimal signs or separators: its rows have twice the fields of its header."""
+    above = [split(line, ",") for line in lines[: layout.first]]
+    names = next((row for row in reversed(above) if len(row) > 1 and not any(is_value(one, ".") for one in row)), [])
+    if names and layout.count > len(names):
+        text = (
+            f"{path} has {len(names)} names of columns and {layout.count} fields in a row: its commas are separators "
+            "and decimal signs alike, which no option can part. Export it with semicolons or tabs."
+        )
+        raise RecordingError(text, culprit=str(path), value=layout.count)

@@ -1,0 +1,61 @@
+"""Any text to columns: an export that is recognised, or a plain table whose layout is found out."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from cosim.data.columns import Columns
+from cosim.data.importers import importer_of
+from cosim.data.limits import check_columns, short
+from cosim.data.text.encoding import text_of
+from cosim.data.text.layout import find_layout
+from cosim.data.text.table import table_of
+from cosim.data.text.vocabulary import with_vocabulary
+from cosim.support.errors import RecordingError
+
+LINES, HEAD = 400, 1 << 20
+"""Lines, and bytes, from which a layout is found out."""
+
+
+def read_text(path: Path, stated: Mapping[str, str] | None = None) -> Columns:
+    """Read a table of text.
+
+    Args:
+        path: the file, also .gz.
+        stated: what `--layout` says; see `find_layout`, and `encoding`.
+
+    Raises:
+        RecordingError: it is no table, or can be read in two ways; the message names the option that decides.
+    """
+    data, encoding = text_of(path, (stated or {}).get("encoding", ""))
+    _check_first_line(path, data)
+    lines = head_of(data)
+    importer = importer_of(lines) if not stated else None
+    if importer:
+        return importer(path, data, lines)
+    layout = find_layout(path, lines, stated or {})
+    if layout is None:
+        return _nothing(path, lines)
+    told = f"{layout}{'' if encoding == 'utf-8' else f', {encoding}'}"
+    return with_vocabulary(replace(table_of(path, data, layout), layout=told))
+
+
+def head_of(data: bytes) -> list[str]:
+    """Return the first lines of a text; a line that the head cuts is left out."""
+    head = data[:HEAD]
+    whole = head if len(data) <= HEAD else head[: head.rfind(b"\n") + 1] or head
+    return [line.rstrip("\r") for line in whole.decode("utf-8", "replace").split("\n")[:LINES]]
+
+
+def _check_first_line(path: Path, data: bytes) -> None:
+    """Refuse a line of more fields than a table may have columns before it is cut into them."""
+    line = data[: data.find(b"\n")] if b"\n" in data[:HEAD] else data[: 50 * HEAD].partition(b"\n")[0]
+    check_columns(path, 1 + max(line.count(sign) for sign in (b",", b";", b"\t")))
+
+
+def _nothing(path: Path, lines: Sequence[str]) -> Columns:
+    """Refuse what holds no line of values; names alone mean that nothing was recorded."""
+    if sum(bool(line.strip()) for line in lines) <= 1:
+        return Columns({})
+    text = f"{path} holds no table of numbers; its first line is: {short(lines[0])!r}. --layout says how it is written."
+    raise RecordingError(text, culprit=str(path))

@@ -1,0 +1,129 @@
+"""A table of text as columns: the preamble is left, the body is parsed at once."""
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+from pyarrow import csv
+
+from cosim.data.columns import Columns
+from cosim.data.limits import check_cells, short
+from cosim.data.text.layout import Layout
+from cosim.data.text.names import is_unit, spelled, split_unit
+from cosim.support.errors import RecordingError
+
+
+def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
+    """Parse the body of a text whose layout is known."""
+    body = _body(data, layout)
+    check_cells(path, body.count(b"\n"), layout.count)
+    table, notes = _parsed(path, body, layout)
+    names, units = _names(layout)
+    kept = {name: as_array(column) for name, column in zip(names, table.columns, strict=True) if name or _holds(column)}
+    return Columns(
+        kept, {name: unit for name, unit in units.items() if name in kept}, notes=notes, numbered=not layout.names
+    )
+
+
+def _holds(column: Any) -> bool:
+    """Whether a column without a name holds anything: a separator at the end of each row makes one that does not."""
+    return not pa.types.is_null(column.type) and column.null_count < len(column)
+
+
+def _body(data: bytes, layout: Layout) -> bytes:
+    """Return the text from the first sample on, its runs of blanks as tabs."""
+    start = 0
+    for _ in range(layout.first):
+        start = data.find(b"\n", start) + 1
+    body = data[start:] if start else data
+    if layout.separator != " ":
+        return body
+    return b"\n".join(b"\t".join(line.split()) for line in body.split(b"\n"))
+
+
+def _parsed(path: Path, body: bytes, layout: Layout) -> tuple[Any, tuple[str, ...]]:
+    """Parse rows; what is no row is left out with a note if it is a comment or ends the file, and refused elsewhere."""
+    odd: list[Any] = []
+    try:
+        return _read(body, layout, None), ()
+    except pa.ArrowInvalid as error:
+        if "Expected" not in str(error):
+            raise
+
+    def skip(row: Any) -> str:
+        odd.append(row)
+        return "skip"
+
+    table = _read(body, layout, skip)
+    torn = next((row for row in odd if row.number <= len(table) and not _is_remark(row.text)), None)
+    if torn is not None:
+        text = f"{path}: row {torn.number:,} has {torn.actual_columns} fields where the others have {layout.count}: "
+        raise RecordingError(f"{text}{short(torn.text)!r}.", culprit=str(path), value=torn.actual_columns)
+    lines = f"{len(odd)} lines that are no samples were" if len(odd) > 1 else "one line that is no sample was"
+    return table, (f"{path.stem}: {lines} left out, such as {short(odd[-1].text)!r}.",)
+
+
+def _is_remark(text: str) -> bool:
+    return text.lstrip().startswith(("#", "%", "//")) or not any(one.isdigit() for one in text)
+
+
+def _read(body: bytes, layout: Layout, odd: Any) -> Any:
+    return csv.read_csv(
+        pa.BufferReader(body),
+        read_options=csv.ReadOptions(
+            column_names=[str(number) for number in range(layout.count)],
+            block_size=len(body) + 1,
+            use_threads=odd is None,  # rows are numbered only without threads
+        ),
+        parse_options=csv.ParseOptions(
+            delimiter="\t" if layout.separator == " " else layout.separator, invalid_row_handler=odd
+        ),
+        convert_options=csv.ConvertOptions(decimal_point=layout.decimal),
+    )
+
+
+def _names(layout: Layout) -> tuple[list[str], dict[str, str]]:
+    """Return the name of each column and the units that names and a row of units state.
+
+    Columns that differ by their unit alone keep it in their name; those of one name have their number there.
+    """
+    if not layout.names:
+        return [f"#{number + 1}" for number in range(layout.count)], {}
+    parted = [split_unit(name) for name in layout.names]
+    names = _distinct([name for name, _ in parted], [name.strip() for name in layout.names])
+    units = {name: unit for name, (_, unit) in zip(names, parted, strict=True) if unit}
+    rows = {name: spelled(text.strip("[]() ")) for name, text in zip(names, layout.units, strict=False)}
+    return names, {name: text for name, text in rows.items() if is_unit(text)} | units
+
+
+def _distinct(bare: Sequence[str], whole: Sequence[str]) -> list[str]:
+    often, exactly = Counter(bare), Counter(whole)
+    named = [long if often[name] > 1 and name else name for name, long in zip(bare, whole, strict=True)]
+    return [
+        f"{name} (#{place})" if name and exactly[long] > 1 else name
+        for place, (name, long) in enumerate(zip(named, whole, strict=True), 1)
+    ]
+
+
+def as_array(column: Any) -> np.ndarray:
+    """Return an Arrow column as float64, int64 where a double would lose digits, datetime64, or object for text."""
+    kind = column.type
+    if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
+        return np.asarray(column.cast(pa.timestamp("ns")).to_numpy(), dtype="datetime64[ns]")
+    if pa.types.is_time(kind):
+        return np.asarray(column.cast(pa.time64("ns")).cast(pa.int64()).to_numpy()).astype("timedelta64[ns]")
+    if pa.types.is_integer(kind) and not column.null_count and _is_long(column):
+        return np.asarray(column.to_numpy())
+    numeric = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)
+    if numeric or pa.types.is_null(kind) or pa.types.is_decimal(kind):
+        return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
+    return np.asarray(column.to_pylist(), dtype=object)
+
+
+def _is_long(column: Any) -> bool:
+    """Whether integers are beyond 2^53, from where on a double skips some."""
+    values = column.to_numpy()
+    return bool(len(values)) and max(abs(int(values.min())), abs(int(values.max()))) > 2**53

@@ -1,0 +1,132 @@
+"""Columns of time, however they count: time stamps, seconds since 1970, ms or us, checked against their sampling.
+
+A servo is sampled at 10 Hz to 50 kHz, and a recording of it lasts 2 s at least. So a column without a unit that steps
+by one second or more counts something smaller than seconds; where two units fit, it is refused and `--units t=...`
+decides.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from cosim.data import questions
+from cosim.data.limits import short
+
+SLOWEST, FASTEST = 10.0, 50e3
+"""Rates at which servos are sampled [Hz]."""
+SHORTEST = 2.0
+"""Seconds below which a recording tells nothing (LEAST_SECONDS of the diagnosis)."""
+SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+YEARS = 1e9, 4.2e9
+"""Seconds since 1970 of 2001 and 2103: a time between them is a date."""
+DAY = 86_400.0
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Time stamps, the unit they are in, when they start if that is known, and what was concluded."""
+
+    values: np.ndarray
+    unit: str = ""
+    start: str = ""
+    notes: tuple[str, ...] = ()
+
+
+def read_clock(path: Path, column: np.ndarray, name: str, stated: str, servo: bool) -> Clock:
+    """Turn a column of time into numbers of one unit.
+
+    Args:
+        path: the file, for messages.
+        column: the column as `Columns` has it.
+        name: its name in the file.
+        stated: its unit where it was stated.
+        servo: whether its sampling must be one of a servo.
+
+    Raises:
+        UndecidedError: its unit is ambiguous; the message names the option that decides.
+    """
+    if column.dtype == object:
+        column = _parsed(column)
+    if column.dtype.kind in "mM":
+        return _of_stamps(column)
+    if column.dtype == object or len(column) < 2:
+        return Clock(column, stated)
+    unit = stated or _of_date(column)
+    notes: tuple[str, ...] = ()
+    if not unit and servo:
+        unit = _of_sampling(path, column, name)
+        notes = _told(path, column, name, unit)
+    values, start = _since_first(column, unit)
+    return Clock(values, unit, start, notes)
+
+
+def _parsed(column: np.ndarray) -> np.ndarray:
+    """Read time stamps of text: 01.03.2024 22:13:04,5 and the like; text that is none stays."""
+    import pandas as pd
+
+    texts = [str(text).replace(",", ".") for text in column]
+    if ":" not in texts[0]:
+        return column
+    try:
+        if "-" in texts[0] or "/" in texts[0] or texts[0].count(".") > 1:
+            stamps = pd.to_datetime(pd.Series(texts), format="mixed", dayfirst=texts[0][:4].count(".") > 0, utc=True)
+            return np.asarray(stamps.dt.tz_localize(None), dtype="datetime64[ns]")
+        return np.asarray(pd.to_timedelta(pd.Series(texts)), dtype="timedelta64[ns]")
+    except (ValueError, OverflowError):
+        return column
+
+
+def _of_stamps(column: np.ndarray) -> Clock:
+    """Return seconds since the first stamp; clocks of a day go on past midnight."""
+    missing = np.isnat(column)
+    seconds = (
+        np.where(missing, np.nan, (column - column[~missing][:1]).astype(np.int64) * 1e-9)
+        if (~missing).any()
+        else column
+    )
+    if column.dtype.kind == "m":
+        seconds = seconds + DAY * np.cumsum(np.concatenate([[0], np.diff(seconds) < -DAY / 2]))
+    start = str(column[0].astype("datetime64[ms]")) if column.dtype.kind == "M" and not missing[0] else ""
+    return Clock(np.asarray(seconds, dtype=np.float64), "s", start)
+
+
+def _of_date(column: np.ndarray) -> str:
+    """Return the unit in which a column counts since 1970, or an empty text if it does not."""
+    first = float(column[0])
+    return next((unit for unit, size in SECONDS.items() if YEARS[0] <= first * size <= YEARS[1] and unit != "s"), "")
+
+
+def _of_sampling(path: Path, column: np.ndarray, name: str) -> str:
+    """Return the unit that makes the steps of a column those of a servo; seconds wherever they can be."""
+    values = column.astype(np.float64)
+    steps = np.diff(values[np.isfinite(values)])
+    step = float(np.median(steps)) if len(steps) else 0.0
+    if step < 1:
+        return ""
+    if name.startswith("#"):
+        raise questions.counting(path, name, step)
+    span = float(np.nanmax(values) - np.nanmin(values))
+    fitting = [unit for unit, size in SECONDS.items() if SLOWEST <= 1 / (step * size) <= FASTEST]
+    lasting = [unit for unit in fitting if span * SECONDS[unit] >= SHORTEST] or fitting
+    if len(lasting) == 1:
+        return lasting[0]
+    said = " or ".join(f"{1 / (step * SECONDS[unit]):.4g} Hz in {unit}" for unit in lasting or SECONDS)
+    raise questions.rates(path, name, step, lasting, said)
+
+
+def _told(path: Path, column: np.ndarray, name: str, unit: str) -> tuple[str, ...]:
+    if not unit:
+        return ()
+    rate = 1 / (float(np.median(np.diff(column.astype(np.float64)))) * SECONDS[unit])
+    told = f'"{short(name)}" was taken for {unit}, as its rate is {rate:.4g} Hz then; --units t=s if it counts s.'
+    return (f"{path.stem}: {told}",)
+
+
+def _since_first(column: np.ndarray, unit: str) -> tuple[np.ndarray, str]:
+    """Return times since the first where they count from 1970 in less than seconds, exact to the last digit."""
+    first = column[0]
+    if unit in ("ms", "us", "ns") and YEARS[0] <= float(first) * SECONDS[unit] <= YEARS[1]:
+        ticks = int(float(first) * SECONDS[unit] * 1e3)
+        return np.asarray(column - first, dtype=np.float64), str(np.datetime64(ticks, "ms"))
+    return np.asarray(column, dtype=np.float64), ""

@@ -1,0 +1,237 @@
+"""Compare fitted structures, and candidates beside one, by one evidence.
+
+All structures of a diagnosis are compared on the same rows, scaled by the same noise over speed, beside the same
+nuisances; only their torques and tangents differ.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import inf
+
+import numpy as np
+
+from cosim.diagnosis.bands import Bands, NoiseOverSpeed, noise_over_speed
+from cosim.diagnosis.candidates import Candidate, columns_of
+from cosim.diagnosis.discrepancy import Discrepancy, Shapes, discrepancy
+from cosim.diagnosis.hypotheses import candidates, named
+from cosim.diagnosis.marginal import Group, Marginal, marginal
+from cosim.diagnosis.policy import Policy
+from cosim.diagnosis.priors import trust
+from cosim.estimation.fit import Fit
+from cosim.estimation.least_squares import projected
+from cosim.estimation.prepare import Array
+from cosim.estimation.problem import Problem
+from cosim.support.statistics import rms
+from pyfmi_models.effects import Effect
+
+Aside = frozenset[str]
+"""Names of nuisances that stand aside, because they are the effect in question."""
+NONE: Aside = frozenset()
+
+
+def aside_for(*effects: str) -> Aside:
+    """Nuisances that stand aside for effects."""
+    return frozenset(nuisance for name in effects if (nuisance := named(name).imitated_by))
+
+
+@dataclass(frozen=True)
+class Screened:
+    """A candidate with the evidence that a linear step towards it has, and the share of the plain energy."""
+
+    candidate: Candidate
+    evidence: float
+    plain: float
+    coefficients: Array
+
+    @property
+    def form(self) -> type[Effect]:
+        """Class of the effect."""
+        return type(self.candidate.instances[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """What all comparisons of a diagnosis share."""
+
+    problem: Problem
+    policy: Policy
+    bands: Bands
+    nuisances: Discrepancy
+    floor: Array
+    noise: NoiseOverSpeed
+    inertia: float
+    """Inertia [kg m2, kg] that carries the reading's noise into the torque."""
+
+    @classmethod
+    def of(cls, problem: Problem, base: Fit, policy: Policy) -> "Comparison":
+        """Set up from the refitted base: noise over speed is what the base leaves beside the best of every effect."""
+        prepared, weight = problem.prepared, problem.weight
+        nuisances = discrepancy(base.mount, prepared, policy)
+        counted = (weight > 0).astype(float)
+        known = np.column_stack([base.slopes, nuisances.columns]) * counted[:, None]
+        rest = projected(base.residual * counted, known)
+        tried = candidates(base.mount, prepared, rest, np.abs(nuisances.level))
+        groups = columns_of(base.mount, tried, prepared, base.values)
+        best: dict[type[Effect], tuple[float, Array]] = {}
+        for one, columns in zip(tried, groups, strict=True):
+            share = _share(rest, columns * counted[:, None], known)
+            form = type(one.instances[0])
+            if share > best.get(form, (0.0,))[0]:
+                best[form] = share, columns
+        everything = np.column_stack([known, *(columns * counted[:, None] for _, columns in best.values())])
+        noise = noise_over_speed(projected(base.residual * counted, everything), prepared.stacked("v"), weight)
+        bands = Bands.of(prepared, weight, noise.at(prepared.stacked("v")), policy)
+        # A base that lacks much may be left with no inertia; then the card knows better what noise there is.
+        inertia = max(float(base.mount.axis.inertia), float(problem.mount.axis.inertia))
+        floor = bands.least_noise(prepared, inertia, policy)
+        return cls(problem, policy, bands, nuisances, floor, noise, inertia)
+
+    @cached_property
+    def _nuisances(self) -> Array:
+        return self.bands.transform(self.nuisances.columns)
+
+    @cached_property
+    def _nuisance_grams(self) -> Array:
+        return self.bands.grams(self._nuisances)
+
+    def evidence(self, found: Fit, aside: Aside = NONE) -> float:
+        """Log marginal likelihood of a fitted structure, phases that each recording tells priced."""
+        return self._marginal(found, aside).log_likelihood - self.policy.phase_price * found.phases
+
+    def _marginal(self, found: Fit, aside: Aside) -> Marginal:
+        own = self.bands.transform(np.column_stack([found.residual, found.slopes]))
+        grams, groups = self._joined(own, aside)
+        return marginal(grams, self._free(found, grams), groups, self.bands.count, self.bands.effective, self.floor)
+
+    def _free(self, found: Fit, grams: Array) -> Array:
+        free = np.ones(grams.shape[1] - 1)
+        free[: len(found.free)] = [trust(n, v) for n, v in zip(found.free, found.values, strict=True)]
+        return free
+
+    def _joined(self, own: Array, aside: Aside) -> tuple[Array, list[Group]]:
+        """Gram matrices of own columns and the nuisances that stay, and where those are among the columns."""
+        groups, kept = self._staying(aside)
+        first = own.shape[1]
+        size = first + len(kept)
+        grams = np.empty((len(self.bands.count), size, size))
+        grams[:, :first, :first] = self.bands.grams(own)
+        cross = self.bands.crossed(own, self._nuisances[:, kept])
+        grams[:, :first, first:], grams[:, first:, :first] = cross, np.swapaxes(cross, 1, 2)
+        grams[:, first:, first:] = self._nuisance_grams[:, kept][:, :, kept]
+        placed, start = [], first - 1
+        for group in groups:
+            placed.append(Group(np.arange(start, start + len(group.columns)), group.prior))
+            start += len(group.columns)
+        return grams, placed
+
+    def _staying(self, aside: Aside) -> tuple[list[Shapes], list[int]]:
+        groups = [group for group in self.nuisances.groups if group.name not in aside]
+        return groups, [k for group in groups for k in group.columns]
+
+    def screen(self, found: Fit) -> list[Screened]:
+        """Score every candidate beside a fitted structure."""
+        prepared, counted = self.problem.prepared, (self.problem.weight > 0)[:, None]
+        known = np.column_stack([found.slopes, self.nuisances.columns]) * counted
+        rest = projected(found.residual * counted[:, 0], known)
+        tried = candidates(found.mount, prepared, rest, np.abs(self.nuisances.level))
+        groups = columns_of(found.mount, tried, prepared, found.values)
+        return self.score(found, tried, groups)
+
+    def score(self, found: Fit, tried: Sequence[Candidate], groups: Sequence[Array]) -> list[Screened]:
+        """Score columns of candidates beside a fitted structure."""
+        own = self.bands.transform(np.column_stack([found.residual, found.slopes]))
+        plain, bands = _Plain(found, self.problem.weight), self.bands
+        torque = rms(self.problem.prepared.stacked("tau"))
+        ready: dict[Aside, tuple[Array, list[Group], Array, Marginal]] = {}
+        scored = []
+        for one, columns in zip(tried, groups, strict=True):
+            aside = aside_for(one.effect)
+            if aside not in ready:
+                ready[aside] = self._ready(found, own, aside)
+            grams, placed, free, now = ready[aside]
+            added = self.bands.transform(columns)
+            grown = self._grown(grams, own, aside, added)
+            size = np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
+            prior = np.ones(columns.shape[1]) if one.finite else 0.5 * torque / size
+            after = marginal(
+                grown, np.concatenate([free, prior]), placed, bands.count, bands.effective, self.floor, now, 2
+            )
+            gain, beta = after.log_likelihood - now.log_likelihood, after.beta[len(free) :]
+            possible = not one.positive or bool(np.all(beta > 0))
+            shares = (gain, plain.share(columns)) if possible else (-inf, 0.0)
+            scored.append(Screened(one, *shares, beta))
+        return scored
+
+    def _ready(self, found: Fit, own: Array, aside: Aside) -> tuple[Array, list[Group], Array, Marginal]:
+        grams, placed = self._joined(own, aside)
+        free, bands = self._free(found, grams), self.bands
+        return grams, placed, free, marginal(grams, free, placed, bands.count, bands.effective, self.floor)
+
+    def group(self, found: Fit, columns: Array) -> tuple[float, Array]:
+        """Evidence of columns whose coefficients share an unknown size, and those coefficients, shrunk as that says.
+
+        Columns have unit RMS in training; the prior of the size is `policy.shape_prior` of the friction level.
+        """
+        own = self.bands.transform(np.column_stack([found.residual, found.slopes]))
+        grams, placed, free, now = self._ready(found, own, NONE)
+        bands = self.bands
+        level = rms(self.nuisances.level) or float(np.std(self.problem.prepared.stacked("tau")))
+        scaled = columns * level
+        grown = self._grown(grams, own, NONE, self.bands.transform(scaled))
+        many = len(free)
+        added = Group(np.arange(many, many + columns.shape[1]), self.policy.shape_prior)
+        both = np.concatenate([free, np.ones(columns.shape[1])])
+        after = marginal(grown, both, [*placed, added], bands.count, bands.effective, self.floor)
+        return after.log_likelihood - now.log_likelihood, after.beta[many:] * level
+
+    def above_noise(self, found: Fit, without: Fit) -> float:
+        """Energy that an effect removes, over the least noise: the reading's in the torque, and any model's accuracy.
+
+        The acceleration is known up to that noise, which biases what scales with it: least squares shrinks the inertia
+        where noise is loud, and so does a spring.
+        """
+        left = self.bands.transform(np.column_stack([without.residual, found.residual]))
+        energy = self.bands.grams(left).sum(0)
+        noise = float(self.floor @ self.bands.count)
+        return float(energy[0, 0] - energy[1, 1]) / max(noise, 1e-300)
+
+    def wander(self, found: Fit) -> dict[str, float]:
+        """Estimated sizes of the nuisances beside a structure."""
+        sizes = self._marginal(found, NONE).sizes
+        return {group.name: float(size) for group, size in zip(self.nuisances.groups, sizes, strict=True)}
+
+    def _grown(self, grams: Array, own: Array, aside: Aside, added: Array) -> Array:
+        kept = self._staying(aside)[1]
+        size, more = grams.shape[1], added.shape[1]
+        out = np.empty((len(grams), size + more, size + more))
+        out[:, :size, :size] = grams
+        cross = np.concatenate([self.bands.crossed(own, added), self.bands.crossed(self._nuisances[:, kept], added)], 1)
+        out[:, :size, size:], out[:, size:, :size] = cross, np.swapaxes(cross, 1, 2)
+        out[:, size:, size:] = self.bands.grams(added)
+        return out
+
+
+class _Plain:
+    """Share of the plain residual energy that columns explain beyond the tangents of a fit."""
+
+    def __init__(self, found: Fit, weight: Array) -> None:
+        scale = np.sqrt((found.slopes**2).sum(0)) + 1e-300
+        self._base, _ = np.linalg.qr(found.slopes / scale * weight[:, None])
+        self._weight, target = weight, found.residual * weight
+        self._rest = target - self._base @ (self._base.T @ target)
+        self._energy = float(self._rest @ self._rest) + 1e-300
+
+    def share(self, columns: Array) -> float:
+        """Share of the energy that columns explain."""
+        own = columns * self._weight[:, None]
+        own = own - self._base @ (self._base.T @ own)
+        beta = np.linalg.lstsq(own.T @ own, own.T @ self._rest, rcond=1e-9)[0]
+        return float(beta @ (own.T @ self._rest)) / self._energy
+
+
+def _share(rest: Array, columns: Array, known: Array) -> float:
+    """Share of a rest that columns explain (the rest is free of `known` already)."""
+    own = projected(columns, known)
+    beta = np.linalg.lstsq(own.T @ own, own.T @ rest, rcond=1e-9)[0]
+    return float(beta @ (own.T @ rest)) / (float(rest @ rest) + 1e-300)

@@ -1,0 +1,150 @@
+"""The decision, from scores alone: what is named, what stays open, whether something unknown is left. No data here."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import exp
+
+from cosim.diagnosis.calibration import calibrated
+from cosim.diagnosis.policy import Policy
+
+
+@dataclass(frozen=True)
+class EffectScores:
+    """Scores of an effect that stands after the proof. Nats."""
+
+    effect: str
+    evidence: float
+    """Beside the other effects, in training."""
+    margins: Mapping[str, float]
+    """By how much it is better than each rival."""
+    explains: Mapping[str, float]
+    """Share of the residual energy that the effect, or a rival in its place, removes."""
+    predicted: float = 0.0
+    """What the held-out recordings lose without it."""
+
+
+@dataclass(frozen=True)
+class TermScores:
+    """Scores of a flexible term, a smooth shape of a recorded quantity, beside the structure that stands."""
+
+    name: str
+    evidence: float
+    predicted: float
+    share: float
+    """Share of the held-out residual energy that it predicts."""
+
+
+@dataclass(frozen=True)
+class RestScores:
+    """What is left: its slow part relative to friction, in training and held out, and what it follows."""
+
+    share: float
+    share_there: float
+    terms: Sequence[TermScores] = ()
+    over_time: str = "time"
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The answer."""
+
+    sets: Mapping[str, tuple[str, ...]]
+    """For each named effect the rivals that these recordings cannot exclude."""
+    probabilities: Mapping[str, Mapping[str, float]]
+    """For each named effect the probabilities of the members of its set."""
+    is_unknown: bool
+    depends_on: tuple[str, ...]
+    doubtful: tuple[str, ...] = ()
+    """Names that help, and may yet imitate what is unknown."""
+
+
+def decide(effects: Sequence[EffectScores], rest: RestScores, policy: Policy) -> Decision:
+    """Decide what is named, what stays open and whether something without a name is left."""
+    sets = {one.effect: open_rivals(one, policy) for one in effects}
+    probabilities = {one.effect: _probabilities(one, sets[one.effect]) for one in effects}
+    unknown = is_left(effects, rest, policy)
+    follows = followed(rest, policy) if unknown else ()
+    return Decision(sets, probabilities, unknown, follows, doubted(effects, rest, policy) if unknown else ())
+
+
+def doubted(effects: Sequence[EffectScores], rest: RestScores, policy: Policy) -> tuple[str, ...]:
+    """Names that may be no more than imitations: what is left beside them is not much less than what they explain."""
+    left = max((one.evidence for one in rest.terms), default=0.0)
+    if left < policy.floor:
+        return ()
+    weak = [one for one in effects if one.explains[one.effect] < policy.imitation_share]
+    return tuple(one.effect for one in weak if left > policy.imitation * one.evidence)
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What held-out recordings gain by an effect: nats, and shares of the plain residual energy in two bands.
+
+    The bands are those of the analysis and of the protocol: fast effects show in the wider one, and in either a few
+    rows of noise may hide what the other shows.
+    """
+
+    nats: float
+    plain: float
+    protocol: float
+
+    def halves(self, policy: Policy) -> bool:
+        """Whether the plain error energy is halved in both bands, and the likelihood does not clearly speak against it.
+
+        What is slow is free to wander in the likelihood, so that an effect of it may gain nothing there.
+        """
+        return min(self.plain, self.protocol) >= policy.halved and self.nats > -policy.floor
+
+    def raises(self, policy: Policy) -> bool:
+        """Whether the plain error is raised, in both bands or by much in one."""
+        return max(self.plain, self.protocol) < 0 or min(self.plain, self.protocol) < -policy.most_raised
+
+
+def stands(gain: Gain, share: float, policy: Policy) -> bool:
+    """Whether an effect stands on the held-out recordings.
+
+    It predicts (or halves the plain error), it does not raise the plain error there, and what it explains is no small
+    change of what the base leaves: beside a strong effect, a weak one may be what the strong one's equation lacks.
+    """
+    matters = share >= policy.least_share or gain.nats >= policy.sure_predicted
+    predicts = gain.nats >= policy.least_predicted or gain.halves(policy)
+    return predicts and not gain.raises(policy) and matters
+
+
+def open_rivals(one: EffectScores, policy: Policy) -> tuple[str, ...]:
+    """Rivals that are not beaten by the margin of a set, closest first."""
+    near = [name for name, margin in one.margins.items() if margin < policy.set_margin]
+    return tuple(sorted(near, key=lambda name: one.margins[name]))
+
+
+def is_left(effects: Sequence[EffectScores], rest: RestScores, policy: Policy) -> bool:
+    """Whether something is left that is no misfit of a friction law, nor of the equations of what is named."""
+    large = rest.share > policy.large_rest or rest.share_there > policy.large_rest_there
+    sure = set(one.effect for one in effects) - set(doubted(effects, rest, policy))
+    largest = max((one.evidence for one in effects if one.effect in sure), default=0.0)
+    return large or any(_is_no_misfit(one, policy.imitation * largest, policy) for one in rest.terms)
+
+
+def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:
+    """Whether what the rest follows is more than the misfit of a friction law: sure, or held out as well as trained."""
+    sure = term.share >= -policy.contradicted or term.evidence >= policy.sure_floor
+    there = term.evidence >= policy.least_followed and term.share >= policy.follows
+    return term.evidence >= least and (there or (term.evidence >= policy.floor and sure))
+
+
+def followed(rest: RestScores, policy: Policy) -> tuple[str, ...]:
+    """Quantities that the rest follows elsewhere, the best first; where there is none, how it goes over time."""
+    best = max((one.share for one in rest.terms), default=0.0)
+    least = max(policy.follows, policy.beside * best)
+    ranked = sorted(rest.terms, key=lambda one: -one.share)
+    return tuple(one.name for one in ranked if one.share > least) or (rest.over_time,)
+
+
+def _probabilities(one: EffectScores, members: Sequence[str]) -> dict[str, float]:
+    """Posterior shares of an effect, its rivals and "none" (equal priors), times what each explains, calibrated."""
+    odds = {one.effect: 0.0, **{name: -margin for name, margin in one.margins.items()}}
+    top = max(odds.values())
+    weights = {name: exp(value - top) for name, value in odds.items()}
+    total = sum(weights.values()) + exp(-min(one.evidence, 700.0) - top)
+    told = {name: calibrated(weights[name] / total * one.explains[name]) for name in (one.effect, *members)}
+    return {name: value / max(1.0, sum(told.values())) for name, value in told.items()}

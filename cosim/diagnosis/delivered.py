@@ -1,0 +1,24 @@
+"""What each effect is worth in the model that is delivered, where others were taken out of the one it was found in."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.proof import Proof
+from cosim.diagnosis.rivals import AcceptedEffect
+from cosim.diagnosis.search import weighed
+
+
+def standing(comparison: Comparison, proof: Proof) -> Sequence[AcceptedEffect]:
+    """The effects that stand, each weighed beside just those that are delivered with it."""
+    return [_weighed(comparison, proof, one) for one in proof.standing] if proof.unproven else proof.standing
+
+
+def _weighed(comparison: Comparison, proof: Proof, one: AcceptedEffect) -> AcceptedEffect:
+    problem, chosen = comparison.problem, proof.chosen
+    many = len(problem.mount.effects)
+    own, added = chosen.mount.effects[:many], chosen.mount.effects[many:]
+    rest = tuple(effect for effect in added if effect.id != one.effect.id)
+    without = problem.fit(replace(chosen.mount, effects=(*own, *rest)), 15)
+    (first, *_) = (effect for effect in added if effect.id == one.effect.id)
+    return replace(one, own=weighed(comparison, chosen, without, effect=first), without=without)

@@ -1,0 +1,92 @@
+"""Entries of diagnosis.json that are objects, and what each of them holds; an empty one says that it was not asked."""
+
+from typing import TypedDict
+
+from cosim.support.plain import JsonObject
+
+
+class LawProposal(TypedDict, total=False):
+    """The friction law that would serve better as the base, and the share of the energy left that it would remove."""
+
+    base: str
+    proposed: str
+    gain: float
+
+
+class BiasEntry(TypedDict, total=False):
+    """Whether the control loop biased the fit: p value of "no bias", and relative moves of parameters."""
+
+    biased: bool
+    p_value: float
+    moved: dict[str, float]
+
+
+class LearnedEntry(TypedDict, total=False):
+    """The term learned for what has no name, and the held-out error before and after it [N m or N]."""
+
+    quantities: list[str]
+    size: float
+    table: list[JsonObject]
+    before: float
+    after: float
+    interval: list[float]
+    range: list[str]
+    evidence: list[float]
+    predicted: list[float]
+    statement: str
+
+
+class NextExperiment(TypedDict, total=False):
+    """The recording that would tell most: which effects it separates, by how much torque [N m], and how to take it."""
+
+    separates: list[str]
+    expected_difference: float
+    description: str
+    set_point: JsonObject
+    scenario: str
+    command: str
+
+
+class Source(TypedDict, total=False):
+    """A recording that a diagnosis read; `role` is "train" or "heldout"."""
+
+    name: str
+    sha256: str
+    role: str
+    seconds: float
+    rate_hz: float
+
+
+class CardSource(TypedDict, total=False):
+    """The card that a diagnosis started from; no hash where it was no file."""
+
+    name: str
+    path: str
+    sha256: str
+
+
+class Provenance(TypedDict, total=False):
+    """Where a diagnosis comes from; `base_fmu` names the FMU in whose place the card stands."""
+
+    version: str
+    command: str
+    date: str
+    seed: int
+    recordings: list[Source]
+    card: CardSource
+    base_fmu: str
+
+
+class Improved(TypedDict, total=False):
+    """Files of the improved model, and the ranges [rad/s, rad; m/s, m] in which it is proven."""
+
+    card: str
+    fmu: str
+    fmu_fmi2: str
+    correction: str
+    base_fmu: str
+    ssp: str
+    no_ssp: str
+    not_in_correction: list[str]
+    speed: list[float]
+    position: list[float]

@@ -1,0 +1,35 @@
+"""What is left, and what it follows: smooth shapes of recorded quantities that are no effect of the catalogue."""
+
+import numpy as np
+
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.decision import TermScores
+from cosim.diagnosis.dictionary import OF_LAW, Term, dictionary
+from cosim.diagnosis.predictive import Predictive
+from cosim.estimation.fit import Fit
+from cosim.estimation.least_squares import projected
+from cosim.estimation.prepare import Array
+
+
+def flexible_terms(comparison: Comparison, found: Fit, held: Predictive) -> list[TermScores]:
+    """Score all terms of the dictionary that the held-out recordings have too beside a structure, best first."""
+    there = set.intersection(*(set(piece.extras) for piece in held.prepared.pieces))
+    here = set.intersection(*(set(piece.extras) for piece in comparison.problem.prepared.pieces)) - {"q_d", "v"}
+    rest, slopes = held.residual(found.mount), held.slopes(found)
+    terms = dictionary(comparison.problem.prepared)
+    missing = {name for column in here - there for name in (column, f"position and {column}")}
+    looked_at = {name: term for name, term in terms.items() if name not in (*missing, *OF_LAW)}
+    scored = [_scored(comparison, found, name, term, held, rest, slopes) for name, term in looked_at.items()]
+    return sorted(scored, key=lambda one: -one.evidence)
+
+
+def _scored(
+    comparison: Comparison, found: Fit, name: str, term: Term, held: Predictive, rest: Array, slopes: Array
+) -> TermScores:
+    evidence, beta = comparison.group(found, term.columns(comparison.problem.prepared))
+    after = rest - term.columns(held.prepared) @ beta
+    gain = held.log_likelihood(after) - held.log_likelihood(rest)
+    # The base was bent to what is missing in training, so its own parameters are free beside what is predicted.
+    left = projected(np.column_stack([rest, after]) * held.weight[:, None], slopes * held.weight[:, None])
+    before, with_it = (left**2).sum(0)
+    return TermScores(name, evidence, gain, 1 - float(with_it) / max(float(before), 1e-300))

@@ -1,0 +1,85 @@
+"""Play in the drive."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+
+from cosim.diagnosis.candidates import Candidate, Span, has, of_both_ways
+from cosim.diagnosis.hypotheses.base import Hypothesis, Reach, Seen, with_numbers
+from cosim.diagnosis.result import Where
+from cosim.estimation.play import far_torques
+from cosim.estimation.prepare import Array
+from cosim.support.statistics import rms
+from pyfmi_models.effects import Effect
+from pyfmi_models.effects.backlash import Backlash
+from pyfmi_models.mount import Mount
+
+SHARE = 0.3
+"""Share of the inertia that is behind the play of a middling candidate."""
+GAPS = np.geomspace(1e-4, 1e-2, 10)
+"""Gaps that are looked at, relative to the motion ..."""
+COASTING = np.geomspace(0.03, 1.0, 11)
+"""... and decelerations by its own friction of what is behind them, relative to the RMS of the acceleration: a far side
+that slows down more than the near one never leaves its flank."""
+PROPORTIONAL = ("load_share", "load_friction", "load_viscous")
+"""Numbers of a play that its torque is proportional to: the motion of the far side stays."""
+BEST = 4
+"""Plays on that grid that become candidates."""
+
+CONCEALED = 6
+"""Gaps that are concealed."""
+
+
+class Play(Hypothesis[Backlash]):
+    """Plays of a grid that look most like the residual; it is fine, as what happens in a gap happens or does not."""
+
+    forms = (Backlash,)
+    easiest: ClassVar[int] = 1
+    rank: ClassVar[float] = 21
+    view = "since reversal"
+
+    def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
+        """The best of the grid."""
+        if has(mount, Backlash):
+            return
+        level, viscous = (of_both_ways(getattr(mount.friction, name, None)) for name in ("Fc", "sigma2"))
+        ratio = float(f"{viscous / level:.1g}") if level else 0.0
+        size = rms(span.prepared.stacked("a"))
+        numbers = [(float(gap) * span.reach, float(slowing) * size) for gap in GAPS for slowing in COASTING]
+        columns = far_torques(span.prepared, tuple(numbers), ratio)
+        for index in np.argsort(_alike(columns, span))[: -BEST - 1 : -1]:
+            gap, slowing = numbers[index]
+            far = SHARE * float(mount.axis.inertia)
+            middling = Backlash(
+                gap_rad=gap, load_share=SHARE, load_friction=far * slowing, load_viscous=far * slowing * ratio
+            )
+
+            def start(c: Array, middling: Backlash = middling) -> Effect:
+                times = float(np.clip(c[0], 0.1, 0.8 / SHARE))
+                return replace(middling, **{name: times * getattr(middling, name) for name in PROPORTIONAL})
+
+            yield Candidate("backlash", (middling,), (), start)
+
+    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
+        """Gaps all over the range, with what stops the far side as the likeliest candidate has it."""
+        for first in tried[:1]:
+            for gap in (np.geomspace(GAPS[0], GAPS[-1], CONCEALED) * span.reach).tolist():
+                yield with_numbers(first, gap_rad=gap)
+
+    def looked(self, seen: Seen, mount: Mount) -> str:
+        """Wider gaps."""
+        return f"wider than {seen.low:.2g} {'m' if mount.motion == 'linear' else 'rad'}"
+
+    def where(self, effect: Backlash, reach: Reach) -> Where:
+        """After each reversal."""
+        return Where(axis="time since reversal", description="after each reversal, until the play is crossed")
+
+
+def _alike(columns: Array, span: Span) -> Array:
+    """Share of the residual that each column explains, beyond what inertia and friction may."""
+    v, a = span.v, span.prepared.stacked("a")
+    base = np.column_stack([a, v, np.tanh(v / (0.01 * span.top)), np.ones_like(v)])
+    own = columns - base @ np.linalg.lstsq(base, columns, rcond=None)[0]
+    return np.asarray((own.T @ span.residual) ** 2 / np.maximum((own**2).sum(0), 1e-300))

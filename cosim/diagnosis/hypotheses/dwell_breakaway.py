@@ -1,0 +1,33 @@
+"""Contacts that settle while the axis rests."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import ClassVar
+
+from cosim.diagnosis.candidates import Candidate, Span, contact_level, has
+from cosim.diagnosis.hypotheses.base import Hypothesis
+from cosim.estimation.prepare import Array
+from pyfmi_models.effects import Effect
+from pyfmi_models.effects.dwell_breakaway import DwellBreakaway
+from pyfmi_models.mount import Mount
+
+
+class Settling(Hypothesis[DwellBreakaway]):
+    """A break-away torque that grows with the rest before it."""
+
+    forms = (DwellBreakaway,)
+    member: ClassVar[str] = "memory_rad"
+    rank: ClassVar[float] = 6
+    view = "rest before a start"
+
+    def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
+        """Ages of the contact that a small or a larger slip renews."""
+        if mount.friction.key == "none" or has(mount, DwellBreakaway):
+            return
+        for share in (1e-3, 4e-3):
+            fresh = DwellBreakaway(torque_per_efold=0.0, onset_s=0.1, memory_rad=share * span.reach)
+
+            def start(c: Array, fresh: DwellBreakaway = fresh) -> Effect:
+                return replace(fresh, torque_per_efold=max(float(c[0]), 1e-6 * contact_level(mount)))
+
+            yield Candidate("dwell_breakaway", (fresh,), ("torque_per_efold",), start)

@@ -1,0 +1,47 @@
+"""An encoder disc off its centre."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from math import atan2, hypot, pi
+from typing import ClassVar
+
+from cosim.diagnosis.candidates import Candidate, Span, has
+from cosim.diagnosis.hypotheses.base import Hypothesis, Seen, cycles_shown, in_cycles_a_turn, with_cycles
+from cosim.diagnosis.periodogram import peaks
+from cosim.estimation.prepare import Array
+from pyfmi_models.effects import Effect
+from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
+from pyfmi_models.mount import Mount
+
+MOST_CYCLES = 40.0
+"""Cycles a turn up to which a false reading is concealed."""
+
+
+class Eccentricity(Hypothesis[EncoderEccentricity]):
+    """A false reading once a turn of the disc."""
+
+    forms = (EncoderEccentricity,)
+    member: ClassVar[str] = "cycles_per_rev"
+    rank: ClassVar[float] = 22
+    view = "slow and fast"
+
+    def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
+        """Cycles over angle of what grows with the square of the speed."""
+        if has(mount, EncoderEccentricity):
+            return
+        fast = replace(span, residual=span.residual * (span.v / span.top) ** 2)
+        for cycles in peaks(fast, fast.residual):
+
+            def start(c: Array, cycles: float = cycles) -> Effect:
+                return EncoderEccentricity(cycles_per_rev=cycles, amplitude_rad=hypot(*c), phase=atan2(c[1], c[0]))
+
+            pair = tuple(EncoderEccentricity(cycles_per_rev=cycles, amplitude_rad=0.0, phase=p) for p in (0.0, pi / 2))
+            yield Candidate("encoder_eccentricity", pair, ("amplitude_rad",), start)
+
+    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
+        """Few cycles: bearing and disc make no more."""
+        return with_cycles(tried, cycles_shown(mount, span, 1.0, MOST_CYCLES))
+
+    def looked(self, seen: Seen, mount: Mount) -> str:
+        """Between which cycles."""
+        return in_cycles_a_turn(seen, mount)

@@ -1,0 +1,48 @@
+"""Friction that differs between the two directions."""
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+import numpy as np
+
+from cosim.diagnosis.candidates import Candidate, Span, has
+from cosim.diagnosis.hypotheses.base import Hypothesis, Reach
+from cosim.diagnosis.result import Where
+from cosim.estimation.prepare import Array, Prepared
+from pyfmi_models.effects import Effect, FrictionAsymmetry, TorqueOffset
+from pyfmi_models.mount import Mount
+
+
+class Asymmetry(Hypothesis[FrictionAsymmetry]):
+    """Level and viscous friction at once."""
+
+    forms = (FrictionAsymmetry,)
+    sizes: ClassVar[tuple[str, ...]] = ("level_asymmetry", "viscous_asymmetry")
+    rank: ClassVar[float] = 2
+    needs_position: ClassVar[bool] = False
+    view = "keep turning"
+
+    def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
+        """Both directions alike, and their two differences as columns."""
+        if has(mount, FrictionAsymmetry) or mount.friction.key == "none":
+            return
+        linear = ("level_asymmetry", "viscous_asymmetry")
+        neutral = FrictionAsymmetry(level_asymmetry=0.0, viscous_asymmetry=0.0)
+
+        def start(c: Array) -> Effect:
+            a, b = (float(np.clip(x, -0.9, 0.9)) for x in c)
+            return FrictionAsymmetry(level_asymmetry=a, viscous_asymmetry=b)
+
+        yield Candidate("friction_asymmetry", (neutral,), linear, start)
+
+    def where(self, effect: FrictionAsymmetry, reach: Reach) -> Where:
+        """Both directions."""
+        return Where(axis="direction", description="both directions, differently", regions=((-1, -1), (1, 1)))
+
+    def why_not(self, mount: Mount, prepared: Prepared) -> str:
+        """A law that says nothing of rest cannot tell it from an offset."""
+        if not mount.friction.states() and mount.of_kind(TorqueOffset):
+            return (
+                "alike to the torque offset that was found where the law says nothing of rest; take lugre in the card"
+            )
+        return super().why_not(mount, prepared)

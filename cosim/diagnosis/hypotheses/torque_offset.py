@@ -1,0 +1,28 @@
+"""A constant torque."""
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+from cosim.diagnosis.candidates import Candidate, Span, has
+from cosim.diagnosis.hypotheses.base import Hypothesis
+from cosim.estimation.prepare import Array
+from pyfmi_models.effects import Effect, TorqueOffset
+from pyfmi_models.mount import Mount
+
+
+class Offset(Hypothesis[TorqueOffset]):
+    """A constant."""
+
+    forms = (TorqueOffset,)
+    rank: ClassVar[float] = 11
+    needs_position: ClassVar[bool] = False
+
+    def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
+        """One column of ones."""
+        if has(mount, TorqueOffset):
+            return
+
+        def start(c: Array) -> Effect:
+            return TorqueOffset(torque=float(c[0]))
+
+        yield Candidate("torque_offset", (TorqueOffset(torque=0.0),), ("torque",), start)

@@ -1,0 +1,47 @@
+"""What a drive withholds."""
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+import numpy as np
+
+from cosim.diagnosis.candidates import Candidate, Span, has
+from cosim.diagnosis.hypotheses.base import QUICK_CHANGES, Hypothesis, Reach, Seen
+from cosim.diagnosis.result import Where
+from cosim.estimation.prepare import Array
+from pyfmi_models.effects import Effect
+from pyfmi_models.effects.torque_saturation import TorqueSaturation
+from pyfmi_models.mount import Mount
+
+
+class Saturation(Hypothesis[TorqueSaturation]):
+    """Less torque above a knee."""
+
+    forms = (TorqueSaturation,)
+    easiest: ClassVar[int] = -1
+    unit_step: ClassVar[float] = -0.5
+    rank: ClassVar[float] = 15
+    needs_position: ClassVar[bool] = False
+    view = "load"
+
+    def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
+        """Knees below the highest torques that were asked for."""
+        if has(mount, TorqueSaturation):
+            return
+        for share in (0.8, 0.9, 0.96, 0.985):
+            knee = float(np.quantile(np.abs(span.tau), share))
+            if knee > 0:
+
+                def start(c: Array, knee: float = knee) -> Effect:
+                    return TorqueSaturation(knee_torque=knee, slope=float(np.clip(1 + c[0], 0.02, 0.98)))
+
+                full = TorqueSaturation(knee_torque=knee, slope=1.0)
+                yield Candidate("torque_saturation", (full,), ("slope",), start)
+
+    def looked(self, seen: Seen, mount: Mount) -> str:
+        """Lower knees, past which half of what is asked for comes."""
+        return f"with a knee below {seen.high:.3g} {'N' if mount.motion == 'linear' else 'N·m'}"
+
+    def where(self, effect: TorqueSaturation, reach: Reach) -> Where:
+        """Where much is asked for."""
+        return QUICK_CHANGES

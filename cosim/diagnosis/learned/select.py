@@ -1,0 +1,154 @@
+"""Which terms are learned: those that predict recordings they were not fitted to, one after the other."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.learned.grams import Grams, grams_of, with_trials
+from cosim.diagnosis.learned.trials import Trial
+from cosim.estimation.fit import Fit, with_values
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.prepare import Array
+from pyfmi_models.effects.learned_memory import LearnedHysteresis
+from pyfmi_models.mount import Mount
+
+MOST = 3
+"""Terms of one answer: more is a black box."""
+LEAST_EVIDENCE = 10.0
+"""Evidence that one more term must have in training. Unit: nats."""
+LEAST_PREDICTED = 3.0
+"""What recordings left out must gain by one more term. Unit: nats. As for a named effect (`policy.least_predicted`)."""
+SURE_EVIDENCE = 26.0
+"""Evidence from which a term is tried although no recording left out gains by it. Unit: nats; as `policy.floor`."""
+ROUNDS = 2
+"""Gauss-Newton steps after the linear one: the terms that scale friction are not quite linear."""
+
+
+@dataclass(frozen=True)
+class Path:
+    """Terms in the order in which they were chosen, with what each gained in training and on recordings left out."""
+
+    order: tuple[int, ...] = ()
+    evidence: tuple[float, ...] = ()
+    predicted: tuple[float, ...] = ()
+
+    def longer(self, term: int, evidence: float, predicted: float) -> "Path":
+        """The path with one more term."""
+        return Path((*self.order, term), (*self.evidence, evidence), (*self.predicted, predicted))
+
+
+def path(grams: Grams, candidates: Sequence[int]) -> Path:
+    """Choose terms one after the other, each the one that recordings left out gain most by.
+
+    Where none of them gains, as each training recording may hold what no other does (another place, another
+    temperature), the largest evidence is followed if no misfit of a friction law reaches it: held-out recordings judge.
+    """
+    found, now = Path(), _scores(grams, ())
+    while len(found.order) < MOST:
+        scores = {one: _scores(grams, (*found.order, one)) for one in candidates if one not in found.order}
+        gains = {one: (score[0] - now[0], score[1] - now[1]) for one, score in scores.items()}
+        best = _best(gains)
+        if best is None:
+            break
+        found, now = found.longer(best, *gains[best]), scores[best]
+    return found
+
+
+def _best(gains: Mapping[int, tuple[float, float]]) -> int | None:
+    """The next term, from the evidence and the predicted nats of each."""
+    proven = {k: there for k, (here, there) in gains.items() if here >= LEAST_EVIDENCE and there >= LEAST_PREDICTED}
+    large = {k: here for k, (here, _) in gains.items() if here >= SURE_EVIDENCE}
+    ranked = proven or large
+    return max(ranked, key=lambda k: ranked[k]) if ranked else None
+
+
+def _scores(grams: Grams, chosen: Sequence[int]) -> tuple[float, float]:
+    """Evidence of terms in training, and what each recording says that was left out; one recording alone says both."""
+    every = range(grams.recordings)
+    evidence = grams.marginal(chosen, list(every)).log_likelihood
+    if grams.recordings < 2:
+        return evidence, evidence
+    left = 0.0
+    for one in every:
+        beta = grams.fitted(chosen, [other for other in every if other != one])
+        left += grams.predicted(chosen, beta, [one])
+    return evidence, left
+
+
+def fitted(comparison: Comparison, found: Fit, terms: Sequence[Trial]) -> tuple[Mount, tuple[Trial, ...]]:
+    """Fit the chosen terms together with the base: Gauss-Newton, the size of each term by marginal likelihood.
+
+    It ends where a step does not lower the error, as from tables so steep that no command gives what is needed.
+    """
+    weight, terms = comparison.problem.weight, tuple(terms)
+    now, best = found, (np.inf, found, terms)
+    for _ in range(1 + ROUNDS):
+        if not all(one.prior.any() for one in terms):  # nothing is left of a term that may only take energy
+            break
+        now, terms = _step(comparison, now, terms)
+        risen = tuple(map(_rising, terms))
+        is_cut = any(one is not other for one, other in zip(terms, risen, strict=True))
+        if is_cut:
+            now, terms = _at(comparison, now, now.mount, now.values, risen), risen
+        error = float(np.linalg.norm(weight * now.residual))
+        if not is_cut and error >= best[0]:
+            break
+        best = (np.inf if is_cut else error), now, terms
+    return best[1].mount, best[2]
+
+
+def _rising(trial: Trial) -> Trial:
+    """A hysteresis without the elements that would give energy."""
+    if not isinstance(trial.effect, LearnedHysteresis) or (trial.coefficients >= 0).all():
+        return trial
+    values = np.maximum(trial.coefficients, 0.0)
+    return replace(trial, prior=np.where(values > 0, trial.prior, 0.0)).with_coefficients(values.tolist())
+
+
+def _step(comparison: Comparison, now: Fit, terms: tuple[Trial, ...]) -> tuple[Fit, tuple[Trial, ...]]:
+    """One step: the target is what the base would leave without the terms."""
+    columns = [_columns_beside(now.mount, terms, k, comparison) for k in range(len(terms))]
+    old = np.concatenate([one.coefficients for one in terms])
+    residual = now.residual + np.column_stack(columns) @ old if old.any() else now.residual
+    grams = grams_of(comparison, replace(now, residual=residual), columns, terms)
+    beta = grams.fitted(range(len(terms)), list(range(grams.recordings)))
+    values = np.clip(now.values + beta[: len(now.values)], *_edges(now.mount, now.free))
+    new = _spread(beta[len(now.values) :] * grams.unit, terms)
+    mount = with_values(now.mount, now.free, values)
+    terms = tuple(one.with_coefficients(c.tolist()) for one, c in zip(terms, new, strict=True))
+    return _at(comparison, now, mount, values, terms), terms
+
+
+def _at(comparison: Comparison, now: Fit, mount: Mount, values: Array, terms: Sequence[Trial]) -> Fit:
+    """A fit of the base at other numbers, beside terms."""
+    whole, _ = with_trials(mount, terms)
+    prepared = comparison.problem.prepared
+    torque, slopes = stacked(Inverse(whole, now.free), prepared.pieces, values)
+    left = prepared.stacked("tau") - torque
+    return replace(now, mount=mount, values=values, torque=torque, slopes=slopes, residual=left)
+
+
+def _columns_beside(mount: Mount, terms: Sequence[Trial], which: int, comparison: Comparison) -> Array:
+    """Columns of one term beside the others."""
+    whole, names = with_trials(mount, terms)
+    first = sum(one.count for one in terms[:which])
+    inverse = Inverse(whole, names[first : first + terms[which].count])
+    return stacked(inverse, comparison.problem.prepared.pieces, inverse.present)[1]
+
+
+def _edges(mount: Mount, free: Sequence[str]) -> tuple[Array, Array]:
+    known = {variable.name: variable for variable in mount.parameters()}
+    return np.array([known[name].low for name in free]), np.array([known[name].high for name in free])
+
+
+def _spread(values: Array, terms: Sequence[Trial]) -> list[Array]:
+    """Coefficients of each term, zero where the base holds the wave already."""
+    out, first = [], 0
+    for one in terms:
+        own, free = np.zeros(one.count), one.prior > 0
+        last = first + int(free.sum())
+        own[free], first = values[first:last], last
+        out.append(own)
+    return out

@@ -1,0 +1,165 @@
+"""Terms that may be learned: effects of the catalogue whose coefficients are parameters, zero to begin with.
+
+So the columns that a term adds are the exact derivatives of the plant's own equations, behind springs, drives and
+clocks as well, and the equation that is fitted is the one that is delivered. Sizes of the waves fall with their number:
+a coefficient of wave k has a prior of 1/k beside the size of its term, that of a random walk over the range.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, make_dataclass, replace
+from itertools import product
+from math import pi
+from typing import Any
+
+import numpy as np
+
+from cosim.diagnosis.dictionary import user_columns
+from cosim.estimation.prepare import Array, Prepared
+from pyfmi_models.effects import Effect
+from pyfmi_models.effects.learned import LearnedDrive, LearnedFriction, LearnedTorque
+from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHysteresis
+from pyfmi_models.model import parameter
+from pyfmi_models.mount import Mount
+from pyfmi_models.waves import INPUT
+
+WAVES = 12
+"""Waves over a range: a bump of a tenth of it is still drawn."""
+FEW = 4
+"""Waves over a column beside position and speed: temperature, load; its range is seldom filled."""
+BY = (4, 2)
+"""Waves over position and over a column, in a table of products."""
+STROKES = (0.05, 0.1, 0.2, 0.4, 0.8)
+"""Ways of a long hysteresis, in ranges of position."""
+WAYS = (0.003, 0.01, 0.03, 0.1)
+"""Ways over which a reversal is forgotten, in ranges of position."""
+TIMES = (0.1, 0.2, 0.4, 0.8, 1.6)
+"""Times [s] in which a reversal is forgotten."""
+CREEP = 1e-3
+"""Share of the top speed below which no direction is told."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A term that may be learned: plain name, an effect with free coefficients, and the prior size of each."""
+
+    name: str
+    effect: Effect
+    prior: Array
+    """Of each coefficient, relative; 0 for one that the base holds already."""
+
+    @property
+    def count(self) -> int:
+        """How many coefficients."""
+        return len(self.prior)
+
+    @property
+    def in_torque(self) -> bool:
+        """Whether the coefficients are torques; else they are shares of the friction level."""
+        return isinstance(self.effect, LearnedTorque | LearnedDrive | LearnedHysteresis)
+
+    @property
+    def coefficients(self) -> Array:
+        """Present coefficients."""
+        return np.array([getattr(self.effect, f"c{k}") for k in range(self.count)])
+
+    def coarser(self) -> "Trial":
+        """The same with half of the waves."""
+        kept = np.flatnonzero(self.prior)
+        prior = self.prior.copy()
+        prior[kept[len(kept) // 2 :]] = 0.0
+        return replace(self, prior=prior).with_coefficients([0.0] * self.count)
+
+    def with_coefficients(self, values: Sequence[float]) -> "Trial":
+        """The same at other coefficients."""
+        return replace(self, effect=replace(self.effect, **{f"c{k}": float(c) for k, c in enumerate(values)}))
+
+    def learned(self, values: Sequence[float]) -> Effect:
+        """The effect as a card holds it."""
+        form: Any = type(self.effect).__mro__[1]
+        known = {one.name: getattr(self.effect, one.name) for one in fields(form)}
+        made: Effect = form(**(known | {_TABLES[form]: tuple(map(float, values))}))
+        return made
+
+
+_TABLES: dict[type[Effect], str] = {
+    LearnedTorque: "torque",
+    LearnedFriction: "level_change",
+    LearnedDrive: "missing",
+    LearnedHysteresis: "torque",
+    LearnedAfterReversal: "level_change",
+}
+
+
+_FORMS: dict[tuple[type[Effect], int], Any] = {}
+"""Forms with free coefficients; equations are kept by class, so each is made once."""
+
+
+def _form(form: type[Effect], count: int) -> Any:
+    """The form with `count` coefficients as parameters."""
+    if (form, count) not in _FORMS:
+        names = [f"c{k}" for k in range(count)]
+        free = [(name, Any, parameter("1", "A coefficient of a trial", default=0.0)) for name in names]
+        own = {"coefficients": lambda self: tuple(getattr(self, name) for name in names)}
+        options: dict[str, Any] = {"bases": (form,), "frozen": True, "kw_only": True, "namespace": own}
+        _FORMS[form, count] = make_dataclass(f"Trial{form.__name__}{count}", free, **options)
+    return _FORMS[form, count]
+
+
+def _trial(name: str, form: type[Effect], prior: Sequence[float], **shape: Any) -> Trial:
+    return Trial(name, _form(form, len(prior))(**shape), np.asarray(prior, float))
+
+
+def trials(mount: Mount, prepared: Prepared) -> list[Trial]:
+    """Every term that these recordings could tell."""
+    return [*_of_motion(mount, prepared), *_of_columns(mount, prepared)]
+
+
+def _falling(count: int, first: float = 1.0) -> list[float]:
+    """Prior sizes of waves 0 to `count`."""
+    return [first, *(1 / k for k in range(1, count + 1))]
+
+
+def _of_motion(mount: Mount, prepared: Prepared) -> Iterator[Trial]:
+    q, v = prepared.ranges["q"], prepared.ranges["v"]
+    reach, top = q[1] - q[0], max(map(abs, v))
+    command = float(np.abs(prepared.stacked("tau")).max())
+    rubs = mount.friction.key != "none"
+    smooth = [1.0, *(1 / k**2 for k in range(1, WAVES + 1))]  # steeper than its command no drive may fall
+    yield _trial("torque", LearnedDrive, smooth, command_seen=(-command, command))
+    if rubs:
+        yield _trial("speed", LearnedFriction, _falling(WAVES, 0), over="speed", seen=v)
+        yield _trial("time since reversal", LearnedAfterReversal, [1.0] * len(TIMES), times=TIMES, creep=CREEP * top)
+    if not prepared.has_position:
+        return
+    yield _trial("position", LearnedTorque, _falling(WAVES), over="position", seen=q)
+    strokes, ways = (tuple(reach * one for one in shares) for shares in (STROKES, WAYS))
+    yield _trial("hysteresis over a long stroke", LearnedHysteresis, [1.0] * len(strokes), strokes=strokes)
+    if mount.motion == "rotary" and reach > 2 * pi:
+        pairs = [one for one in _falling(WAVES)[1:] for _ in ("cosine", "sine")]
+        yield _trial("position over the turn", LearnedTorque, [1.0, *pairs], over="turn")
+    if rubs:
+        level = _falling(WAVES, 0)
+        yield _trial("friction level over position", LearnedFriction, level, over="position", seen=q)
+        after = {"ways": ways, "creep": CREEP * top}
+        yield _trial("distance since reversal", LearnedAfterReversal, [1.0] * len(ways), **after)
+
+
+def _of_columns(mount: Mount, prepared: Prepared) -> Iterator[Trial]:
+    rubs = mount.friction.key != "none"
+    for name in user_columns(prepared):
+        whole = np.concatenate([piece.extras[name] for piece in prepared.pieces])
+        seen = (float(whole.min()), float(whole.max()))
+        over = name if name == "temperature" else INPUT + name
+        if not seen[0] < seen[1] or not (name.isidentifier() and name.isascii()):
+            continue
+        yield _trial(f"torque over {name}", LearnedTorque, _falling(FEW), over=over, seen=seen)
+        if rubs:
+            yield _trial(f"friction level over {name}", LearnedFriction, _falling(FEW, 0), over=over, seen=seen)
+            if prepared.has_position:
+                yield _of_products(name, over, seen, prepared)
+
+
+def _of_products(name: str, by: str, seen: tuple[float, float], prepared: Prepared) -> Trial:
+    sizes = [a * b for a, b in product(_falling(BY[0]), _falling(BY[1]))]
+    shape = {"over": "position", "seen": prepared.ranges["q"], "by": by, "by_seen": seen, "waves": BY}
+    return _trial(f"position and {name}", LearnedFriction, [0.0, *sizes[1:]], **shape)

@@ -1,0 +1,95 @@
+"""Marginal likelihood of a structure: how well it explains the recordings, with the price of its freedom.
+
+    y = X b + Z u + e,   b ~ N(0, T^2),  u ~ N(0, s_l^2) by groups l,  e ~ N(0, sigma_b^2) in band b
+
+y is what the fitted structure leaves, X its tangents, Z what friction laws cannot agree on. Noise levels sigma_b and
+sizes s_l are estimated (expectation-maximisation), sizes with half-normal priors p_l:
+
+    M = sum_b c_b X'X_b / sigma_b^2 + P,     P = diag(1/T^2, 1/s^2),     c_b = effective rows / rows of band b
+    sigma_b^2 <- (|left_b|^2 + tr M^-1 X'X_b) / rows_b
+    s^2 <- p^2/2 (-K + sqrt(K^2 + 4 K m / p^2)),   m = mean of u^2 + var u over the K columns of the group
+    log L = -sum_b n_b ln sigma_b - (left' left + u' P u)/2 - ln|M|/2 + ln|P|/2 - sum_l (s_l/p_l)^2/2
+
+Reference: MacKay, Neural Computation 4 (1992) 415; coarsening c_b: Miller and Dunson, JASA 114 (2019) 1113.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from cosim.estimation.prepare import Array
+
+ROUNDS = 6
+
+
+@dataclass(frozen=True)
+class Group:
+    """Columns whose coefficients share one unknown size, with the scale of its half-normal prior."""
+
+    columns: Any
+    prior: float
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """Result: log-likelihood, noise of each band, sizes of the groups, coefficients."""
+
+    log_likelihood: float
+    noise: Array
+    sizes: Array
+    beta: Array
+
+
+def marginal(
+    grams: Array,
+    free: Array,
+    groups: Sequence[Group],
+    count: Array,
+    effective: Array,
+    floor: Array,
+    start: Marginal | None = None,
+    rounds: int = ROUNDS,
+) -> Marginal:
+    """Compute the marginal likelihood from Gram matrices of each band.
+
+    Args:
+        grams: (bands, 1 + n, 1 + n), the target first.
+        free: prior standard deviation of each of the n columns that are in no group.
+        groups: nuisance columns (numbers from 0 among the n).
+        count: rows of each band.
+        effective: independent rows of each band.
+        floor: least noise variance of each band.
+        start: noise and sizes to start from.
+        rounds: how often they are renewed.
+    """
+    yy, xy, xx = grams[:, 0, 0], grams[:, 1:, 0], grams[:, 1:, 1:]
+    share = effective / np.maximum(count, 1e-300)
+    noise = np.maximum(yy / count, floor) if start is None else start.noise
+    sizes = np.array([group.prior for group in groups]) if start is None else start.sizes
+    variance = np.square(np.clip(free, 1e-150, 1e150))
+    for last in range(rounds + 1):
+        for group, size in zip(groups, sizes, strict=True):
+            variance[group.columns] = max(size, 1e-6 * group.prior) ** 2
+        weight = share / noise
+        normal = np.einsum("b,bij->ij", weight, xx) + np.diag(1 / variance)
+        scale = 1 / np.sqrt(np.diag(normal))
+        factor = np.linalg.cholesky(normal * np.outer(scale, scale) + 1e-12 * np.eye(len(scale)))
+        inverse = np.linalg.inv(factor) * scale
+        covariance = inverse.T @ inverse
+        beta = covariance @ (weight @ xy)
+        left = yy - 2 * xy @ beta + np.einsum("i,bij,j->b", beta, xx, beta)
+        if last == rounds:
+            break
+        noise = np.maximum((np.maximum(left, 0) + np.einsum("ij,bij->b", covariance, xx)) / count, floor)
+        sizes = np.array([_size(beta[g.columns], np.diag(covariance)[g.columns], g.prior) for g in groups])
+    log_normal = 2 * float(np.sum(np.log(np.diag(factor)) - np.log(scale)))
+    penalty = sum((size / group.prior) ** 2 for size, group in zip(sizes, groups, strict=True)) / 2
+    fit = float(np.sum(effective * np.log(noise)) + weight @ left + beta @ (beta / variance)) / 2
+    return Marginal(-fit - log_normal / 2 - float(np.sum(np.log(variance))) / 2 - penalty, noise, sizes, beta)
+
+
+def _size(u: Array, var: Array, prior: float) -> float:
+    many, mean = len(u), float(np.mean(u**2 + var))
+    return float(np.sqrt(prior**2 / 2 * (-many + np.sqrt(many**2 + 4 * many * mean / prior**2))))

@@ -1,0 +1,98 @@
+"""Every constant of the decision, in one place: its meaning, its unit, where it comes from, how much depends on it."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Policy:
+    """Constants of evidence, search and decision. Evidence is in nats (natural logarithms of odds)."""
+
+    version: str = "2"
+    bands_hz: tuple[float, ...] = (2.0, 8.0, 32.0)
+    """Edges [Hz] of the bands whose noise levels are estimated apart: what is slow is not judged by what is fast."""
+    coarsening: float = 400.0
+    """Independent rows of a band beyond which more say nothing new: there the model's own misfit, not noise, limits
+    what may be concluded. Unit: rows. Miller and Dunson, J. Am. Stat. Assoc. 114 (2019) 1113."""
+    accuracy: float = 0.001
+    """Least noise of a band relative to the torque in it: no model of friction is better. Unit: 1."""
+    shape_prior: float = 0.1
+    """What a friction law may lack, relative to the friction level (half-normal). Unit: 1."""
+    wander_prior: float = 0.02
+    """Wander of the friction level, relative to it (half-normal). Unit: 1."""
+    wander_seconds: float = 10.0
+    """Correlation time of that wander. Unit: s."""
+    small_gain: float = 0.15
+    """Share of the plain residual energy below which an effect is small: it may imitate a corner of the missing ..."""
+    small_evidence: float = 100.0
+    """... and must have this evidence. Unit: nats."""
+    least_bent: float = 60.0
+    """Evidence that presliding must have. Unit: nats. Beside it what laws may lack at stops stands aside; laws that are
+    smooth in speed differ there from one that is not: in nulls by 24, true ones have 180 and more."""
+    phase_price: float = 1.15
+    """Price of a phase that is found in each recording anew. Unit: nats."""
+    refitted: int = 8
+    """Forms of effects that are refitted in a stage by each of the three screening statistics."""
+    least_evidence: float = 15.0
+    """Evidence that the first effect must have. Unit: nats ..."""
+    large_gain: float = 0.25
+    """... unless it removes this share of the plain residual energy. Unit: 1. What is slow has few independent rows,
+    and so little evidence, but it is large or no one would miss it ..."""
+    evidence_if_large: float = 9.0
+    """... then it needs so much. Unit: nats. In 76 nulls what removes a fifth has 5 at most, or 19 and more and then
+    predicts nothing."""
+    least_plain_gain: float = 0.02
+    """Share of the plain residual energy that an effect must remove: less is about nothing that matters. Unit: 1."""
+    least_above_noise: float = 5.0
+    """Energy that a spring must remove, in those of the reading's noise, differentiated twice. Unit: 1. In nulls of
+    two generators false springs removed 1.2 at most, beside other effects 4.1; true ones 6.8 and more."""
+    keep_evidence: float = 8.0
+    """Evidence below which an accepted effect goes when others came after it. Unit: nats."""
+    further_share: float = 0.4
+    """Evidence that an effect beside others must have, relative to theirs: an equation is never quite the machine's,
+    and what it lacks looks like another effect. Unit: 1. False ones beside true ones had .33 to .37, true ones .53 and
+    more ..."""
+    further_evidence: tuple[float, float] = (8.0, 75.0)
+    """... but at least the first and at most the second. Unit: nats."""
+    least_wave: float = 5.0
+    """Evidence that a further wave of a ripple must have. Unit: nats."""
+    most_effects: int = 6
+    """Different effects that one diagnosis may add."""
+    set_margin: float = 3.0
+    """Evidence by which a rival must be beaten to be out of the set. Unit: nats."""
+    least_predicted: float = 3.0
+    """What the held-out recordings must lose without an effect. Unit: nats."""
+    halved: float = 0.5
+    """Share of the plain held-out error energy that an effect may remove instead. Unit: 1."""
+    sure_predicted: float = 30.0
+    """The same, from which an effect may be small. Unit: nats."""
+    most_raised: float = 0.03
+    """Share by which the plain held-out error energy may rise in one of two bands. Unit: 1."""
+    least_share: float = 0.02
+    """Energy that an effect must remove, relative to what the base leaves: less may be the form of another effect.
+    Unit: 1."""
+    floor: float = 26.0
+    """Evidence of a flexible term that no misfit of a friction law reaches ... Unit: nats."""
+    contradicted: float = 0.05
+    """... if it does not add more than this share to the held-out rest. Unit: 1. A level that wanders follows anything
+    slow by chance: of four nulls with 31 to 77 nats two added .7 and 10 ..."""
+    sure_floor: float = 100.0
+    """... or that none reaches whatever held-out recordings say, where a motion of another kind may hide it. Unit:
+    nats ..."""
+    least_followed: float = 10.0
+    """... or if it has this and predicts the share `follows` there. Unit: nats."""
+    imitation: float = 0.3
+    """Evidence of what is left, relative to a name's, from which the name may imitate what is missing. Unit: 1."""
+    follows: float = 0.3
+    """Share of the held-out rest that a quantity must predict for the rest to be said to follow it ... Unit: 1."""
+    imitation_share: float = 0.6
+    """Share of the residual energy from which a name imitates nothing smaller. Unit: 1."""
+    beside: float = 0.7
+    """... and beside the best one: this share of what that predicts. Unit: 1."""
+    large_rest: float = 0.12
+    """Slow part of the rest, relative to the friction torque, above which something is missing, whatever it follows.
+    Unit: 1. 96 nulls of three generators left at most .118."""
+    large_rest_there: float = 0.3
+    """The same on held-out recordings, to which no number was fitted."""
+
+
+POLICY = Policy()

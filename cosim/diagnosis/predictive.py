@@ -1,0 +1,135 @@
+"""Predictive likelihood: the same evidence on recordings to which nothing was fitted.
+
+No parameter is free there; only the nuisances are (what friction laws cannot agree on, a wandering level), with sizes
+and noise estimated as in training. So a gain here is one of prediction, in the same unit, with nothing to be priced.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from cosim.diagnosis.bands import Bands
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.discrepancy import Discrepancy, discrepancy
+from cosim.diagnosis.marginal import Group, marginal
+from cosim.diagnosis.protocol import is_noise, residuals
+from cosim.estimation.fit import Fit
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.row_weights import weights
+from pyfmi_models.mount import Mount
+
+AMPLIFIED = 2.0
+"""Growth of the protocol's energy from which a model amplifies noise, which it may only if it halves the error that is
+no noise."""
+POINTS = 500
+"""Frequencies at which noise is added up."""
+LEAST_BEYOND = 0.1
+"""Share of an energy that is never put down to noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Predictive:
+    """Held-out recordings, prepared in the band of the analysis, and how they are weighed."""
+
+    prepared: Prepared
+    weight: Array
+    bands: Bands
+    nuisances: Discrepancy
+    floor: Array
+    halved: float
+    protocol: Prepared
+    """The same recordings in the band of the protocol, whose error is what is printed."""
+
+    @classmethod
+    def of(cls, comparison: Comparison, prepared: Prepared, base: Mount, protocol: Prepared) -> "Predictive":
+        """Weigh held-out rows as the training rows are."""
+        many = len(prepared.recording_of)
+        weight = np.ones(many) if base.friction.key == "none" else weights(base.friction, prepared)
+        scale = comparison.noise.at(prepared.stacked("v"))
+        bands = Bands.of(prepared, weight, scale, comparison.policy)
+        floor = bands.least_noise(prepared, comparison.inertia, comparison.policy)
+        return cls(
+            prepared,
+            weight,
+            bands,
+            discrepancy(base, prepared, comparison.policy),
+            floor,
+            comparison.policy.halved,
+            protocol,
+        )
+
+    def residual(self, mount: Mount) -> Array:
+        """Measured minus model torque at the kept rows."""
+        left = zip(residuals(self.prepared, mount), self.prepared.pieces, strict=True)
+        return np.concatenate([one[piece.kept] for one, piece in left])
+
+    def slopes(self, found: Fit) -> Array:
+        """Derivatives of the needed torque by the fitted numbers of a structure, at the kept rows."""
+        return stacked(Inverse(found.mount, found.free), self.prepared.pieces, found.values)[1]
+
+    def log_likelihood(self, residual: Array) -> float:
+        """Log-likelihood of a residual at the kept rows, nuisances integrated out."""
+        target = self.bands.transform(residual[:, None])
+        cross = self.bands.crossed(target, self._nuisances)
+        grams = np.concatenate(
+            [
+                np.concatenate([self.bands.grams(target), cross], axis=2),
+                np.concatenate([np.swapaxes(cross, 1, 2), self._nuisance_grams], axis=2),
+            ],
+            axis=1,
+        )
+        groups = [Group(np.array(group.columns), group.prior) for group in self.nuisances.groups]
+        free = np.ones(grams.shape[1] - 1)
+        return marginal(grams, free, groups, self.bands.count, self.bands.effective, self.floor).log_likelihood
+
+    def plain_gains(self, without: Mount, mount: Mount) -> tuple[float, float]:
+        """Share of the plain residual energy that a model removes, in the band of the analysis and of the protocol.
+
+        What the noise of the reading gives to a model's torque is no error of it: a base whose inertia is nothing has
+        none of that. Where the protocol's band still holds mostly noise, which the model does not amplify, it says
+        nothing: then both are that of the analysis.
+        """
+        share = float(np.mean(self.weight**2))
+        narrow = [
+            _beyond(float(np.mean((self.weight * self.residual(one)) ** 2)), share * reading_noise(self.prepared, one))
+            for one in (without, mount)
+        ]
+        wide = [_beyond(self._protocol_energy(one), reading_noise(self.protocol, one)) for one in (without, mount)]
+        amplified = wide[1] > AMPLIFIED * wide[0] and narrow[1] > (1 - self.halved) * narrow[0]
+        pairs = (narrow, narrow if is_noise(narrow, wide) and not amplified else wide)
+        first, second = (1 - after / max(before, 1e-300) for before, after in pairs)
+        return first, second
+
+    def _protocol_energy(self, mount: Mount) -> float:
+        left = zip(residuals(self.protocol, mount), self.protocol.pieces, strict=True)
+        return float(np.mean(np.concatenate([one[piece.inside] for one, piece in left]) ** 2))
+
+    @cached_property
+    def _nuisances(self) -> Array:
+        return self.bands.transform(self.nuisances.columns)
+
+    @cached_property
+    def _nuisance_grams(self) -> Array:
+        return self.bands.grams(self._nuisances)
+
+
+def reading_noise(prepared: Prepared, mount: Mount) -> float:
+    """Mean square that white noise of the reading, differentiated, has in the torque that a mount needs [N2 m2].
+
+    Of a density D it is the integral of 2 (J w^2 g^2 D)^2 over frequency, g the gain of one pass of the filter.
+    """
+    total, rows, inertia = 0.0, 0, float(mount.axis.inertia)
+    for piece in prepared.pieces:
+        hertz = np.linspace(0.0, 0.5 / piece.dt, POINTS)
+        passed = 1 / (1 + (hertz / piece.cutoff) ** 8)
+        density = inertia * (2 * np.pi * hertz) ** (2 if prepared.has_position else 1) * passed**2 * piece.reading_noise
+        total += len(piece.t) * float(np.trapezoid(2 * density**2, hertz))
+        rows += len(piece.t)
+    return total / max(rows, 1)
+
+
+def _beyond(energy: float, noise: float) -> float:
+    """What is left of an energy beside noise, which is only assumed to be white."""
+    return max(float(energy) - noise, LEAST_BEYOND * float(energy))

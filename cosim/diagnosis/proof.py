@@ -1,0 +1,106 @@
+"""Proof: what each effect is worth on recordings that nothing was fitted to, in the same nats as the evidence."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.decision import Gain, stands
+from cosim.diagnosis.predictive import Predictive
+from cosim.diagnosis.rivals import AcceptedEffect, Examined
+from cosim.estimation.fit import Fit
+from cosim.estimation.problem import Problem
+
+
+@dataclass(frozen=True)
+class Proof:
+    """The effects that stand, the structure with just them, what each predicts, and those that do not stand."""
+
+    chosen: Fit
+    standing: tuple[AcceptedEffect, ...]
+    predicted: dict[str, float]
+    """Nats that the held-out recordings lose without an effect, by its id."""
+    unproven: tuple[AcceptedEffect, ...]
+
+
+def prove(comparison: Comparison, examined: Examined, held: Predictive) -> Proof:
+    """Keep the effects that predict.
+
+    First the length of the list: effects in order of their evidence, up to where the held-out recordings are predicted
+    best; stopping at the first that does not help would lose a later one that does. Then effects are taken out until
+    all that are left stand.
+    """
+    order = sorted(examined.effects, key=lambda one: -one.own.evidence)
+    chosen, some = _longest(comparison, examined, order, held)
+    chosen, standing, gains = _standing(comparison, examined, chosen, some, held)
+    predicted = {one.effect.id: 0.0 for one in order} | {name: gain.nats for name, gain in gains.items()}
+    return Proof(chosen, tuple(standing), predicted, tuple(one for one in order if one not in standing))
+
+
+def _standing(
+    comparison: Comparison, examined: Examined, chosen: Fit, some: Sequence[AcceptedEffect], held: Predictive
+) -> tuple[Fit, list[AcceptedEffect], dict[str, Gain]]:
+    """Of some effects those that stand, their structure, and what each gains, or gained before it was taken out.
+
+    One that does not stand may be spoilt by another: the one that falls lowest is taken out, or the one that helps
+    least, whichever leaves the better prediction in the end.
+    """
+    problem, policy = comparison.problem, comparison.policy
+    gains = {one.effect.id: _gain(problem, chosen, one, some, held) for one in some}
+    nats = {one.effect.id: gains[one.effect.id].nats for one in some}
+    falling = [one for one in some if not stands(gains[one.effect.id], _share(problem, examined.base, one), policy)]
+    if not falling:
+        return chosen, list(some), gains
+    out = {min(group, key=lambda one: nats[one.effect.id]).effect.id for group in (falling, some)}
+    ways = []
+    for name in sorted(out):
+        rest = [one for one in some if one.effect.id != name]
+        ways.append(_standing(comparison, examined, _with(problem, examined, rest), rest, held))
+    best, kept, known = max(ways, key=lambda way: held.log_likelihood(held.residual(way[0].mount)))
+    return best, kept, gains | known
+
+
+def _longest(
+    comparison: Comparison, examined: Examined, order: Sequence[AcceptedEffect], held: Predictive
+) -> tuple[Fit, list[AcceptedEffect]]:
+    fits = [_with(comparison.problem, examined, order[:count]) for count in range(len(order) + 1)]
+    likelihoods = [held.log_likelihood(held.residual(one.mount)) for one in fits]
+    best = max(range(len(fits)), key=lambda count: likelihoods[count])
+    while best < len(order) and _between(fits, likelihoods, best, held).halves(comparison.policy):
+        best += 1
+    return fits[best], list(order[:best])
+
+
+def _between(fits: Sequence[Fit], likelihoods: Sequence[float], count: int, held: Predictive) -> Gain:
+    """What one effect more gains."""
+    without, grown = fits[count], fits[count + 1]
+    return Gain(likelihoods[count + 1] - likelihoods[count], *held.plain_gains(without.mount, grown.mount))
+
+
+def _with(problem: Problem, examined: Examined, some: Sequence[AcceptedEffect]) -> Fit:
+    """The structure with some of the effects, refitted from the one with all."""
+    if len(some) == len(examined.effects):
+        return examined.chosen
+    if not some:
+        return examined.base
+    own = examined.chosen.mount.effects[: len(problem.mount.effects)]
+    kept = tuple(effect for one in some for effect in one.effects)
+    return problem.fit(replace(examined.chosen.mount, effects=(*own, *kept)), 10)
+
+
+def _gain(
+    problem: Problem, chosen: Fit, one: AcceptedEffect, standing: Sequence[AcceptedEffect], held: Predictive
+) -> Gain:
+    """What the held-out recordings lose without an effect."""
+    without = one.without
+    if len(standing) != 1 or len(without.mount.effects) != len(problem.mount.effects):
+        own = len(problem.mount.effects)
+        rest = [e for k, e in enumerate(chosen.mount.effects) if e.id != one.effect.id or k < own]
+        without = problem.fit(replace(chosen.mount, effects=tuple(rest)), 10)
+    after, before = (held.log_likelihood(held.residual(fit.mount)) for fit in (chosen, without))
+    return Gain(after - before, *held.plain_gains(without.mount, chosen.mount))
+
+
+def _share(problem: Problem, base: Fit, one: AcceptedEffect) -> float:
+    """Plain energy that an effect removes, relative to what the base leaves."""
+    energy = [float(((problem.weight * fit.residual) ** 2).sum()) for fit in (one.own.fit, one.without, base)]
+    return (energy[1] - energy[0]) / max(energy[2], 1e-300)

@@ -1,0 +1,134 @@
+"""Each effect that was found, taken out and challenged: is it needed, and who else could stand in its place?"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.instrumental_variable import Misfits, excludes, misfits_of, settled
+from cosim.diagnosis.policy import Policy
+from cosim.diagnosis.search import CandidateFit, Search, Stage, is_admissible, margin, stage, weighed
+from cosim.estimation.fit import Fit
+from pyfmi_models.effects import Effect
+
+Say = Callable[[str], None]
+ROUNDS = 4
+
+
+@dataclass(frozen=True)
+class AcceptedEffect:
+    """One effect (with the harmonics of a ripple), what it is worth beside the others, and its rivals."""
+
+    effects: tuple[Effect, ...]
+    own: CandidateFit
+    without: Fit
+    rivals: tuple[CandidateFit, ...]
+    """One of each kind, the closest first."""
+    margins: Mapping[str, float]
+    """Nats by which this effect is better than each rival."""
+    misfits: Misfits = field(default_factory=dict)
+
+    @property
+    def effect(self) -> Effect:
+        """The effect; of a ripple its strongest wave."""
+        return max(self.effects, key=lambda one: float(getattr(one, "amplitude", 0.0)))
+
+    def margin(self, rival: CandidateFit) -> float:
+        """Nats by which this effect is better than a rival."""
+        return self.margins[rival.effect.id]
+
+
+@dataclass(frozen=True)
+class Examined:
+    """The structure that stands, and its effects."""
+
+    base: Fit
+    chosen: Fit
+    effects: tuple[AcceptedEffect, ...]
+    last: Stage
+    """What was tried beside the structure that stands."""
+
+
+def examine(comparison: Comparison, found: Search, say: Say = lambda _: None) -> Examined:
+    """Take out, challenge and swap until nothing changes."""
+    chosen, known = found.chosen, {_names(one.current): one for one in found.stages}
+    for _ in range(ROUNDS):
+        effects, better = _round(comparison, chosen, known, say)
+        if better is None:
+            break
+        chosen = better
+    else:  # swaps went in a circle: what stands is examined as it is
+        effects = [_challenged(comparison, chosen, group, known, say) for group in grouped(comparison, chosen)]
+    if _names(chosen) not in known:
+        known[_names(chosen)] = stage(comparison, chosen, say)
+    return Examined(found.base, chosen, tuple(effects), known[_names(chosen)])
+
+
+def _round(
+    comparison: Comparison, chosen: Fit, known: dict[tuple[str, ...], Stage], say: Say
+) -> tuple[list[AcceptedEffect], Fit | None]:
+    effects = []
+    for group in grouped(comparison, chosen):
+        one = _challenged(comparison, chosen, group, known, say)
+        if one.own.evidence < comparison.policy.keep_evidence and len(grouped(comparison, chosen)) > 1:
+            return [], one.without
+        best = settled(one.misfits, one.own, one.rivals)
+        if best is one.own:
+            free = [r for r in one.rivals if excludes(one.misfits, one.effect, r.effect) is None]
+            best = next((rival for rival in free if _takes(rival, one, comparison.policy)), best)
+        if best is not one.own:
+            return [], best.fit
+        effects.append(one)
+    return effects, None
+
+
+def _takes(rival: CandidateFit, one: AcceptedEffect, policy: Policy) -> bool:
+    """Whether a rival takes the place: it is better, or near and simpler; one that is near and less simple does not."""
+    fewer = one.own.fit.count - rival.fit.count
+    margin = one.margin(rival)
+    return margin < (policy.set_margin if fewer > 0 else -policy.set_margin if fewer < 0 else 0.0)
+
+
+def grouped(comparison: Comparison, chosen: Fit) -> list[tuple[Effect, ...]]:
+    """Effects that were added, those of one kind together."""
+    groups: dict[str, list[Effect]] = {}
+    for effect in chosen.mount.effects[len(comparison.problem.mount.effects) :]:
+        groups.setdefault(effect.id, []).append(effect)
+    return [tuple(group) for group in groups.values()]
+
+
+def _challenged(
+    comparison: Comparison, chosen: Fit, group: tuple[Effect, ...], known: dict[tuple[str, ...], Stage], say: Say
+) -> AcceptedEffect:
+    problem = comparison.problem
+    say(group[0].title)
+    rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
+    without = problem.fit(replace(chosen.mount, effects=rest), 15)
+    if _names(without) not in known:
+        known[_names(without)] = stage(comparison, without, say)
+    beside = known[_names(without)]
+    own = weighed(comparison, chosen, beside.current, effect=group[0])
+    rivals = [one for one in beside.tried if one.effect.id != group[0].id and is_admissible(comparison, one)]
+    best: dict[str, CandidateFit] = {}
+    for rival in rivals:
+        if rival.effect.id not in best or rival.evidence > best[rival.effect.id].evidence:
+            best[rival.effect.id] = rival
+    misfits = misfits_of(problem.prepared, chosen.mount, group[0])
+    margins = {rival.effect.id: margin(comparison, own, rival) for rival in best.values()}
+    ranked = sorted(best.values(), key=lambda rival: margins[rival.effect.id])
+    return AcceptedEffect(group, own, beside.current, tuple(ranked), margins, misfits)
+
+
+def _names(found: Fit) -> tuple[str, ...]:
+    """Which effects a structure holds."""
+    return tuple(sorted(effect.id for effect in found.mount.effects))
+
+
+def margins(one: AcceptedEffect) -> dict[str, float]:
+    """Nats by which an effect is better than each rival; where the set point speaks of both, by that."""
+    told = {rival.effect.id: excludes(one.misfits, one.effect, rival.effect) for rival in one.rivals}
+    return {name: one.margins[name] if by is None else by / 2 for name, by in told.items()}
+
+
+def explains(one: AcceptedEffect) -> dict[str, float]:
+    """Share of the plain residual energy that an effect, or a rival in its place, removes."""
+    return {candidate.effect.id: max(candidate.plain_gain, 0.0) for candidate in (one.own, *one.rivals)}

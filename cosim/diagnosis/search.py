@@ -1,0 +1,205 @@
+"""Search: which effects are worth a refit, what each is worth after it, and what comes next.
+
+In every stage each form of an effect is screened by three statistics - the evidence of a linear step, the share of the
+plain energy, the same evidence without what is fast - and the best forms by any of them are refitted. Nothing is
+dropped because something else was rejected.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import inf, log
+
+import numpy as np
+
+from cosim.diagnosis.admissibility import in_time
+from cosim.diagnosis.admissibility import is_admissible as is_what_it_says
+from cosim.diagnosis.comparison import Comparison, Screened, aside_for
+from cosim.diagnosis.harmonics import with_harmonics
+from cosim.diagnosis.hypotheses import hypothesis_of
+from cosim.diagnosis.instrumental_variable import is_told, misfits_of, settled
+from cosim.diagnosis.policy import Policy
+from cosim.estimation.fit import Fit
+from pyfmi_models.effects import Effect
+
+Say = Callable[[str], None]
+MOST_WAVES = 8
+"""Effects that one diagnosis may add, each harmonic of a ripple counted."""
+
+
+@dataclass(frozen=True)
+class CandidateFit:
+    """A structure with one effect more, refitted, and what the effect is worth."""
+
+    effect: Effect
+    fit: Fit
+    evidence: float
+    """Nats above the structure without the effect, search priced."""
+    price: float
+    """Nats that the search among the members of its form costs; taken off already."""
+    plain_gain: float
+    """Share of the plain residual energy removed."""
+    above_noise: float = inf
+    """Energy that a spring removes, in those of the reading's noise."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A structure, and all effects that were refitted beside it, best first."""
+
+    current: Fit
+    tried: tuple[CandidateFit, ...]
+    screened: tuple[Screened, ...]
+
+
+def stage(comparison: Comparison, current: Fit, say: Say = lambda _: None) -> Stage:
+    """Screen all candidates beside a structure and refit the best forms."""
+    screened = comparison.screen(current)
+    worth = starts(screened, comparison.policy)
+    fits = [
+        refitted(comparison, current, effect, many, _counted(say, number, len(worth)))
+        for number, (effect, many) in enumerate(worth, 1)
+    ]
+    return Stage(current, tuple(sorted(fits, key=lambda one: -one.evidence)), tuple(screened))
+
+
+def _counted(say: Say, number: int, of: int) -> Say:
+    """Say with every text how far a search is."""
+    return lambda text: say(f"{text} ({number} of {of})")
+
+
+def starts(screened: Sequence[Screened], policy: Policy) -> list[tuple[Effect, int]]:
+    """Effects worth a refit, and how many members of their form were tried."""
+    forms: dict[type[Effect], list[Screened]] = {}
+    for one in screened:
+        forms.setdefault(one.form, []).append(one)
+    hopeful = {form: members for form, members in forms.items() if any(is_hopeful(one, policy) for one in members)}
+    ranked = []
+    for statistic in ("evidence", "plain"):
+        best = {form: max(members, key=lambda one: getattr(one, statistic)) for form, members in hopeful.items()}
+        order = sorted(best, key=lambda form: -getattr(best[form], statistic))
+        ranked.append([best[form] for form in order[: policy.refitted]])
+    chosen = list({_key(one): one for group in ranked for one in group}.values())
+    found = [(one.candidate.start(one.coefficients), len(forms[one.form])) for one in chosen]
+    kinds = {type(effect) for effect, _ in found}
+    # Twins are alike at first order: where one is tried, the other must be, whatever a linear score says.
+    twins = [(twin, many) for effect, many in found for twin in hypothesis_of(effect).twins(effect)]
+    return found + [(twin, many) for twin, many in twins if type(twin) not in kinds]
+
+
+def is_hopeful(one: Screened, policy: Policy) -> bool:
+    """Whether a linear step towards a candidate promises anything, by either statistic."""
+    return one.evidence > 0 or one.plain >= policy.least_plain_gain
+
+
+def _key(one: Screened) -> object:
+    """What tells candidates apart that are worth a refit each: the form, where its refit looks for the rest itself."""
+    return one.form if hypothesis_of(one.candidate.instances[0]).finds_its_way else id(one)
+
+
+def refitted(
+    comparison: Comparison, current: Fit, effect: Effect, many: int, say: Say = lambda _: None
+) -> CandidateFit:
+    """Add an effect to a fitted structure, refit everything, weigh it."""
+    say(effect.title)
+    problem = comparison.problem
+    grown = replace(current.mount, effects=(*current.mount.effects, effect))
+    found, aside = problem.fit(grown, 12), aside_for(effect.id)
+    found = hypothesis_of(effect).tuned(problem, found, effect, lambda fit: comparison.evidence(fit, aside))
+    return weighed(comparison, found, current, many)
+
+
+def weighed(
+    comparison: Comparison, found: Fit, current: Fit, many: int = 1, effect: Effect | None = None
+) -> CandidateFit:
+    """What an effect of a fitted structure (the last one) is worth beside the structure without it."""
+    effect = effect or found.mount.effects[-1]
+    price = log(max(many, 1))
+    aside = aside_for(effect.id)
+    gain = comparison.evidence(found, aside) - comparison.evidence(current, aside) - price
+    plain = [float(np.sum((comparison.problem.weight * one.residual) ** 2)) for one in (found, current)]
+    loud = comparison.above_noise(found, current) if hypothesis_of(effect).must_stand_out else inf
+    return CandidateFit(effect, found, gain, price, 1 - plain[0] / max(plain[1], 1e-300), loud)
+
+
+@dataclass(frozen=True)
+class Search:
+    """Structures in the order in which effects were added, and the stage beside each."""
+
+    base: Fit
+    stages: tuple[Stage, ...]
+
+    @property
+    def chosen(self) -> Fit:
+        """The last structure."""
+        return self.stages[-1].current
+
+
+def search(comparison: Comparison, base: Fit, say: Say = lambda _: None) -> Search:
+    """Add the admissible effect of the largest evidence until none has enough."""
+    stages, largest = [stage(comparison, base, say)], 0.0
+    while True:
+        now = stages[-1]
+        best = best_of(comparison, now, largest)
+        if best is None or _is_full(best, comparison):
+            return Search(base, tuple(stages))
+        largest = max(largest, best.evidence)
+        stages.append(stage(comparison, with_harmonics(comparison, best.fit, best.effect), say))
+
+
+def least(policy: Policy, largest: float, gain: float) -> float:
+    """Evidence that one more effect of this plain gain must have beside others of which the largest has so much."""
+    if not largest:
+        return policy.evidence_if_large if gain >= policy.large_gain else policy.least_evidence
+    lowest, highest = policy.further_evidence
+    return min(highest, max(lowest, policy.further_share * largest))
+
+
+def best_of(comparison: Comparison, now: Stage, largest: float = 0.0) -> CandidateFit | None:
+    """The admissible candidate of the largest evidence among those with enough, beside effects with at most `largest`.
+
+    Between delay and lag the set point decides.
+    """
+    problem, policy = comparison.problem, comparison.policy
+    enough = [one for one in now.tried if one.evidence >= least(policy, largest, one.plain_gain)]
+    fit = [one for one in enough if is_admissible(comparison, one) and not is_minor(one, policy)]
+    misfits = {id(one): misfits_of(problem.prepared, one.fit.mount, one.effect) for one in fit}
+    told = [one for one in fit if is_told(misfits[id(one)], one)]
+    if not told:
+        return None
+    best = first_of(comparison, told)
+    return settled(misfits[id(best)], best, told)
+
+
+def first_of(comparison: Comparison, several: Sequence[CandidateFit]) -> CandidateFit:
+    """The best of some candidates beside one structure."""
+    ranked = sorted(several, key=lambda one: -one.evidence)
+    best = ranked[0]
+    for rival in ranked[1:]:
+        if aside_for(best.effect.id) != aside_for(rival.effect.id) and margin(comparison, best, rival) < 0:
+            best = rival
+    return best
+
+
+def margin(comparison: Comparison, one: CandidateFit, other: CandidateFit) -> float:
+    """Nats by which one structure is better than another; nuisances that either effect is stand aside for both."""
+    aside = aside_for(one.effect.id, other.effect.id)
+    return comparison.evidence(one.fit, aside) - one.price - comparison.evidence(other.fit, aside) + other.price
+
+
+def is_minor(one: CandidateFit, policy: Policy) -> bool:
+    """Whether an effect explains little, and not surely."""
+    if hypothesis_of(one.effect).is_common_misfit and one.evidence < policy.least_bent:
+        return True
+    return one.plain_gain < policy.small_gain and one.evidence < policy.small_evidence
+
+
+def is_admissible(comparison: Comparison, one: CandidateFit) -> bool:
+    """Whether an effect is large enough to matter, means what its name says, and can be told from this motion."""
+    policy, problem = comparison.policy, comparison.problem
+    loud = one.plain_gain >= policy.least_plain_gain and one.above_noise >= policy.least_above_noise
+    return loud and is_what_it_says(problem, one) and in_time(problem, one)
+
+
+def _is_full(best: CandidateFit, comparison: Comparison) -> bool:
+    added = best.fit.mount.effects[len(comparison.problem.mount.effects) :]
+    return len({effect.id for effect in added}) > comparison.policy.most_effects or len(added) > MOST_WAVES

@@ -1,0 +1,75 @@
+"""What friction laws cannot agree on: shapes that any real contact may add to a fitted law.
+
+A real contact is neither LuGre nor Coulomb. Its misfit has these shapes: bristles that slip at other distances (stop
+operators) and a level that varies with speed in another way. Offered to the fit as nuisances with every candidate,
+they keep an imprecise friction law from being taken for a missing effect.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.estimation.prepare import Array, Piece, Prepared
+
+Index = npt.NDArray[np.int64]
+
+STOPS = 8
+
+
+def stop_distances(prepared: Prepared) -> Array:
+    """Slip distances from a few resolvable steps to a fifth of the motion, evenly in the logarithm."""
+    low, high = prepared.ranges["q"]
+    steps = np.concatenate([np.abs(np.diff(piece.q)) for piece in prepared.pieces])
+    smallest = max(float(np.median(steps)), 1e-6 * (high - low))
+    return np.geomspace(smallest / 3, (high - low) / 5, STOPS)
+
+
+def stop_operators(piece: Piece, distances: Array) -> Array:
+    """Elastic up to a distance, then sliding: s <- clip(s + dq / distance, -1, 1); shape (rows, distances)."""
+    moves = np.diff(piece.q, prepend=piece.q[:1])[:, None] / distances
+    out, state = np.empty_like(moves), np.sign(piece.v[0]) * np.ones(len(distances))
+    for row, move in enumerate(moves):
+        state = np.minimum(np.maximum(state + move, -1.0), 1.0)
+        out[row] = state
+    return out
+
+
+def last_reversal(q: Array, least: float) -> tuple[Index, Array]:
+    """Row from which the motion goes the other way, and its direction (+-1), at each row of positions q.
+
+    A turn counts once the motion came back by `least`: a way, not a speed, so noise at rest reverses nothing. Before
+    the first turn the row is 0.
+    """
+    turned, direction = np.zeros(len(q), np.int64), np.ones(len(q))
+    ahead, start, extreme = 1.0, 0, float(q[0])
+    for row, place in enumerate(q.tolist()):
+        if ahead * (extreme - place) > least:
+            ahead, start, extreme = -ahead, row, place
+        extreme = max(ahead * extreme, ahead * place) * ahead
+        turned[row], direction[row] = start, ahead
+    return turned, direction
+
+
+def since_reversal(t: Array, v: Array) -> Array:
+    """Seconds since the speed last changed its sign, or since the start, at each row."""
+    turned = np.flatnonzero(np.diff(np.sign(v), prepend=np.sign(v[:1])) != 0)
+    last = np.concatenate([[0], turned])[np.searchsorted(turned, np.arange(len(t)), side="right")]
+    return np.asarray(t - t[last])
+
+
+def speed_shapes(piece: Piece, top: float) -> Array:
+    """Friction that falls with speed at three scales, (rows, 3); the sign is smoothed over 1e-3 of the top speed."""
+    scales = top * np.array([0.03, 0.1, 0.3])
+    sign = np.tanh(piece.v / (1e-3 * top))
+    return np.asarray(sign[:, None] * np.exp(-((piece.v[:, None] / scales) ** 2)))
+
+
+@lru_cache(maxsize=4)
+def bank(prepared: Prepared) -> tuple[Array, Array]:
+    """Return the stop operators and the speed shapes at the kept rows, filtered: (rows, 8) and (rows, 3)."""
+    distances = stop_distances(prepared)
+    top = max(abs(edge) for edge in prepared.ranges["v"])
+    stops = [piece.lowpass(stop_operators(piece, distances))[piece.kept] for piece in prepared.pieces]
+    speeds = [piece.lowpass(speed_shapes(piece, top))[piece.kept] for piece in prepared.pieces]
+    return np.concatenate(stops), np.concatenate(speeds)

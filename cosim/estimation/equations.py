@@ -1,0 +1,242 @@
+"""The plant's own equations, turned round: from a reading and its derivatives to the torque of that moment.
+
+Expressions are compiled once for a structure; its numbers are parameters.
+"""
+
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from cosim.estimation.prepare import Array, Piece
+from cosim.estimation.rowwise import Rowwise, Stepwise, recurrence
+from cosim.estimation.tonal_disturbance import without_tones
+from pyfmi_models.effects import DriveEffect, MotionEffect, SensorEffect
+from pyfmi_models.effects.presliding import LEAST_LEVEL
+from pyfmi_models.model import Scalar, structure_of, symbols_of
+from pyfmi_models.mount import Mount
+
+READING = ("t", "q", "v", "a")
+NEWTON = 3
+LEAST_SLOPE = 1e-2
+"""A drive that gives less than this share of what more is asked for is undone as if it gave this share."""
+
+
+class Equations:
+    """Compiled expressions of a mount in which the parameters `free` may vary."""
+
+    def __init__(self, mount: Mount, free: tuple[str, ...]) -> None:
+        self._mount, self._free = mount, free
+        self._inputs = tuple(variable.name for variable in mount.inputs())
+        owners = [(name, part.states()) for name, part in mount.of_kind(MotionEffect) if part.states()]
+        self._owners = [*owners, ("friction", mount.law.states())]
+        self.count = sum(len(states) for _, states in self._owners)
+
+    def columns(self, piece: Piece) -> Array:
+        """What each row gives: time, reading, its derivatives, and the inputs of effects."""
+        starts = {variable.name: variable.start for variable in self._mount.inputs()}
+        given = [piece.extras.get(name, np.full(len(piece.t), starts[name])) for name in self._inputs]
+        return np.vstack([piece.t, piece.q, piece.v, piece.a, *given])
+
+    @cached_property
+    def _symbols(self) -> dict[str, Scalar]:
+        p, symbols = symbols_of(self._mount.parameters())
+        found: dict[str, Scalar] = {name: ca.SX.sym(name) for name in (*READING, "dt", *self._inputs)}
+        found |= {"p": p, "state": ca.SX.sym("state", self.count), "symbols": symbols}
+        found["end"] = ca.SX.sym("end", len(READING) + len(self._inputs))
+        return found | {"free": ca.vertcat(*[symbols[name] for name in self._free])}
+
+    @cached_property
+    def _column(self) -> Any:
+        return ca.vertcat(*(self._symbols[name] for name in (*READING, *self._inputs)))
+
+    @cached_property
+    def _known(self) -> tuple[Any, ...]:
+        """Mount with symbols, motion, states by owner; in terms of the true motion.
+
+        Tonal disturbances are left out: the time of a recording does not tell their phase (`tonal_disturbance.py`).
+        """
+        s = self._symbols
+        this = without_tones(self._mount.with_symbols(s["symbols"], s["v"]))
+        motion = this.at(s["t"], s["q"], s["v"], {name: s[name] for name in self._inputs})
+        own, first = {}, 0
+        for name, states in self._owners:
+            own[name] = s["state"][first : first + len(states)]
+            first += len(states)
+        return this, motion, own
+
+    def _true(self, expression: Any) -> Any:
+        """Put the true motion in: position, speed and acceleration behind the reading's."""
+        if not any(self._mount.of_kind(SensorEffect)):
+            return expression
+        s, (this, motion, own) = self._symbols, self._known
+        reading = s["q"]
+        error = ca.Function("error", [s["q"], s["t"], s["p"]], [this.reading(motion, own) - s["q"]])
+        q = reading - error(reading - error(reading, s["t"], s["p"]), s["t"], s["p"])
+        slope = ca.jacobian(q, reading)
+        speed, acceleration = slope * s["v"], slope * s["a"] + ca.jacobian(slope, reading) * s["v"] ** 2
+        return ca.substitute(expression, ca.vertcat(s["q"], s["v"], s["a"]), ca.vertcat(q, speed, acceleration))
+
+    @cached_property
+    def torque(self) -> Rowwise:
+        """Torque and its derivatives by states and free parameters, from the columns and the states."""
+        s, (this, motion, own) = self._symbols, self._known
+        level, near = this.level(motion, own), this.inertia(this.axis.inertia, motion, own)
+        torque = near * s["a"] + ca.jacobian(near, motion.q) * motion.v**2 / 2
+        torque += this.law.contact(own["friction"], motion.v, level) + this.viscous(motion, own)
+        torque = self._true(_asked(this, torque + this.loads(motion, own)))
+        rows = ca.vertcat(torque, ca.jacobian(torque, s["state"]).T, ca.jacobian(torque, s["free"]).T)
+        return Rowwise(ca.vertcat(self._column, s["state"]), s["p"], rows)
+
+    @cached_property
+    def _following(self) -> Any:
+        s, (this, motion, own) = self._symbols, self._known
+        remembering = [(own[name], part) for name, part in this.of_kind(MotionEffect) if name in own]
+        parts = [_advanced(part, motion._replace(state=state), s["dt"]) for state, part in remembering]
+        effects = self._true(ca.vertcat(ca.SX(0, 1), *parts))
+        if not this.law.states():
+            return effects
+        # Rows lie so far apart that the level changes in a step. Where sliding leaves the state behind it, sigma1
+        # times the speed magnifies what it lacks.
+        law, bristles, speed = this.law, own["friction"], self._true(motion.v)
+        middle, end = self._levels(effects)
+        bent = ca.fabs(ca.sum1(law.rate(ca.DM.zeros(bristles.numel()), speed, middle))) * s["dt"]
+        late = _late(bent / ca.fmax(middle, LEAST_LEVEL))
+        return ca.vertcat(effects, law.advance(bristles, speed, middle + (end - middle) * late, s["dt"]))
+
+    def _levels(self, effects: Any) -> tuple[Any, Any]:
+        """Friction level in the middle of a step, and at its end, where the effects have these states."""
+        s, (this, motion, own) = self._symbols, self._known
+        level = self._true(this.level(motion, own))
+        later = ca.vertcat(self._column, s["state"]), ca.vertcat(s["end"], effects, own["friction"])
+        return level, ca.substitute(level, *later)
+
+    @cached_property
+    def _step_column(self) -> Any:
+        """Columns in the middle of a step and at its end, and dt."""
+        return ca.vertcat(self._column, self._symbols["end"], self._symbols["dt"])
+
+    def states(self, steps: Array, full: Array) -> tuple[Array, list[Array]]:
+        """States along the rows from zero on, (states, rows + 1), and their derivatives, (free, rows + 1) each.
+
+        Effects go by their rates, friction by the law's closed form. A step that is linear in its own state is a
+        recurrence, solved for all rows at once; others are walked. `steps` are the columns of each step.
+        """
+        return self._at_once(steps, full) if self._affine else self._walked(steps, full)
+
+    def _at_once(self, steps: Array, full: Array) -> tuple[Array, list[Array]]:
+        states, slopes = np.zeros((self.count, steps.shape[1] + 1)), list[Array]()
+        for k, affine in enumerate(self._affine):
+            out = affine(np.vstack([steps, states[:, :-1]]), full)
+            states[k] = recurrence(out[0], out[1][:, None])[:, 0]
+            kept, added = out[2:].reshape(2, k + len(self._free), steps.shape[1])
+            change = kept * states[k, :-1] + added
+            drift = change[k:] + sum((change[j] * slopes[j][:, :-1] for j in range(k)), start=0.0)
+            slopes.append(recurrence(out[0], drift.T).T)
+        return states, slopes
+
+    @cached_property
+    def _affine(self) -> list[Rowwise]:
+        """For each state what its step keeps of it, what it adds, and how both change; [] where one is not linear."""
+        state = self._symbols["state"]
+        kept = [ca.jacobian(self._following[k], state[k]) for k in range(self.count)]
+        if any(ca.depends_on(one, state[k]) for k, one in enumerate(kept)):
+            return []
+        added = [ca.substitute(self._following[k], state[k], 0.0) for k in range(self.count)]
+        return [self._changing(k, *both) for k, both in enumerate(zip(kept, added, strict=True))]
+
+    def _changing(self, k: int, kept: Any, added: Any) -> Rowwise:
+        """Both parts of a step, and their derivatives by the states before and the free parameters."""
+        s = self._symbols
+        by = ca.vertcat(ca.SX(0, 1), *(s["state"][j] for j in range(k)), s["free"])
+        rows = ca.vertcat(kept, added, ca.jacobian(kept, by).T, ca.jacobian(added, by).T)
+        return Rowwise(ca.vertcat(self._step_column, s["state"]), s["p"], rows)
+
+    def _walked(self, steps: Array, full: Array) -> tuple[Array, list[Array]]:
+        """A state's step may depend on itself and on those before it, so their derivatives are carried one by one."""
+        states, rows = self._step(steps, full), steps.shape[1]
+        out = self._step_slopes(np.vstack([steps, states[:, :-1]]), full)
+        between = out[: self.count**2].reshape(self.count, self.count, rows)
+        by_free = out[self.count**2 :].reshape(self.count, len(self._free), rows)
+        slopes: list[Array] = []
+        for k in range(self.count):
+            drift = by_free[k] + sum((between[k, j] * slopes[j][:, :-1] for j in range(k)), start=0.0)
+            slopes.append(recurrence(between[k, k], drift.T).T)
+        return states, slopes
+
+    @cached_property
+    def _step(self) -> Stepwise:
+        s = self._symbols
+        return Stepwise(s["state"], self._step_column, s["p"], self._following)
+
+    @cached_property
+    def _step_slopes(self) -> Rowwise:
+        """Derivatives of each state's step by all states and by the free parameters, from columns, dt and states."""
+        s = self._symbols
+        by_state = ca.vec(ca.jacobian(self._following, s["state"]).T)
+        by_free = ca.vec(ca.jacobian(self._following, s["free"]).T)
+        return Rowwise(ca.vertcat(self._step_column, s["state"]), s["p"], ca.vertcat(by_state, by_free))
+
+    def motion(self, piece: Piece, full: Array) -> Array:
+        """True speed and acceleration at all rows of a piece, (2, rows)."""
+        if not any(self._mount.of_kind(SensorEffect)):
+            return np.vstack([piece.v, piece.a])
+        return self._motion(self.columns(piece), full)
+
+    @cached_property
+    def _motion(self) -> Rowwise:
+        return Rowwise(self._column, self._symbols["p"], self._true(ca.vertcat(self._symbols["v"], self._symbols["a"])))
+
+
+def _asked(this: Mount, needed: Any) -> Any:
+    """Command [N m] for which drives that follow at once give what is needed: Newton's method, from what is needed.
+
+    Past a knee the first step is exact where the drive is linear again; the others serve the bend.
+    """
+    for _, drive in reversed([(name, one) for name, one in this.of_kind(DriveEffect) if not one.states()]):
+        command = ca.SX.sym("command")
+        rest = drive.applied((), command) - needed
+        slope = ca.fmax(ca.jacobian(rest, command), LEAST_SLOPE)
+        step = ca.Function("step", [command], [command - rest / slope], {"allow_free": True})
+        target = needed
+        for _ in range(NEWTON):
+            target = step(target)
+        needed = target
+    return needed
+
+
+def _advanced(effect: MotionEffect, motion: Any, dt: Any) -> Any:
+    """States of an effect after dt at constant motion, for a rate that is linear in each state: exact."""
+    rate = effect.rate(motion)
+    pull = ca.diag(ca.jacobian(rate, motion.state))
+    drive, x = ca.substitute(rate, motion.state, ca.DM.zeros(motion.state.numel())), pull * dt
+    growth = ca.if_else(ca.fabs(x) < 1e-6, 1 + x / 2, (ca.exp(x) - 1) / (x + 1e-300))
+    return ca.exp(x) * motion.state + dt * drive * growth
+
+
+def _late(x: Any) -> Any:
+    """Where between the middle (0) and the end (1) of a step lies the level that counts, if it is reached x times.
+
+    A state that follows a level, z' = (level - z) x/dt, while that goes straight from g - d to g + d, ends where it
+    does under the constant level g + w d, w = coth(x/2) - 2/x.
+    """
+    safe = ca.fmax(x, 1e-2)
+    return ca.if_else(x < safe, x / 6, 1 / ca.tanh(safe / 2) - 2 / safe)
+
+
+MOST_KNOWN = 512
+"""Structures that are kept, the last ones: one diagnosis tries some hundred."""
+_KNOWN: dict[tuple[Any, ...], Equations] = {}
+"""Equations by structure: building them costs more than evaluating them."""
+
+
+def equations_of(mount: Mount, names: tuple[str, ...], free: tuple[str, ...]) -> Equations:
+    """Return the equations of a structure, built once."""
+    parts = [(type(part), *structure_of(part).values()) for part in mount.components().values()]
+    key = (mount.motion, names, free, *parts)
+    found = _KNOWN.pop(key, None) or Equations(mount, free)
+    _KNOWN[key] = found
+    if len(_KNOWN) > MOST_KNOWN:
+        del _KNOWN[next(iter(_KNOWN))]
+    return found

@@ -1,0 +1,223 @@
+"""Fit the parameters of a known structure to the torque of recorded motions.
+
+Least squares on the filtered torque residual with exact derivatives, bounds from the parameters' own declarations,
+and a weak prior that keeps what the recordings cannot tell at the card's number: a factor `PRIOR_FACTOR` off costs as
+much as one standard deviation of the residual in one independent row.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from math import log
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.estimation.coordinates import coordinates
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.least_squares import least_squares
+from cosim.estimation.prepare import Array, Piece
+from cosim.estimation.tonal_disturbance import phases_of
+from cosim.support.statistics import rms
+from pyfmi_models.model import Pair, Recorded, Variable, fields_of, unfitted_of
+from pyfmi_models.mount import Mount
+
+PRIOR_FACTOR = 2.0
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Result: the mount with fitted numbers, its torque (rows,), the derivatives (rows, free), and the residual.
+
+    A phase that is another in each recording is that of the first piece.
+    """
+
+    mount: Mount
+    free: tuple[str, ...]
+    values: Array
+    torque: Array
+    slopes: Array
+    residual: Array
+    phases: int = 0
+    """How many phases were found beside the free parameters, one in each piece for each tone."""
+
+    @property
+    def count(self) -> int:
+        """How many numbers were fitted."""
+        return len(self.free) + self.phases
+
+    @property
+    def rms(self) -> float:
+        """RMS of the residual."""
+        return rms(self.residual)
+
+    def parameters(self) -> dict[str, float]:
+        """Return the fitted numbers by name."""
+        return dict(zip(self.free, self.values.tolist(), strict=True))
+
+
+def free_parameters(mount: Mount, fixed: Sequence[str] = (), freed: Sequence[str] = ()) -> tuple[str, ...]:
+    """Names of the parameters a fit may change; a phase that is another in each recording is none of them.
+
+    What parts declare as not fitted stays, but for endings that are `freed`; endings that are `fixed` stay too.
+    """
+    left = {f"{prefix}.{name}" for prefix, part in mount.components().items() for name in unfitted_of(part)}
+    left = {name for name in left if not name.endswith(tuple(freed))} | set(phases_of(mount))
+    known = [variable.name for variable in mount.parameters()]
+    return tuple(name for name in known if name not in left and not name.endswith(tuple(fixed)))
+
+
+def fit(
+    mount: Mount,
+    pieces: Sequence[Piece],
+    weight: Array,
+    prior: Mount | None = None,
+    evaluations: int = 25,
+    factor: float = PRIOR_FACTOR,
+    fixed: Sequence[str] = (),
+    freed: Sequence[str] = (),
+) -> Fit:
+    """Fit all free parameters of a mount, starting from its numbers.
+
+    Args:
+        mount: structure and start.
+        pieces: what was recorded.
+        weight: weight of each kept row, 0 leaves it out; shape (rows,).
+        prior: mount whose numbers the weak prior pulls to (default: the start).
+        evaluations: how many evaluations of the model may be spent.
+        factor: a parameter of the base this far from the prior costs one unit (see the module).
+        fixed: endings of the names of parameters that stay.
+        freed: endings of the names of parameters that are fitted although their parts declare that they stay.
+
+    Returns:
+        The fit; residual = measured - model torque, N m.
+    """
+    free = free_parameters(mount, fixed, freed)
+    inverse, tau = Inverse(mount, free), np.concatenate([piece.tau[piece.kept] for piece in pieces])
+    known = {variable.name: variable for variable in mount.parameters()}
+    start = np.array([known[name].start for name in free])
+    edges = _edges(mount, [known[name] for name in free], pieces)
+    own = coordinates(mount, free, np.array([_scale(known[name]) for name in free]), edges)
+    pull = _prior(prior or mount, free, rms(weight * tau) * 1e-2 / log(factor))
+    # Pieces without weight are only looked at once, at the end.
+    used, unused = _weighted(pieces, weight)
+    cache: dict[bytes, tuple[Array, Array]] = {}
+    best: list[tuple[Array, Array]] = []
+
+    def evaluate(u: Array) -> tuple[Array, Array]:
+        key = u.tobytes()
+        if key not in cache:
+            cache.clear()
+            cache[key] = stacked(inverse, [pieces[k] for k in used.pieces], own.matrix @ u)
+        return cache[key]
+
+    tau_used, weight_used = tau[used.rows], weight[used.rows]
+
+    def residuals(u: Array) -> Array:
+        return np.concatenate([weight_used * (tau_used - evaluate(u)[0]), pull(own.matrix @ u)[0]])
+
+    def jacobian(u: Array) -> Array:
+        best[:] = [evaluate(u)]  # asked for where the fit goes on from, and so last where it ends
+        slopes = np.concatenate([-weight_used[:, None] * evaluate(u)[1], np.diag(pull(own.matrix @ u)[1])])
+        return np.asarray(slopes @ own.matrix)
+
+    found = least_squares(residuals, jacobian, own.of(start), (own.low, own.high), evaluations)
+    values = np.clip(own.matrix @ found, *edges)
+    torque, slopes = _joined(used, best[0], unused, lambda rest: stacked(inverse, [pieces[k] for k in rest], values))
+    phases = inverse.phases(pieces[0], values)
+    fitted = with_values(mount, (*free, *phases), np.array([*values, *phases.values()]))
+    return Fit(fitted, free, values, torque, slopes, tau - torque, len(phases) * len(pieces))
+
+
+class _Part(NamedTuple):
+    """Some of the pieces, by number, and their kept rows."""
+
+    pieces: list[int]
+    rows: npt.NDArray[np.int64]
+
+
+def _weighted(pieces: Sequence[Piece], weight: Array) -> tuple[_Part, _Part]:
+    """Pieces with any weight, and the others."""
+    edges = np.cumsum([0, *(len(piece.kept) for piece in pieces)])
+    spans = [np.arange(first, last) for first, last in pairwise(edges)]
+    heavy = [bool(np.any(weight[rows] > 0)) for rows in spans]
+    parts = ([k for k, one in enumerate(heavy) if one is wanted] for wanted in (True, False))
+    used, unused = (_Part(part, np.concatenate([*(spans[k] for k in part), np.arange(0)])) for part in parts)
+    return used, unused
+
+
+def _joined(
+    used: _Part, known: tuple[Array, Array], unused: _Part, look: Callable[[list[int]], tuple[Array, Array]]
+) -> tuple[Array, Array]:
+    """Torque and slopes at all rows: known where there was weight, looked at only now elsewhere."""
+    count = len(used.rows) + len(unused.rows)
+    torque, slopes = np.empty(count), np.empty((count, known[1].shape[1]))
+    torque[used.rows], slopes[used.rows] = known
+    if unused.pieces:
+        torque[unused.rows], slopes[unused.rows] = look(unused.pieces)
+    return torque, slopes
+
+
+def with_values(mount: Mount, names: Sequence[str], values: Array) -> Mount:
+    """Return the mount with new numbers for the named parameters."""
+    numbers = {variable.name: variable.start for variable in mount.parameters()}
+    numbers |= dict(zip(names, (float(value) for value in values), strict=True))
+    parts = {prefix: _filled(part, prefix, numbers) for prefix, part in mount.components().items()}
+    axis, friction, *effects = parts.values()
+    return replace(mount, axis=axis, friction=friction, effects=tuple(effects))
+
+
+def _filled(part: Any, prefix: str, numbers: dict[str, float]) -> Any:
+    changes: dict[str, float | Pair] = {}
+    for name in fields_of(part):
+        full = f"{prefix}.{name}"
+        sides = [numbers.get(f"{full}.{side}") for side in Pair._fields]
+        changes[name] = numbers[full] if full in numbers else Pair(*sides)  # type: ignore[arg-type]
+    return replace(part, **changes)
+
+
+def _edges(mount: Mount, variables: Sequence[Variable], pieces: Sequence[Piece]) -> tuple[Array, Array]:
+    """Lowest and highest values of some parameters in a fit to these pieces, as their parts declare them."""
+    top = max(float(np.abs(piece.v).max()) for piece in pieces)
+    asked = float(np.quantile(np.abs(np.concatenate([piece.tau for piece in pieces])), 0.98))
+    parts, recorded = mount.components(), Recorded(top, asked)
+    edges = []
+    for variable in variables:
+        prefix, _, name = variable.name.partition(".")
+        edges.append(parts[prefix].fit_bounds(replace(variable, name=name), recorded))
+    lowest, highest = (np.array(column) for column in zip(*edges, strict=True))
+    return lowest, highest
+
+
+def edges_of(mount: Mount, pieces: Sequence[Piece]) -> dict[str, tuple[float, float]]:
+    """Bounds of each free parameter of a mount in a fit to these pieces."""
+    known, free = {variable.name: variable for variable in mount.parameters()}, free_parameters(mount)
+    lowest, highest = _edges(mount, [known[name] for name in free], pieces)
+    return dict(zip(free, zip(lowest.tolist(), highest.tolist(), strict=True), strict=True))
+
+
+def _scale(variable: Variable) -> float:
+    return abs(variable.start) or abs(variable.nominal) or 1.0
+
+
+def _prior(mount: Mount, free: Sequence[str], weight: float) -> Callable[[Array], tuple[Array, Array]]:
+    """Weak log-normal pull of the base's positive parameters towards the card; effects are left alone."""
+    known = {variable.name: variable for variable in mount.parameters()}
+    centre = np.array([known[name].start if name in known else 0.0 for name in free])
+    positive = np.array(
+        [
+            name.startswith(("axis.", "friction.")) and name in known and known[name].low >= 0 < known[name].start
+            for name in free
+        ]
+    )
+    centre = np.where(positive, centre, 1.0)
+
+    def pull(values: Array) -> tuple[Array, Array]:
+        safe = np.where(positive, np.maximum(values, 1e-3 * centre), 1.0)
+        return (
+            np.where(positive, weight * np.log(safe / centre), 0.0),
+            np.where(positive, weight / safe, 0.0),
+        )
+
+    return pull

@@ -1,0 +1,276 @@
+"""The torque that a recorded motion needs, and how it changes with every parameter.
+
+    needed(t) = D^-1 [ J(q) q'' + J'(q) q'^2 / 2 + contact + viscous + loads + coupled ] + shaken
+
+with the true motion recovered from the reading, the states of friction and effects integrated along it, what hangs on
+a spring (`coupled`) answered in the frequency domain, what is behind a play simulated (`play.py`), and D the drive
+effects undone, a motor in front of a spring first; then two clocks are brought together. Last come tonal disturbances:
+their phase is another in each piece, found in the torque recorded there (`tonal_disturbance.py`). The equations are
+those of the plant: the same objects, with measured motion put in (`equations.py`).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from scipy.interpolate import CubicSpline
+
+from cosim.estimation.equations import Equations, equations_of
+from cosim.estimation.play import play_torque
+from cosim.estimation.prepare import Array, Piece
+from cosim.estimation.row_weights import described_rows
+from cosim.estimation.spectrum import Spectrum
+from cosim.estimation.tonal_disturbance import Tone, in_phase, phases_of
+from pyfmi_models.effects import ClockEffect, DriveEffect, Effect
+from pyfmi_models.effects.backlash import Backlash
+from pyfmi_models.effects.base import Transmission
+from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
+from pyfmi_models.model import with_symbols
+from pyfmi_models.mount import Mount
+
+BUMP = 1e-6
+"""Relative change of a parameter by which a frequency response is differentiated."""
+
+
+@dataclass(frozen=True)
+class Inverse:
+    """Torque needed by a mount for a measured motion; `free` names the parameters that may vary."""
+
+    mount: Mount
+    free: tuple[str, ...]
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of all parameters of the mount, in its order."""
+        return tuple(variable.name for variable in self.mount.parameters())
+
+    @cached_property
+    def start(self) -> Array:
+        """Present values of all parameters."""
+        return np.array([variable.start for variable in self.mount.parameters()])
+
+    @cached_property
+    def present(self) -> Array:
+        """Present values of the free parameters, in the order of `free`."""
+        return np.asarray(self.start[[self.names.index(name) for name in self.free]], float)
+
+    @cached_property
+    def _equations(self) -> Equations:
+        return equations_of(self.mount, self.names, self.free)
+
+    def torque(self, piece: Piece, values: Array) -> tuple[Array, Array]:
+        """Return needed torque (rows,) and its derivatives (rows, free) at all rows of a piece, filtered once more."""
+        columns = self.behind(piece, self.momentary(piece, values), values)
+        return columns[:, 0], columns[:, 1:]
+
+    def momentary(self, piece: Piece, values: Array) -> Array:
+        """Torque that the motion and the states need, and its derivatives: (rows, 1 + free), filtered once more."""
+        return piece.lowpass(np.column_stack(self._momentary(piece, self._with(values))))
+
+    def behind(self, piece: Piece, columns: Array, values: Array) -> Array:
+        """The same after springs, drive and clocks, which act on a torque as a whole, and with what shakes the axis."""
+        full = self._with(values)
+        return self._with_shaken(piece, self._unshaken(piece, columns, full), full)
+
+    def phases(self, piece: Piece, values: Array) -> dict[str, float]:
+        """Phase [rad] at time zero of what shakes the axis in a piece, by the name of the parameter."""
+        names = phases_of(self.mount)
+        if not names:
+            return {}
+        full = self._with(values)
+        rest = piece.tau - self._unshaken(piece, self.momentary(piece, values), full)[:, 0]
+        tones = self._tones(full)
+        late = [float(np.angle(self._drive(full, tone.hertz))) for tone in tones]
+        found = in_phase(piece, rest, tones, self._telling(piece))
+        return {name: phase + lag for name, (phase, _), lag in zip(names, found, late, strict=True)}
+
+    def _unshaken(self, piece: Piece, columns: Array, full: Array) -> Array:
+        columns = self._with_coupled(piece, columns, full)
+        columns = self._with_motors(piece, columns, full)
+        columns = self._undone_drive(columns, full, piece.dt)
+        return self._on_one_clock(piece, columns, full)
+
+    def _with(self, values: Array) -> Array:
+        full = self.start.copy()
+        full[[self.names.index(name) for name in self.free]] = values
+        return full
+
+    def _momentary(self, piece: Piece, full: Array) -> tuple[Array, Array]:
+        """Torque that the motion of each moment and the states need, and its derivatives (rows, free)."""
+        rows = self._equations.columns(piece)
+        state, slopes = self._states(piece, rows, full)
+        out = self._equations.torque(np.vstack([rows, state]), full)
+        torque, by_state, by_free = out[0], out[1 : 1 + len(state)], out[1 + len(state) :]
+        for row, slope in zip(by_state, slopes, strict=True):
+            by_free = by_free + row * slope
+        return torque, by_free.T
+
+    def _states(self, piece: Piece, rows: Array, full: Array) -> tuple[Array, list[Array]]:
+        """States of effects and friction along the motion, (states, rows), and their derivatives (free, rows) each."""
+        if self._equations.count == 0:
+            return np.zeros((0, len(piece.t))), []
+        middle, end = (rows[:, 1:] + rows[:, :-1]) / 2, rows[:, 1:]
+        steps = np.vstack([middle, end, np.full(len(piece.t) - 1, piece.dt)])
+        return self._equations.states(steps, full)
+
+    def _parts(self, kind: type[Effect]) -> list[str]:
+        return [name for name, part in self.mount.components().items() if isinstance(part, kind)]
+
+    def _set(self, prefix: str, full: Array) -> Any:
+        values = dict(zip(self.names, full, strict=True))
+        return with_symbols(self.mount.components()[prefix], values, 0.0, prefix)
+
+    def _bumped(self, full: Array, name: str) -> tuple[Array, float]:
+        """All parameters with one of them changed a little, and by how much."""
+        index = self.names.index(name)
+        change = BUMP * (abs(full[index]) or 1.0)
+        other = full.copy()
+        other[index] += change
+        return other, change
+
+    def _with_coupled(self, piece: Piece, columns: Array, full: Array) -> Array:
+        """Add what masses behind a spring or a play need beyond being carried rigidly.
+
+        Where several stand in a row, each is taken to follow the axis itself: what one of them does to the motion that
+        the next one sees is left out.
+        """
+        couplings, motors = [name for name, _ in self.mount.trailing()], self._parts(Transmission)
+        if not couplings:
+            return columns
+        v, a = self._equations.motion(piece, full)
+        spectrum = Spectrum(piece.lowpass(a)[:, None], piece.dt)
+
+        def added(numbers: Array) -> Array:
+            total: Array = np.zeros_like(a)
+            far = self._behind_motors(numbers)
+            for prefix in couplings:
+                coupling = self._set(prefix, numbers)
+                far = far * coupling.share()
+                if isinstance(coupling, Backlash):
+                    total += piece.lowpass(play_torque(coupling, far, v, a, piece.dt))
+                else:
+                    total += spectrum.times(far * (coupling.carried(spectrum.omega) - 1))[:, 0]
+            return total
+
+        return self._with_changes(columns, full, added, ("axis.inertia", *motors, *couplings))
+
+    def _behind_motors(self, full: Array) -> float:
+        """Inertia that the transmissions leave for the axis."""
+        shares = [self._set(name, full).share() for name in self._parts(Transmission)]
+        return float(full[self.names.index("axis.inertia")] * np.prod(shares))
+
+    def _with_motors(self, piece: Piece, columns: Array, full: Array) -> Array:
+        """Turn what the axis needs into what a motor in front of its spring needs: exact, as the axis is what is read.
+
+            needed = J_motor q'' + (1 + J_motor s^2 / (k + d s)) (columns - J_motor q'')
+
+        The factor grows with frequency, the filter behind the columns falls faster. Of several motors in a row each is
+        taken to follow the axis itself.
+        """
+        motors = self._parts(Transmission)
+        if not motors:
+            return columns
+        a = piece.lowpass(self._equations.motion(piece, full)[1])
+        spectrum = Spectrum(np.column_stack([a, columns]), piece.dt)
+
+        def added(numbers: Array) -> Array:
+            both = spectrum.times(self._demand(numbers, spectrum.omega) - 1, slice(2))
+            motor = numbers[self.names.index("axis.inertia")] - self._behind_motors(numbers)
+            return np.asarray(both[:, 1] - motor * both[:, 0])
+
+        out = self._with_changes(columns, full, added, ("axis.inertia", *motors))
+        out[:, 1:] += spectrum.times(self._demand(full, spectrum.omega) - 1, slice(2, None))
+        return out
+
+    def _demand(self, full: Array, omega: npt.NDArray[Any]) -> npt.NDArray[np.complex128]:
+        """Torque on the first motor per torque on the axis."""
+        parts = [self._set(name, full).demand(omega) for name in self._parts(Transmission)]
+        return np.asarray(np.prod([np.ones_like(omega, dtype=np.complex128), *parts], axis=0))
+
+    def _with_changes(
+        self, columns: Array, full: Array, added: Callable[[Array], Array], prefixes: Sequence[str]
+    ) -> Array:
+        """Add a torque that depends on some parts, and its derivatives, by differences."""
+        now, out = added(full), columns.copy()
+        out[:, 0] += now
+        for column, name in enumerate(self.free):
+            if name.startswith(tuple(prefixes)):
+                other, change = self._bumped(full, name)
+                out[:, 1 + column] += (added(other) - now) / change
+        return out
+
+    def _undone_drive(self, columns: Array, full: Array, dt: float) -> Array:
+        """Undo the linear drive effects on all columns, and add the derivatives by their parameters."""
+        drives = self._parts(DriveEffect)
+        if not any(self.mount.components()[name].states() for name in drives):
+            return columns
+        spectrum = Spectrum(columns, dt)
+
+        def inverse(numbers: Array) -> npt.NDArray[np.complex128]:
+            return np.asarray(1 / np.prod([self._set(n, numbers).response(spectrum.omega) for n in drives], axis=0))
+
+        now = inverse(full)
+        out = spectrum.times(now)
+        for column, name in enumerate(self.free):
+            if name.split(".")[0] in drives:
+                other, change = self._bumped(full, name)
+                out[:, 1 + column] += spectrum.times((inverse(other) - now) / change, slice(1))[:, 0]
+        return out
+
+    def _on_one_clock(self, piece: Piece, columns: Array, full: Array) -> Array:
+        """Bring the torque needed at a reading's time to the time of the torque recorded beside it."""
+        clocks = self._parts(ClockEffect)
+        if not clocks:
+            return columns
+        spline = CubicSpline(piece.t, columns, axis=0)
+
+        def later(numbers: Array) -> Array:
+            parts = [self._set(name, numbers) for name in clocks]
+            return np.asarray(sum(part.ahead(self.mount.at(piece.t, piece.q, piece.v)) for part in parts))
+
+        at = np.clip(piece.t - later(full), piece.t[0], piece.t[-1])
+        out, slope = spline(at), spline(at, 1)[:, 0]
+        for column, name in enumerate(self.free):
+            if name.split(".")[0] in clocks:
+                other, change = self._bumped(full, name)
+                out[:, 1 + column] -= slope * (later(other) - later(full)) / change
+        return np.asarray(out)
+
+    def _with_shaken(self, piece: Piece, columns: Array, full: Array) -> Array:
+        """Add what shakes the axis, in the phase that the torque recorded in this piece tells, and its derivatives."""
+        prefixes = self._parts(PeriodicDisturbance)
+        if not prefixes:
+            return columns
+        rest, rows = piece.tau - columns[:, 0], self._telling(piece)
+
+        def added(numbers: Array) -> Array:
+            return np.asarray(sum(torque for _, torque in in_phase(piece, rest, self._tones(numbers), rows)))
+
+        return self._with_changes(columns, full, added, prefixes)
+
+    def _tones(self, full: Array) -> list[Tone]:
+        """What shakes the axis, as the torque in front of the drive shows it."""
+        parts = [self._set(prefix, full) for prefix in self._parts(PeriodicDisturbance)]
+        return [Tone(one.frequency_hz, one.amplitude / abs(self._drive(full, one.frequency_hz))) for one in parts]
+
+    def _drive(self, full: Array, hertz: float) -> complex:
+        """Response of the drive, from command to the torque on the axis, at one frequency."""
+        omega, names = np.array([2 * np.pi * hertz]), self._parts(DriveEffect)
+        followed = np.prod([self._set(name, full).response(omega)[0] for name in names])
+        return complex(followed / self._demand(full, omega)[0])
+
+    def _telling(self, piece: Piece) -> npt.NDArray[np.bool_]:
+        """Rows whose rest tells a phase."""
+        return np.asarray(piece.inside & described_rows(self.mount.friction, piece.v))
+
+
+def stacked(inverse: Inverse, pieces: Sequence[Piece], values: Array) -> tuple[Array, Array]:
+    """Return torque and derivatives at the kept rows of all pieces."""
+    parts = [(piece, *inverse.torque(piece, values)) for piece in pieces]
+    return (
+        np.concatenate([torque[piece.kept] for piece, torque, _ in parts]),
+        np.concatenate([slopes[piece.kept] for piece, _, slopes in parts]),
+    )

@@ -1,0 +1,65 @@
+"""Of which rows a model says anything, and how much each row counts.
+
+At rest a friction law without memory says nothing. And rows that repeat one operating point say little that is new:
+what a law misses there, they all miss alike.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.estimation.prepare import Array, Prepared
+from pyfmi_models.friction import FrictionLaw, MemorylessLaw
+
+CLEAR_MOTION = 0.02
+"""Clear motion: faster than this share of the highest speed."""
+
+
+STILL = 0.1
+"""A recording whose speeds all stay below this share of what is clear motion beside the others is at rest."""
+
+
+def least_speed(v: Array) -> float:
+    """Speed above which motion is clear, on the scale of these speeds."""
+    return CLEAR_MOTION * float(np.abs(v).max())
+
+
+def described_rows(law: FrictionLaw, v: Array) -> npt.NDArray[np.bool_]:
+    """Rows at these speeds of which the law says something: all, or without memory those in clear motion."""
+    if isinstance(law, MemorylessLaw):
+        return np.abs(v) > least_speed(v)
+    return np.ones(len(v), bool)
+
+
+def weights(law: FrictionLaw, prepared: Prepared) -> Array:
+    """Weight of each kept row in a fit: 0 where the law says nothing; squares of the others average 1.
+
+    Rest is judged by the speeds of its own recording: one at a hundredth of the others' speed moves all the same.
+    """
+    v = prepared.stacked("v")
+    says = np.concatenate([_says(law, piece.v[piece.kept], least_speed(v)) for piece in prepared.pieces])
+    new = says / _repeated(v, says, prepared.recording_of)
+    return np.asarray(np.sqrt(new * says.sum() / max(new.sum(), 1e-300)))
+
+
+def _says(law: FrictionLaw, v: Array, least: float) -> Array:
+    still = isinstance(law, MemorylessLaw) and np.abs(v).max(initial=0.0) < STILL * least
+    return np.zeros(len(v)) if still else described_rows(law, v).astype(float)
+
+
+def _repeated(v: Array, says: Array, recording: npt.NDArray[np.int64]) -> Array:
+    """How many rows stand for one, at each row: 1 + (n - 1) rho for a recording of n rows.
+
+    rho is the intraclass correlation of speed, from an analysis of variance: 1 if each recording holds one speed, about
+    0 if each visits all. With errors that a recording's rows have in common this is the factor of Moulton (Journal of
+    Econometrics 32, 1986, 385).
+    """
+    count = np.bincount(recording, weights=says)
+    groups, rows = np.count_nonzero(count), count.sum()
+    if groups < 2 or rows <= groups:
+        return np.ones(len(v))
+    mean = np.bincount(recording, weights=says * v) / np.maximum(count, 1)
+    within = float(says @ (v - mean[recording]) ** 2) / (rows - groups)
+    between = float(count @ (mean - (count @ mean) / rows) ** 2) / (groups - 1)
+    size = (rows - (count @ count) / rows) / (groups - 1)
+    rho = max(0.0, (between - within) / max(between + (size - 1) * within, 1e-300))
+    return np.asarray(1 + np.maximum(count[recording] - 1, 0) * rho)

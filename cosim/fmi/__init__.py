@@ -1,0 +1,1 @@
+"""Components behind one interface: FMUs, Python functions, their descriptions and aliases."""

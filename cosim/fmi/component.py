@@ -1,0 +1,138 @@
+"""The contract of what a master steps.
+
+Call sequence, once each unless said otherwise:
+
+    1. `ports`                      names, references, causality and units, before anything runs
+    2. `start(parameters)`          sets parameters and start values, initialises at t = 0
+    3. `get`, `set`, `step`         in every tick, or their addresses in `functions`, called by the C loop;
+       `save`, `restore`            around steps that are taken back, where `rewinds` says that it can
+    4. `failed(status)`             after a call that returned a status above 1; then nothing more is called but close
+    5. `close()`                    frees everything, whatever happened before
+
+Statuses are those of FMI: 0 OK, 1 warning, 2 discard, 3 error, 4 fatal; above 1 a component must not be stepped again.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import inf
+from typing import Any, Protocol
+
+import numpy as np
+
+OK, WARNING, DISCARD, ERROR, FATAL = range(5)
+NOT_FINITE, TERMINATED, NOT_AGREED, NOT_EXACT, POOL_FULL = 100, 101, 102, 103, 104
+STATUSES = {
+    DISCARD: "discarded the step",
+    ERROR: "returned an error",
+    FATAL: "failed for good",
+    5: "left the step pending",
+    NOT_FINITE: "gave an output that is not a finite number",
+    NOT_AGREED: "and those coupled with it did not agree within the iterations allowed",
+    NOT_EXACT: "met a value that its type does not hold",
+    POOL_FULL: "gave more texts and binaries than there is room for",
+}
+
+
+@dataclass(frozen=True)
+class Port:
+    """A variable of a component as the outside sees it, or an element of an array; `unit` is empty where unknown.
+
+    `type` is FMI 3's name of it. `items` are the names of an enumeration's values. An array has a `shape`; each of its
+    elements is a port too, with the array's name as `array` and its place in FMI's order as `element`.
+    """
+
+    name: str
+    reference: int
+    causality: str
+    unit: str = ""
+    description: str = ""
+    start: Any = None
+    low: float = -inf
+    high: float = inf
+    settable: bool = False
+    type: str = "Float64"
+    items: Mapping[int, str] = field(default_factory=dict)
+    shape: tuple[int, ...] = ()
+    array: str = ""
+    element: int = 0
+
+    @property
+    def real(self) -> bool:
+        """Whether it is one double, which needs no conversion."""
+        return self.type == "Float64" and not self.shape and not self.array
+
+    @property
+    def variable(self) -> str:
+        """The variable that it is, or is an element of."""
+        return self.array or self.name
+
+
+@dataclass(frozen=True)
+class Functions:
+    """Addresses that the compiled loop calls: set, get and step of reals in FMI `version` 2 or 3.
+
+    `save` and `restore` are those of the FMU's state, 0 where it cannot be taken back; `state` is where it is kept.
+    """
+
+    version: int
+    instance: int
+    set: int
+    get: int
+    step: int
+    save: int = 0
+    restore: int = 0
+    state: int = 0
+
+
+class Component(Protocol):
+    """Anything a master can step."""
+
+    name: str
+    origin: dict[str, Any]
+
+    @property
+    def ports(self) -> Mapping[str, Port]:
+        """Variables by name."""
+
+    @property
+    def feedthrough(self) -> Mapping[str, frozenset[str] | None]:
+        """The inputs that each output follows at once, without a step; None where nothing is said about it."""
+
+    @property
+    def rewinds(self) -> bool:
+        """Whether `save` and `restore` work."""
+
+    @property
+    def flexible(self) -> bool:
+        """Whether steps may differ in length."""
+
+    @property
+    def functions(self) -> Functions | None:
+        """Addresses for the compiled loop; None for a component that only Python can step."""
+
+    def start(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
+        """Set parameters and start values by name and initialise at `time`; may be called again for another run."""
+
+    def set(self, references: np.ndarray, values: np.ndarray) -> int:
+        """Set real inputs; references uint32, values float64, shape (n,)."""
+
+    def get(self, references: np.ndarray, values: np.ndarray) -> int:
+        """Write the values of real variables into `values`."""
+
+    def step(self, time: float, size: float, final: bool = True) -> int:
+        """Go from `time` to `time + size`, both in s; `final` False: the step may be taken back."""
+
+    def save(self) -> int:
+        """Keep the state as it is now, in the place of the one kept before."""
+
+    def restore(self) -> int:
+        """Go back to the state kept."""
+
+    def failed(self, status: int) -> None:
+        """Hear that a call returned this status, so that `close` calls only what is still allowed."""
+
+    def messages(self) -> tuple[str, ...]:
+        """What the component said last, newest at the end."""
+
+    def close(self) -> None:
+        """Free everything; may be called twice."""

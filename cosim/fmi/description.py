@@ -1,0 +1,134 @@
+"""What an FMU says about itself, read by FMPy and judged: can it run here, and which variables does it have."""
+
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from cosim.fmi.sound import check_variables, check_xml
+from cosim.support.archive import contents
+from cosim.support.errors import FmuError
+from cosim.support.files import sha256
+
+READ = {"modelDescription.xml", "sources/buildDescription.xml"}
+"""XML members that FMPy reads."""
+INTERFACES = {
+    "coSimulation": "co-simulation",
+    "modelExchange": "model-exchange",
+    "scheduledExecution": "scheduled-execution",
+}
+"""What FMI calls the interfaces, by their element in a model description."""
+
+
+def describe(path: Path) -> Any:
+    """Read the model description (FMPy's) of an FMU that this tool can run.
+
+    Raises:
+        FmuError: the file is missing, no FMU, or of another FMI version or kind.
+    """
+    import fmpy
+
+    if not path.exists():
+        raise FmuError(f"{path} does not exist.", culprit=str(path))
+    if not zipfile.is_zipfile(path):
+        raise FmuError(f"{path} is no FMU: it is not a zip archive.", culprit=str(path))
+    names = {one.filename for one in contents(path, complaint_of(path))}
+    if "modelDescription.xml" not in names:
+        raise FmuError(f"{path} is no FMU: the archive holds no modelDescription.xml.", culprit=str(path))
+    try:
+        for member in names & READ:
+            check_xml(path, member)
+        version = _version(path)
+        with path.open("rb") as file:  # FMPy would leave it open where it cannot read it
+            description = fmpy.read_model_description(file, validate=False) if version[:2] in ("2.", "3.") else None
+    except FmuError:
+        raise
+    except Exception as error:  # FMPy and its XML parser raise many kinds; each means the same to the user
+        raise FmuError(f"{path} has a modelDescription.xml that cannot be read: {first_line(error)}.") from error
+    if description is None:
+        raise FmuError(f"{path} is of FMI {version}; this tool runs FMI 2.0 and 3.0.", culprit=str(path))
+    check_variables(path, description)
+    return description
+
+
+def complaint_of(path: Path) -> Callable[[str], FmuError]:
+    """Return what makes an error of a sentence about the archive of an FMU."""
+    return lambda what: FmuError(f"{path} is no FMU that can be run: {what}.", culprit=str(path))
+
+
+def own_interface(path: Path, description: Any, name: str) -> Any:
+    """Return one interface of a model description: `coSimulation`, `modelExchange` or `scheduledExecution`.
+
+    Raises:
+        FmuError: the FMU does not have it.
+    """
+    found = getattr(description, name)
+    if found is None:
+        have = tuple(word for key, word in INTERFACES.items() if getattr(description, key) is not None)
+        message = f"{path} has no {INTERFACES[name]} interface; it has: {', '.join(have) or 'none'}."
+        raise FmuError(message, culprit=str(path), choices=have)
+    return found
+
+
+def feedthrough_of(description: Any) -> dict[str, frozenset[str] | None]:
+    """List the inputs that each output follows at once; None where the model description does not say.
+
+    A discrete output changes only when the model steps.
+    """
+    found: dict[str, frozenset[str] | None] = {}
+    for unknown in description.outputs:
+        known = unknown.dependencies
+        inputs = None if known is None else frozenset(one.name for one in known if one.causality == "input")
+        found[unknown.variable.name] = frozenset() if unknown.variable.variability == "discrete" else inputs
+    return found
+
+
+def check_binary(path: Path, description: Any, identifier: str) -> None:
+    """Refuse an FMU that has no binary for this platform.
+
+    Raises:
+        FmuError: names this platform and those the FMU has, or the file that is misnamed.
+    """
+    import fmpy
+
+    folder = fmpy.platform if description.fmiVersion[0] == "2" else fmpy.platform_tuple
+    library = f"{identifier}{fmpy.sharedLibraryExtension}"
+    names = _names(path)
+    if f"binaries/{folder}/{library}" not in names:
+        folders = [name.split("/") for name in names if name.startswith("binaries/")]
+        have = sorted({parts[1] for parts in folders if len(parts) > 2 and parts[2]})
+        if folder in have:
+            there = ", ".join(parts[2] for parts in folders if parts[1] == folder and parts[2:3] > [""])
+            rule = f"its modelIdentifier asks for binaries/{folder}/{library}, and there is only: {there}"
+            raise FmuError(f"{path} cannot run: {rule}.", culprit=str(path), value=library)
+        has = ", ".join(have) or "none"
+        message = f"{path} has no {folder} binary; it has {has}. Export it again for this platform."
+        raise FmuError(message, culprit=str(path), value=folder, choices=tuple(have))
+
+
+def _names(path: Path) -> list[str]:
+    with zipfile.ZipFile(path) as archive:
+        return archive.namelist()
+
+
+def _version(path: Path) -> str:
+    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+        return ElementTree.parse(file).getroot().get("fmiVersion", "?")
+
+
+def origin_of(path: Path, description: Any) -> dict[str, Any]:
+    """Say which FMU it is, for the origin of a recording."""
+    return {
+        "file": path.name,
+        "sha256": sha256(path),
+        "model": description.modelName,
+        "fmi": description.fmiVersion,
+        "tool": description.generationTool or "",
+    }
+
+
+def first_line(error: BaseException) -> str:
+    """Return the first line of an error, without its full stop."""
+    lines = str(error).splitlines()
+    return lines[0].rstrip(".") if lines else type(error).__name__

@@ -1,0 +1,293 @@
+"""A component that is an FMU: FMPy reads, unpacks and starts it, the loop calls its functions directly.
+
+FMI 2.0 and 3.0, co-simulation. Unpacked files live in a temporary directory that goes with the component.
+"""
+
+import ctypes
+import tempfile
+from collections import deque
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.fmi.component import ERROR, FATAL, OK, TERMINATED, Functions, Port
+from cosim.fmi.description import (
+    check_binary,
+    complaint_of,
+    describe,
+    feedthrough_of,
+    first_line,
+    origin_of,
+    own_interface,
+)
+from cosim.fmi.listeners import callbacks2, registered, same_directory
+from cosim.fmi.settings import STRUCTURAL, Setting, settings_of, sizes_of, tell
+from cosim.fmi.variables import ports_of
+from cosim.support.activity import doing
+from cosim.support.archive import unpack
+from cosim.support.errors import CosimError, FmuError
+
+_TERMINATED = 3
+"""fmi2Terminated of fmi2StatusKind."""
+_STEP2 = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
+_VALUES2 = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
+_SAVE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
+_VALUES3 = ctypes.CFUNCTYPE(
+    ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p, ctypes.c_size_t
+)
+
+
+class FmuComponent:
+    """One instance of an FMU.
+
+    Args:
+        path: the .fmu file.
+        name: what the component is called in messages; the model's name where not given.
+        description: what `describe` read of it, if that was done before.
+        tolerance: relative tolerance of the FMU's own solver; the FMU's default where not given.
+
+    Raises:
+        FmuError: the file is no FMU, has no binary for this platform, or cannot be instantiated.
+    """
+
+    interface = "coSimulation"
+    """The element of the model description that must be there."""
+
+    def __init__(
+        self, path: Path | str, name: str = "", description: Any = None, tolerance: float | None = None
+    ) -> None:
+        self.path = Path(path)
+        self._description = description or describe(self.path)
+        self._own = own_interface(self.path, self._description, self.interface)
+        self.name = name or self._description.modelName
+        self._tolerance = tolerance
+        self.ports: Mapping[str, Port] = ports_of(self._description)
+        self._sizes: Mapping[str, int] = {}
+        self.feedthrough = feedthrough_of(self._description)
+        self.origin: dict[str, Any] = origin_of(self.path, self._description)
+        self._messages: deque[str] = deque(maxlen=5)
+        self._started = False
+        self._worst = OK
+        self._state = ctypes.c_void_p()
+        self._directory = tempfile.TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True)
+        try:
+            with doing(self.name, "loaded"):
+                self._fmu = self._instantiate()
+            self.functions: Functions | None = self._functions()
+            self._set, self._get, self._step = self._callables()
+        except BaseException:
+            self._directory.cleanup()
+            raise
+
+    def configure(self, parameters: Mapping[str, Any]) -> None:
+        """Give arrays the size that structural parameters among these ask for; others are left for `start`.
+
+        Raises:
+            FmuError: a value is none of the parameter's.
+        """
+        sizes = sizes_of(self.ports, self.name, parameters)
+        if sizes != self._sizes:
+            self._sizes, self.ports = sizes, ports_of(self._description, sizes)
+
+    def start(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
+        """Set parameters and start values by name and initialise at `time` [s]; a second call starts all over again.
+
+        Raises:
+            FmuError: a name is unknown or not settable, a value breaks its bounds, or the FMU refuses.
+        """
+        if self._worst == FATAL:
+            raise FmuError(f"{self.name} ({self.path}) failed for good and cannot start again; open it anew.")
+        self.configure(parameters)
+        with doing(self.name, "initialised"):
+            self._initialise(settings_of(self.ports, self.name, parameters), time)
+
+    def _initialise(self, settings: Sequence[Setting], time: float) -> None:
+        """Set parameters and go through initialisation."""
+        structural = [one for one in settings if one.port.causality == STRUCTURAL]
+        try:
+            if self._started:
+                self._fmu.reset()
+                self._worst = OK
+            if structural:
+                self._fmu.enterConfigurationMode()
+                tell(self._fmu, self._version, structural)
+                self._fmu.exitConfigurationMode()
+            tell(self._fmu, self._version, [one for one in settings if one not in structural])
+            if self._version == 2:
+                self._fmu.setupExperiment(tolerance=self._tolerance, startTime=time)
+            self._started = True
+            told = {} if self._version == 2 else {"tolerance": self._tolerance, "startTime": time}
+            self._fmu.enterInitializationMode(**told)
+            self._fmu.exitInitializationMode()
+        except CosimError:
+            raise
+        except Exception as error:
+            self.failed(getattr(error, "status", 0))
+            raise FmuError(f"{self.name} ({self.path}) does not start: {self._reason(error)}.") from error
+
+    def set(self, references: np.ndarray, values: np.ndarray) -> int:
+        """Set real inputs; references uint32, values float64, shape (n,), contiguous."""
+        return int(self._set(*self._arrays(references, values)))
+
+    def get(self, references: np.ndarray, values: np.ndarray) -> int:
+        """Write the values of real variables into `values`."""
+        return int(self._get(*self._arrays(references, values)))
+
+    def step(self, time: float, size: float, final: bool = True) -> int:
+        """Go from `time` to `time + size`, both in s; `final` False: the step may be taken back."""
+        return int(self._step(time, size, final))
+
+    def save(self) -> int:
+        """Keep the state as it is now, in the place of the one kept before."""
+        assert self.functions is not None
+        return int(_SAVE(self.functions.save)(self._fmu.component, ctypes.addressof(self._state)))
+
+    def restore(self) -> int:
+        """Go back to the state kept."""
+        assert self.functions is not None
+        return int(_SAVE(self.functions.restore)(self._fmu.component, self._state.value))
+
+    def messages(self) -> tuple[str, ...]:
+        """What the FMU said last, newest at the end."""
+        return tuple(self._messages)
+
+    def failed(self, status: int) -> None:
+        """Hear that a call returned this status: after an error only freeing is allowed, after a fatal one nothing."""
+        self._worst = max(self._worst, status)
+
+    def terminated(self) -> bool:
+        """Say whether a step was discarded because the FMU asks to end the simulation (FMI 2; FMI 3 says it itself)."""
+        if self._version != 2 or self.interface != "coSimulation":
+            return False
+        try:
+            return bool(self._fmu.getBooleanStatus(_TERMINATED))
+        except Exception:  # an FMU without asynchronous steps need not know
+            return False
+
+    def close(self) -> None:
+        """Free instance, library and unpacked files as far as FMI allows it; may be called twice."""
+        fmu, self._fmu = self._fmu, None
+        if fmu is not None and self._worst != FATAL:
+            with doing(self.name, "closed"):
+                self._free(fmu)
+        self._directory.cleanup()
+
+    def _free(self, fmu: Any) -> None:
+        self._forget(fmu)
+        with suppress(Exception):  # an FMU may refuse to be terminated; it is freed all the same
+            if self._worst < ERROR:
+                fmu.terminate()
+        with suppress(Exception):
+            fmu.freeInstance()
+
+    def _forget(self, fmu: Any) -> None:
+        """Free the state kept."""
+        if self._state.value and self._worst < ERROR:
+            name = "fmi2FreeFMUstate" if self._version == 2 else "fmi3FreeFMUState"
+            _SAVE((name, fmu.dll))(fmu.component, ctypes.addressof(self._state))
+
+    def __enter__(self) -> "FmuComponent":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    @property
+    def rewinds(self) -> bool:
+        """Whether the FMU can save and restore its state."""
+        return bool(self._own.canGetAndSetFMUstate)
+
+    @property
+    def flexible(self) -> bool:
+        """Whether the FMU takes steps of changing length."""
+        return bool(self._own.canHandleVariableCommunicationStepSize)
+
+    @property
+    def version(self) -> int:
+        """Of FMI: 2 or 3."""
+        return self._version
+
+    @property
+    def instance(self) -> int:
+        """The address that FMI's functions take first."""
+        component = self._fmu.component
+        return int(getattr(component, "value", component))
+
+    def address(self, function: str) -> int:
+        """Return the address of a function of the FMU, named without its prefix: `GetInteger`; 0 where it has none."""
+        found = getattr(self._fmu.dll, f"fmi{self._version}{function}", None)
+        return 0 if found is None else ctypes.cast(found, ctypes.c_void_p).value or 0
+
+    @property
+    def _version(self) -> int:
+        return int(self._description.fmiVersion[0])
+
+    def _instantiate(self) -> Any:
+        from fmpy import fmi2, fmi3
+
+        check_binary(self.path, self._description, self._own.modelIdentifier)
+        folder, complaint = Path(self._directory.name), complaint_of(self.path)
+        unpack(self.path, folder, lambda name: name.startswith(("binaries/", "resources/")), complaint)
+        suffix = {"coSimulation": "Slave", "modelExchange": "Model"}.get(self.interface, "ScheduledExecution")
+        kind = getattr(fmi2, f"FMU2{suffix}") if self._version == 2 else getattr(fmi3, f"FMU3{suffix}")
+        description = self._description
+        instance = registered(self, self.name)
+        try:
+            with same_directory():
+                fmu = kind(
+                    guid=description.guid if self._version == 2 else description.instantiationToken,
+                    modelIdentifier=self._own.modelIdentifier,
+                    unzipDirectory=self._directory.name,
+                    instanceName=instance,
+                )
+            self._begin(fmu)
+        except Exception as error:
+            raise FmuError(f"{self.path} cannot be instantiated: {self._reason(error)}.") from error
+        return fmu
+
+    def _begin(self, fmu: Any) -> None:
+        if self._version == 2:
+            fmu.instantiate(callbacks=callbacks2())
+        else:
+            fmu.instantiate(logMessage=lambda _, status, category, message: self.hear(message))
+
+    def hear(self, message: bytes | None) -> None:
+        """Keep what the FMU says."""
+        self._messages.append((message or b"").decode("utf-8", "replace").strip())
+
+    def _functions(self) -> Functions | None:
+        kind, real, state = ("fmi2", "Real", "FMUstate") if self._version == 2 else ("fmi3", "Float64", "FMUState")
+        names = [f"Set{real}", f"Get{real}", "DoStep", *((f"Get{state}", f"Set{state}") if self.rewinds else ())]
+        addresses = [ctypes.cast(getattr(self._fmu.dll, kind + name), ctypes.c_void_p).value or 0 for name in names]
+        instance = self._fmu.component
+        functions = Functions(self._version, getattr(instance, "value", instance), *addresses)
+        return replace(functions, state=ctypes.addressof(self._state))
+
+    def _callables(self) -> tuple[Any, Any, Any]:
+        functions: Any = self.functions
+        if functions.version == 2:
+            do_step = _STEP2(functions.step)
+            set_, get = _VALUES2(functions.set), _VALUES2(functions.get)
+            return set_, get, lambda t, h, final: do_step(functions.instance, t, h, final)
+        return _VALUES3(functions.set), _VALUES3(functions.get), self._step3
+
+    def _step3(self, time: float, size: float, final: bool) -> int:
+        flags = [ctypes.c_bool() for _ in range(3)]
+        last = ctypes.c_double(time)
+        function = self._fmu.dll.fmi3DoStep
+        status = int(function(self._fmu.component, time, size, final, *map(ctypes.byref, flags), ctypes.byref(last)))
+        return TERMINATED if status <= 1 and flags[1].value else status
+
+    def _arrays(self, references: np.ndarray, values: np.ndarray) -> tuple[Any, ...]:
+        count, functions = len(references), self.functions
+        assert functions is not None
+        more = [count] if functions.version == 3 else []
+        return (functions.instance, references.ctypes.data, count, values.ctypes.data, *more)
+
+    def _reason(self, error: Exception) -> str:
+        said = f'; it said "{self._messages[-1]}"' if self._messages else ""
+        return first_line(error) + said

@@ -1,0 +1,105 @@
+"""The variables of an FMU as ports: scalars, arrays with their elements, and the other names that FMI 3 gives them.
+
+The size of an array may follow structural parameters; it is that of their start values unless others are given.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from math import inf, prod
+from typing import Any
+
+from cosim.fmi.component import Port
+from cosim.fmi.types import FLOATS, OF_FMI2, elements, indexed
+from cosim.support.units import BASE, in_base_units
+
+MOST_ELEMENTS = 65_536
+"""Elements of an array at most that become ports; a larger one is shown, and can be neither wired nor recorded."""
+
+
+def ports_of(description: Any, sizes: Mapping[str, int] | None = None) -> dict[str, Port]:
+    """List the variables of a model description by name.
+
+    Args:
+        description: FMPy's.
+        sizes: values of structural parameters by name where they are not their start values.
+    """
+    own = _own_units(description)
+    listed = (port for one in description.modelVariables for port in _ports(one, own, sizes or {}))
+    found: dict[str, Port] = {}
+    for port in listed:
+        found.setdefault(port.name, port)
+    return found
+
+
+def _ports(variable: Any, own_units: Mapping[str, str], sizes: Mapping[str, int]) -> Iterator[Port]:
+    shape = tuple(_size(one, sizes) for one in variable.dimensions)
+    names = [variable.name, *(alias.name for alias in variable.aliases or ())]
+    for port in (_port(variable, name, own_units, shape) for name in names):
+        yield port
+        if 0 < prod(shape) <= MOST_ELEMENTS and shape:
+            starts = _starts(port, prod(shape))
+            for number, index in enumerate(elements(shape)):
+                one = replace(port, name=indexed(port.name, index), start=starts[number], shape=())
+                yield replace(one, array=port.name, element=number)
+
+
+def _size(dimension: Any, sizes: Mapping[str, int]) -> int:
+    if dimension.start is not None:
+        return int(dimension.start)
+    return int(sizes.get(dimension.variable.name, dimension.variable.start))
+
+
+def _port(variable: Any, name: str, own_units: Mapping[str, str], shape: tuple[int, ...]) -> Port:
+    declared = variable.declaredType
+    inherited = {key: getattr(variable, key) or (declared and getattr(declared, key)) for key in ("unit", "min", "max")}
+    given = variable.causality in ("parameter", "input", "structuralParameter")
+    exact = given or variable.initial in ("exact", "approx")
+    kind = OF_FMI2.get(variable.type, variable.type)
+    unit = inherited["unit"] or ""
+    return Port(
+        name=name,
+        reference=variable.valueReference,
+        causality=variable.causality or "local",
+        unit=own_units.get(unit, unit) if kind in FLOATS else "",
+        description=variable.description or "",
+        start=_start(variable.start, kind, bool(shape)),
+        low=-inf if inherited["min"] is None else float(inherited["min"]),
+        high=inf if inherited["max"] is None else float(inherited["max"]),
+        settable=exact and variable.start is not None and variable.variability != "constant" and kind != "Clock",
+        type=kind,
+        items=_items(declared) if kind == "Enumeration" else {},
+        shape=shape,
+    )
+
+
+def _items(declared: Any) -> dict[int, str]:
+    return {int(one.value): one.name for one in getattr(declared, "items", None) or ()}
+
+
+def _start(text: str | None, kind: str, array: bool) -> Any:
+    """Read a start value: a number, or the text of a string, a binary or an array."""
+    if text is None or array or kind in ("String", "Binary"):
+        return text
+    if kind == "Boolean":
+        return float(text in ("true", "1"))
+    with suppress(TypeError, ValueError):
+        return float(text)
+    return None
+
+
+def _starts(port: Port, count: int) -> list[Any]:
+    """Return the start values of the elements; None where they are not said one by one."""
+    texts = str(port.start).split() if port.start is not None else []
+    if port.type in ("String", "Binary") or len(texts) != count:
+        return [None] * count
+    return [_start(text, port.type, False) for text in texts]
+
+
+def _own_units(description: Any) -> dict[str, str]:
+    """Write the units of an FMU as this project knows them."""
+    bases = {one.name: one.baseUnit for one in description.unitDefinitions or () if one.baseUnit is not None}
+    return {
+        name: in_base_units(name, {one: getattr(base, one) for one in BASE}, float(base.factor), float(base.offset))
+        for name, base in bases.items()
+    }

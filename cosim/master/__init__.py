@@ -1,0 +1,1 @@
+"""The co-simulation master: planning, execution and the one loop in C."""

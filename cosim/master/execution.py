@@ -1,0 +1,182 @@
+"""A plan on its way: the loop runs it chunk by chunk, and its rows go to a writer."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass
+from time import perf_counter
+
+import numpy as np
+
+from cosim.data.signals import Stream
+from cosim.data.writer import MemoryWriter
+from cosim.fmi.component import DISCARD, FATAL, NOT_EXACT, POOL_FULL, STATUSES, TERMINATED, Component
+from cosim.master.loop import CompiledLoop, InterpretedLoop, slow_because
+from cosim.master.planning import make_streams
+from cosim.master.result import Statistics
+from cosim.support.errors import SignalError, StepError
+from cosim.support.interrupts import uninterrupted
+from cosim.system.plan import Column, Plan
+from cosim.system.wiring import Wiring
+
+Progress = Callable[[int, int], None]
+"""Called between chunks with ticks done and ticks in all."""
+
+CHUNK = 32_768
+"""Ticks between two looks at progress and Ctrl-C at most; fewer where steps are slow."""
+CHUNK_SECONDS = 0.1
+
+
+@dataclass
+class Execution:
+    """A plan on its way: what the loop runs and where its rows go."""
+
+    wiring: Wiring
+    plan: Plan
+    loop: CompiledLoop | InterpretedLoop
+    writer: MemoryWriter
+    ticks: int
+    progress: Progress | None
+    last: bool = False
+    seconds: float = 0.0
+    ended: str = ""
+    """Who asked to end the run before its time, and when; empty where nobody did."""
+
+    def execute(self) -> None:
+        """Run the loop to its end and complete the recording, whatever ends the run; the last row may be cut short."""
+        begun = perf_counter()
+        try:
+            with closing(self.writer):
+                self._stream()
+        finally:
+            self.seconds = perf_counter() - begun
+
+    def statistics(self) -> Statistics:
+        """Tell how it went, for people and programs."""
+        simulated = self.loop.tick * self.plan.step
+        return {
+            "steps": self.loop.tick,
+            "step": self.plan.step,
+            "simulated_seconds": simulated,
+            "seconds": self.seconds,
+            "ratio_to_real_time": simulated / self.seconds,
+            "microseconds_per_step": 1e6 * self.seconds / max(self.loop.tick, 1),
+            "rows": self.writer.rows,
+            "ended": self.ended,
+            "loop": self.loop.kind,
+            "algorithm": self.wiring.algorithm.kind,
+            "coupling": [asdict(effort) for effort in self.loop.efforts],
+            "warnings": self.loop.warnings,
+            "unconnected": list(self.wiring.unconnected()),
+            "notes": self._notes(),
+        }
+
+    def _notes(self) -> list[str]:
+        notes = [f"{self.ended}."] if self.ended else []
+        notes += self.wiring.doubts()
+        for effort in self.loop.efforts:
+            if effort.at_limit:
+                some = f"{effort.at_limit:,} of {effort.rounds:,} pieces of steps"
+                reason = "lost more energy than tolerated though they were the smallest allowed"
+                notes.append(f"{some} {reason}: raise algorithm.max_pieces or make the step smaller.")
+        for part in self.plan.parts:
+            if "function" in part.component.origin:
+                notes.append(f"{part.name} is a Python function: each of its steps costs microseconds.")
+        if self.loop.kind != "compiled":
+            notes.append(f"{slow_because(self.plan)}: the loop ran in Python.")
+        return notes
+
+    def _stream(self) -> None:
+        self.writer.origin["complete"] = False
+        try:
+            self._run_chunks()
+        finally:
+            with uninterrupted():
+                self._write(self.loop.flush())
+        self.writer.origin |= {"complete": True} | ({"ended": self.ended} if self.ended else {})
+
+    def _run_chunks(self) -> None:
+        streams = make_streams(self.wiring, self.plan.step)
+        self.loop.start()
+        self._check()
+        for chunk in chunks(self.ticks):
+            if self.ended:
+                return
+            given = self._given(streams, chunk)
+            with uninterrupted():
+                self._write(self.loop.run(len(chunk), given))
+            self._check()
+            if self.progress:
+                self.progress(self.loop.tick, self.ticks)
+        if self.last and not self.ended:  # where a row falls due at stop
+            self.loop.finish(self._given(streams, np.array([self.ticks])))
+
+    def _given(self, streams: Sequence[Stream], chunk: np.ndarray) -> np.ndarray:
+        """Return what the signals give in these ticks, shape (signals, ticks)."""
+        columns = [stream(chunk) for stream in streams]
+        given = np.concatenate(columns) if columns else np.empty((0, len(chunk)))
+        self._check_given(given, int(chunk[0]))
+        return given
+
+    def _check_given(self, given: np.ndarray, first: int) -> None:
+        """Refuse signals that are no numbers before a component meets them."""
+        if np.isfinite(given).all():
+            return
+        row, column = np.argwhere(~np.isfinite(given))[0]
+        names = [f"{name}.{output}" for name, one in self.wiring.sources().items() for output in one.outputs]
+        when = f"at tick {first + column:,} ({self.plan.start + (first + column) * self.plan.step:.9g} s)"
+        message = f'The signal "{names[row]}" is {given[row, column]} {when}; it must be a finite number.'
+        raise SignalError(message, culprit=names[row], value=float(given[row, column]))
+
+    def _write(self, rows: np.ndarray) -> None:
+        first, count = self.writer.rows, rows.shape[1]
+        if count:
+            t = self.plan.start + np.arange(first, first + count) * self.plan.decimation * self.plan.step
+            columns = zip(self.wiring.records, self.plan.columns, rows, strict=True)
+            self.writer.write({"t": t} | {name: self._told(column, row) for name, column, row in columns})
+        if self.plan.pool is not None:
+            self.plan.pool.sweep(np.concatenate([self.plan.bus[list(self.plan.named)], self.loop.held]))
+
+    def _told(self, column: Column, row: np.ndarray) -> np.ndarray:
+        """Return a row of a column with what its numbers name in the place of them."""
+        found: np.ndarray = self.plan.pool.column(row, column.kind) if column.kind else row
+        return found
+
+    def _check(self) -> None:
+        """Raise the failure of the loop, if there is one, as a sentence; a component may just ask to end the run."""
+        failure = self.loop.failure
+        if failure is None:
+            return
+        part = self.plan.parts[failure.part]
+        name, component = part.name, part.component
+        when = f"at tick {failure.tick:,} ({self.plan.start + failure.tick * self.plan.step:.9g} s)"
+        if failure.status == TERMINATED or (failure.status == DISCARD and getattr(component, "terminated", bool)()):
+            self.ended = f"{name} asked to end the simulation {when}"
+            return
+        self._tell_failed(component, failure.status)
+        inputs = self.plan.inputs(failure.part)
+        what = STATUSES.get(failure.status, f"returned status {failure.status}")
+        shown = getattr(component, "shown", lambda _, value: f"{value:.9g}")
+        last = ", ".join(f"{key} = {shown(key, value)}" for key, value in inputs.items()) or "none"
+        ours = failure.status in (NOT_EXACT, POOL_FULL)
+        said = "".join(f": {text}" if ours else f'; it said "{text}"' for text in component.messages()[-1:])
+        raise StepError(
+            f"{name} {what} {when}{said}; its last inputs: {last}.", component=name, tick=failure.tick, inputs=inputs
+        )
+
+    def _tell_failed(self, component: Component, status: int) -> None:
+        """Let components know which calls are still allowed; FATAL counts for all instances of one FMU."""
+        same = component.origin.get("sha256")
+        for other in (part.component for part in self.plan.parts):
+            if other is component or (status == FATAL and same and other.origin.get("sha256") == same):
+                other.failed(status)
+
+
+def chunks(ticks: int) -> Iterator[np.ndarray]:
+    """Yield all ticks in pieces that take about CHUNK_SECONDS each, as measured on the piece before."""
+    first, size = 0, 16
+    while first < ticks:
+        begun = perf_counter()
+        last = min(first + size, ticks)
+        yield np.arange(first, last)
+        fitting = size * CHUNK_SECONDS / max(perf_counter() - begun, 1e-9)
+        first, size = last, int(max(16, min(CHUNK, 8 * size, fitting)))

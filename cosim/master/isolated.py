@@ -1,0 +1,140 @@
+"""A run in a process of its own: a component that crashes, ends the process or never returns costs one sentence.
+
+The whole loop runs there, so a step costs what it costs here; only starting the process takes its time. What it
+protects from is faults, not malice: the process has all rights of its user.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from signal import Signals
+from time import monotonic
+
+from cosim.master.loop.structures import CLoop
+from cosim.master.result import RunResult, Statistics
+from cosim.master.simulate import Options, run
+from cosim.support.activity import Board
+from cosim.support.cell import Cell, LostError
+from cosim.support.child import tell
+from cosim.support.errors import LostComponentError
+from cosim.support.files import forget_partials
+from cosim.system.scenario import Scenario
+
+CALL_TIMEOUT = 60.0
+"""Seconds that one call of a component may take; models that fetch a licence or fill tables need some."""
+GRACE = 5.0
+"""Seconds that a call of a component may take once the run was interrupted; completing the recording has no limit."""
+SIGNALS = {
+    "SIGSEGV": "segmentation fault",
+    "SIGABRT": "abort",
+    "SIGFPE": "arithmetic error",
+    "SIGILL": "illegal instruction",
+    "SIGBUS": "bus error, as of a library cut short",
+    "SIGKILL": "killed, perhaps because memory ran out",
+}
+
+
+def run_isolated(
+    scenario: Scenario, options: Options, *, call_timeout: float = CALL_TIMEOUT, keep: tuple[int, ...] = ()
+) -> RunResult:
+    """Run a scenario in a process of its own; errors as of `run`, and one more.
+
+    Args:
+        scenario: what is run.
+        options: how; the recording goes to a file.
+        call_timeout: seconds that one call of a component may take.
+        keep: file descriptors that the process inherits.
+
+    Raises:
+        LostComponentError: a component ended, crashed or blocked the process; nothing is recorded.
+    """
+    assert options.path is not None  # what is only in its memory ends with a process
+    cell = Cell(quiet=False, keep=keep)
+    cell.begin()
+    watch = Watch(cell.board(), scenario.step, call_timeout)
+    pid = cell.pid
+    try:
+        told = options.progress or _ignore
+        statistics = cell.call(_work, scenario, replace(options, progress=None), told=told, overdue=watch.overdue)
+    except KeyboardInterrupt:
+        cell.finish(Watch(cell.board(), scenario.step, GRACE).overdue)
+        raise
+    except LostError as loss:
+        raise watch.error(loss, scenario) from loss
+    finally:
+        cell.close()
+        forget_partials(pid, options.path.parent)
+    return RunResult(scenario.name, statistics, {"recording": options.path})
+
+
+def _work(scenario: Scenario, options: Options) -> Statistics:
+    """Run here, where a crash may happen."""
+    return run(scenario, replace(options, progress=tell)).statistics
+
+
+def _ignore(done: int, of: int) -> None:
+    pass
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a process is: in which call of which component, or in none; at which tick."""
+
+    component: str
+    what: str
+    tick: int
+
+    @classmethod
+    def of(cls, board: Board) -> "Place":
+        """Read it from the board of a process."""
+        loop = board.read_loop(CLoop)
+        component, what = board.work
+        if not component and loop.status < 0:
+            names = board.names
+            component, what = names[min(-1 - loop.status, len(names) - 1)], "stepped"
+        return cls(component, what, int(loop.tick))
+
+
+class Watch:
+    """What is known of a run from outside: how long it has been in one call, and where it was when it ended.
+
+    Args:
+        board: of the process.
+        step: of the scenario in s.
+        limit: seconds that one call may take.
+    """
+
+    def __init__(self, board: Board, step: float, limit: float, clock: Callable[[], float] = monotonic) -> None:
+        self._board, self._step, self._limit, self._clock = board, step, limit, clock
+        self._place, self._since = Place.of(board), clock()
+
+    def overdue(self) -> str:
+        """Say that the component being called has not returned in time; empty as long as it may."""
+        place, now = Place.of(self._board), self._clock()
+        if place != self._place or not place.component:
+            self._place, self._since = place, now
+        return "a call did not return" if now - self._since > self._limit else ""
+
+    def error(self, loss: LostError, scenario: Scenario) -> LostComponentError:
+        """Say in a sentence what became of the process."""
+        place = Place.of(self._board)
+        section = scenario.components.get(place.component)
+        source = (section.fmu or section.python) if section else None
+        who = f"{place.component} ({source})" if source else place.component or "The process of the run"
+        when = f" at tick {place.tick:,} ({place.tick * self._step:.9g} s)" if place.what == "stepped" else ""
+        where = f" while it was {place.what}{when}" if place.component else ""
+        if loss.status == "timeout":
+            message = f"{who} did not return within {self._limit:g} s{where}; --call-timeout lets it take longer."
+        else:
+            message = f"{who} {_end(loss.code)}{where}; a component must return from its calls."
+        return LostComponentError(f"{message} Nothing was recorded.", component=place.component, reason=str(loss))
+
+
+def _end(code: int) -> str:
+    """Say how a component ended the process."""
+    if code >= 0:
+        return f"ended its process with exit code {code}"
+    try:
+        name = Signals(-code).name
+    except ValueError:
+        return f"crashed with signal {-code}"
+    return f"crashed: {name}, {SIGNALS[name]}," if name in SIGNALS else f"crashed: {name},"

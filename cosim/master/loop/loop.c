@@ -1,0 +1,233 @@
+/* The stepping loop. At tick k, t = k * step:
+ *   1. the signals of the tick are put on the bus;
+ *   2. outputs and signals are noted for the recording (at tick 0 after outputs have met their inputs, see settle);
+ *   3. the turns of the tick are taken: wires carry  y = quantise(gain * x + offset) + noise  to inputs, components step;
+ *   4. the row is recorded: outputs at t_k and the inputs that act from t_k to t_(k+1).
+ * A component that steps every n ticks takes its inputs at ticks 0, n, 2n, ... and is stepped at the end of the last
+ * tick before the next of them, so nobody sees its outputs early. interpreted.py does the same in Python, bit for bit.
+ * Nothing is allocated here. */
+#include "loop.h"
+
+static bool begins(const Part *part, int64_t tick)
+{
+    return part->every == 1 || tick % part->every == 0;
+}
+
+static bool ends(const Part *part, int64_t tick)
+{
+    return part->every == 1 || (tick + 1) % part->every == 0;
+}
+
+static void gather(const Loop *loop, const Part *part)
+{
+    if (begins(part, loop->tick)) {
+        for (int64_t i = part->wire; i < part->wire + part->wires; i++) {
+            loop->bus[loop->wire[i].target] = carry(loop, &loop->wire[i]);
+        }
+    }
+}
+
+/* Takes one component over its step, as far as it falls into this tick; returns the worst status of its calls. */
+static int advance(const Loop *loop, const Part *part)
+{
+    int status = begins(part, loop->tick) ? set_inputs(part) : 0;
+    if (status > FMI_WARNING || !ends(part, loop->tick)) {
+        return status;
+    }
+    double time = (double)(loop->tick + 1 - part->every) * loop->step;
+    status = worse(status, do_step(part, time, (double)part->every * loop->step, true));
+    if (status <= FMI_WARNING) {
+        status = worse(status, get_outputs(part));
+    }
+    return finite_outputs(part, status);
+}
+
+static int step_all(Loop *loop, const Turn *turn)
+{
+    for (int64_t i = turn->part; i < turn->part + turn->parts; i++) {
+        const Part *part = enter(loop, i);
+        int status = advance(loop, part);
+        loop->warnings += status == FMI_WARNING;
+        if (status > FMI_WARNING) {
+            return fail(loop, i, status, loop->tick - loop->tick % part->every);
+        }
+    }
+    return 0;
+}
+
+static int take(Loop *loop, Turn *turn)
+{
+    switch (turn->kind) {
+    case GATHER:
+        for (int64_t i = turn->part; i < turn->part + turn->parts; i++) {
+            gather(loop, &loop->part[i]);
+        }
+        return 0;
+    case STEP:
+        return step_all(loop, turn);
+    case ITERATE:
+        return iterate(loop, turn);
+    default:
+        return balance(loop, turn);
+    }
+}
+
+/* Writes the row begun at the last multiple of `decimation`; rows are stored column by column, `capacity` apart. */
+static void emit(Loop *loop, double *row, int64_t capacity)
+{
+    for (int64_t i = 0; i < loop->columns; i++) {
+        Column *column = &loop->column[i];
+        row[i * capacity] = column->mean ? column->sum / (double)loop->halves : column->sample;
+        column->sum = 0.0;
+    }
+    loop->halves = 0;
+    loop->sampled = 0;
+}
+
+/* Adds half a tick to the means, which ends a row when its window is full; returns the number of rows ended. */
+static int64_t add_half(Loop *loop, double *row, int64_t capacity)
+{
+    int64_t ended = loop->half == loop->edge;
+    if (ended) {
+        emit(loop, row, capacity);
+        loop->edge += 2 * loop->decimation;
+    }
+    for (int64_t i = 0; i < loop->columns; i++) {
+        if (loop->column[i].mean) {
+            loop->column[i].sum += loop->column[i].value;
+        }
+    }
+    loop->halves++;
+    loop->half++;
+    return ended;
+}
+
+static int64_t record(Loop *loop, double *row, int64_t capacity)
+{
+    if (loop->decimation == 1 || loop->tick % loop->decimation == 0) { /* a division costs as much as a wire */
+        for (int64_t i = 0; i < loop->columns; i++) {
+            loop->column[i].sample = loop->column[i].value;
+        }
+        loop->sampled = 1;
+        if (loop->means == 0) {
+            emit(loop, row, capacity);
+            return 1;
+        }
+    }
+    if (loop->means == 0) {
+        return 0;
+    }
+    int64_t ended = add_half(loop, row, capacity);
+    return ended + add_half(loop, row + ended, capacity);
+}
+
+static void note(Loop *loop, int64_t late)
+{
+    for (int64_t i = 0; i < loop->columns; i++) {
+        if (loop->column[i].late == late) {
+            loop->column[i].value = loop->bus[loop->column[i].source];
+        }
+    }
+}
+
+/* Tells how its data is laid out, so that a library of another version is not trusted. */
+EXPORT int64_t loop_layout(void)
+{
+    return (int64_t)(sizeof(Loop) + 3 * sizeof(Part) + 5 * sizeof(Wire) + 7 * sizeof(Turn) + 11 * sizeof(Column) +
+                     13 * sizeof(Inner) + 17 * sizeof(Bond) + 19 * sizeof(Fault));
+}
+
+/* Reads all outputs once, before the first tick. */
+EXPORT int64_t loop_start(Loop *loop)
+{
+    for (int64_t i = 0; i < loop->parts; i++) {
+        int status = get_outputs(enter(loop, i));
+        if (status > FMI_WARNING) {
+            fail(loop, i, status, 0);
+            return 0;
+        }
+    }
+    return 1;
+}
+
+/* Before the first tick, outputs that follow inputs at once are brought to the inputs of that tick, as often as it may
+ * take to get through a chain of such components; a wire that breaks a loop is followed once. */
+static int settle(Loop *loop)
+{
+    int64_t rounds = 0;
+    for (int64_t i = 0; i < loop->parts; i++) {
+        rounds += loop->part[i].direct;
+    }
+    for (int64_t round = 0; round < rounds; round++) {
+        for (int64_t i = 0; i < loop->parts; i++) {
+            const Part *part = enter(loop, i);
+            if (part->direct) {
+                for (int64_t j = part->wire; j < part->wire + part->wires; j++) {
+                    if (round == 0 || !loop->wire[j].breaks_loop) {
+                        loop->bus[loop->wire[j].target] = carry(loop, &loop->wire[j]);
+                    }
+                }
+                int status = worse(set_inputs(part), get_outputs(part));
+                if (status > FMI_WARNING) {
+                    return fail(loop, i, status, 0);
+                }
+            }
+        }
+    }
+    return 0;
+}
+
+/* Runs `ticks` ticks. `signals` holds one column of `ticks` values for each signal, `rows` one of `capacity` for each
+ * recorded column. Returns the number of rows written; `failed` and `status` tell whether it got to the end. */
+EXPORT int64_t loop_run(Loop *loop, int64_t ticks, const double *signals, double *rows, int64_t capacity)
+{
+    int64_t written = 0;
+    for (int64_t k = 0; k < ticks; k++) {
+        for (int64_t i = 0; i < loop->signals; i++) {
+            loop->signal[i] = signals[i * ticks + k];
+        }
+        int failed = loop->tick == 0 ? settle(loop) : 0;
+        note(loop, 0);
+        for (int64_t i = 0; i < loop->turns && !failed; i++) {
+            failed = take(loop, &loop->turn[i]);
+        }
+        note(loop, 1);
+        written += record(loop, rows + written, capacity);
+        if (failed) {
+            return written;
+        }
+        loop->tick++;
+    }
+    return written;
+}
+
+/* After the last tick: the row at stop, where one falls due. Wires are carried once more, and nothing steps, so a mean
+ * is that of the half window before. `loop_flush` writes it. */
+EXPORT void loop_finish(Loop *loop, const double *signals)
+{
+    if (loop->tick % loop->decimation) {
+        return;
+    }
+    for (int64_t i = 0; i < loop->signals; i++) {
+        loop->signal[i] = signals[i];
+    }
+    note(loop, 0);
+    for (int64_t i = 0; i < loop->parts; i++) {
+        gather(loop, &loop->part[i]);
+    }
+    note(loop, 1);
+    for (int64_t i = 0; i < loop->columns; i++) {
+        loop->column[i].sample = loop->column[i].value;
+    }
+    loop->sampled = 1;
+}
+
+/* Ends a row whose window was cut short by the end of the run; its means are those of what there was. */
+EXPORT int64_t loop_flush(Loop *loop, double *rows, int64_t capacity)
+{
+    if (!loop->sampled) {
+        return 0;
+    }
+    emit(loop, rows, capacity);
+    return 1;
+}

@@ -1,0 +1,82 @@
+"""What came out of a run: its recording and how it went."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import NotRequired, TypedDict
+
+from cosim.data.recording import Recording
+from cosim.support.html import facts
+
+
+class Statistics(TypedDict):
+    """How a run went, as run.json says it; times in s. `coupling` has a row for each coupled group."""
+
+    steps: int
+    step: float
+    simulated_seconds: float
+    seconds: float
+    ratio_to_real_time: float
+    microseconds_per_step: float
+    rows: int
+    ended: str
+    loop: str
+    algorithm: str
+    coupling: Sequence[Mapping[str, int]]
+    warnings: int
+    unconnected: Sequence[str]
+    notes: Sequence[str]
+    scenario: NotRequired[str]
+    recording: NotRequired[str]
+    page: NotRequired[str]
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What a run gave: its name, statistics as in run.json, and the files that were written, by kind."""
+
+    name: str
+    statistics: Statistics
+    files: Mapping[str, Path] = field(default_factory=dict)
+    _recording: Recording | None = field(default=None, repr=False)
+
+    @cached_property
+    def recording(self) -> Recording:
+        """The recording: columns of shape (rows,) in SI; read from its file when it is first asked for."""
+        return self._recording or Recording.read(self.files["recording"], required=())
+
+    def frame(self) -> object:
+        """Return the recording as a pandas `DataFrame`, a row a sample."""
+        return self.recording.frame()
+
+    def __str__(self) -> str:
+        return "\n".join([f"{self.name}: {_speed(self.statistics)}", *remarks(self.statistics)])
+
+    def _repr_html_(self) -> str:
+        said, files = remarks(self.statistics), {kind: str(path) for kind, path in self.files.items()}
+        notes = {"note": " ".join(said)} if said else {}
+        return facts(self.name, {"speed": _speed(self.statistics)} | notes | files)
+
+
+def remarks(statistics: Statistics) -> list[str]:
+    """Say in sentences what a run's statistics tell beside its speed."""
+    said = []
+    for effort in statistics["coupling"]:
+        a_step = effort["rounds"] / max(statistics["steps"], 1)
+        said.append(f"coupled components took {a_step:.3g} passes a step, {effort['greatest']} at most")
+    if "page" in statistics:
+        said.append(f"pictures: {statistics['page']}")
+    if statistics["unconnected"]:
+        said.append(f"not connected, at their start values: {', '.join(statistics['unconnected'])}")
+    said += statistics["notes"]
+    if statistics["warnings"]:
+        said.append(f"{statistics['warnings']:,} steps ended with a warning of their FMU")
+    return said
+
+
+def _speed(statistics: Statistics) -> str:
+    return (
+        "{steps:,} steps in {seconds:.3g} s, {ratio_to_real_time:.3g} times real time, "
+        "{microseconds_per_step:.3g} us a step with recording ({rows:,} rows, {loop} loop)".format(**statistics)
+    )

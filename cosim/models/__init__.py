@@ -1,0 +1,1 @@
+"""FMUs and SSPs made from the cards and models that a scenario names."""

@@ -1,0 +1,155 @@
+"""The pages as text: templates, filled from jobs; everything that comes from a file is escaped."""
+
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from starlette.responses import HTMLResponse, Response
+
+from cosim.reading import LAYOUT
+from cosim.serve.desk import OURS, Desk
+from cosim.serve.form import FIELDS, FRICTIONS, MOTIONS
+from cosim.serve.job import Job
+from cosim.support.files import in_bytes
+from cosim.support.plain import Parsed
+
+STATES = {
+    "draft": "not started",
+    "queued": "waiting",
+    "running": "being diagnosed",
+    "done": "done",
+    "failed": "failed",
+    "cancelled": "cancelled",
+    "interrupted": "interrupted",
+}
+ROLES = {"train": "fit the model", "heldout": "keep for the proof", "out": "leave out"}
+MEANINGS = {"t": "time", "tau": "torque", "q": "position", "v": "speed", "q_d": "set point"}
+HINTS = {
+    "separator": "comma, semicolon, tab, space",
+    "decimal": "point, comma",
+    "header": "line of the names, 0 for none",
+    "encoding": "utf-8, latin-1",
+    "period": "1ms",
+}
+"""Examples of what a layout may say."""
+SUFFIXES = ".csv,.gz,.parquet,.mat,.h5,.hdf5,.mf4,.mcap,.db3,.txt,.log,.dat,.tsv,.lvm,.asc,.toml"
+"""Kinds of files that a file dialogue offers first."""
+CARD = """[mount]
+name = "azimuth"
+motion = "rotary"      # or "linear": then m, N, kg
+inertia = 30.0         # kg m2
+torque_limit = 50.0    # N m
+
+[friction]
+model = "coulomb"      # or "static", "dahl", "lugre", "maxwell_slip", "none"
+Fc = 2.5               # N m
+sigma2 = 30.0          # N m s/rad
+"""
+"""What a card that is to be written begins with."""
+NO_ANSWER: Parsed = {"heading": "", "findings": [], "check": [], "verdict": []}
+FILES = (
+    ("report.html", "Report", "one page, alone"),
+    ("card.toml", "Model card", "the better one"),
+    ("diagnosis.json", "JSON", "the same for programs"),
+    ("missing_torque.parquet", "Missing torque", "one row a sample, with its band"),
+    ("next_experiment.toml", "Next experiment", "a scenario"),
+)
+"""What a diagnosis writes, beside FMUs."""
+
+
+def home_page(desk: Desk, problem: str = "") -> Response:
+    """Show where to drop recordings, and what was diagnosed."""
+    return _page("home.html.j2", title="Diagnose an axis", problem=problem, jobs=history(desk), suffixes=SUFFIXES)
+
+
+def job_page(desk: Desk, job: Job, problem: str = "", given: Mapping[str, str] | None = None) -> Response:
+    """Show a job as far as it is; `problem` is why something was refused, `given` the form that was."""
+    values = _draft(desk, job) | {"given": defaultdict(str, given or {})} if job.state == "draft" else _begun(desk, job)
+    name = job.machine or (job.uploads[0].name if job.uploads else "New diagnosis")
+    template = "draft.html.j2" if job.state == "draft" else "begun.html.j2"
+    return _page(template, status=400 if problem else 200, title=name, job=job, problem=problem, **values)
+
+
+def history(desk: Desk) -> list[dict[str, str]]:
+    """Return what was diagnosed, one row a job, the newest first."""
+    return [
+        {
+            "id": job.id,
+            "when": job.made[:16].replace("T", " "),
+            "name": job.machine or (job.uploads[0].name if job.uploads else "New diagnosis"),
+            "files": f"{len(job.uploads)} recording{'' if len(job.uploads) == 1 else 's'}",
+            "state": STATES[job.state],
+            "told": job.answer.get("heading", "") if job.state == "done" else job.problem,
+        }
+        for job in desk.store.all()
+    ]
+
+
+def _draft(desk: Desk, job: Job) -> Parsed:
+    views = desk.views(job)
+    return {
+        "recordings": [(one, views[one.name], number) for number, one in enumerate(job.uploads, 1)],
+        "card_view": desk.card_view(job),
+        "start_card": CARD,
+        "card_text": desk.card_text(job),
+        "lacking": desk.lacking(job) if job.uploads or job.card else [],
+        "shipped": _shipped(),
+        "roles": ROLES,
+        "fields": FIELDS,
+        "motions": MOTIONS,
+        "frictions": FRICTIONS,
+        "ours": {name: MEANINGS.get(name, name) for name in OURS},
+        "layout": {name: HINTS[name] for name in LAYOUT},
+        "suffixes": SUFFIXES,
+        "size": in_bytes,
+    }
+
+
+def _begun(desk: Desk, job: Job) -> Parsed:
+    progress = desk.queue.progress
+    own = progress.id == job.id
+    return {
+        "live": job.live,
+        "waiting": desk.queue.before(job.id) if job.state == "queued" else 0,
+        "steps": progress.steps if own else [],
+        "answer": NO_ANSWER | ((progress.answer if own else {}) or job.answer),
+        "elapsed": round(time.time() - job.begun) if job.state == "running" else round(job.seconds),
+        "files": list(_results(desk, job)),
+        "state": STATES[job.state],
+    }
+
+
+def _results(desk: Desk, job: Job) -> Iterator[dict[str, str]]:
+    """Yield the files of a result that can be downloaded, the improved FMUs among them."""
+    folder = desk.store.result(job.id)
+    if job.state != "done" or not folder.is_dir():
+        return
+    told = {name: (title, text) for name, title, text in FILES}
+    for path in sorted(folder.iterdir(), key=lambda one: ([*told, one.name].index(one.name), one.name)):
+        kind = "FMI 2" if "fmi2" in path.stem else "FMI 3"
+        title, text = told.get(
+            path.name, (f"FMU, {kind}", "the better model as an FMU") if path.suffix == ".fmu" else ("", "")
+        )
+        if title:
+            yield {"name": path.name, "title": title, "text": text, "size": in_bytes(path.stat().st_size)}
+
+
+@cache
+def _shipped() -> list[str]:
+    from importlib.resources import files
+
+    return sorted(Path(one.name).stem for one in (files("pyfmi_models") / "cards").iterdir())
+
+
+@cache
+def _templates() -> Environment:
+    loader = PackageLoader("cosim.serve", "pages")
+    return Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+
+
+def _page(template: str, status: int = 200, **values: Any) -> Response:
+    return HTMLResponse(_templates().get_template(template).render(values), status)

@@ -1,0 +1,33 @@
+"""What pydantic complains about first, as one sentence: culprit, value, rule, choices."""
+
+from collections.abc import Callable
+from typing import Any
+
+from pydantic import ValidationError
+
+from cosim.support.numbers import shown as display
+from cosim.support.plain import Parsed
+
+Location = tuple[int | str, ...]
+
+
+def first_of(error: ValidationError) -> Any:
+    """Return the first key that is none, if there is one: a misspelt key leaves another one missing."""
+    errors = error.errors(include_url=False)
+    return next((one for one in errors if one["type"] == "extra_forbidden"), errors[0])
+
+
+def complaint(error: ValidationError, path: str, noun: str, keys: Callable[[Location], tuple[str, ...]]) -> Parsed:
+    """Return the arguments of an `InputError`; `keys` lists the legal keys beside a location of `noun`."""
+    first = first_of(error)
+    where = ".".join(str(part) for part in first["loc"]) or "the file"
+    if first["type"] == "extra_forbidden":
+        choices = keys(first["loc"])
+        message = f'{path}: "{where}" is no key of {noun}; keys there are: {", ".join(choices)}.'
+        return {"message": message, "culprit": where, "choices": choices}
+    if first["type"] == "missing":
+        return {"message": f'{path}: "{where}" is missing.', "culprit": where}
+    value, rule = first["input"], first["msg"].removeprefix("Value error, ").rstrip(".")
+    shown = "" if isinstance(value, dict | list) else f" = {display(value)}"
+    message = f"{path}: {where}{shown} breaks a rule: {rule[0].lower()}{rule[1:]}."
+    return {"message": message, "culprit": where, "value": value}

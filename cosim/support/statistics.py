@@ -1,0 +1,37 @@
+"""Statistics that more than one place needs: the root mean square, one window, one bootstrap."""
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Index = npt.NDArray[np.int64]
+Z95 = 1.96
+"""Standard errors on either side of an estimate that hold 95 % of a normal distribution."""
+
+
+def rms(values: npt.NDArray[np.floating]) -> float:
+    """Root of the mean square; NaN of nothing."""
+    return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")
+
+
+def hann(length: int) -> Array:
+    """Hann window of so many samples, with zeros at both ends."""
+    return np.hanning(length)
+
+
+def bootstrap_range(statistic: Callable[[Index], Array], count: int, draws: int, seed: int = 0) -> tuple[float, float]:
+    """95 % percentile range of a statistic of independent blocks, drawn with replacement.
+
+    Args:
+        statistic: takes numbers of blocks, shape (draws, count), and returns a value each draw; NaN is "undefined".
+        count: how many blocks there are.
+        draws: how often as many blocks are drawn.
+        seed: of the draws.
+
+    Reference: Efron, Tibshirani, An Introduction to the Bootstrap (1993), chapter 13.
+    """
+    drawn = np.random.default_rng(seed).integers(0, count, (draws, count))
+    low, high = np.nanquantile(statistic(drawn), (0.025, 0.975))
+    return float(low), float(high)

@@ -1,0 +1,72 @@
+"""A job with its files, for machines that do not have them."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from cosim.support.files import cache_home, replacing
+from cosim.sweep.job import Job
+from cosim.system.scenario import Scenario
+from cosim.system.sections import ComponentSection
+
+
+@dataclass(frozen=True)
+class PortableJob:
+    """A job, and what is in the files it names, by their path where it was made."""
+
+    job: Job
+    files: Mapping[Path, bytes]
+
+    @classmethod
+    def of(cls, job: Job) -> "PortableJob":
+        """Pack the FMUs and recordings of a job."""
+        return cls(job, {path: path.read_bytes() for path in files_of(job.scenario).values()})
+
+    def job_here(self) -> Job:
+        """Return the job with paths on this machine, where its files are put once."""
+        here = {path: _stored(content, path.suffix) for path, content in self.files.items()}
+        return replace(self.job, scenario=_located(self.job.scenario, here))
+
+
+def files_of(scenario: Scenario) -> dict[str, Path]:
+    """List by their owner the files a scenario needs: FMUs, and recordings that are replayed."""
+    made = {f"components.{name}": one.fmu or _python(one) for name, one in scenario.components.items()}
+    replayed = {f"signals.{name}": _file(signal) for name, signal in scenario.signals.items()}
+    return {name: path for name, path in (made | replayed).items() if path is not None}
+
+
+def _file(signal: Any) -> Path | None:
+    return getattr(signal, "file", None)
+
+
+def _python(section: ComponentSection) -> Path | None:
+    return Path(section.python.rpartition(":")[0]) if section.python else None
+
+
+@lru_cache(maxsize=8)
+def _stored(content: bytes, suffix: str) -> Path:
+    path = cache_home() / "sweeps" / (hashlib.sha256(content).hexdigest() + suffix)
+    if not path.exists():
+        with replacing(path, force=True) as partial:
+            partial.write_bytes(content)
+    return path
+
+
+def _located(scenario: Scenario, here: Mapping[Path, Path]) -> Scenario:
+    components = {name: _moved(one, here) for name, one in scenario.components.items()}
+    signals: dict[str, Any] = {
+        name: signal.model_copy(update={"file": here[file]}) if (file := _file(signal)) else signal  # type: ignore[attr-defined]
+        for name, signal in scenario.signals.items()
+    }
+    return replace(scenario, components=components, signals=signals)
+
+
+def _moved(section: ComponentSection, here: Mapping[Path, Path]) -> ComponentSection:
+    if section.fmu is not None:
+        return section.model_copy(update={"fmu": here[section.fmu]})
+    file = _python(section)
+    function = (section.python or "").rpartition(":")[2]
+    return section if file is None else section.model_copy(update={"python": f"{here[file]}:{function}"})

@@ -1,0 +1,1 @@
+"""What is simulated: scenario, wiring, coupling algorithm, schedule, faults, diagram and SSP."""

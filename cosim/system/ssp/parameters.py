@@ -1,0 +1,147 @@
+"""Parameter bindings: which values an SSP gives to the variables of a component.
+
+Outer systems win over inner ones, a later binding over an earlier one. A binding with a mapping applies only what the
+mapping names. What is given to a connector of a system goes along its connections, and wins over what is given to
+the variable that it feeds.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from xml.etree.ElementTree import Element
+
+from cosim.support.errors import UnitError
+from cosim.system.ssp.archive import child, children
+from cosim.system.ssp.place import Place, units_of
+from cosim.system.ssp.structure import End, Link, Path, Structure, name_of
+from cosim.system.ssp.transformation import Effect, Transformation, Value, transformation_of
+
+Values = Value | list[Value]
+_INTEGERS = ("Integer", "Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
+_READERS: tuple[tuple[str, Callable[[str], Value]], ...] = (
+    *((kind, float) for kind in ("Real", "Float64", "Float32")),
+    *((kind, int) for kind in _INTEGERS),
+    *((kind, str) for kind in ("String", "Enumeration", "Binary")),
+)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A value and its unit; the unit is empty where it is that of the variable. `transformation` acts on the way."""
+
+    value: Values
+    unit: str = ""
+    transformation: Transformation = field(default_factory=Transformation)
+
+    def arriving(self, place: Place, name: str, unit: str) -> Values:
+        """Return the value in the unit of the variable called `name`."""
+        try:
+            effect = Effect(unit=self.unit).then(self.transformation, unit)
+        except UnitError as error:
+            raise place.error(f'"{name}" is given in {self.unit}: {str(error).rstrip(".")}') from error
+        if isinstance(self.value, list):
+            return [effect.apply(one) for one in self.value]
+        return effect.apply(self.value)
+
+
+def settings_of(structure: Structure, path: Path) -> dict[str, Setting]:
+    """Collect what the bindings of an element and of the systems around it say of its variables, by name.
+
+    What a set says of others is left out.
+    """
+    found: dict[str, Setting] = {}
+    for depth in range(len(path), -1, -1):
+        below = "".join(f"{name}." for name in path[depth:])
+        for holder, place in structure.nodes[path[:depth]].bindings:
+            for binding in children(holder, "ssd:ParameterBindings", "ssd:ParameterBinding"):
+                values = _binding(place, binding)
+                found |= {name.removeprefix(below): one for name, one in values if name.startswith(below)}
+    return found
+
+
+def given(structure: Structure, chain: tuple[Link, ...], own: Mapping[End, Setting]) -> Setting | None:
+    """Return what a chain of links brings from the first connector of a system on it that is given a value."""
+    for number, link in enumerate(chain):
+        setting = own.get(link.start)
+        if setting is not None:
+            return _carried(structure, setting, chain[number:])
+    return None
+
+
+def _carried(structure: Structure, setting: Setting, chain: tuple[Link, ...]) -> Setting:
+    """Take a value along links; its last transformation is left to be done in the unit of the variable itself."""
+    place = structure.place
+    connector = structure.nodes[chain[0].start[0]].connectors[chain[0].start[1]]
+    value, unit = setting.arriving(place, name_of(chain[0].start), connector.unit), connector.unit or setting.unit
+    for link in chain[:-1]:
+        stated = structure.nodes[link.end[0]].connectors[link.end[1]].unit
+        value = Setting(value, unit, link.transformation).arriving(place, name_of(link.end), stated)
+        unit = stated or unit
+    return Setting(value, unit, chain[-1].transformation)
+
+
+def _binding(place: Place, binding: Element) -> Iterator[tuple[str, Setting]]:
+    values = _content(place, binding, "ssd:ParameterValues", "ssv:ParameterSet")
+    mapping, prefix = child(binding, "ssd:ParameterMapping"), binding.get("prefix", "")
+    entries = None if mapping is None else list(children(_mapping(place, mapping), "ssm:MappingEntry"))
+    units = place.units | units_of(place.archive, values, "ssv:Units")
+    for parameter in children(values, "ssv:Parameters", "ssv:Parameter"):
+        name, setting = prefix + parameter.get("name", ""), _setting(place, parameter, units)
+        if entries is None:
+            yield name, setting
+        for entry in entries or ():
+            if entry.get("source") == name:
+                target = entry.get("target", "")
+                yield target, Setting(setting.value, setting.unit, transformation_of(place, entry, target))
+
+
+def _content(place: Place, holder: Element, inline: str, tag: str) -> Element:
+    """Return what a binding holds, in its file or inline."""
+    _check_base(place, holder)
+    if holder.get("source"):
+        return place.xml(holder.get("source", ""), tag)
+    found = child(holder, inline, tag)
+    if found is None:
+        raise place.error(f"a parameter binding has neither a source nor a {tag} of its own")
+    return found
+
+
+def _mapping(place: Place, mapping: Element) -> Element:
+    _check_base(place, mapping)
+    if mapping.get("source"):
+        return place.xml(mapping.get("source", ""), "ssm:ParameterMapping")
+    found = child(mapping, "ssm:ParameterMapping")
+    return mapping if found is None else found
+
+
+def _check_base(place: Place, holder: Element) -> None:
+    if holder.get("sourceBase", "SSD") != "SSD":
+        raise place.error(f'"{holder.get("source")}" lies inside a component, and only the SSP\'s own files are read')
+
+
+def _setting(place: Place, parameter: Element, units: Mapping[str, str]) -> Setting:
+    name = parameter.get("name", "")
+    for kind, read in (("Boolean", _boolean), *_READERS):
+        one = child(parameter, f"ssv:{kind}")
+        if one is not None:
+            unit = one.get("unit", "")
+            return Setting(_read(place, parameter, one, name, kind, read), units.get(unit, unit))
+    choices = ("Boolean", *(kind for kind, _ in _READERS))
+    raise place.error(f'the parameter "{name}" is of a kind that is not read', *choices)
+
+
+def _read(place: Place, parameter: Element, one: Element, name: str, kind: str, read: Callable[[str], Value]) -> Values:
+    """Read a value, or the list of an array in row-major order."""
+    several = [text.get("value", "") for text in children(one, "ssv:Value")]
+    array = child(parameter, "ssc:Dimension") is not None or len(several) > 1
+    texts = several or ([one.get("value", "")] if read is str or not array else one.get("value", "").split())
+    try:
+        values = [read(text) for text in texts]
+    except ValueError as error:
+        raise place.error(f'the parameter "{name}" = "{one.get("value")}" is no {kind}') from error
+    return values if array else values[0]
+
+
+def _boolean(text: str) -> bool:
+    if text not in ("true", "false", "1", "0"):
+        raise ValueError(text)
+    return text in ("true", "1")

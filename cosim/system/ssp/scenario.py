@@ -1,0 +1,50 @@
+"""The text of the scenario that an SSP means."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path as File
+from typing import Any
+
+from cosim.system.ssp.meaning import Meaning
+from cosim.system.ssp.structure import Path, Structure
+
+_INTERFACES = {"CoSimulation": {"interface": "co-simulation"}, "ModelExchange": {"interface": "model-exchange"}}
+
+
+def scenario_of(structure: Structure, files: Mapping[Path, File]) -> str:
+    """Write the scenario; `files` are the FMUs by their element."""
+    meaning = Meaning(structure, files)
+    start, stop, step, assumed = meaning.experiment()
+    parameters = {path: meaning.parameters(path) for path in structure.components}
+    strange = [name for _, names in parameters.values() for name in names]
+    described = structure.nodes[()].element.get("description", "").rstrip(".")
+    said = [f"{described}." if described else "", assumed, *structure.notes]
+    said += [f"Not set, because their FMUs do not have them: {', '.join(strange)}."] if strange else []
+    head = {"name": structure.place.root.get("name") or "system", "description": " ".join(filter(None, said))}
+    lines = _table("", head | ({"start": start} if start else {}) | {"step": step, "stop": stop})
+    for path, node in structure.components.items():
+        name = _text(meaning.names[path])
+        interface = _INTERFACES.get(node.element.get("implementation", ""), {})
+        lines += _table(f"[components.{name}]", {"fmu": str(files[path])} | interface)
+        lines += _table(f"[components.{name}.parameters]", parameters[path][0])
+        for variable, stated in meaning.units(path).items():
+            lines += _table(f"[components.{name}.variables.{_text(variable)}]", {"name": variable, "unit": stated})
+    for wire in meaning.wires():
+        lines += _table("[[connections]]", wire)
+    return "\n".join(lines + _table("[record.signals]", meaning.records())) + "\n"
+
+
+def _table(head: str, values: Mapping[str, Any]) -> list[str]:
+    rows = [f"{_text(key)} = {_text(value)}" for key, value in values.items()]
+    return ["", head, *rows] if head else rows
+
+
+def _text(value: Any) -> str:
+    """Write a value as TOML, which reads JSON's strings and Python's floats (DEL must be escaped)."""
+    if isinstance(value, float):
+        return repr(value)
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{_text(key)} = {_text(one)}' for key, one in value.items())} }}"
+    if isinstance(value, list):
+        return f"[{', '.join(_text(one) for one in value)}]"
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,0 +1,89 @@
+"""Effects outside the list for which the diagnosis has no shape either: what they depend on it never regresses on.
+
+run_in         friction that falls with the way travelled, whatever the time it took
+sluggish_oil   viscous friction that waves with position: speed times position
+dead_band      a drive that passes nothing below a threshold of its command
+motor_ripple   a torque constant that waves with position: command times position
+drive_fade     a drive that gives less when warm: command times temperature
+payload_comes  a weight that is there from some moment on: position, but only then
+ground         a floor that trembles now and then: noise between 2 and 10 Hz
+"""
+
+import numpy as np
+from scipy.signal import butter, sosfilt
+
+from cosim_studies.proof.bench import Bench, Parameters, log_uniform, root_mean_square
+from cosim_studies.proof.families import Family, add_push, angle, goal
+from cosim_studies.proof.truth import TICK, Array
+
+
+def run_in(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+    """Dry contacts that polish themselves, and forget it over night."""
+    way = float(np.abs(bench.training.v).mean()) * bench.pace.duration * float(rng.uniform(0.1, 0.3))
+    bench.mount |= {"run_in": size * float(rng.uniform(0.6, 1.2)), "run_in_length": way}
+    return {"relative": bench.mount["run_in"], "length": way}
+
+
+def sluggish_oil(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+    """A bearing that is tight at one side, in viscous friction only."""
+    cycles = max(1, round(1 / (2 * bench.pace.amplitude * bench.turn / (2 * np.pi))))
+    viscous = bench.mount["viscous"] = max(bench.mount["viscous"], 0.5 * bench.mount["coulomb"] / bench.pace.speed)
+    bench.belief["friction"]["sigma2"] = viscous
+    swing = min(0.95, 2.5 * goal(bench, rng, size) / (viscous * root_mean_square(bench.training.v)))
+    bench.mount |= {"viscous_swing": swing, "viscous_cycles": bench.turn * cycles, "viscous_phase": angle(rng)}
+    return {"relative": swing, "cycles_per_rev": cycles}
+
+
+def dead_band(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+    """A bridge that does not switch for small commands."""
+    bench.mount["dead_band"] = 1.5 * goal(bench, rng, size)
+    return {"torque": bench.mount["dead_band"]}
+
+
+def motor_ripple(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+    """Magnets of unequal strength."""
+    felt = root_mean_square(bench.mount["inertia"] * bench.training.a) + bench.friction_rms
+    swing = min(0.5, 2 * goal(bench, rng, size) / felt)
+    cycles = round(log_uniform(rng, 2, 12) * max(1.0, np.pi / (bench.turn * bench.pace.amplitude)))
+    bench.mount |= {"gain_swing": swing, "gain_cycles": bench.turn * cycles, "gain_phase": angle(rng)}
+    return {"relative": swing, "cycles_per_rev": cycles}
+
+
+def drive_fade(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+    """Copper and magnets lose with temperature; here the whole drive follows the bearing's."""
+    bench.mount["gain_fade"] = -size * float(rng.uniform(0.02, 0.04))
+    bench.shows_temperature = bool(rng.random() < 0.7)
+    return {"per_degC": bench.mount["gain_fade"]}
+
+
+def payload_comes(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+    """Somebody hangs a weight onto it while it is recorded."""
+    phase, when = angle(rng), bench.pace.duration * float(rng.uniform(0.3, 0.7))
+    shape = root_mean_square(np.sin(bench.training.q + phase))
+    bench.mount |= {"shift": 2.5 * goal(bench, rng, size) / shape, "shift_phase": phase, "shift_time": when}
+    return {"mgl": bench.mount["shift"], "phase": phase, "after_s": when}
+
+
+def ground(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+    """Bursts of a trembling floor: a torque through the unbalance of whatever the axis carries."""
+    low = float(rng.uniform(2, 4))
+    filtered = butter(2, (low, low * float(rng.uniform(1.5, 2.5))), "bandpass", fs=1 / TICK, output="sos")
+    strength = 2.5 * goal(bench, rng, size)
+
+    def push(_: str, t: Array) -> Array:
+        noise = np.asarray(sosfilt(filtered, rng.standard_normal(t.size)))
+        wave = noise / (noise.std() + 1e-300)
+        gates = [np.exp(-(((t - c) / w) ** 2)) for c, w in _bursts(rng, t[-1])]
+        return np.asarray(strength * wave * np.sum(gates, axis=0))
+
+    add_push(bench, push)
+    return {"torque_rms": strength, "from_hz": low}
+
+
+def _bursts(rng: np.random.Generator, end: float) -> list[tuple[float, float]]:
+    return [(float(rng.uniform(0.1, 0.9)) * end, end * float(rng.uniform(0.03, 0.08))) for _ in range(3)]
+
+
+_ALL: tuple[Family, ...] = (run_in, sluggish_oil, dead_band, motor_ripple, drive_fade, payload_comes, ground)
+
+SHAPELESS = {family.__name__: family for family in _ALL}

@@ -1,0 +1,143 @@
+"""A proof from its seed to its page: deal, play what is not played yet on all cores, score, write."""
+
+import hashlib
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from contextlib import ExitStack, closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from time import sleep
+
+from cosim.diagnosis.calibration import OFFSET, SLOPE
+from cosim.support.errors import ProofError
+from cosim.support.plain import Parsed
+from cosim.support.version import __version__
+from cosim.sweep.journal import Journal
+from cosim.sweep.pool import cores
+from cosim_studies.proof.deck import CaseSpec, deal
+from cosim_studies.proof.page import MADE, proof, write
+from cosim_studies.proof.play import Table, Tool
+from cosim_studies.proof.seal import Row, Seals
+from cosim_studies.proof.tool import answer
+
+Told = Callable[[int, int, str], None]
+"""Called after each case with cases done, cases in all, and what was the last."""
+GENERATOR = "home"
+"""What the list of decks calls the generator of this package."""
+LEAST_SECONDS = 10.0
+"""Shorter recordings hold less than a soft start and a swing."""
+ROOMS = ("cosim/diagnosis", "cosim_studies/proof", "cosim/estimation", "pyfmi_models")
+"""Where the code lies that decides the scores."""
+
+
+@dataclass(frozen=True)
+class Benchmark:
+    """What is played: seed, cases, seconds of each recording."""
+
+    seed: int
+    cases: int
+    seconds: float = 60.0
+
+
+def conduct(
+    deck: Benchmark,
+    out: Path,
+    *,
+    workers: int | None = None,
+    force: bool = False,
+    say: Callable[[str], None] = lambda text: None,
+    told: Told = lambda done, of, last: None,
+    tool: Tool = answer,
+    command: str = "",
+) -> Parsed:
+    """Play a deck, or what is left of it, write everything into `out`, and return what `proof.json` holds.
+
+    Args:
+        deck: what is played.
+        out: folder; a proof begun there with the same seed and code is continued, also to more cases.
+        workers: cases at a time; the cores of this machine where not given.
+        force: start over.
+        say: told each seal before the tool runs.
+        told: called after each case.
+        tool: what is tested.
+        command: what the page says it was made by.
+
+    Raises:
+        ProofError: a wish cannot be met, or a seal is broken.
+        OutputError: `out` holds another proof.
+    """
+    _check(deck, workers)
+    hands = deal(deck.seed, deck.cases)
+    identity = {
+        "generator": GENERATOR,
+        "seed": str(deck.seed),
+        "seconds": str(deck.seconds),
+        "version": __version__,
+        "code": code(),
+    }
+    with ExitStack() as stack:
+        journal = stack.enter_context(Journal(out, identity, force, "proof", MADE))
+        table = Table(deck.seed, deck.seconds, Seals(out / "seals.jsonl"), say, tool)
+        rest = [hand for hand in hands if hand.number not in journal.rows]
+        facts = {**identity, "seed": deck.seed, "seconds": deck.seconds, "cases": deck.cases, "command": command}
+        facts["calibration"] = [OFFSET, SLOPE]
+        result = stack.enter_context(_written(out, journal, table.seals, facts))
+        rows = stack.enter_context(closing(_played(table, rest, workers or cores())))
+        for done, row in enumerate(rows, deck.cases - len(rest) + 1):
+            journal.append(row)
+            told(done, deck.cases, _last(row))
+    return result
+
+
+def _check(deck: Benchmark, workers: int | None) -> None:
+    wished = (("--cases", deck.cases, 1), ("--seed", deck.seed, 0), ("--workers", workers, 1))
+    for name, value, least in wished:
+        if value is not None and value < least:
+            raise ProofError(f"{name} {value}: it must be at least {least}.", culprit=name, value=value)
+    if deck.seconds < LEAST_SECONDS:
+        text = f"--seconds {deck.seconds:g}: a recording must last {LEAST_SECONDS:g} s at least."
+        raise ProofError(text, culprit="--seconds", value=deck.seconds)
+
+
+def code() -> str:
+    """SHA-256 of the code that decides the scores."""
+    home = Path(__file__).parents[2]
+    files = sorted(path for room in ROOMS for path in (home / room).rglob("*") if path.suffix in (".py", ".c"))
+    whole = hashlib.sha256()
+    for path in files:
+        whole.update(f"{path.relative_to(home).as_posix()}\n".encode() + path.read_bytes())
+    return whole.hexdigest()
+
+
+def _played(table: Table, hands: Sequence[CaseSpec], workers: int) -> Generator[Row, None, None]:
+    """Yield the rows as they come; when this is closed early, what is still played is lost."""
+    threads = ThreadPoolExecutor(workers, "proof")
+    pending = [threads.submit(table.play, hand) for hand in hands]
+    try:
+        for future in as_completed(pending):
+            yield future.result()
+    finally:
+        threads.shutdown(wait=False, cancel_futures=True)
+        while not all(future.done() for future in pending):
+            table.close()  # again and again: a thread may just have begun a process
+            sleep(0.05)
+        table.close()
+
+
+@contextmanager
+def _written(out: Path, journal: Journal, seals: Seals, facts: Parsed) -> Iterator[Parsed]:
+    """Score and write what is done when the block ends, however it ends."""
+    result: Parsed = {}
+    try:
+        yield result
+    finally:
+        rows: list[Row] = [row for number, row in sorted(journal.rows.items()) if number < facts["cases"]]
+        if rows:
+            seals.check(rows)
+            result |= proof(rows, facts)
+            write(out, result)
+
+
+def _last(row: Row) -> str:
+    said = " + ".join(row["answer"]["verdict"]) or "none" if row["status"] == "ok" else row["status"]
+    return f"case {row['run']}: {' + '.join(row['effects']) or 'none'}, answered {said}"

@@ -1,0 +1,108 @@
+"""One case from its hand to its row: make, seal, ask the tool, open, measure.
+
+A row of `runs.jsonl` and of `proof.json`:
+    run, seed, kind, effects, size       the hand
+    seal, salt, truth              SHA-256 written before the tool ran, and what it seals (`seal.py`)
+    status, reason                 "ok", or how the tool ended instead: "crashed", "timeout", "failed"
+    answer                         what the tool said (`tool.py`), with the baselines' answers
+    ceiling                        held-out RMS of the true structure refitted, or the reason why there is none
+    seconds                        {"make", "tool", "ceiling"}
+"""
+
+from collections.abc import Callable
+from tempfile import TemporaryDirectory
+from threading import local
+from time import perf_counter
+from typing import Any
+
+from cosim.support.cell import Cell, LostError
+from cosim.support.errors import InputError, ProofError
+from cosim.support.plain import Parsed
+from cosim_studies.proof.ceiling import ceiling
+from cosim_studies.proof.deck import CaseSpec
+from cosim_studies.proof.make import make
+from cosim_studies.proof.seal import Row, Seals, salt_of, seal
+from cosim_studies.proof.tool import answer
+
+Tool = Callable[[str], Parsed]
+"""From a folder with recordings and card to an answer; a function of a module."""
+TIMEOUT = 600.0
+"""Seconds after which a tool is given up."""
+
+
+class Table:
+    """Where the cases of a deck are played, by several threads at once.
+
+    Args:
+        seed: of the deck.
+        seconds: length of a recording.
+        seals: where each truth is sealed.
+        say: told each seal before the tool runs.
+        tool: what is tested.
+    """
+
+    def __init__(
+        self, seed: int, seconds: float, seals: Seals, say: Callable[[str], None], tool: Tool = answer
+    ) -> None:
+        self.seed, self.seconds, self.seals, self.say, self.tool = seed, seconds, seals, say, tool
+        self._own, self._cells = local(), list[Cell]()
+
+    def play(self, hand: CaseSpec) -> Row:
+        """Play one hand.
+
+        Raises:
+            ProofError: it was sealed before with another truth, or could not be made.
+        """
+        maker, user = self._processes()
+        head = {"run": hand.number, "seed": hand.seed, "kind": hand.kind, "effects": list(hand.effects)}
+        head |= {"size": hand.size}
+        with TemporaryDirectory(prefix="cosim-prove-") as folder:
+            begun = perf_counter()
+            truth = _made(maker, hand, self.seconds, folder)
+            made = perf_counter() - begun
+            opened = self._sealed(hand, truth)
+            said = _asked(user, self.tool, folder)
+            knows = bool(truth["effects"]) and said["status"] == "ok"
+            best = _asked(user, ceiling, folder, truth["effects"], truth["mount"]) if knows else {"seconds": 0.0}
+        seconds = {"make": made, "tool": said.pop("seconds"), "ceiling": best.pop("seconds")}
+        return head | opened | said | {"ceiling": best.get("answer", best), "seconds": seconds}
+
+    def close(self) -> None:
+        """End all processes, whatever they are doing; may be called from another thread."""
+        for cell in self._cells:
+            cell.close()
+
+    def _sealed(self, hand: CaseSpec, truth: Parsed) -> Parsed:
+        salt = salt_of(self.seed, hand.number)
+        sealed = seal(truth, salt)
+        self.seals.write(hand.number, sealed)
+        self.say(f"case {hand.number}: truth sealed, SHA-256 {sealed}")
+        return {"seal": sealed, "salt": salt, "truth": truth}
+
+    def _processes(self) -> tuple[Cell, Cell]:
+        """The two processes of this thread: one makes cases, the other is the tool."""
+        if not hasattr(self._own, "cells"):
+            self._own.cells = Cell(), Cell()
+            self._cells.extend(self._own.cells)
+        cells: tuple[Cell, Cell] = self._own.cells
+        return cells
+
+
+def _made(maker: Cell, hand: CaseSpec, seconds: float, folder: str) -> Parsed:
+    try:
+        truth: Parsed = maker.call(make, hand, seconds, folder, timeout=TIMEOUT)
+    except LostError as loss:
+        raise ProofError(f"Case {hand.number} could not be made: {loss}", culprit=hand.label) from loss
+    return truth
+
+
+def _asked(user: Cell, function: Callable[..., Any], *arguments: Any) -> Parsed:
+    """Call in the tool's process; whatever goes wrong there is an answer too."""
+    begun, said = perf_counter(), Parsed()
+    try:
+        said = {"status": "ok", "reason": "", "answer": user.call(function, *arguments, timeout=TIMEOUT)}
+    except LostError as loss:
+        said = {"status": loss.status, "reason": str(loss)}
+    except InputError as error:
+        said = {"status": "failed", "reason": str(error)}
+    return said | {"seconds": perf_counter() - begun}

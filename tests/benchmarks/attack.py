@@ -1,0 +1,216 @@
+"""Spoilt files and numbers of every kind against the command line: what is it that a user sees, and what is left?
+
+    python tests/benchmarks/attack.py --seed 1 --out results/attack [--count 3000]
+
+Each mutation runs in a forked process with limits of time and memory (attack_worker.py) and ends in one of these ways:
+
+    refused      exit code 2, one sentence, no traceback
+    answered     exit code 0 with a result that is whole (or 1, where yes or no was asked)
+    long         still at work after 15 s of a processor; Ctrl-C ended it well
+    traceback, crash (a signal), hung (Ctrl-C did not end it), silent (success without a result), left (files of no
+    use, or a process), unclear (anything else): defects. There must be none.
+"""
+
+import argparse
+import collections
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from random import Random
+from shutil import rmtree
+
+for name in ("OMP", "OPENBLAS", "ARROW"):
+    os.environ.setdefault(f"{name}_NUM_THREADS", "1")
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+
+from attack_kinds import kinds  # noqa: E402
+from attack_targets import Target, Yard, line  # noqa: E402
+from attack_worker import Ended, attempt  # noqa: E402
+
+import cosim.api.identify  # noqa: E402  what is loaded here need not be loaded in each fork
+import cosim.api.run  # noqa: E402
+import cosim.api.show  # noqa: E402
+import cosim.hardware.session  # noqa: E402
+import cosim.sweep  # noqa: E402, F401
+from cosim.support.files import replacing  # noqa: E402
+from cosim.support.version import __version__  # noqa: E402
+
+FINE = ("refused", "answered", "long")
+DEFECTS = ("traceback", "crash", "hung", "silent", "left", "unclear")
+LOUD = 3
+"""Lines of a refusal, beyond which it is no sentence any more."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """One mutation: its kind, number, what was done, how it ended, and what was said."""
+
+    kind: str
+    number: int
+    how: str
+    end: str
+    said: str
+    seconds: float
+
+
+def judged(target: Target, ended: Ended, folder: Path, file: Path, good: bytes) -> str:
+    """The way it ended."""
+    if "Traceback (most recent call last)" in ended.err + ended.out:
+        return "traceback"
+    if ended.hung:
+        return "hung"
+    if ended.code < 0:
+        return "crash"
+    if ended.left or (ended.running and not ended.asked):
+        return "left"
+    if ended.asked:
+        return "long" if ended.code in (0, 130) else "unclear"
+    if ended.code == 0:
+        return "answered" if target.proof(folder, ended, file, good) else "silent"
+    if ended.code == 130 or (ended.code == 1 and ended.out.strip()):
+        return "answered"
+    return "refused" if ended.code == 2 and is_sentence(ended.err) else "unclear"
+
+
+def is_sentence(said: str) -> bool:
+    """Whether a refusal is one: `cosim: ...` at the end, or what the command line says of a wrong option."""
+    lines = said.strip().splitlines()
+    usage = any(one.startswith("Usage: ") for one in lines)
+    return usage or (bool(lines) and sum(one.startswith("cosim: ") for one in lines) == 1)
+
+
+def drawn(targets: list[Target], seed: int, count: int) -> list[tuple[int, Target]]:
+    """The numbers and kinds of so many attacks, by their shares, in any order: a part of them is a fair sample."""
+    whole = sum(one.share for one in targets)
+    found = [one for one in targets for _ in range(max(1, round(count * one.share / whole)))]
+    return Random(seed).sample(list(enumerate(found)), len(found))
+
+
+def journalled(journal: Path) -> list[Found]:
+    """What a journal has; nothing where there is none."""
+    return [Found(**json.loads(one)) for one in journal.read_text("utf-8").splitlines()] if journal.exists() else []
+
+
+def attacks(targets: list[Target], seed: int, count: int, journal: Path) -> Iterator[Found]:
+    """Attack, and write down each; those of a journal that was begun are not played again."""
+    done = {one.number: one for one in journalled(journal)}
+    for place, target in drawn(targets, seed, count):
+        if place not in done:
+            done[place] = attack(target, seed, place)
+            with journal.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(vars(done[place])) + "\n")
+        yield done[place]
+
+
+def untouched(dice: Random, raw: bytes) -> tuple[str, bytes]:
+    """Spoil nothing."""
+    return "nothing", raw
+
+
+def controls(targets: list[Target]) -> Iterator[Found]:
+    """Every good file to its command: an attack means nothing where these are not answered."""
+    for target in targets:
+        for place, seed in enumerate(target.seeds):
+            yield attack(replace(target, seeds=[seed], spoil=untouched), 0, place)
+
+
+def attack(target: Target, seed: int, place: int, keep: bool = False) -> Found:
+    dice = Random(f"{seed}.{target.kind}.{place}")
+    name, good = dice.choice(target.seeds)
+    how, bad = target.spoil(dice, good)
+    folder = Path(tempfile.mkdtemp(prefix="attack-"))
+    try:
+        (folder / name).write_bytes(bad)
+        command = target.command(folder, folder / name, dice)
+        call: Callable[[], object] = line(command) if isinstance(command, list) else command
+        ended = attempt(call, folder)
+        end = judged(target, ended, folder, folder / name, good)
+        said = (ended.err.strip() or ended.out.strip()).replace(str(folder), "DIR")
+        if keep:
+            print(f"{folder}\n{ended.out}\n{ended.err}\n{ended.left} {ended.running} {ended.code}")
+        note = f" LEFT {ended.left} {ended.running}" if end == "left" else ""
+        return Found(target.kind, place, how, end, said[-600:] + note, ended.seconds)
+    finally:
+        if not keep:
+            rmtree(folder, ignore_errors=True)
+
+
+def page(found: list[Found], seed: int, planned: int) -> str:
+    """The table for people."""
+    counts = collections.Counter((one.kind, one.end) for one in found)
+    total = collections.Counter(one.end for one in found)
+    rows = [
+        (kind, [counts[kind, end] for end in (*FINE, *DEFECTS)]) for kind in dict.fromkeys(one.kind for one in found)
+    ]
+    rows.append(("**all**", [total[end] for end in (*FINE, *DEFECTS)]))
+    head = ("attacked", "tried", *FINE, *DEFECTS)
+    defects = sum(total[end] for end in DEFECTS)
+    lines = [
+        "# Spoilt files and numbers against the command line",
+        "",
+        f"    python tests/benchmarks/attack.py --seed {seed} --count {planned} --out results/attack",
+        "",
+        f"mount-cosim {__version__}; {len(found):,} mutations of {planned:,} planned, {defects} defects. "
+        "What the columns mean stands at the top of `tests/benchmarks/attack.py`; "
+        "`defects.json` has what was said in each defect.",
+        "",
+        "| " + " | ".join(head) + " |",
+        "|---|" + "--:|" * (len(head) - 1),
+        *(f"| {kind} | {sum(row)} | " + " | ".join(f"{one:,}" for one in row) + " |" for kind, row in rows),
+        "",
+        f"Seconds of a mutation: median {sorted(one.seconds for one in found)[len(found) // 2]:.2g}, "
+        f"longest {max(one.seconds for one in found):.2g}.",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Attack and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=3000)
+    parser.add_argument("--only", type=int, help="number of one attack, to play it again and look")
+    parser.add_argument("--journal", type=Path, help="file of what is done: a run that ended early goes on from there")
+    parser.add_argument("--so-far", action="store_true", help="only write the table of what the journal has")
+    parser.add_argument("--out", type=Path, required=True)
+    given = parser.parse_args()
+    if given.so_far:
+        written(journalled(given.journal), given.seed, given.count, given.out)
+        return
+    folder = tempfile.mkdtemp(prefix="attack-")  # no TemporaryDirectory: each fork would remove it at its end
+    try:
+        targets = kinds(Yard(Path(folder)))
+        if given.only is not None:
+            attack(dict(drawn(targets, given.seed, given.count))[given.only], given.seed, given.only, keep=True)
+            return
+        for one in controls(targets):
+            if one.end != "answered":
+                raise SystemExit(f"the good file of {one.kind} (number {one.number}) is {one.end}: {one.said}")
+        found = []
+        for one in attacks(targets, given.seed, given.count, given.journal or Path(folder) / "journal"):
+            found.append(one)
+            if one.end in DEFECTS:
+                print(f"{one.end} {one.kind} {one.number} ({one.how}): ...{one.said[-300:]}", flush=True)
+    finally:
+        rmtree(folder, ignore_errors=True)
+    written(found, given.seed, len(found), given.out)
+
+
+def written(found: list[Found], seed: int, planned: int, out: Path) -> None:
+    """Write README.md and defects.json."""
+    out.mkdir(parents=True, exist_ok=True)
+    defects = [vars(one) for one in found if one.end in DEFECTS]
+    for name, text in (
+        ("README.md", page(found, seed, planned)),
+        ("defects.json", json.dumps(defects, indent=1) + "\n"),
+    ):
+        with replacing(out / name, force=True) as partial:
+            partial.write_text(text, "utf-8")
+
+
+if __name__ == "__main__":
+    main()

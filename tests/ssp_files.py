@@ -1,0 +1,82 @@
+"""SSP archives written by hand around the tiny FMU."""
+
+import zipfile
+from pathlib import Path
+
+NAMES = {
+    "ssd": "Description",
+    "ssc": "Common",
+    "ssv": "ParameterValues",
+    "ssm": "ParameterMapping",
+    "ssb": "SignalDictionary",
+}
+SPACES = (
+    " ".join(f'xmlns:{key}="http://ssp-standard.org/SSP1/SystemStructure{name}"' for key, name in NAMES.items())
+    + ' xmlns:osp="http://opensimulationplatform.com/SSP/OSPAnnotations"'
+)
+CONNECTORS = "".join(
+    f'<ssd:Connector name="{name}" kind="{kind}"><ssc:Real/></ssd:Connector>'
+    for name, kind in {"a": "input", "b": "input", "y": "output"}.items()
+)
+EXPERIMENT = """<ssd:DefaultExperiment stopTime="0.01"><ssd:Annotations>
+<ssc:Annotation type="com.opensimulationplatform"><osp:Algorithm><osp:FixedStepAlgorithm baseStepSize="0.001"/>
+</osp:Algorithm></ssc:Annotation></ssd:Annotations></ssd:DefaultExperiment>"""
+
+
+def component(name: str, bindings: str = "", source: str = "resources/tiny%202.fmu", kind: str = "") -> str:
+    return (
+        f'<ssd:Component name="{name}" source="{source}" {kind}><ssd:Connectors>{CONNECTORS}</ssd:Connectors>'
+        f"<ssd:ParameterBindings>{bindings}</ssd:ParameterBindings></ssd:Component>"
+    )
+
+
+def values(inside: str, attributes: str = "") -> str:
+    """A binding with values inline."""
+    return (
+        f"<ssd:ParameterBinding {attributes}><ssd:ParameterValues>{parameter_set(inside)}</ssd:ParameterValues>"
+        "</ssd:ParameterBinding>"
+    )
+
+
+def parameter_set(inside: str) -> str:
+    parameters = f"<ssv:Parameters>{inside}</ssv:Parameters>"
+    return f'<ssv:ParameterSet {SPACES} version="1.0" name="s">{parameters}</ssv:ParameterSet>'
+
+
+def real(name: str, value: object, unit: str = "") -> str:
+    unit = f'unit="{unit}"' if unit else ""
+    return f'<ssv:Parameter name="{name}"><ssv:Real value="{value}" {unit}/></ssv:Parameter>'
+
+
+def wire(start: str, end: str, inside: str = "", attributes: str = "") -> str:
+    """A connection; an end without a dot is a connector of the system itself."""
+    said = attributes
+    for side, one in (("start", start), ("end", end)):
+        element, _, connector = one.rpartition(".")
+        said += (f' {side}Element="{element}"' if element else "") + f' {side}Connector="{connector}"'
+    return f"<ssd:Connection {said}>{inside}</ssd:Connection>"
+
+
+def system(elements: str, wires: str = "", name: str = "s", connectors: str = "", bindings: str = "") -> str:
+    return (
+        f'<ssd:System name="{name}"><ssd:Connectors>{connectors}</ssd:Connectors>'
+        f"<ssd:ParameterBindings>{bindings}</ssd:ParameterBindings>"
+        f"<ssd:Elements>{elements}</ssd:Elements><ssd:Connections>{wires}</ssd:Connections></ssd:System>"
+    )
+
+
+def connector(name: str, kind: str) -> str:
+    return f'<ssd:Connector name="{name}" kind="{kind}"><ssc:Real/></ssd:Connector>'
+
+
+def pack(
+    path: Path, fmu: Path, inside: str, *, experiment: str = EXPERIMENT, version: str = "1.0", **files: str
+) -> Path:
+    root = "ssd:SystemStructureDescription"
+    text = f'<{root} {SPACES} version="{version}" name="t">{inside}{experiment}</{root}>'
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("SystemStructure.ssd", text)
+        archive.write(fmu, "resources/tiny 2.fmu")
+        for name, content in files.items():
+            archive.writestr(f"resources/{name.replace('_', '.')}", content)
+    return path

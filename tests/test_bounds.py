@@ -1,0 +1,81 @@
+"""Bounds of what was not seen: what is concealed at the bound is found, what is far below it is not."""
+
+import sys
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.diagnosis.bounds import SeenFrom
+from cosim.diagnosis.candidates import columns_of
+from cosim.diagnosis.concealment import Concealment, Hidden
+from cosim.diagnosis.hypotheses import candidates
+
+sys.path.append(str(Path(__file__).parent / "benchmarks"))
+from bounds import Stand, case, drawn
+
+CONCEALED = ("torque_offset", "cogging", "delay", "friction_asymmetry", "periodic_disturbance")
+
+
+@cache
+def stand() -> Stand:
+    return Stand(*case(951, 20.0))
+
+
+@pytest.mark.parametrize("effect", CONCEALED)
+def test_what_is_concealed_at_the_bound_is_found_by_the_search(effect: str) -> None:
+    assert found_at(effect, 1.0)
+
+
+@pytest.mark.parametrize("effect", CONCEALED)
+def test_a_tenth_of_the_bound_is_not_found(effect: str) -> None:
+    assert not found_at(effect, 0.1)
+
+
+def found_at(effect: str, times: float) -> bool:
+    here = stand()
+    bound = here.bounds[effect]
+    member = next(one for one in here.members() if one.effect == effect and one.place >= bound.places[0])
+    smaller = replace(bound, size=times * bound.size)
+    return here.is_found(effect, drawn(member, smaller, np.random.default_rng(1), len(here.runs)))
+
+
+def test_bounds_are_shares_of_the_friction_and_hold_for_what_they_say() -> None:
+    bounds = stand().bounds
+    assert len(bounds) >= 15
+    for name, bound in bounds.items():
+        assert isinstance(bound, SeenFrom)
+        assert bound.size > 0, name
+        assert bound.power >= 0.9, name
+        assert bound.places[0] <= bound.places[1], name
+
+
+def test_what_is_found_of_a_concealed_effect_is_what_screening_the_altered_recording_finds() -> None:
+    """Gram matrices say the same as altering the residual and scoring it by the search's own screen."""
+    here = stand()
+    comparison, base = here.comparison, here.base
+    tried = candidates(base.mount, here.problem.prepared, base.residual, np.abs(comparison.nuisances.level))
+    (one,) = (one for one in tried if one.effect == "torque_offset")
+    (columns,) = columns_of(base.mount, [one], here.problem.prepared, base.values)
+    size = 2 * here.bounds["torque_offset"].size
+    prior = 0.5 * np.sqrt(np.mean(here.problem.prepared.stacked("tau") ** 2)) / np.sqrt(np.mean(columns**2, axis=0))
+    hidden = Hidden("torque_offset", np.array([0]), prior, 0.0)
+    worth = Concealment(comparison, base, [columns]).worth(hidden, np.array([size]))
+    altered = replace(base, residual=base.residual + size * columns[:, 0])
+    (screened,) = comparison.score(altered, [one], [columns])
+    assert worth.evidence == pytest.approx(screened.evidence, rel=0.1)
+    assert worth.plain == pytest.approx(screened.plain, rel=1e-6)
+
+
+def test_a_louder_rest_raises_the_bound() -> None:
+    """The bound is one of this recording: with three times the rest, an offset must be larger to be seen."""
+    here = stand()
+    (columns,) = (one.columns for one in here.members() if one.effect == "torque_offset")
+    hidden = Hidden("torque_offset", np.array([0]), np.array([1.0]), 0.0)
+    size = np.array([here.bounds["torque_offset"].size])
+    noise = np.random.default_rng(2).standard_normal(len(here.base.residual))
+    louder = replace(here.base, residual=here.base.residual + 10 * here.base.rms * noise)
+    assert Concealment(here.comparison, here.base, [columns]).is_found(hidden, size)
+    assert not Concealment(here.comparison, louder, [columns]).is_found(hidden, size)

@@ -1,0 +1,63 @@
+"""The documentation site says of every effect what a reader needs, and has a page for every subject."""
+
+import importlib
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from effect_examples import FORMS
+
+from cosim.diagnosis.hypotheses import TRIED
+from pyfmi_models.effects import CATALOGUE
+
+DOCS = Path(__file__).parents[1] / "docs"
+PAGES = (
+    "card recording_data report theory decision glossary reading scenarios fmus other_tools hardware api architecture"
+)
+
+
+@pytest.fixture(scope="module")
+def gallery() -> Any:
+    sys.path.insert(0, str(DOCS))
+    try:
+        yield importlib.import_module("gallery")
+    finally:
+        sys.path.remove(str(DOCS))
+
+
+@pytest.mark.parametrize("name", sorted(TRIED))
+def test_every_effect_has_equation_words_advice_and_literature(gallery: Any, name: str) -> None:
+    for form in CATALOGUE[name]:
+        said, literature = gallery.described(form)
+        assert said
+        assert form.equation
+        assert form.action
+    assert literature or gallery.LITERATURE[name]
+
+
+def test_no_literature_is_told_twice(gallery: Any) -> None:
+    assert set(gallery.LITERATURE) <= set(TRIED)
+    last = {form.id: form for form in FORMS if form.id in TRIED}
+    assert [name for name in gallery.LITERATURE if gallery.described(last[name])[1]] == []
+
+
+def test_the_index_leads_to_every_page_that_is_there() -> None:
+    index = (DOCS / "index.md").read_text("utf-8")
+    listed = set(re.findall(r"^([a-z_/]+)$", index, re.M))
+    assert {*PAGES.split()} <= listed
+    assert all((DOCS / f"{name}.md").exists() for name in listed if not name.startswith("_generated"))
+
+
+def test_ci_builds_the_site_with_warnings_as_errors() -> None:
+    ci = (DOCS.parent / ".ci" / "run").read_text("utf-8")
+    assert "-m sphinx -W" in ci
+    assert "-m sphinx -W" in (DOCS / "site.md").read_text("utf-8")
+
+
+def test_links_out_of_the_folder_are_said_as_paths() -> None:
+    outside = re.search(r"^OUTSIDE = re\.compile\(r\"(.*)\"\)$", (DOCS / "conf.py").read_text("utf-8"), re.M)
+    assert outside is not None
+    text = re.sub(outside[1], lambda link: f"{link[1]} ({link[2]})", "see [results](../results/a.md#b) and [x](y.md)")
+    assert text == "see results (results/a.md) and [x](y.md)"

@@ -1,0 +1,247 @@
+"""A replay compares every column bit for bit, sees what is missing, and believes nothing that a recording says."""
+
+import json
+import shutil
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from on_hardware import SCENARIO, invoke, recorded, scenario, session
+
+from cosim.data.recording import Recording
+from cosim.hardware.blackbox import HEADER, MAGIC, read_black_box
+from cosim.hardware.replay import replay
+from cosim.hardware.session import run_session
+from cosim.hardware.story import broken_seal, seal_of
+from cosim.support.errors import CosimError, HardwareError
+from cosim.support.files import cache_home
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
+
+SHORT = ("stop = 0.4", "stop = 0.12")
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """A session as it was recorded."""
+    folder = tmp_path_factory.mktemp("session")
+    with session(folder, what=scenario(SHORT)) as one:
+        run_session(one)
+    return recorded(folder)
+
+
+def with_column(recording: Recording, name: str, column: np.ndarray) -> Recording:
+    return replace(recording, table=recording.table | {name: column})
+
+
+def with_story(recording: Recording, change: Callable[[dict[str, Any]], Any]) -> Recording:
+    story = json.loads(json.dumps(recording.origin["hardware"]))
+    changed = change(story)
+    return replace(recording, origin=recording.origin | {"hardware": story if changed is None else changed})
+
+
+def sealed(recording: Recording) -> Recording:
+    """Seal it again, as who means to deceive would."""
+    return replace(recording, origin=recording.origin | {"seal": seal_of(recording.table)})
+
+
+def test_what_was_recorded_is_identical(whole: Recording) -> None:
+    done = replay(whole)
+    assert (done.identical, done.noticed, done.first) == (True, "", -1)
+    assert set(done.different) == set(whole)
+    assert done.stepped > 1000
+
+
+def test_a_changed_bit_in_any_column_is_seen(whole: Recording) -> None:
+    """What only enters the loop (set points, a torque below what the loop tells apart) needs the seal; all else not."""
+    row = len(whole) // 2
+    unseen = []
+    for name in whole:
+        column = whole[name].copy()
+        column[row] = np.nextafter(column[row], np.inf)
+        changed = with_column(whole, name, column)
+        if name == "machine.tick":
+            with pytest.raises(HardwareError, match="was altered"):
+                replay(changed)
+            continue
+        done = replay(changed)
+        assert done.noticed == "its numbers are not those that were recorded"
+        if not done.different[name] and replay(sealed(changed)).identical:
+            unseen.append(name)
+    assert set(unseen) <= {"q_d", "v_d", "a_d", "machine.value", "machine.torque"}
+
+
+@pytest.mark.parametrize("value", [0.25, np.nan, np.inf, -1.0, 2.0**32, 1e300])
+@pytest.mark.parametrize("name", ["machine.state", "machine.statusword", "machine.notes", "machine.encoder"])
+def test_a_number_that_its_field_cannot_hold_is_no_match(whole: Recording, name: str, value: float) -> None:
+    column = whole[name].copy()
+    column[700] = column[700] + value if value == 0.25 else value
+    done = replay(sealed(with_column(whole, name, column)))
+    assert done.different[name] >= 1
+    assert not done.identical
+
+
+def test_what_is_cut_off_is_seen(whole: Recording) -> None:
+    cut = replace(whole, table={name: column[:500] for name, column in whole.table.items()})
+    done = replay(cut)
+    assert not any(done.different.values())
+    assert done.noticed == f"it has 500 of the {len(whole):,} cycles that were recorded"
+    assert not done.identical
+
+
+def test_a_hole_is_seen(whole: Recording) -> None:
+    kept = np.delete(np.arange(len(whole)), np.arange(300, 310))
+    with pytest.raises(HardwareError, match="was altered: cycle 310 follows cycle 299"):
+        replay(replace(whole, table={name: column[kept] for name, column in whole.table.items()}))
+
+
+def test_a_cycle_that_is_there_twice_is_no_division_by_zero(whole: Recording) -> None:
+    tick = whole["machine.tick"].copy()
+    tick[301] = tick[300]
+    with pytest.raises(HardwareError, match="was altered: cycle 300 follows cycle 300"):
+        replay(with_column(whole, "machine.tick", tick))
+
+
+def test_the_seal_is_checked(whole: Recording) -> None:
+    assert broken_seal(whole) == ""
+    other = seal_of(whole.table | {"extra": np.zeros(len(whole))})
+    for seal, reason in [
+        (None, "it has no seal, or one that is damaged"),
+        ({"records": "many", "sha256": "0" * 64}, "it has no seal, or one that is damaged"),
+        ({"records": len(whole), "sha256": "0" * 63}, "it has no seal, or one that is damaged"),
+        (other, "its numbers are not those that were recorded"),
+        (other | {"records": 1}, f"it has {len(whole):,} of the 1 cycles that were recorded"),
+    ]:
+        done = replay(replace(whole, origin=whole.origin | {"seal": seal}))
+        assert (done.noticed, done.identical) == (reason, False)
+
+
+def test_the_seal_depends_on_every_name_and_number() -> None:
+    one = seal_of({"a": np.arange(3.0), "b": np.zeros(3)})
+    assert one == seal_of({"b": np.zeros(3), "a": np.arange(3.0)})
+    for other in (
+        {"a": np.arange(3.0), "c": np.zeros(3)},
+        {"a": np.arange(3.0), "b": -np.zeros(3)},
+        {"a": np.array([0.0, 2.0, 1.0]), "b": np.zeros(3)},
+        {"a": np.arange(3.0)},
+    ):
+        assert seal_of(other)["sha256"] != one["sha256"]
+
+
+def test_a_column_too_much_or_too_few_is_seen(whole: Recording) -> None:
+    more = replay(sealed(with_column(whole, "machine.more", np.zeros(len(whole)))))
+    assert (more.identical, more.different["machine.more"]) == (False, len(whole))
+    less = {name: column for name, column in whole.table.items() if name != "tau"}
+    assert replay(sealed(replace(whole, table=less))).different["tau"] == len(whole)
+    for name in ("machine.late", "machine.order", "machine.link", "v_d"):
+        less = {key: column for key, column in whole.table.items() if key != name}
+        with pytest.raises(HardwareError, match=f"it has no column {name}"):
+            replay(replace(whole, table=less))
+
+
+JUNK: list[Any] = [None, 0, -1, 1e300, "", "x" * 300, [], {}, [1], {"a": 1}, True, "../../etc/passwd"]
+
+
+def test_no_story_that_was_altered_is_a_traceback(whole: Recording) -> None:
+    """Every key, also those inside, becomes every kind of junk, and is left out; what still runs may be identical."""
+    story = whole.origin["hardware"]
+    paths = [(key,) for key in story]
+    paths += [("machine", key) for key in story["machine"]] + [("controller", key) for key in story["controller"]]
+    paths += [("machine", "limits", key) for key in story["machine"]["limits"]]
+    for path in paths:
+        for junk in (*JUNK, "left out"):
+
+            def change(story: dict[str, Any], path: tuple[str, ...] = path, junk: Any = junk) -> None:
+                place: Any = story
+                for key in path[:-1]:
+                    place = place[key]
+                if junk == "left out":
+                    place.pop(path[-1])
+                else:
+                    place[path[-1]] = junk
+
+            with suppress(CosimError):  # a sentence
+                replay(with_story(whole, change))
+    for junk in JUNK:
+        with pytest.raises(HardwareError):
+            replay(replace(whole, origin={"hardware": junk}))
+
+
+def test_a_controller_that_a_recording_names_is_never_opened(
+    whole: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = next(
+        one
+        for one in (cache_home() / "fmus").glob("*.fmu")
+        if one.name == whole.origin["hardware"]["controller"]["file"]
+    )
+    copy = shutil.copy(own, tmp_path / "controller.fmu")
+    named = with_story(whole, lambda story: story["controller"].update(path=str(copy), file=str(copy)))
+    assert replay(named).identical  # found in the cache, by its hash
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "empty"))
+    with pytest.raises(HardwareError, match=r"is not in the cache; it was built from|is not in the cache\."):
+        replay(named)
+    assert replay(named, Path(copy)).identical
+    with pytest.raises(HardwareError, match="there is no such controller"):
+        replay(named, tmp_path / "none.fmu")
+
+
+def test_another_controller_is_refused(whole: Recording, tmp_path: Path) -> None:
+    wrong = next(one for one in (cache_home() / "fmus").glob("paper_mount-plant-*.fmu"))
+    with pytest.raises(HardwareError, match="is another controller than that of the session"):
+        replay(whole, wrong)
+    renamed = with_story(whole, lambda story: story["controller"].update(sha256="0" * 64))
+    with pytest.raises(HardwareError, match=r"SHA-256 0000000000000000\.\.\.\) is not in the cache"):
+        replay(renamed)
+
+
+def test_the_command_finds_the_controller_by_the_card(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(SCENARIO.replace(*SHORT), "utf-8")
+    done = invoke("run", str(path), "--fast", "--out", str(tmp_path / "out"))
+    assert done.exit_code == 0, done.output
+    recording = tmp_path / "out" / "recording.parquet"
+    said = Recording.read(recording, required=()).origin["hardware"]["cards"]
+    assert {name: one["card"] for name, one in said.items()} == {"mount": "paper_mount", "controller": "paper_mount"}
+    assert invoke("replay", str(recording), "--card", "paper_mount").exit_code == 0
+    other = invoke("replay", str(recording), "--card", "emps")
+    assert other.exit_code == 2
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "empty"))
+    assert invoke("replay", str(recording)).exit_code == 2
+
+
+def test_the_command_says_what_was_cut_off(whole: Recording, tmp_path: Path) -> None:
+    cut = replace(whole, table={name: column[:500] for name, column in whole.table.items()})
+    done = invoke("replay", str(cut.write(tmp_path / "cut.parquet")))
+    assert done.exit_code == 1
+    assert f"is not the file that was written: it has 500 of the {len(whole):,} cycles" in done.output
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda raw: raw[: HEADER // 2],
+        lambda raw: raw[:-1],
+        lambda raw: raw[:HEADER],
+        lambda raw: raw + b"\0",
+        lambda raw: MAGIC + b"x" + raw[len(MAGIC) + 1 :],
+        lambda raw: MAGIC + b"[1]\n" + raw[len(MAGIC) + 4 :],
+        lambda raw: MAGIC + b"{}\n" + raw[len(MAGIC) + 3 :],
+        lambda raw: MAGIC + b'{"capacity": -1}\n' + raw[len(MAGIC) + 17 :],
+        lambda raw: MAGIC + b'{"capacity": 99999999999}\n' + raw[len(MAGIC) + 26 :],
+        lambda raw: MAGIC + b"[" * 30_000 + raw[len(MAGIC) + 30_000 :],
+        lambda raw: MAGIC + bytes(range(256)) * 10 + raw[len(MAGIC) + 2560 :],
+    ],
+)
+def test_a_black_box_that_is_damaged_is_a_sentence(tmp_path: Path, damage: Callable[[bytes], bytes]) -> None:
+    with session(tmp_path, what=scenario(SHORT)) as one:
+        one.advance(10)
+    path = tmp_path / "box"
+    path.write_bytes(damage(path.read_bytes()))
+    with pytest.raises(HardwareError, match=r"is no black box of this version|whose head is damaged, or that is cut"):
+        read_black_box(path)

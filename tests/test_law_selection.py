@@ -1,0 +1,70 @@
+"""Another friction law is proposed where a row of elements rubs, and none where the base's own bristle does."""
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.law_selection import LEAST, proposed_law
+from cosim.estimation.prepare import prepare
+from cosim.estimation.problem import Problem
+from pyfmi_models.friction import Coulomb, Dahl, FrictionLaw, LuGre, MaxwellSlip
+from pyfmi_models.mount import Axis, Mount
+
+Array = npt.NDArray[np.float64]
+REACH = np.geomspace(2e-3, 0.1, 6)
+"""Distances over which the elements slip [rad]."""
+
+
+def bristle(q: Array) -> Array:
+    """Dahl's curve, solved from row to row: 1 N m over 0.01 rad."""
+    out, state = np.empty_like(q), 0.0
+    for row, step in enumerate(np.diff(q, prepend=q[0])):
+        state = np.sign(step) + (state - np.sign(step)) * np.exp(-abs(step) / 0.01) if step else state
+        out[row] = state
+    return out
+
+
+def row_of_elements(q: Array) -> Array:
+    """Jenkin elements with equal levels, 1 N m together."""
+    out, state = np.empty_like(q), np.zeros(len(REACH))
+    for row, step in enumerate(np.diff(q, prepend=q[0])):
+        state = np.clip(state + step / REACH, -1, 1)
+        out[row] = state.mean()
+    return out
+
+
+def problem(friction: FrictionLaw, truth: object) -> Problem:
+    """Two recordings of an axis that turns over and over after distances of 2e-3 to 0.3 rad."""
+    rng, t = np.random.default_rng(5), np.arange(30_000) / 1000
+    recordings = []
+    for name, phase in (("one", 0.0), ("two", 1.0)):
+        size = 0.15 * np.exp(-2.0 * (1 + np.sin(0.5 * t + phase)))
+        q = size * np.sin(2 * np.pi * 0.7 * t + phase)
+        a = np.gradient(np.gradient(q, t), t)
+        tau = 5 * a + truth(q) + 0.01 * rng.standard_normal(len(t))  # type: ignore[operator]
+        recordings.append(Recording(name, {"t": t, "tau": tau, "q": q}))
+    prepared = prepare(recordings, 15.0)
+    mount = Mount(name="axis", axis=Axis(inertia=5.0), friction=friction)
+    return Problem(mount, prepared, np.ones(len(prepared.recording_of)), 1e-3)
+
+
+def proposed(friction: FrictionLaw, truth: object) -> dict[str, object]:
+    this = problem(friction, truth)
+    return proposed_law(this, this.fit(this.mount, 25))
+
+
+@pytest.mark.parametrize("law", [LuGre(sigma0=100.0, Fc=1.0, sigma1=0.1), Dahl(sigma0=100.0, Fc=1.0)])
+def test_a_row_of_elements_is_told_from_one_bristle(law: FrictionLaw) -> None:
+    elements = proposed(law, row_of_elements)
+    assert elements["proposed"] == "maxwell_slip"
+    assert LEAST < float(elements["gain"]) < 1  # type: ignore[arg-type]
+    assert proposed(law, bristle) == {"base": law.key, "proposed": law.key, "gain": 0.0}
+
+
+def test_one_bristle_is_proposed_in_place_of_a_row_of_elements_that_is_none() -> None:
+    assert proposed(MaxwellSlip(sigma0=100.0, Fc=1.0), bristle)["proposed"] == "lugre"
+
+
+def test_a_law_without_memory_keeps_its_name_as_its_memory_is_an_effect() -> None:
+    assert proposed(Coulomb(Fc=1.0), row_of_elements)["proposed"] == "coulomb"

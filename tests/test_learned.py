@@ -1,0 +1,194 @@
+"""Learned terms: tables as data in a card, the same in NumPy, CasADi and FMU; what they may not do."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from effect_examples import EXAMPLES, LAW, evaluate, mount, simulate
+from export_models import Driver
+
+from pyfmi_models.card import parse_card
+from pyfmi_models.card_writer import card_text
+from pyfmi_models.effects.learned import LearnedDrive, LearnedFriction, LearnedTorque
+from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHysteresis
+from pyfmi_models.errors import CardError
+from pyfmi_models.export import build_library
+from pyfmi_models.friction import LuGre
+
+LEARNED = [one for one in EXAMPLES if one.id == "learned"]
+NAMED = pytest.mark.parametrize("effect", LEARNED, ids=lambda one: type(one).__name__)
+CARD = '[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\nsigma2 = 3.0\n'
+OVER_POSITION = {"over": "position", "seen": (-1.0, 1.2), "torque": (0.3, 0.5, -0.2, 0.1)}
+
+
+def table(x: np.ndarray, coefficients: tuple[float, ...]) -> np.ndarray:
+    """The sum of the docstring, x from 0 to 1."""
+    place = np.clip(x, 0, 1)
+    return sum(c * np.cos(np.pi * k * place) for k, c in enumerate(coefficients))
+
+
+@NAMED
+def test_a_card_keeps_every_digit_of_a_table(effect) -> None:
+    given = parse_card(CARD, "a.toml")
+    back = parse_card(card_text(replace(given, effects=(effect, effect))), "b.toml")
+    assert back.effects == (effect, effect)
+
+
+def test_a_table_over_position_is_its_sum_of_waves() -> None:
+    effect, q = LearnedTorque(**OVER_POSITION), np.linspace(-2, 3, 101)
+    found = [float(effect.load(mount(effect).at(0.0, one, 0.3))) for one in q]
+    np.testing.assert_allclose(found, table((q + 1) / 2.2, effect.torque), atol=1e-13)
+
+
+def test_a_table_over_speed_is_its_sum_of_waves_dense_near_rest() -> None:
+    effect = LearnedTorque(over="speed", seen=(-0.5, 1.0), torque=(0.1, 0.5, -0.2, 0.1, 0.3))
+    v = np.linspace(-2, 2, 101)
+    p = lambda s: s / (np.abs(s) + 0.05)  # noqa: E731
+    found = [float(effect.load(mount(effect).at(0.0, 0.1, one))) for one in v]
+    np.testing.assert_allclose(found, table((p(v) - p(-0.5)) / (p(1.0) - p(-0.5)), effect.torque), atol=1e-13)
+
+
+def test_a_table_over_the_turn_repeats_after_it() -> None:
+    effect = LearnedTorque(over="turn", torque=(0.1, 0.4, -0.3, 0.0, 0.2))
+    q = np.linspace(-9, 9, 61)
+    found = np.array([float(effect.load(mount(effect).at(0.0, one, 0.0))) for one in q])
+    np.testing.assert_allclose(found, 0.1 + 0.4 * np.cos(q) - 0.3 * np.sin(q) + 0.2 * np.sin(2 * q), atol=1e-13)
+
+
+def test_a_product_table_is_friction_over_position_and_temperature() -> None:
+    effect = next(one for one in LEARNED if isinstance(one, LearnedFriction))
+    here = mount(effect)
+    for q, degrees in ((0.3, 22.0), (-0.9, 40.0), (5.0, 10.0)):
+        x, y = np.clip((q + 1) / 2.2, 0, 1), np.clip((degrees - 15) / 20, 0, 1)
+        waves = np.outer(np.cos(np.pi * np.arange(3) * x), np.cos(np.pi * np.arange(2) * y))
+        expected = np.exp(waves.ravel() @ effect.level_change)
+        found = float(here.level(here.at(0.0, q, 0.1, {"temperature": degrees}))) / float(LAW.Fc)
+        assert found == pytest.approx(expected, rel=1e-13)
+
+
+def test_a_drive_gives_its_command_less_the_table() -> None:
+    effect = next(one for one in LEARNED if isinstance(one, LearnedDrive))
+    command = np.linspace(-30, 30, 41)
+    p = lambda s: s / (np.abs(s) + 1.0)  # noqa: E731
+    missing = table((p(command) - p(-20.0)) / (p(20.0) - p(-20.0)), effect.missing)
+    found = [float(effect.applied((), one)) for one in command]
+    np.testing.assert_allclose(found, command - missing, atol=1e-13)
+
+
+@pytest.mark.parametrize("over", ["position", "speed", "input.load"])
+def test_beyond_its_range_a_table_is_constant_and_its_slope_is_continuous(over: str) -> None:
+    effect = LearnedTorque(over=over, seen=(-0.4, 0.8), torque=(0.1, 0.5, -0.7, 0.3))
+    s = ca.SX.sym("s")
+    given = {"position": {"q": s}, "speed": {"v": s}, "input.load": {"inputs": {"load": s}}}[over]
+    here = mount(effect)
+    motion = here.at(0.0, given.get("q", 0.0), given.get("v", 0.0), given.get("inputs", {}))
+    value = effect.load(motion)
+    f = ca.Function("f", [s], [value, ca.jacobian(value, s)])
+    for edge, out in ((-0.4, -1), (0.8, 1)):
+        inside, slope = (float(part) for part in f(edge - 1e-7 * out))
+        beyond, flat = (float(part) for part in f(edge + 5.0 * out))
+        assert flat == 0
+        assert abs(slope) < 1e-4
+        assert beyond == pytest.approx(inside, abs=1e-9)
+
+
+def test_an_input_of_the_plant_is_what_a_table_goes_over() -> None:
+    effect = LearnedTorque(over="input.load", seen=(0.0, 10.0), torque=(0.0, 1.0))
+    model = mount(effect).model()
+    assert [one.name for one in model.inputs] == ["tau", "disturbance", "load"]
+    heavy, light = (evaluate(model, load=load)["der(speed)"] for load in (10.0, 0.0))
+    assert (heavy - light) * 2.0 == pytest.approx(2.0)
+
+
+def test_hysteresis_takes_energy_over_a_round_trip_and_gives_none() -> None:
+    effect = LearnedHysteresis(strokes=(0.1, 0.4), torque=(0.2, 0.3))
+    t = np.linspace(0, 3, 30001)
+    v = 0.8 * 2 * np.pi * np.cos(2 * np.pi * t)
+    state, work, dt = np.zeros(2), [], t[1]
+    for one in v:
+        motion = mount(effect).at(0.0, 0.0, one)._replace(state=state)
+        work.append(float(effect.load(motion)) * one * dt)
+        state = state + dt * np.array(ca.DM(effect.rate(motion))).ravel()
+    turn = np.array(work)[-10000:]
+    assert 0.5 * 4 * 0.8 * 0.5 < turn.sum() < 4 * 0.8 * 0.5
+    assert np.cumsum(work).min() > -1e-9
+
+
+def test_after_a_reversal_friction_comes_back_to_its_level() -> None:
+    effect = LearnedAfterReversal(ways=(0.1,), level_change=(0.5,))
+    here = mount(effect)
+    settled, turned = (float(here.level(here.at(0.0, 0.0, 0.2), {"learned": [memory]})) for memory in (1.0, -1.0))
+    assert settled == pytest.approx(1.0)
+    assert turned == pytest.approx(np.exp(0.5))
+
+
+@NAMED
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_an_fmu_steps_as_the_equations_of_a_learned_term_say(effect, fmi: int) -> None:
+    law = LuGre(sigma0=2e4, sigma1=200.0, sigma2=3.0, Fc=1.0, Fs=1.5, Vs=0.05)
+    model = mount(effect, friction=law).model()
+    given = {"temperature": 31.0} if any(one.name == "temperature" for one in model.inputs) else {}
+    run = simulate(model, np.array([0.0, 0.2]), lambda t: 6.0, **given)
+    driver = Driver(model, build_library(model), fmi)
+    driver.start(tolerance=1e-9, **given)
+    driver.set("tau", 6.0)
+    driver.run(0, 200, 1e-3)
+    expected = [run[name][-1] for name in ("q", "v")]
+    assert abs(expected[0]) > 1e-3
+    np.testing.assert_allclose(driver.get("q", "v"), expected, rtol=1e-6)
+
+
+def test_the_range_is_in_the_description_of_the_model() -> None:
+    said = mount(LearnedTorque(**OVER_POSITION)).model().description
+    assert said == "m: one axis with coulomb friction, learned over position -1 to 1.2 rad"
+    linear = mount(LearnedHysteresis(strokes=(0.1, 0.4), torque=(0.2, 0.3)), motion="linear").model().description
+    assert linear.endswith("learned over strokes of 0.1 to 0.4 m")
+
+
+@pytest.mark.parametrize(
+    ("table", "rule"),
+    [
+        ('over = "positon"\nseen = [0, 1]\ntorque = [1]', '"positon" is no quantity; quantities are: position, turn,'),
+        ('over = "position"\nseen = [1, 0]\ntorque = [1]', "the lower one first"),
+        ('over = "position"\nseen = [0]\ntorque = [1]', "seen must be two numbers"),
+        ('over = "position"\ntorque = [1]', "seen must be two numbers"),
+        ("over = 3\nseen = [0, 1]\ntorque = [1]", "over = 3 is not a text"),
+        ('over = "position"\nseen = [0, 1]\ntorque = []', "the table has 0 coefficients"),
+        ('over = "position"\nseen = [0, 1]\ntorque = [true]', "torque[1] = True is not a number"),
+        ('over = "position"\nseen = [0, 1]\nlevel_change = [9]', "level_change[1] = 9 is outside -5 .. 5"),
+        ('over = "turn"\nseen = [0, 1]\ntorque = [1]', "seen is not for the turn"),
+        ('over = "turn"\ntorque = [1, 2]', "an odd number of coefficients"),
+        ('over = "position"\nseen = [0, 1]\nwaves = [2, 2]\ntorque = [1]', "belong to a table of products"),
+        ('over = "position"\nseen = [0, 1]\nby = "speed"\nby_seen = [0, 1]\ntorque = [1]', "waves must be two whole"),
+        (
+            'over = "position"\nseen = [0, 1]\nby = "speed"\nby_seen = [0, 1]\nwaves = [1, 1]\ntorque = [1]',
+            "the table has 1 coefficients; it needs 4",
+        ),
+        ('over = "command"\nseen = [0, 1]\ntorque = [1]', "command_seen and missing"),
+        ('over = "input.a b"\nseen = [0, 1]\ntorque = [1]', '"input.a b" is no quantity'),
+        ("command_seen = [-1, 1]\nmissing = [0, -90]", "gives less where it is asked for more"),
+        ("command_seen = [-1, 1]\nmissing = []", "missing has 0 coefficients"),
+        ("strokes = [0.1]\ntorque = [1, 2]", "2 coefficients for 1 ways or times"),
+        ("strokes = [0.1]\ntorque = [-1]", "torque[1] = -1 is outside 0"),
+        ("times = [0]\nlevel_change = [1]", "times[1] = 0 is outside"),
+        ('over = "position"\nseen = [0, 1]\ntorqe = [1]', "is not a key here"),
+    ],
+)
+def test_nonsense_is_refused_in_one_sentence(table: str, rule: str) -> None:
+    with pytest.raises(CardError) as caught:
+        parse_card(f'{CARD}[[effects]]\neffect = "learned"\n{table}\n', "a.toml")
+    assert rule in str(caught.value)
+    assert str(caught.value).startswith("a.toml: [[effects]] number 1 (learned)")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_card_with_a_table_exports(tmp_path: Path) -> None:
+    from pyfmi_models.export import export_fmu
+
+    card = parse_card(
+        f'{CARD}[[effects]]\neffect = "learned"\nover = "position"\nseen = [0, 1]\ntorque = [1, 2]\n', "a"
+    )
+    path = export_fmu(card.plant().model(), tmp_path / "a.fmu", fmi=2)
+    assert path.stat().st_size > 1000

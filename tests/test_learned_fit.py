@@ -1,0 +1,199 @@
+"""What has no name is learned, and delivered where it helps a recording that nothing saw."""
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_unknown import FC, Array, Extra, iron, kick, night
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.deliver import as_json, deliver_quickly
+from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.learned.grams import columns_of, with_trials
+from cosim.diagnosis.learned.learn import Learned, learn
+from cosim.diagnosis.learned.select import LEAST_EVIDENCE, path
+from cosim.diagnosis.learned.trials import trials
+from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.predictive import Predictive
+from cosim.diagnosis.protocol import CUTOFF
+from cosim.estimation.fit import Fit
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.prepare import prepare
+from cosim.estimation.problem import Problem
+from pyfmi_models.card import parse_card, read_card
+from pyfmi_models.effects.learned import LearnedDrive, LearnedFriction
+from pyfmi_models.effects.learned_memory import LearnedHysteresis
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+NOISE = 0.05
+MOUNT = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=FC, sigma2=1.0), effects=())
+
+
+def warm_place(now: dict[str, Array]) -> Array:
+    """Friction that rises at one place with the temperature: a product, none of the catalogue."""
+    bump = np.exp(-((now["q"] / 0.15) ** 2))
+    return 0.15 * (now["temperature"] - 20) * bump * np.sign(now["v"])
+
+
+def droop(now: dict[str, Array]) -> Array:
+    """A drive whose torque falls behind its command, the more the more it is asked for."""
+    needed = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"]
+    return 0.05 * needed * np.abs(needed)
+
+
+def nothing(now: dict[str, Array]) -> Array:
+    return 0 * now["t"]
+
+
+def gives(now: dict[str, Array]) -> Array:
+    """A loop the wrong way round, as of a delay that feeds energy in."""
+    return -0.3 * iron(now)
+
+
+def wanders(now: dict[str, Array]) -> Array:
+    """Large, and of another sign in each night: what was learned from two helps no third."""
+    return (-1.0 if now["run"][0] == 3 else 1.0) * np.cos(20 * now["q"])
+
+
+def recording(extra: Extra, seed: int) -> Recording:
+    now, rng = night(seed), np.random.default_rng(100 + seed)
+    tau = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"] + extra(now) + NOISE * rng.standard_normal(6000)
+    return Recording(f"night_{seed}", {n: now[n] for n in ("t", "q", "temperature")} | {"tau": tau})
+
+
+@cache
+def parts(extra: Extra) -> tuple[Comparison, Fit, Predictive]:
+    """The refitted base on two nights, and a third that proves."""
+    train, there = [recording(extra, 1), recording(extra, 2)], [recording(extra, 3)]
+    prepared = prepare(train, 10.0)
+    v = np.abs(prepared.stacked("v"))
+    problem = Problem(MOUNT, prepared, np.asarray(v > 0.02 * v.max(), float), 0.01)
+    base = problem.fit(MOUNT, 25)
+    comparison = Comparison.of(problem, base, POLICY)
+    return comparison, base, Predictive.of(comparison, prepare(there, 10.0), base.mount, prepare(there, CUTOFF))
+
+
+@cache
+def learned(extra: Extra) -> Learned | None:
+    return learn(*parts(extra))
+
+
+@pytest.mark.parametrize(
+    ("extra", "quantity", "least"),
+    [
+        (warm_place, "position and temperature", 0.6),
+        (droop, "torque", 0.3),
+        (iron, "hysteresis over a long stroke", 0.6),
+    ],
+)
+def test_what_has_no_name_is_modelled_and_the_held_out_error_falls(extra: Extra, quantity: str, least: float) -> None:
+    found = learned(extra)
+    assert found is not None
+    assert found.quantities[0] == quantity
+    assert 1 - found.after / found.before > least
+    low, high = found.interval
+    assert 0 < low < found.before - found.after < high
+    assert found.sentence().startswith(f"Something that depends on {quantity}")
+
+
+def test_the_size_of_a_term_is_that_of_what_was_missing() -> None:
+    found = learned(iron)
+    assert found is not None
+    assert found.size == pytest.approx(1.0, rel=0.35)  # the base gives a part of its Coulomb level
+
+
+@pytest.mark.parametrize("extra", [nothing, wanders])
+def test_nothing_is_delivered_where_it_does_not_help(extra: Extra) -> None:
+    assert learned(extra) is None
+
+
+def test_no_recording_is_worse_off_than_before() -> None:
+    """A night night that has less of it than the others vetoes what they propose."""
+    comparison, base, _ = parts(iron)
+    there = [recording(iron, 3), recording(nothing, 4)]
+    held = Predictive.of(comparison, prepare(there, 10.0), base.mount, prepare(there, CUTOFF))
+    assert learn(comparison, base, held) is None
+
+
+def test_columns_of_a_trial_are_what_its_coefficients_add() -> None:
+    comparison, base, _ = parts(warm_place)
+    prepared = comparison.problem.prepared
+    for trial in trials(base.mount, prepared):
+        if trial.name in ("torque", "position and temperature", "hysteresis over a long stroke"):
+            columns, size = columns_of(base.mount, trial, prepared), 1e-4
+            values = [size if k == 2 else 0.0 for k in range(trial.count)]
+            torques = []
+            for one in (trial, trial.with_coefficients(values)):
+                mount, _ = with_trials(base.mount, [one])
+                torques.append(stacked(Inverse(mount, ()), prepared.pieces, np.zeros(0))[0])
+            np.testing.assert_allclose((torques[1] - torques[0]) / size, columns[:, 2], atol=2e-3)
+
+
+def test_the_effect_of_a_card_is_the_trial_that_was_fitted() -> None:
+    comparison, base, _ = parts(warm_place)
+    prepared = comparison.problem.prepared
+    for trial in trials(base.mount, prepared):
+        fitted = trial.with_coefficients([0.01 * (k + 1) for k in range(trial.count)])
+        there, _ = with_trials(base.mount, [fitted])
+        here = replace(base.mount, effects=(fitted.learned(fitted.coefficients.tolist()),))
+        torques = [stacked(Inverse(one, ()), prepared.pieces, np.zeros(0))[0] for one in (here, there)]
+        np.testing.assert_allclose(torques[0], torques[1], atol=1e-9)
+
+
+def test_friction_that_is_learned_never_drives_and_a_drive_gives_more_for_more() -> None:
+    for extra in (warm_place, droop):
+        found = learned(extra)
+        assert found is not None
+        for effect in found.effects:
+            assert effect.broken_rule() == ""
+            assert isinstance(effect, LearnedFriction | LearnedDrive)
+
+
+def test_a_hysteresis_that_would_give_energy_is_not_learned() -> None:
+    found = learned(gives)
+    for effect in found.effects if found else ():
+        assert not isinstance(effect, LearnedHysteresis) or min(effect.torque) >= 0
+
+
+def test_terms_need_evidence_each() -> None:
+    class Scores:
+        recordings = 2
+
+        def marginal(self, chosen, which):
+            return type("M", (), {"log_likelihood": 5.0 * len(chosen)})
+
+        def fitted(self, chosen, which):
+            return np.zeros(0)
+
+        def predicted(self, chosen, beta, which):
+            return 100.0 * len(chosen)
+
+    assert LEAST_EVIDENCE > 5
+    assert path(Scores(), range(4)).order == ()
+
+
+def test_a_diagnosis_says_unknown_delivers_the_term_and_its_card_holds_it(tmp_path: Path) -> None:
+    text = '[mount]\nname = "axis"\ninertia = 5.0\n[friction]\nmodel = "coulomb"\nFc = 2.0\nsigma2 = 1.0\n'
+    card = parse_card(text, "axis.toml")
+    train, there = [recording(warm_place, 1), recording(warm_place, 2)], [recording(warm_place, 3)]
+    outcome = diagnose(train, there, card)
+    assert "unknown" in outcome.diagnosis.verdict
+    said = as_json(outcome.diagnosis)["learned"]
+    assert outcome.diagnosis.heldout.after_rms < outcome.diagnosis.heldout.before_rms
+    assert said["after"] < 0.5 * said["before"]
+    assert len(said["table"]) == len(said["range"]) == len(said["quantities"])
+    deliver_quickly(outcome, train, there, card, tmp_path, "cosim diagnose")
+    back = read_card(tmp_path / "card.toml")
+    assert back.effects == outcome.card.effects
+    assert "something learned over position" in (tmp_path / "card.toml").read_text("utf-8")
+    assert json.loads((tmp_path / "diagnosis.json").read_text("utf-8"))["improved"]["card"] == "card.toml"
+
+
+def test_a_memory_of_reversals_is_learned_or_refused_but_never_worse() -> None:
+    found = learned(kick)
+    assert found is None or found.after < found.before

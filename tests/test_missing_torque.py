@@ -1,0 +1,56 @@
+"""The file of missing torque says nothing where nothing was judged; the page leaves no second time out."""
+
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.breakdown import samples
+from cosim.diagnosis.missing_torque import write_missing_torque
+from cosim.diagnosis.protocol import Structures, traces
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+MOUNT = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0))
+RATE = 500.0
+
+
+def recording(name: str, holes: tuple[tuple[float, float], ...] = ()) -> Recording:
+    t = np.arange(int(40 * RATE)) / RATE
+    t = t[~np.any([(t > a) & (t < b) for a, b in holes], axis=0)] if holes else t
+    q = 0.2 * np.sin(0.7 * t) + 0.1 * np.sin(2.3 * t)
+    return Recording(name, {"t": t, "tau": 2 * np.sign(np.cos(0.7 * t)), "q": q})
+
+
+def test_rows_before_after_and_inside_gaps_are_empty(tmp_path: Path) -> None:
+    """A piece of 1.5 s between two gaps is too short to be judged: its rows are inside them."""
+    whole, holed = recording("whole"), recording("holed", ((12.0, 14.0), (15.5, 17.0)))
+    found = traces([whole], [holed], Structures(MOUNT, MOUNT, MOUNT))
+    write_missing_torque(found, [whole, holed], tmp_path / "missing.parquet")
+    table = pq.read_table(tmp_path / "missing.parquet").to_pandas()
+    assert len(table) == len(whole) + len(holed)
+    for name in ("missing_torque", "band", "after"):
+        for trace in found:
+            rows = table[table["recording"] == trace.name]
+            said = rows["t"][rows[name].notna()]
+            spans = [(trace.t[0], trace.t[-1])]
+            if trace.name == "holed":
+                first, second = (trace.t[trace.t < 12.1][-1], trace.t[trace.t > 16.9][0])
+                assert first < 12.0
+                assert second > 17.0
+                spans = [(trace.t[0], first), (second, trace.t[-1])]
+            inside = [any(low <= t <= high for low, high in spans) for t in rows["t"]]
+            assert sorted(said) == sorted(rows["t"][inside])
+    assert table["missing_torque"].isna().any()
+
+
+def test_the_report_judges_every_row_that_the_protocol_judges() -> None:
+    run = recording("whole")
+    (trace,) = traces([run], [], Structures(MOUNT, MOUNT, MOUNT))
+    assert trace.t[0] == pytest.approx(3.0, abs=0.01)
+    assert trace.t[-1] == pytest.approx(run.duration - 0.5, abs=0.01)
+    judged = samples((trace,))
+    assert len(judged.t) == len(trace.t)
+    assert np.sqrt(np.mean(judged.before**2)) == np.sqrt(np.mean(trace.missing**2))

@@ -1,0 +1,128 @@
+"""What is printed is what is delivered: the written card is read back, and every number of the JSON computed again."""
+
+import json
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.deliver import deliver_quickly
+from cosim.diagnosis.diagnose import _problem, diagnose
+from cosim.diagnosis.protocol import heldout_rms
+from cosim.estimation.fit import free_parameters, with_values
+from cosim_studies.proof.generator import make_case, to_toml
+from pyfmi_models.card import Card, parse_card, read_card
+from pyfmi_models.model import parameters_of
+
+ROUNDING = 1e-3
+"""Relative: what a printed number of four digits may differ by."""
+CONVERGED = 0.02
+"""Share by which a structure without an effect, fitted again, may end elsewhere."""
+
+
+class Delivered(NamedTuple):
+    """What a diagnosis was given, and what it wrote."""
+
+    card: Card
+    train: list[Recording]
+    held: Recording
+    told: dict[str, Any]
+    better: Card
+
+
+@pytest.fixture(scope="module")
+def delivered(tmp_path_factory: pytest.TempPathFactory) -> Delivered:
+    case = make_case(953, ["friction_asymmetry", "torque_offset"], duration=20.0)
+    runs = [
+        Recording(name, {n: frame[n].to_numpy(float) for n in frame.columns})
+        for name, frame in zip(("train_1", "train_2", "heldout"), (*case.train, case.heldout), strict=True)
+    ]
+    card, out = parse_card(to_toml(case.card), "card.toml"), tmp_path_factory.mktemp("out")
+    deliver_quickly(diagnose(runs[:2], runs[2:], card), runs[:2], runs[2:], card, out, "a test")
+    told = json.loads((out / "diagnosis.json").read_text("utf-8"))
+    return Delivered(card, runs[:2], runs[2], told, read_card(out / "card.toml"))
+
+
+def test_something_was_found_to_speak_of(delivered: Delivered) -> None:
+    assert in_model(delivered)
+
+
+def test_the_held_out_errors_are_those_of_the_card_given_refitted_and_written(delivered: Delivered) -> None:
+    held, runs = delivered.told["heldout"], [delivered.held]
+    names = [name for name in delivered.told["base_parameters"]]
+    refitted = with_values(
+        delivered.card.plant(), names, np.array([delivered.told["base_parameters"][name][1] for name in names])
+    )
+    assert heldout_rms(runs, delivered.card.plant(), held["cutoff_hz"]) == pytest.approx(
+        held["nominal_rms"], rel=ROUNDING
+    )
+    assert heldout_rms(runs, refitted, held["cutoff_hz"]) == pytest.approx(held["before_rms"], rel=ROUNDING)
+    assert heldout_rms(runs, delivered.better.plant(), held["cutoff_hz"]) == pytest.approx(
+        held["after_rms"], rel=ROUNDING
+    )
+
+
+def test_the_origin_of_the_card_says_the_same_errors(delivered: Delivered) -> None:
+    held = delivered.told["heldout"]
+    evidence = str(delivered.better.origin["evidence"])
+    assert f"{held['before_rms']:.4g} refitted, {held['after_rms']:.4g} with" in evidence
+
+
+def test_the_parameters_are_those_of_the_written_effects(delivered: Delivered) -> None:
+    for told in in_model(delivered):
+        (effect,) = (one for one in delivered.better.effects if one.id == told["effect"])
+        written = {variable.name: variable.start for variable in parameters_of(effect)}
+        assert {name: told["parameters"][name] for name in written} == pytest.approx(written, rel=ROUNDING)
+
+
+def test_the_base_parameters_are_those_of_the_written_card(delivered: Delivered) -> None:
+    written = {variable.name: variable.start for variable in delivered.better.plant().parameters()}
+    for name, (_, _, after) in delivered.told["base_parameters"].items():
+        assert written[name] == pytest.approx(after, rel=ROUNDING), name
+
+
+def test_each_gain_is_what_the_written_model_loses_without_the_effect(delivered: Delivered) -> None:
+    problem, mount = _problem(delivered.train, delivered.card), delivered.better.plant()
+    whole = energy(problem.weight, problem.fit(mount, 0).residual)
+    for told in in_model(delivered):
+        rest = tuple(one for one in mount.effects if one.id != told["effect"])
+        without = problem.fit(replace(mount, effects=rest), 15)
+        gain = 1 - whole / energy(problem.weight, without.residual)
+        assert told["gain"] == pytest.approx(gain, abs=CONVERGED), told["effect"]
+        assert f"removes {told['gain']:.0%} of the error energy" in told["evidence"]
+
+
+def test_the_ranges_are_the_standard_errors_of_the_written_numbers(delivered: Delivered) -> None:
+    for told in in_model(delivered):
+        assert set(told["standard_errors"]) <= set(told["parameters"])
+        for name, error in told["standard_errors"].items():
+            low, high = told["ranges"][name]
+            assert (low + high) / 2 == pytest.approx(told["parameters"][name], rel=ROUNDING)
+            assert high - low == pytest.approx(2 * 1.96 * error, rel=ROUNDING)
+
+
+def test_every_effect_has_a_bound_or_a_reason(delivered: Delivered) -> None:
+    assert len(delivered.told["effects"]) >= 21
+    for told in delivered.told["effects"]:
+        bound = told["bound"]
+        assert bound["value"] is not None or bound["reason"], told["effect"]
+        if told["answer"] == "not_seen":
+            assert bound["power"] >= 0.9
+            assert bound["unit"]
+            assert bound["range"]
+            assert bound["band_hz"][1] > 0
+
+
+def test_a_model_that_is_written_has_free_numbers_that_the_fit_knows(delivered: Delivered) -> None:
+    assert set(free_parameters(delivered.card.plant())) <= {v.name for v in delivered.better.plant().parameters()}
+
+
+def in_model(delivered: Delivered) -> list[dict[str, Any]]:
+    """Effects that the written model holds."""
+    return [e for e in delivered.told["effects"] if e["answer"] in ("found", "ambiguous") and e["where"] is not None]
+
+
+def energy(weight: np.ndarray, residual: np.ndarray) -> float:
+    return float(np.sum((weight * residual) ** 2))

@@ -1,0 +1,52 @@
+"""How much a row counts: rows that repeat one operating point count together, and what moves slowly is not at rest."""
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.estimation.prepare import Prepared, prepare
+from cosim.estimation.row_weights import weights
+from pyfmi_models.friction import Coulomb, LuGre
+
+COULOMB, LUGRE = Coulomb(Fc=1.0), LuGre(Fc=1.0, Fs=1.2, Vs=0.01, sigma0=1e4)
+SECONDS = (3, 6, 12)
+
+
+def recorded(speeds: list[np.ndarray]) -> Prepared:
+    runs = [{"t": np.arange(len(v)) / 100, "v": v, "tau": np.sign(v)} for v in speeds]
+    return prepare([Recording(f"run_{number}", one) for number, one in enumerate(runs)], 5.0)
+
+
+def of_each(prepared: Prepared, law: Coulomb | LuGre) -> np.ndarray:
+    """Sum of squared weights of each recording."""
+    return np.bincount(prepared.recording_of, weights=weights(law, prepared) ** 2)
+
+
+@pytest.mark.parametrize("law", [COULOMB, LUGRE])
+def test_recordings_of_one_speed_count_alike_however_long_they_last(law: Coulomb | LuGre) -> None:
+    prepared = recorded([np.full(100 * s, float(s)) for s in SECONDS])
+    assert of_each(prepared, law) == pytest.approx(len(prepared.recording_of) / 3)
+
+
+def test_rows_of_recordings_that_visit_all_speeds_count_alike() -> None:
+    prepared = recorded([np.sin(np.arange(100 * s) * 2 * np.pi / 150) for s in SECONDS])
+    weight = weights(LUGRE, prepared)
+    assert weight == pytest.approx(np.ones(len(weight)), abs=0.05)
+
+
+def test_one_recording_is_weighed_by_nothing_but_rest() -> None:
+    prepared = recorded([np.concatenate([np.full(600, 1.0), np.full(600, 0.001)])])
+    assert set(np.unique(weights(COULOMB, prepared))) == {0.0, 1.0}
+    assert set(np.unique(weights(LUGRE, prepared))) == {1.0}
+
+
+def test_a_recording_that_moves_slowly_counts_and_one_at_rest_does_not() -> None:
+    noise = np.random.default_rng(1).standard_normal(600)
+    prepared = recorded([np.full(600, 10.0), np.full(600, -10.0), np.full(600, 0.1), 1e-4 * noise])
+    slow, still = of_each(prepared, COULOMB)[2:]
+    assert slow > 0
+    assert still == 0
+
+
+def test_one_speed_in_all_recordings_is_no_group() -> None:
+    assert weights(COULOMB, recorded([np.full(600, 1.0)] * 2)) == pytest.approx(1.0)

@@ -1,0 +1,81 @@
+"""The base that leaves its card, the encoder's step and the missing set point are said, and only where they matter."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.sanity.base import base_far_from_card
+from cosim.diagnosis.sanity.limits import encoder_step, no_set_point
+from cosim.estimation.fit import edges_of
+from cosim.estimation.prepare import prepare
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+
+def axis(inertia: float = 5.0, Fc: float = 2.0, sigma2: float = 1.0) -> Mount:
+    return Mount(name="axis", axis=Axis(inertia=inertia), friction=Coulomb(Fc=Fc, sigma2=sigma2))
+
+
+def run(step: float = 0.0, name: str = "run") -> Recording:
+    t = np.arange(10_000) / 500
+    q = 0.2 * np.sin(0.7 * t) + 0.1 * np.sin(2.3 * t)
+    q = np.round(q / step) * step if step else q
+    return Recording(name, {"t": t, "tau": 2 * np.sign(np.cos(0.7 * t)), "q": q})
+
+
+BOUNDS = edges_of(axis(), prepare([run()], 20.0).pieces)
+
+
+def said(card: Mount, refitted: Mount) -> list[str]:
+    return [one.statement for one in base_far_from_card(card, refitted, BOUNDS, 0.5)]
+
+
+@pytest.mark.parametrize("factor", [0.5, 0.9, 2.5])
+def test_a_base_near_its_card_is_no_finding(factor: float) -> None:
+    assert said(axis(), axis(5 * factor, 2 * factor, factor)) == []
+
+
+@pytest.mark.parametrize(("inertia", "words"), [(50.0, "10 times the card's"), (0.5, "10 times smaller")])
+def test_another_inertia_is_said_with_both_numbers(inertia: float, words: str) -> None:
+    (text,) = said(axis(), axis(inertia))
+    assert text.startswith("Refitted, the inertia is ")
+    assert words in text
+    assert f"5 -> {inertia:.3g} kg.m2" in text
+
+
+def test_friction_that_ends_at_a_bound_is_said_and_one_that_is_not_felt_is_not() -> None:
+    (text,) = said(axis(), axis(Fc=0.0, sigma2=6.0))[:1]
+    assert "Coulomb friction ends at a bound of the fit (2 -> 0 N.m)" in text
+    assert said(axis(sigma2=0.01), axis(sigma2=0.0)) == []
+
+
+def test_each_direction_is_judged_where_friction_has_two() -> None:
+    from pyfmi_models.model import Pair
+
+    card = replace(axis(), friction=Coulomb(Fc=Pair(2.0, 2.0), sigma2=1.0))
+    (text,) = said(card, replace(card, friction=Coulomb(Fc=Pair(2.0, 9.0), sigma2=1.0)))
+    assert "the Coulomb friction backward is 4.5 times the card's" in text
+
+
+def test_a_coarse_encoder_is_said_with_what_it_limits() -> None:
+    (one,) = encoder_step([run(), run(3e-3, "coarse")], axis(0.1), 8.0)
+    assert one.finding == "encoder_step"
+    assert "The encoder of coarse counts in steps of 3 mrad: the analysis ends at 8 Hz" in one.statement
+    assert "a play below about 6 mrad cannot be seen" in one.statement
+    assert not one.blocks_naming
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-7])
+def test_an_encoder_that_spoils_no_torque_is_not_mentioned(step: float) -> None:
+    assert encoder_step([run(step)], axis(0.1), 30.0) == ()
+
+
+def test_a_missing_set_point_is_said_with_what_it_costs() -> None:
+    asked = replace(run(name="asked"), table=run().table | {"q_d": run()["q"]})
+    assert no_set_point([asked]) == ()
+    (one,) = no_set_point([asked, run(name="blind")])
+    assert one.statement.startswith("blind: no set point (q_d) was recorded.")
+    assert "delay from a lag" in one.statement
+    assert "no proof in closed loop" in one.statement

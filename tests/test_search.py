@@ -1,0 +1,126 @@
+"""One effect beside a fitted base: what is tried of it, in which shape it is fitted, and what it is worth."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.search import CandidateFit, best_of, is_hopeful, is_minor, least, refitted, stage, starts
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import prepare
+from cosim.estimation.problem import Problem
+from pyfmi_models.effects import Cogging, LocalFriction, PeriodicFriction, StribeckEffect, TorqueOffset
+from pyfmi_models.effects.presliding import Presliding
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+LEVEL = 2.0
+
+
+def compared(extra: object) -> tuple[Comparison, Fit]:
+    """An axis with dry friction that nobody doubts and `extra(q, v)`, recorded twice; its refitted base."""
+    t = np.arange(10_000) / 500
+    recordings, rng = [], np.random.default_rng(1)
+    for run in (0.0, 2.0):
+        tones = [(0.5, 0.11, run), (0.1, 0.37, 1.0 + run), (0.02, 0.9, 2.0)]
+        q = sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in tones)
+        v = sum(a * 2 * np.pi * f * np.cos(2 * np.pi * f * t + p) for a, f, p in tones)
+        acceleration = sum(-a * (2 * np.pi * f) ** 2 * np.sin(2 * np.pi * f * t + p) for a, f, p in tones)
+        noise = 0.002 * rng.standard_normal(len(t))
+        tau = 5 * acceleration + LEVEL * np.sign(v) + v + extra(q, v) + noise  # type: ignore[operator]
+        recordings.append(Recording(f"run_{run}", {"t": t, "tau": tau, "q": q}))
+    mount = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=LEVEL, sigma2=1.0))
+    prepared = prepare(recordings, 20.0)
+    weight = (np.abs(prepared.stacked("v")) > 0.02).astype(float)
+    problem = Problem(mount, prepared, weight, t[1])
+    base = problem.fit(mount, 25)
+    return Comparison.of(problem, base, POLICY), base
+
+
+@pytest.mark.parametrize("delta", [1.0, 2.0])
+def test_a_stribeck_curve_has_the_exponent_of_the_recorded_friction(delta: float) -> None:
+    comparison, base = compared(lambda _, v: 1.6 * np.exp(-((np.abs(v) / 0.08) ** delta)) * np.sign(v))
+    found = refitted(comparison, base, StribeckEffect(Fs=3.0, Vs=0.05), 1).effect
+    assert isinstance(found, StribeckEffect)
+    assert found.delta == pytest.approx(delta, abs=0.15)
+    assert found.Vs == pytest.approx(0.08, rel=0.15)
+
+
+def test_one_rough_spot_is_tried_where_a_wave_imitates_it_better_than_a_first_guess_of_the_spot() -> None:
+    comparison, base = compared(lambda q, v: 1.5 * np.exp(-(((q - 0.1) / 0.04) ** 2) / 2) * np.sign(v))
+    screened = comparison.screen(base)
+    assert {LocalFriction, PeriodicFriction} <= {one.form for one in screened}
+    assert LocalFriction in {type(effect) for effect, _ in starts(screened, POLICY)}
+
+
+def test_an_offset_that_is_another_in_each_recording_is_tried_all_the_same() -> None:
+    levels = iter((0.2, 1.0))
+    comparison, base = compared(lambda q, _: next(levels) + 0 * q)
+    assert TorqueOffset in {type(effect) for effect, _ in starts(comparison.screen(base), POLICY)}
+
+
+@pytest.mark.parametrize("share", [0.01, 0.1])
+def test_a_small_ripple_over_a_quiet_axis_is_seen_and_its_size_is_right(share: float) -> None:
+    amplitude = share * LEVEL * np.sqrt(2)
+    comparison, base = compared(lambda q, _: amplitude * np.sin(40 * q))
+    best = best_of(comparison, stage(comparison, base))
+    assert best is not None
+    assert isinstance(best.effect, Cogging)
+    assert best.evidence > POLICY.least_evidence
+    assert best.effect.amplitude == pytest.approx(amplitude, rel=0.1)
+
+
+def test_where_nothing_is_missing_nothing_has_evidence() -> None:
+    comparison, base = compared(lambda q, _: 0 * q)
+    best = best_of(comparison, stage(comparison, base))
+    assert best is None
+
+
+def test_what_is_slow_counts_beside_loud_fast_noise() -> None:
+    rng = np.random.default_rng(4)
+    comparison, base = compared(lambda q, _: 0.15 * np.sin(q + 0.3) + 0.5 * rng.standard_normal(len(q)))
+    best = best_of(comparison, stage(comparison, base))
+    assert best is not None
+    assert best.effect.id in ("gravity_unbalance", "cable_wrap")
+    assert best.evidence > POLICY.least_evidence
+
+
+def test_beside_a_strong_effect_a_further_one_must_be_stronger_than_alone() -> None:
+    lowest, highest = POLICY.further_evidence
+    assert least(POLICY, 1.0, 0.1) == lowest
+    assert lowest < least(POLICY, 100.0, 0.1) < highest
+    assert least(POLICY, 1e4, 0.9) == highest
+
+
+def test_alone_what_removes_much_needs_less_evidence_than_what_removes_little() -> None:
+    assert least(POLICY, 0.0, POLICY.large_gain - 0.01) == POLICY.least_evidence
+    assert least(POLICY, 0.0, POLICY.large_gain) == POLICY.evidence_if_large < POLICY.least_evidence
+
+
+def test_a_step_that_promises_nothing_by_either_statistic_is_not_refitted() -> None:
+    comparison, base = compared(lambda q, _: 0.1 * LEVEL * np.sin(40 * q))
+    screened = comparison.screen(base)
+    hopeless = {one.form for one in screened} - {one.form for one in screened if is_hopeful(one, POLICY)}
+    chosen = [type(effect) for effect, _ in starts(screened, POLICY)]
+    assert hopeless
+    assert Cogging in chosen
+    assert not hopeless & set(chosen)
+
+
+def test_a_spring_does_not_start_from_a_negative_mass() -> None:
+    rng = np.random.default_rng(2)
+    comparison, base = compared(lambda q, _: 0.3 * rng.standard_normal(len(q)))
+    springs = [one for one in comparison.screen(base) if one.candidate.effect == "compliance"]
+    negative = [one for one in springs if one.coefficients[0] <= 0]
+    assert negative
+    assert all(one.evidence == -np.inf and one.plain == 0 for one in negative)
+
+
+def test_a_small_presliding_is_minor_however_much_it_removes() -> None:
+    _, base = compared(lambda q, _: 0 * q)
+    bent = CandidateFit(Presliding(sigma0=1e4), base, POLICY.least_bent - 1, 0.0, 0.5)
+    assert is_minor(bent, POLICY)
+    assert not is_minor(replace(bent, evidence=POLICY.least_bent + 1), POLICY)

@@ -1,0 +1,352 @@
+"""The page in a real browser: dropped files to the report, by mouse, on a phone's width, by keyboard, read aloud."""
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+import serve_work
+from serving import CARD, HERE, READER, TOKEN, recording, until  # skips without the extra [serve]
+
+from cosim.serve.app import make_app
+from cosim.serve.desk import Desk
+from cosim.serve.server import listening
+
+sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+uvicorn = pytest.importorskip("uvicorn", reason="the extra [serve] is not installed")
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
+Page = Any
+PHONE, DESK = {"width": 390, "height": 844}, {"width": 1280, "height": 800}
+FIRST = 30.0
+"""Seconds of processor in which the first answer for the demo's files must be there."""
+LARGEST = 1_000_000
+"""Bytes of a report."""
+TOUCH = 44
+"""Least height of what is touched, in CSS pixels (WCAG 2.2, 2.5.5)."""
+REFUSED = "400 (Bad Request)"
+"""Part of what the browser itself says when the server refuses a form; the page says why."""
+PATIENCE = 300_000
+"""Milliseconds for a diagnosis on a machine that is busy with other things."""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with sync_api.sync_playwright() as tool:
+        chromium = tool.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        yield chromium
+        chromium.close()
+
+
+@contextmanager
+def serving(home: Path, work: Any) -> Iterator[tuple[Desk, str]]:
+    """A server in this process whose diagnosis is replaced."""
+    desk = Desk(home, work=work, reader=READER)
+    listener = listening(0)
+    port = listener.getsockname()[1]
+    server = uvicorn.Server(uvicorn.Config(make_app(desk, TOKEN, port), log_level="warning"))
+    thread = threading.Thread(target=server.run, args=([listener],))
+    thread.start()
+    try:
+        yield desk, f"http://127.0.0.1:{port}/?token={TOKEN}"
+    finally:
+        server.should_exit = True
+        thread.join()
+        listener.close()
+        desk.queue.close()
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> list[Path]:
+    """Two recordings and a card."""
+    made = {"run1.csv": recording(), "heldout.csv": recording(seed=1), "axis.toml": CARD.encode()}
+    for name, content in made.items():
+        (tmp_path / name).write_bytes(content)
+    return [tmp_path / name for name in made]
+
+
+@pytest.fixture(autouse=True)
+def _path(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PYTHONPATH", f"{HERE}{os.pathsep}{HERE.parent}")
+
+
+@contextmanager
+def opened(browser: Any, address: str, size: dict[str, int], scheme: str = "light") -> Iterator[Page]:
+    """A page in a browser of its own; every message, error and request elsewhere fails the test."""
+    context = browser.new_context(viewport=size, color_scheme=scheme)
+    page, said = context.new_page(), []
+    home = address.partition("?")[0]
+    page.on("console", lambda message: REFUSED in message.text or said.append(message.text))
+    page.on("pageerror", lambda error: said.append(str(error)))
+    page.on("request", lambda request: request.url.startswith((home, "blob:")) or said.append(request.url))
+    page.on("dialog", lambda dialog: dialog.accept())
+    page.goto(address)
+    try:
+        yield page
+    finally:
+        context.close()
+    assert said == []
+
+
+def holds(page: Page, code: str, seconds: float = 60.0) -> None:
+    """Wait until an expression is true; the page's policy forbids the browser to be told to wait for it."""
+    until(lambda: page.evaluate(f"Boolean({code})"), seconds)
+
+
+def dropped(page: Page, paths: list[Path]) -> None:
+    """Drop files on the page as a mouse does."""
+    import base64
+
+    content = [[path.name, base64.b64encode(path.read_bytes()).decode()] for path in paths]
+    code = """(files) => {
+      const data = new DataTransfer();
+      for (const [name, text] of files)
+        data.items.add(new File([Uint8Array.from(atob(text), (one) => one.charCodeAt(0))], name));
+      const zone = document.querySelector("[data-drop]");
+      for (const kind of ["dragenter", "dragover", "drop"])
+        zone.dispatchEvent(new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer: data }));
+    }"""
+    page.evaluate(code, content)
+
+
+def ready(page: Page, paths: list[Path]) -> None:
+    page.set_input_files("#files", paths)
+    page.wait_for_selector("#start")
+    assert page.locator(".lacking").count() == 0
+
+
+# The whole way
+
+
+@pytest.fixture(scope="module")
+def night(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The files of `cosim demo`."""
+    from cosim_studies.demo import SECONDS, SEED, demo_case, write_case
+
+    folder = tmp_path_factory.mktemp("demo") / "night"
+    write_case(demo_case(SEED, SECONDS), folder)
+    return folder
+
+
+def processor(pid: int) -> float:
+    """Seconds of processor of a process and of all that it started."""
+    total = 0.0
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            words = path.read_text().rpartition(")")[2].split()
+        except OSError:
+            continue
+        if path.parent.name == str(pid) or words[1] == str(pid):
+            total += sum(map(int, words[11:15])) / os.sysconf("SC_CLK_TCK")
+    return total
+
+
+@pytest.mark.skipif(not Path("/proc").exists(), reason="the time of a process is looked up in /proc")
+def test_the_demo_is_diagnosed_from_the_drop_to_the_report_through_reload_and_a_killed_browser(
+    browser: Any, night: Path, tmp_path: Path
+) -> None:
+    command = [sys.executable, "-m", "cosim", "serve", "--no-browser", "--data", str(tmp_path / "data")]
+    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=HERE.parent)
+    assert server.stdout is not None
+    try:
+        address = server.stdout.readline().strip()
+        paths = [night / name for name in ("train_1.parquet", "train_2.parquet", "heldout.parquet", "card.toml")]
+        with opened(browser, address, DESK) as page:
+            began = processor(server.pid), time.monotonic()
+            dropped(page, paths)
+            page.wait_for_selector("#start")
+            assert page.locator("figure").count() == 9
+            assert page.locator("#role-3").input_value() == "heldout"
+            page.click("#start")
+            page.wait_for_selector("#cancel")
+            page.reload()
+            place = page.url
+        with opened(browser, address, DESK) as page:  # the browser before is gone; the diagnosis is not
+            page.goto(place)
+            page.wait_for_selector("#first, #report", timeout=PATIENCE)
+            spent, passed = processor(server.pid) - began[0], time.monotonic() - began[1]
+            print(f"first answer after {passed:.1f} s, {spent:.1f} s of processor")
+            assert page.inner_text("h1") == "Two effects are missing from the model"
+            page.wait_for_selector("#report", timeout=PATIENCE)
+            page.frame_locator("#report").locator("h1").wait_for()
+            assert "Two effects" in page.frame_locator("#report").locator("h1").inner_text()
+            holds(page, "document.getElementById('report').clientHeight > 2000")
+            with page.expect_download() as download:
+                page.click("text=Model card")
+            assert "[[effects]]" in Path(download.value.path()).read_text("utf-8")
+            names = page.eval_on_selector_all(".downloads a", "all => all.map(one => one.href.split('/').pop())")
+            assert {"report.html", "card.toml", "diagnosis.json", "missing_torque.parquet"} <= set(names)
+            assert sum(name.endswith(".fmu") for name in names) == 2
+        (report,) = (tmp_path / "data").rglob("report.html")
+        assert report.stat().st_size <= LARGEST
+        assert spent <= FIRST
+    finally:
+        server.send_signal(signal.SIGTERM)
+        server.wait(20)
+        server.stdout.close()
+
+
+# How it is used
+
+
+def test_dropped_files_are_shown_corrected_and_diagnosed(browser: Any, files: list[Path], tmp_path: Path) -> None:
+    bad = tmp_path / "bad.csv"
+    bad.write_bytes(b"\x00\x01nothing")
+    with serving(tmp_path / "data", serve_work.quickly) as (desk, address), opened(browser, address, DESK) as page:
+        dropped(page, [*files, bad])
+        page.wait_for_selector("#start")
+        for role in ("out", "train"):
+            page.select_option("#role-1", role)
+            until(lambda role=role: desk.store.all()[0].upload("run1.csv").role == role)  # type: ignore[misc]
+        holds(page, "document.getElementById('role-1').value === 'train'")
+        page.click("#start")
+        page.wait_for_selector("#problem")
+        assert "bad.csv cannot be used" in page.inner_text("#problem")
+        page.click("#drop-3")
+        page.wait_for_selector("#role-3", state="detached")
+        page.click("#correct-summary-2")
+        page.fill("#u-2-q", "deg")
+        page.click("#read-2")
+        holds(page, "document.getElementById('u-2-q').value === 'deg'")
+        assert page.locator("#correct-2").get_attribute("open") is not None
+        page.click("#start")
+        page.wait_for_selector("#report")
+        assert page.inner_text("h1") == serve_work.ANSWER["heading"]
+        (job,) = desk.store.all()
+        assert job.upload("heldout.csv").options["units"] == {"q": "deg"}
+
+
+def test_it_is_used_by_keyboard_alone(browser: Any, files: list[Path], tmp_path: Path) -> None:
+    with serving(tmp_path / "data", serve_work.for_ever) as (_, address), opened(browser, address, DESK) as page:
+        page.keyboard.press("Tab")
+        assert page.evaluate("document.activeElement.textContent") == "To the content"
+        to(page, "files")
+        page.locator("#files").set_input_files(files)  # the window that chooses files is the browser's own
+        page.wait_for_selector("#start")
+        to(page, "role-2")
+        page.keyboard.press("ArrowDown")
+        holds(page, "document.querySelector('.lacking')")
+        assert page.evaluate("document.activeElement.id") == "role-2"
+        page.keyboard.press("ArrowUp")
+        holds(page, "!document.querySelector('.lacking')")
+        to(page, "start")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("#cancel")
+        holds(page, "document.querySelector('#progress').textContent.includes('Friction asymmetry')")
+        holds(page, "document.getElementById('status').textContent.includes('Friction asymmetry')")
+        to(page, "cancel")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("#again")
+        assert page.evaluate("document.activeElement.tagName") == "H1"
+        to(page, "to-all")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("#history")
+
+
+def to(page: Page, name: str) -> None:
+    """Press Tab until an element has the focus, which must then be visible."""
+    for _ in range(120):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.id") == name:
+            box = page.locator(f"#{name}").bounding_box()
+            assert box
+            assert box["y"] >= 0
+            return
+    raise AssertionError(f"{name} is not reached by Tab")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_fits_a_phone_and_everything_can_be_touched(
+    browser: Any, files: list[Path], tmp_path: Path, scheme: str
+) -> None:
+    with (
+        serving(tmp_path / "data", serve_work.quickly) as (_, address),
+        opened(browser, address, PHONE, scheme) as page,
+    ):
+        check_phone(page, scheme)
+        ready(page, files)
+        for one in page.locator("summary").all():
+            one.click()
+        check_phone(page, scheme)
+        page.click("#start")
+        page.wait_for_selector("#report")
+        check_phone(page, scheme)
+        page.click("#to-all")
+        page.wait_for_selector(".jobs")
+        check_phone(page, scheme)
+
+
+def check_phone(page: Page, scheme: str) -> None:
+    assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
+    low = page.evaluate(
+        """([least, what]) => [...document.querySelectorAll(what)]
+        .filter((one) => one.checkVisibility() && one.getBoundingClientRect().height < least)
+        .map((one) => one.outerHTML)""",
+        [TOUCH, "button, select, input:not([type=hidden]), textarea, summary, li a"],
+    )
+    assert low == []
+    red = int(page.evaluate("getComputedStyle(document.body).backgroundColor").partition("(")[2].partition(",")[0])
+    assert (red < 60) == (scheme == "dark")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing(browser: Any, files: list[Path], tmp_path: Path, scheme: str) -> None:
+    axe = pytest.importorskip("axe_core_python", reason="axe-core-python is not installed")
+    code = (Path(axe.__file__).parent / "axe.min.js").read_text("utf-8")
+    (tmp_path / "open.csv").write_bytes((HERE / "samples" / "odrive.csv").read_bytes())
+    with (
+        serving(tmp_path / "data", serve_work.for_ever) as (desk, address),
+        opened(browser, address, DESK, scheme) as page,
+    ):
+        check_axe(page, code)
+        page.set_input_files("#files", [*files, tmp_path / "open.csv"])
+        page.wait_for_selector("#accept-3")
+        for one in page.locator("summary").all():
+            if one.is_visible():
+                one.click()
+        check_axe(page, code)
+        page.click("#start")
+        page.wait_for_selector("#problem")
+        check_axe(page, code)
+        page.click("#drop-3")
+        page.wait_for_selector("#drop-3", state="detached")
+        page.click("#start")
+        page.wait_for_selector("#first")
+        check_axe(page, code)
+        page.click("#cancel")
+        page.wait_for_selector("#again")
+        check_axe(page, code)
+        page.click("#to-all")
+        page.wait_for_selector(".jobs")
+        check_axe(page, code)
+        assert desk.store.all()
+
+
+def check_axe(page: Page, code: str) -> None:
+    page.evaluate(code)
+    found = page.evaluate(
+        "axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21aa', 'wcag22aa', 'best-practice'] })"
+    )
+    told = [(one["id"], one["impact"], [node["html"][:120] for node in one["nodes"]]) for one in found["violations"]]
+    assert told == []
+
+
+def test_a_server_that_is_gone_is_said(browser: Any, files: list[Path], tmp_path: Path) -> None:
+    context = browser.new_context(viewport=DESK)
+    page = context.new_page()
+    with serving(tmp_path / "data", serve_work.quickly) as (_, address):
+        page.goto(address)
+        ready(page, files)
+    page.click("#start")
+    page.wait_for_selector("#status.box")
+    assert "start cosim serve again" in page.inner_text("#status")
+    context.close()

@@ -1,0 +1,164 @@
+"""The command line meets a slip half way: it completes names, suggests what was meant, and says how far it is."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.cli import main
+from cosim.data.recording import Recording
+from cosim.estimation.identify.estimate import Estimate, Outputs, estimate
+from cosim.support.errors import InputError, UndecidedError
+from cosim.support.near import near as near_of_runner
+from cosim.support.terminal import stage
+from pyfmi_models.near import near as near_of_physics
+
+CARD = '[mount]\ninertia = 3.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\n'
+
+
+def said(capsys: pytest.CaptureFixture[str], *words: object) -> str:
+    with pytest.raises(SystemExit) as left:
+        main([str(word) for word in words])
+    assert left.value.code == 2
+    return " ".join(capsys.readouterr().err.split())
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (("run", "siderial", "--out", "x"), "sidereal"),
+        (("show", "two_axes"), "two_axis"),
+        (("export", "paper_mont", "--out", "x"), "paper_mount"),
+        (("identify", "run.csv", "--card", "emsp", "--out", "x"), "emps"),
+    ],
+)
+def test_a_name_that_was_nearly_hit_is_suggested(
+    capsys: pytest.CaptureFixture[str], words: tuple[str, ...], meant: str
+) -> None:
+    assert f'Did you mean "{meant}"?' in said(capsys, *words)
+
+
+@pytest.mark.parametrize(("words", "meant"), [(("diagnos",), "diagnose"), (("hardware", "chek"), "check")])
+def test_a_verb_that_was_nearly_hit_is_suggested(
+    capsys: pytest.CaptureFixture[str], words: tuple[str, ...], meant: str
+) -> None:
+    assert f"Did you mean '{meant}'?" in said(capsys, *words)
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        (CARD.replace("inertia", "inertai"), "[mount] inertai is not a key of a card; keys are: name, motion,"),
+        (CARD.replace("inertia", "inertai"), 'torque_limit. Did you mean "inertia"?'),
+        (CARD + "[encoder]\ncounts = 3\n", 'Did you mean "counts_per_rev"?'),
+        (CARD + "[fricton]\n", 'Did you mean "friction"?'),
+        (CARD.replace("coulomb", "coulom"), 'Did you mean "coulomb"?'),
+        (CARD + "sigam2 = 1.0\n", 'Did you mean "sigma2"?'),
+        (CARD + '[[effects]]\neffect = "coging"\n', 'Did you mean "cogging"?'),
+    ],
+)  # fmt: skip
+def test_a_misspelt_key_of_a_card_is_named_before_the_one_that_is_then_missing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, sentence: str
+) -> None:
+    path = tmp_path / "axis.toml"
+    path.write_text(text)
+    assert sentence in said(capsys, "show", path)
+
+
+def test_a_misspelt_key_of_a_scenario_is_named_with_the_one_that_was_meant(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "loop.toml"
+    path.write_text("stpe = 0.001\nstop = 1.0\n")
+    assert '"stpe" is no key of a scenario' in (told := said(capsys, "run", path, "--out", tmp_path / "out"))
+    assert 'Did you mean "step"?' in told
+
+
+def test_a_suggestion_is_made_once_and_only_where_something_is_alike() -> None:
+    assert str(InputError("no furlong.", value="furlong", choices=("deg", "rad"))) == "no furlong."
+    assert str(InputError("no wires.", value="wires", choices=("wire",))) == 'no wires. Did you mean "wire"?'
+    assert str(InputError("x.", culprit="mount.angel", choices=("angle",))) == 'x. Did you mean "angle"?'
+    assert str(InputError('x. Did you mean "b"?', value="a1", choices=("a2",))) == 'x. Did you mean "b"?'
+    assert str(UndecidedError("which?", decided_by={}, value="torque", choices=("torque1", "torque2"))) == "which?"
+    assert str(InputError("long.", value="x" * 10**6, choices=tuple(f"c{k}" for k in range(2000)))) == "long."
+
+
+def test_the_runner_and_the_physics_suggest_alike() -> None:
+    for name, choices in {"Inertai": ("inertia", "name"), "q": ("tau",), "SIDEREAL": ("sidereal",)}.items():
+        assert near_of_runner(name, choices) == near_of_physics(name, choices)
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("cosim dia", "diagnose"),
+        ("cosim run --fo", "--force"),
+        ("cosim run sid", "sidereal"),
+        ("cosim export paper_mount_", "paper_mount_directional"),
+    ],
+)
+def test_a_shell_completes_verbs_options_and_shipped_names(line: str, offered: str) -> None:
+    words = line.split()
+    ask = {"_COSIM_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+    done = subprocess.run(
+        [sys.executable, "-m", "cosim"], env=os.environ | ask, capture_output=True, text=True, check=False
+    )
+    assert offered in done.stdout.split()
+
+
+def test_completion_can_be_installed(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    assert "--install-completion" in capsys.readouterr().out
+
+
+def test_a_stage_that_is_logged_leaves_a_line_off_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
+    with stage("identifying") as progress:
+        progress.tell("nothing of this")
+        progress.log("friction map")
+    assert capsys.readouterr().err.splitlines() == ["identifying", "friction map"]
+
+
+def undetermined(*names: str) -> Estimate:
+    """Of y = a exp(-t) + b exp(-1.0001 t) and noise, a and b are anything that has their sum."""
+    t = np.linspace(0, 3, 400)
+    columns = np.stack([np.exp(-t), np.exp(-1.0001 * t)], axis=1)
+    measured = columns @ [1.0, 2.0] + 0.01 * np.random.default_rng(1).normal(size=len(t))
+
+    def model(values: np.ndarray) -> Outputs:
+        return Outputs((measured - columns @ values)[:, None], columns[:, None, :])
+
+    return estimate(names, np.array([1.5, 1.5]), model)
+
+
+def test_a_number_that_is_not_determined_is_told_with_its_error() -> None:
+    found = undetermined("a", "b")
+    assert found.values.sum() == pytest.approx(3.0, abs=0.01)
+    assert any(warning.startswith("a = ") and "is not identifiable here." in warning for warning in found.warnings)
+
+
+def test_identify_says_what_it_does_and_what_it_could_not_determine_before_it_writes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from cosim.estimation.identify import identify as found_by
+
+    t = np.arange(4000) * 1e-3
+    Recording("run", {"t": t, "tau": np.cos(t), "q": np.sin(t), "q_d": np.sin(t)}).write(tmp_path / "run.csv")
+    (tmp_path / "axis.toml").write_text(CARD)
+    monkeypatch.setattr(found_by, "_map", lambda *_: None)
+    monkeypatch.setattr(found_by, "_outputs", lambda *_: [undetermined("axis.inertia", "friction.Fc")])
+    monkeypatch.setattr(found_by, "_with_estimate", lambda card, _: card)
+    monkeypatch.setattr("cosim.estimation.identify.figures.FIGURES", {})
+    out = tmp_path / "out"
+    with pytest.raises(SystemExit) as left:
+        main(["identify", str(tmp_path / "run.csv"), "--card", str(tmp_path / "axis.toml"), "--out", str(out)])
+    assert not left.value.code
+    lines = capsys.readouterr().err.splitlines()
+    stages = [line.split(":")[0] for line in lines]
+    for one, after in (("free", "friction map"), ("friction map", "presliding steps"), ("careful", "drawing")):
+        assert stages.index(one) < stages.index(after)
+    careful = next(line for line in lines if line.startswith("careful: axis.inertia = "))
+    assert "is not identifiable here. card.toml will hold it" in careful

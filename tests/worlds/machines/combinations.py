@@ -1,0 +1,38 @@
+"""Effects that are concealed together."""
+
+PAIRS = (
+    ("cogging", "friction_asymmetry"),
+    ("cogging", "gravity_unbalance"),
+    ("gravity_unbalance", "friction_asymmetry"),
+    ("position_friction", "torque_offset"),
+    ("thermal_viscosity", "torque_offset"),
+    ("thermal_viscosity", "cogging"),
+    ("cable_wrap", "cogging"),
+    ("delay", "torque_offset"),
+    ("actuator_lag", "cogging"),
+    ("periodic_disturbance", "cogging"),
+    ("periodic_disturbance", "friction_asymmetry"),
+    ("quadratic_drag", "torque_offset"),
+    ("inertia_variation", "friction_asymmetry"),
+    ("stribeck", "torque_offset"),
+    ("presliding", "cogging"),
+    ("presliding", "torque_offset"),
+    ("backlash", "torque_offset"),
+    ("compliance", "friction_asymmetry"),
+    ("encoder_eccentricity", "friction_asymmetry"),
+    ("load_dependent_friction", "torque_offset"),
+    ("torque_saturation", "torque_offset"),
+    ("cable_wrap", "friction_asymmetry"),
+    ("stribeck", "cogging"),
+    ("torque_offset", "friction_asymmetry"),
+    ("dwell_breakaway", "torque_offset"),
+)
+TRIPLES = (
+    ("cogging", "friction_asymmetry", "torque_offset"),
+    ("periodic_disturbance", "torque_offset", "cogging"),
+    ("position_friction", "torque_offset", "periodic_disturbance"),
+    ("cable_wrap", "friction_asymmetry", "cogging"),
+    ("stribeck", "torque_offset", "cogging"),
+    ("delay", "friction_asymmetry", "torque_offset"),
+    ("gravity_unbalance", "cogging", "friction_asymmetry"),
+)
