@@ -1,7 +1,8 @@
 """A small sample of the attack on every kind of file: refused in a sentence or answered, never anything else.
 
 Each test runs in an interpreter of its own: an attack forks, and a fork inherits what other tests left in theirs
-(callbacks for the end, threads)."""
+(callbacks for the end, threads).
+"""
 
 import subprocess
 import sys
