@@ -38,21 +38,21 @@ class Demo:
     diagnosis: Diagnosis
 
 
-def run_demo(out: Path, command: str, say: Callable[[str], None]) -> Demo:
+def run_demo(out: Path, command: str, on_progress: Callable[[str], None]) -> Demo:
     """Run the chain and leave its files in `out`."""
     directory(out)
-    say("recording a mount with concealed physics")
+    on_progress("recording a mount with concealed physics")
     write_case(demo_case(SEED, SECONDS), out / "night")
     card = read_card(out / "night" / "card.toml")
     train = [Recording.read(out / "night" / f"train_{k}.parquet") for k in (1, 2)]
     heldout = Recording.read(out / "night" / "heldout.parquet")
-    say("building FMUs of plant and controller")
+    on_progress("building FMUs of plant and controller")
     plant, _ = export_pair(card, out / "fmus")
-    say("co-simulating plant and controller at 0.1 ms, checking the stiff integration")
+    on_progress("co-simulating plant and controller at 0.1 ms, checking the stiff integration")
     with Loops(card, [heldout]) as loops, beside(integration, card) as table:
         loops.close("nominal", card.plant(), plant)
-        outcome = diagnose(train, [heldout], card, say, loops.close)
-        found = deliver(outcome, train, [heldout], card, out / "diagnosis", command, loops, say)
+        outcome = diagnose(train, [heldout], card, on_progress, loops.close)
+        found = deliver(outcome, train, [heldout], card, out / "diagnosis", command, loops, on_progress)
         for key, name in (("nominal", "simulated"), ("after", "improved")):
             replace(*loops.runs(key), name=name).write(out / f"{name}.parquet", force=True)
         errors, text = loops.errors(), f"{HEADING}\n\n{table.result()}"

@@ -116,7 +116,7 @@ def test_iteration_needs_components_that_can_be_taken_back(tiny: Tiny, tmp_path:
 
 
 def test_pieces_of_a_step_need_components_that_take_them(plain: Tiny, tmp_path: Path) -> None:
-    fmu = described(plain[3], tmp_path / "stiff.fmu", description(3, flexible=False))
+    fmu = described(plain[3], tmp_path / "stiff.fmu", description(3, can_vary_step=False))
     with pytest.raises(WiringError, match='"mass" takes steps of one length only, and the energy algorithm cuts them'):
         oscillator(fmu, Energy(kind="energy", bonds=BOND))
 

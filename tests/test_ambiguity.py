@@ -11,7 +11,7 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.absent import not_found
 from cosim.diagnosis.admissibility import in_time, is_degenerate
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import EffectScores, RestScores, TermScores, decide, doubted, open_rivals
+from cosim.diagnosis.decision import EffectScores, ResidualScores, TermScores, decide, doubted, open_rivals
 from cosim.diagnosis.hypotheses import hypothesis_of
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.search import CandidateFit
@@ -39,7 +39,7 @@ MOUNT = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=1.0))
 NONE: Array = np.zeros(0)
 
 
-QUIET = RestScores(0.0, 0.0)
+QUIET = ResidualScores(0.0, 0.0)
 
 
 def scores(effect: str, evidence: float, explains: float = 0.5, **margins: float) -> EffectScores:
@@ -76,10 +76,10 @@ def test_nothing_is_unknown_where_nothing_is_left_and_what_is_left_says_what_it_
     assert not decide([], QUIET, POLICY).is_unknown
     assert decide([], QUIET, POLICY).depends_on == ()
     terms = [TermScores("position", POLICY.floor + 5, 3.0, 0.6), TermScores("temperature", POLICY.floor - 5, 3.0, 0.2)]
-    left = decide([], RestScores(0.0, 0.0, terms), POLICY)
+    left = decide([], ResidualScores(0.0, 0.0, terms), POLICY)
     assert left.is_unknown
     assert left.depends_on == ("position",)
-    large = decide([], RestScores(POLICY.large_rest + 0.01, 0.0, (), "time"), POLICY)
+    large = decide([], ResidualScores(POLICY.large_residual + 0.01, 0.0, (), "time"), POLICY)
     assert large.is_unknown
     assert large.depends_on == ("time",)
 
@@ -87,7 +87,7 @@ def test_nothing_is_unknown_where_nothing_is_left_and_what_is_left_says_what_it_
 def test_what_the_held_out_recordings_contradict_is_unknown_only_where_training_is_sure() -> None:
     def is_unknown(evidence: float, share: float) -> bool:
         term = TermScores("temperature", evidence, 0.0, share)
-        return decide([], RestScores(0.0, 0.0, [term]), POLICY).is_unknown
+        return decide([], ResidualScores(0.0, 0.0, [term]), POLICY).is_unknown
 
     assert not is_unknown(POLICY.floor + 5, -2 * POLICY.contradicted)
     assert is_unknown(POLICY.floor + 5, 0.0)
@@ -98,10 +98,10 @@ def test_what_the_held_out_recordings_contradict_is_unknown_only_where_training_
 
 
 def test_a_weak_name_beside_a_rest_as_large_may_imitate_it_and_a_strong_one_does_not() -> None:
-    rest = RestScores(0.0, 0.0, [TermScores("position", POLICY.floor + 10, 3.0, 0.2)])
+    residual = ResidualScores(0.0, 0.0, [TermScores("position", POLICY.floor + 10, 3.0, 0.2)])
     weak, strong = scores("cogging", 2 * POLICY.floor), scores("delay", 50 * POLICY.floor)
-    assert doubted([weak, strong], rest, POLICY) == ("cogging",)
-    assert doubted([scores("cogging", 2 * POLICY.floor, explains=0.9)], rest, POLICY) == ()
+    assert doubted([weak, strong], residual, POLICY) == ("cogging",)
+    assert doubted([scores("cogging", 2 * POLICY.floor, explains=0.9)], residual, POLICY) == ()
     assert doubted([weak, strong], QUIET, POLICY) == ()
 
 
@@ -143,8 +143,8 @@ def test_a_cable_whose_home_is_many_strokes_away_is_an_offset() -> None:
 def test_noise_at_constant_speed_tells_no_delay_unless_a_set_point_asks_for_it() -> None:
     steady = 1 + 0.02 * np.random.default_rng(1).standard_normal(20_000)
     for found, told in ((problem(steady), False), (problem(steady, q_d=np.arange(20_000) / 1000), True)):
-        rest = np.zeros(len(found.prepared.recording_of))
-        late = CandidateFit(Delay(delay_ms=5.0), Fit(MOUNT, (), NONE, NONE, NONE, rest), 50.0, 0.0, 0.5)
+        residual = np.zeros(len(found.prepared.recording_of))
+        late = CandidateFit(Delay(delay_ms=5.0), Fit(MOUNT, (), NONE, NONE, NONE, residual), 50.0, 0.0, 0.5)
         assert in_time(found, late) is told
 
 

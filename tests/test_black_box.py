@@ -14,7 +14,7 @@ from cosim.diagnosis.black_box import Base, BlackBox, as_base
 from cosim.diagnosis.correction_fmu import Correction
 from cosim.diagnosis.protocol import residuals
 from cosim.estimation.prepare import prepare
-from cosim.fmi.renamed import Alias
+from cosim.fmi.alias import Alias
 from cosim.master.simulate import run
 from cosim.support.errors import InputError, WiringError
 from cosim.system.scenario import read_scenario

@@ -150,7 +150,7 @@ def test_a_long_run_says_how_long_and_an_absurd_one_is_refused(
     told: list[str] = []
     with monkeypatch.context() as clock:
         clock.setattr(cosim.cli.run, "perf_counter", iter([0.0, 2.0, 4.0]).__next__)
-        progress = cosim.cli.run.foretold(lambda done, of: None, 2_000_000_000, told.append)
+        progress = cosim.cli.run.with_forecast(lambda done, of: None, 2_000_000_000, told.append)
         progress(1000, 7_201_000)
         progress(2000, 7_201_000)
     assert told == ["about 4 h to go; the recording grows to 2 GB"]

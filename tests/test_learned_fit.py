@@ -13,10 +13,10 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.deliver import as_json, deliver_quickly
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.learned.grams import columns_of, with_trials
+from cosim.diagnosis.learned.candidate_terms import candidate_terms
+from cosim.diagnosis.learned.grams import columns_of, with_terms
 from cosim.diagnosis.learned.learn import Learned, learn
 from cosim.diagnosis.learned.select import LEAST_EVIDENCE, path
-from cosim.diagnosis.learned.trials import trials
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.protocol import CUTOFF
@@ -120,26 +120,26 @@ def test_no_recording_is_worse_off_than_before() -> None:
     assert learn(comparison, base, held) is None
 
 
-def test_columns_of_a_trial_are_what_its_coefficients_add() -> None:
+def test_columns_of_a_term_are_what_its_coefficients_add() -> None:
     comparison, base, _ = parts(warm_place)
     prepared = comparison.problem.prepared
-    for trial in trials(base.mount, prepared):
-        if trial.name in ("torque", "position and temperature", "hysteresis over a long stroke"):
-            columns, size = columns_of(base.mount, trial, prepared), 1e-4
-            values = [size if k == 2 else 0.0 for k in range(trial.count)]
+    for term in candidate_terms(base.mount, prepared):
+        if term.name in ("torque", "position and temperature", "hysteresis over a long stroke"):
+            columns, size = columns_of(base.mount, term, prepared), 1e-4
+            values = [size if k == 2 else 0.0 for k in range(term.count)]
             torques = []
-            for one in (trial, trial.with_coefficients(values)):
-                mount, _ = with_trials(base.mount, [one])
+            for one in (term, term.with_coefficients(values)):
+                mount, _ = with_terms(base.mount, [one])
                 torques.append(stacked(Inverse(mount, ()), prepared.pieces, np.zeros(0))[0])
             np.testing.assert_allclose((torques[1] - torques[0]) / size, columns[:, 2], atol=2e-3)
 
 
-def test_the_effect_of_a_card_is_the_trial_that_was_fitted() -> None:
+def test_the_effect_of_a_card_is_the_term_that_was_fitted() -> None:
     comparison, base, _ = parts(warm_place)
     prepared = comparison.problem.prepared
-    for trial in trials(base.mount, prepared):
-        fitted = trial.with_coefficients([0.01 * (k + 1) for k in range(trial.count)])
-        there, _ = with_trials(base.mount, [fitted])
+    for term in candidate_terms(base.mount, prepared):
+        fitted = term.with_coefficients([0.01 * (k + 1) for k in range(term.count)])
+        there, _ = with_terms(base.mount, [fitted])
         here = replace(base.mount, effects=(fitted.learned(fitted.coefficients.tolist()),))
         torques = [stacked(Inverse(one, ()), prepared.pieces, np.zeros(0))[0] for one in (here, there)]
         np.testing.assert_allclose(torques[0], torques[1], atol=1e-9)

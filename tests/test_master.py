@@ -109,7 +109,7 @@ def test_time_is_counted_not_summed_and_chunks_do_not_matter(tiny: Tiny, monkeyp
 
 def test_progress_is_told_to_the_end(tiny: Tiny) -> None:
     seen: list[tuple[int, int]] = []
-    control_loop(tiny[3], ticks=3000, progress=lambda done, of: seen.append((done, of)))
+    control_loop(tiny[3], ticks=3000, on_progress=lambda done, of: seen.append((done, of)))
     assert seen[-1] == (3000, 3000)
     assert len(seen) > 1
 

@@ -246,7 +246,7 @@ class TestMeasured:
     def test_a_slip_is_called_by_its_name(self, machine: str, slip: str) -> None:
         change, finding, words = SLIPS[slip]
         if (machine, slip) == ("anticogging_motor", "late"):
-            pytest.skip("turns at nearly constant speed do not tell a lateness from friction, and nothing is said")
+            pytest.skip("turns at nearly constant speed do not tell a lag from friction, and nothing is said")
         found = said(*self.given(machine), change)
         assert set(finding.split("|")) & {one[0] for one in found}
         assert any(words in one[1] for one in found)

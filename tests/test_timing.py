@@ -1,6 +1,6 @@
 """Between a delay and a lag the part of the signals that follows the set point decides, whatever the noise does.
 
-Between a late torque and a late reading the reading's own lateness behind the set point decides.
+Between a late torque and a late reading the reading's own lag behind the set point decides.
 """
 
 from dataclasses import replace
@@ -10,7 +10,7 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.instrumental_variable import DECISIVE, misfits_of
-from cosim.diagnosis.timing_attribution import blamed, lateness
+from cosim.diagnosis.timing_attribution import attributed, reading_lag
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Prepared, prepare
 from pyfmi_models.effects import ActuatorLag, Delay
@@ -66,20 +66,20 @@ def trailing(seconds: float, noise: float = 2e-6) -> Prepared:
 
 
 def test_how_late_a_reading_is_behind_its_set_point_is_measured_within_its_error() -> None:
-    late = lateness(trailing(5e-3))
+    late = reading_lag(trailing(5e-3))
     assert late is not None
     assert abs(late.seconds - 5e-3) < 3 * late.error + 2e-5
     assert late.error < 1e-4
 
 
 def test_a_reading_that_trails_by_what_the_torque_is_late_is_the_clock_and_one_that_does_not_is_the_drive() -> None:
-    assert blamed(trailing(5e-3), 5.2e-3, 1e-3) == "clock"
-    assert blamed(trailing(0.0), 5e-3, 1e-3) == "drive"
+    assert attributed(trailing(5e-3), 5.2e-3, 1e-3) == "clock"
+    assert attributed(trailing(0.0), 5e-3, 1e-3) == "drive"
 
 
 def test_a_loop_that_trails_by_itself_leaves_it_open_as_does_a_set_point_that_was_not_recorded() -> None:
     prepared = trailing(12e-3)
-    assert blamed(prepared, 5e-3, 1e-3) == "either"
+    assert attributed(prepared, 5e-3, 1e-3) == "either"
     blind = replace(prepared, pieces=tuple(replace(piece, extras={}) for piece in prepared.pieces))
-    assert blamed(blind, 5e-3, 1e-3) == "either"
-    assert blamed(blind, 0.5e-3, 1e-3) == "drive"
+    assert attributed(blind, 5e-3, 1e-3) == "either"
+    assert attributed(blind, 0.5e-3, 1e-3) == "drive"

@@ -31,25 +31,25 @@ def run(name: str, amplitude: float, phase: float, seed: int, seconds: float = 1
     t, rng = np.arange(int(seconds * 250)) / 250, np.random.default_rng(seed)
     tones = [(a, 2 * np.pi * f, p) for a, f, p in zip((0.2, 0.1, 0.03), rng.uniform(0.1, 1, 3), (0, 1, 2), strict=True)]
     q, v, a = (sum(s * w**k * np.sin(w * t + p + k * np.pi / 2) for s, w, p in tones) for k in range(3))
-    shaken = amplitude * (np.sin(2 * np.pi * HERTZ * t + phase) + 0.6 * np.sin(2 * np.pi * SECOND * t + 2 * phase))
+    disturbed = amplitude * (np.sin(2 * np.pi * HERTZ * t + phase) + 0.6 * np.sin(2 * np.pi * SECOND * t + 2 * phase))
     noise = 0.05 * rng.standard_normal(len(t))
-    return Recording(name, {"t": t, "tau": 5.0 * a + 2.0 * np.sign(v) + 1.0 * v + shaken + noise, "q": q})
+    return Recording(name, {"t": t, "tau": 5.0 * a + 2.0 * np.sign(v) + 1.0 * v + disturbed + noise, "q": q})
 
 
-def shaken(*amplitudes: float) -> list[Recording]:
+def disturbed(*amplitudes: float) -> list[Recording]:
     """Recordings with tones of these amplitudes, in each in other phases."""
     return [run(f"run_{k}", amplitude, 0.5 + k, k) for k, amplitude in enumerate(amplitudes)]
 
 
 def answered(*amplitudes: float) -> Outcome:
-    *train, held = shaken(*amplitudes)
+    *train, held = disturbed(*amplitudes)
     card = replace(read_card("paper_mount"), controller=None)
     card = replace(card, mount=card.mount.model_copy(update={"inertia": 5.0}), friction=BASE.friction)
     return diagnose(train, [held], card)
 
 
 def test_a_fit_finds_one_frequency_and_one_amplitude_over_recordings_of_other_phases() -> None:
-    prepared = prepare(shaken(AMPLITUDE, AMPLITUDE), 20.0)
+    prepared = prepare(disturbed(AMPLITUDE, AMPLITUDE), 20.0)
     start = replace(BASE, effects=(PeriodicDisturbance(frequency_hz=HERTZ + 0.005, amplitude=0.1),))
     weight = (np.abs(prepared.stacked("v")) > 0.02).astype(float)
     found = fit(start, prepared.pieces, weight)
@@ -117,7 +117,7 @@ def test_a_concealed_disturbance_is_named_and_has_a_ceiling(tmp_path: Path) -> N
     assert outcome.diagnosis.heldout.after_rms < 1.2 * best
 
 
-def heard_in(q: np.ndarray, t: np.ndarray, residual: np.ndarray) -> list[float]:
+def found_in(q: np.ndarray, t: np.ndarray, residual: np.ndarray) -> list[float]:
     """The tones that stand out from a residual beside a motion."""
     prepared = prepare([Recording("r", {"t": t, "tau": residual, "q": q})], 20.0)
     rest = prepared.stacked("tau")
@@ -128,12 +128,12 @@ def test_what_follows_a_motion_that_repeats_itself_or_turns_steadily_is_no_tone(
     t, pitch = np.arange(6000) / 125, 0.35
     residual = np.sin(2 * np.pi * 3 * pitch * t) + 0.1 * np.random.default_rng(1).standard_normal(len(t))
     for wild in (0, 9):
-        found = heard_in(np.sin(2 * np.pi * pitch * t + 0.5 * wild * np.sin(0.4 * t)), t, residual)
+        found = found_in(np.sin(2 * np.pi * pitch * t + 0.5 * wild * np.sin(0.4 * t)), t, residual)
         assert any(abs(hertz - 3 * pitch) < 0.02 for hertz in found) == bool(wild)
-    turning = heard_in(0.6 * t + 1e-3 * np.sin(t), t, residual)
+    turning = found_in(0.6 * t + 1e-3 * np.sin(t), t, residual)
     assert not any(abs(hertz - 3 * pitch) < 0.02 for hertz in turning)
 
 
 def test_recordings_too_short_for_a_tone_have_none() -> None:
     t = np.arange(40) / 10
-    assert heard_in(np.sin(t), t, np.cos(9 * t)) == []
+    assert found_in(np.sin(t), t, np.cos(9 * t)) == []

@@ -42,7 +42,7 @@ def torques(case: Case, k: int) -> tuple[pd.DataFrame, Array, Array]:
     return table[inside], low_pass(table, table.tau)[inside], need[inside]
 
 
-def lateness(case: Case) -> float:
+def lag(case: Case) -> float:
     """Seconds by which the motion follows the command, by least squares on the slope of what it needs."""
     late = []
     for k in range(3):
@@ -151,10 +151,10 @@ def test_a_null_needs_inertia_and_friction_and_nothing_else(seed: int) -> None:
 
 
 def test_delay_lag_and_clock_show_as_lateness() -> None:
-    assert abs(lateness(make_case(4, duration=8))) < 2e-4
+    assert abs(lag(make_case(4, duration=8))) < 2e-4
     for name, key in (("delay", "delay_ms"), ("actuator_lag", "time_constant_ms")):
         case = make_case(4, [name], duration=8)
-        assert lateness(case) == pytest.approx(1e-3 * case.truth["effects"][0]["parameters"][key], rel=0.25)
+        assert lag(case) == pytest.approx(1e-3 * case.truth["effects"][0]["parameters"][key], rel=0.25)
     case = make_case(4, ["clock_skew"], duration=8)
     table, hidden, expected = case.heldout, case.oracle[2], case.truth["effects"][0]["parameters"]
     ahead = np.dot(table.q - hidden.angle, hidden.speed) / np.dot(hidden.speed, hidden.speed)

@@ -328,7 +328,7 @@ def test_what_a_type_cannot_do_is_refused(
 
 def test_components_agree_within_a_tick_on_real_numbers_only(mirror: dict[int, Path], tiny: dict[int, Path]) -> None:
     with FmuComponent(tiny[3]) as one, FmuComponent(mirror[3]) as two:
-        two.__class__ = type("Rewinding", (FmuComponent,), {"rewinds": True})
+        two.__class__ = type("Rewinding", (FmuComponent,), {"can_get_and_set_state": True})
         with pytest.raises(WiringError, match=r'from "two.int8_out" to "one.a" carries an Int8; values that'):
             simulate(
                 {"one": one, "two": two},

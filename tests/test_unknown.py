@@ -8,9 +8,8 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.diagnosis.adequacy import over_time, share_left, share_there
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import Decision, RestScores, decide
-from cosim.diagnosis.flagged import Rest as Pieces
-from cosim.diagnosis.flagged import flagged, loud_states, noise_at
+from cosim.diagnosis.decision import Decision, ResidualScores, decide
+from cosim.diagnosis.flagged import Residual, flagged, loud_states, noise_at
 from cosim.diagnosis.flexible import flexible_terms
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.predictive import Predictive
@@ -49,7 +48,7 @@ def recorded(extra: Extra, *seeds: int) -> Prepared:
     return prepare(recordings, 10.0)
 
 
-def left(extra: Extra) -> tuple[RestScores, Decision]:
+def left(extra: Extra) -> tuple[ResidualScores, Decision]:
     """What the base, refitted to two nights, leaves of a torque that it lacks; nothing is named."""
     mount = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=FC, sigma2=1.0), effects=())
     prepared, there = recorded(extra, 1, 2), recorded(extra, 3)
@@ -59,8 +58,8 @@ def left(extra: Extra) -> tuple[RestScores, Decision]:
     comparison = Comparison.of(problem, base, POLICY)
     held = Predictive.of(comparison, there, base.mount, there)
     sizes = share_left(comparison, base), share_there(comparison, held.residual(base.mount), held)
-    rest = RestScores(*sizes, flexible_terms(comparison, base, held), over_time(comparison, base))
-    return rest, decide([], rest, POLICY)
+    residual = ResidualScores(*sizes, flexible_terms(comparison, base, held), over_time(comparison, base))
+    return residual, decide([], residual, POLICY)
 
 
 def kick(now: dict[str, Array]) -> Array:
@@ -115,8 +114,8 @@ def test_a_large_rest_is_unknown_and_goes_with_what_makes_it(extra: Extra, goes_
     ids=["nothing", "wandering level", "noise"],
 )
 def test_a_small_rest_and_noise_are_nothing_to_explain(extra: Extra) -> None:
-    rest, decision = left(extra)
-    assert rest.share < POLICY.large_rest
+    residual, decision = left(extra)
+    assert residual.share < POLICY.large_residual
     assert not decision.is_unknown
     assert decision.depends_on == ()
 
@@ -128,13 +127,13 @@ def test_a_turn_counts_once_the_motion_came_back_far_enough() -> None:
     assert direction.tolist() == [1, 1, 1, 1, 1, -1, -1, -1, -1, 1]
 
 
-def piece(loud: tuple[float, float], seed: int, fitted: bool = True, noise: float = 0.05) -> Pieces:
+def piece(loud: tuple[float, float], seed: int, fitted: bool = True, noise: float = 0.05) -> Residual:
     """A minute that turns every 7 s and rests from 40 to 44 s; friction is doubled in one span."""
     t = np.arange(6000) / 100
     v = np.where(np.abs(t - 42) < 2, 0.0, np.sin(2 * np.pi * t / 14))
     rubbing = (t > loud[0]) & (t < loud[1])
     left = noise * np.random.default_rng(seed).standard_normal(len(t)) + rubbing * np.sign(v) - 0.2 * np.sign(v)
-    return Pieces(t, v, left, left, np.column_stack([np.sign(v), v]), fitted)
+    return Residual(t, v, left, left, np.column_stack([np.sign(v), v]), fitted)
 
 
 def test_spans_are_found_though_the_base_was_fitted_to_them_too() -> None:

@@ -137,10 +137,10 @@ def described(fmu: Path, path: Path, xml: str) -> Path:
     return path
 
 
-def description(version: int, *, direct: bool = False, state: bool = True, flexible: bool = True) -> str:
+def description(version: int, *, direct: bool = False, state: bool = True, can_vary_step: bool = True) -> str:
     """Write the XML of one FMI version.
 
-    `direct`: y follows a and b at once; `state`: it can be saved; `flexible`: steps may differ in length.
+    `direct`: y follows a and b at once; `state`: it can be saved; `can_vary_step`: steps may differ in length.
     """
     head = {
         2: '<fmiModelDescription fmiVersion="2.0" modelName="tiny" guid="t">',
@@ -152,7 +152,7 @@ def description(version: int, *, direct: bool = False, state: bool = True, flexi
         3: f'<Output valueReference="6" dependencies="{known}"/>',
     }
     saves = f'canGetAndSetFMU{"s" if version == 2 else "S"}tate="{str(state).lower()}"'
-    saves += f' canHandleVariableCommunicationStepSize="{str(flexible).lower()}"'
+    saves += f' canHandleVariableCommunicationStepSize="{str(can_vary_step).lower()}"'
     units = "".join(f'<Unit name="{unit}"/>' for unit in ("rad", "1", "s"))
     rows = "".join(_variable(version, number, *row) for number, row in enumerate(VARIABLES))
     return (

@@ -15,7 +15,7 @@ from cosim.diagnosis.diagnose import diagnose as find
 from cosim.diagnosis.entries import Improved
 from cosim.diagnosis.result import Diagnosis, Finding
 from cosim.diagnosis.terminal import summary
-from cosim.fmi.renamed import Alias
+from cosim.fmi.alias import Alias
 from cosim.reading import check_kind
 from cosim.support.errors import InputError
 from cosim.support.html import table as html_table
@@ -72,8 +72,8 @@ def diagnose(
     variables: Mapping[str, str] | None = None,
     quick: bool = False,
     force: bool = False,
-    say: Callable[[str], None] = lambda text: None,
-    answered: Callable[[Diagnosis], None] = lambda found: None,
+    on_progress: Callable[[str], None] = lambda text: None,
+    on_answer: Callable[[Diagnosis], None] = lambda found: None,
     command: str = "cosim.diagnose",
 ) -> DiagnosisResult:
     """Say which physics a card lacks, and prove it on a recording that was never fitted.
@@ -91,8 +91,8 @@ def diagnose(
         variables: our name to the FMU's, where they differ: {"tau": "Motor.torque"}.
         quick: write diagnosis.json and card.toml alone, and close no loop.
         force: overwrite what is there.
-        say: told in a few words what is being done.
-        answered: told the answer as soon as it stands, before FMUs and report are made from it.
+        on_progress: told in a few words what is being done.
+        on_answer: told the answer as soon as it stands, before FMUs and report are made from it.
         command: what the files shall name as what made them.
 
     Returns:
@@ -116,10 +116,14 @@ def diagnose(
     check_split(fitted, held)
     given = _Given(fitted, held, believed)
     if fmu is not None:
-        given = _beside(BlackBox(Path(fmu), {name: Alias(own) for name, own in (variables or {}).items()}), given, say)
-    telling = _Telling(say, answered)
+        given = _beside(
+            BlackBox(Path(fmu), {name: Alias(own) for name, own in (variables or {}).items()}), given, on_progress
+        )
+    listeners = _Listeners(on_progress, on_answer)
     return (
-        _delivered(given, folder, command, telling) if folder and not quick else _found(given, folder, command, telling)
+        _delivered(given, folder, command, listeners)
+        if folder and not quick
+        else _found(given, folder, command, listeners)
     )
 
 
@@ -134,38 +138,40 @@ class _Given:
     base: str = ""
 
 
-class _Telling(NamedTuple):
+class _Listeners(NamedTuple):
     """Whom to tell what is being done, and the answer."""
 
-    say: Callable[[str], None]
-    answered: Callable[[Diagnosis], None]
+    on_progress: Callable[[str], None]
+    on_answer: Callable[[Diagnosis], None]
 
 
-def _beside(box: BlackBox, given: _Given, say: Callable[[str], None]) -> _Given:
+def _beside(box: BlackBox, given: _Given, on_progress: Callable[[str], None]) -> _Given:
     """Put the card that is most like an FMU in its place."""
-    base = as_base(box, given.train, given.heldout, given.card, say)
+    base = as_base(box, given.train, given.heldout, given.card, on_progress)
     correction = Correction(box, base.card, *motion_of(given.train[0]))
     return _Given(base.train, base.heldout, base.card, correction.deliver, box.told)
 
 
-def _found(given: _Given, out: Path | None, command: str, telling: _Telling) -> DiagnosisResult:
+def _found(given: _Given, out: Path | None, command: str, listeners: _Listeners) -> DiagnosisResult:
     """Diagnose, and write the answer and the card where there is a folder."""
-    outcome = find(given.train, given.heldout, given.card, telling.say)
-    telling.answered(outcome.diagnosis)
+    outcome = find(given.train, given.heldout, given.card, listeners.on_progress)
+    listeners.on_answer(outcome.diagnosis)
     done = outcome.diagnosis
     if out:
         done = deliver_quickly(outcome, given.train, given.heldout, given.card, out, command, given.base)
     return DiagnosisResult(done, outcome.card, outcome.refitted)
 
 
-def _delivered(given: _Given, out: Path, command: str, telling: _Telling) -> DiagnosisResult:
+def _delivered(given: _Given, out: Path, command: str, listeners: _Listeners) -> DiagnosisResult:
     """Diagnose with the loops closed beside it, and write all files."""
     train, heldout, card = given.train, given.heldout, given.card
     with Loops(card, heldout) as loops:
         loops.close("nominal", card.plant())
-        outcome = find(train, heldout, card, telling.say, loops.close)
-        telling.answered(outcome.diagnosis)
-        done = deliver(outcome, train, heldout, card, out, command, loops, telling.say, given.more, given.base)
+        outcome = find(train, heldout, card, listeners.on_progress, loops.close)
+        listeners.on_answer(outcome.diagnosis)
+        done = deliver(
+            outcome, train, heldout, card, out, command, loops, listeners.on_progress, given.more, given.base
+        )
     return DiagnosisResult(done, outcome.card, outcome.refitted)
 
 

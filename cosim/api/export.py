@@ -54,7 +54,7 @@ def export(
     ssp: bool = False,
     modelica: bool = False,
     force: bool = False,
-    progress: Progress = lambda done, of: None,
+    on_progress: Progress = lambda done, of: None,
 ) -> Exported:
     """Write the plant of a card and, where it has one, its controller as FMUs for co-simulation and model exchange.
 
@@ -66,7 +66,7 @@ def export(
         ssp: also wire plant, controller and a set point as one SSP 1.0, NAME.ssp.
         modelica: also write the plant as a Modelica package.
         force: overwrite what is there.
-        progress: told how many FMUs are done, and of how many.
+        on_progress: told how many FMUs are done, and of how many.
 
     Returns:
         `Exported`: the paths.
@@ -75,7 +75,7 @@ def export(
         CardError: the card is not good, or cannot have what is asked for.
         OutputError: a file is there already; nothing was written then.
     """
-    return planned(card, out, fmi, platform, ssp, modelica, force).write(progress)
+    return planned(card, out, fmi, platform, ssp, modelica, force).write(on_progress)
 
 
 @dataclass(frozen=True)
@@ -87,10 +87,10 @@ class Plan:
     modelica: tuple[Path, Writer] | None
     force: bool
 
-    def write(self, progress: Progress = lambda done, of: None) -> Exported:
-        """Write everything; `progress` is told how many FMUs are done, and of how many."""
+    def write(self, on_progress: Progress = lambda done, of: None) -> Exported:
+        """Write everything; `on_progress` is told how many FMUs are done, and of how many."""
         for done, one in enumerate(self.archives):
-            progress(done, len(self.archives))
+            on_progress(done, len(self.archives))
             directory(one.path.parent)
             export_fmu(one.model, one.path, fmi=one.fmi, force=self.force, platforms=one.machines)
         for path, write in self._others():

@@ -56,7 +56,7 @@ def identify(
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     force: bool = False,
-    say: Callable[[str], None] = lambda text: None,
+    on_progress: Callable[[str], None] = lambda text: None,
 ) -> IdentifyResult:
     """Identify a card's numbers: friction map, presliding steps, output error in closed loop.
 
@@ -72,7 +72,7 @@ def identify(
         columns: our name to the source's, as in `cosim.read`; they come before the card's.
         units: our name to the unit in the source, as in `cosim.read`.
         force: overwrite what is there.
-        say: told in a few words what is being done.
+        on_progress: told in a few words what is being done.
 
     Returns:
         `IdentifyResult`. Standard errors are those of the least-squares fits (Ljung 1999, chapter 9).
@@ -89,10 +89,10 @@ def identify(
     believed = card if isinstance(card, Card) else read_card(card)
     taken = read_all(recordings, "recording", dict(believed.columns) | dict(columns or {}), units)
     check_kind(taken, believed.mount.motion)
-    found = find(taken, believed, Options(tuple(free), cut, keep_inertia, starts, seed), say)
+    found = find(taken, believed, Options(tuple(free), cut, keep_inertia, starts, seed), on_progress)
     if folder:
         for warning in found.best.warnings if found.best else ():
-            say(f"careful: {warning} card.toml will hold it; --free leaves it out.")
-        say("drawing")
+            on_progress(f"careful: {warning} card.toml will hold it; --free leaves it out.")
+        on_progress("drawing")
         found = deliver.deliver(found, taken, believed, folder, time.perf_counter() - started)
     return IdentifyResult(found, believed)

@@ -27,8 +27,8 @@ def run(
     isolate: bool | None = None,
     call_timeout: float = CALL_TIMEOUT,
     command: str = "cosim.run",
-    progress: Progress | None = None,
-    say: Callable[[str], None] = lambda text: None,
+    on_progress: Progress | None = None,
+    on_build: Callable[[str], None] = lambda text: None,
 ) -> RunResult:
     """Run a scenario; FMUs of its cards are built where the cache does not have them.
 
@@ -42,8 +42,8 @@ def run(
             has FMUs or functions that are given.
         call_timeout: seconds that one call of an isolated component may take.
         command: what the recording shall say it was made by.
-        progress: called between chunks with ticks done and ticks in all.
-        say: told of each FMU that is built.
+        on_progress: called between chunks with ticks done and ticks in all.
+        on_build: told of each FMU that is built.
 
     Returns:
         `RunResult`.
@@ -57,8 +57,8 @@ def run(
     folder = None if out is None else Path(out)
     for path in files_of(folder, page).values():
         check_free(path, force)
-    ready = with_fmus(wanted, say)
-    options = Options(None, force, progress, compiled, command)
+    ready = with_fmus(wanted, on_build)
+    options = Options(None, force, on_progress, compiled, command)
     if folder is None:
         done = run_here(ready, options)
         return replace(done, statistics={**done.statistics, "scenario": wanted.name})

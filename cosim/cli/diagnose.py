@@ -71,7 +71,7 @@ def diagnose(
             quick=quick,
             force=force,
             command=command,
-            say=progress.tell,
+            on_progress=progress.tell,
         )
     if as_json:
         put_json(found.as_json())

@@ -51,7 +51,7 @@ def identify(
     say(f"Read {len(read)} recording{several}, {seconds:.0f} s; card {believed.mount.name}")
     given: Any = {"free": free or (), "cut": cut, "keep_inertia": keep_inertia, "starts": starts, "seed": seed}
     with stage("identifying") as progress:
-        done = find(read, believed, out, force=force, say=progress.log, **given)
+        done = find(read, believed, out, force=force, on_progress=progress.log, **given)
     if as_json:
         put_json(done.as_json())
     else:

@@ -36,9 +36,11 @@ def prove(
         enlist(decks, GENERATOR, seed, cases, purpose, code())
     command = f"cosim prove --cases {cases} --seed {seed} --seconds {seconds:g} --out {out}"
     try:
-        with _telling(f"{cases} concealed cases") as told:
+        with _reporting(f"{cases} concealed cases") as on_progress:
             deck = Benchmark(seed, cases, seconds)
-            found = conduct(deck, out, workers=workers, force=force, say=say, told=told, command=command)
+            found = conduct(
+                deck, out, workers=workers, force=force, on_seal=say, on_progress=on_progress, command=command
+            )
     except KeyboardInterrupt:
         say(f"what was done until then is scored in {out / 'README.md'}; the same command goes on from there")
         raise
@@ -50,19 +52,19 @@ def prove(
 
 
 @contextmanager
-def _telling(title: str) -> Iterator[Callable[[int, int, str], None]]:
+def _reporting(title: str) -> Iterator[Callable[[int, int, str], None]]:
     """Yield what tells the progress: a bar on a terminal, and for each case a line with the time to go."""
     with stage(title) as bar:
         begun, before = time.monotonic(), -1
 
-        def told(done: int, of: int, last: str) -> None:
+        def on_progress(done: int, of: int, last: str) -> None:
             nonlocal before
             before = done - 1 if before < 0 else before
             bar(done, of)
             left = (of - done) * (time.monotonic() - begun) / (done - before)
             say(f"{last}; {done} of {of}, about {left:.0f} s left")
 
-        yield told
+        yield on_progress
 
 
 def _line(score: dict[str, object]) -> str:

@@ -81,7 +81,7 @@ def _run(scenario: "Scenario", delivery: "Delivery") -> "RunResult":
     recording = delivery.folder / RECORDING
     try:
         with stage(title) as shown:
-            options = replace(delivery.options, progress=foretold(shown, size, say))
+            options = replace(delivery.options, on_progress=with_forecast(shown, size, say))
             return replace(delivery, options=options).of(scenario)
     except (StepError, KeyboardInterrupt):
         if recording.exists():
@@ -89,7 +89,7 @@ def _run(scenario: "Scenario", delivery: "Delivery") -> "RunResult":
         raise
 
 
-def foretold(shown: Progress, size: int, say: Callable[[str], None]) -> Progress:
+def with_forecast(shown: Progress, size: int, say: Callable[[str], None]) -> Progress:
     """Return a progress that also says once how long a long run will take, and how large its recording gets."""
     begun, told = perf_counter(), [False]
 

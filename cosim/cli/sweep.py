@@ -33,7 +33,7 @@ def sweep(
     ready = with_fmus(read_scenario(wanted.scenario), say)
     title = f"{ready.name}: {wanted.design.runs:,} runs of {ready.stop:g} s"
     try:
-        with _telling(title) as told:
+        with _reporting(title) as on_progress:
             done = conduct(
                 wanted,
                 ready,
@@ -42,7 +42,7 @@ def sweep(
                 address=cluster,
                 force=force,
                 retry=retry,
-                told=told,
+                on_progress=on_progress,
                 command=f"cosim sweep {file} --out {out}",
             )
     except KeyboardInterrupt:
@@ -57,13 +57,13 @@ def sweep(
 
 
 @contextmanager
-def _telling(title: str) -> Iterator[Callable[[int, int, int], None]]:
+def _reporting(title: str) -> Iterator[Callable[[int, int, int], None]]:
     """Yield what tells the progress: a bar on a terminal, a line now and then elsewhere."""
     with stage(title) as bar:
         lines = not messages().is_terminal
         last, before = time.monotonic(), 0
 
-        def told(done: int, of: int, failed: int) -> None:
+        def on_progress(done: int, of: int, failed: int) -> None:
             nonlocal last, before
             bar(done, of)
             if lines and time.monotonic() - last > PAUSE:
@@ -72,7 +72,7 @@ def _telling(title: str) -> Iterator[Callable[[int, int, int], None]]:
                 say(f"{done:,} of {of:,} runs{lost}, about {(of - done) / rate:.0f} s left")
                 last, before = time.monotonic(), done
 
-        yield told
+        yield on_progress
 
 
 def _picture(table: Path) -> str:

@@ -114,10 +114,10 @@ class NoiseOverSpeed:
         return np.asarray(np.interp(np.abs(v), self.speed, self.size))
 
 
-def noise_over_speed(rest: Array, v: Array, weight: Array) -> NoiseOverSpeed:
-    """RMS of a rest in bins of speed of equal count; at least `LEAST_SCALE` of the median over speeds."""
+def noise_over_speed(residual: Array, v: Array, weight: Array) -> NoiseOverSpeed:
+    """RMS of a residual in bins of speed of equal count; at least `LEAST_SCALE` of the median over speeds."""
     speed, counted = np.abs(v), np.flatnonzero(weight > 0)
     parts = [p for p in np.array_split(counted[np.argsort(speed[counted])], SPEED_BINS) if len(p)]
     centre = np.array([float(np.median(speed[part])) for part in parts])
-    size = np.array([rms(rest[part]) for part in parts])
+    size = np.array([rms(residual[part]) for part in parts])
     return NoiseOverSpeed(centre, np.maximum(size, LEAST_SCALE * float(np.median(size)) + 1e-300))

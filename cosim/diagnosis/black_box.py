@@ -24,7 +24,7 @@ from cosim.data.recording import Recording
 from cosim.estimation.fit import fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Array, Piece, choose_cutoff, derivative, lowpass, prepare
-from cosim.fmi.renamed import Alias
+from cosim.fmi.alias import Alias
 from cosim.master.simulate import simulate
 from cosim.support.errors import InputError, StepError
 from cosim.support.files import sha256
@@ -77,7 +77,7 @@ def as_base(
     train: Sequence[Recording],
     heldout: Sequence[Recording],
     card: Card,
-    say: Callable[[str], None] = lambda _: None,
+    on_progress: Callable[[str], None] = lambda _: None,
 ) -> Base:
     """Let an FMU take the place of a card.
 
@@ -86,7 +86,7 @@ def as_base(
         train: recordings that may be fitted.
         heldout: recordings that prove the result.
         card: what is believed of the FMU: inertia and friction within a factor of two or so.
-        say: told, in a few words, what is being done.
+        on_progress: told, in a few words, what is being done.
 
     Raises:
         InputError: no loop makes the FMU follow the recorded motion.
@@ -99,14 +99,14 @@ def as_base(
         follower = _Follower(box, card, Path(folder), _start(box)).fitting(prepared[0].pieces[0])
         followed = []
         for one in prepared:
-            say(f"letting {box.fmu.name} follow {one.names[0]}")
+            on_progress(f"letting {box.fmu.name} follow {one.names[0]}")
             followed.append([follower.followed(piece) for piece in one.pieces])
     fitted = len(train)
     like = _likeness([piece for pieces in followed[:fitted] for piece in pieces], card)
-    rests = [_rests(pieces, like.plant()) for pieces in followed]
-    unlike = rms(np.concatenate([rest for one in rests[:fitted] for rest in one]))
+    misfits = [_misfits(pieces, like.plant()) for pieces in followed]
+    unlike = rms(np.concatenate([misfit for one in misfits[:fitted] for misfit in one]))
     note = f"The base is {box.told}; the card that is most like it needs another torque by {unlike:.3g} RMS."
-    beside = [_without(one, pieces, rest) for one, pieces, rest in zip(recordings, followed, rests, strict=True)]
+    beside = [_without(one, pieces, misfit) for one, pieces, misfit in zip(recordings, followed, misfits, strict=True)]
     beside[0] = replace(beside[0], notes=(*beside[0].notes, note))
     return Base(tuple(beside[:fitted]), tuple(beside[fitted:]), like, unlike)
 
@@ -211,16 +211,16 @@ def _likeness(pieces: Sequence[Piece], card: Card) -> Card:
     return replace(card, mount=section, friction=base.friction)
 
 
-def _rests(pieces: Sequence[Piece], like: Mount) -> list[Array]:
+def _misfits(pieces: Sequence[Piece], like: Mount) -> list[Array]:
     """What the FMU needs beyond the card, at the rows of each piece; nothing at its edges, where filters settle."""
     inverse = Inverse(like, ())
     return [np.where(piece.inside, piece.tau - inverse.torque(piece, np.zeros(0))[0], 0.0) for piece in pieces]
 
 
-def _without(recording: Recording, pieces: Sequence[Piece], rests: Sequence[Array]) -> Recording:
+def _without(recording: Recording, pieces: Sequence[Piece], misfits: Sequence[Array]) -> Recording:
     """The recording without a torque that is known at the rows of its pieces."""
     tau = recording["tau"].copy()
-    for piece, rest in zip(pieces, rests, strict=True):
+    for piece, misfit in zip(pieces, misfits, strict=True):
         rows = (recording.t >= piece.t[0]) & (recording.t <= piece.t[-1])
-        tau[rows] -= np.interp(recording.t[rows], piece.t, rest)
+        tau[rows] -= np.interp(recording.t[rows], piece.t, misfit)
     return replace(recording, table=recording.table | {"tau": tau})

@@ -70,12 +70,12 @@ class Comparison:
         nuisances = discrepancy(base.mount, prepared, policy)
         counted = (weight > 0).astype(float)
         known = np.column_stack([base.slopes, nuisances.columns]) * counted[:, None]
-        rest = projected(base.residual * counted, known)
-        tried = candidates(base.mount, prepared, rest, np.abs(nuisances.level))
+        residual = projected(base.residual * counted, known)
+        tried = candidates(base.mount, prepared, residual, np.abs(nuisances.level))
         groups = columns_of(base.mount, tried, prepared, base.values)
         best: dict[type[Effect], tuple[float, Array]] = {}
         for one, columns in zip(tried, groups, strict=True):
-            share = _share(rest, columns * counted[:, None], known)
+            share = _share(residual, columns * counted[:, None], known)
             form = type(one.instances[0])
             if share > best.get(form, (0.0,))[0]:
                 best[form] = share, columns
@@ -133,8 +133,8 @@ class Comparison:
         """Score every candidate beside a fitted structure."""
         prepared, counted = self.problem.prepared, (self.problem.weight > 0)[:, None]
         known = np.column_stack([found.slopes, self.nuisances.columns]) * counted
-        rest = projected(found.residual * counted[:, 0], known)
-        tried = candidates(found.mount, prepared, rest, np.abs(self.nuisances.level))
+        residual = projected(found.residual * counted[:, 0], known)
+        tried = candidates(found.mount, prepared, residual, np.abs(self.nuisances.level))
         groups = columns_of(found.mount, tried, prepared, found.values)
         return self.score(found, tried, groups)
 
@@ -219,19 +219,19 @@ class _Plain:
         scale = np.sqrt((found.slopes**2).sum(0)) + 1e-300
         self._base, _ = np.linalg.qr(found.slopes / scale * weight[:, None])
         self._weight, target = weight, found.residual * weight
-        self._rest = target - self._base @ (self._base.T @ target)
-        self._energy = float(self._rest @ self._rest) + 1e-300
+        self._residual = target - self._base @ (self._base.T @ target)
+        self._energy = float(self._residual @ self._residual) + 1e-300
 
     def share(self, columns: Array) -> float:
         """Share of the energy that columns explain."""
         own = columns * self._weight[:, None]
         own = own - self._base @ (self._base.T @ own)
-        beta = np.linalg.lstsq(own.T @ own, own.T @ self._rest, rcond=1e-9)[0]
-        return float(beta @ (own.T @ self._rest)) / self._energy
+        beta = np.linalg.lstsq(own.T @ own, own.T @ self._residual, rcond=1e-9)[0]
+        return float(beta @ (own.T @ self._residual)) / self._energy
 
 
-def _share(rest: Array, columns: Array, known: Array) -> float:
-    """Share of a rest that columns explain (the rest is free of `known` already)."""
+def _share(residual: Array, columns: Array, known: Array) -> float:
+    """Share of a residual that columns explain (the residual is free of `known` already)."""
     own = projected(columns, known)
-    beta = np.linalg.lstsq(own.T @ own, own.T @ rest, rcond=1e-9)[0]
-    return float(beta @ (own.T @ rest)) / (float(rest @ rest) + 1e-300)
+    beta = np.linalg.lstsq(own.T @ own, own.T @ residual, rcond=1e-9)[0]
+    return float(beta @ (own.T @ residual)) / (float(residual @ residual) + 1e-300)

@@ -35,7 +35,7 @@ class TermScores:
 
 
 @dataclass(frozen=True)
-class RestScores:
+class ResidualScores:
     """What is left: its slow part relative to friction, in training and held out, and what it follows."""
 
     share: float
@@ -58,18 +58,18 @@ class Decision:
     """Names that help, and may yet imitate what is unknown."""
 
 
-def decide(effects: Sequence[EffectScores], rest: RestScores, policy: Policy) -> Decision:
+def decide(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Decision:
     """Decide what is named, what stays open and whether something without a name is left."""
     sets = {one.effect: open_rivals(one, policy) for one in effects}
     probabilities = {one.effect: _probabilities(one, sets[one.effect]) for one in effects}
-    unknown = is_left(effects, rest, policy)
-    follows = followed(rest, policy) if unknown else ()
-    return Decision(sets, probabilities, unknown, follows, doubted(effects, rest, policy) if unknown else ())
+    unknown = is_left(effects, residual, policy)
+    follows = followed(residual, policy) if unknown else ()
+    return Decision(sets, probabilities, unknown, follows, doubted(effects, residual, policy) if unknown else ())
 
 
-def doubted(effects: Sequence[EffectScores], rest: RestScores, policy: Policy) -> tuple[str, ...]:
+def doubted(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
     """Names that may be no more than imitations: what is left beside them is not much less than what they explain."""
-    left = max((one.evidence for one in rest.terms), default=0.0)
+    left = max((one.evidence for one in residual.terms), default=0.0)
     if left < policy.floor:
         return ()
     weak = [one for one in effects if one.explains[one.effect] < policy.imitation_share]
@@ -117,27 +117,27 @@ def open_rivals(one: EffectScores, policy: Policy) -> tuple[str, ...]:
     return tuple(sorted(near, key=lambda name: one.margins[name]))
 
 
-def is_left(effects: Sequence[EffectScores], rest: RestScores, policy: Policy) -> bool:
+def is_left(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> bool:
     """Whether something is left that is no misfit of a friction law, nor of the equations of what is named."""
-    large = rest.share > policy.large_rest or rest.share_there > policy.large_rest_there
-    sure = set(one.effect for one in effects) - set(doubted(effects, rest, policy))
+    large = residual.share > policy.large_residual or residual.share_there > policy.large_residual_there
+    sure = set(one.effect for one in effects) - set(doubted(effects, residual, policy))
     largest = max((one.evidence for one in effects if one.effect in sure), default=0.0)
-    return large or any(_is_no_misfit(one, policy.imitation * largest, policy) for one in rest.terms)
+    return large or any(_is_no_misfit(one, policy.imitation * largest, policy) for one in residual.terms)
 
 
 def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:
-    """Whether what the rest follows is more than the misfit of a friction law: sure, or held out as well as trained."""
+    """Whether what the residual follows is more than a friction law's misfit: sure, or held out as well as trained."""
     sure = term.share >= -policy.contradicted or term.evidence >= policy.sure_floor
     there = term.evidence >= policy.least_followed and term.share >= policy.follows
     return term.evidence >= least and (there or (term.evidence >= policy.floor and sure))
 
 
-def followed(rest: RestScores, policy: Policy) -> tuple[str, ...]:
-    """Quantities that the rest follows elsewhere, the best first; where there is none, how it goes over time."""
-    best = max((one.share for one in rest.terms), default=0.0)
+def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
+    """Quantities that the residual follows elsewhere, the best first; where there is none, how it goes over time."""
+    best = max((one.share for one in residual.terms), default=0.0)
     least = max(policy.follows, policy.beside * best)
-    ranked = sorted(rest.terms, key=lambda one: -one.share)
-    return tuple(one.name for one in ranked if one.share > least) or (rest.over_time,)
+    ranked = sorted(residual.terms, key=lambda one: -one.share)
+    return tuple(one.name for one in ranked if one.share > least) or (residual.over_time,)
 
 
 def _probabilities(one: EffectScores, members: Sequence[str]) -> dict[str, float]:

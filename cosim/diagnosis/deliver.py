@@ -69,7 +69,7 @@ def deliver(
     out: Path,
     command: str,
     loops: Loops,
-    say: Callable[[str], None] = lambda _: None,
+    on_progress: Callable[[str], None] = lambda _: None,
     more: Callable[[Card, Path], Improved] = lambda *_: Improved(),
     base: str = "",
 ) -> Diagnosis:
@@ -85,7 +85,7 @@ def deliver(
     found, better = _signed(outcome, train, heldout, card, command, base)
     _write_card(better, found, out)
     if _adds_physics(found):
-        say("building the improved FMU")
+        on_progress("building the improved FMU")
         improved = Improved(card=CARD) | _fmus(better, found, out) | _proven_range(found) | more(better, out)
         found = replace(found, improved=improved)
     loops.close("after", outcome.card.plant(), out / found.improved["fmu"] if "fmu" in found.improved else None)
@@ -95,11 +95,11 @@ def deliver(
     write_missing_torque(found.traces, [*train, *heldout], out / MISSING)
     from cosim.diagnosis.report import write_report  # takes a second, in which the loops go on
 
-    say("closing the loop")
+    on_progress("closing the loop")
     positions = {key: error.position for key, error in loops.errors().items()}
     found = replace(found, heldout=replace(found.heldout, position=positions))
     _write_json(found, out)
-    say("writing the report")
+    on_progress("writing the report")
     write_report(found, out / REPORT)
     return found
 

@@ -11,7 +11,7 @@ from cosim.data.single_readings import cleaned
 from cosim.diagnosis.absent import not_found
 from cosim.diagnosis.adequacy import over_time, share_left, share_there
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import Decision, EffectScores, RestScores, decide
+from cosim.diagnosis.decision import Decision, EffectScores, ResidualScores, decide
 from cosim.diagnosis.delivered import standing
 from cosim.diagnosis.experiment import Experiment, best, told
 from cosim.diagnosis.findings import accepted, rival_finding, standard_errors
@@ -41,7 +41,7 @@ from pyfmi_models.card import Card
 from pyfmi_models.effects import GravityUnbalance
 from pyfmi_models.mount import Mount
 
-Say = Callable[[str], None]
+OnProgress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ def diagnose(
     train: Sequence[Recording],
     heldout: Sequence[Recording],
     card: Card,
-    say: Say = lambda _: None,
-    stood: Callable[[str, Mount], None] = lambda *_: None,
+    on_progress: OnProgress = lambda _: None,
+    on_model_ready: Callable[[str, Mount], None] = lambda *_: None,
 ) -> Outcome:
     """Find what physics a card lacks.
 
@@ -86,9 +86,9 @@ def diagnose(
             they do not predict is taken out as not proven. So their error after it is a little optimistic;
             `HeldOut.unvetoed_rms` is the error of what training alone proposed.
         card: the model as delivered.
-        say: told, in a few words, what is being done.
-        stood: told the refitted base ("before") and the model it ends with ("after") as soon as they stand, so that
-            something can be done with them beside the rest.
+        on_progress: told, in a few words, what is being done.
+        on_model_ready: told the refitted base ("before") and the model it ends with ("after") as soon as they stand, so
+            that something can be done with them meanwhile.
 
     Raises:
         InputError: the card holds an effect that a diagnosis cannot take into account yet.
@@ -100,24 +100,24 @@ def diagnose(
     check_recordings(train, heldout)
     sanity = (*doubts(train, heldout, card), *single_readings(given, (*train, *heldout)))
     problem = _problem(train, card)
-    say("refitting the base")
+    on_progress("refitting the base")
     base = problem.fit(problem.mount, 25)
     sanity = (*sanity, *of_base(problem, base.mount, train, heldout))
     refitted = _improved(card, base.mount)
-    stood("before", refitted.plant())
+    on_model_ready("before", refitted.plant())
     if any(one.blocks_naming for one in sanity):
         withheld = without_names(problem, base.mount, train, heldout, sanity)
         numbers = _base_parameters(Structures(problem.mount, base.mount, base.mount))
         seconds = time.perf_counter() - started
         return Outcome(replace(withheld, base_parameters=numbers, seconds=seconds), refitted, refitted, refitted)
     comparison = Comparison.of(problem, base, POLICY)
-    examined = examine(comparison, search(comparison, base, say), say)
-    say("proving on the recording that was not fitted")
+    examined = examine(comparison, search(comparison, base, on_progress), on_progress)
+    on_progress("proving on the recording that was not fitted")
     answer = _answer(comparison, examined, heldout)
     learned = learn(comparison, answer.chosen, answer.held) if answer.decision.is_unknown else None
     model = learned.mount if learned else answer.chosen.mount
     delivered, first = (_improved(card, one) for one in (model, examined.chosen.mount))
-    stood("after", delivered.plant())
+    on_model_ready("after", delivered.plant())
     experiment = _experiment(answer)
     described = _with_learned(_described(answer, train, heldout, card.mount.name), answer, learned, train, heldout)
     diagnosis = replace(
@@ -144,8 +144,8 @@ def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Record
     prepared = prepare(heldout, comparison.problem.prepared.cutoff)
     held = Predictive.of(comparison, prepared, examined.base.mount, prepare(heldout, CUTOFF))
     proof = prove(comparison, examined, held)
-    rest, policy = _rest(comparison, proof, held), comparison.policy
-    return Answer(comparison, examined.base, proof, decide(_scores(proof), rest, policy), held)
+    residual, policy = _residual_scores(comparison, proof, held), comparison.policy
+    return Answer(comparison, examined.base, proof, decide(_scores(proof), residual, policy), held)
 
 
 def _scores(proof: Proof) -> list[EffectScores]:
@@ -155,11 +155,11 @@ def _scores(proof: Proof) -> list[EffectScores]:
     ]
 
 
-def _rest(comparison: Comparison, proof: Proof, held: Predictive) -> RestScores:
+def _residual_scores(comparison: Comparison, proof: Proof, held: Predictive) -> ResidualScores:
     left, there = share_left(comparison, proof.chosen), held.residual(proof.chosen.mount)
     terms = flexible_terms(comparison, proof.chosen, held)
     shown = over_time(comparison, proof.chosen)
-    return RestScores(left, share_there(comparison, there, held), terms, shown)
+    return ResidualScores(left, share_there(comparison, there, held), terms, shown)
 
 
 def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Recording], name: str) -> Diagnosis:

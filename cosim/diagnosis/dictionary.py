@@ -1,4 +1,4 @@
-"""What a rest may follow: shapes of recorded quantities, by plain names, none of them an effect.
+"""What a residual may follow: shapes of recorded quantities, by plain names, none of them an effect.
 
 Smooth and general: waves over the position, speed, acceleration, time since the start and since the last reversal,
 long hysteresis, user columns, and products of those with the position.

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.diagnosis.policy import Policy
-from cosim.estimation.discrepancy_basis import bank
+from cosim.estimation.discrepancy_basis import discrepancy_basis
 from cosim.estimation.level import friction_level
 from cosim.estimation.prepare import Array, Prepared
 from cosim.support.statistics import rms
@@ -41,7 +41,7 @@ def discrepancy(mount: Mount, prepared: Prepared, policy: Policy) -> Discrepancy
     """Make the nuisance columns beside a base."""
     level = friction_level(mount, prepared)
     size = rms(level)
-    stops, speeds = bank(prepared)
+    stops, speeds = discrepancy_basis(prepared)
     # Where motion never turns, stops are nothing but level.
     stops = stops - np.outer(level, level @ stops / max(float(level @ level), 1e-300))
     wander = _wander(level, prepared, policy)

@@ -109,8 +109,8 @@ def motions(visited: Visited) -> Iterator[tuple[str, SetPoint]]:
         yield "a chirp up to high frequencies", Chirp(kind="chirp", smooth_start=SMOOTH_START, **way)
     tones = np.geomspace(0.5, hertz, 12)
     sizes = (0.3 * visited.acceleration / (2 * np.pi * tones) ** 2).tolist()
-    shaken = Multisine(kind="multisine", frequencies=tones.tolist(), amplitudes=sizes, smooth_start=SMOOTH_START)
-    yield "many tones at once", shaken
+    multisine = Multisine(kind="multisine", frequencies=tones.tolist(), amplitudes=sizes, smooth_start=SMOOTH_START)
+    yield "many tones at once", multisine
     limits: Any = {
         "max_velocity": visited.speed,
         "max_acceleration": visited.acceleration,
@@ -129,8 +129,8 @@ def _difference(main: Mount, rival: Mount, signal: SetPoint, visited: Visited) -
         return 0.0
     inverse = Inverse(rival, free_parameters(rival))
     other, slopes = inverse.torque(replace(piece, tau=torque), inverse.present)
-    rest = projected((torque - other)[piece.inside], slopes[piece.inside])
-    return rms(rest)
+    residual = projected((torque - other)[piece.inside], slopes[piece.inside])
+    return rms(residual)
 
 
 def _piece(signal: SetPoint, visited: Visited) -> Piece:

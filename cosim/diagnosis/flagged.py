@@ -5,9 +5,9 @@ not set the measure: the base is fitted once more by least absolute deviations, 
 the training recordings. A span is loud where a chain of two states says so, noise of the usual size or `loud` times
 that,
 
-    log p(loud) - log p(quiet) = z^2 (1 - 1 / loud^2) / 2 - log(loud),     z = rest / noise at this speed,
+    log p(loud) - log p(quiet) = z^2 (1 - 1 / loud^2) / 2 - log(loud),     z = residual / noise at this speed,
 
-a change of state costing `CHANGE`: rest and reversals say nothing and do not end a span. Reference: Viterbi, IEEE
+a change of state costing `CHANGE`: residual and reversals say nothing and do not end a span. Reference: Viterbi, IEEE
 Trans. Inf. Theory 13 (1967) 260.
 """
 
@@ -25,9 +25,9 @@ Mask = npt.NDArray[np.bool_]
 Spans = tuple[tuple[float, float], ...]
 
 CELL = 0.1
-"""Seconds of one step of the chain: the rest is averaged over it."""
+"""Seconds of one step of the chain: the residual is averaged over it."""
 INDEPENDENT = 0.3
-"""Share of a cell that counts as an independent observation: the rest of neighbouring cells is alike."""
+"""Share of a cell that counts as an independent observation: the residual of neighbouring cells is alike."""
 CHANGE = 5.0
 """Log-odds that a change of state costs: quiet at three times the noise, some two seconds."""
 LEAST_LOUD = 3.0
@@ -45,7 +45,7 @@ ROUNDS = 20
 
 
 @dataclass(frozen=True)
-class Rest:
+class Residual:
     """A contiguous piece of a recording at its rows: time, speed, and what base and better model leave."""
 
     t: Array
@@ -58,39 +58,39 @@ class Rest:
     """Whether the base may be fitted to it."""
 
 
-def noise_at(speed: Array, rest: Array, wanted: Array) -> Array:
-    """Standard deviation of a rest at the wanted speeds, from medians in bins of equal count."""
+def noise_at(speed: Array, residual: Array, wanted: Array) -> Array:
+    """Standard deviation of a residual at the wanted speeds, from medians in bins of equal count."""
     parts = [part for part in np.array_split(np.argsort(np.abs(speed)), SPEEDS) if len(part)]
     centres = [float(np.median(np.abs(speed[part]))) for part in parts]
-    sizes = np.array([float(np.median(np.abs(rest[part]))) / MEDIAN for part in parts])
+    sizes = np.array([float(np.median(np.abs(residual[part]))) / MEDIAN for part in parts])
     typical = float(np.median(sizes)) + 1e-300
     return np.asarray(np.interp(np.abs(wanted), centres, np.clip(sizes, LEAST * typical, MOST_NOISE * typical)))
 
 
-def flagged(rests: Sequence[Rest]) -> list[Spans]:
-    """Spans of each piece in which the rest is loud."""
-    least = CLEAR_MOTION * max(float(np.abs(one.v).max()) for one in rests)
-    cells = [_cells(one, left, least) for one, left in zip(rests, _left(rests, least), strict=True)]
-    known = [cell for cell, one in zip(cells, rests, strict=True) if one.fitted]
-    names = ("speed", "rest", "after")
-    speed, rest, after = (np.concatenate([cell[name][cell["moving"] > 0] for cell in known]) for name in names)
+def flagged(residuals: Sequence[Residual]) -> list[Spans]:
+    """Spans of each piece in which the residual is loud."""
+    least = CLEAR_MOTION * max(float(np.abs(one.v).max()) for one in residuals)
+    cells = [_cells(one, left, least) for one, left in zip(residuals, _left(residuals, least), strict=True)]
+    known = [cell for cell, one in zip(cells, residuals, strict=True) if one.fitted]
+    names = ("speed", "residual", "after")
+    speed, residual, after = (np.concatenate([cell[name][cell["moving"] > 0] for cell in known]) for name in names)
     if not len(speed):
-        return [() for _ in rests]
+        return [() for _ in residuals]
 
     def noise(wanted: Array) -> Array:
-        return np.minimum(noise_at(speed, rest, wanted), noise_at(speed, after, wanted))
+        return np.minimum(noise_at(speed, residual, wanted), noise_at(speed, after, wanted))
 
-    sizes = np.abs(rest) / noise(speed)
+    sizes = np.abs(residual) / noise(speed)
     beyond = sizes[sizes > LEAST_LOUD]
     loud = max(LEAST_LOUD, rms(beyond)) if len(beyond) else LEAST_LOUD
     return [_spans(cell, noise(cell["speed"]), loud) for cell in cells]
 
 
-def _left(rests: Sequence[Rest], least: float) -> list[Array]:
+def _left(residuals: Sequence[Residual], least: float) -> list[Array]:
     """What the base leaves when it is fitted by least absolute deviations to the clear motion of what may be fitted."""
-    slopes = np.concatenate([one.slopes for one in rests if one.fitted])
-    residual = np.concatenate([one.residual for one in rests if one.fitted])
-    counts = np.concatenate([np.abs(one.v) > least for one in rests if one.fitted])
+    slopes = np.concatenate([one.slopes for one in residuals if one.fitted])
+    residual = np.concatenate([one.residual for one in residuals if one.fitted])
+    counts = np.concatenate([np.abs(one.v) > least for one in residuals if one.fitted])
     scale = np.sqrt((slopes**2).sum(0)) + 1e-300
     change, weight = np.zeros(len(scale)), counts.astype(float)
     for _ in range(ROUNDS if counts.any() else 0):
@@ -99,23 +99,23 @@ def _left(rests: Sequence[Rest], least: float) -> list[Array]:
         change = np.linalg.solve(normal, weighted @ residual)
         left = np.abs(residual - slopes @ (change / scale))
         weight = counts / (left + 0.1 * float(np.median(left[counts])) + 1e-300)
-    return [one.residual - one.slopes @ (change / scale) for one in rests]
+    return [one.residual - one.slopes @ (change / scale) for one in residuals]
 
 
-def _cells(one: Rest, left: Array, least: float) -> dict[str, Array]:
-    """Means over cells of `CELL` seconds of what moves: rests, speed; whether most of a cell moves; its start."""
+def _cells(one: Residual, left: Array, least: float) -> dict[str, Array]:
+    """Means over cells of `CELL` seconds of what moves: residuals, speed; whether most of a cell moves; its start."""
     number = ((one.t - one.t[0]) / CELL).astype(int)
     moving = (np.abs(one.v) > least).astype(float)
     count, rows = np.bincount(number, moving), np.bincount(number)
     mean = {
         name: np.bincount(number, moving * values) / np.maximum(count, 1.0)
-        for name, values in (("rest", left), ("after", one.after), ("speed", np.abs(one.v)))
+        for name, values in (("residual", left), ("after", one.after), ("speed", np.abs(one.v)))
     }
     return {**mean, "moving": (2 * count > rows).astype(float), "start": one.t[0] + CELL * np.arange(len(rows))}
 
 
 def _spans(cell: dict[str, Array], noise: Array, loud: float) -> Spans:
-    gain = 0.5 * (cell["rest"] / noise) ** 2 * (1 - loud**-2)
+    gain = 0.5 * (cell["residual"] / noise) ** 2 * (1 - loud**-2)
     odds = INDEPENDENT * cell["moving"] * (np.minimum(gain, MOST * np.log(loud)) - np.log(loud))
     state = np.concatenate([[False], loud_states(odds, CHANGE), [False]])
     edges = np.append(cell["start"], cell["start"][-1] + CELL)

@@ -15,21 +15,21 @@ def flexible_terms(comparison: Comparison, found: Fit, held: Predictive) -> list
     """Score all terms of the dictionary that the held-out recordings have too beside a structure, best first."""
     there = set.intersection(*(set(piece.extras) for piece in held.prepared.pieces))
     here = set.intersection(*(set(piece.extras) for piece in comparison.problem.prepared.pieces)) - {"q_d", "v"}
-    rest, slopes = held.residual(found.mount), held.slopes(found)
+    residual, slopes = held.residual(found.mount), held.slopes(found)
     terms = dictionary(comparison.problem.prepared)
     missing = {name for column in here - there for name in (column, f"position and {column}")}
     looked_at = {name: term for name, term in terms.items() if name not in (*missing, *OF_LAW)}
-    scored = [_scored(comparison, found, name, term, held, rest, slopes) for name, term in looked_at.items()]
+    scored = [_scored(comparison, found, name, term, held, residual, slopes) for name, term in looked_at.items()]
     return sorted(scored, key=lambda one: -one.evidence)
 
 
 def _scored(
-    comparison: Comparison, found: Fit, name: str, term: Term, held: Predictive, rest: Array, slopes: Array
+    comparison: Comparison, found: Fit, name: str, term: Term, held: Predictive, residual: Array, slopes: Array
 ) -> TermScores:
     evidence, beta = comparison.group(found, term.columns(comparison.problem.prepared))
-    after = rest - term.columns(held.prepared) @ beta
-    gain = held.log_likelihood(after) - held.log_likelihood(rest)
+    after = residual - term.columns(held.prepared) @ beta
+    gain = held.log_likelihood(after) - held.log_likelihood(residual)
     # The base was bent to what is missing in training, so its own parameters are free beside what is predicted.
-    left = projected(np.column_stack([rest, after]) * held.weight[:, None], slopes * held.weight[:, None])
+    left = projected(np.column_stack([residual, after]) * held.weight[:, None], slopes * held.weight[:, None])
     before, with_it = (left**2).sum(0)
     return TermScores(name, evidence, gain, 1 - float(with_it) / max(float(before), 1e-300))

@@ -50,7 +50,7 @@ def global_test(comparison: Comparison, base: Fit, seed: int = 0) -> GlobalTest:
     columns = columns_of(base.mount, tried, prepared, base.values)
     scores = Scores(comparison, base, tried, columns)
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], (scores.rows, DRAWS))
-    largest = scores.of(np.column_stack([scores.rest, signs * scores.rest[:, None]]))
+    largest = scores.of(np.column_stack([scores.residual, signs * scores.residual[:, None]]))
     statistic, null = float(largest[0]), largest[1:]
     p = (1 + int(np.sum(null >= statistic))) / (1 + DRAWS)
     return GlobalTest(statistic, float(np.quantile(null, 1 - ALPHA)), p)
@@ -67,8 +67,8 @@ class Scores:
         scaled = transformed[inside] * np.sqrt(weight[bands.band[inside]])[:, None]
         target, known, tests = np.split(scaled, [1, 1 + own.shape[1]], axis=1)
         self._normal = np.linalg.inv(known.T @ known + np.diag(1 / prior**2))
-        self.rest = target[:, 0] - known @ (self._normal @ (known.T @ target[:, 0]))
-        self.rows = len(self.rest)
+        self.residual = target[:, 0] - known @ (self._normal @ (known.T @ target[:, 0]))
+        self.rows = len(self.residual)
         self._tests = tests - known @ (self._normal @ (known.T @ tests))
         self._gram = tests.T @ self._tests
         torque = float(np.sqrt(np.mean(comparison.problem.prepared.stacked("tau") ** 2)))

@@ -186,8 +186,8 @@ def _chi2(parts: Sequence[Crossed], noise: Sequence[Array], form: type[Drive], m
     return float(left @ left) / OVERLAP
 
 
-def _noise(rest: Complex) -> Array:
+def _noise(residual: Complex) -> Array:
     """Standard deviation of each bin's sum over segments, averaged over neighbouring bins."""
-    power = (np.abs(rest) ** 2).sum(0)
+    power = (np.abs(residual) ** 2).sum(0)
     kernel = np.ones(SMOOTH) / SMOOTH
     return np.asarray(np.sqrt(np.convolve(np.pad(power, SMOOTH // 2, mode="edge"), kernel, "valid") + 1e-300))

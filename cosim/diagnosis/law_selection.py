@@ -1,8 +1,9 @@
 """Would another friction law serve better as the base? A proposal beside the verdict, never an effect of it.
 
 One bristle yields over one distance; a row of elements that slip one after the other yields over many. What that row
-would explain is measured with elements of free shares, the stop operators of the bank, which everywhere else are
-nuisances: there they keep a law's misfit from being taken for an effect, so here nothing else may stand beside them.
+would explain is measured with elements of free shares, the stop operators of the discrepancy basis. Everywhere else
+they are nuisances: there they keep a law's misfit from being taken for an effect, so here nothing else may stand beside
+them.
 Laws that differ in a number or two are fitted. A law without memory gets its memory from the effect `presliding`, and
 a Stribeck curve is an effect too.
 """
@@ -13,7 +14,7 @@ import numpy as np
 
 from cosim.diagnosis.entries import LawProposal
 from cosim.estimation.blocks import Blocks
-from cosim.estimation.discrepancy_basis import bank
+from cosim.estimation.discrepancy_basis import discrepancy_basis
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
@@ -57,7 +58,7 @@ def _instead(law: FrictionLaw, form: type[FrictionLaw]) -> FrictionLaw:
 def _elements_gain(problem: Problem, chosen: Fit) -> float:
     """Share that a row of elements removes, beside the structure's own tangents, from blocks it was not fitted to."""
     weight = problem.weight[:, None]
-    own, stops = chosen.slopes * weight, bank(problem.prepared)[0] * weight
+    own, stops = chosen.slopes * weight, discrepancy_basis(problem.prepared)[0] * weight
     target, blocks = chosen.residual * problem.weight, Blocks.of(problem.prepared)
     return 1 - _crossed(target, np.column_stack([own, stops]), blocks) / _crossed(target, own, blocks)
 

@@ -73,8 +73,8 @@ class Policy:
     floor: float = 26.0
     """Evidence of a flexible term that no misfit of a friction law reaches ... Unit: nats."""
     contradicted: float = 0.05
-    """... if it does not add more than this share to the held-out rest. Unit: 1. A level that wanders follows anything
-    slow by chance: of four nulls with 31 to 77 nats two added .7 and 10 ..."""
+    """... if it does not add more than this share to the held-out residual. Unit: 1. A level that wanders follows
+    anything slow by chance: of four nulls with 31 to 77 nats two added .7 and 10 ..."""
     sure_floor: float = 100.0
     """... or that none reaches whatever held-out recordings say, where a motion of another kind may hide it. Unit:
     nats ..."""
@@ -83,15 +83,15 @@ class Policy:
     imitation: float = 0.3
     """Evidence of what is left, relative to a name's, from which the name may imitate what is missing. Unit: 1."""
     follows: float = 0.3
-    """Share of the held-out rest that a quantity must predict for the rest to be said to follow it ... Unit: 1."""
+    """Share of the held-out residual that a quantity must predict for it to be said to follow that ... Unit: 1."""
     imitation_share: float = 0.6
     """Share of the residual energy from which a name imitates nothing smaller. Unit: 1."""
     beside: float = 0.7
     """... and beside the best one: this share of what that predicts. Unit: 1."""
-    large_rest: float = 0.12
-    """Slow part of the rest, relative to the friction torque, above which something is missing, whatever it follows.
-    Unit: 1. 96 nulls of three generators left at most .118."""
-    large_rest_there: float = 0.3
+    large_residual: float = 0.12
+    """Slow part of the residual, relative to the friction torque, above which something is missing, whatever it
+    follows. Unit: 1. 96 nulls of three generators left at most .118."""
+    large_residual_there: float = 0.3
     """The same on held-out recordings, to which no number was fitted."""
 
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.flagged import Rest, Spans, flagged, noise_at
+from cosim.diagnosis.flagged import Residual, Spans, flagged, noise_at
 from cosim.diagnosis.result import HeldOut, Trace
-from cosim.estimation.discrepancy_basis import bank
+from cosim.estimation.discrepancy_basis import discrepancy_basis
 from cosim.estimation.fit import free_parameters
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.least_squares import projected
@@ -104,9 +104,9 @@ def _sliding(recordings: Sequence[Recording], models: Structures, cutoff: float)
 def _floor(prepared: Prepared, mount: Mount) -> float:
     """RMS that a general friction model and slow drifts, fitted to this very recording, would leave: noise, roughly."""
     kept = [piece.kept for piece in prepared.pieces]
-    left = [rest[rows] for rest, rows in zip(residuals(prepared, mount), kept, strict=True)]
+    left = [one[rows] for one, rows in zip(residuals(prepared, mount), kept, strict=True)]
     drift = np.concatenate([_drifts(piece)[piece.kept] for piece in prepared.pieces])
-    return rms(projected(np.concatenate(left), np.column_stack([*bank(prepared), drift])))
+    return rms(projected(np.concatenate(left), np.column_stack([*discrepancy_basis(prepared), drift])))
 
 
 def _drifts(piece: Piece) -> Array:
@@ -130,34 +130,34 @@ def interval_of(before: Array, after: Array, dt: float) -> tuple[float, float]:
 def traces(train: Sequence[Recording], heldout: Sequence[Recording], models: Structures) -> tuple[Trace, ...]:
     """Signals of all recordings for pictures and for the file of missing torque."""
     prepared = [prepare([recording], CUTOFF) for recording in (*train, *heldout)]
-    rests = [_rests(one, models, number < len(train)) for number, one in enumerate(prepared)]
-    spans = iter(flagged([rest for parts in rests for rest in parts]))
-    intervals = [tuple(span for _ in parts for span in next(spans)) for parts in rests]
-    found = zip(prepared, rests, intervals, strict=True)
+    pieces = [_residuals(one, models, number < len(train)) for number, one in enumerate(prepared)]
+    spans = iter(flagged([one for parts in pieces for one in parts]))
+    intervals = [tuple(span for _ in parts for span in next(spans)) for parts in pieces]
+    found = zip(prepared, pieces, intervals, strict=True)
     return tuple(_trace(one, parts, when) for one, parts, when in found)
 
 
-def _rests(prepared: Prepared, models: Structures, fitted: bool) -> list[Rest]:
+def _residuals(prepared: Prepared, models: Structures, fitted: bool) -> list[Residual]:
     """What the refitted base and the better model leave of each piece, away from its edges."""
     inverse = Inverse(models.before, free_parameters(models.before))
-    rests = []
+    pieces = []
     for piece, after in zip(prepared.pieces, residuals(prepared, models.after), strict=True):
         torque, slopes = inverse.torque(piece, inverse.present)
         rows = piece.inside
         left = (piece.tau - torque)[rows]
-        rests.append(Rest(piece.t[rows], piece.v[rows], left, after[rows], slopes[rows], fitted))
-    return rests
+        pieces.append(Residual(piece.t[rows], piece.v[rows], left, after[rows], slopes[rows], fitted))
+    return pieces
 
 
-def _trace(prepared: Prepared, rests: Sequence[Rest], intervals: Spans) -> Trace:
+def _trace(prepared: Prepared, pieces: Sequence[Residual], intervals: Spans) -> Trace:
     (name,) = prepared.names
     q, tau = (np.concatenate([getattr(p, signal)[p.inside] for p in prepared.pieces]) for signal in ("q", "tau"))
     t, v, before, after = (
-        np.concatenate([getattr(rest, signal) for rest in rests]) for signal in ("t", "v", "residual", "after")
+        np.concatenate([getattr(one, signal) for one in pieces]) for signal in ("t", "v", "residual", "after")
     )
     return Trace(
         name=name,
-        heldout=not rests[0].fitted,
+        heldout=not pieces[0].fitted,
         t=t,
         q=q,
         v=v,

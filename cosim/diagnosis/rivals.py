@@ -10,7 +10,7 @@ from cosim.diagnosis.search import CandidateFit, Search, Stage, is_admissible, m
 from cosim.estimation.fit import Fit
 from pyfmi_models.effects import Effect
 
-Say = Callable[[str], None]
+OnProgress = Callable[[str], None]
 ROUNDS = 4
 
 
@@ -48,27 +48,27 @@ class Examined:
     """What was tried beside the structure that stands."""
 
 
-def examine(comparison: Comparison, found: Search, say: Say = lambda _: None) -> Examined:
+def examine(comparison: Comparison, found: Search, on_progress: OnProgress = lambda _: None) -> Examined:
     """Take out, challenge and swap until nothing changes."""
     chosen, known = found.chosen, {_names(one.current): one for one in found.stages}
     for _ in range(ROUNDS):
-        effects, better = _round(comparison, chosen, known, say)
+        effects, better = _round(comparison, chosen, known, on_progress)
         if better is None:
             break
         chosen = better
     else:  # swaps went in a circle: what stands is examined as it is
-        effects = [_challenged(comparison, chosen, group, known, say) for group in grouped(comparison, chosen)]
+        effects = [_challenged(comparison, chosen, group, known, on_progress) for group in grouped(comparison, chosen)]
     if _names(chosen) not in known:
-        known[_names(chosen)] = stage(comparison, chosen, say)
+        known[_names(chosen)] = stage(comparison, chosen, on_progress)
     return Examined(found.base, chosen, tuple(effects), known[_names(chosen)])
 
 
 def _round(
-    comparison: Comparison, chosen: Fit, known: dict[tuple[str, ...], Stage], say: Say
+    comparison: Comparison, chosen: Fit, known: dict[tuple[str, ...], Stage], on_progress: OnProgress
 ) -> tuple[list[AcceptedEffect], Fit | None]:
     effects = []
     for group in grouped(comparison, chosen):
-        one = _challenged(comparison, chosen, group, known, say)
+        one = _challenged(comparison, chosen, group, known, on_progress)
         if one.own.evidence < comparison.policy.keep_evidence and len(grouped(comparison, chosen)) > 1:
             return [], one.without
         best = settled(one.misfits, one.own, one.rivals)
@@ -97,14 +97,18 @@ def grouped(comparison: Comparison, chosen: Fit) -> list[tuple[Effect, ...]]:
 
 
 def _challenged(
-    comparison: Comparison, chosen: Fit, group: tuple[Effect, ...], known: dict[tuple[str, ...], Stage], say: Say
+    comparison: Comparison,
+    chosen: Fit,
+    group: tuple[Effect, ...],
+    known: dict[tuple[str, ...], Stage],
+    on_progress: OnProgress,
 ) -> AcceptedEffect:
     problem = comparison.problem
-    say(group[0].title)
+    on_progress(group[0].title)
     rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
     without = problem.fit(replace(chosen.mount, effects=rest), 15)
     if _names(without) not in known:
-        known[_names(without)] = stage(comparison, without, say)
+        known[_names(without)] = stage(comparison, without, on_progress)
     beside = known[_names(without)]
     own = weighed(comparison, chosen, beside.current, effect=group[0])
     rivals = [one for one in beside.tried if one.effect.id != group[0].id and is_admissible(comparison, one)]

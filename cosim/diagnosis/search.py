@@ -21,7 +21,7 @@ from cosim.diagnosis.policy import Policy
 from cosim.estimation.fit import Fit
 from pyfmi_models.effects import Effect
 
-Say = Callable[[str], None]
+OnProgress = Callable[[str], None]
 MOST_WAVES = 8
 """Effects that one diagnosis may add, each harmonic of a ripple counted."""
 
@@ -51,20 +51,20 @@ class Stage:
     screened: tuple[Screened, ...]
 
 
-def stage(comparison: Comparison, current: Fit, say: Say = lambda _: None) -> Stage:
+def stage(comparison: Comparison, current: Fit, on_progress: OnProgress = lambda _: None) -> Stage:
     """Screen all candidates beside a structure and refit the best forms."""
     screened = comparison.screen(current)
     worth = starts(screened, comparison.policy)
     fits = [
-        refitted(comparison, current, effect, many, _counted(say, number, len(worth)))
+        refitted(comparison, current, effect, many, _counted(on_progress, number, len(worth)))
         for number, (effect, many) in enumerate(worth, 1)
     ]
     return Stage(current, tuple(sorted(fits, key=lambda one: -one.evidence)), tuple(screened))
 
 
-def _counted(say: Say, number: int, of: int) -> Say:
+def _counted(on_progress: OnProgress, number: int, of: int) -> OnProgress:
     """Say with every text how far a search is."""
-    return lambda text: say(f"{text} ({number} of {of})")
+    return lambda text: on_progress(f"{text} ({number} of {of})")
 
 
 def starts(screened: Sequence[Screened], policy: Policy) -> list[tuple[Effect, int]]:
@@ -97,10 +97,10 @@ def _key(one: Screened) -> object:
 
 
 def refitted(
-    comparison: Comparison, current: Fit, effect: Effect, many: int, say: Say = lambda _: None
+    comparison: Comparison, current: Fit, effect: Effect, many: int, on_progress: OnProgress = lambda _: None
 ) -> CandidateFit:
     """Add an effect to a fitted structure, refit everything, weigh it."""
-    say(effect.title)
+    on_progress(effect.title)
     problem = comparison.problem
     grown = replace(current.mount, effects=(*current.mount.effects, effect))
     found, aside = problem.fit(grown, 12), aside_for(effect.id)
@@ -134,16 +134,16 @@ class Search:
         return self.stages[-1].current
 
 
-def search(comparison: Comparison, base: Fit, say: Say = lambda _: None) -> Search:
+def search(comparison: Comparison, base: Fit, on_progress: OnProgress = lambda _: None) -> Search:
     """Add the admissible effect of the largest evidence until none has enough."""
-    stages, largest = [stage(comparison, base, say)], 0.0
+    stages, largest = [stage(comparison, base, on_progress)], 0.0
     while True:
         now = stages[-1]
         best = best_of(comparison, now, largest)
         if best is None or _is_full(best, comparison):
             return Search(base, tuple(stages))
         largest = max(largest, best.evidence)
-        stages.append(stage(comparison, with_harmonics(comparison, best.fit, best.effect), say))
+        stages.append(stage(comparison, with_harmonics(comparison, best.fit, best.effect), on_progress))
 
 
 def least(policy: Policy, largest: float, gain: float) -> float:

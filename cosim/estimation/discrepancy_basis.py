@@ -66,7 +66,7 @@ def speed_shapes(piece: Piece, top: float) -> Array:
 
 
 @lru_cache(maxsize=4)
-def bank(prepared: Prepared) -> tuple[Array, Array]:
+def discrepancy_basis(prepared: Prepared) -> tuple[Array, Array]:
     """Return the stop operators and the speed shapes at the kept rows, filtered: (rows, 8) and (rows, 3)."""
     distances = stop_distances(prepared)
     top = max(abs(edge) for edge in prepared.ranges["v"])

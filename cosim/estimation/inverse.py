@@ -1,6 +1,6 @@
 """The torque that a recorded motion needs, and how it changes with every parameter.
 
-    needed(t) = D^-1 [ J(q) q'' + J'(q) q'^2 / 2 + contact + viscous + loads + coupled ] + shaken
+    needed(t) = D^-1 [ J(q) q'' + J'(q) q'^2 / 2 + contact + viscous + loads + coupled ] + tones
 
 with the true motion recovered from the reading, the states of friction and effects integrated along it, what hangs on
 a spring (`coupled`) answered in the frequency domain, what is behind a play simulated (`play.py`), and D the drive
@@ -73,7 +73,7 @@ class Inverse:
     def behind(self, piece: Piece, columns: Array, values: Array) -> Array:
         """The same after springs, drive and clocks, which act on a torque as a whole, and with what shakes the axis."""
         full = self._with(values)
-        return self._with_shaken(piece, self._unshaken(piece, columns, full), full)
+        return self._with_tones(piece, self._without_tones(piece, columns, full), full)
 
     def phases(self, piece: Piece, values: Array) -> dict[str, float]:
         """Phase [rad] at time zero of what shakes the axis in a piece, by the name of the parameter."""
@@ -81,13 +81,13 @@ class Inverse:
         if not names:
             return {}
         full = self._with(values)
-        rest = piece.tau - self._unshaken(piece, self.momentary(piece, values), full)[:, 0]
+        residual = piece.tau - self._without_tones(piece, self.momentary(piece, values), full)[:, 0]
         tones = self._tones(full)
         late = [float(np.angle(self._drive(full, tone.hertz))) for tone in tones]
-        found = in_phase(piece, rest, tones, self._telling(piece))
+        found = in_phase(piece, residual, tones, self._telling(piece))
         return {name: phase + lag for name, (phase, _), lag in zip(names, found, late, strict=True)}
 
-    def _unshaken(self, piece: Piece, columns: Array, full: Array) -> Array:
+    def _without_tones(self, piece: Piece, columns: Array, full: Array) -> Array:
         columns = self._with_coupled(piece, columns, full)
         columns = self._with_motors(piece, columns, full)
         columns = self._undone_drive(columns, full, piece.dt)
@@ -239,15 +239,15 @@ class Inverse:
                 out[:, 1 + column] -= slope * (later(other) - later(full)) / change
         return np.asarray(out)
 
-    def _with_shaken(self, piece: Piece, columns: Array, full: Array) -> Array:
+    def _with_tones(self, piece: Piece, columns: Array, full: Array) -> Array:
         """Add what shakes the axis, in the phase that the torque recorded in this piece tells, and its derivatives."""
         prefixes = self._parts(PeriodicDisturbance)
         if not prefixes:
             return columns
-        rest, rows = piece.tau - columns[:, 0], self._telling(piece)
+        residual, rows = piece.tau - columns[:, 0], self._telling(piece)
 
         def added(numbers: Array) -> Array:
-            return np.asarray(sum(torque for _, torque in in_phase(piece, rest, self._tones(numbers), rows)))
+            return np.asarray(sum(torque for _, torque in in_phase(piece, residual, self._tones(numbers), rows)))
 
         return self._with_changes(columns, full, added, prefixes)
 

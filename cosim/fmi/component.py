@@ -5,7 +5,7 @@ Call sequence, once each unless said otherwise:
     1. `ports`                      names, references, causality and units, before anything runs
     2. `start(parameters)`          sets parameters and start values, initialises at t = 0
     3. `get`, `set`, `step`         in every tick, or their addresses in `functions`, called by the C loop;
-       `save`, `restore`            around steps that are taken back, where `rewinds` says that it can
+       `save`, `restore`            around steps that are taken back, where `can_get_and_set_state` says that it can
     4. `failed(status)`             after a call that returned a status above 1; then nothing more is called but close
     5. `close()`                    frees everything, whatever happened before
 
@@ -99,11 +99,11 @@ class Component(Protocol):
         """The inputs that each output follows at once, without a step; None where nothing is said about it."""
 
     @property
-    def rewinds(self) -> bool:
+    def can_get_and_set_state(self) -> bool:
         """Whether `save` and `restore` work."""
 
     @property
-    def flexible(self) -> bool:
+    def can_vary_step(self) -> bool:
         """Whether steps may differ in length."""
 
     @property

@@ -197,12 +197,12 @@ class FmuComponent:
         self.close()
 
     @property
-    def rewinds(self) -> bool:
+    def can_get_and_set_state(self) -> bool:
         """Whether the FMU can save and restore its state."""
         return bool(self._own.canGetAndSetFMUstate)
 
     @property
-    def flexible(self) -> bool:
+    def can_vary_step(self) -> bool:
         """Whether the FMU takes steps of changing length."""
         return bool(self._own.canHandleVariableCommunicationStepSize)
 
@@ -261,7 +261,12 @@ class FmuComponent:
 
     def _functions(self) -> Functions | None:
         kind, real, state = ("fmi2", "Real", "FMUstate") if self._version == 2 else ("fmi3", "Float64", "FMUState")
-        names = [f"Set{real}", f"Get{real}", "DoStep", *((f"Get{state}", f"Set{state}") if self.rewinds else ())]
+        names = [
+            f"Set{real}",
+            f"Get{real}",
+            "DoStep",
+            *((f"Get{state}", f"Set{state}") if self.can_get_and_set_state else ()),
+        ]
         addresses = [ctypes.cast(getattr(self._fmu.dll, kind + name), ctypes.c_void_p).value or 0 for name in names]
         instance = self._fmu.component
         functions = Functions(self._version, getattr(instance, "value", instance), *addresses)

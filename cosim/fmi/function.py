@@ -45,7 +45,7 @@ class FunctionComponent:
         origin: what a recording shall say about where it comes from.
     """
 
-    rewinds, flexible = False, True
+    can_get_and_set_state, can_vary_step = False, True
 
     def __init__(
         self,

@@ -76,12 +76,12 @@ class ScheduledComponent(FmuComponent):
         self._zero = 0.0
 
     @property
-    def rewinds(self) -> bool:
+    def can_get_and_set_state(self) -> bool:
         """Partitions are not taken back."""
         return False
 
     @property
-    def flexible(self) -> bool:
+    def can_vary_step(self) -> bool:
         """Steps of any length."""
         return True
 

@@ -121,7 +121,7 @@ def _check_controller(scenario: Scenario, name: str, component: FmuComponent, in
         raise _no(scenario, f'"{name}.{REFERENCE}" must be fed, or there is no following error to watch')
     if len(inputs) > INPUTS:
         raise _no(scenario, f"the controller has {len(inputs)} inputs, and a record has room for {INPUTS}")
-    if not component.rewinds:
+    if not component.can_get_and_set_state:
         raise _no(scenario, f'"{name}" cannot save its state, which each entry into operation starts from')
     period = period_of(component)
     if period and abs(period - scenario.step) > 1e-9 * period:

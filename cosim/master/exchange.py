@@ -118,12 +118,12 @@ class ExchangeComponent(FmuComponent):
         return (*super().messages(), *([f"{reason}, because of {self._culprit()}"] if reason else []))
 
     @property
-    def rewinds(self) -> bool:
+    def can_get_and_set_state(self) -> bool:
         """Steps of the solver are not taken back."""
         return False
 
     @property
-    def flexible(self) -> bool:
+    def can_vary_step(self) -> bool:
         """Steps of any length."""
         return True
 

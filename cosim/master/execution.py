@@ -35,7 +35,7 @@ class Execution:
     loop: CompiledLoop | InterpretedLoop
     writer: MemoryWriter
     ticks: int
-    progress: Progress | None
+    on_progress: Progress | None
     last: bool = False
     seconds: float = 0.0
     ended: str = ""
@@ -105,8 +105,8 @@ class Execution:
             with uninterrupted():
                 self._write(self.loop.run(len(chunk), given))
             self._check()
-            if self.progress:
-                self.progress(self.loop.tick, self.ticks)
+            if self.on_progress:
+                self.on_progress(self.loop.tick, self.ticks)
         if self.last and not self.ended:  # where a row falls due at stop
             self.loop.finish(self._given(streams, np.array([self.ticks])))
 

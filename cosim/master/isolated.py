@@ -53,8 +53,10 @@ def run_isolated(
     watch = Watch(cell.board(), scenario.step, call_timeout)
     pid = cell.pid
     try:
-        told = options.progress or _ignore
-        statistics = cell.call(_work, scenario, replace(options, progress=None), told=told, overdue=watch.overdue)
+        told = options.on_progress or _ignore
+        statistics = cell.call(
+            _work, scenario, replace(options, on_progress=None), on_message=told, overdue=watch.overdue
+        )
     except KeyboardInterrupt:
         cell.finish(Watch(cell.board(), scenario.step, GRACE).overdue)
         raise
@@ -68,7 +70,7 @@ def run_isolated(
 
 def _work(scenario: Scenario, options: Options) -> Statistics:
     """Run here, where a crash may happen."""
-    return run(scenario, replace(options, progress=tell)).statistics
+    return run(scenario, replace(options, on_progress=tell)).statistics
 
 
 def _ignore(done: int, of: int) -> None:

@@ -8,9 +8,9 @@ from typing import Any, cast
 import numpy as np
 
 from cosim.data.signals import Samples, Signal, check_frequency
+from cosim.fmi.alias import Aliased
 from cosim.fmi.component import Component
 from cosim.fmi.function import FunctionComponent, load_function
-from cosim.fmi.renamed import Renamed
 from cosim.master.exchange import open_fmu
 from cosim.support.errors import WiringError
 from cosim.system.arrays import each_record, each_wire
@@ -67,7 +67,7 @@ def _opened(stack: ExitStack, name: str, source: Source, system: System) -> Comp
     if hasattr(component, "configure"):
         given = system.parameters.get(name, {}).items()
         component.configure({names[key].name if key in names else key: value for key, value in given})
-    return cast(Component, Renamed(component, names)) if names else component
+    return cast(Component, Aliased(component, names)) if names else component
 
 
 def _made(stack: ExitStack, name: str, source: Source) -> Component:

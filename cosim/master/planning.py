@@ -18,7 +18,7 @@ from cosim.system.conversions import exact, table_of
 from cosim.system.faults import broken
 from cosim.system.plan import Column, Link, Part, Plan
 from cosim.system.ports import PortRef
-from cosim.system.schedule import backward, order_of, turns
+from cosim.system.schedule import backward, order_of, planned_stages
 from cosim.system.wire import Record, Wire
 from cosim.system.wiring import Wiring
 
@@ -33,7 +33,7 @@ def make_plan(wiring: Wiring, step: float, decimation: int, start: float = 0.0) 
     """
     wiring.check()
     wiring.doubts()
-    order = order_of(wiring.algorithm.acts(tuple(wiring.components)))
+    order = order_of(wiring.algorithm.stages(tuple(wiring.components)))
     bus = _Bus(wiring, order, start)
     places = dict(bus.places)
     signal = len(places)
@@ -42,7 +42,7 @@ def make_plan(wiring: Wiring, step: float, decimation: int, start: float = 0.0) 
             places[f"{name}.{output}"] = len(places)
     return Plan(
         parts=tuple(_part(bus, name, places, step) for name in order),
-        turns=turns(wiring.algorithm, wiring.wires, wiring.components, wiring.every),
+        stages=planned_stages(wiring.algorithm, wiring.wires, wiring.components, wiring.every),
         columns=tuple(_column(bus, record, places) for record in wiring.records.values()),
         signal=signal,
         signals=len(places) - signal,

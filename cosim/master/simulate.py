@@ -25,14 +25,14 @@ class Options:
     Args:
         path: Parquet file to stream to; None keeps the recording in memory.
         force: overwrite the file.
-        progress: called between chunks.
+        on_progress: called between chunks.
         compiled: False asks for the loop in Python, which gives the same bits.
         command: what the recording of a scenario says it was made by.
     """
 
     path: Path | None = None
     force: bool = False
-    progress: Progress | None = None
+    on_progress: Progress | None = None
     compiled: bool = True
     command: str = ""
 
@@ -55,7 +55,7 @@ def simulate(system: System, options: Options = PLAIN) -> RunResult:
         told = {"scenario": system.text, "command": options.command} if system.text else {}
         writer = writer_of(wiring, plan, {**origin, **told}, options.path, options.force)
         loop = make_loop(plan, options.compiled)
-        work = Execution(wiring, plan, loop, writer, system.ticks, options.progress, system.ends_on_a_row)
+        work = Execution(wiring, plan, loop, writer, system.ticks, options.on_progress, system.ends_on_a_row)
         work.execute()
     recording = kept(writer, system.name) if options.path is None else None
     files = {} if options.path is None else {"recording": options.path}

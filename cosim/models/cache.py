@@ -19,8 +19,8 @@ FMI: Literal[3] = 3
 """Version of the FMUs built for a run."""
 
 
-def with_fmus(scenario: Scenario, say: Callable[[str], None] = lambda text: None) -> Scenario:
-    """Return the scenario with an FMU for every component made from a card or model; `say` is told of each one built.
+def with_fmus(scenario: Scenario, on_build: Callable[[str], None] = lambda text: None) -> Scenario:
+    """Return the scenario with an FMU for every component made from a card or model; `on_build` is told of each built.
 
     Raises:
         ScenarioError: there is no such card.
@@ -29,9 +29,9 @@ def with_fmus(scenario: Scenario, say: Callable[[str], None] = lambda text: None
     made = {}
     for name, component in scenario.components.items():
         if component.fmu is None and component.card is not None:
-            made[name] = _fmu(component, f"{scenario.path}: components.{name}.card", say)
+            made[name] = _fmu(component, f"{scenario.path}: components.{name}.card", on_build)
         elif component.fmu is None and component.model is not None:
-            made[name] = _fmu_of_model(component.model, say)
+            made[name] = _fmu_of_model(component.model, on_build)
     return scenario.with_fmus(made)
 
 
@@ -46,32 +46,32 @@ def hash_of_card(card: str, where: str = "card") -> str:
     return sha256(_card_file(card, where))
 
 
-def fmu_of_card(card: str, part: Literal["plant", "controller"], say: Callable[[str], None]) -> Path:
+def fmu_of_card(card: str, part: Literal["plant", "controller"], on_build: Callable[[str], None]) -> Path:
     """Return the FMU of a part of a card, built if need be.
 
     Raises:
         ScenarioError: there is no such card.
         ModelError: the card is not good, or cannot be exported.
     """
-    return _fmu(ComponentSection(card=card, part=part), "card", say)
+    return _fmu(ComponentSection(card=card, part=part), "card", on_build)
 
 
-def _fmu(component: ComponentSection, where: str, say: Callable[[str], None]) -> Path:
+def _fmu(component: ComponentSection, where: str, on_build: Callable[[str], None]) -> Path:
     card, part = str(component.card), str(component.part)
     source = _card_file(card, where)
     key = hashlib.sha256(f"{_sources()} {part} {FMI} ".encode() + source.read_bytes()).hexdigest()[:16]
     path = _home() / f"{source.stem}-{part}-{key}.fmu"
     if not path.exists():
-        say(f"building the FMU of the {part} of {card}")
+        on_build(f"building the FMU of the {part} of {card}")
         _build(card if not Path(card).exists() else str(source), part, path)
     return path
 
 
-def _fmu_of_model(model: str, say: Callable[[str], None]) -> Path:
+def _fmu_of_model(model: str, on_build: Callable[[str], None]) -> Path:
     key = hashlib.sha256(f"{_sources()} {model} {FMI}".encode()).hexdigest()[:16]
     path = _home() / f"{model}-{key}.fmu"
     if not path.exists():
-        say(f"building the FMU of {model}")
+        on_build(f"building the FMU of {model}")
         _export(_model(model), path)
     return path
 

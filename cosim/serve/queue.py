@@ -129,7 +129,7 @@ class Queue:
     def _diagnosed(self, job: Job) -> Parsed:
         recordings = self._store.folder(job.id) / "recordings"
         order = job_order(job, recordings, self._store.card(job), self._store.result(job.id))
-        answer: Parsed = self._cell.call(self._function, order, told=self._told, overdue=self._given_up)
+        answer: Parsed = self._cell.call(self._function, order, on_message=self._told, overdue=self._given_up)
         return answer
 
     def _told(self, kind: str, content: Any) -> None:

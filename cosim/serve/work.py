@@ -64,8 +64,8 @@ def _diagnosed(order: Order) -> Parsed:
         read["heldout"],
         card,
         order.out,
-        say=lambda text: tell("step", text),
-        answered=lambda found: tell("answer", in_words(found)),
+        on_progress=lambda text: tell("step", text),
+        on_answer=lambda found: tell("answer", in_words(found)),
         command=command(order),
     )
     return in_words(done.diagnosis)

@@ -61,7 +61,7 @@ class Cell:
         *arguments: Any,
         timeout: float | None = None,
         overdue: Overdue | None = None,
-        told: Callable[..., None] = lambda *_: None,
+        on_message: Callable[..., None] = lambda *_: None,
     ) -> Any:
         """Call a function of a module in the process and return its result.
 
@@ -70,7 +70,7 @@ class Cell:
             arguments: what it is called with.
             timeout: seconds that it may take.
             overdue: asked every tenth of a second whether it is given up.
-            told: called with what the process tells before it answers.
+            on_message: called with what the process tells before it answers.
 
         Raises:
             CosimError, OSError, MemoryError: the function raised it; or KeyboardInterrupt: it was told to end and did.
@@ -80,7 +80,7 @@ class Cell:
         with self._guarded(process, _either(timeout, overdue)) as late:
             try:
                 self._send(process, function, arguments)
-                answer = self._answer(process, told)
+                answer = self._answer(process, on_message)
             except (EOFError, OSError, pickle.UnpicklingError):
                 raise self._loss(process, late) from None
         if isinstance(answer, CosimError | KeyboardInterrupt | OSError | MemoryError):
@@ -155,13 +155,13 @@ class Cell:
         pickle.dump((function, arguments), process.stdin)
         process.stdin.flush()
 
-    def _answer(self, process: "subprocess.Popen[bytes]", told: Callable[..., None]) -> Any:
+    def _answer(self, process: "subprocess.Popen[bytes]", on_message: Callable[..., None]) -> Any:
         assert process.stdout is not None
         while True:
             kind, content = pickle.load(process.stdout)
             if kind == "answer":
                 return content
-            told(*content)
+            on_message(*content)
 
     @contextmanager
     def _guarded(self, process: "subprocess.Popen[bytes]", overdue: Overdue) -> Iterator[list[str]]:

@@ -19,7 +19,7 @@ from cosim.sweep.portable_job import files_of
 from cosim.sweep.table import write_table
 from cosim.system.scenario import Scenario
 
-Told = Callable[[int, int, int], None]
+OnProgress = Callable[[int, int, int], None]
 """Called after each run with runs done, runs in all, and runs that came to nothing."""
 
 
@@ -44,7 +44,7 @@ def conduct(
     address: str = "",
     force: bool = False,
     retry: bool = False,
-    told: Told = lambda done, of, failed: None,
+    on_progress: OnProgress = lambda done, of, failed: None,
     command: str = "",
 ) -> Summary:
     """Run a sweep, or what is left of it, and write `out`/table.parquet.
@@ -57,7 +57,7 @@ def conduct(
         address: of a Dask cluster that does the runs instead.
         force: start over.
         retry: run again what failed, crashed or took too long.
-        told: called after each run.
+        on_progress: called after each run.
         command: what the table says it was made by.
 
     Raises:
@@ -84,7 +84,7 @@ def conduct(
         for done, row in enumerate(rows, len(known) + 1):
             journal.append(row)
             failed += row["status"] != "ok"
-            told(done, sweep.design.runs, failed)
+            on_progress(done, sweep.design.runs, failed)
     return Summary(sweep.design.runs, len(rest), len(known), failed, perf_counter() - begun, table)
 
 

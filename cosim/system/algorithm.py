@@ -27,8 +27,8 @@ Name = str
 
 
 @dataclass(frozen=True)
-class Act:
-    """One turn of a tick, by names: these components gather their inputs, step, or are taken over the tick coupled."""
+class Stage:
+    """One stage of a tick, by names: these components gather their inputs, step, or are taken over the tick coupled."""
 
     what: Literal["gather", "step", "couple"]
     names: tuple[Name, ...]
@@ -43,9 +43,9 @@ class Jacobi(_Algorithm):
 
     kind: Literal["jacobi"] = "jacobi"
 
-    def acts(self, names: Sequence[Name]) -> tuple[Act, ...]:
+    def stages(self, names: Sequence[Name]) -> tuple[Stage, ...]:
         """Return what is done in a tick, in its order."""
-        return (Act("gather", tuple(names)), Act("step", tuple(names)))
+        return (Stage("gather", tuple(names)), Stage("step", tuple(names)))
 
 
 JACOBI = Jacobi()
@@ -60,14 +60,14 @@ class GaussSeidel(_Algorithm):
     kind: Literal["gauss-seidel"]
     order: tuple[Name, ...] = ()
 
-    def acts(self, names: Sequence[Name]) -> tuple[Act, ...]:
+    def stages(self, names: Sequence[Name]) -> tuple[Stage, ...]:
         """Return what is done in a tick, in its order."""
         order = self.order or tuple(names)
         if sorted(order) != sorted(names):
             said, have = ", ".join(order), ", ".join(names)
             message = f"The Gauss-Seidel order names {said}; it must name each component once: {have}."
             raise WiringError(message, culprit="order", value=order, choices=tuple(names))
-        return tuple(Act(what, (name,)) for name in order for what in ("gather", "step"))  # type: ignore[arg-type]
+        return tuple(Stage(what, (name,)) for name in order for what in ("gather", "step"))  # type: ignore[arg-type]
 
 
 class Iterated(_Algorithm):
@@ -85,7 +85,7 @@ class Iterated(_Algorithm):
     max_iterations: int = Field(default=50, ge=2, le=1_000_000)
     theta: float = Field(default=0.5, ge=0.0, le=1.0)
 
-    def acts(self, names: Sequence[Name]) -> tuple[Act, ...]:
+    def stages(self, names: Sequence[Name]) -> tuple[Stage, ...]:
         """Return what is done in a tick, in its order."""
         return _coupled(names, self.components or tuple(names), "components")
 
@@ -112,7 +112,7 @@ class Energy(_Algorithm):
             raise ValueError("max_pieces must be a power of two, so that time stays counted")
         return self
 
-    def acts(self, names: Sequence[Name]) -> tuple[Act, ...]:
+    def stages(self, names: Sequence[Name]) -> tuple[Stage, ...]:
         """Return what is done in a tick, in its order."""
         owners = tuple(dict.fromkeys(PortRef(output).owner for bond in self.bonds for output in bond))
         return _coupled(names, owners, "bonds")
@@ -126,11 +126,11 @@ def _named(value: Any) -> Any:
 Algorithm = Annotated[Jacobi | GaussSeidel | Iterated | Energy, Field(discriminator="kind"), BeforeValidator(_named)]
 
 
-def _coupled(names: Sequence[Name], members: tuple[Name, ...], key: str) -> tuple[Act, ...]:
+def _coupled(names: Sequence[Name], members: tuple[Name, ...], key: str) -> tuple[Stage, ...]:
     for name in members:
         if name not in names:
             message = f'algorithm.{key} names "{name}", which is no component; components are: {", ".join(names)}.'
             raise WiringError(message, culprit=name, choices=tuple(names))
     others = tuple(name for name in names if name not in members)
-    gather = Act("gather", (*others, *members))
-    return (gather, *((Act("step", others),) if others else ()), Act("couple", members))
+    gather = Stage("gather", (*others, *members))
+    return (gather, *((Stage("step", others),) if others else ()), Stage("couple", members))

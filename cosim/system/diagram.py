@@ -118,5 +118,5 @@ def origin(component: Any) -> str:
 def in_short(scenario: Scenario) -> str:
     """Name the algorithm, for Gauss-Seidel with its order."""
     names = tuple(scenario.components)
-    order = order_of(scenario.algorithm.acts(names)) if isinstance(scenario.algorithm, GaussSeidel) else ()
+    order = order_of(scenario.algorithm.stages(names)) if isinstance(scenario.algorithm, GaussSeidel) else ()
     return scenario.algorithm.kind + (f": {', '.join(order)}" if order else "")

@@ -1,8 +1,8 @@
 """What a loop executes, with names turned into places on one bus of values.
 
-A tick is a programme of turns, taken in their order: `Gather` carries values to the inputs of some components, `Step`
-takes some over their step, `Iterate` and `Balance` take some over the tick together. A turn names its components by the
-index of the first and their number, so they stand side by side in `Plan.parts`.
+A tick is a programme of stages, taken in their order: `Gather` carries values to the inputs of some components, `Step`
+takes some over their step, `Iterate` and `Balance` take some over the tick together. A stage names its components by
+the index of the first and their number, so they stand side by side in `Plan.parts`.
 """
 
 from dataclasses import dataclass
@@ -133,7 +133,7 @@ class Balance:
     most: int
 
 
-Turn = Gather | Step | Iterate | Balance
+PlannedStage = Gather | Step | Iterate | Balance
 
 
 @dataclass(frozen=True)
@@ -141,7 +141,7 @@ class Plan:
     """Everything a loop needs; `bus` is its memory. Signals take the places from `signal` on."""
 
     parts: tuple[Part, ...]
-    turns: tuple[Turn, ...]
+    stages: tuple[PlannedStage, ...]
     columns: tuple[Column, ...]
     signal: int
     signals: int
@@ -173,7 +173,7 @@ class Failure:
 
 @dataclass
 class Effort:
-    """What a coupled turn took: iterations (or pieces) in all, the most in one tick, pieces too large at the limit."""
+    """What a coupled stage took: iterations (or pieces) in all, the most in one tick, pieces too large at the limit."""
 
     rounds: int = 0
     greatest: int = 0

@@ -8,7 +8,7 @@
                         interface = "model-exchange" to step it by the built-in solver, or
                         "co-simulation", "scheduled-execution";
                         or python = "file.py:function" with inputs and outputs, see `function`;
-                        variables = { NAME = "its own name" or { name, unit } } where its names differ, see `renamed`
+                        variables = { NAME = "its own name" or { name, unit } } where its names differ, see `alias`
                         every = ticks of a step of this component, or step = s, a whole multiple of the scenario's
     [signals.NAME]      kind = "sine" | "ramp" | "sidereal" | "star" | "constant" | "steps" | "multisine" | "chirp"
                         | "slews" | "recorded" | "noise" and what the kind needs, see `signals`
@@ -172,7 +172,7 @@ def parse_scenario(text: str, path: str, directory: Path) -> Scenario:
 
 def _check_algorithm(raw: File, path: str) -> None:
     try:
-        raw.algorithm.acts(tuple(raw.components))
+        raw.algorithm.stages(tuple(raw.components))
     except WiringError as error:
         raise ScenarioError(f"{path}: {error}", culprit=error.culprit, choices=error.choices) from error
 

@@ -1,4 +1,4 @@
-"""What an algorithm makes of a wiring: the turns of a tick, what each wire delays, and loops that it cannot solve."""
+"""What an algorithm makes of a wiring: the stages of a tick, what each wire delays, and loops that it cannot solve."""
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ from math import lcm
 from cosim.fmi.component import Component
 from cosim.support.errors import UnitError, WiringError
 from cosim.support.units import unit
-from cosim.system.algorithm import Act, Algorithm, Energy, Iterated
+from cosim.system.algorithm import Algorithm, Energy, Iterated, Stage
 from cosim.system.conversions import check_smooth
-from cosim.system.plan import Balance, Gather, Inner, Iterate, Step, Turn
+from cosim.system.plan import Balance, Gather, Inner, Iterate, PlannedStage, Step
 from cosim.system.ports import PortRef
 from cosim.system.wire import Wire
 
@@ -35,14 +35,14 @@ class Delay:
         return str(self.least) if self.least == self.most else f"{self.least} to {self.most}"
 
 
-def order_of(acts: Sequence[Act]) -> tuple[str, ...]:
+def order_of(stages: Sequence[Stage]) -> tuple[str, ...]:
     """Return the components in the order in which they step."""
-    return tuple(name for act in acts if act.what != "gather" for name in act.names)
+    return tuple(name for stage in stages if stage.what != "gather" for name in stage.names)
 
 
-def coupled_of(acts: Sequence[Act]) -> tuple[str, ...]:
+def coupled_of(stages: Sequence[Stage]) -> tuple[str, ...]:
     """Return the components that are taken over the tick together."""
-    return next((act.names for act in acts if act.what == "couple"), ())
+    return next((stage.names for stage in stages if stage.what == "couple"), ())
 
 
 def delays(
@@ -53,19 +53,19 @@ def delays(
     Raises:
         WiringError: the algorithm names what is not there.
     """
-    acts = algorithm.acts(components)
-    return {wire.target: _delay(wire, algorithm, acts, every) for wire in wires}
+    stages = algorithm.stages(components)
+    return {wire.target: _delay(wire, algorithm, stages, every) for wire in wires}
 
 
-def _delay(wire: Wire, algorithm: Algorithm, acts: Sequence[Act], every: Mapping[str, int]) -> Delay:
+def _delay(wire: Wire, algorithm: Algorithm, stages: Sequence[Stage], every: Mapping[str, int]) -> Delay:
     source, target = wire.source.owner, wire.target.owner
-    members = coupled_of(acts)
-    if source not in order_of(acts):
+    members = coupled_of(stages)
+    if source not in order_of(stages):
         return Delay(0, 0)
     if source in members and target in members:
         return Delay(0, 1, "solved together" if isinstance(algorithm, Iterated) else "a piece of a step")
-    gathered = next((k for k, act in enumerate(acts) if act.what == "gather" and target in act.names), 0)
-    stepped = next(k for k, act in enumerate(acts) if act.what != "gather" and source in act.names)
+    gathered = next((k for k, stage in enumerate(stages) if stage.what == "gather" and target in stage.names), 0)
+    stepped = next(k for k, stage in enumerate(stages) if stage.what != "gather" and source in stage.names)
     return _between(every.get(source, 1), every.get(target, 1), forward=stepped < gathered)
 
 
@@ -76,41 +76,41 @@ def _between(source: int, target: int, forward: bool) -> Delay:
     return Delay(min(ages), max(ages))
 
 
-def turns(
+def planned_stages(
     algorithm: Algorithm, wires: Sequence[Wire], components: Mapping[str, Component], every: Mapping[str, int]
-) -> tuple[Turn, ...]:
-    """Return the turns of a tick, for parts in the order of `order_of`.
+) -> tuple[PlannedStage, ...]:
+    """Return the stages of a tick, for parts in the order of `order_of`.
 
     Raises:
         WiringError: the algorithm does not fit these components and wires.
     """
-    acts = algorithm.acts(tuple(components))
-    place = {name: index for index, name in enumerate(order_of(acts))}
-    made: list[Turn] = []
-    for act in acts:
-        part, parts = place[act.names[0]], len(act.names)
-        if act.what == "gather":
+    stages = algorithm.stages(tuple(components))
+    place = {name: index for index, name in enumerate(order_of(stages))}
+    made: list[PlannedStage] = []
+    for stage in stages:
+        part, parts = place[stage.names[0]], len(stage.names)
+        if stage.what == "gather":
             made.append(Gather(part, parts))
-        elif act.what == "step":
+        elif stage.what == "step":
             made.append(Step(part, parts))
         else:
-            made.append(_couple(algorithm, act, wires, components, every, place))
+            made.append(_couple(algorithm, stage, wires, components, every, place))
     return tuple(made)
 
 
 def _couple(
     algorithm: Algorithm,
-    act: Act,
+    stage: Stage,
     wires: Sequence[Wire],
     components: Mapping[str, Component],
     every: Mapping[str, int],
     place: Mapping[str, int],
-) -> Turn:
-    inside = [wire for wire in wires if wire.source.owner in act.names and wire.target.owner in act.names]
-    _check_members(algorithm, act.names, components, every)
-    check_smooth(inside, {name: components[name].ports for name in act.names})
+) -> PlannedStage:
+    inside = [wire for wire in wires if wire.source.owner in stage.names and wire.target.owner in stage.names]
+    _check_members(algorithm, stage.names, components, every)
+    check_smooth(inside, {name: components[name].ports for name in stage.names})
     inner = tuple(_inner(wire, wires, place) for wire in inside)
-    part, parts = place[act.names[0]], len(act.names)
+    part, parts = place[stage.names[0]], len(stage.names)
     if isinstance(algorithm, Iterated):
         for wire in inside:
             if wire.quantum:
@@ -129,13 +129,13 @@ def _check_members(
         if every.get(name, 1) != 1:
             message = f'"{name}" steps every {every[name]} ticks; components that are coupled must step at every tick.'
             raise WiringError(message, culprit=name, value=every[name])
-        if isinstance(algorithm, Iterated) and not components[name].rewinds:
+        if isinstance(algorithm, Iterated) and not components[name].can_get_and_set_state:
             message = (
                 f'"{name}" cannot save and restore its state, which the iterated algorithm needs; '
                 f"leave it out of algorithm.components, or choose jacobi, gauss-seidel or energy."
             )
             raise WiringError(message, culprit=name, choices=("jacobi", "gauss-seidel", "energy"))
-        if isinstance(algorithm, Energy) and not components[name].flexible:
+        if isinstance(algorithm, Energy) and not components[name].can_vary_step:
             message = f'"{name}" takes steps of one length only, and the energy algorithm cuts them into pieces.'
             raise WiringError(message, culprit=name, choices=("jacobi", "gauss-seidel", "iterated"))
 
@@ -175,8 +175,8 @@ def _bond(bond: tuple[str, str], inside: Sequence[Wire], components: Mapping[str
 
 def backward(algorithm: Algorithm, wires: Sequence[Wire], components: Collection[str]) -> set[str]:
     """Return the targets of wires that point back between components that are taken over the tick together."""
-    acts = algorithm.acts(tuple(components))
-    members, order = coupled_of(acts), order_of(acts)
+    stages = algorithm.stages(tuple(components))
+    members, order = coupled_of(stages), order_of(stages)
     inner = [(wire.source.owner, wire.target.owner, wire.target) for wire in wires]
     inner = [one for one in inner if one[0] in members and one[1] in members]
     return {target for source, owner, target in inner if order.index(source) >= order.index(owner)}
@@ -190,7 +190,7 @@ def check_loops(algorithm: Algorithm, wires: Sequence[Wire], components: Mapping
     Raises:
         WiringError: names the loop.
     """
-    members = coupled_of(algorithm.acts(tuple(components))) if isinstance(algorithm, Iterated) else ()
+    members = coupled_of(algorithm.stages(tuple(components))) if isinstance(algorithm, Iterated) else ()
     open_ = [
         wire
         for wire in wires

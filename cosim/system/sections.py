@@ -6,7 +6,7 @@ from typing import Any, Literal, get_args
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cosim.data.signals import Generator
-from cosim.fmi.renamed import Alias
+from cosim.fmi.alias import Alias
 from cosim.support.numbers import LONGEST, Count, Seconds, Step
 from cosim.system.algorithm import JACOBI, Algorithm
 from cosim.system.faults import Fault

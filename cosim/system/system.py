@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.data.signals import Signal
+from cosim.fmi.alias import Alias
 from cosim.fmi.component import Component
-from cosim.fmi.renamed import Alias
 from cosim.system.algorithm import JACOBI, Algorithm
 from cosim.system.faults import Fault
 from cosim.system.wire import Record, Wire
@@ -57,7 +57,7 @@ class System:
         parameters: by component, parameters and start values by name; "signal.output" is its value at the start.
         algorithm: how components are coupled; Jacobi where not given.
         every: by component, the ticks of its step where they are not one.
-        variables: by component, names of ours for variables of its own (see `renamed`).
+        variables: by component, names of ours for variables of its own (see `alias`).
         faults: what breaks on wires and signals, and when (see `faults`).
         decimation: ticks for each row.
         start: time of tick 0 in s, for components and recording; signals and faults count from the first tick.

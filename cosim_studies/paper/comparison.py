@@ -92,13 +92,13 @@ class Comparison:
 
 
 def compare(
-    workshop: Workshop, plan: Plan, known: Study | None = None, progress: Progress = lambda done, of: None
+    workshop: Workshop, plan: Plan, known: Study | None = None, on_progress: Progress = lambda done, of: None
 ) -> Comparison:
     """Search a design on the design seeds, then measure it and all options on the test seeds.
 
     What is `known` already of conditions, cases and test seeds is not run again.
     """
-    tried = tuple(_tried(workshop, plan, progress))
+    tried = tuple(_tried(workshop, plan, on_progress))
     chosen = choice(tried)
     best = [one.option for one in frontier(one for one in tried if one.option.knows == "nominal")]
     compared = (*plan.options, chosen_option(chosen))
@@ -106,8 +106,8 @@ def compare(
         plan=plan,
         designs=tried,
         chosen=chosen,
-        rows=tuple(_rows(workshop, _places(compared, best), plan.seeds, known, progress)),
-        survivals=tuple(_survivals(workshop, compared, plan, progress)),
+        rows=tuple(_rows(workshop, _places(compared, best), plan.seeds, known, on_progress)),
+        survivals=tuple(_survivals(workshop, compared, plan, on_progress)),
     )
 
 
@@ -135,10 +135,10 @@ def planned(workshop: Workshop, pairs: Iterable[Pair], seeds: Sequence[int]) -> 
             yield Place(where.key, option.key, seed), job
 
 
-def _tried(workshop: Workshop, plan: Plan, progress: Progress) -> Iterator[Design]:
+def _tried(workshop: Workshop, plan: Plan, on_progress: Progress) -> Iterator[Design]:
     where, every = condition(A), len(plan.design_seeds)
     pairs = [(where, one, every) for one in (REFERENCE, *plan.designs)]
-    found = Ratios(performed(list(planned(workshop, pairs, plan.design_seeds)), progress))
+    found = Ratios(performed(list(planned(workshop, pairs, plan.design_seeds)), on_progress))
     for option in plan.designs:
         under = option.under(where)
         cost = price(under)
@@ -152,13 +152,13 @@ def _tried(workshop: Workshop, plan: Plan, progress: Progress) -> Iterator[Desig
 
 
 def _rows(
-    workshop: Workshop, pairs: Sequence[Pair], seeds: Sequence[int], known: Study | None, progress: Progress
+    workshop: Workshop, pairs: Sequence[Pair], seeds: Sequence[int], known: Study | None, on_progress: Progress
 ) -> Iterator[Row]:
     cases = {REFERENCE.key, "C2a"}  # these controllers are the paper's cases as they are
     done = [trial for trial in (known.trials if known else ()) if trial.case in cases]
     ready = {(trial.condition, trial.case, trial.seed) for trial in done}
     wanted = [(place, job) for place, job in planned(workshop, pairs, seeds) if place not in ready]
-    found = Ratios(Study(trials=(*done, *performed(wanted, progress).trials), seeds=tuple(seeds)))
+    found = Ratios(Study(trials=(*done, *performed(wanted, on_progress).trials), seeds=tuple(seeds)))
     for where, option, _ in pairs:
         ratios, cost = found.ratios(where.key, option.key), price(option.under(where))
         yield Row(
@@ -175,11 +175,11 @@ def _rows(
         )
 
 
-def _survivals(workshop: Workshop, compared: Sequence[Option], plan: Plan, progress: Progress) -> Iterator[Survival]:
+def _survivals(workshop: Workshop, compared: Sequence[Option], plan: Plan, on_progress: Progress) -> Iterator[Survival]:
     places = [(stress, option) for stress in plan.stresses for option in compared]
     pairs = [(stress.on(condition(B)), option, 1) for stress, option in places]
     designed = (condition(B), REFERENCE, 1)
-    found = Ratios(performed(list(planned(workshop, [designed, *pairs], plan.seeds)), progress))
+    found = Ratios(performed(list(planned(workshop, [designed, *pairs], plan.seeds)), on_progress))
     usual = found.ise[B, REFERENCE.key][plan.seeds[0]]
     for (stress, option), (where, _, _) in zip(places, pairs, strict=True):
         ise = found.ise[where.key, option.key][plan.seeds[0]]

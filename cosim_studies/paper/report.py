@@ -54,7 +54,7 @@ def reproduce(
     command: str,
     plan: Plan | None = None,
     force: bool = False,
-    progress: Callable[[int, int], None] = lambda done, of: None,
+    on_progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Written:
     """Run all experiments, and a comparison of controllers where there is a plan for one; write everything into `out`.
 
@@ -65,9 +65,9 @@ def reproduce(
         check_free(out / name, force)
     with TemporaryDirectory() as folder:
         workshop = Workshop(Path(folder))
-        found = study(workshop, seeds, progress=progress)
+        found = study(workshop, seeds, on_progress=on_progress)
         variants = study(workshop, seeds[:1], definitions())
-        comparison = compare(workshop, plan, found, progress) if plan else None
+        comparison = compare(workshop, plan, found, on_progress) if plan else None
     results = Results(found=found, variants=variants, identified=identification(seeds[0]), comparison=comparison)
     return write(out, results, command, force)
 

@@ -59,7 +59,7 @@ def study(
     seeds: Sequence[int],
     wanted: Sequence[Condition] = (),
     cases: Sequence[str] = CASES,
-    progress: Callable[[int, int], None] = lambda done, of: None,
+    on_progress: Callable[[int, int], None] = lambda done, of: None,
 ) -> Study:
     """Run the experiment under each condition (default: all) with each case and, where there is noise, each seed."""
     planned = [
@@ -68,11 +68,11 @@ def study(
         for case in cases
         for seed, one in jobs(workshop, condition, case, seeds)
     ]
-    return performed(planned, progress)
+    return performed(planned, on_progress)
 
 
 def performed(
-    planned: Sequence[tuple[Place, Job]], progress: Callable[[int, int], None] = lambda done, of: None
+    planned: Sequence[tuple[Place, Job]], on_progress: Callable[[int, int], None] = lambda done, of: None
 ) -> Study:
     """Run all jobs on all cores."""
     trials = []
@@ -80,7 +80,7 @@ def performed(
         outcomes = spread(run, [one for _, one in planned])
         for (place, _), outcome in zip(planned, outcomes, strict=True):
             trials.append(Trial(condition=place.condition, case=place.case, seed=place.seed, outcome=outcome))
-            progress(len(trials), len(planned))
+            on_progress(len(trials), len(planned))
     return Study(trials=tuple(trials), seeds=tuple(dict.fromkeys(trial.seed for trial in trials)))
 
 

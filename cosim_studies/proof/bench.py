@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from cosim.support.plain import Parsed
-from cosim_studies.proof.motion import MOTIONS, Motion, Pace, shaken
+from cosim_studies.proof.motion import MOTIONS, Motion, Pace, with_tremble
 from cosim_studies.proof.truth import BLOCKS, TICK, Array, Drive
 
 Parameters = Parsed
@@ -77,7 +77,7 @@ def draw_pace(rng: np.random.Generator, duration: float) -> Pace:
 def draw_motions(rng: np.random.Generator, pace: Pace, tremble: float = 0.35) -> dict[str, Motion]:
     """Two kinds for training, a third held out; each with short bursts of tremble that excite the drive."""
     kinds = zip(RECORDINGS, ["wander", "slews", str(rng.choice(["swell", "chirp"]))], strict=True)
-    return {name: shaken(MOTIONS[kind](pace, rng), rng, tremble) for name, kind in kinds}
+    return {name: with_tremble(MOTIONS[kind](pace, rng), rng, tremble) for name, kind in kinds}
 
 
 def draw_mount(rng: np.random.Generator, friction: str, motions: dict[str, Motion], pace: Pace) -> Parsed:

@@ -20,7 +20,7 @@ from cosim_studies.proof.play import Table, Tool
 from cosim_studies.proof.seal import Row, Seals
 from cosim_studies.proof.tool import answer
 
-Told = Callable[[int, int, str], None]
+OnProgress = Callable[[int, int, str], None]
 """Called after each case with cases done, cases in all, and what was the last."""
 GENERATOR = "home"
 """What the list of decks calls the generator of this package."""
@@ -45,8 +45,8 @@ def conduct(
     *,
     workers: int | None = None,
     force: bool = False,
-    say: Callable[[str], None] = lambda text: None,
-    told: Told = lambda done, of, last: None,
+    on_seal: Callable[[str], None] = lambda text: None,
+    on_progress: OnProgress = lambda done, of, last: None,
     tool: Tool = answer,
     command: str = "",
 ) -> Parsed:
@@ -57,8 +57,8 @@ def conduct(
         out: folder; a proof begun there with the same seed and code is continued, also to more cases.
         workers: cases at a time; the cores of this machine where not given.
         force: start over.
-        say: told each seal before the tool runs.
-        told: called after each case.
+        on_seal: told each seal before the tool runs.
+        on_progress: called after each case.
         tool: what is tested.
         command: what the page says it was made by.
 
@@ -77,7 +77,7 @@ def conduct(
     }
     with ExitStack() as stack:
         journal = stack.enter_context(Journal(out, identity, force, "proof", MADE))
-        table = Table(deck.seed, deck.seconds, Seals(out / "seals.jsonl"), say, tool)
+        table = Table(deck.seed, deck.seconds, Seals(out / "seals.jsonl"), on_seal, tool)
         rest = [hand for hand in hands if hand.number not in journal.rows]
         facts = {**identity, "seed": deck.seed, "seconds": deck.seconds, "cases": deck.cases, "command": command}
         facts["calibration"] = [OFFSET, SLOPE]
@@ -85,7 +85,7 @@ def conduct(
         rows = stack.enter_context(closing(_played(table, rest, workers or cores())))
         for done, row in enumerate(rows, deck.cases - len(rest) + 1):
             journal.append(row)
-            told(done, deck.cases, _last(row))
+            on_progress(done, deck.cases, _last(row))
     return result
 
 

@@ -127,7 +127,7 @@ def chirp(pace: Pace, rng: np.random.Generator) -> Motion:
     return placed(pace, Motion(np.sin(phase), rate * np.cos(phase), change * np.cos(phase) - rate**2 * np.sin(phase)))
 
 
-def shaken(motion: Motion, rng: np.random.Generator, share: float) -> Motion:
+def with_tremble(motion: Motion, rng: np.random.Generator, share: float) -> Motion:
     """`motion` with two bursts of a faint tremble, 2 to 20 Hz, whose acceleration is `share` of the motion's peak."""
     strength = share * float(np.quantile(np.abs(motion.a), 0.98))
     time, total = ticks(motion.q.size), motion

@@ -37,14 +37,14 @@ class Table:
         seed: of the deck.
         seconds: length of a recording.
         seals: where each truth is sealed.
-        say: told each seal before the tool runs.
+        on_seal: told each seal before the tool runs.
         tool: what is tested.
     """
 
     def __init__(
-        self, seed: int, seconds: float, seals: Seals, say: Callable[[str], None], tool: Tool = answer
+        self, seed: int, seconds: float, seals: Seals, on_seal: Callable[[str], None], tool: Tool = answer
     ) -> None:
-        self.seed, self.seconds, self.seals, self.say, self.tool = seed, seconds, seals, say, tool
+        self.seed, self.seconds, self.seals, self.on_seal, self.tool = seed, seconds, seals, on_seal, tool
         self._own, self._cells = local(), list[Cell]()
 
     def play(self, hand: CaseSpec) -> Row:
@@ -76,7 +76,7 @@ class Table:
         salt = salt_of(self.seed, hand.number)
         sealed = seal(truth, salt)
         self.seals.write(hand.number, sealed)
-        self.say(f"case {hand.number}: truth sealed, SHA-256 {sealed}")
+        self.on_seal(f"case {hand.number}: truth sealed, SHA-256 {sealed}")
         return {"seal": sealed, "salt": salt, "truth": truth}
 
     def _processes(self) -> tuple[Cell, Cell]:

@@ -9,7 +9,7 @@ import numpy as np
 from cosim.support.plain import Parsed
 from cosim_studies.proof.bench import RECORDINGS, Bench, Parameters, believe, draw_drive, log_uniform, stream
 from cosim_studies.proof.machines import MACHINES, Machine, suited
-from cosim_studies.proof.motion import MOTIONS, Motion, Pace, shaken
+from cosim_studies.proof.motion import MOTIONS, Motion, Pace, with_tremble
 from cosim_studies.proof.strokes import STROKES
 from cosim_studies.proof.truth import BLOCKS, TICK
 
@@ -81,7 +81,7 @@ def _waves(rng: np.random.Generator, kind: Machine) -> dict[str, str]:
 
 def _motions(seed: int, pace: Pace, waves: dict[str, str], tremble: float) -> dict[str, Motion]:
     rng = stream(seed, "motion")
-    return {name: shaken(WAVES[wave](pace, rng), rng, tremble) for name, wave in waves.items()}
+    return {name: with_tremble(WAVES[wave](pace, rng), rng, tremble) for name, wave in waves.items()}
 
 
 def _masses(rng: np.random.Generator, kind: Machine, motions: dict[str, Motion], pace: Pace) -> Parameters:

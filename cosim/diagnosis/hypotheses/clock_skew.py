@@ -8,7 +8,7 @@ import numpy as np
 from cosim.diagnosis.candidates import Candidate, Span, has
 from cosim.diagnosis.hypotheses.base import Hypothesis, Seen
 from cosim.diagnosis.hypotheses.delay_and_lag import NOTHING_ASKED
-from cosim.diagnosis.timing_attribution import blamed
+from cosim.diagnosis.timing_attribution import attributed
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Effect
@@ -60,9 +60,9 @@ class Clocks(Hypothesis[ClockSkew]):
         return late if late > (0 if steady else problem.sample_time) else None
 
     def is_degenerate(self, problem: Problem, effect: ClockSkew) -> bool:
-        """A lateness that lies in the drive."""
+        """A lag that lies in the drive."""
         late = self.late(problem, effect)
-        return late is not None and blamed(problem.prepared, late, problem.sample_time) == "drive"
+        return late is not None and attributed(problem.prepared, late, problem.sample_time) == "drive"
 
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """Nothing asks."""

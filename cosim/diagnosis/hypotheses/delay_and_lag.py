@@ -11,7 +11,7 @@ import numpy as np
 from cosim.diagnosis.candidates import Candidate, Span, has
 from cosim.diagnosis.hypotheses.base import QUICK_CHANGES, Hypothesis, Reach
 from cosim.diagnosis.result import Where
-from cosim.diagnosis.timing_attribution import blamed
+from cosim.diagnosis.timing_attribution import attributed
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import ActuatorLag, Delay, DriveEffect, Effect
@@ -68,11 +68,11 @@ class LateTorque(Hypothesis[Drive]):
         return 1e-3 * milliseconds(effect)
 
     def is_degenerate(self, problem: Problem, effect: Drive) -> bool:
-        """A delay too short to be told from the time stamps', or a lateness that lies in the clocks."""
+        """A delay too short to be told from the time stamps', or a lag that lies in the clocks."""
         shortest = 1e3 * max(LEAST_DELAY_SAMPLES * problem.sample_time, LEAST_DELAY)
         if type(effect) is Delay and effect.delay_ms < shortest:
             return True
-        return blamed(problem.prepared, 1e-3 * milliseconds(effect), problem.sample_time) == "clock"
+        return attributed(problem.prepared, 1e-3 * milliseconds(effect), problem.sample_time) == "clock"
 
     def where(self, effect: Drive, reach: Reach) -> Where:
         """Wherever the torque changes."""

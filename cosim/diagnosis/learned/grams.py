@@ -1,4 +1,4 @@
-"""Residual, tangents, nuisances and trial columns as Gram matrices of each band and recording.
+"""Residual, tangents, nuisances and columns of candidate terms as Gram matrices of each band and recording.
 
     y = X d + C beta + Z u + e,    d ~ N(0, T^2),  beta ~ N(0, s^2 prior^2),  u, e as in `marginal.py`
 
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from cosim.diagnosis.bands import Bands
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.learned.trials import Trial
+from cosim.diagnosis.learned.candidate_terms import CandidateTerm
 from cosim.diagnosis.marginal import Group, Marginal, marginal
 from cosim.diagnosis.priors import trust
 from cosim.estimation.fit import Fit
@@ -30,15 +30,15 @@ SIZE = 0.5
 """What a term may be, relative to the friction level or to all torque where there is none (half-normal). Unit: 1."""
 
 
-def columns_of(mount: Mount, trial: Trial, prepared: Prepared) -> Array:
-    """Torque that a unit of each coefficient adds at the kept rows, (rows, count), at the trial's own coefficients."""
-    whole, names = with_trials(mount, [trial])
+def columns_of(mount: Mount, term: CandidateTerm, prepared: Prepared) -> Array:
+    """Torque that a unit of each coefficient adds at the kept rows, (rows, count), at the term's own coefficients."""
+    whole, names = with_terms(mount, [term])
     inverse = Inverse(whole, names)
     return stacked(inverse, prepared.pieces, inverse.present)[1]
 
 
-def with_trials(mount: Mount, added: Sequence[Trial]) -> tuple[Mount, tuple[str, ...]]:
-    """A mount with trials, and the names of their coefficients, one trial after the other."""
+def with_terms(mount: Mount, added: Sequence[CandidateTerm]) -> tuple[Mount, tuple[str, ...]]:
+    """A mount with terms, and the names of their coefficients, one term after the other."""
     whole = replace(mount, effects=(*mount.effects, *(one.effect for one in added)))
     prefixes = list(whole.components())[-len(added) :] if added else []
     pairs = zip(prefixes, added, strict=True)
@@ -47,7 +47,7 @@ def with_trials(mount: Mount, added: Sequence[Trial]) -> tuple[Mount, tuple[str,
 
 @dataclass(frozen=True, eq=False)
 class Grams:
-    """Gram matrices (recordings, bands, 1 + n, 1 + n) of [residual, tangents, nuisances, columns of the trials]."""
+    """Gram matrices (recordings, bands, 1 + n, 1 + n) of [residual, tangents, nuisances, columns of the terms]."""
 
     parts: Array
     plain: Array
@@ -60,9 +60,9 @@ class Grams:
     """Prior size of each tangent's parameter."""
     nuisances: tuple[Group, ...]
     columns: tuple[slice, ...]
-    """Where the columns of each trial are, among the n."""
+    """Where the columns of each term are, among the n."""
     unit: Array
-    """What a coefficient of size one stands for, of each column of the trials."""
+    """What a coefficient of size one stands for, of each column of the terms."""
 
     @property
     def recordings(self) -> int:
@@ -75,7 +75,7 @@ class Grams:
         return int(self.columns[0].start) if self.columns else int(self.parts.shape[-1]) - 1
 
     def marginal(self, chosen: Sequence[int], which: Sequence[int]) -> Marginal:
-        """Marginal likelihood of tangents, nuisances and the chosen trials on some recordings, with their sizes."""
+        """Marginal likelihood of tangents, nuisances and the chosen terms on some recordings, with their sizes."""
         kept = [0, *(1 + k for k in range(self.many)), *(1 + k for k in self._places(chosen))]
         grams = self.parts[which].sum(0)[:, kept][:, :, kept]
         groups, first = list(self.nuisances), self.many
@@ -88,7 +88,7 @@ class Grams:
         return marginal(grams, free, groups, *self._rows(which), self.floor)
 
     def fitted(self, chosen: Sequence[int], which: Sequence[int]) -> Array:
-        """Numbers of the tangents and the chosen trials: least squares, with the sizes of the marginal likelihood.
+        """Numbers of the tangents and the chosen terms: least squares, with the sizes of the marginal likelihood.
 
         Least squares as the base was fitted: weights by bands would move the base for reasons of their own.
         """
@@ -126,7 +126,7 @@ class Grams:
         return marginal(grams, free, groups, *self._rows(which), self.floor).log_likelihood
 
 
-def grams_of(comparison: Comparison, found: Fit, columns: Sequence[Array], added: Sequence[Trial]) -> Grams:
+def grams_of(comparison: Comparison, found: Fit, columns: Sequence[Array], added: Sequence[CandidateTerm]) -> Grams:
     """Gram matrices of the training recordings, beside a structure."""
     level = float(np.sqrt(np.mean(comparison.nuisances.level**2))) or float(np.std(_torque(comparison.problem)))
     unit = [one.prior * (level if one.in_torque else 1.0) for one in added]

@@ -12,10 +12,10 @@ import numpy as np
 
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.entries import LearnedEntry
+from cosim.diagnosis.learned.candidate_terms import CandidateTerm, candidate_terms
 from cosim.diagnosis.learned.grams import columns_of, grams_of
 from cosim.diagnosis.learned.select import fitted, path
 from cosim.diagnosis.learned.tables import table_of
-from cosim.diagnosis.learned.trials import Trial, trials
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.protocol import interval_of, residuals
 from cosim.estimation.fit import Fit
@@ -75,7 +75,7 @@ class Learned:
 
 def learn(comparison: Comparison, found: Fit, held: Predictive) -> Learned | None:
     """Learn what a structure leaves; None where nothing that was learned is better on the held-out recordings."""
-    tried = [one for one in trials(found.mount, comparison.problem.prepared) if _is_recorded(one, held)]
+    tried = [one for one in candidate_terms(found.mount, comparison.problem.prepared) if _is_recorded(one, held)]
     columns = [columns_of(found.mount, one, comparison.problem.prepared) for one in tried]
     chosen = path(grams_of(comparison, found, columns, tried), range(len(tried)))
     best: Learned | None = None
@@ -86,7 +86,7 @@ def learn(comparison: Comparison, found: Fit, held: Predictive) -> Learned | Non
     return replace(best, size=_size(comparison, best)) if best else None
 
 
-def _judged(comparison: Comparison, found: Fit, terms: Sequence[Trial], held: Predictive) -> Learned | None:
+def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], held: Predictive) -> Learned | None:
     """Fit some terms and ask the held-out recordings; None where they veto."""
     whole, effects = _allowed(comparison, found, terms)
     if not effects:
@@ -102,7 +102,7 @@ def _judged(comparison: Comparison, found: Fit, terms: Sequence[Trial], held: Pr
     return Learned(whole, effects, tuple(one.name for one in terms), 0.0, before, after, interval)
 
 
-def _allowed(comparison: Comparison, found: Fit, terms: Sequence[Trial]) -> tuple[Mount, tuple[Effect, ...]]:
+def _allowed(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]) -> tuple[Mount, tuple[Effect, ...]]:
     """Fit terms that break no rule, with fewer waves where they would: a drive that falls where no row tells."""
     for _ in range(FEWER):
         mount, fit = fitted(comparison, found, terms)
@@ -117,17 +117,17 @@ def _allowed(comparison: Comparison, found: Fit, terms: Sequence[Trial]) -> tupl
 def _left(held: Predictive, mount: Mount) -> list[Array]:
     """What a model leaves of each held-out recording, by the protocol."""
     pieces = held.protocol.pieces
-    rests = [rest[piece.inside] for rest, piece in zip(residuals(held.protocol, mount), pieces, strict=True)]
+    left = [one[piece.inside] for one, piece in zip(residuals(held.protocol, mount), pieces, strict=True)]
     owners = [piece.recording for piece in pieces]
     return [
-        np.concatenate([rest for rest, own in zip(rests, owners, strict=True) if own == number])
+        np.concatenate([one for one, own in zip(left, owners, strict=True) if own == number])
         for number in sorted(set(owners))
     ]
 
 
-def _is_recorded(trial: Trial, held: Predictive) -> bool:
+def _is_recorded(term: CandidateTerm, held: Predictive) -> bool:
     """Whether the held-out recordings have what a term goes over."""
-    return all(one.name in piece.extras for one in trial.effect.inputs() for piece in held.prepared.pieces)
+    return all(one.name in piece.extras for one in term.effect.inputs() for piece in held.prepared.pieces)
 
 
 def _size(comparison: Comparison, learned: Learned) -> float:

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.learned.grams import Grams, grams_of, with_trials
-from cosim.diagnosis.learned.trials import Trial
+from cosim.diagnosis.learned.candidate_terms import CandidateTerm
+from cosim.diagnosis.learned.grams import Grams, grams_of, with_terms
 from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array
@@ -77,7 +77,9 @@ def _scores(grams: Grams, chosen: Sequence[int]) -> tuple[float, float]:
     return evidence, left
 
 
-def fitted(comparison: Comparison, found: Fit, terms: Sequence[Trial]) -> tuple[Mount, tuple[Trial, ...]]:
+def fitted(
+    comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]
+) -> tuple[Mount, tuple[CandidateTerm, ...]]:
     """Fit the chosen terms together with the base: Gauss-Newton, the size of each term by marginal likelihood.
 
     It ends where a step does not lower the error, as from tables so steep that no command gives what is needed.
@@ -99,15 +101,15 @@ def fitted(comparison: Comparison, found: Fit, terms: Sequence[Trial]) -> tuple[
     return best[1].mount, best[2]
 
 
-def _rising(trial: Trial) -> Trial:
+def _rising(term: CandidateTerm) -> CandidateTerm:
     """A hysteresis without the elements that would give energy."""
-    if not isinstance(trial.effect, LearnedHysteresis) or (trial.coefficients >= 0).all():
-        return trial
-    values = np.maximum(trial.coefficients, 0.0)
-    return replace(trial, prior=np.where(values > 0, trial.prior, 0.0)).with_coefficients(values.tolist())
+    if not isinstance(term.effect, LearnedHysteresis) or (term.coefficients >= 0).all():
+        return term
+    values = np.maximum(term.coefficients, 0.0)
+    return replace(term, prior=np.where(values > 0, term.prior, 0.0)).with_coefficients(values.tolist())
 
 
-def _step(comparison: Comparison, now: Fit, terms: tuple[Trial, ...]) -> tuple[Fit, tuple[Trial, ...]]:
+def _step(comparison: Comparison, now: Fit, terms: tuple[CandidateTerm, ...]) -> tuple[Fit, tuple[CandidateTerm, ...]]:
     """One step: the target is what the base would leave without the terms."""
     columns = [_columns_beside(now.mount, terms, k, comparison) for k in range(len(terms))]
     old = np.concatenate([one.coefficients for one in terms])
@@ -121,18 +123,18 @@ def _step(comparison: Comparison, now: Fit, terms: tuple[Trial, ...]) -> tuple[F
     return _at(comparison, now, mount, values, terms), terms
 
 
-def _at(comparison: Comparison, now: Fit, mount: Mount, values: Array, terms: Sequence[Trial]) -> Fit:
+def _at(comparison: Comparison, now: Fit, mount: Mount, values: Array, terms: Sequence[CandidateTerm]) -> Fit:
     """A fit of the base at other numbers, beside terms."""
-    whole, _ = with_trials(mount, terms)
+    whole, _ = with_terms(mount, terms)
     prepared = comparison.problem.prepared
     torque, slopes = stacked(Inverse(whole, now.free), prepared.pieces, values)
     left = prepared.stacked("tau") - torque
     return replace(now, mount=mount, values=values, torque=torque, slopes=slopes, residual=left)
 
 
-def _columns_beside(mount: Mount, terms: Sequence[Trial], which: int, comparison: Comparison) -> Array:
+def _columns_beside(mount: Mount, terms: Sequence[CandidateTerm], which: int, comparison: Comparison) -> Array:
     """Columns of one term beside the others."""
-    whole, names = with_trials(mount, terms)
+    whole, names = with_terms(mount, terms)
     first = sum(one.count for one in terms[:which])
     inverse = Inverse(whole, names[first : first + terms[which].count])
     return stacked(inverse, comparison.problem.prepared.pieces, inverse.present)[1]
@@ -143,7 +145,7 @@ def _edges(mount: Mount, free: Sequence[str]) -> tuple[Array, Array]:
     return np.array([known[name].low for name in free]), np.array([known[name].high for name in free])
 
 
-def _spread(values: Array, terms: Sequence[Trial]) -> list[Array]:
+def _spread(values: Array, terms: Sequence[CandidateTerm]) -> list[Array]:
     """Coefficients of each term, zero where the base holds the wave already."""
     out, first = [], 0
     for one in terms:

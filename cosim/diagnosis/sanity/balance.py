@@ -190,18 +190,18 @@ class Balance:
         own = 1 / np.diag(np.linalg.inv(gram))
         inverse = np.linalg.inv(gram - np.diag(self._taken(own, size, count)))
         found = inverse @ (columns.T @ tau)
-        rest = tau - columns @ found
-        sums = inverse @ np.add.reduceat(columns * rest[:, None], self._starts).T
-        left = rms(rest)
+        residual = tau - columns @ found
+        sums = inverse @ np.add.reduceat(columns * residual[:, None], self._starts).T
+        left = rms(residual)
         share = HIDDEN + left / self.torque
         hidden = (share * left + OVERLOOKED * self.torque) * np.sqrt(count / own)
         error = np.hypot(np.sqrt((sums**2).sum(1)), hidden) / size
         number = found / size
         error[1] = np.hypot(error[1], OFFSET * number[1]) if self.one_way else error[1]
         inertia, coulomb = (Estimate(float(number[k]), float(error[k])) for k in (0, 1))
-        rows, explained = independent(rest), max(0.0, 1 - float(rest @ rest) / float(tau @ tau))
+        rows, explained = independent(residual), max(0.0, 1 - float(residual @ residual) / float(tau @ tau))
         sign = 0.5 * rows * explained * self._sign(columns, tau)
-        return Solution(inertia, coulomb, float(rest @ rest), rows, sign, explained)
+        return Solution(inertia, coulomb, float(residual @ residual), rows, sign, explained)
 
     def _sign(self, columns: Array, tau: Array) -> float:
         """Log of the squares that are left with the torque's sign turned, over those with the recorded one."""
@@ -237,11 +237,11 @@ def _clean_band(recordings: Sequence[Recording]) -> tuple[Prepared, tuple[float,
         band *= NARROWER
 
 
-def independent(rest: Array) -> float:
-    """How many rows of a rest are independent, if it is autoregressive of first order."""
-    energy = float(rest @ rest) + 1e-300
-    alike = float(rest[1:] @ rest[:-1]) / energy
-    return len(rest) * (1 - max(alike, 0.0)) / (1 + max(alike, 0.0))
+def independent(residual: Array) -> float:
+    """How many rows of a residual are independent, if it is autoregressive of first order."""
+    energy = float(residual @ residual) + 1e-300
+    alike = float(residual[1:] @ residual[:-1]) / energy
+    return len(residual) * (1 - max(alike, 0.0)) / (1 + max(alike, 0.0))
 
 
 def _timed(recording: Recording, time: float) -> Recording:

@@ -6,7 +6,8 @@ is solved for each lag. Without the bounds a late position would only look like 
 viscosity are one thing. Recordings are fitted each with numbers of its own; their log-likelihoods are added.
 
 Friction that turns round over a distance is late as well. So a lag counts only if it is there both with the plain
-balance and beside the shapes that friction laws cannot agree on (`bank`), and what neither excludes is its range.
+balance and beside the shapes that friction laws cannot agree on (`discrepancy_basis`), and what neither excludes is
+its range.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,7 +19,7 @@ from scipy.optimize import lsq_linear
 
 from cosim.diagnosis.sanity.balance import Balance
 from cosim.diagnosis.sanity.entry import Alternative, Sanity
-from cosim.estimation.discrepancy_basis import bank
+from cosim.estimation.discrepancy_basis import discrepancy_basis
 from cosim.estimation.prepare import Array
 
 Columns = Callable[[Balance], Array]
@@ -39,7 +40,7 @@ CLOCKS, CLOCKS_TOO_LATE = 0.6, 0.85
 
 
 @dataclass(frozen=True)
-class Lateness:
+class ClockOffset:
     """How much later than the torque the position is [s], and the range that is not excluded."""
 
     lag: float
@@ -65,28 +66,30 @@ class Lateness:
         return furthest < REACH - STEP / 2 and abs(self.lag) > lag - STEP / 2 and certain > least - STEP / 2
 
 
-NOT_LATE = Lateness(0.0, 0.0, 0.0)
+NO_OFFSET = ClockOffset(0.0, 0.0, 0.0)
 
 
-def lateness(balances: Sequence[Balance]) -> Lateness:
+def clock_offset(balances: Sequence[Balance]) -> ClockOffset:
     """Find the lag of the position behind the torque that balances recordings best, with any friction."""
-    plain = _lateness(balances, lambda one: one.columns(one.own_order))
+    plain = _clock_offset(balances, lambda one: one.columns(one.own_order))
     if not plain.is_late:
         return plain
-    rich = _lateness(balances, lambda one: np.column_stack([one.columns(one.own_order), *bank(one.prepared)]))
-    return Lateness(plain.lag, min(plain.low, rich.low), max(plain.high, rich.high))
+    rich = _clock_offset(
+        balances, lambda one: np.column_stack([one.columns(one.own_order), *discrepancy_basis(one.prepared)])
+    )
+    return ClockOffset(plain.lag, min(plain.low, rich.low), max(plain.high, rich.high))
 
 
-def _lateness(balances: Sequence[Balance], columns: Columns) -> Lateness:
+def _clock_offset(balances: Sequence[Balance], columns: Columns) -> ClockOffset:
     likelihood = np.sum([_likelihood(one, columns(one)) for one in balances], axis=0)
     near = LAGS[likelihood >= likelihood.max() - ALIKE]
-    return Lateness(float(LAGS[int(likelihood.argmax())]), float(near.min()), float(near.max()))
+    return ClockOffset(float(LAGS[int(likelihood.argmax())]), float(near.min()), float(near.max()))
 
 
 def clocks(balances: Sequence[Balance], names: str) -> tuple[Sanity, ...]:
     """Say that torque and position are not of one time, where no drive explains it."""
     told = [one for one in balances if not one.one_way and one.solution(one.own_order).explained > EXPLAINED]
-    found = lateness(told) if told else NOT_LATE
+    found = clock_offset(told) if told else NO_OFFSET
     if not found.is_late:
         return ()
     size, ends = 1e3 * abs(found.lag), sorted(1e3 * abs(end) for end in (found.low, found.high))

@@ -60,7 +60,7 @@ def identify(
     recordings: Sequence[Recording],
     card: Card,
     options: Options | None = None,
-    say: Callable[[str], None] = lambda _: None,
+    on_progress: Callable[[str], None] = lambda _: None,
 ) -> Identified:
     """Identify what the recordings tell; raise InputError where they tell nothing at all."""
     options = options or Options()
@@ -68,15 +68,15 @@ def identify(
     steps = [one for one in recordings if is_step(one, card)]
     moves = [one for one in recordings if one not in steps]
     not_done: list[str] = []
-    say(f"free: {', '.join(free)}")
-    say("friction map")
+    on_progress(f"free: {', '.join(free)}")
+    on_progress("friction map")
     found_map = _tried(not_done, "friction map", lambda: _map(moves, card, options))
-    say(f"presliding steps: {len(steps)}")
+    on_progress(f"presliding steps: {len(steps)}")
     found_steps = {one.name: presliding(card, one) for one in steps}
     if not steps:
         not_done.append("presliding: no recording without a set point is held by friction.")
     started = _started(card, free, found_map, found_steps)
-    found_outputs = _tried(not_done, "output error", lambda: _outputs(moves, started, free, options, say)) or ()
+    found_outputs = _tried(not_done, "output error", lambda: _outputs(moves, started, free, options, on_progress)) or ()
     if not (found_map or found_steps or found_outputs):
         raise InputError(f"Nothing can be identified: {' '.join(not_done)}")
     improved = _with_estimate(started, found_outputs[0]) if found_outputs else started
@@ -130,12 +130,12 @@ def _map(moves: Sequence[Recording], card: Card, options: Options) -> FrictionMa
 
 
 def _outputs(
-    moves: Sequence[Recording], card: Card, free: tuple[str, ...], options: Options, say: Callable[[str], None]
+    moves: Sequence[Recording], card: Card, free: tuple[str, ...], options: Options, on_progress: Callable[[str], None]
 ) -> list[Estimate]:
     driven = [one for one in moves if "q_d" in one and "q" in one]
     if not driven:
         raise InputError("no moving recording has a set point q_d, which drives the simulated loop.")
-    return fit_outputs(closed_loop(card, free), driven, options.starts, options.seed, say)
+    return fit_outputs(closed_loop(card, free), driven, options.starts, options.seed, on_progress)
 
 
 def _started(card: Card, free: tuple[str, ...], found: FrictionMap | None, steps: dict[str, Presliding]) -> Card:

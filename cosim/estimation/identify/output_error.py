@@ -108,7 +108,7 @@ def fit_outputs(
     recordings: Sequence[Recording],
     starts: int = 1,
     seed: int = 0,
-    say: Callable[[str], None] = lambda _: None,
+    on_progress: Callable[[str], None] = lambda _: None,
 ) -> list[Estimate]:
     """Fit from the plant's own numbers and from `starts` - 1 random ones up to `FACTOR` off; the best estimate first.
 
@@ -129,13 +129,13 @@ def fit_outputs(
 
     def one(number: int) -> Estimate:
         found = explore(machine.free, own * factors[number - 1], model, limits, LOOK)
-        say(f"output error, start {number} of {starts}: {_told(found)}")
+        on_progress(f"output error, start {number} of {starts}: {_told(found)}")
         return found
 
     with ThreadPoolExecutor(max_workers=2) as pool:
         looked = sorted(pool.map(one, range(1, starts + 1)), key=_size)
     best = settle(looked[0], model, limits)
-    say(f"output error, best start settled: {_told(best)}")
+    on_progress(f"output error, best start settled: {_told(best)}")
     return [best, *looked[1:]]
 
 

@@ -9,9 +9,9 @@ import numpy as np
 from cosim.fmi.component import Functions
 from cosim.master.loop.shared import declare, opened
 from cosim.master.loop.shared import part as as_part
-from cosim.master.loop.structures import LAYOUT, CBond, CColumn, CFault, CInner, CLoop, CPart, CTurn, CWire
+from cosim.master.loop.structures import LAYOUT, CBond, CColumn, CFault, CInner, CLoop, CPart, CStage, CWire
 from cosim.support.activity import board
-from cosim.system.plan import Balance, Effort, Failure, Gather, Iterate, Link, Part, Plan, Step, Turn
+from cosim.system.plan import Balance, Effort, Failure, Gather, Iterate, Link, Part, Plan, PlannedStage, Step
 
 _TABLE = 2
 _KINDS = {Gather: 0, Step: 1, Iterate: 2, Balance: 3}
@@ -45,17 +45,17 @@ class CompiledLoop:
         self.plan, self._library = plan, library
         first = [sum(len(part.links) for part in plan.parts[:index]) for index in range(len(plan.parts))]
         links = [link for part in plan.parts for link in part.links]
-        turns = [_turn(turn, first) for turn in plan.turns]
+        stages = [_stage(stage, first) for stage in plan.stages]
         values = dict(
             parts=len(plan.parts),
             wires=len(links),
-            turns=len(turns),
+            stages=len(stages),
             signals=plan.signals,
             columns=len(plan.columns),
             means=sum(column.mean for column in plan.columns),
             part=_array(CPart, [_part(part, start, plan.bus) for part, start in zip(plan.parts, first, strict=True)]),
             wire=_array(CWire, [_wire(link) for link in links]),
-            turn=_array(CTurn, turns),
+            stage=_array(CStage, stages),
             column=_array(CColumn, [CColumn(one.source, one.mean, one.late) for one in plan.columns]),
             bus=_address(plan.bus, 0),
             signal=_address(plan.bus, plan.signal),
@@ -86,8 +86,10 @@ class CompiledLoop:
 
     @property
     def efforts(self) -> list[Effort]:
-        """What the coupled turns took."""
-        coupled = [one for one in self._loop.turn[: self._loop.turns] if one.kind in (_KINDS[Iterate], _KINDS[Balance])]
+        """What the coupled stages took."""
+        coupled = [
+            one for one in self._loop.stage[: self._loop.stages] if one.kind in (_KINDS[Iterate], _KINDS[Balance])
+        ]
         return [Effort(one.rounds, one.greatest, one.at_limit) for one in coupled]
 
     @property
@@ -151,15 +153,15 @@ def _wire(link: Link) -> CWire:
     )
 
 
-def _turn(turn: Turn, first: list[int]) -> CTurn:
-    made = CTurn(kind=_KINDS[type(turn)], part=turn.part, parts=turn.parts, relaxation=1.0, size=1.0)
-    if isinstance(turn, Iterate | Balance):
-        inner = [CInner(wire=first[one.part] + one.link, back=one.back) for one in turn.inner]
-        bonds = [CBond(*bond) for bond in turn.bonds] if isinstance(turn, Balance) else []
+def _stage(stage: PlannedStage, first: list[int]) -> CStage:
+    made = CStage(kind=_KINDS[type(stage)], part=stage.part, parts=stage.parts, relaxation=1.0, size=1.0)
+    if isinstance(stage, Iterate | Balance):
+        inner = [CInner(wire=first[one.part] + one.link, back=one.back) for one in stage.inner]
+        bonds = [CBond(*bond) for bond in stage.bonds] if isinstance(stage, Balance) else []
         made.inners, made.inner = len(inner), _array(CInner, inner)
         made.bonds, made.bond = len(bonds), _array(CBond, bonds)
-        made.tolerance, made.most = turn.tolerance, turn.most
-        made.theta = turn.theta if isinstance(turn, Iterate) else 0.0
+        made.tolerance, made.most = stage.tolerance, stage.most
+        made.theta = stage.theta if isinstance(stage, Iterate) else 0.0
     return made
 
 

@@ -30,10 +30,10 @@ static double *target(const Loop *loop, const Inner *inner)
     return &loop->bus[loop->wire[inner->wire].target];
 }
 
-static int set_all(const Loop *loop, const Turn *turn, const Part *part, bool held)
+static int set_all(const Loop *loop, const Stage *stage, const Part *part, bool held)
 {
-    for (int64_t i = 0; i < turn->inners; i++) {
-        Inner *inner = &turn->inner[i];
+    for (int64_t i = 0; i < stage->inners; i++) {
+        Inner *inner = &stage->inner[i];
         if (feeds(inner, part)) {
             *target(loop, inner) = held ? inner->held : inner->guess;
         }
@@ -42,22 +42,22 @@ static int set_all(const Loop *loop, const Turn *turn, const Part *part, bool he
 }
 
 /* Steps one component with the held inputs; returns its worst status. */
-static int step_held(const Loop *loop, const Turn *turn, const Part *part, double time, double size, bool final)
+static int step_held(const Loop *loop, const Stage *stage, const Part *part, double time, double size, bool final)
 {
-    int status = set_all(loop, turn, part, true);
+    int status = set_all(loop, stage, part, true);
     return status > FMI_WARNING ? status : worse(status, do_step(part, time, size, final));
 }
 
 /* Reads the outputs that belong to the inputs guessed for the end; the bus keeps the inputs that were held. */
-static int read_at_end(const Loop *loop, const Turn *turn, const Part *part)
+static int read_at_end(const Loop *loop, const Stage *stage, const Part *part)
 {
-    int status = set_all(loop, turn, part, false);
+    int status = set_all(loop, stage, part, false);
     if (status <= FMI_WARNING) {
         status = worse(status, get_outputs(part));
     }
-    for (int64_t i = 0; i < turn->inners; i++) {
-        if (feeds(&turn->inner[i], part)) {
-            *target(loop, &turn->inner[i]) = turn->inner[i].held;
+    for (int64_t i = 0; i < stage->inners; i++) {
+        if (feeds(&stage->inner[i], part)) {
+            *target(loop, &stage->inner[i]) = stage->inner[i].held;
         }
     }
     return finite_outputs(part, status);
@@ -69,9 +69,9 @@ static int judge(Loop *loop, int64_t part, int status)
     return status > FMI_WARNING ? fail(loop, part, status, loop->tick) : 0;
 }
 
-static int save_all(Loop *loop, const Turn *turn)
+static int save_all(Loop *loop, const Stage *stage)
 {
-    for (int64_t i = turn->part; i < turn->part + turn->parts; i++) {
+    for (int64_t i = stage->part; i < stage->part + stage->parts; i++) {
         if (judge(loop, i, enter(loop, i)->save(loop->part[i].instance, loop->part[i].state))) {
             return 1;
         }
@@ -79,9 +79,9 @@ static int save_all(Loop *loop, const Turn *turn)
     return 0;
 }
 
-static int restore_all(Loop *loop, const Turn *turn)
+static int restore_all(Loop *loop, const Stage *stage)
 {
-    for (int64_t i = turn->part; i < turn->part + turn->parts; i++) {
+    for (int64_t i = stage->part; i < stage->part + stage->parts; i++) {
         if (judge(loop, i, enter(loop, i)->restore(loop->part[i].instance, *loop->part[i].state))) {
             return 1;
         }
@@ -90,20 +90,20 @@ static int restore_all(Loop *loop, const Turn *turn)
 }
 
 /* Steps every component once, each with the newest values of those before it. */
-static int sweep(Loop *loop, Turn *turn, double time)
+static int sweep(Loop *loop, Stage *stage, double time)
 {
-    for (int64_t i = turn->part; i < turn->part + turn->parts; i++) {
+    for (int64_t i = stage->part; i < stage->part + stage->parts; i++) {
         const Part *part = enter(loop, i);
-        for (int64_t j = 0; j < turn->inners; j++) {
-            Inner *inner = &turn->inner[j];
+        for (int64_t j = 0; j < stage->inners; j++) {
+            Inner *inner = &stage->inner[j];
             if (feeds(inner, part)) {
                 inner->guess = inner->back ? inner->guess : carry(loop, &loop->wire[inner->wire]);
-                inner->held = inner->from + turn->theta * (inner->guess - inner->from);
+                inner->held = inner->from + stage->theta * (inner->guess - inner->from);
             }
         }
-        int status = step_held(loop, turn, part, time, loop->step, false);
+        int status = step_held(loop, stage, part, time, loop->step, false);
         if (status <= FMI_WARNING) {
-            status = worse(status, read_at_end(loop, turn, part));
+            status = worse(status, read_at_end(loop, stage, part));
         }
         if (judge(loop, i, status)) {
             return 1;
@@ -113,18 +113,18 @@ static int sweep(Loop *loop, Turn *turn, double time)
 }
 
 /* Compares the wires that point back with what was guessed and improves the guesses; returns whether all agree. */
-static bool agree(const Loop *loop, Turn *turn, int64_t round)
+static bool agree(const Loop *loop, Stage *stage, int64_t round)
 {
     bool agreed = true;
     double above = 0.0, below = 0.0;
-    for (int64_t i = 0; i < turn->inners; i++) {
-        Inner *inner = &turn->inner[i];
+    for (int64_t i = 0; i < stage->inners; i++) {
+        Inner *inner = &stage->inner[i];
         if (!inner->back) {
             continue;
         }
         double value = carry(loop, &loop->wire[inner->wire]), residual = value - inner->guess;
         inner->scale = larger(inner->scale, fabs(value));
-        if (fabs(residual) > turn->tolerance * inner->scale) {
+        if (fabs(residual) > stage->tolerance * inner->scale) {
             double change = (residual - inner->residual) / inner->scale;
             agreed = false;
             above += inner->residual / inner->scale * change;
@@ -133,52 +133,52 @@ static bool agree(const Loop *loop, Turn *turn, int64_t round)
         inner->residual = residual;
     }
     if (round > 1 && below > 0.0 && above != 0.0) {
-        turn->relaxation = -turn->relaxation * above / below;
+        stage->relaxation = -stage->relaxation * above / below;
     }
-    for (int64_t i = 0; i < turn->inners && !agreed; i++) {
-        if (turn->inner[i].back) {
-            turn->inner[i].guess += turn->relaxation * turn->inner[i].residual;
+    for (int64_t i = 0; i < stage->inners && !agreed; i++) {
+        if (stage->inner[i].back) {
+            stage->inner[i].guess += stage->relaxation * stage->inner[i].residual;
         }
     }
     return agreed;
 }
 
-int iterate(Loop *loop, Turn *turn)
+int iterate(Loop *loop, Stage *stage)
 {
     double time = (double)loop->tick * loop->step;
-    for (int64_t i = 0; i < turn->inners; i++) {
-        turn->inner[i].from = turn->inner[i].guess = *target(loop, &turn->inner[i]);
+    for (int64_t i = 0; i < stage->inners; i++) {
+        stage->inner[i].from = stage->inner[i].guess = *target(loop, &stage->inner[i]);
     }
-    if (save_all(loop, turn)) {
+    if (save_all(loop, stage)) {
         return 1;
     }
     for (int64_t round = 1;; round++) {
-        if (sweep(loop, turn, time)) {
+        if (sweep(loop, stage, time)) {
             return 1;
         }
-        turn->rounds++;
-        turn->greatest = round > turn->greatest ? round : turn->greatest;
-        if (agree(loop, turn, round)) {
+        stage->rounds++;
+        stage->greatest = round > stage->greatest ? round : stage->greatest;
+        if (agree(loop, stage, round)) {
             return 0;
         }
-        if (round == turn->most) {
-            return fail(loop, turn->part, NOT_AGREED, loop->tick);
+        if (round == stage->most) {
+            return fail(loop, stage->part, NOT_AGREED, loop->tick);
         }
-        if (restore_all(loop, turn)) {
+        if (restore_all(loop, stage)) {
             return 1;
         }
     }
 }
 
 /* Takes everybody over one piece of `size` seconds from `time`. */
-static int piece(Loop *loop, Turn *turn, double time, double size)
+static int piece(Loop *loop, Stage *stage, double time, double size)
 {
-    for (int64_t i = 0; i < turn->inners; i++) {
-        turn->inner[i].held = turn->inner[i].from + turn->inner[i].slope * size / 2.0;
+    for (int64_t i = 0; i < stage->inners; i++) {
+        stage->inner[i].held = stage->inner[i].from + stage->inner[i].slope * size / 2.0;
     }
-    for (int64_t i = turn->part; i < turn->part + turn->parts; i++) {
+    for (int64_t i = stage->part; i < stage->part + stage->parts; i++) {
         const Part *part = enter(loop, i);
-        int status = step_held(loop, turn, part, time, size, true);
+        int status = step_held(loop, stage, part, time, size, true);
         if (status <= FMI_WARNING) {
             status = finite_outputs(part, worse(status, get_outputs(part)));
         }
@@ -186,11 +186,11 @@ static int piece(Loop *loop, Turn *turn, double time, double size)
             return 1;
         }
     }
-    for (int64_t i = 0; i < turn->inners; i++) {
-        turn->inner[i].guess = carry(loop, &loop->wire[turn->inner[i].wire]);
+    for (int64_t i = 0; i < stage->inners; i++) {
+        stage->inner[i].guess = carry(loop, &loop->wire[stage->inner[i].wire]);
     }
-    for (int64_t i = turn->part; i < turn->part + turn->parts; i++) {
-        if (judge(loop, i, read_at_end(loop, turn, enter(loop, i)))) {
+    for (int64_t i = stage->part; i < stage->part + stage->parts; i++) {
+        if (judge(loop, i, read_at_end(loop, stage, enter(loop, i)))) {
             return 1;
         }
     }
@@ -198,24 +198,24 @@ static int piece(Loop *loop, Turn *turn, double time, double size)
 }
 
 /* The energy lost on the bonds in a piece, in units of what is tolerated; notes how the wires change. */
-static double account(const Loop *loop, Turn *turn, double size)
+static double account(const Loop *loop, Stage *stage, double size)
 {
     double worst = 0.0;
-    for (int64_t i = 0; i < turn->inners; i++) {
-        turn->inner[i].guess = carry(loop, &loop->wire[turn->inner[i].wire]);
+    for (int64_t i = 0; i < stage->inners; i++) {
+        stage->inner[i].guess = carry(loop, &loop->wire[stage->inner[i].wire]);
     }
-    for (int64_t i = 0; i < turn->bonds; i++) {
-        Bond *bond = &turn->bond[i];
-        const Inner *one = &turn->inner[bond->one], *other = &turn->inner[bond->other];
+    for (int64_t i = 0; i < stage->bonds; i++) {
+        Bond *bond = &stage->bond[i];
+        const Inner *one = &stage->inner[bond->one], *other = &stage->inner[bond->other];
         double first = (one->from + one->guess) / 2.0, second = (other->from + other->guess) / 2.0;
         double lost = fabs(other->held * first - one->held * second) * size;
         bond->scale = larger(bond->scale, fabs(one->guess * other->guess));
         if (bond->scale > 0.0) {
-            worst = larger(worst, lost / (turn->tolerance * bond->scale * loop->step));
+            worst = larger(worst, lost / (stage->tolerance * bond->scale * loop->step));
         }
     }
-    for (int64_t i = 0; i < turn->inners; i++) {
-        Inner *inner = &turn->inner[i];
+    for (int64_t i = 0; i < stage->inners; i++) {
+        Inner *inner = &stage->inner[i];
         inner->slope = (inner->guess - inner->from) / size;
         inner->from = inner->guess;
     }
@@ -243,27 +243,27 @@ static int64_t fitting(double size, int64_t position, int64_t most)
     return found;
 }
 
-int balance(Loop *loop, Turn *turn)
+int balance(Loop *loop, Stage *stage)
 {
     int64_t pieces = 0;
-    for (int64_t i = 0; i < turn->inners; i++) {
-        turn->inner[i].from = *target(loop, &turn->inner[i]);
+    for (int64_t i = 0; i < stage->inners; i++) {
+        stage->inner[i].from = *target(loop, &stage->inner[i]);
     }
-    for (int64_t position = 0; position < turn->most; pieces++) {
-        int64_t units = fitting(turn->size, position, turn->most);
-        double size = loop->step * ((double)units / (double)turn->most);
-        double time = loop->step * ((double)loop->tick + (double)position / (double)turn->most);
-        if (piece(loop, turn, time, size)) {
+    for (int64_t position = 0; position < stage->most; pieces++) {
+        int64_t units = fitting(stage->size, position, stage->most);
+        double size = loop->step * ((double)units / (double)stage->most);
+        double time = loop->step * ((double)loop->tick + (double)position / (double)stage->most);
+        if (piece(loop, stage, time, size)) {
             return 1;
         }
-        double error = account(loop, turn, size);
-        turn->at_limit += units == 1 && error > 1.0;
-        turn->size = larger(1.0, turn->size * growth(turn->error, error));
-        turn->size = turn->size > (double)turn->most ? (double)turn->most : turn->size;
-        turn->error = error;
+        double error = account(loop, stage, size);
+        stage->at_limit += units == 1 && error > 1.0;
+        stage->size = larger(1.0, stage->size * growth(stage->error, error));
+        stage->size = stage->size > (double)stage->most ? (double)stage->most : stage->size;
+        stage->error = error;
         position += units;
     }
-    turn->rounds += pieces;
-    turn->greatest = pieces > turn->greatest ? pieces : turn->greatest;
+    stage->rounds += pieces;
+    stage->greatest = pieces > stage->greatest ? pieces : stage->greatest;
     return 0;
 }

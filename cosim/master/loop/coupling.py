@@ -30,11 +30,11 @@ class _Wire:
 class Coupled(ABC):
     """What both methods share: hold inputs, step, and read the outputs that belong to the inputs at the end."""
 
-    def __init__(self, loop: Parts, turn: Any) -> None:
-        self.loop, self.turn, self.effort = loop, turn, Effort()
+    def __init__(self, loop: Parts, stage: Any) -> None:
+        self.loop, self.stage, self.effort = loop, stage, Effort()
         parts = loop.plan.parts
-        self.wires = [_Wire(inner, parts[inner.part].links[inner.link]) for inner in turn.inner]
-        self.members = range(turn.part, turn.part + turn.parts)
+        self.wires = [_Wire(inner, parts[inner.part].links[inner.link]) for inner in stage.inner]
+        self.members = range(stage.part, stage.part + stage.parts)
 
     @abstractmethod
     def take(self) -> bool:
@@ -72,7 +72,7 @@ class Coupled(ABC):
 class Iterating(Coupled):
     """The theta method, iterated with rollback."""
 
-    turn: Iterate
+    stage: Iterate
     relaxation = 1.0
 
     def take(self) -> bool:
@@ -82,16 +82,16 @@ class Iterating(Coupled):
             wire.guess = wire.start
         if self._all("save"):
             return True
-        for round_ in range(1, self.turn.most + 1):
+        for round_ in range(1, self.stage.most + 1):
             if self._sweep():
                 return True
             self.effort.rounds += 1
             self.effort.greatest = max(self.effort.greatest, round_)
             if self._agree(round_):
                 return False
-            if round_ < self.turn.most and self._all("restore"):
+            if round_ < self.stage.most and self._all("restore"):
                 return True
-        return self.loop.judge(self.turn.part, NOT_AGREED)
+        return self.loop.judge(self.stage.part, NOT_AGREED)
 
     def _all(self, what: str) -> bool:
         components = ((index, self.loop.plan.parts[index].component) for index in self.members)
@@ -102,7 +102,7 @@ class Iterating(Coupled):
         for index in self.members:
             for wire in self.into(index):
                 wire.guess = wire.guess if wire.inner.back else loop.carry(wire.link)
-                wire.held = wire.start + self.turn.theta * (wire.guess - wire.start)
+                wire.held = wire.start + self.stage.theta * (wire.guess - wire.start)
             status = self.step_held(index, time, loop.plan.step, False)
             if status <= WARNING:
                 status = max(status, self.read_at_end(index))
@@ -116,7 +116,7 @@ class Iterating(Coupled):
             value = self.loop.carry(wire.link)
             residual = value - wire.guess
             wire.scale = max(wire.scale, abs(value))
-            if abs(residual) > self.turn.tolerance * wire.scale:
+            if abs(residual) > self.stage.tolerance * wire.scale:
                 change = (residual - wire.residual) / wire.scale
                 agreed = False
                 above += wire.residual / wire.scale * change
@@ -132,16 +132,16 @@ class Iterating(Coupled):
 class Balancing(Coupled):
     """Pieces of the tick whose size follows the energy that is lost on the bonds."""
 
-    turn: Balance
+    stage: Balance
     size, error = 1.0, 0.0
 
-    def __init__(self, loop: Parts, turn: Balance) -> None:
-        super().__init__(loop, turn)
-        self.scales = [0.0] * len(turn.bonds)
+    def __init__(self, loop: Parts, stage: Balance) -> None:
+        super().__init__(loop, stage)
+        self.scales = [0.0] * len(stage.bonds)
 
     def take(self) -> bool:
         """Take piece after piece."""
-        loop, most = self.loop, self.turn.most
+        loop, most = self.loop, self.stage.most
         self.begin()
         position, pieces = 0, 0
         while position < most:
@@ -178,13 +178,13 @@ class Balancing(Coupled):
         worst = 0.0
         for wire in self.wires:
             wire.guess = self.loop.carry(wire.link)
-        for number, (first, second) in enumerate(self.turn.bonds):
+        for number, (first, second) in enumerate(self.stage.bonds):
             one, other = self.wires[first], self.wires[second]
             mean, other_mean = (one.start + one.guess) / 2.0, (other.start + other.guess) / 2.0
             lost = abs(other.held * mean - one.held * other_mean) * size
             scale = self.scales[number] = max(self.scales[number], abs(one.guess * other.guess))
             if scale > 0.0:
-                worst = max(worst, lost / (self.turn.tolerance * scale * self.loop.plan.step))
+                worst = max(worst, lost / (self.stage.tolerance * scale * self.loop.plan.step))
         for wire in self.wires:
             wire.slope = (wire.guess - wire.start) / size
             wire.start = wire.guess

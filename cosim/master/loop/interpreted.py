@@ -10,7 +10,7 @@ import numpy as np
 from cosim.fmi.component import OK, WARNING
 from cosim.master.loop.coupling import Balancing, Coupled, Iterating
 from cosim.master.loop.part import Parts
-from cosim.system.plan import Effort, Failure, Gather, Iterate, Part, Plan, Step, Turn
+from cosim.system.plan import Effort, Failure, Gather, Iterate, Part, Plan, PlannedStage, Step
 
 
 class InterpretedLoop(Parts):
@@ -21,7 +21,7 @@ class InterpretedLoop(Parts):
     def __init__(self, plan: Plan) -> None:
         super().__init__(plan)
         self._coupled: list[Coupled] = []
-        self._turns = [self._taker(turn) for turn in plan.turns]
+        self._stages = [self._taker(stage) for stage in plan.stages]
         self._value = [0.0] * len(plan.columns)
         self._sample = [0.0] * len(plan.columns)
         self._sum = [0.0] * len(plan.columns)
@@ -30,7 +30,7 @@ class InterpretedLoop(Parts):
 
     @property
     def efforts(self) -> list[Effort]:
-        """What the coupled turns took."""
+        """What the coupled stages took."""
         return [one.effort for one in self._coupled]
 
     @property
@@ -55,7 +55,7 @@ class InterpretedLoop(Parts):
             bus[plan.signal : plan.signal + plan.signals] = signals[:, k]
             failed = self.tick == 0 and self._settle()
             self._note(late=False)
-            failed = failed or any(take() for take in self._turns)
+            failed = failed or any(take() for take in self._stages)
             self._note(late=True)
             self._record(rows)
             if failed:
@@ -82,14 +82,14 @@ class InterpretedLoop(Parts):
             self._emit(rows)
         return self._array(rows)
 
-    def _taker(self, turn: Turn) -> Callable[[], bool]:
-        """Return what takes a turn and tells whether a component failed."""
-        members = range(turn.part, turn.part + turn.parts)
-        if isinstance(turn, Gather):
+    def _taker(self, stage: PlannedStage) -> Callable[[], bool]:
+        """Return what takes a stage and tells whether a component failed."""
+        members = range(stage.part, stage.part + stage.parts)
+        if isinstance(stage, Gather):
             return lambda: any(self._gather(self.plan.parts[index]) for index in members)
-        if isinstance(turn, Step):
+        if isinstance(stage, Step):
             return lambda: any(self._advance(index) for index in members)
-        self._coupled.append(Iterating(self, turn) if isinstance(turn, Iterate) else Balancing(self, turn))
+        self._coupled.append(Iterating(self, stage) if isinstance(stage, Iterate) else Balancing(self, stage))
         return self._coupled[-1].take
 
     def _gather(self, part: Part) -> bool:

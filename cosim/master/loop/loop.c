@@ -1,7 +1,7 @@
 /* The stepping loop. At tick k, t = k * step:
  *   1. the signals of the tick are put on the bus;
  *   2. outputs and signals are noted for the recording (at tick 0 after outputs have met their inputs, see settle);
- *   3. the turns of the tick are taken: wires carry  y = quantise(gain * x + offset) + noise  to inputs, components step;
+ *   3. the stages of the tick are taken: wires carry  y = quantise(gain * x + offset) + noise  to inputs, components step;
  *   4. the row is recorded: outputs at t_k and the inputs that act from t_k to t_(k+1).
  * A component that steps every n ticks takes its inputs at ticks 0, n, 2n, ... and is stepped at the end of the last
  * tick before the next of them, so nobody sees its outputs early. interpreted.py does the same in Python, bit for bit.
@@ -42,9 +42,9 @@ static int advance(const Loop *loop, const Part *part)
     return finite_outputs(part, status);
 }
 
-static int step_all(Loop *loop, const Turn *turn)
+static int step_all(Loop *loop, const Stage *stage)
 {
-    for (int64_t i = turn->part; i < turn->part + turn->parts; i++) {
+    for (int64_t i = stage->part; i < stage->part + stage->parts; i++) {
         const Part *part = enter(loop, i);
         int status = advance(loop, part);
         loop->warnings += status == FMI_WARNING;
@@ -55,20 +55,20 @@ static int step_all(Loop *loop, const Turn *turn)
     return 0;
 }
 
-static int take(Loop *loop, Turn *turn)
+static int take(Loop *loop, Stage *stage)
 {
-    switch (turn->kind) {
+    switch (stage->kind) {
     case GATHER:
-        for (int64_t i = turn->part; i < turn->part + turn->parts; i++) {
+        for (int64_t i = stage->part; i < stage->part + stage->parts; i++) {
             gather(loop, &loop->part[i]);
         }
         return 0;
     case STEP:
-        return step_all(loop, turn);
+        return step_all(loop, stage);
     case ITERATE:
-        return iterate(loop, turn);
+        return iterate(loop, stage);
     default:
-        return balance(loop, turn);
+        return balance(loop, stage);
     }
 }
 
@@ -133,7 +133,7 @@ static void note(Loop *loop, int64_t late)
 /* Tells how its data is laid out, so that a library of another version is not trusted. */
 EXPORT int64_t loop_layout(void)
 {
-    return (int64_t)(sizeof(Loop) + 3 * sizeof(Part) + 5 * sizeof(Wire) + 7 * sizeof(Turn) + 11 * sizeof(Column) +
+    return (int64_t)(sizeof(Loop) + 3 * sizeof(Part) + 5 * sizeof(Wire) + 7 * sizeof(Stage) + 11 * sizeof(Column) +
                      13 * sizeof(Inner) + 17 * sizeof(Bond) + 19 * sizeof(Fault));
 }
 
@@ -188,8 +188,8 @@ EXPORT int64_t loop_run(Loop *loop, int64_t ticks, const double *signals, double
         }
         int failed = loop->tick == 0 ? settle(loop) : 0;
         note(loop, 0);
-        for (int64_t i = 0; i < loop->turns && !failed; i++) {
-            failed = take(loop, &loop->turn[i]);
+        for (int64_t i = 0; i < loop->stages && !failed; i++) {
+            failed = take(loop, &loop->stage[i]);
         }
         note(loop, 1);
         written += record(loop, rows + written, capacity);

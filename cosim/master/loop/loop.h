@@ -1,8 +1,8 @@
 /* What the loop executes. All values live on one bus: outputs and inputs of each component, then the signals of the tick.
  *
- * A tick is a programme of turns (cosim/system/plan.py names them): GATHER carries values to the inputs of some components, STEP takes
- * some over their step, ITERATE and BALANCE take some together (coupling.c). Jacobi is one GATHER and one STEP of all;
- * Gauss-Seidel a GATHER and a STEP for each in its order.
+ * A tick is a programme of stages (cosim/system/plan.py names them): GATHER carries values to the inputs of some
+ * components, STEP takes some over their step, ITERATE and BALANCE take some together (coupling.c). Jacobi is one GATHER
+ * and one STEP of all; Gauss-Seidel a GATHER and a STEP for each in its order.
  *
  * Everything here is laid out by compiled.py, which compares sizes before it trusts a library. */
 #ifndef LOOP_H
@@ -74,7 +74,7 @@ typedef struct {
     int64_t most;                       /* iterations, or pieces of a tick */
     int64_t rounds, greatest, at_limit; /* statistics: iterations or pieces in all, the most in a tick, limits met */
     double relaxation, error, size;     /* memory: of Aitken's method; of the control of the piece size */
-} Turn;
+} Stage;
 
 typedef struct {
     int64_t source; /* place on the bus */
@@ -84,10 +84,10 @@ typedef struct {
 } Column;
 
 typedef struct {
-    int64_t parts, wires, turns, signals, columns, means;
+    int64_t parts, wires, stages, signals, columns, means;
     Part *part;
     Wire *wire;
-    Turn *turn;
+    Stage *stage;
     Column *column;
     double *bus, *signal; /* `signal` is the place of the first signal on the bus */
     double step;
@@ -107,8 +107,8 @@ int finite_outputs(const Part *part, int status);
 int fail(Loop *loop, int64_t part, int status, int64_t since);
 const Part *enter(Loop *loop, int64_t part);
 
-/* coupling.c: both take the components of a turn over one tick and return 0, or what `fail` returned. */
-int iterate(Loop *loop, Turn *turn);
-int balance(Loop *loop, Turn *turn);
+/* coupling.c: both take the components of a stage over one tick and return 0, or what `fail` returned. */
+int iterate(Loop *loop, Stage *stage);
+int balance(Loop *loop, Stage *stage);
 
 #endif

@@ -80,8 +80,8 @@ class CBond(Structure):
     _fields_ = [("one", c_int64), ("other", c_int64), ("scale", c_double)]
 
 
-class CTurn(Structure):
-    """A turn of a tick."""
+class CStage(Structure):
+    """A stage of a tick."""
 
     _fields_ = [
         ("kind", c_int64),
@@ -122,13 +122,13 @@ class CLoop(Structure):
     _fields_ = [
         ("parts", c_int64),
         ("wires", c_int64),
-        ("turns", c_int64),
+        ("stages", c_int64),
         ("signals", c_int64),
         ("columns", c_int64),
         ("means", c_int64),
         ("part", POINTER(CPart)),
         ("wire", POINTER(CWire)),
-        ("turn", POINTER(CTurn)),
+        ("stage", POINTER(CStage)),
         ("column", POINTER(CColumn)),
         ("bus", c_void_p),
         ("signal", c_void_p),
@@ -149,7 +149,7 @@ class CLoop(Structure):
 LAYOUT = sum(
     weight * sizeof(structure)
     for weight, structure in zip(
-        (1, 3, 5, 7, 11, 13, 17, 19), (CLoop, CPart, CWire, CTurn, CColumn, CInner, CBond, CFault), strict=True
+        (1, 3, 5, 7, 11, 13, 17, 19), (CLoop, CPart, CWire, CStage, CColumn, CInner, CBond, CFault), strict=True
     )
 )
 """What loop_layout() of a library that fits returns."""

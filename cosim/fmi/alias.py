@@ -28,7 +28,7 @@ class Alias:
     unit: str = ""
 
 
-class Renamed:
+class Aliased:
     """A component whose variables have other names; everything else is the component's own.
 
     Raises:

@@ -39,7 +39,7 @@ CREEP = 1e-3
 
 
 @dataclass(frozen=True)
-class Trial:
+class CandidateTerm:
     """A term that may be learned: plain name, an effect with free coefficients, and the prior size of each."""
 
     name: str
@@ -62,14 +62,14 @@ class Trial:
         """Present coefficients."""
         return np.array([getattr(self.effect, f"c{k}") for k in range(self.count)])
 
-    def coarser(self) -> "Trial":
+    def coarser(self) -> "CandidateTerm":
         """The same with half of the waves."""
         kept = np.flatnonzero(self.prior)
         prior = self.prior.copy()
         prior[kept[len(kept) // 2 :]] = 0.0
         return replace(self, prior=prior).with_coefficients([0.0] * self.count)
 
-    def with_coefficients(self, values: Sequence[float]) -> "Trial":
+    def with_coefficients(self, values: Sequence[float]) -> "CandidateTerm":
         """The same at other coefficients."""
         return replace(self, effect=replace(self.effect, **{f"c{k}": float(c) for k, c in enumerate(values)}))
 
@@ -98,18 +98,18 @@ def _form(form: type[Effect], count: int) -> Any:
     """The form with `count` coefficients as parameters."""
     if (form, count) not in _FORMS:
         names = [f"c{k}" for k in range(count)]
-        free = [(name, Any, parameter("1", "A coefficient of a trial", default=0.0)) for name in names]
+        free = [(name, Any, parameter("1", "A coefficient of a candidate term", default=0.0)) for name in names]
         own = {"coefficients": lambda self: tuple(getattr(self, name) for name in names)}
         options: dict[str, Any] = {"bases": (form,), "frozen": True, "kw_only": True, "namespace": own}
-        _FORMS[form, count] = make_dataclass(f"Trial{form.__name__}{count}", free, **options)
+        _FORMS[form, count] = make_dataclass(f"Free{form.__name__}{count}", free, **options)
     return _FORMS[form, count]
 
 
-def _trial(name: str, form: type[Effect], prior: Sequence[float], **shape: Any) -> Trial:
-    return Trial(name, _form(form, len(prior))(**shape), np.asarray(prior, float))
+def _term(name: str, form: type[Effect], prior: Sequence[float], **shape: Any) -> CandidateTerm:
+    return CandidateTerm(name, _form(form, len(prior))(**shape), np.asarray(prior, float))
 
 
-def trials(mount: Mount, prepared: Prepared) -> list[Trial]:
+def candidate_terms(mount: Mount, prepared: Prepared) -> list[CandidateTerm]:
     """Every term that these recordings could tell."""
     return [*_of_motion(mount, prepared), *_of_columns(mount, prepared)]
 
@@ -119,32 +119,32 @@ def _falling(count: int, first: float = 1.0) -> list[float]:
     return [first, *(1 / k for k in range(1, count + 1))]
 
 
-def _of_motion(mount: Mount, prepared: Prepared) -> Iterator[Trial]:
+def _of_motion(mount: Mount, prepared: Prepared) -> Iterator[CandidateTerm]:
     q, v = prepared.ranges["q"], prepared.ranges["v"]
     reach, top = q[1] - q[0], max(map(abs, v))
     command = float(np.abs(prepared.stacked("tau")).max())
     rubs = mount.friction.key != "none"
     smooth = [1.0, *(1 / k**2 for k in range(1, WAVES + 1))]  # steeper than its command no drive may fall
-    yield _trial("torque", LearnedDrive, smooth, command_seen=(-command, command))
+    yield _term("torque", LearnedDrive, smooth, command_seen=(-command, command))
     if rubs:
-        yield _trial("speed", LearnedFriction, _falling(WAVES, 0), over="speed", seen=v)
-        yield _trial("time since reversal", LearnedAfterReversal, [1.0] * len(TIMES), times=TIMES, creep=CREEP * top)
+        yield _term("speed", LearnedFriction, _falling(WAVES, 0), over="speed", seen=v)
+        yield _term("time since reversal", LearnedAfterReversal, [1.0] * len(TIMES), times=TIMES, creep=CREEP * top)
     if not prepared.has_position:
         return
-    yield _trial("position", LearnedTorque, _falling(WAVES), over="position", seen=q)
+    yield _term("position", LearnedTorque, _falling(WAVES), over="position", seen=q)
     strokes, ways = (tuple(reach * one for one in shares) for shares in (STROKES, WAYS))
-    yield _trial("hysteresis over a long stroke", LearnedHysteresis, [1.0] * len(strokes), strokes=strokes)
+    yield _term("hysteresis over a long stroke", LearnedHysteresis, [1.0] * len(strokes), strokes=strokes)
     if mount.motion == "rotary" and reach > 2 * pi:
         pairs = [one for one in _falling(WAVES)[1:] for _ in ("cosine", "sine")]
-        yield _trial("position over the turn", LearnedTorque, [1.0, *pairs], over="turn")
+        yield _term("position over the turn", LearnedTorque, [1.0, *pairs], over="turn")
     if rubs:
         level = _falling(WAVES, 0)
-        yield _trial("friction level over position", LearnedFriction, level, over="position", seen=q)
+        yield _term("friction level over position", LearnedFriction, level, over="position", seen=q)
         after = {"ways": ways, "creep": CREEP * top}
-        yield _trial("distance since reversal", LearnedAfterReversal, [1.0] * len(ways), **after)
+        yield _term("distance since reversal", LearnedAfterReversal, [1.0] * len(ways), **after)
 
 
-def _of_columns(mount: Mount, prepared: Prepared) -> Iterator[Trial]:
+def _of_columns(mount: Mount, prepared: Prepared) -> Iterator[CandidateTerm]:
     rubs = mount.friction.key != "none"
     for name in user_columns(prepared):
         whole = np.concatenate([piece.extras[name] for piece in prepared.pieces])
@@ -152,14 +152,14 @@ def _of_columns(mount: Mount, prepared: Prepared) -> Iterator[Trial]:
         over = name if name == "temperature" else INPUT + name
         if not seen[0] < seen[1] or not (name.isidentifier() and name.isascii()):
             continue
-        yield _trial(f"torque over {name}", LearnedTorque, _falling(FEW), over=over, seen=seen)
+        yield _term(f"torque over {name}", LearnedTorque, _falling(FEW), over=over, seen=seen)
         if rubs:
-            yield _trial(f"friction level over {name}", LearnedFriction, _falling(FEW, 0), over=over, seen=seen)
+            yield _term(f"friction level over {name}", LearnedFriction, _falling(FEW, 0), over=over, seen=seen)
             if prepared.has_position:
                 yield _of_products(name, over, seen, prepared)
 
 
-def _of_products(name: str, by: str, seen: tuple[float, float], prepared: Prepared) -> Trial:
+def _of_products(name: str, by: str, seen: tuple[float, float], prepared: Prepared) -> CandidateTerm:
     sizes = [a * b for a, b in product(_falling(BY[0]), _falling(BY[1]))]
     shape = {"over": "position", "seen": prepared.ranges["q"], "by": by, "by_seen": seen, "waves": BY}
-    return _trial(f"position and {name}", LearnedFriction, [0.0, *sizes[1:]], **shape)
+    return _term(f"position and {name}", LearnedFriction, [0.0, *sizes[1:]], **shape)
