@@ -389,7 +389,7 @@ def tools(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("tools")
 def test_a_proof_goes_on_where_it_ended_and_leaves_complete_files(tmp_path: Path) -> None:
     told: list[str] = []
-    wanted = {"workers": 1, "tool": prove_tool.cautious, "say": told.append}
+    wanted = {"workers": 1, "tool": prove_tool.cautious, "on_seal": told.append}
     out = tmp_path / "proof"
     first = conduct(Benchmark(5, 1, 10.0), out, **wanted)
     before = (out / RUNS).read_text()
