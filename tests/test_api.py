@@ -168,6 +168,7 @@ def test_a_diagnosis_of_data_frames_answers_in_python_on_a_terminal_and_in_a_not
     assert "quadratic drag" in str(answer).lower()
     assert "quadratic drag" in answer._repr_html_().lower()
     assert answer.as_json()["verdict"]
+    assert "Wrote" not in str(answer)
 
 
 @pytest.mark.parametrize("name", ["sidereal", "paper_mount"])

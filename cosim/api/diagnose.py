@@ -10,7 +10,7 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.black_box import BlackBox, as_base
 from cosim.diagnosis.closed_loop import Loops
 from cosim.diagnosis.correction_fmu import Correction, motion_of
-from cosim.diagnosis.deliver import FILES, QUICK, as_json, check_out, deliver, deliver_quickly
+from cosim.diagnosis.deliver import FILES, QUICK, as_json, check_out, deliver, deliver_quickly, without_files
 from cosim.diagnosis.diagnose import diagnose as find
 from cosim.diagnosis.entries import Improved
 from cosim.diagnosis.result import Diagnosis, Finding
@@ -156,7 +156,7 @@ def _found(given: _Given, out: Path | None, command: str, listeners: _Listeners)
     """Diagnose, and write the answer and the card where there is a folder."""
     outcome = find(given.train, given.heldout, given.card, listeners.on_progress)
     listeners.on_answer(outcome.diagnosis)
-    done = outcome.diagnosis
+    done = without_files(outcome.diagnosis)
     if out:
         done = deliver_quickly(outcome, given.train, given.heldout, given.card, out, command, given.base)
     return DiagnosisResult(done, outcome.card, outcome.refitted)

@@ -42,7 +42,7 @@ def _absent(name: str, found: SeenFrom | None, mount: Mount, prepared: Prepared)
         units={main.parameter: bound.unit},
         visible_from=value if main.is_size else None,
         evidence=where,
-        action="" if found else where,
+        action="" if found or named(name).is_settled(mount) else form.to_record,
         bound=bound,
     )
 

@@ -53,12 +53,17 @@ def deliver_quickly(
     directory(out)
     found, better = _signed(outcome, train, heldout, card, command, base)
     _write_card(better, found, out)
-    plan = found.next_experiment.copy()
-    plan.pop("scenario", None)
     improved = Improved(card=CARD) | _proven_range(found) if _adds_physics(found) else Improved()
-    found = replace(found, next_experiment=plan, improved=improved, files=(DOCUMENT,))
+    found = replace(without_files(found), improved=improved, files=(DOCUMENT,))
     _write_json(found, out)
     return found
+
+
+def without_files(found: Diagnosis) -> Diagnosis:
+    """The same answer, naming no file: neither a report nor the scenario of the next experiment."""
+    plan = found.next_experiment.copy()
+    plan.pop("scenario", None)
+    return replace(found, next_experiment=plan, files=())
 
 
 def deliver(

@@ -69,7 +69,7 @@ def _ordered(word: str, text: str) -> list[str]:
 
 def _to_do(block: Block, diagnosis: Diagnosis) -> list[str]:
     """Return what to do about a finding."""
-    action = do(block, diagnosis)
+    action = do(block, diagnosis) if block.answer != "not_proven" else ""
     return _ordered("Do", f"{block.title}: {action[:1].lower()}{action[1:]}") if action else []
 
 
@@ -173,7 +173,8 @@ def _next(diagnosis: Diagnosis) -> list[str]:
 
 
 def _wrote(diagnosis: Diagnosis) -> list[str]:
-    lines = [f"Wrote {' '.join([*diagnosis.files, *reversed(delivered(diagnosis))])}", *left_out(diagnosis)]
+    names = [*diagnosis.files, *reversed(delivered(diagnosis))]
+    lines = [f"Wrote {' '.join(names)}" if names else "", *left_out(diagnosis)]
     return [line for text in lines for line in _wrapped(text, 0)]
 
 

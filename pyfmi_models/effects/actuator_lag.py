@@ -18,6 +18,7 @@ class ActuatorLag(DriveEffect):
     title: ClassVar[str] = "Actuator lag"
     equation: ClassVar[str] = "τ_applied = τ / (1 + s T)"
     main: ClassVar[Main] = Main("time_constant_ms", unit="ms")
+    to_record: ClassVar[str] = "record a chirp up to high frequencies, with its set point"
     rivals: ClassVar[tuple[str, ...]] = ("delay", "clock_skew", "backlash")
     told_apart_by: ClassVar[str] = "a lag takes amplitude away at high frequency; a delay turns phase only"
     action: ClassVar[str] = "Check the bandwidth of the current loop and any torque filter in the drive."

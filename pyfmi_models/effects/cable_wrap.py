@@ -19,6 +19,7 @@ class CableWrap(LoadEffect):
     title: ClassVar[str] = "Cable wrap"
     equation: ClassVar[str] = "k x (1 + h x²), x = q − q₀"
     main: ClassVar[Main] = Main("stiffness", unit="N.m/rad")
+    to_record: ClassVar[str] = "record from end to end of the travel"
     rivals: ClassVar[tuple[str, ...]] = ("gravity_unbalance", "torque_offset")
     told_apart_by: ClassVar[str] = "a cable pulls harder turn after turn; an unbalance repeats once per turn"
     action: ClassVar[str] = "Give the cable more slack, or bring home to the middle of its travel."

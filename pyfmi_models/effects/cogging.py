@@ -28,6 +28,7 @@ class Cogging(LoadEffect):
     title: ClassVar[str] = "Cogging"
     equation: ClassVar[str] = "a cos(N q + φ)"
     main: ClassVar[Main] = Main("amplitude")
+    to_record: ClassVar[str] = "record slow motion over the whole stroke"
     rivals: ClassVar[tuple[str, ...]] = ("position_friction", "gravity_unbalance", "encoder_eccentricity")
     told_apart_by: ClassVar[str] = "friction that depends on position changes sign with the direction; cogging does not"
     action: ClassVar[str] = "Nothing needs repair: motors with slots and magnets do this. Use the improved model."

@@ -29,6 +29,7 @@ class Delay(DriveEffect):
     title: ClassVar[str] = "Delay"
     equation: ClassVar[str] = "τ_applied(t) = τ(t − T)"
     main: ClassVar[Main] = Main("delay_ms", unit="ms")
+    to_record: ClassVar[str] = "record a chirp up to high frequencies, with its set point"
     rivals: ClassVar[tuple[str, ...]] = ("actuator_lag", "clock_skew", "backlash")
     told_apart_by: ClassVar[str] = (
         "a delay turns phase only; a lag also takes amplitude away at high frequency; a late clock trails the set point"

@@ -21,6 +21,7 @@ class InertiaVariation(InertiaEffect):
     title: ClassVar[str] = "Inertia variation"
     equation: ClassVar[str] = "J (1 + r cos(N q + φ))"
     main: ClassVar[Main] = Main("relative_amplitude", 100.0, "%")
+    to_record: ClassVar[str] = "record hard accelerations at several positions"
     rivals: ClassVar[tuple[str, ...]] = ("encoder_eccentricity", "compliance", "torque_saturation")
     told_apart_by: ClassVar[str] = "it scales with the acceleration at a place; an eccentric encoder with speed squared"
     action: ClassVar[str] = "Nothing needs repair: a payload off the axis does this. Use the improved model."

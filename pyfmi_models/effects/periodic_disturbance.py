@@ -18,6 +18,7 @@ class PeriodicDisturbance(LoadEffect):
     title: ClassVar[str] = "Periodic disturbance"
     equation: ClassVar[str] = "a sin(2π f t + φ)"
     main: ClassVar[Main] = Main("amplitude")
+    to_record: ClassVar[str] = "record a minute of motion that does not repeat"
     rivals: ClassVar[tuple[str, ...]] = ("cogging", "position_friction", "compliance")
     told_apart_by: ClassVar[str] = "its frequency stays when the speed changes; that of cogging follows the speed"
     action: ClassVar[str] = "Look for fans, pumps or a machine next door that runs at this frequency."

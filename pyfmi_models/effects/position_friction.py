@@ -15,6 +15,7 @@ class _PositionFriction(FrictionEffect):
     title: ClassVar[str] = "Position-dependent friction"
     equation: ClassVar[str] = "F (1 + r cos(N q + φ)), or F (1 + r) near one place"
     main: ClassVar[Main] = Main("relative_amplitude", 100.0, "%")
+    to_record: ClassVar[str] = "record several speeds over the same places, both ways"
     rivals: ClassVar[tuple[str, ...]] = ("cogging", "gravity_unbalance", "load_dependent_friction")
     told_apart_by: ClassVar[str] = "cogging pushes the same way in both directions; friction always resists"
 

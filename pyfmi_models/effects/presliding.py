@@ -30,6 +30,7 @@ class Presliding(FrictionEffect):
     title: ClassVar[str] = "Presliding"
     equation: ClassVar[str] = "dz/dt = v − σ₀ |v| z / g(v)"
     main: ClassVar[Main] = Main("sigma0", unit="N.m/rad", is_size=False)
+    to_record: ClassVar[str] = "record small, slow reversals"
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "dwell_breakaway", "backlash", "compliance")
     told_apart_by: ClassVar[str] = "below break-away the axis springs back when released; with play it does not"
     action: ClassVar[str] = "Nothing needs repair: contacts bend. For fine tracking use the improved model."

@@ -19,6 +19,7 @@ class StribeckEffect(FrictionEffect):
     title: ClassVar[str] = "Stribeck friction"
     equation: ClassVar[str] = "[Fc + (Fs − Fc) exp(−|v/Vs|^δ)] sign v"
     main: ClassVar[Main] = Main("Fs", is_size=False)
+    to_record: ClassVar[str] = "record slow motion, down to a creep"
     rivals: ClassVar[tuple[str, ...]] = ("presliding", "dwell_breakaway")
     told_apart_by: ClassVar[str] = "Stribeck friction is the same leaving and reaching standstill"
     action: ClassVar[str] = "Look at lubrication if slow motion is jerky; otherwise use the improved model."

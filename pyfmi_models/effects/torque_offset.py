@@ -15,6 +15,7 @@ class TorqueOffset(LoadEffect):
     title: ClassVar[str] = "Torque offset"
     equation: ClassVar[str] = "τ₀"
     main: ClassVar[Main] = Main("torque")
+    to_record: ClassVar[str] = "record the same speeds in both directions"
     rivals: ClassVar[tuple[str, ...]] = ("friction_asymmetry", "gravity_unbalance", "cable_wrap")
     told_apart_by: ClassVar[str] = "friction asymmetry vanishes at standstill; unbalance changes with position"
     special_case_of: ClassVar[tuple[str, ...]] = ("friction_asymmetry", "cable_wrap")

@@ -13,7 +13,8 @@ stands, one file an effect, what only a diagnosis asks. In the order in which it
     where(effect, reach)           where it acts, within what was visited
     concealed(mount, span, tried)  what is concealed in recordings to test how small it may be and still be seen
     looked(seen, mount)            for what the bound that this gives holds
-    why_not(mount, prepared)       why these recordings cannot test it
+    is_settled(mount)              whether no recording can test it: the model has it, or the axis cannot have it
+    why_not(mount, prepared)       why these recordings cannot test it, in one reason
 
 Hypotheses are stateless; a new one is a new file in this folder, and nothing else is edited.
 """
@@ -164,14 +165,26 @@ class Hypothesis(Generic[Form]):
         """For what a bound holds, if not for all of the effect, and what cannot be tested."""
         return ""
 
+    def is_settled(self, mount: Mount) -> bool:
+        """Whether no recording can test the effect: the model has it already, or the axis cannot have it."""
+        return any(isinstance(effect, self.forms) for effect in mount.effects)
+
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
-        """Why these recordings cannot test the effect, and what to record."""
-        return "the model has it already, or these recordings do not excite it"
+        """Why these recordings cannot test the effect: one reason. What to record is the effect's own to say."""
+        if self.is_settled(mount):
+            return HELD
+        if mount.friction.key == "none" and any(form.place == "Friction" for form in self.forms):
+            return NO_FRICTION
+        return NO_POSITION if self.needs_position and not prepared.has_position else UNSEEN
 
 
 EVERYWHERE = Where(axis="everywhere", description="everywhere", regions=())
 QUICK_CHANGES = Where(axis="frequency", description="wherever the torque changes quickly", regions=())
-NO_POSITION = "no position was recorded; record q"
+HELD = "the model has it already"
+NO_FRICTION = "the card says that there is no friction"
+NO_POSITION = "no position was recorded"
+UNSEEN = "no size of it would have shown in these recordings"
+"""Reasons why an effect cannot be tested."""
 
 
 def visited(reach: Reach) -> Where:
@@ -215,4 +228,5 @@ def with_numbers(one: Candidate, **numbers: float) -> Candidate:
 def in_cycles_a_turn(seen: Seen, mount: Mount) -> str:
     """Between which cycles a bound holds."""
     per = "a metre" if mount.motion == "linear" else "a turn"
-    return f"at {seen.low:.2g} to {seen.high:.0f} cycles {per}; not testable above"
+    low, high = (f"{one:.3g}" if one < 1000 else f"{one:.0f}" for one in (seen.low, seen.high))
+    return f"at {low if low == high else f'{low} to {high}'} cycles {per}; not testable above"

@@ -6,7 +6,6 @@ from typing import ClassVar
 
 from cosim.diagnosis.candidates import Candidate, Span
 from cosim.diagnosis.hypotheses.base import (
-    NO_POSITION,
     Hypothesis,
     Reach,
     Seen,
@@ -17,7 +16,7 @@ from cosim.diagnosis.hypotheses.base import (
 )
 from cosim.diagnosis.periodogram import peaks
 from cosim.diagnosis.result import Where
-from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Cogging, Effect
 from pyfmi_models.mount import Mount
@@ -59,9 +58,9 @@ class Ripple(Hypothesis[Cogging]):
         """At all positions."""
         return visited(reach)
 
-    def why_not(self, mount: Mount, prepared: Prepared) -> str:
-        """It needs a position."""
-        return super().why_not(mount, prepared) if prepared.has_position else NO_POSITION
+    def is_settled(self, mount: Mount) -> bool:
+        """Never: there may be further waves."""
+        return False
 
 
 def _wave(cycles: float) -> Candidate:

@@ -83,8 +83,8 @@ class LateTorque(Hypothesis[Drive]):
         if not any(piece.asked for piece in prepared.pieces):
             return NOTHING_ASKED
         if has(mount, DriveEffect):
-            return "alike to what was found in the drive; record faster reversals to tell them apart"
+            return "alike to what was found in the drive"
         return super().why_not(mount, prepared)
 
 
-NOTHING_ASKED = "nothing asks for a change of torque; record a speed that changes, and the set point"
+NOTHING_ASKED = "nothing in these recordings asks for a change of torque"

@@ -41,8 +41,8 @@ class Asymmetry(Hypothesis[FrictionAsymmetry]):
 
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """A law that says nothing of rest cannot tell it from an offset."""
-        if not mount.friction.states() and mount.of_kind(TorqueOffset):
-            return (
-                "alike to the torque offset that was found where the law says nothing of rest; take lugre in the card"
-            )
+        if not mount.friction.states() and has(mount, TorqueOffset) and not has(mount, FrictionAsymmetry):
+            return "alike to the torque offset that was found, as the card's friction law says nothing of rest"
+        if prepared.ranges["v"][0] >= 0 or prepared.ranges["v"][1] <= 0:
+            return "these recordings hold no reversals"
         return super().why_not(mount, prepared)

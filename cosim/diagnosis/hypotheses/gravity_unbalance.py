@@ -5,7 +5,7 @@ from math import atan2, hypot, pi
 from typing import ClassVar
 
 from cosim.diagnosis.candidates import Candidate, Span, has
-from cosim.diagnosis.hypotheses.base import NO_POSITION, Hypothesis, Reach, visited
+from cosim.diagnosis.hypotheses.base import Hypothesis, Reach, visited
 from cosim.diagnosis.result import Where
 from cosim.estimation.prepare import Array, Prepared
 from pyfmi_models.effects import Effect, GravityUnbalance
@@ -34,10 +34,10 @@ class Unbalance(Hypothesis[GravityUnbalance]):
         """At all positions."""
         return visited(reach)
 
+    def is_settled(self, mount: Mount) -> bool:
+        """It needs a rotary axis, and a card without one."""
+        return mount.motion == "linear" or super().is_settled(mount)
+
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
-        """It needs a rotary axis, a position, and a card without one."""
-        if mount.motion == "linear":
-            return "a linear axis has no unbalance"
-        if has(mount, GravityUnbalance):
-            return "the card has it already"
-        return super().why_not(mount, prepared) if prepared.has_position else NO_POSITION
+        """It needs a rotary axis."""
+        return "a linear axis has no unbalance" if mount.motion == "linear" else super().why_not(mount, prepared)

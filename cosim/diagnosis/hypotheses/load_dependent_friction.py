@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.diagnosis.candidates import Candidate, Span, contact_level, has
 from cosim.diagnosis.hypotheses.base import Hypothesis
-from cosim.estimation.prepare import Array
+from cosim.estimation.prepare import Array, Prepared
 from pyfmi_models.effects import Effect, PayloadEffect
 from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction, LoadScaledFriction
 from pyfmi_models.mount import Mount
@@ -34,3 +34,8 @@ class LoadFriction(Hypothesis[LoadDependentFriction]):
                 return replace(form, coulomb_per_Nm=float(np.clip(c[0], 1e-6, 5)))
 
             yield Candidate("load_dependent_friction", (form,), ("coulomb_per_Nm",), start)
+
+    def why_not(self, mount: Mount, prepared: Prepared) -> str:
+        """It needs a weight of known size."""
+        known = has(mount, PayloadEffect) or mount.friction.key == "none"
+        return super().why_not(mount, prepared) if known else "the model holds no load that changes"

@@ -16,6 +16,8 @@ from pyfmi_models.effects import Effect
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.mount import Mount
 
+TOO_SHORT = "these recordings hold too few waves of any tone"
+
 
 class Tone(Hypothesis[PeriodicDisturbance]):
     """Tones that stand out most from the torque; their phase is each recording's own."""
@@ -68,6 +70,11 @@ class Tone(Hypothesis[PeriodicDisturbance]):
         """Between which frequencies."""
         return f"between {seen.low:.2g} and {seen.high:.3g} Hz; not testable above {seen.cutoff:.3g} Hz"
 
+    def is_settled(self, mount: Mount) -> bool:
+        """Never: there may be further tones."""
+        return False
+
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
-        """A motion that repeats itself makes tones of its own."""
-        return "too short, or the motion repeats itself or turns steadily; record a motion that wanders"
+        """A motion that repeats itself makes tones of its own, and a short recording holds too few waves."""
+        slowest, fastest = detectable_band(prepared)
+        return TOO_SHORT if fastest < 2 * slowest else "what the motion repeats cannot be told from a tone"

@@ -9,7 +9,6 @@ import numpy as np
 
 from cosim.diagnosis.candidates import Candidate, Span, has
 from cosim.diagnosis.hypotheses.base import (
-    NO_POSITION,
     Hypothesis,
     Reach,
     Seen,
@@ -21,7 +20,7 @@ from cosim.diagnosis.hypotheses.base import (
 )
 from cosim.diagnosis.periodogram import peaks
 from cosim.diagnosis.result import Where
-from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.prepare import Array
 from pyfmi_models.effects import Effect, LocalFriction, PeriodicFriction
 from pyfmi_models.mount import Mount
 
@@ -64,9 +63,9 @@ class FrictionRipple(Hypothesis[PeriodicFriction]):
         """At all positions."""
         return visited(reach)
 
-    def why_not(self, mount: Mount, prepared: Prepared) -> str:
-        """It needs a position."""
-        return super().why_not(mount, prepared) if prepared.has_position else NO_POSITION
+    def is_settled(self, mount: Mount) -> bool:
+        """Never: there may be further waves."""
+        return False
 
 
 class RoughSpot(Hypothesis[LocalFriction]):

@@ -47,6 +47,10 @@ class BendingContact(Hypothesis[Presliding]):
 
             yield Candidate("presliding", (bent,), (), start)
 
+    def is_settled(self, mount: Mount) -> bool:
+        """A law may bend itself."""
+        return bool(mount.law.states())
+
     def looked(self, seen: Seen, mount: Mount) -> str:
         """Softer contacts."""
         return f"with a contact softer than {seen.high:.3g} {'N/m' if mount.motion == 'linear' else 'N·m/rad'}"

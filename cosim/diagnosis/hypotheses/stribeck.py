@@ -11,7 +11,7 @@ from cosim.diagnosis.hypotheses.base import Evidence, Hypothesis, Reach, Seen
 from cosim.diagnosis.result import Where
 from cosim.diagnosis.tuning import LEAST_GAIN, at_bound, freed, refound, revived
 from cosim.estimation.fit import Fit
-from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Effect, StribeckEffect
 from pyfmi_models.friction.base import LEAST_VS
@@ -78,9 +78,9 @@ class StribeckCurve(Hypothesis[StribeckEffect]):
         edge = min(2 * effect.Vs, reach.top)
         return Where(axis="speed", description=f"slower than {edge:.2g}", regions=((-edge, edge),))
 
-    def why_not(self, mount: Mount, prepared: Prepared) -> str:
+    def is_settled(self, mount: Mount) -> bool:
         """A law may have the curve itself."""
-        return "the card's friction law has it already" if _has_curve(mount) else super().why_not(mount, prepared)
+        return _has_curve(mount) or super().is_settled(mount)
 
 
 def _has_curve(mount: Mount) -> bool:

@@ -8,10 +8,5 @@ def equation(effect: str) -> str:
     return _form(effect).equation
 
 
-def to_record(effect: str) -> str:
-    """What to record where the effect cannot be tested and the diagnosis does not say."""
-    return _form(effect).to_record
-
-
 def _form(effect: str) -> type[Effect]:
     return CATALOGUE.get(effect, (Effect,))[0]

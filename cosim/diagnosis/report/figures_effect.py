@@ -10,7 +10,7 @@ from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture, Sheet, degrees, heading
 from cosim.diagnosis.result import Array, Finding
 from cosim.plots.quantities import ANGLE, LENGTH, handy
-from cosim.plots.style import AFTER, BEFORE, GREY, Style
+from cosim.plots.style import AFTER, BEFORE, GREY, MEASURED, Style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -90,7 +90,7 @@ def keep_turning(finding: Finding, chosen: Samples, scales: Scales) -> Picture |
     sheet = blank(finding)
     axes = sheet.axes()
     edges = _speeds(steady, falls) * scales.speed.factor
-    for sign, mark, fill in ((1.0, "^", AFTER), (-1.0, "v", "white")):
+    for sign, mark, fill in ((1.0, "^", MEASURED), (-1.0, "v", "white")):
         _side(axes, steady.where(steady.v * sign > 0), sign, (mark, fill), edges, scales)
     axes.set_xlabel(f"speed [{scales.speed.unit}]")
     axes.set_xlim(edges[0], edges[-1])
@@ -144,7 +144,7 @@ def _side(axes: "Axes", side: Samples, sign: float, mark: tuple[str, str], edges
         "marker": mark[0],
         "ms": 8,
         "mfc": mark[1],
-        "color": AFTER,
+        "color": MEASURED,
         "elinewidth": 1.4,
         "zorder": 4,
     }

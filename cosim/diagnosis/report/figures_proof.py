@@ -67,7 +67,7 @@ def _rows(axes: "Axes", labels: list[str]) -> None:
     axes.spines["left"].set_visible(False)
 
 
-def _short(text: str, most: int = 16) -> str:
+def _short(text: str, most: int = 18) -> str:
     return text if len(text) <= most else text[: most - 1] + "…"
 
 

@@ -10,6 +10,9 @@ from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.result import Diagnosis, Finding, is_special
 
+NOTHING_YET = "Nothing yet: it did not hold on the run that was not fitted."
+_NATS = re.compile(r"^([^:]+): .*\(([\d,]+ nats) behind\)$").findall
+
 
 @dataclass(frozen=True)
 class Numbers:
@@ -43,7 +46,7 @@ def block(one: words.Block, diagnosis: Diagnosis, scales: Scales, picture: Pictu
     if one.answer == "ambiguous":
         said = [*words.either(said), _in_model(diagnosis, *one.findings)]
     rows = [("Where", where(first, scales)), ("Tell apart", _apart(one))]
-    rows += [("Ruled out", "; ".join(first.ruled_out)), ("Less likely", "; ".join(first.less_likely))]
+    rows += [("Ruled out", _plainly(first.ruled_out)), ("Less likely", _plainly(first.less_likely))]
     closed = tuple(_numbers(finding) for finding in one.findings)
     filled = tuple((name, text) for name, text in rows if text)
     sizes = words.sized(first)
@@ -84,12 +87,19 @@ def where(finding: Finding, scales: Scales) -> str:
 
 
 def _apart(one: words.Block) -> str:
-    texts = dict.fromkeys(finding.told_apart_by for finding in one.findings if finding.told_apart_by)
-    return "; ".join(texts)
+    """What tells the first from its rivals; of possible causes each other's sentence would say the same."""
+    return next((finding.told_apart_by for finding in one.findings if finding.told_apart_by), "")
+
+
+def _plainly(rivals: tuple[str, ...]) -> str:
+    """Rivals without the unit of evidence, which stands among the numbers."""
+    return "; ".join(re.sub(r" \([\d,]+ nats behind\)", "", rival) for rival in rivals)
 
 
 def do(one: words.Block, diagnosis: Diagnosis) -> str:
-    """Return the action; rivals ask for the next experiment."""
+    """Return the action; rivals ask for the next experiment, and what did not prove itself for nothing."""
+    if one.answer == "not_proven":
+        return NOTHING_YET
     if one.answer == "ambiguous" and diagnosis.next_experiment.get("description"):
         return words.started(str(diagnosis.next_experiment["description"]))
     files = words.delivered(diagnosis)
@@ -100,6 +110,8 @@ def _numbers(finding: Finding) -> Numbers:
     lines = [words.started(words.closed(finding.evidence))] if finding.evidence else []
     if finding.answer in ("found", "ambiguous"):
         lines.append("The probability is its share of the evidence among its rivals, calibrated on simulated cases.")
+    behind = [f"{title}, {nats}" for one in (*finding.ruled_out, *finding.less_likely) for title, nats in _NATS(one)]
+    lines += [f"Evidence by which rivals are behind: {'; '.join(behind)}."] if behind else []
     limit = words.shows_from(finding)
     lines += [f"Would have shown from {limit}."] if limit else []
     lines.append("Ranges: 95 %, robust to errors that are alike within a block.")

@@ -5,7 +5,7 @@ from math import pi
 from typing import Any
 
 from cosim.diagnosis.report.quantities import Scales
-from cosim.plots.quantities import joined, number, trimmed
+from cosim.plots.quantities import FAMILIES, handy, joined, number, trimmed
 
 
 def motion(point: Mapping[str, Any], scales: Scales) -> str:
@@ -16,12 +16,12 @@ def motion(point: Mapping[str, Any], scales: Scales) -> str:
 
 def _sine(point: Mapping[str, Any], scales: Scales) -> str:
     fastest = 2 * pi * float(point["frequency"]) * float(point["amplitude"])
-    side = scales.position.text(float(point["amplitude"]))
+    side = _length(float(point["amplitude"]), scales)
     return f"a sine of {_hertz(point['frequency'])} and {side} to each side, up to {scales.speed.text(fastest)}"
 
 
 def _chirp(point: Mapping[str, Any], scales: Scales) -> str:
-    side = scales.position.text(float(point["amplitude"]))
+    side = _length(float(point["amplitude"]), scales)
     return f"a sine of {side} to each side that rises from {_hertz(point['start'])} to {_hertz(point['stop'])}"
 
 
@@ -35,6 +35,12 @@ def _slews(point: Mapping[str, Any], scales: Scales) -> str:
     rests = list(point["dwell"])
     speed = scales.speed.text(float(point["max_velocity"]))
     return f"slews from {places} at up to {speed}, with rests of {min(rests):g} to {max(rests):g} s"
+
+
+def _length(value: float, scales: Scales) -> str:
+    """An angle or a length in a unit that needs no zeros: a chirp moves an axis by much less than its stroke."""
+    family = next(family for family in FAMILIES.values() if scales.position in family)
+    return handy(family, abs(value)).text(value)
 
 
 def _hertz(value: Any) -> str:

@@ -7,9 +7,8 @@ import numpy as np
 
 from cosim.diagnosis.breakdown import Part, bars
 from cosim.diagnosis.entries import Source
-from cosim.diagnosis.report.equations import to_record
 from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.words import ANSWERS, lowered, shows_from, sized, unit_of, unseen_torque
+from cosim.diagnosis.report.words import ANSWERS, in_handy_units, lowered, shows_from, sized, unseen_torque
 from cosim.diagnosis.result import Diagnosis, Finding, Trace
 from cosim.plots.quantities import decimals, number, scale_of
 
@@ -36,34 +35,26 @@ def _from(finding: Finding, least: str) -> str:
     if finding.answer in ("found", "ambiguous", "not_proven"):
         return shows_from(finding)
     if finding.answer != "not_testable":
-        return shows_from(finding) or finding.evidence or f"a torque of {least}" * bool(least)
-    said = [finding.evidence, finding.action or to_record(finding.effect)]
-    return "; ".join(dict.fromkeys(text.rstrip(".") for text in said if text))
+        return in_handy_units(shows_from(finding) or finding.evidence) or f"a torque of {least}" * bool(least)
+    return "; ".join(text.rstrip(".") for text in (finding.evidence, finding.action) if text)
 
 
 def limits(diagnosis: Diagnosis, scales: Scales) -> Table:
-    """Group effects that were not seen or cannot be tested, for the first screen of "nothing is missing"."""
+    """List effects that were not seen or cannot be tested, for the first screen of "nothing is missing".
+
+    Effects of which the same is said share a row.
+    """
     least = unseen_torque(diagnosis, scales)
     groups: dict[tuple[str, str], list[Finding]] = {}
-    for finding in diagnosis.findings:
-        if finding.answer == "not_seen":
-            key = unit_of(finding) if finding.visible_from is not None else _from(finding, least)
-            groups.setdefault((finding.answer, key), []).append(finding)
-    for finding in diagnosis.findings:
-        if finding.answer == "not_testable":
-            groups.setdefault((finding.answer, _from(finding, least)), []).append(finding)
-    rows = [(_titles(group), ANSWERS[answer], _limits(group, least)) for (answer, _), group in groups.items()]
+    for answer in ("not_seen", "not_testable"):
+        for finding in (one for one in diagnosis.findings if one.answer == answer):
+            groups.setdefault((answer, _from(finding, least)), []).append(finding)
+    rows = [(_titles(group), ANSWERS[answer], said) for (answer, said), group in groups.items()]
     return Table(("Effect", "Answer", "Would have shown from"), tuple(rows))
 
 
 def _titles(group: Sequence[Finding]) -> str:
     return ", ".join([group[0].title, *(lowered(finding.title) for finding in group[1:])])
-
-
-def _limits(group: Sequence[Finding], least: str) -> str:
-    """The limits of effects in their order, or what is the same for all of them."""
-    texts = [_from(finding, least) for finding in group]
-    return ", ".join(texts) if len(set(texts)) > 1 else texts[0]
 
 
 def numbers(finding: Finding) -> Table:

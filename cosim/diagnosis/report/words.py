@@ -52,6 +52,8 @@ class Block:
         return "finding-" + "".join(letter for letter in self.first.effect if letter.isalnum() or letter == "_")
 
 
+NAMES = ("Stribeck",)
+"""Names of people with which titles begin."""
 SEEN = 0.05
 """Share of the residual energy that an effect must hold to be seen."""
 
@@ -196,7 +198,8 @@ def unit_of(finding: Finding) -> str:
 
 def lowered(title: str) -> str:
     """Return a title as it reads inside a sentence; names and abbreviations keep their capitals."""
-    return title if len(title) > 1 and title[1].isupper() else title[:1].lower() + title[1:]
+    keeps = title.startswith(NAMES) or title[1:2].isupper()
+    return title if keeps else title[:1].lower() + title[1:]
 
 
 def started(sentence: str) -> str:

@@ -58,13 +58,13 @@ def _far(
     if bounds and _at_bound(value, bounds, card.start):
         return [
             f"Refitted, the {words}{side} ends at a bound of the fit ({numbers}): it stands for something else, or "
-            f"nothing tells it. Check first: {causes}."
+            f"nothing tells it. Possible causes: {causes}."
         ]
     factor = value / card.start if card.start > 0 else 1.0
     if 1 / FAR <= factor <= FAR:
         return []
     how = f"{factor:.3g} times the card's" if factor > 1 else f"{1 / factor:.3g} times smaller than the card's"
-    return [f"Refitted, the {words}{side} is {how} ({numbers}). Check first: {causes}."]
+    return [f"Refitted, the {words}{side} is {how} ({numbers}). Possible causes: {causes}."]
 
 
 def _at_bound(value: float, bounds: tuple[float, float], start: float) -> bool:

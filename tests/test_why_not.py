@@ -1,0 +1,58 @@
+"""What cannot be tested has one reason, and what to record is said apart from it, and only where a recording helps."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.hypotheses import TRIED, named
+from cosim.diagnosis.hypotheses.base import HELD, NO_FRICTION, NO_POSITION, UNSEEN
+from cosim.estimation.prepare import Prepared, prepare
+from pyfmi_models.effects import CATALOGUE, FrictionAsymmetry, GravityUnbalance
+from pyfmi_models.friction import Coulomb, Frictionless, LuGre
+from pyfmi_models.mount import Axis, Mount
+
+T = np.arange(8000) / 200
+BARE = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0))
+
+
+def taken(q: np.ndarray, of: str = "q") -> Prepared:
+    return prepare([Recording("run", {"t": T, "tau": np.cos(T), of: q, "q_d": q})], 20.0)
+
+
+BOTH_WAYS, ONE_WAY = 0.3 * np.sin(T), 0.3 * T + 0.05 * np.sin(T)
+
+
+def reason(effect: str, mount: Mount = BARE, prepared: Prepared | None = None) -> str:
+    return named(effect).why_not(mount, prepared or taken(BOTH_WAYS))
+
+
+@pytest.mark.parametrize("effect", TRIED)
+def test_a_reason_is_one_and_gives_no_advice(effect: str) -> None:
+    for mount in (BARE, replace(BARE, motion="linear"), replace(BARE, friction=Frictionless())):
+        for prepared in (taken(BOTH_WAYS), taken(ONE_WAY), taken(np.cos(T), "v")):
+            assert not re.search(r";|\bor\b|record [a-z0-9]", reason(effect, mount, prepared))
+
+
+@pytest.mark.parametrize("effect", TRIED)
+def test_what_to_record_is_said_of_every_effect(effect: str) -> None:
+    assert all(form.to_record.startswith("record ") for form in CATALOGUE[effect])
+
+
+def test_the_reason_is_the_one_that_holds() -> None:
+    both = replace(BARE, effects=(GravityUnbalance(mgl=1.0, phase=0.0), FrictionAsymmetry(level_asymmetry=0.1)))
+    assert [reason(name, both) for name in ("gravity_unbalance", "friction_asymmetry")] == [HELD, HELD]
+    assert reason("gravity_unbalance", replace(BARE, motion="linear")) == "a linear axis has no unbalance"
+    assert reason("friction_asymmetry", prepared=taken(ONE_WAY)) == "these recordings hold no reversals"
+    assert reason("friction_asymmetry", replace(BARE, friction=Frictionless())) == NO_FRICTION
+    assert reason("cable_wrap", prepared=taken(np.cos(T), "v")) == NO_POSITION
+    assert reason("quadratic_drag", prepared=taken(np.cos(T), "v")) == UNSEEN
+
+
+def test_an_effect_that_the_law_or_the_card_holds_needs_no_recording() -> None:
+    lugre = replace(BARE, friction=LuGre(sigma0=1e4, sigma1=10.0, sigma2=1.0, Fc=2.0, Fs=2.5, Vs=0.01))
+    settled = [name for name in TRIED if named(name).is_settled(lugre)]
+    assert sorted(settled) == ["presliding", "stribeck"]
+    assert not [name for name in TRIED if named(name).is_settled(BARE)]
