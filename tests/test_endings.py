@@ -17,7 +17,7 @@ __all__ = ["tiny"]
 
 LOOPS = pytest.mark.parametrize("compiled", [True, False])
 VERSIONS = pytest.mark.parametrize("fmi", [2, 3])
-ENDS, DISCARDS = 17.0, 2.0
+ENDS, EARLY, DISCARDS = 17.0, 18.0, 2.0
 
 
 @LOOPS
@@ -50,6 +50,19 @@ def test_a_discarded_step_that_ends_nothing_is_a_failure(tiny: dict[int, Path], 
     with pytest.raises(StepError, match="one discarded the step at tick 10"):
         simulate(
             {"one": tiny[2]}, [], record={"y": "one.y"}, step=0.1, ticks=20, parameters=parameters, compiled=compiled
+        )
+
+
+@LOOPS
+def test_a_step_that_returns_early_unasked_is_a_failure_and_no_loss_of_time(
+    tiny: dict[int, Path], compiled: bool
+) -> None:
+    """Early return is never allowed here, so an FMU goes through its events itself; one that does not is named."""
+    parameters = {"one": {"status": EARLY, "fail_at": 1.0}}
+    said = "one returned early from its step, though early return is not allowed here, at tick 10"
+    with pytest.raises(StepError, match=said):
+        simulate(
+            {"one": tiny[3]}, [], record={"y": "one.y"}, step=0.1, ticks=20, parameters=parameters, compiled=compiled
         )
 
 

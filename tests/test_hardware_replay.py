@@ -47,7 +47,9 @@ def with_story(recording: Recording, change: Callable[[dict[str, Any]], Any]) ->
 
 def sealed(recording: Recording) -> Recording:
     """Seal it again, as who means to deceive would."""
-    return replace(recording, origin=recording.origin | {"seal": seal_of(recording.table)})
+    return replace(
+        recording, origin=recording.origin | {"seal": seal_of(recording.table, recording.origin["hardware"])}
+    )
 
 
 def test_what_was_recorded_is_identical(whole: Recording) -> None:
@@ -109,7 +111,7 @@ def test_a_cycle_that_is_there_twice_is_no_division_by_zero(whole: Recording) ->
 
 def test_the_seal_is_checked(whole: Recording) -> None:
     assert broken_seal(whole) == ""
-    other = seal_of(whole.table | {"extra": np.zeros(len(whole))})
+    other = seal_of(whole.table | {"extra": np.zeros(len(whole))}, whole.origin["hardware"])
     for seal, reason in [
         (None, "it has no seal, or one that is damaged"),
         ({"records": "many", "sha256": "0" * 64}, "it has no seal, or one that is damaged"),
@@ -122,15 +124,35 @@ def test_the_seal_is_checked(whole: Recording) -> None:
 
 
 def test_the_seal_depends_on_every_name_and_number() -> None:
-    one = seal_of({"a": np.arange(3.0), "b": np.zeros(3)})
-    assert one == seal_of({"b": np.zeros(3), "a": np.arange(3.0)})
+    one = seal_of({"a": np.arange(3.0), "b": np.zeros(3)}, {})
+    assert one == seal_of({"b": np.zeros(3), "a": np.arange(3.0)}, {})
     for other in (
         {"a": np.arange(3.0), "c": np.zeros(3)},
         {"a": np.arange(3.0), "b": -np.zeros(3)},
         {"a": np.array([0.0, 2.0, 1.0]), "b": np.zeros(3)},
         {"a": np.arange(3.0)},
     ):
-        assert seal_of(other)["sha256"] != one["sha256"]
+        assert seal_of(other, {})["sha256"] != one["sha256"]
+
+
+def test_the_card_and_all_else_that_a_session_says_is_part_of_what_is_checked(tmp_path: Path) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(SCENARIO.replace(*SHORT), "utf-8")
+    assert invoke("run", str(path), "--fast", "--out", str(tmp_path / "out")).exit_code == 0
+    session = Recording.read(tmp_path / "out" / "recording.parquet", required=())
+    assert replay(session).identical
+    for altered in (
+        with_story(session, lambda story: story["cards"]["mount"].update(sha256="0" * 64)),
+        with_story(session, lambda story: story["cards"]["mount"].update(card="another")),
+        with_story(session, lambda story: story.pop("cards") and None),
+        with_story(session, lambda story: story["machine"]["limits"].update(following_error=9.0)),
+        with_story(session, lambda story: story.update(scenario="")),
+    ):
+        done = replay(altered)
+        assert (done.noticed, done.identical) == (
+            "what it says of its machine, controller and cards was altered",
+            False,
+        )
 
 
 def test_a_column_too_much_or_too_few_is_seen(whole: Recording) -> None:
@@ -181,7 +203,7 @@ def test_a_controller_that_a_recording_names_is_never_opened(
         if one.name == whole.origin["hardware"]["controller"]["file"]
     )
     copy = shutil.copy(own, tmp_path / "controller.fmu")
-    named = with_story(whole, lambda story: story["controller"].update(path=str(copy), file=str(copy)))
+    named = sealed(with_story(whole, lambda story: story["controller"].update(path=str(copy), file=str(copy))))
     assert replay(named).identical  # found in the cache, by its hash
     monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "empty"))
     with pytest.raises(HardwareError, match=r"is not in the cache; it was built from|is not in the cache\."):

@@ -3,7 +3,7 @@
 mode 0: y' = k (a - b); mode 1: y = k (a - b) a step later; mode 2: y = k (a - b) at once.
 From fail_at on a step returns the number `status`; 11 crashes the process, 12 never returns,
 13 prints a line and goes on, 14 ends the process with exit code 0, 15 aborts, 16 starts a process that stays,
-17 asks to end the simulation.
+17 asks to end the simulation, 18 returns early from its step (FMI 3).
 """
 
 import subprocess
@@ -23,7 +23,7 @@ SOURCE = r"""
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, STATUS, COUNT, CRASH = 11, HANG, CHATTER, LEAVE, ABORT, SPAWN, END };
+enum { A, B, K, MODE, FAIL_AT, NAN_AT, Y, STATUS, COUNT, CRASH = 11, HANG, CHATTER, LEAVE, ABORT, SPAWN, END, EARLY };
 typedef struct { double v[COUNT]; char name[99]; void *log; } M;
 typedef void Log2(void *, const char *, int, const char *, const char *, ...);
 typedef void Log3(void *, int, const char *, const char *);
@@ -89,6 +89,7 @@ API int fmi3SetFloat64(M *m, const unsigned *r, size_t n, const double *x, size_
 API int fmi3GetFloat64(M *m, const unsigned *r, size_t n, double *x, size_t k) { return get(m, r, n, x); }
 API int fmi3DoStep(M *m, double t, double h, bool p, bool *e, bool *x, bool *y, double *l) {
   int s = step(m, t, h); if (s == END) return *x = true, 0;
+  if (s == EARLY) return *y = true, *l = t + h / 2, 0;
   if (s) ((Log3 *)m->log)(NULL, 3, "error", "the shaft broke"); return s; }
 API const char *fmi3GetVersion(void) { return "3.0"; }
 """

@@ -20,7 +20,7 @@ from typing import Any, Protocol
 import numpy as np
 
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
-NOT_FINITE, TERMINATED, NOT_AGREED, NOT_EXACT, POOL_FULL = 100, 101, 102, 103, 104
+NOT_FINITE, TERMINATED, NOT_AGREED, NOT_EXACT, POOL_FULL, EARLY = range(100, 106)
 STATUSES = {
     DISCARD: "discarded the step",
     ERROR: "returned an error",
@@ -30,6 +30,7 @@ STATUSES = {
     NOT_AGREED: "and those coupled with it did not agree within the iterations allowed",
     NOT_EXACT: "met a value that its type does not hold",
     POOL_FULL: "gave more texts and binaries than there is room for",
+    EARLY: "returned early from its step, though early return is not allowed here,",
 }
 
 

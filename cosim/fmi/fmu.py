@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.fmi.component import ERROR, FATAL, OK, TERMINATED, Functions, Port
+from cosim.fmi.component import EARLY, ERROR, FATAL, OK, TERMINATED, WARNING, Functions, Port
 from cosim.fmi.description import (
     check_binary,
     complaint_of,
@@ -285,7 +285,9 @@ class FmuComponent:
         last = ctypes.c_double(time)
         function = self._fmu.dll.fmi3DoStep
         status = int(function(self._fmu.component, time, size, final, *map(ctypes.byref, flags), ctypes.byref(last)))
-        return TERMINATED if status <= 1 and flags[1].value else status
+        if status > WARNING:
+            return status
+        return TERMINATED if flags[1].value else EARLY if flags[2].value else status
 
     def _arrays(self, references: np.ndarray, values: np.ndarray) -> tuple[Any, ...]:
         count, functions = len(references), self.functions

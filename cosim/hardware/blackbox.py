@@ -167,7 +167,7 @@ def recording_of(kept: Kept, name: str) -> Recording:
     units = {"t": "s", "tau": "N.m", "q": "rad", "machine.command": "N.m", "machine.order": "N.m"}
     units |= {name: unit for name, unit in origin["units"].items() if name in table and unit}
     columns = {key: np.ascontiguousarray(column, dtype=np.float64) for key, column in table.items()}
-    return Recording(name, columns, units, {"hardware": origin, "torn": kept.torn, "seal": seal_of(columns)})
+    return Recording(name, columns, units, {"hardware": origin, "torn": kept.torn, "seal": seal_of(columns, origin)})
 
 
 def unwrapped(counts: np.ndarray) -> np.ndarray:

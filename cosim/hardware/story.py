@@ -5,6 +5,7 @@ a hash can show.
 """
 
 import hashlib
+import json
 from collections.abc import Mapping
 
 import numpy as np
@@ -65,10 +66,11 @@ class Story(_Said):
 
 
 class Seal(_Said):
-    """`seal`: how many records the recording was written with, and the hash of their columns."""
+    """`seal`: how many records the recording was written with, the hash of their columns, and that of the story."""
 
     records: int = Field(ge=0)
     sha256: str = Hash
+    story: str = Hash
 
 
 def story_in(recording: Recording) -> Story:
@@ -87,12 +89,16 @@ def story_in(recording: Recording) -> Story:
         raise HardwareError(**complaint(error, recording.name, "a session", lambda _: ())) from error
 
 
-def seal_of(table: Mapping[str, np.ndarray]) -> JsonObject:
-    """Return the seal of a table: rows, and the SHA-256 of all columns with their names, in the order of names."""
+def seal_of(table: Mapping[str, np.ndarray], story: object) -> JsonObject:
+    """Return the seal of a session: rows, and the SHA-256 of all columns with their names, in the order of names.
+
+    The story has a hash of its own: machine, limits, controller and the cards with their hashes.
+    """
     digest = hashlib.sha256()
     for name in sorted(table):
         digest.update(name.encode() + b"\0" + np.ascontiguousarray(table[name], dtype="<f8").tobytes())
-    return {"records": len(next(iter(table.values()))), "sha256": digest.hexdigest()}
+    said = hashlib.sha256(json.dumps(story, sort_keys=True).encode()).hexdigest()
+    return {"records": len(next(iter(table.values()))), "sha256": digest.hexdigest(), "story": said}
 
 
 def broken_seal(recording: Recording) -> str:
@@ -103,5 +109,7 @@ def broken_seal(recording: Recording) -> str:
         return "it has no seal, or one that is damaged"
     if seal.records != len(recording):
         return f"it has {len(recording):,} of the {seal.records:,} cycles that were recorded"
-    now = seal_of({name: recording[name] for name in recording})
-    return "" if now["sha256"] == seal.sha256 else "its numbers are not those that were recorded"
+    now = seal_of({name: recording[name] for name in recording}, recording.origin.get("hardware"))
+    if now["sha256"] != seal.sha256:
+        return "its numbers are not those that were recorded"
+    return "" if now["story"] == seal.story else "what it says of its machine, controller and cards was altered"

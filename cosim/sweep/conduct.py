@@ -75,7 +75,7 @@ def conduct(
         if not address:
             warm(min(workers or cores(), sweep.design.runs))
         units = _units(job)
-        journal = stack.enter_context(Journal(out, _identity(sweep, scenario), force))
+        journal = stack.enter_context(Journal(out, _identity(sweep, scenario), force, fits=sweep.fits))
         known = {run for run, row in journal.rows.items() if row["status"] == "ok" or not retry}
         rest = [(number, point) for number, point in enumerate(sweep.design.points()) if number not in known]
         failed = sum(journal.rows[run]["status"] != "ok" for run in known)

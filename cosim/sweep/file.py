@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from cosim.support.complaint import Location, complaint
 from cosim.support.errors import SweepError
 from cosim.support.numbers import Count, Seconds
+from cosim.support.plain import Parsed
 from cosim.support.toml import parsed
 from cosim.sweep.design import Design, grid, latin_hypercube, monte_carlo
 from cosim.sweep.statistics import Statistic
@@ -54,6 +55,14 @@ class Sweep:
     def columns(self) -> tuple[str, ...]:
         """Names of the table's columns."""
         return ("run", *self.variations, *self.statistics, "seconds", "status", "reason")
+
+    def fits(self, row: Parsed) -> bool:
+        """Whether a row read from a file is one of this sweep: its columns, a run that there is, words and numbers."""
+        if set(row) != set(self.columns) or not 0 <= row["run"] < self.design.runs:
+            return False
+        texts = (row["status"], row["reason"])
+        numbers = [row[name] for name in (*self.variations, *self.statistics, "seconds")]
+        return all(isinstance(one, str) for one in texts) and all(isinstance(one, int | float) for one in numbers)
 
 
 def read_sweep(path: Path) -> Sweep:

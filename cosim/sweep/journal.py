@@ -8,7 +8,7 @@ recordings/      one file a run, where wanted
 
 import json
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import IO
@@ -32,9 +32,10 @@ class Journal:
         force: start over, whatever is there.
         kind: what the folder holds, in messages.
         made: files and folders that belong to it; the first is that of the identity.
+        fits: whether a row that is found may be one of these runs.
 
     Raises:
-        OutputError: the folder holds another sweep, or one that is being written.
+        OutputError: the folder holds another sweep, one that is being written, or rows that another hand changed.
     """
 
     def __init__(
@@ -44,7 +45,9 @@ class Journal:
         force: bool = False,
         kind: str = "sweep",
         made: Sequence[str] = MADE,
+        fits: Callable[[Row], bool] = lambda row: True,
     ) -> None:
+        self._fits = fits
         self.folder, self.rows, self._kind, self._identity = folder, dict[int, Row](), kind, folder / made[0]
         if force:
             clear(folder, made)
@@ -80,7 +83,10 @@ class Journal:
         if not self._identity.exists():
             _check_free(self.folder, made)
             return
-        before: Parsed = json.loads(self._identity.read_text("utf-8"))
+        before = _object(self._identity.read_bytes())
+        if before is None:
+            rule = "give another --out, or --force to start over"
+            raise OutputError(f"{self._identity} is damaged: it is no JSON; {rule}.", culprit=str(self._identity))
         changed = [name for name in {**before, **identity} if before.get(name) != identity.get(name)]
         if changed:
             rule = "give another --out, or --force to start over"
@@ -91,13 +97,31 @@ class Journal:
         """Read what is there and cut off a line that was not finished."""
         self._file.seek(0)
         whole = 0
-        for line in self._file:
+        for number, line in enumerate(self._file, 1):
             if not line.endswith(b"\n"):
                 break
-            row = json.loads(line)
+            row = self._row(line, number)
             self.rows[row["run"]] = row
             whole += len(line)
         self._file.truncate(whole)
+
+    def _row(self, line: bytes, number: int) -> Row:
+        """Return the row of a line; one that is none was changed by another hand, and must not be lost unseen."""
+        row = _object(line)
+        if row is not None and type(row.get("run")) is int and self._fits(row):
+            return row
+        rule = "mend or remove that line and its run is made again, or give --force to start over"
+        message = f"{self.folder / RUNS}: line {number:,} is no row of a {self._kind}; {rule}."
+        raise OutputError(message, culprit=str(self.folder / RUNS), value=number)
+
+
+def _object(text: bytes) -> Parsed | None:
+    """Return a JSON object; None where it is none."""
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None
 
 
 def _check_free(folder: Path, made: Sequence[str]) -> None:

@@ -1,6 +1,6 @@
 """Commands that are ended at any moment: is a file half written, does anything still run, is anything left behind?
 
-    python tests/benchmarks/kills.py --trials 50 --out results/kills
+    python tests/benchmarks/kills.py --trials 50 --out results/kills [--only run sweep] [--journal FILE]
 
 Each command is run once to its end, and then again and again, ended by SIGKILL, SIGINT or SIGTERM at a moment drawn
 from that time. Afterwards every file under its own name must be whole. After SIGINT and SIGTERM there must be no
@@ -21,6 +21,7 @@ import zipfile
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
 from random import Random
 from shutil import rmtree
@@ -31,6 +32,7 @@ import pyarrow.parquet as pq  # noqa: E402
 
 from cosim.hardware.blackbox import read_black_box  # noqa: E402
 from cosim.support.files import replacing  # noqa: E402
+from cosim.support.plain import JsonObject  # noqa: E402
 from cosim.support.version import __version__  # noqa: E402
 
 SIGNALS = (signal.SIGKILL, signal.SIGINT, signal.SIGTERM)
@@ -179,33 +181,53 @@ def page(found: dict[tuple[str, str], Counts], undone: dict[str, int], command: 
     return "\n".join(lines) + "\n"
 
 
+def journalled(journal: Path | None) -> tuple[dict[tuple[str, str], Counts], dict[str, int]]:
+    """What a journal has of commands ended so often by each signal, and of commands run again; nothing without one."""
+    found: dict[tuple[str, str], Counts] = {}
+    undone: dict[str, int] = {}
+    for line in journal.read_text("utf-8").splitlines() if journal and journal.exists() else []:
+        one = json.loads(line)
+        found[one["command"], one["signal"]] = Counts(one["trials"], one["found"])
+        undone |= one["undone"]
+    return found, undone
+
+
+def ended(name: str, command: list[str], kill: signal.Signals, given: argparse.Namespace, folder: Path) -> JsonObject:
+    """End a command by a signal, as often as asked, at moments of the time that it takes now; a line of the journal."""
+    good, seconds = trial(command, folder / "good", None, 0)
+    if any(good.values()):
+        raise SystemExit(f"{name} does not end well by itself: {good}: {(folder / 'good/said').read_text()}")
+    rmtree(folder / "good")
+    dice, counts, undone = Random(f"{given.seed}.{name}.{kill.name}"), Counts(), {}
+    for number in range(given.trials):
+        here = folder / f"{name}{kill.name}{number}"
+        counts.add(**trial(command, here, kill, dice.uniform(0, seconds))[0])
+        if kill == signal.SIGKILL and number == given.trials - 1:
+            undone[name] = again(command, here, name)
+        rmtree(here)
+    return {"command": name, "signal": kill.name, **vars(counts), "undone": undone}
+
+
 def main() -> None:
     """Kill, count, and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--trials", type=int, default=50)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", nargs="*", default=["run", "sweep", "export", "diagnose", "hardware"])
+    parser.add_argument("--journal", type=Path, help="file of what is done: a run that ended early goes on from there")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
-    dice, found, undone = Random(given.seed), {}, {}
     folder = Path(tempfile.mkdtemp(prefix="kills-"))
+    journal = given.journal or folder / "journal"
     try:
-        for name, command in commands(folder).items():
-            if name not in given.only:
-                continue
-            good, seconds = trial(command, folder / "good", None, 0)
-            if any(good.values()):
-                raise SystemExit(f"{name} does not end well by itself: {good}: {(folder / 'good/said').read_text()}")
-            rmtree(folder / "good")
-            for kill in SIGNALS:
-                counts = found[name, kill.name] = Counts()
-                for number in range(given.trials):
-                    here = folder / f"{name}{kill.name}{number}"
-                    counts.add(**trial(command, here, kill, dice.uniform(0, seconds))[0])
-                    if kill == signal.SIGKILL and number == given.trials - 1:
-                        undone[name] = again(command, here, name)
-                    rmtree(here)
-                print(name, kill.name, counts, flush=True)
+        todo = {name: one for name, one in commands(folder).items() if name in given.only}
+        for (name, command), kill in product(todo.items(), SIGNALS):
+            if (name, kill.name) not in journalled(journal)[0]:
+                line = json.dumps(ended(name, command, kill, given, folder))
+                print(line, flush=True)
+                with journal.open("a", encoding="utf-8") as file:
+                    file.write(line + "\n")
+        found, undone = journalled(journal)
     finally:
         rmtree(folder, ignore_errors=True)
     given.out.mkdir(parents=True, exist_ok=True)

@@ -18,7 +18,7 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-enum { FMI_WARNING = 1, NOT_FINITE = 100, TERMINATED = 101, NOT_AGREED = 102 };
+enum { FMI_WARNING = 1, NOT_FINITE = 100, TERMINATED = 101, NOT_AGREED = 102, EARLY = 105 };
 
 enum { GATHER, STEP, ITERATE, BALANCE };
 

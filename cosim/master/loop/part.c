@@ -87,7 +87,10 @@ int do_step(const Part *part, double time, double size, bool final)
     bool event = false, terminate = false, early = false;
     double last = time;
     int status = ((Step3 *)part->step)(part->instance, time, size, final, &event, &terminate, &early, &last);
-    return status <= FMI_WARNING && terminate ? TERMINATED : status;
+    if (status <= FMI_WARNING && terminate) {
+        return TERMINATED;
+    }
+    return status <= FMI_WARNING && early ? EARLY : status; /* it was told that it must not */
 }
 
 int worse(int one, int other)
