@@ -273,3 +273,24 @@ def test_importing_the_package_is_quick_and_a_warm_run_needs_no_casadi(tmp_path:
     for name in ("cold", "warm"):
         said = subprocess.check_output([*command, str(tmp_path / name)], env=environment, cwd=tmp_path, text=True)
     assert not {"casadi", "ziglang", "matplotlib", "pandas"} & set(said.split())
+
+
+def test_a_signal_that_comes_before_a_verb_begins_is_told_by_the_exit_code(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Typer takes each KeyboardInterrupt for Ctrl-C."""
+
+    def parsing(*_: object, **__: object) -> None:
+        signal.raise_signal(number)
+
+    monkeypatch.setattr("typer.core.TyperGroup.parse_args", parsing)
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            assert call("show", "paper_mount") == code
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+    assert "cosim: terminated" in capsys.readouterr().err

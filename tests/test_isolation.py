@@ -1,6 +1,7 @@
 """A component that crashes, ends its process or never returns costs one sentence, and leaves nothing behind."""
 
 import os
+import pickle
 import re
 import shutil
 import signal
@@ -18,7 +19,7 @@ from tiny_fmu import tiny
 from cosim.data.recording import Recording
 from cosim.master.isolated import run_isolated
 from cosim.master.simulate import Options
-from cosim.support.activity import Board
+from cosim.support.activity import SIZE, Board
 from cosim.support.errors import LostComponentError
 from cosim.system.scenario import read_scenario
 
@@ -286,3 +287,36 @@ def test_a_lock_survives_the_file_being_removed(tmp_path: Path) -> None:
     with claimed(tmp_path / "out", "run"):
         assert left(tmp_path) == ["out", "out/.cosim.lock"]
     assert left(tmp_path) == []
+
+
+@linux
+@pytest.mark.parametrize("call", [b"", b"\x80\x05\x95\xff\xff", pickle.dumps((print, ("heard",)))[:-5]])
+@pytest.mark.parametrize("orphan", [False, True])
+def test_a_process_whose_parent_is_gone_in_the_middle_of_a_call_ends_without_a_trace(
+    tmp_path: Path, call: bytes, orphan: bool
+) -> None:
+    folder = tmp_path / "cosim-own"
+    folder.mkdir()
+    (folder / "board").write_bytes(bytes(SIZE))
+    parent = ["1"] if orphan else [str(os.getpid())]  # one that ended before its child had begun
+    command = [sys.executable, "-m", "cosim.support.child", str(folder / "board"), *parent]
+    done = subprocess.run(
+        command, env=ENVIRONMENT, input=call, capture_output=True, start_new_session=True, timeout=60, check=False
+    )
+    assert done.stderr == b""
+    assert not folder.exists()
+
+
+@linux
+def test_a_process_whose_parent_was_gone_before_it_began_does_not_work_on(tmp_path: Path) -> None:
+    folder = tmp_path / "cosim-own"
+    folder.mkdir()
+    (folder / "board").write_bytes(bytes(SIZE))
+    command = [sys.executable, "-m", "cosim.support.child", str(folder / "board"), "1"]
+    process = subprocess.Popen(command, env=ENVIRONMENT, stdin=subprocess.PIPE, start_new_session=True)
+    assert process.stdin is not None
+    process.stdin.write(pickle.dumps((time.sleep, (600.0,))))
+    process.stdin.flush()
+    process.wait(60)
+    process.stdin.close()
+    assert not folder.exists()

@@ -165,6 +165,24 @@ def test_a_machine_with_such_a_number_is_refused(old: str, new: str, sentence: s
         parse_machine(text.replace(old, new, 1), "m.toml")
 
 
+@pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
+@pytest.mark.parametrize(
+    ("verb", "option"),
+    [("run", "--call-timeout"), ("hardware check", "--seconds"), ("prove", "--seconds"), ("identify", "--cut")],
+)
+def test_a_number_of_the_command_line_that_is_none_is_refused(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], verb: str, option: str, number: str
+) -> None:
+    card = ["--card", "paper_mount"] if verb == "identify" else []
+    file = [] if verb == "prove" else [scenario]
+    out = [] if verb == "hardware check" else ["--out", tmp_path / "out"]
+    assert call(*verb.split(), *file, *card, *out, option, number) == 2
+    said = capsys.readouterr().err
+    assert f"{option} {number}: it must be a finite number." in said or said.startswith("Usage: ")
+    assert "Traceback" not in said
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_long_value_is_cut_short_in_a_message() -> None:
     assert shown(3.5) == "3.5"
     assert shown("x" * 100) == f"'{'x' * 59}... (102 characters)"

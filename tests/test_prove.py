@@ -429,6 +429,8 @@ def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path: Path) -> Non
         (["--cases", "0"], "--cases 0: it must be at least 1"),
         (["--seconds", "5"], "--seconds 5: a recording must last 10 s at least"),
         (["--workers", "0"], "--workers 0: it must be at least 1"),
+        (["--workers", str(2**64)], "--workers 18446744073709551616: 1,024 are the most"),
+        (["--seconds", "nan"], "--seconds nan: it must be a finite number"),
     ],
 )
 def test_wrong_wishes_end_with_one_sentence(wrong, message, tmp_path, capsys) -> None:

@@ -120,6 +120,8 @@ def test_the_command_prints_the_table_and_draws_it(folder: Path, capsys: pytest.
     assert "9 runs, 9 of them done before" in said.err
     assert call("sweep", folder / "sweep.toml", "--out", folder / "out", "--workers", "0") == 2
     assert capsys.readouterr().err.endswith("cosim: --workers 0: there must be at least one.\n")
+    assert call("sweep", folder / "sweep.toml", "--out", folder / "out", "--workers", str(2**64)) == 2
+    assert capsys.readouterr().err.endswith("cosim: --workers 18446744073709551616: 1,024 are the most.\n")
 
 
 @pytest.mark.parametrize("varied", ["one", "map", "many"])

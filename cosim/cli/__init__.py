@@ -11,21 +11,24 @@ SIGTERM).
 import errno
 import functools
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
+from math import isfinite
 from typing import Annotated, Any, NoReturn
 
 import typer
 
-from cosim.support.errors import CosimError
-from cosim.support.interrupts import Terminated, end_well
+from cosim.support.errors import CosimError, InputError
+from cosim.support.interrupts import Terminated, end_well, is_terminated
 from cosim.support.terminal import abandon_stdout, finish_stdout, keep_stdout, put, say
 from cosim.support.version import __version__
 from pyfmi_models.errors import ModelError
 
 SEVERAL = ("--columns", "--units", "--layout", "--variables")
 """Options that may be followed by several name=value pairs."""
+INTERRUPTED, TERMINATED = 130, 143
+"""Exit codes."""
 LONGEST = 300
 """Characters of a name, or of a reason of the system, in a message."""
 VERBS = ("demo", "export", "run", "identify", "diagnose", "prove", "paper", "sweep", "hardware", "show", "serve")
@@ -44,13 +47,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if debug:
             raise
         leave(error)
+    except SystemExit as ended:  # before its verb began: typer takes each signal for Ctrl-C
+        if ended.code == INTERRUPTED and is_terminated():
+            leave(Terminated())
+        raise
 
 
 def leave(error: KeyboardInterrupt) -> NoReturn:
     """Say that a signal ended the command, and leave with its exit code."""
     ended = isinstance(error, Terminated)
     say(f"cosim: {'terminated' if ended else 'interrupted'}")
-    sys.exit(143 if ended else 130)
+    sys.exit(TERMINATED if ended else INTERRUPTED)
 
 
 def repeated(arguments: Sequence[str]) -> list[str]:
@@ -97,6 +104,7 @@ def guarded(verb: Callable[..., Any], debug: bool) -> Callable[..., Any]:
     @functools.wraps(verb)
     def call(*args: Any, **kwargs: Any) -> Any:
         try:
+            check_finite(kwargs)
             done = verb(*args, **kwargs)
             finish_stdout()
             return done
@@ -117,6 +125,18 @@ def guarded(verb: Callable[..., Any], debug: bool) -> Callable[..., Any]:
             leave(error)
 
     return call
+
+
+def check_finite(options: Mapping[str, object]) -> None:
+    """Refuse numbers of the command line that are none: no bound of an option holds back `nan`.
+
+    Raises:
+        InputError: names the option.
+    """
+    for name, value in options.items():
+        if isinstance(value, float) and not isfinite(value):
+            option = f"--{name.replace('_', '-')}"
+            raise InputError(f"{option} {value}: it must be a finite number.", culprit=option, value=value)
 
 
 def surroundings(error: OSError | MemoryError) -> str:

@@ -118,7 +118,7 @@ def check(
     machine: MachineOption = "simulated",
     drive: DriveOption = "",
     key: KeyOption = "",
-    seconds: Annotated[float, typer.Option(help="How long to watch the clock of this computer.")] = 1.0,
+    seconds: Annotated[float, typer.Option(help="How long to watch the clock.", min=0, max=86_400)] = 1.0,
     move: Annotated[
         bool, typer.Option("--move", help="Then move the axis a little: is the encoder scaled right?")
     ] = False,

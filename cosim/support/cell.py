@@ -135,7 +135,7 @@ class Cell:
         # One thread of linear algebra each: the cores are busy with runs already.
         environment = os.environ | {"PYTHONPATH": paths, "OMP_NUM_THREADS": "1"}
         environment |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)
-        command = [sys.executable, "-m", "cosim.support.child", str(Path(folder) / BOARD)]
+        command = [sys.executable, "-m", "cosim.support.child", str(Path(folder) / BOARD), str(os.getpid())]
         # A session of its own: Ctrl-C at the terminal reaches the parent alone, which then ends this process.
         self._process = subprocess.Popen(
             command,

@@ -1,4 +1,4 @@
-"""The process of a cell: `python -m cosim.support.child BOARD`, calls on stdin, answers on stdout, both pickled.
+"""The process of a cell: `python -m cosim.support.child BOARD PARENT`, calls on stdin, answers on stdout, both pickled.
 
 What an FMU prints goes to stderr, so that it cannot get between the answers. Ctrl-C is the parent's business; SIGTERM
 ends a call as Ctrl-C would. A process whose parent is gone ends too.
@@ -18,7 +18,7 @@ from typing import IO, Any
 from cosim.support.activity import watched
 from cosim.support.errors import CosimError
 from cosim.support.files import forget_partials
-from cosim.support.interrupts import end_well
+from cosim.support.interrupts import ENDING, end_well
 
 PREFIX = "cosim-"
 """Of the names of folders for temporary files."""
@@ -32,15 +32,25 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_well()
     watched(Path(sys.argv[1]))
-    Thread(target=_mind_parent, args=(os.getppid(),), daemon=True).start()
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     _ANSWERS.append(answers)
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
-    with suppress(EOFError, KeyboardInterrupt, BrokenPipeError):  # the parent has no more calls, or is gone
-        while True:
-            function, arguments = pickle.load(sys.stdin.buffer)
-            _put("answer", _answer(function, arguments))
+    try:
+        # The parent has no more calls, or is gone, perhaps in the middle of one.
+        with suppress(EOFError, KeyboardInterrupt, BrokenPipeError, pickle.UnpicklingError):
+            _listen(int(sys.argv[2]))
+    except KeyboardInterrupt:
+        pass  # it came on the way out
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
     _remove_folder()
+
+
+def _listen(parent: int) -> None:
+    Thread(target=_mind_parent, args=(parent,), daemon=True).start()
+    while True:
+        function, arguments = pickle.load(sys.stdin.buffer)
+        _put("answer", _answer(function, arguments))
 
 
 def tell(*content: Any) -> None:

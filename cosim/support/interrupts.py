@@ -14,15 +14,26 @@ class Terminated(KeyboardInterrupt):
     """The process was asked to end; files are completed on the way out, as after Ctrl-C."""
 
 
+_HEARD: list[int] = []
+"""Signals that asked this process to end since `end_well`."""
+
+
 def end_well() -> None:
     """Let SIGTERM (and SIGHUP) end this process as Ctrl-C does, so that no file is left half written."""
+    _HEARD.clear()
     if threading.current_thread() is threading.main_thread():
         for number in ENDING:
             if signal.getsignal(number) is signal.SIG_DFL:
                 signal.signal(number, _end)
 
 
+def is_terminated() -> bool:
+    """Whether this process was asked to end by a signal that is not Ctrl-C."""
+    return bool(_HEARD)
+
+
 def _end(number: int, frame: FrameType | None) -> None:
+    _HEARD.append(number)
     raise Terminated
 
 

@@ -14,7 +14,7 @@ from cosim.support.version import __version__
 from cosim.sweep.file import Sweep
 from cosim.sweep.job import Job, Row, job_of, rehearse
 from cosim.sweep.journal import Journal
-from cosim.sweep.pool import Numbered, Pool, close_cells, cluster, cores, free, local, new_cell, warm
+from cosim.sweep.pool import Numbered, Pool, close_cells, cluster, free, local, most_workers, new_cell, warm
 from cosim.sweep.portable_job import files_of
 from cosim.sweep.table import write_table
 from cosim.system.scenario import Scenario
@@ -64,8 +64,7 @@ def conduct(
         SweepError, WiringError, FmuError, SignalError: before the first run.
         OutputError: `out` holds another sweep.
     """
-    if workers is not None and workers < 1:
-        raise SweepError(f"--workers {workers}: there must be at least one.", culprit="workers", value=workers)
+    processes = most_workers(workers, sweep.design.runs)
     if sweep.record and address:
         raise SweepError("record = true keeps files on this machine; it does not go with --cluster.", culprit="record")
     begun = perf_counter()
@@ -73,14 +72,14 @@ def conduct(
     with ExitStack() as stack:
         stack.callback(close_cells)
         if not address:
-            warm(min(workers or cores(), sweep.design.runs))
+            warm(processes)
         units = _units(job)
         journal = stack.enter_context(Journal(out, _identity(sweep, scenario), force, fits=sweep.fits))
         known = {run for run, row in journal.rows.items() if row["status"] == "ok" or not retry}
         rest = [(number, point) for number, point in enumerate(sweep.design.points()) if number not in known]
         failed = sum(journal.rows[run]["status"] != "ok" for run in known)
         table = stack.enter_context(_table(out, sweep, journal, units, _origin(sweep, scenario, command)))
-        rows = stack.enter_context(closing(_rows(_pool(job, workers, address), rest)))
+        rows = stack.enter_context(closing(_rows(_pool(job, processes, address), rest)))
         for done, row in enumerate(rows, len(known) + 1):
             journal.append(row)
             failed += row["status"] != "ok"
@@ -94,8 +93,8 @@ def _rows(pool: AbstractContextManager[Pool], rest: list[Numbered]) -> Generator
             yield from ready.rows(rest)
 
 
-def _pool(job: Job, workers: int | None, address: str) -> AbstractContextManager[Pool]:
-    return cluster(job, address) if address else local(job, workers or cores())
+def _pool(job: Job, workers: int, address: str) -> AbstractContextManager[Pool]:
+    return cluster(job, address) if address else local(job, workers)
 
 
 @contextmanager

@@ -17,6 +17,8 @@ from cosim.sweep.portable_job import PortableJob
 
 Numbered = tuple[int, Point]
 
+MOST = 1024
+"""Processes on this machine at most: more are a slip of the finger, and no machine's memory holds them."""
 PATIENCE = 10.0
 """Seconds that a scheduler may take to answer."""
 _OWN = threading.local()
@@ -92,6 +94,19 @@ def close_cells() -> None:
     _FREE.clear()
     while _CELLS:
         _CELLS.pop().close()
+
+
+def most_workers(workers: int | None, runs: int) -> int:
+    """Return how many processes there shall be: those asked for, else one a core; never more than there are runs.
+
+    Raises:
+        SweepError: nobody can mean so few or so many.
+    """
+    if workers is not None and workers < 1:
+        raise SweepError(f"--workers {workers}: there must be at least one.", culprit="workers", value=workers)
+    if workers is not None and workers > MOST:
+        raise SweepError(f"--workers {workers}: {MOST:,} are the most.", culprit="workers", value=workers)
+    return min(workers or cores(), runs)
 
 
 def cores() -> int:

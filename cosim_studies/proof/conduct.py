@@ -13,7 +13,7 @@ from cosim.support.errors import ProofError
 from cosim.support.plain import Parsed
 from cosim.support.version import __version__
 from cosim.sweep.journal import Journal
-from cosim.sweep.pool import cores
+from cosim.sweep.pool import MOST, cores
 from cosim_studies.proof.deck import CaseSpec, deal
 from cosim_studies.proof.page import MADE, proof, write
 from cosim_studies.proof.play import Table, Tool
@@ -94,6 +94,8 @@ def _check(deck: Benchmark, workers: int | None) -> None:
     for name, value, least in wished:
         if value is not None and value < least:
             raise ProofError(f"{name} {value}: it must be at least {least}.", culprit=name, value=value)
+    if workers is not None and workers > MOST:
+        raise ProofError(f"--workers {workers}: {MOST:,} are the most.", culprit="--workers", value=workers)
     if deck.seconds < LEAST_SECONDS:
         text = f"--seconds {deck.seconds:g}: a recording must last {LEAST_SECONDS:g} s at least."
         raise ProofError(text, culprit="--seconds", value=deck.seconds)

@@ -217,6 +217,7 @@ def main() -> None:
     parser.add_argument("--journal", type=Path, help="file of what is done: a run that ended early goes on from there")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell lets what runs in its background ignore it
     folder = Path(tempfile.mkdtemp(prefix="kills-"))
     journal = given.journal or folder / "journal"
     try:
