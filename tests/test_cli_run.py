@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -280,13 +281,11 @@ def test_a_signal_that_comes_before_a_verb_begins_is_told_by_the_exit_code(
 ) -> None:
     """Typer takes each KeyboardInterrupt for Ctrl-C."""
 
-    def parsing(*_: object, **__: object) -> None:
-        signal.raise_signal(number)
-
-    monkeypatch.setattr("typer.core.TyperGroup.parse_args", parsing)
     before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
     try:
         for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+            come = partial(signal.raise_signal, number)
+            monkeypatch.setattr("typer.core.TyperGroup.parse_args", lambda *_, come=come, **__: come())
             signal.signal(signal.SIGINT, signal.default_int_handler)
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
             assert call("show", "paper_mount") == code
