@@ -280,7 +280,6 @@ def test_a_signal_that_comes_before_a_verb_begins_is_told_by_the_exit_code(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Typer takes each KeyboardInterrupt for Ctrl-C."""
-
     before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
     try:
         for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
