@@ -12,17 +12,14 @@ from typing import Any
 
 import casadi as ca
 
-from pyfmi_models.effects import ClockEffect, SensorEffect
-from pyfmi_models.effects.base import Coupling, Effect, InertiaEffect, Motion, MotionEffect
+from pyfmi_models.effects.base import Effect, Motion, MotionEffect
 from pyfmi_models.model import Model, Scalar, Variable, symbols_of
 from pyfmi_models.mount import Mount
-
-ELSEWHERE = (ClockEffect, SensorEffect, Coupling, InertiaEffect)
 
 
 def left_out(better: Mount) -> tuple[str, ...]:
     """Effects of a mount that no correction of the torque can give."""
-    return tuple(effect.id for effect in better.effects if isinstance(effect, ELSEWHERE))
+    return tuple(effect.id for effect in better.effects if not effect.is_torque)
 
 
 def correction(plant: Mount, better: Mount) -> Model:
@@ -31,7 +28,7 @@ def correction(plant: Mount, better: Mount) -> Model:
     Inputs: the command tau, q and v of the plant, and what effects of the better mount read. Output: `corrected`, the
     torque for the plant. Parameters and states are called `before.*` and `after.*`.
     """
-    kept = replace(better, effects=tuple(one for one in better.effects if not isinstance(one, ELSEWHERE)))
+    kept = replace(better, effects=tuple(one for one in better.effects if one.is_torque))
     before, after = _Side("before", plant), _Side("after", kept)
     inputs = tuple(kept.in_axis_units(one) for one in (*_INPUTS, *kept.inputs()))
     t, u = ca.SX.sym("t"), ca.SX.sym("u", len(inputs))

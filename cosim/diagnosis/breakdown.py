@@ -1,28 +1,21 @@
-"""What the figures need and a diagnosis does not hold: errors by part of a run, by second, by place."""
+"""Errors by part of the held-out recordings, and by second and place as pictures show them.
 
-from collections.abc import Callable
+What is said about a part rests on a bootstrap and belongs to the diagnosis (`parts`); means and RMS values over bins of
+a picture are worked out when it is drawn.
+"""
+
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
-from cosim.diagnosis.result import Diagnosis, Trace
+from cosim.diagnosis.result import Part, Trace
 from cosim.support.statistics import Array, Index, bootstrap_range, rms
 
 Mask = npt.NDArray[np.bool_]
 DRAWS = 400
-
-
-@dataclass(frozen=True)
-class Part:
-    """One part of the runs that were not fitted, with its error before and after and what may be said about it."""
-
-    label: str
-    before: float
-    after: float
-    change: str
-    """"better", "no clear change" or "worse", from a bootstrap over seconds."""
 
 
 @dataclass(frozen=True)
@@ -64,11 +57,17 @@ def _judged(trace: Trace) -> Samples:
     return Samples(*(np.asarray(column, dtype=float)[keep] for column in columns))
 
 
-def part(label: str, chosen: Samples) -> Part:
+def part(label: str, chosen: Samples, speeds: tuple[float, float] | None = None) -> Part:
     """Judge one set of samples by drawing its seconds with replacement."""
     low, high = change_range(chosen)
-    change = "better" if low > 0 else "worse" if high < 0 else "no clear change"
-    return Part(label, rms(chosen.before), rms(chosen.after), change)
+    before, after = rms(chosen.before), rms(chosen.after)
+    return Part(
+        label=label,
+        before=before,
+        after=after,
+        change="better" if low > 0 else "worse" if high < 0 else "no clear change",
+        speeds=speeds,
+    )
 
 
 def change_range(chosen: Samples) -> tuple[float, float]:
@@ -98,18 +97,22 @@ def speed_classes(v: Array, classes: int = 3) -> Array:
     return np.unique(np.quantile(moving, np.linspace(0, 1, classes + 1)))
 
 
-def parts(diagnosis: Diagnosis, speed: Callable[[float, float], str]) -> tuple[Part, ...]:
+def parts(traces: Sequence[Trace]) -> tuple[Part, ...]:
     """Return the held-out proof: every recording, then standing, speed classes and directions over all of them."""
-    heldout = tuple(trace for trace in diagnosis.traces if trace.heldout)
+    heldout = tuple(trace for trace in traces if trace.heldout)
     whole = samples(heldout)
     rows = [part(trace.name, samples((trace,))) for trace in heldout[:4]]
-    masks = [("standing", np.abs(whole.v) <= slow(whole.v))]
-    edges = speed_classes(whole.v)
-    for low, high in pairwise(edges):
-        masks.append((speed(float(low), float(high)), (np.abs(whole.v) > low) & (np.abs(whole.v) <= high)))
-    masks += [("forward", whole.v > slow(whole.v)), ("backward", whole.v < -slow(whole.v))]
-    chosen = [(label, whole.where(mask)) for label, mask in masks]
-    return tuple(rows + [part(label, some) for label, some in chosen if len(np.unique(some.second)) >= 3])
+    chosen = [(label, whole.where(mask), speeds) for label, mask, speeds in _masks(whole.v)]
+    return (*rows, *(part(*some) for some in chosen if len(np.unique(some[1].second)) >= 3))
+
+
+def _masks(v: Array) -> Iterator[tuple[str, Mask, tuple[float, float] | None]]:
+    """Yield label, rows and speeds of standing, of the classes of speed, and of the directions."""
+    yield "standing", np.abs(v) <= slow(v), None
+    for low, high in pairwise(speed_classes(v)):
+        yield "speed", (np.abs(v) > low) & (np.abs(v) <= high), (float(low), float(high))
+    yield "forward", v > slow(v), None
+    yield "backward", v < -slow(v), None
 
 
 def bars(trace: Trace, most: int = 120) -> tuple[Array, Array, Array]:

@@ -10,6 +10,7 @@ from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
 from cosim.diagnosis.absent import not_found
 from cosim.diagnosis.adequacy import over_time, share_left, share_there
+from cosim.diagnosis.breakdown import parts
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.decision import Decision, EffectScores, ResidualScores, decide
 from cosim.diagnosis.delivered import standing
@@ -175,6 +176,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         findings=tuple(found),
         heldout=replace(judge(heldout, models, prepared.cutoff), black_box_rms=black_box_rms(signals)),
         traces=signals,
+        parts=parts(signals),
         regions=regions(signals, False, linear),
         regions_after=regions(signals, True, linear),
         mount=name,
@@ -202,6 +204,7 @@ def _with_learned(
         learned=learned.as_json(),
         heldout=replace(held, black_box_rms=named.heldout.black_box_rms),
         traces=signals,
+        parts=parts(signals),
         regions_after=regions(signals, True, problem.mount.motion == "linear"),
         base_parameters=_base_parameters(models),
     )

@@ -18,11 +18,8 @@ from cosim.estimation.discrepancy_basis import discrepancy_basis
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
-from pyfmi_models.friction import FrictionLaw, LuGre, MaxwellSlip
+from pyfmi_models.friction import LAWS, FrictionLaw
 
-FITTED: dict[str, type[FrictionLaw]] = {"dahl": LuGre, "maxwell_slip": LuGre}
-"""Laws that are fitted in place of a base's."""
-ONE_BRISTLE = ("lugre", "dahl")
 FOLDS = 4
 """Every so many blocks are predicted from the others."""
 LEAST = 0.1
@@ -32,12 +29,10 @@ simulated axes, and more than 0.2 in 7 of 11 that rub with slip blocks too."""
 
 def proposed_law(problem: Problem, chosen: Fit) -> LawProposal:
     """The law that would explain most in place of the base's own, and the share of the energy; the own if none does."""
-    base = chosen.mount.friction.key
-    gains = {base: 0.0}
-    if base in FITTED:
-        gains[FITTED[base].key] = _fitted_gain(problem, chosen, FITTED[base])
-    if base in ONE_BRISTLE:
-        gains[MaxwellSlip.key] = _elements_gain(problem, chosen)
+    law = chosen.mount.friction
+    base, gains = law.key, {law.key: 0.0}
+    for form in (LAWS[key] for key in law.rivals):
+        gains[form.key] = _elements_gain(problem, chosen) if form.in_rows else _fitted_gain(problem, chosen, form)
     best = max(gains, key=lambda key: gains[key])
     best = best if gains[best] > LEAST else base
     return {"base": base, "proposed": best, "gain": gains[best] if best != base else 0.0}

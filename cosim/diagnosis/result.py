@@ -134,6 +134,20 @@ class Trace:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Part:
+    """A part of the held-out recordings: RMS error before and after, and what may be said about the change."""
+
+    label: str
+    """Name of a recording, "standing", "forward", "backward" or "speed"."""
+    before: float
+    after: float
+    change: Literal["better", "no clear change", "worse"]
+    """From a bootstrap over seconds."""
+    speeds: tuple[float, float] | None = None
+    """Least and largest speed of a class of speeds [rad/s or m/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Region:
     """Mean missing torque over one coordinate: centres, mean, half 95 % band, samples; NaN where never visited."""
 
@@ -157,6 +171,8 @@ class Diagnosis:
     """All effects that were looked for, ranked."""
     heldout: HeldOut
     traces: tuple[Trace, ...]
+    parts: tuple[Part, ...]
+    """The held-out proof: every recording, then standing, classes of speed and directions over all of them."""
     regions: tuple[Region, ...]
     """Before any effect is added: missing torque over position, speed, direction, ..."""
     regions_after: tuple[Region, ...]

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.diagnosis.priors import LINEAR
+from cosim.diagnosis.priors import is_linear
 from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Effect
@@ -24,7 +24,8 @@ def revived(problem: Problem, found: Fit, start: Effect) -> Fit:
     Where a friction is nothing, its change with temperature or direction is nothing too, and no step leads away.
     """
     card = {variable.name: variable.start for variable in problem.mount.parameters()}
-    levels = {name: value for name, value in found.parameters().items() if name in card and name.endswith(LINEAR)}
+    law, numbers = found.mount.friction, found.parameters()
+    levels = {name: value for name, value in numbers.items() if name in card and is_linear(law, name)}
     dead = [name for name, value in levels.items() if abs(value) < DEAD * abs(card[name])]
     if not dead:
         return found

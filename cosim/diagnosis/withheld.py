@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.breakdown import parts
 from cosim.diagnosis.hypotheses import TRIED
 from cosim.diagnosis.locate import regions
 from cosim.diagnosis.protocol import Structures, judge, traces
@@ -31,6 +32,7 @@ def without_names(
         findings=tuple(_untestable(name) for name in TRIED),
         heldout=judge(heldout, models, problem.prepared.cutoff),
         traces=signals,
+        parts=parts(signals),
         regions=regions(signals, False, linear),
         regions_after=regions(signals, True, linear),
         mount=problem.mount.name,

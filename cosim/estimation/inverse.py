@@ -19,13 +19,12 @@ import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 from cosim.estimation.equations import Equations, equations_of
-from cosim.estimation.play import play_torque
+from cosim.estimation.play import stepped_torque
 from cosim.estimation.prepare import Array, Piece
 from cosim.estimation.row_weights import described_rows
 from cosim.estimation.spectrum import Spectrum
 from cosim.estimation.tonal_disturbance import Tone, in_phase, phases_of
 from pyfmi_models.effects import ClockEffect, DriveEffect, Effect
-from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.base import Transmission
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.model import with_symbols
@@ -149,10 +148,11 @@ class Inverse:
             for prefix in couplings:
                 coupling = self._set(prefix, numbers)
                 far = far * coupling.share()
-                if isinstance(coupling, Backlash):
-                    total += piece.lowpass(play_torque(coupling, far, v, a, piece.dt))
+                carried = coupling.carried(spectrum.omega)
+                if carried is None:
+                    total += piece.lowpass(stepped_torque(coupling, far, v, a, piece.dt))
                 else:
-                    total += spectrum.times(far * (coupling.carried(spectrum.omega) - 1))[:, 0]
+                    total += spectrum.times(far * (carried - 1))[:, 0]
             return total
 
         return self._with_changes(columns, full, added, ("axis.inertia", *motors, *couplings))

@@ -1,12 +1,13 @@
-"""What a mass behind a play needs beyond being carried rigidly, along a recorded motion.
+"""What a mass behind a play, or behind any coupling that is not linear, needs beyond being carried rigidly.
 
     added(t) = torque passed on - J_far a_near
 
-The far side is simulated behind the recorded near one: it coasts, rubs and is caught (`Backlash.advance`). Its contact
+The far side is simulated behind the recorded near one: it coasts, rubs and is caught (`Coupling.advance`). Its contact
 is stiffer than the band of a diagnosis, so one implicit step a row is enough; exact bouncing would explain nothing.
 """
 
 from functools import cache, lru_cache
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -14,17 +15,19 @@ import numpy as np
 from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.rowwise import Stepwise
 from pyfmi_models.effects.backlash import Backlash
+from pyfmi_models.effects.base import Coupling
 from pyfmi_models.model import fields_of
 
 SEARCHED = 150.0
 """Rows a second that tell where in a grid the play is."""
 
 
-def play_torque(play: Backlash, far: float, v: Array, a: Array, dt: float) -> Array:
+def stepped_torque(coupling: Coupling, far: float, v: Array, a: Array, dt: float) -> Array:
     """Torque [N m] that a far mass of inertia `far` adds at rows dt apart, the near side at speed v, acceleration a."""
-    numbers = np.array([far, *(getattr(play, name) for name in fields_of(play))])
+    numbers = np.array([far, *(getattr(coupling, name) for name in fields_of(coupling))])
     columns = np.vstack([v[:-1], v[1:], np.full(len(v) - 1, dt)])
-    passed = _walk()(columns, numbers)[2]
+    kind: Any = type(coupling)
+    passed = _walk(kind, fields_of(coupling))(columns, numbers)[2]
     # A step's torque is that of its middle: a row has half of the step before it and half of the one after it.
     return np.asarray((passed + np.append(passed[1:], passed[-1])) / 2 - far * a)
 
@@ -42,16 +45,15 @@ def far_torques(prepared: Prepared, plays: tuple[tuple[float, float], ...], rati
 def _searched(piece: Piece, gap: float, slowing: float, ratio: float) -> Array:
     step = max(1, int(1 / (SEARCHED * piece.dt)))
     play = Backlash(gap_rad=gap, load_friction=slowing, load_viscous=ratio * slowing)
-    coarse = play_torque(play, 1.0, piece.v[::step], piece.a[::step], step * piece.dt)
+    coarse = stepped_torque(play, 1.0, piece.v[::step], piece.a[::step], step * piece.dt)
     return piece.lowpass(np.interp(piece.t, piece.t[::step], coarse))[piece.kept]
 
 
 @cache
-def _walk() -> Stepwise:
+def _walk(kind: type[Coupling], names: tuple[str, ...]) -> Stepwise:
     """Twist, its rate and the torque passed on, from speeds before and after each step and dt."""
-    names = fields_of(Backlash(gap_rad=0.0))
     state, column, numbers = ca.SX.sym("state", 3), ca.SX.sym("column", 3), ca.SX.sym("numbers", 1 + len(names))
-    play = Backlash(**{name: numbers[1 + k] for k, name in enumerate(names)})
+    play = kind(**{name: numbers[1 + k] for k, name in enumerate(names)})
     before, after, dt = ca.vertsplit(column)
     twist, speed, torque = play.advance(state[0], before - state[1], after, dt, numbers[0])
     return Stepwise(state, column, numbers, ca.vertcat(twist, after - speed, torque))

@@ -9,19 +9,21 @@ from cosim.support.numbers import shown as display
 from cosim.support.plain import Parsed
 
 Location = tuple[int | str, ...]
+UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
+"""What pydantic calls a key that a model, or a dataclass, does not have."""
 
 
 def first_of(error: ValidationError) -> Any:
     """Return the first key that is none, if there is one: a misspelt key leaves another one missing."""
     errors = error.errors(include_url=False)
-    return next((one for one in errors if one["type"] == "extra_forbidden"), errors[0])
+    return next((one for one in errors if one["type"] in UNKNOWN_KEY), errors[0])
 
 
 def complaint(error: ValidationError, path: str, noun: str, keys: Callable[[Location], tuple[str, ...]]) -> Parsed:
     """Return the arguments of an `InputError`; `keys` lists the legal keys beside a location of `noun`."""
     first = first_of(error)
     where = ".".join(str(part) for part in first["loc"]) or "the file"
-    if first["type"] == "extra_forbidden":
+    if first["type"] in UNKNOWN_KEY:
         choices = keys(first["loc"])
         message = f'{path}: "{where}" is no key of {noun}; keys there are: {", ".join(choices)}.'
         return {"message": message, "culprit": where, "choices": choices}

@@ -159,7 +159,7 @@ def parse_scenario(text: str, path: str, directory: Path) -> Scenario:
         ticks=ticks,
         components={name: _located(one, directory) for name, one in raw.components.items()},
         signals={name: _located_signal(one, directory) for name, one in raw.signals.items()},
-        wires=tuple(Wire(**one.model_dump()) for one in raw.connections),
+        wires=tuple(raw.connections),
         records=_records(raw.record),
         decimation=raw.record.decimation,
         algorithm=raw.algorithm,
@@ -193,5 +193,4 @@ def _located_signal(signal: Any, directory: Path) -> Any:
 
 def _records(section: RecordingSection) -> dict[str, Record]:
     named = section.signals if isinstance(section.signals, dict) else {name: name for name in section.signals}
-    modes = {name: Record(one, section.mode) for name, one in named.items() if isinstance(one, str)}
-    return {name: modes.get(name) or Record(**one.model_dump()) for name, one in named.items()}  # type: ignore[union-attr]
+    return {name: Record(one, section.mode) if isinstance(one, str) else one for name, one in named.items()}

@@ -10,6 +10,7 @@ from cosim.fmi.alias import Alias
 from cosim.support.numbers import LONGEST, Count, Seconds, Step
 from cosim.system.algorithm import JACOBI, Algorithm
 from cosim.system.faults import Fault
+from cosim.system.wire import Record, Wire, keys_of
 
 
 class _Section(BaseModel):
@@ -63,32 +64,10 @@ class ComponentSection(_Section):
         return {name: Alias(**one.model_dump()) for name, one in self.variables.items()}
 
 
-class ConnectionSection(_Section):
-    """`[[connections]]`: one wire."""
-
-    source: str = Field(alias="from")
-    target: str = Field(alias="to")
-    gain: float = 1.0
-    offset: float = 0.0
-    quantum: float = Field(default=0.0, ge=0)
-    noise: str = ""
-    unit: str = ""
-    breaks_loop: bool = False
-    cast: bool = False
-    table: dict[str, float | bool | str] = Field(default={}, alias="map")
-
-
-class RecordSection(_Section):
-    """A recorded signal with its mode."""
-
-    signal: str
-    mode: Literal["sample", "mean"]
-
-
 class RecordingSection(_Section):
     """`[record]`: columns, ticks for each row, and the mode of columns that state none."""
 
-    signals: dict[str, str | RecordSection] | list[str] = Field(min_length=1)
+    signals: dict[str, str | Record] | list[str] = Field(min_length=1)
     decimation: Count = 1
     mode: Literal["sample", "mean"] = "sample"
     last: bool = False
@@ -105,7 +84,7 @@ class File(_Section):
     algorithm: Algorithm = JACOBI
     components: dict[str, ComponentSection] = Field(min_length=1)
     signals: dict[str, Generator] = {}
-    connections: list[ConnectionSection] = []
+    connections: list[Wire] = []
     faults: list[Fault] = []
     record: RecordingSection
 
@@ -117,7 +96,7 @@ def _kinds(union: Any) -> dict[str, Any]:
 
 def keys(location: tuple[int | str, ...]) -> tuple[str, ...]:
     """List the legal keys beside the one at `location`."""
-    sections = {"components": ComponentSection, "connections": ConnectionSection, "record": RecordingSection}
+    sections = {"components": ComponentSection, "connections": Wire, "record": RecordingSection}
     section: Any = File
     if location[2:3] == ("variables",):
         section = VariableSection
@@ -126,4 +105,6 @@ def keys(location: tuple[int | str, ...]) -> tuple[str, ...]:
     elif len(location) > 1:
         kinds = _kinds(Fault if location[0] == "faults" else Generator)
         section = sections.get(str(location[0])) or kinds[str(location[2])]
+    if section is Wire:
+        return keys_of(Wire)
     return tuple(field.alias or name for name, field in section.model_fields.items())

@@ -71,6 +71,8 @@ class Effect(Part):
     """One kind of missing physics: what a mechanic would call it, and what tells it from its rivals."""
 
     place: ClassVar[str] = "Mechanics"
+    is_torque: ClassVar[bool] = True
+    """Whether a torque added to the command can do what the effect does to the axis."""
     id: ClassVar[str]
     title: ClassVar[str]
     equation: ClassVar[str] = ""
@@ -180,6 +182,8 @@ class PayloadEffect(LoadEffect):
 class InertiaEffect(MotionEffect):
     """An inertia that changes with the position or with an input, on the side of the encoder."""
 
+    is_torque: ClassVar[bool] = False
+
     def inertia(self, inertia: Scalar, motion: Motion) -> Scalar:
         """Return the inertia [kg m2] that replaces `inertia`; its slopes are the plant's business."""
         return inertia
@@ -196,6 +200,8 @@ class Coupling(Effect):
     Drive torque, friction, loads and encoder stay on the near side. Several couplings stand in a row, each splitting
     what is behind the one before. The twist is near minus far position; its start is 0, so both sides start together.
     """
+
+    is_torque: ClassVar[bool] = False
 
     def states(self) -> tuple[Variable, ...]:
         """Twist and its rate."""
@@ -216,6 +222,17 @@ class Coupling(Effect):
         """Friction torque on the far side [N m] at its speed, resists."""
         return 0 * speed
 
+    def carried(self, omega: npt.NDArray[np.float64]) -> npt.NDArray[np.complex128] | None:
+        """Acceleration of the far mass per near acceleration at angular frequencies omega [rad/s]; 1 where it is rigid.
+
+        None where a coupling is not linear: then `advance` follows it in time.
+        """
+        return None
+
+    def advance(self, twist: Scalar, far_speed: Scalar, speed: Scalar, dt: Scalar, far: Scalar) -> tuple[Scalar, ...]:
+        """Twist, speed of the far side and torque passed on [N m] after dt, the near side moving at `speed`."""
+        raise TypeError(f"{type(self).__name__} has no advance")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Transmission(Coupling):
@@ -235,6 +252,7 @@ class SensorEffect(MotionEffect):
     """An error between the true position and what the encoder reads."""
 
     place: ClassVar[str] = "Sensor path"
+    is_torque: ClassVar[bool] = False
 
     def reading(self, reading: Scalar, motion: Motion) -> Scalar:
         """Return the reading [rad or m] that replaces `reading`."""
@@ -246,6 +264,7 @@ class ClockEffect(MotionEffect):
     """Two clocks: the reading in a row of a recording was taken later or earlier than its torque."""
 
     place: ClassVar[str] = "Sensor path"
+    is_torque: ClassVar[bool] = False
 
     def ahead(self, motion: Motion) -> Scalar:
         """Seconds by which the reading runs ahead of the torque beside it."""

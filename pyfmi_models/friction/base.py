@@ -25,6 +25,12 @@ class FrictionLaw(Part):
 
     place: ClassVar[str] = "Friction"
     key: ClassVar[str]
+    linear: ClassVar[tuple[str, ...]] = ()
+    """Parameters in which the torque is linear: a tangent holds however far they move."""
+    rivals: ClassVar[tuple[str, ...]] = ()
+    """Keys of the laws that recordings should be compared with, beside this one."""
+    in_rows: ClassVar[bool] = False
+    """Whether it is a row of elements: another such law with free shares tells whether recordings follow it."""
 
     def states(self) -> tuple[Variable, ...]:
         """Name the internal states of the contact, in N m (N for a linear axis)."""

@@ -17,6 +17,7 @@ class Coulomb(MemorylessLaw):
     """
 
     key: ClassVar[str] = "coulomb"
+    linear: ClassVar[tuple[str, ...]] = ("Fc", "sigma2")
     Fc: Scalar = parameter("N.m", "Coulomb friction level", low=0)
     sigma2: Scalar = parameter("N.m.s/rad", "Viscous friction coefficient", default=0.0, low=0)
 

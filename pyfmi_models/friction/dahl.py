@@ -25,6 +25,8 @@ class Dahl(FrictionLaw):
     """
 
     key: ClassVar[str] = "dahl"
+    linear: ClassVar[tuple[str, ...]] = ("Fc", "sigma2")
+    rivals: ClassVar[tuple[str, ...]] = ("lugre", "maxwell_slip")
     sigma0: Scalar = parameter("N.m/rad", "Stiffness of the contact at zero torque", low=1e-6, nominal=1e4)
     Fc: Scalar = parameter("N.m", "Friction level in sliding", low=1e-9)
     n: Scalar = parameter(

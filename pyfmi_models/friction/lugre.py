@@ -26,6 +26,8 @@ class LuGre(FrictionLaw):
     """
 
     key: ClassVar[str] = "lugre"
+    linear: ClassVar[tuple[str, ...]] = ("Fc", "sigma2")
+    rivals: ClassVar[tuple[str, ...]] = ("maxwell_slip",)
     sigma0: Scalar = parameter("N.m/rad", "Bristle stiffness", low=1e-6, nominal=1e4)
     sigma1: Scalar = parameter("N.m.s/rad", "Bristle damping", default=0.0, low=0, nominal=100)
     sigma2: Scalar = parameter("N.m.s/rad", "Viscous friction coefficient", default=0.0, low=0)

@@ -32,6 +32,7 @@ class PassiveLuGre(LuGre):
     """
 
     key: ClassVar[str] = "lugre_passive"
+    rivals: ClassVar[tuple[str, ...]] = ()
     Vd: Scalar = parameter(
         "rad/s", "Speed at which damping fades; none: the fastest that is passive", default=None, low=1e-9, nominal=0.01
     )

@@ -32,6 +32,9 @@ class MaxwellSlip(FrictionLaw):
     """
 
     key: ClassVar[str] = "maxwell_slip"
+    linear: ClassVar[tuple[str, ...]] = ("Fc", "sigma2")
+    rivals: ClassVar[tuple[str, ...]] = ("lugre",)
+    in_rows: ClassVar[bool] = True
     elements: ClassVar[int] = 8
     """Number of elements; another number is another structure, so a subclass."""
     sigma0: Scalar = parameter("N.m/rad", "Stiffness of all elements together", low=1e-6, nominal=1e4)

@@ -18,6 +18,7 @@ class Stribeck(MemorylessLaw):
     """
 
     key: ClassVar[str] = "static"
+    linear: ClassVar[tuple[str, ...]] = ("Fc", "sigma2")
     Fc: Scalar = parameter("N.m", "Coulomb level at high speed", low=0)
     Fs: Scalar = parameter("N.m", "Break-away level at rest; none: Fc, no Stribeck term", default=None, low=0)
     Vs: Scalar = parameter("rad/s", "Stribeck speed", default=None, low=1e-9)

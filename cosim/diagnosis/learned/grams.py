@@ -145,7 +145,7 @@ def grams_of(comparison: Comparison, found: Fit, columns: Sequence[Array], added
         count,
         comparison.policy.coarsening,
         comparison.floor,
-        np.array([trust(name, value) for name, value in zip(found.free, found.values, strict=True)]),
+        trust(found),
         groups,
         tuple(slice(int(first), int(last)) for first, last in pairwise(edges[2:])),
         np.concatenate([size[size > 0] for size in unit]) if unit else np.zeros(0),

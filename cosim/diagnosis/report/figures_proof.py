@@ -3,10 +3,9 @@
 import re
 from typing import TYPE_CHECKING
 
-from cosim.diagnosis.breakdown import Part
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture, Sheet
-from cosim.diagnosis.result import Diagnosis, Finding
+from cosim.diagnosis.result import Diagnosis, Finding, Part
 from cosim.plots.style import AFTER, BEFORE, GREY, MEASURED, SHADE, Style
 
 if TYPE_CHECKING:

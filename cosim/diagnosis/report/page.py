@@ -7,7 +7,7 @@ from importlib.resources import files as resources
 
 import numpy as np
 
-from cosim.diagnosis.breakdown import Samples, bars, parts, samples, worst
+from cosim.diagnosis.breakdown import Samples, bars, samples, worst
 from cosim.diagnosis.report import tables, unknown, words
 from cosim.diagnosis.report.explorer import payload
 from cosim.diagnosis.report.figures_dynamic import effect
@@ -36,7 +36,7 @@ def context(diagnosis: Diagnosis) -> dict[str, object]:
 def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
     """Return the first screen."""
     kind = words.verdict(diagnosis)
-    rows = parts(diagnosis, scales.speed.span)
+    rows = scales.labelled(diagnosis.parts)
     return {
         "heading": heading(diagnosis),
         "mount": diagnosis.mount,

@@ -1,11 +1,11 @@
 """The display units of one report."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 
 import numpy as np
 
-from cosim.diagnosis.result import Diagnosis
+from cosim.diagnosis.result import Diagnosis, Part
 from cosim.plots.quantities import ANGLE, FORCE, LENGTH, MOVING, TORQUE, TURNING, Scale, handy
 
 
@@ -32,6 +32,10 @@ class Scales:
             handy(TURNING if rotary else MOVING, speed),
             2 * pi if rotary else 1.0,
         )
+
+    def labelled(self, parts: tuple[Part, ...]) -> tuple[Part, ...]:
+        """Return the parts with classes of speed called by their speeds."""
+        return tuple(replace(one, label=self.speed.span(*one.speeds)) if one.speeds else one for one in parts)
 
     def of_unit(self, unit: str) -> Scale:
         """Return the display unit for an SI unit."""

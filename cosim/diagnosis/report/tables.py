@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cosim.diagnosis.breakdown import Part, bars
+from cosim.diagnosis.breakdown import bars
 from cosim.diagnosis.entries import Source
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.words import ANSWERS, in_handy_units, lowered, shows_from, sized, unseen_torque
-from cosim.diagnosis.result import Diagnosis, Finding, Trace
+from cosim.diagnosis.result import Diagnosis, Finding, Part, Trace
 from cosim.plots.quantities import decimals, number, scale_of
 
 
