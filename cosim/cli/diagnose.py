@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from cosim.cli.complete import cards
+from cosim.cli.options import Columns, Force, Layout, Units
 from cosim.reading import pairs_of, read_recordings
 from cosim.support.memory import keep_freed_memory
 from cosim.support.terminal import put, put_json, say, stage
@@ -23,15 +24,9 @@ def diagnose(
         str, typer.Option("--card", help="Model card (.toml), or the name of a shipped one.", autocompletion=cards)
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
-    columns: Annotated[
-        list[str] | None, typer.Option("--columns", help="Our name = the file's: tau=force run3.csv:tau=current ...")
-    ] = None,
-    units: Annotated[
-        list[str] | None, typer.Option("--units", help="Units in the files: q=deg run3.csv:t=ms ...")
-    ] = None,
-    layout: Annotated[
-        list[str] | None, typer.Option("--layout", help="How texts are written: decimal=comma header=4 period=1ms ...")
-    ] = None,
+    columns: Columns = None,
+    units: Units = None,
+    layout: Layout = None,
     fmu: Annotated[
         Path | None,
         typer.Option("--fmu", help="Anyone's plant FMU as the base; the card says roughly what it is."),
@@ -42,7 +37,7 @@ def diagnose(
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
     check: Annotated[bool, typer.Option("--check", help="Exit with 1 if something is missing.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="The answer and the card alone: no FMU, no report.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+    force: Force = False,
 ) -> None:
     """Say which physics a card lacks, and prove it on a recording that was never fitted."""
     from cosim.api.diagnose import diagnose as find

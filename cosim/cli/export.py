@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 import typer
 
 from cosim.cli.complete import cards
+from cosim.cli.options import Force
 from cosim.support.terminal import put, put_json, stage
 
 
@@ -32,7 +33,7 @@ def export(
     ssp: Annotated[bool, typer.Option("--ssp", help="Also wire plant, controller and a set point: NAME.ssp.")] = False,
     modelica: Annotated[bool, typer.Option("--modelica", help="Also write the plant as Modelica text.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the paths as JSON.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+    force: Force = False,
 ) -> None:
     """Write the plant of a card and, where it has one, its controller as FMUs."""
     from cosim.api.export import planned

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cosim.cli.options import Force
 from cosim.support.terminal import put, put_json, say
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ def firmware(
     out: Annotated[Path, typer.Option("--out", "-o", help="Directory for the C project.")],
     target: Annotated[str, typer.Option("--target", help="cortex-a9 or host.")] = "cortex-a9",
     as_json: Annotated[bool, typer.Option("--json", help="Print stack and memory as JSON.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+    force: Force = False,
 ) -> None:
     """Write the controller of a card as a small C project without a heap; print what stack and memory it takes."""
     from cosim.support.files import check_free, directory

@@ -8,6 +8,7 @@ import typer
 
 from cosim.cli.drive import JsonOption, KeyOption, MachineOption, machine_of, virtual_drive
 from cosim.cli.firmware import firmware
+from cosim.cli.options import Force
 from cosim.cli.supervisor import alpaca, indi
 from cosim.support.terminal import put, put_json, say
 
@@ -30,7 +31,7 @@ def run(
     key: KeyOption = "",
     fast: Annotated[bool, typer.Option("--fast", help="Without a clock, as fast as possible.")] = False,
     as_json: JsonOption = False,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+    force: Force = False,
 ) -> None:
     """Run a scenario with its plant replaced by a machine; write DIR/black_box.bin, recording.parquet and run.json."""
     from cosim.hardware.blackbox import read_black_box, recording_of

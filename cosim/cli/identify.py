@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from cosim.cli.complete import cards
+from cosim.cli.options import Columns, Force, Layout, Units
 from cosim.support.terminal import put, put_json, say, stage
 
 
@@ -26,17 +27,11 @@ def identify(
     ] = True,
     starts: Annotated[int, typer.Option("--starts", min=1, help="Starts of the output-error fit.")] = 4,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random starts.")] = 0,
-    columns: Annotated[
-        list[str] | None, typer.Option("--columns", help="Our name = the file's: tau=force run3.csv:tau=current ...")
-    ] = None,
-    units: Annotated[
-        list[str] | None, typer.Option("--units", help="Units in the files: q=deg run3.csv:t=ms ...")
-    ] = None,
-    layout: Annotated[
-        list[str] | None, typer.Option("--layout", help="How texts are written: decimal=comma header=4 period=1ms ...")
-    ] = None,
+    columns: Columns = None,
+    units: Units = None,
+    layout: Layout = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print identify.json instead of the summary.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+    force: Force = False,
 ) -> None:
     """Identify a card's numbers: friction map, presliding steps, output error in closed loop."""
     from cosim.api.identify import identify as find

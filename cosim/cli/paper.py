@@ -5,6 +5,7 @@ from typing import Annotated
 
 import typer
 
+from cosim.cli.options import Force
 from cosim.support.terminal import put, put_json, say, stage
 
 
@@ -19,7 +20,7 @@ def paper(
         int, typer.Option("--design-seed", min=0, help="First of two seeds on which --full chooses a design.")
     ] = 500,
     as_json: Annotated[bool, typer.Option("--json", help="Print table4.json.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+    force: Force = False,
 ) -> None:
     """Run every tracking experiment of the paper on FMUs; write tables and figures beside the published numbers."""
     from cosim_studies.paper.comparison import Plan

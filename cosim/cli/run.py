@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cosim.cli.complete import scenarios
+from cosim.cli.options import Force
 from cosim.support.files import in_bytes
 from cosim.support.terminal import put, put_json, say, stage
 
@@ -31,7 +32,7 @@ def run(
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="Directory for the recording.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print the statistics as JSON.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+    force: Force = False,
     interpreted: Annotated[
         bool, typer.Option("--interpreted", help="Use the loop in Python: slow, same bits.")
     ] = False,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from cosim.cli.options import Force
 from cosim.support.terminal import put, say
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def _command(kind: str, default: int, served: "Callable[[Telescope, str, int], S
         longitude: Annotated[float, typer.Option("--longitude", help="Of the site, degrees east.")] = 0.0,
         speed: Annotated[float, typer.Option("--speed", help="Simulated seconds a second.")] = 1.0,
         out: Annotated[Path | None, typer.Option("--out", "-o", help="Directory for the recording.")] = None,
-        force: Annotated[bool, typer.Option("--force", help="Overwrite what is there.")] = False,
+        force: Force = False,
     ) -> None:
         with ExitStack() as stack:
             mount, telescope = stack.enter_context(_telescope(scenario, longitude, speed, out, force))

@@ -11,6 +11,7 @@ the periodic error, are fitted to it together by least squares at the times as t
 import numpy as np
 
 from cosim.data.recording import Recording
+from cosim.support.statistics import rms
 
 ARCSEC = 648_000 / np.pi
 AXES = {"RA": ("RARawDistance", "RAGuideDistance"), "Dec": ("DECRawDistance", "DECGuideDistance")}
@@ -34,7 +35,7 @@ def _of_axis(axis: str, t: np.ndarray, seen: np.ndarray, corrected: np.ndarray, 
         return {f"{axis} without corrections": "it stayed where it was"}
     drift, period, amplitude, rest = strongest(t - t[0], free)
     return {
-        f"{axis} guided": f"{scale * np.sqrt(np.mean(seen**2)):.3g} {named} rms",
+        f"{axis} guided": f"{scale * rms(seen):.3g} {named} rms",
         f"{axis} without corrections": f"drift {60 * drift:.3g} {named}/min, strongest period {period:.3g} s with "
         f"+-{amplitude:.3g} {named}; the rest is {rest:.3g} {named} rms",
     }
@@ -53,7 +54,7 @@ def strongest(t: np.ndarray, free: np.ndarray) -> tuple[float, float, float, flo
             [np.ones_like(t), t / span, np.sin(2 * np.pi * t / period), np.cos(2 * np.pi * t / period)], 1
         )
         fitted, *_ = np.linalg.lstsq(columns, free, rcond=None)
-        left = float(np.sqrt(np.mean((free - columns @ fitted) ** 2)))
+        left = rms(free - columns @ fitted)
         best = min(best, (left, period, fitted), key=lambda one: one[0])
     left, period, fitted = best
     return float(fitted[1] / span), float(period), float(np.hypot(*fitted[2:])), left

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.tonal_disturbance import detectable_band
-from pyfmi_models.effects import ClockEffect, Effect, MotionEffect, SensorEffect
+from pyfmi_models.effects import Effect, SensorEffect
 from pyfmi_models.model import Pair
 from pyfmi_models.mount import Mount
 
@@ -154,9 +154,8 @@ def _changes(mount: Mount, found: Sequence[Candidate], prepared: Prepared) -> li
     columns = []
     for candidate in found:
         inverse = Inverse(replace(mount, effects=(*mount.effects, *candidate.instances)), ())
-        # A spring, a drive or a clock leaves what the motion of each moment needs.
-        same = not isinstance(candidate.instances[0], MotionEffect) or isinstance(candidate.instances[0], ClockEffect)
-        own_moments = moments if same else [inverse.momentary(piece, none) for piece in prepared.pieces]
+        anew = candidate.instances[0].at_once
+        own_moments = [inverse.momentary(piece, none) for piece in prepared.pieces] if anew else moments
         after = [inverse.behind(p, m, none) for p, m in zip(prepared.pieces, own_moments, strict=True)]
         columns.append(_kept(prepared, after) - now)
     return columns

@@ -22,7 +22,7 @@ from cosim.estimation.fit import Fit
 from cosim.estimation.least_squares import projected
 from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
-from cosim.support.statistics import rms
+from cosim.support.statistics import column_rms, rms
 from pyfmi_models.effects import Effect
 
 Aside = frozenset[str]
@@ -152,7 +152,7 @@ class Comparison:
             grams, placed, free, now = ready[aside]
             added = self.bands.transform(columns)
             grown = self._grown(grams, own, aside, added)
-            size = np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
+            size = column_rms(columns)
             prior = np.ones(columns.shape[1]) if one.finite else 0.5 * torque / size
             after = marginal(
                 grown, np.concatenate([free, prior]), placed, bands.count, bands.effective, self.floor, now, 2

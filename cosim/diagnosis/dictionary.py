@@ -12,6 +12,7 @@ import numpy as np
 
 from cosim.estimation.discrepancy_basis import last_reversal, stop_operators
 from cosim.estimation.prepare import Array, Piece, Prepared
+from cosim.support.statistics import column_rms
 
 PRODUCT_WAVES = 4
 """Waves over the range of positions in a product with another quantity."""
@@ -52,7 +53,7 @@ def dictionary(prepared: Prepared) -> dict[str, Term]:
 
 
 def _scale(prepared: Prepared, make: Maker) -> Array:
-    return np.asarray(np.sqrt(np.mean(made(prepared, make) ** 2, axis=0)) + 1e-300)
+    return column_rms(made(prepared, make))
 
 
 def _of_position(prepared: Prepared) -> dict[str, Maker]:

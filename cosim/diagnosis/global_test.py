@@ -23,6 +23,7 @@ from cosim.diagnosis.marginal import Group, marginal
 from cosim.diagnosis.priors import trust
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
+from cosim.support.statistics import column_rms, rms
 
 DRAWS = 199
 """Nulls; the smallest p that can be told is one in 200."""
@@ -71,7 +72,7 @@ class Scores:
         self.rows = len(self.residual)
         self._tests = tests - known @ (self._normal @ (known.T @ tests))
         self._gram = tests.T @ self._tests
-        torque = float(np.sqrt(np.mean(comparison.problem.prepared.stacked("tau") ** 2)))
+        torque = rms(comparison.problem.prepared.stacked("tau"))
         self._groups = list(_groups(tried, columns, torque))
 
     @staticmethod
@@ -104,7 +105,7 @@ def _groups(tried: Sequence[Candidate], columns: Sequence[Array], torque: float)
     forms = [type(one.instances[0]) for one in tried]
     first = 0
     for one, own, form in zip(tried, columns, forms, strict=True):
-        size = np.sqrt(np.mean(own**2, axis=0)) + 1e-300
+        size = column_rms(own)
         prior = np.ones(own.shape[1]) if one.finite else 0.5 * torque / size
         yield np.arange(first, first + own.shape[1]), prior, log(forms.count(form))
         first += own.shape[1]

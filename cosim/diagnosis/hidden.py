@@ -15,6 +15,7 @@ from cosim.diagnosis.candidates import Candidate, Span, columns_of
 from cosim.diagnosis.hypotheses import HYPOTHESES, hypothesis_of
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
+from cosim.support.statistics import column_rms, rms
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.model import parameters_of
@@ -67,7 +68,7 @@ def members(problem: Problem, mount: Mount, span: Span, tried: Sequence[Candidat
     ]
     even = [one for one in chosen if not isinstance(one.instances[0], PeriodicDisturbance)]
     columns = columns_of(mount, even, problem.prepared, values)
-    torque = float(np.sqrt(np.mean(problem.prepared.stacked("tau") ** 2)))
+    torque = rms(problem.prepared.stacked("tau"))
     many = {name: sum(one.effect == name for one in tried) for name in {one.effect for one in chosen}}
     made = [
         _member(one, own, mount, torque, many[one.effect], problem.sample_time)
@@ -80,7 +81,7 @@ def members(problem: Problem, mount: Mount, span: Span, tried: Sequence[Candidat
 def _member(one: Candidate, columns: Array, mount: Mount, torque: float, many: int, step: float) -> Member:
     instance, own = one.instances[0], hypothesis_of(one.instances[0])
     main = instance.main
-    size = np.sqrt(np.mean(columns**2, axis=0)) + 1e-300
+    size = column_rms(columns)
     high = next(variable.high for variable in parameters_of(instance) if variable.name == main.parameter)
     return Member(
         instance=instance,

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
 
 from cosim.data.recording import GAP, Gap, Recording
+from cosim.support.statistics import rms
 
 Array = npt.NDArray[np.float64]
 CUTOFFS = (100.0, 70.0, 50.0, 40.0, 30.0, 24.0, 19.0, 15.0, 12.0, 10.0, 8.0)
@@ -71,7 +72,7 @@ class Piece:
     @cached_property
     def is_steady(self) -> bool:
         """Whether its speed is constant, but for what a loop leaves of it."""
-        return bool(np.std(self.v) <= STEADY * np.sqrt(np.mean(self.v**2)))
+        return bool(np.std(self.v) <= STEADY * rms(self.v))
 
     @cached_property
     def kept(self) -> npt.NDArray[np.int64]:

@@ -16,6 +16,11 @@ def rms(values: npt.NDArray[np.floating]) -> float:
     return float(np.sqrt(np.mean(np.square(values)))) if values.size else float("nan")
 
 
+def column_rms(columns: npt.NDArray[np.floating]) -> Array:
+    """Root of the mean square of each column (rows, n), never quite zero: columns are divided by it."""
+    return np.asarray(np.sqrt(np.mean(columns**2, axis=0)) + 1e-300)
+
+
 def hann(length: int) -> Array:
     """Hann window of so many samples, with zeros at both ends."""
     return np.hanning(length)

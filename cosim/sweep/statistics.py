@@ -21,6 +21,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cosim.data.recording import Recording
 from cosim.support.errors import SweepError, UnitError
+from cosim.support.statistics import rms
 from cosim.support.units import conversion
 
 KINDS: Mapping[str, Callable[[np.ndarray, float], float]] = {
@@ -28,7 +29,7 @@ KINDS: Mapping[str, Callable[[np.ndarray, float], float]] = {
     "std": lambda x, dt: float(np.std(x)),
     "min": lambda x, dt: float(np.min(x)),
     "max": lambda x, dt: float(np.max(x)),
-    "rms": lambda x, dt: float(np.sqrt(np.mean(x * x))),
+    "rms": lambda x, dt: rms(x),
     "peak": lambda x, dt: float(np.max(np.abs(x))),
     "ise": lambda x, dt: float(np.sum(x * x) * dt),
     "iae": lambda x, dt: float(np.sum(np.abs(x)) * dt),

@@ -1,10 +1,5 @@
 """References to ports: "component.variable", "signal.output", or "signal" where it has only one output."""
 
-from typing import Any
-
-from pydantic import GetCoreSchemaHandler
-from pydantic_core.core_schema import CoreSchema, no_info_after_validator_function
-
 
 class PortRef(str):
     """A port by name: the text of a scenario, with its two parts.
@@ -45,8 +40,3 @@ class PortField:
 
     def __set__(self, instance: object, value: str) -> None:
         instance.__dict__[self._name] = PortRef(value)
-
-    @classmethod
-    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        """Check it as text where it comes from a file."""
-        return no_info_after_validator_function(PortRef, handler(str))

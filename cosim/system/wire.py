@@ -4,12 +4,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Annotated, Any, ClassVar, Literal, get_type_hints
 
-from pydantic import ConfigDict, Field
+from pydantic import ConfigDict, Field, PlainValidator
 
-from cosim.system.ports import PortField
+from cosim.system.ports import PortField, PortRef
 
 CHECKED = ConfigDict(extra="forbid", allow_inf_nan=False, populate_by_name=True)
 """How a section of a file is checked when it is read; what Python code makes is checked when it is wired."""
+
+
+def _port(value: Any) -> PortRef:
+    """Check a port that comes from a file."""
+    if not isinstance(value, str):
+        raise ValueError("input should be a valid string")
+    return PortRef(value)
 
 
 @dataclass(frozen=True)
@@ -22,8 +29,8 @@ class Wire:
     value of the target's type where that does not hold what arrives.
     """
 
-    source: Annotated[PortField, Field(alias="from")] = PortField()
-    target: Annotated[PortField, Field(alias="to")] = PortField()
+    source: Annotated[PortField, PlainValidator(_port), Field(alias="from")] = PortField()
+    target: Annotated[PortField, PlainValidator(_port), Field(alias="to")] = PortField()
     gain: float = 1.0
     offset: float = 0.0
     quantum: Annotated[float, Field(ge=0)] = 0.0
@@ -44,7 +51,7 @@ class Wire:
 class Record:
     """A column of the recording: the sample at the row's time, or the mean over the sample interval around it."""
 
-    signal: PortField = PortField()
+    signal: Annotated[PortField, PlainValidator(_port)] = PortField()
     mode: Literal["sample", "mean"] = "sample"
     __pydantic_config__: ClassVar[Any] = CHECKED
 
@@ -53,4 +60,6 @@ def keys_of(section: type[Wire] | type[Record]) -> tuple[str, ...]:
     """Return the keys that a section of a file may have: aliases where fields have one."""
     hints = get_type_hints(section, include_extras=True)
     notes = {one.name: getattr(hints[one.name], "__metadata__", ()) for one in fields(section)}
-    return tuple(next((note.alias for note in found if note.alias), name) for name, found in notes.items())
+    return tuple(
+        next((note.alias for note in found if getattr(note, "alias", None)), name) for name, found in notes.items()
+    )

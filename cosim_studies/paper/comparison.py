@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cosim.support.errors import InputError
+from cosim.support.statistics import rms
 from cosim_studies.paper.conditions import Condition, condition
 from cosim_studies.paper.experiment import Job
 from cosim_studies.paper.frontier import Design, choice, chosen_option, designs, frontier
@@ -206,4 +207,4 @@ class Ratios:
 
     def torque(self, where: str, key: str) -> float:
         """Return the RMS of the command over all seeds [N m]."""
-        return float(np.sqrt(np.mean(np.square(self._torque[where, key]))))
+        return rms(np.asarray(self._torque[where, key]))

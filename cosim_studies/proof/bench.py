@@ -10,6 +10,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from cosim.support.plain import Parsed
+from cosim.support.statistics import rms
 from cosim_studies.proof.motion import MOTIONS, Motion, Pace, with_tremble
 from cosim_studies.proof.truth import BLOCKS, TICK, Array, Drive
 
@@ -59,12 +60,7 @@ class Bench:
     def friction_rms(self) -> float:
         """Expected friction torque while it moves [N m], root mean square over the training set points."""
         v = np.abs(self.training.v)
-        return root_mean_square((self.mount["coulomb"] + self.mount["viscous"] * v)[v > 0.02 * self.pace.speed])
-
-
-def root_mean_square(x: Array) -> float:
-    """The root of the mean square of `x`."""
-    return float(np.sqrt(np.mean(np.square(x))))
+        return rms((self.mount["coulomb"] + self.mount["viscous"] * v)[v > 0.02 * self.pace.speed])
 
 
 def draw_pace(rng: np.random.Generator, duration: float) -> Pace:

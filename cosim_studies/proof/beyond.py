@@ -12,7 +12,8 @@ ground         a floor that trembles now and then: noise between 2 and 10 Hz
 import numpy as np
 from scipy.signal import butter, sosfilt
 
-from cosim_studies.proof.bench import Bench, Parameters, log_uniform, root_mean_square
+from cosim.support.statistics import rms
+from cosim_studies.proof.bench import Bench, Parameters, log_uniform
 from cosim_studies.proof.families import Family, add_push, angle, goal
 from cosim_studies.proof.truth import TICK, Array
 
@@ -29,7 +30,7 @@ def sluggish_oil(bench: Bench, rng: np.random.Generator, size: float) -> Paramet
     cycles = max(1, round(1 / (2 * bench.pace.amplitude * bench.turn / (2 * np.pi))))
     viscous = bench.mount["viscous"] = max(bench.mount["viscous"], 0.5 * bench.mount["coulomb"] / bench.pace.speed)
     bench.belief["friction"]["sigma2"] = viscous
-    swing = min(0.95, 2.5 * goal(bench, rng, size) / (viscous * root_mean_square(bench.training.v)))
+    swing = min(0.95, 2.5 * goal(bench, rng, size) / (viscous * rms(bench.training.v)))
     bench.mount |= {"viscous_swing": swing, "viscous_cycles": bench.turn * cycles, "viscous_phase": angle(rng)}
     return {"relative": swing, "cycles_per_rev": cycles}
 
@@ -42,7 +43,7 @@ def dead_band(bench: Bench, rng: np.random.Generator, size: float) -> Parameters
 
 def motor_ripple(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """Magnets of unequal strength."""
-    felt = root_mean_square(bench.mount["inertia"] * bench.training.a) + bench.friction_rms
+    felt = rms(bench.mount["inertia"] * bench.training.a) + bench.friction_rms
     swing = min(0.5, 2 * goal(bench, rng, size) / felt)
     cycles = round(log_uniform(rng, 2, 12) * max(1.0, np.pi / (bench.turn * bench.pace.amplitude)))
     bench.mount |= {"gain_swing": swing, "gain_cycles": bench.turn * cycles, "gain_phase": angle(rng)}
@@ -59,7 +60,7 @@ def drive_fade(bench: Bench, rng: np.random.Generator, size: float) -> Parameter
 def payload_comes(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """Somebody hangs a weight onto it while it is recorded."""
     phase, when = angle(rng), bench.pace.duration * float(rng.uniform(0.3, 0.7))
-    shape = root_mean_square(np.sin(bench.training.q + phase))
+    shape = rms(np.sin(bench.training.q + phase))
     bench.mount |= {"shift": 2.5 * goal(bench, rng, size) / shape, "shift_phase": phase, "shift_time": when}
     return {"mgl": bench.mount["shift"], "phase": phase, "after_s": when}
 

@@ -5,7 +5,8 @@ Contract between these functions and a bench, and the meaning of `size`: see `fa
 
 import numpy as np
 
-from cosim_studies.proof.bench import Bench, Parameters, log_uniform, root_mean_square
+from cosim.support.statistics import rms
+from cosim_studies.proof.bench import Bench, Parameters, log_uniform
 from cosim_studies.proof.families import Family, angle, goal, signed
 from cosim_studies.proof.motion import Motion
 from cosim_studies.proof.truth import Array
@@ -38,7 +39,7 @@ def backlash(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     total, gap = bench.mount["inertia"], size * log_uniform(rng, 3e-4, 1.5e-3)
     if bench.setup:
         gap *= bench.pace.amplitude
-    felt = bench.friction_rms / total / root_mean_square(bench.training.a)
+    felt = bench.friction_rms / total / rms(bench.training.a)
     load = float(np.clip(rng.uniform(0.6, 1.2) * felt, 0.12, 0.5)) * total
     spring = load * (2 * np.pi * (log_uniform(rng, 10, 60) if bench.setup else float(rng.uniform(25, 50)))) ** 2
     dry = float(rng.uniform(0.1, 0.25)) * bench.mount["coulomb"]
@@ -54,7 +55,7 @@ def backlash(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
 
 def encoder_eccentricity(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """A disc off centre: the reading errs once and twice per encoder turn, felt as torque ~ J A (n v)^2."""
-    v2 = root_mean_square(bench.training.v**2)
+    v2 = rms(bench.training.v**2)
     v2 *= bench.turn**2
     amplitude, wanted = log_uniform(rng, 1e-4, 1e-3), 2 * goal(bench, rng, size) / bench.mount["inertia"]
     cycles = int(np.clip(round(np.sqrt(wanted / (amplitude * v2))), 4, 64))

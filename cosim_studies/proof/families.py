@@ -11,7 +11,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from cosim_studies.proof.bench import Bench, Parameters, log_uniform, root_mean_square
+from cosim.support.statistics import rms
+from cosim_studies.proof.bench import Bench, Parameters, log_uniform
 from cosim_studies.proof.truth import Array, ticks
 
 Family = Callable[[Bench, np.random.Generator, float], Parameters]
@@ -117,7 +118,7 @@ def _rough_spot(bench: Bench, rng: np.random.Generator, size: float) -> Paramete
 def gravity_unbalance(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """A weight that was not balanced."""
     phase = angle(rng)
-    mgl = 1.3 * goal(bench, rng, size) / root_mean_square(np.sin(bench.training.q + phase))
+    mgl = 1.3 * goal(bench, rng, size) / rms(np.sin(bench.training.q + phase))
     bench.mount |= {"unbalance": mgl, "unbalance_phase": phase}
     return {"mgl": mgl, "phase": phase}
 
@@ -148,7 +149,7 @@ def dwell_breakaway(bench: Bench, rng: np.random.Generator, size: float) -> Para
 
 def quadratic_drag(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """Wind of its own making."""
-    bench.mount["quadratic"] = 2.5 * goal(bench, rng, size) / root_mean_square(bench.training.v**2)
+    bench.mount["quadratic"] = 2.5 * goal(bench, rng, size) / rms(bench.training.v**2)
     return {"coefficient": bench.mount["quadratic"]}
 
 
@@ -157,7 +158,7 @@ def cable_wrap(bench: Bench, rng: np.random.Generator, size: float) -> Parameter
     home = bench.pace.home + bench.pace.amplitude * float(rng.uniform(-0.3, 0.3))
     hardening = 0.0 if rng.random() < 0.5 else float(rng.uniform(0.3, 1.5)) / bench.pace.amplitude**2
     x = bench.training.q - home
-    stiffness = 1.2 * goal(bench, rng, size) / root_mean_square(x * (1 + hardening * x**2))
+    stiffness = 1.2 * goal(bench, rng, size) / rms(x * (1 + hardening * x**2))
     bench.mount |= {"cable": stiffness, "cable_home": home, "cable_hardening": hardening}
     return {"stiffness": stiffness, "home": home, "hardening": hardening}
 
@@ -167,7 +168,7 @@ def inertia_variation(bench: Bench, rng: np.random.Generator, size: float) -> Pa
     cycles = 2 if bench.pace.amplitude < 1 else int(rng.integers(1, 3))
     phase = angle(rng)
     shape = np.cos(bench.turn * cycles * bench.training.q + phase)
-    felt = bench.mount["inertia"] * root_mean_square((shape - shape.mean()) * bench.training.a)
+    felt = bench.mount["inertia"] * rms((shape - shape.mean()) * bench.training.a)
     relative = min(0.5, 1.2 * goal(bench, rng, size) / felt)
     bench.mount |= {"inertia_swing": relative, "inertia_cycles": bench.turn * cycles, "inertia_phase": phase}
     return {"relative_amplitude": relative, "cycles_per_rev": cycles, "phase": phase}
@@ -176,7 +177,7 @@ def inertia_variation(bench: Bench, rng: np.random.Generator, size: float) -> Pa
 def load_dependent_friction(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """A known payload presses on the bearing."""
     phase = -bench.pace.home + float(rng.choice([0.0, np.pi])) + float(rng.uniform(-0.4, 0.4))
-    shape = root_mean_square(np.sin(bench.training.q + phase))
+    shape = rms(np.sin(bench.training.q + phase))
     mgl, share = float(rng.uniform(1.0, 2.0)) * bench.friction_rms / shape, size * float(rng.uniform(0.25, 0.4))
     bench.mount |= {"payload": mgl, "payload_phase": phase}
     bench.belief["unbalance"] = {"mgl": mgl, "phase": phase}

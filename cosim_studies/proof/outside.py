@@ -8,7 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from cosim_studies.proof.bench import Bench, Parameters, drift, root_mean_square
+from cosim.support.statistics import rms
+from cosim_studies.proof.bench import Bench, Parameters, drift
 from cosim_studies.proof.beyond import SHAPELESS
 from cosim_studies.proof.families import Family, add_push, goal, signed
 from cosim_studies.proof.truth import ticks
@@ -16,7 +17,7 @@ from cosim_studies.proof.truth import ticks
 
 def acceleration_drag(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     """Drag that needs speed and acceleration at once: c |a| v."""
-    shape = root_mean_square(bench.training.a * bench.training.v)
+    shape = rms(bench.training.a * bench.training.v)
     bench.mount["swerve"] = 1.6 * goal(bench, rng, size) / shape
     return {"coefficient": bench.mount["swerve"]}
 

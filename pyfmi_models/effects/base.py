@@ -73,6 +73,8 @@ class Effect(Part):
     place: ClassVar[str] = "Mechanics"
     is_torque: ClassVar[bool] = True
     """Whether a torque added to the command can do what the effect does to the axis."""
+    at_once: ClassVar[bool] = False
+    """Whether it changes what the motion of each moment needs, not only what drive, springs and clocks make of that."""
     id: ClassVar[str]
     title: ClassVar[str]
     equation: ClassVar[str] = ""
@@ -137,6 +139,8 @@ class DriveEffect(Effect):
 @dataclass(frozen=True, kw_only=True)
 class MotionEffect(Effect):
     """An effect that depends on the motion of the axis, and may remember it in states of its own."""
+
+    at_once: ClassVar[bool] = True
 
     def rate(self, motion: Motion) -> Any:
         """Time derivative of the states, a column."""
@@ -264,6 +268,7 @@ class ClockEffect(MotionEffect):
     """Two clocks: the reading in a row of a recording was taken later or earlier than its torque."""
 
     place: ClassVar[str] = "Sensor path"
+    at_once: ClassVar[bool] = False
     is_torque: ClassVar[bool] = False
 
     def ahead(self, motion: Motion) -> Scalar:

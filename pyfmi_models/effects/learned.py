@@ -11,23 +11,47 @@ Waves that are level at both ends are the basis of smoothing splines: Solin and 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
-from pyfmi_models.effects.base import DriveEffect, FrictionEffect, LoadEffect, Main, Motion, MotionEffect
+from pyfmi_models.effects.base import DriveEffect, Effect, FrictionEffect, LoadEffect, Main, Motion, MotionEffect
 from pyfmi_models.model import Scalar, Variable, parameter, structure, word
 from pyfmi_models.waves import INPUT, broken_range, input_of, span, spoken, waves
 
 Array = npt.NDArray[np.float64]
 MOST_WAVES = 40
 """Of one quantity; more is noise, and costs time in every step."""
+ROWS = 41
+"""Values of a table for a reader, over one quantity; a table of products has `COLUMNS` in each row."""
+COLUMNS = 5
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Table(MotionEffect):
+class LearnedEffect(Effect):
+    """What a learned term declares beside its equation."""
+
+    filled: ClassVar[str]
+    """Field that holds the coefficients."""
+    in_torque: ClassVar[bool] = True
+    """Whether the coefficients are torques; else they are shares of the friction level."""
+    never_negative: ClassVar[bool] = False
+    """Whether a negative coefficient would give energy."""
+
+    def coefficients(self) -> Sequence[Scalar]:
+        """Coefficients of the waves or elements; those of a second quantity fastest."""
+        found: Sequence[Scalar] = getattr(self, self.filled)
+        return found
+
+    def for_reader(self, unit: str) -> dict[str, Any]:
+        """The term as a table of plain numbers: quantity, values, their unit; `unit` is that of a torque."""
+        raise TypeError(f"{type(self).__name__} has no table")
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Table(LearnedEffect, MotionEffect):
     """Where a table goes over, what was seen of it, and its waves at a motion."""
 
     id: ClassVar[str] = "learned"
@@ -42,10 +66,6 @@ class _Table(MotionEffect):
     by_seen: tuple[float, ...] = structure("1", "Lowest and highest value seen of it", low=-1e9, high=1e9)
     waves: tuple[float, ...] = structure("1", "Highest wave over each quantity", low=0, high=MOST_WAVES)
     share: Scalar = parameter("1", "Share of the table that acts", default=1.0, low=0, high=1, fitted=False)
-
-    def coefficients(self) -> Sequence[Scalar]:
-        """Coefficients of the table, those of the second quantity fastest."""
-        raise TypeError(f"{type(self).__name__} has no coefficients")
 
     def inputs(self) -> tuple[Variable, ...]:
         """What is not the axis's own business."""
@@ -122,6 +142,21 @@ class _Table(MotionEffect):
     def _sized(self, unit: str) -> str:
         return f"{self.size():.2g} {unit}"
 
+    def for_reader(self, unit: str) -> dict[str, Any]:
+        """A torque, or a share of the friction level, over the range seen of one quantity or of two."""
+        kind, unit = ("torque", unit) if self.in_torque else ("friction", "1")
+        at, values = self.values(ROWS)
+        named = {"kind": kind, "unit": unit, "over": spoken(self.over), "at": at.tolist()}
+        if not self.by:
+            return {**named, "value": self._acts(values).tolist()}
+        others = np.linspace(self.by_seen[0], self.by_seen[1], COLUMNS)
+        grid = np.array([self.values(ROWS, float(other))[1] for other in others])
+        return {**named, "by": spoken(self.by), "by_at": others.tolist(), "value": self._acts(grid).T.tolist()}
+
+    def _acts(self, table: Array) -> Array:
+        """What a table does: it is a torque, or the logarithm of a factor."""
+        return table if self.in_torque else np.asarray(np.expm1(table))
+
 
 @dataclass(frozen=True, kw_only=True)
 class LearnedTorque(_Table, LoadEffect):
@@ -132,11 +167,8 @@ class LearnedTorque(_Table, LoadEffect):
     It may take or give energy over a round trip where it goes over the speed. Constant outside the range `seen`.
     """
 
+    filled: ClassVar[str] = "torque"
     torque: tuple[float, ...] = structure("N.m", "Coefficients of the waves", low=-1e9, high=1e9)
-
-    def coefficients(self) -> Sequence[Scalar]:
-        """`torque`."""
-        return self.torque
 
     def load(self, motion: Motion) -> Scalar:
         """The table."""
@@ -152,11 +184,9 @@ class LearnedFriction(_Table, FrictionEffect):
     To first order the table is the relative change of the level. Constant outside the range `seen`.
     """
 
+    filled: ClassVar[str] = "level_change"
+    in_torque: ClassVar[bool] = False
     level_change: tuple[float, ...] = structure("1", "Coefficients of the waves", low=-5, high=5)
-
-    def coefficients(self) -> Sequence[Scalar]:
-        """`level_change`."""
-        return self.level_change
 
     def level(self, level: Scalar, motion: Motion) -> Scalar:
         """`level exp(table)`."""
@@ -167,7 +197,7 @@ class LearnedFriction(_Table, FrictionEffect):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LearnedDrive(DriveEffect):
+class LearnedDrive(LearnedEffect, DriveEffect):
     """What a drive does not give of its command: applied = command - table(command).
 
         table = share sum_k c_k cos(pi k x),   x over `command_seen` as for a speed
@@ -181,13 +211,10 @@ class LearnedDrive(DriveEffect):
     main: ClassVar[Main] = Main("share", unit="1", is_size=False)
     told_apart_by: ClassVar[str] = _Table.told_apart_by
     action: ClassVar[str] = "Measure what the drive gives at small and at large commands."
+    filled: ClassVar[str] = "missing"
     command_seen: tuple[float, ...] = structure("N.m", "Lowest and highest command seen", low=-1e9, high=1e9)
     missing: tuple[float, ...] = structure("N.m", "Coefficients of the waves", low=-1e9, high=1e9)
     share: Scalar = parameter("1", "Share of the table that acts", default=1.0, low=0, high=1, fitted=False)
-
-    def coefficients(self) -> Sequence[Scalar]:
-        """`missing`."""
-        return self.missing
 
     def applied(self, state: object, command: Scalar) -> Scalar:
         """`command - table(command)`."""
@@ -215,6 +242,11 @@ class LearnedDrive(DriveEffect):
         """Commands over the range seen, and what is missing of each."""
         command = np.linspace(self.command_seen[0], self.command_seen[1], count)
         return command, command - np.asarray(ca.DM(self.applied((), ca.DM(command))).full().ravel())
+
+    def for_reader(self, unit: str) -> dict[str, Any]:
+        """What is missing of commands over the range seen."""
+        command, missing = self.curve(ROWS)
+        return {"kind": "drive", "command": command.tolist(), "missing": missing.tolist(), "unit": unit}
 
     def _falls(self) -> bool:
         command, missing = self.curve(2001)

@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import casadi as ca
 
 from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Main, Motion, MotionEffect
+from pyfmi_models.effects.learned import LearnedEffect
 from pyfmi_models.model import Scalar, Variable, parameter, structure
 
 MOST = 12
@@ -15,7 +16,7 @@ SHORTEST = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Memory(MotionEffect):
+class _Memory(LearnedEffect, MotionEffect):
     """Elements that follow the direction of motion, each over a way or a time of its own, from -1 to 1."""
 
     id: ClassVar[str] = "learned"
@@ -29,10 +30,6 @@ class _Memory(MotionEffect):
     def spans(self) -> Sequence[float]:
         """Way or time of each element."""
         raise TypeError(f"{type(self).__name__} has no elements")
-
-    def coefficients(self) -> Sequence[Scalar]:
-        """Coefficient of each element."""
-        raise TypeError(f"{type(self).__name__} has no coefficients")
 
     def states(self) -> tuple[Variable, ...]:
         """One state an element, at 0 to begin with: nothing is remembered."""
@@ -63,6 +60,8 @@ class LearnedHysteresis(_Memory, LoadEffect):
     Reference: Dahl, AIAA Journal 14 (1976) 1675.
     """
 
+    filled: ClassVar[str] = "torque"
+    never_negative: ClassVar[bool] = True
     strokes: tuple[float, ...] = structure("rad", "Ways over which the elements turn round", low=SHORTEST, high=1e9)
     torque: tuple[float, ...] = structure("N.m", "Torque of each element", low=0, high=1e9)
 
@@ -70,9 +69,9 @@ class LearnedHysteresis(_Memory, LoadEffect):
         """`strokes`."""
         return self.strokes
 
-    def coefficients(self) -> Sequence[Scalar]:
-        """`torque`."""
-        return self.torque
+    def for_reader(self, unit: str) -> dict[str, Any]:
+        """The elements."""
+        return {"kind": "hysteresis", "strokes": list(self.strokes), "torque": list(self.torque), "unit": unit}
 
     def rate(self, motion: Motion) -> Any:
         """`(v - |v| y) / stroke`."""
@@ -103,6 +102,8 @@ class LearnedAfterReversal(_Memory, FrictionEffect):
     m_k is 1 right after a reversal and falls to 0. The level stays above zero, so friction never drives.
     """
 
+    filled: ClassVar[str] = "level_change"
+    in_torque: ClassVar[bool] = False
     ways: tuple[float, ...] = structure("rad", "Ways over which the elements forget", low=SHORTEST, high=1e9)
     times: tuple[float, ...] = structure("s", "Times in which the elements forget", low=SHORTEST, high=1e9)
     level_change: tuple[float, ...] = structure("1", "Coefficient of each element", low=-5, high=5)
@@ -114,9 +115,10 @@ class LearnedAfterReversal(_Memory, FrictionEffect):
         """`ways`, then `times`."""
         return (*self.ways, *self.times)
 
-    def coefficients(self) -> Sequence[Scalar]:
-        """`level_change`."""
-        return self.level_change
+    def for_reader(self, unit: str) -> dict[str, Any]:
+        """The elements, of the level."""
+        own = {"ways": list(self.ways), "times": list(self.times), "level_change": list(self.level_change)}
+        return {"kind": "friction after a reversal", **own, "unit": "1"}
 
     def rate(self, motion: Motion) -> Any:
         """The equations above."""

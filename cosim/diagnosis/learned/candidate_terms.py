@@ -15,8 +15,7 @@ import numpy as np
 
 from cosim.diagnosis.dictionary import user_columns
 from cosim.estimation.prepare import Array, Prepared
-from pyfmi_models.effects import Effect
-from pyfmi_models.effects.learned import LearnedDrive, LearnedFriction, LearnedTorque
+from pyfmi_models.effects.learned import LearnedDrive, LearnedEffect, LearnedFriction, LearnedTorque
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHysteresis
 from pyfmi_models.model import parameter
 from pyfmi_models.mount import Mount
@@ -43,7 +42,7 @@ class CandidateTerm:
     """A term that may be learned: plain name, an effect with free coefficients, and the prior size of each."""
 
     name: str
-    effect: Effect
+    effect: LearnedEffect
     prior: Array
     """Of each coefficient, relative; 0 for one that the base holds already."""
 
@@ -55,7 +54,7 @@ class CandidateTerm:
     @property
     def in_torque(self) -> bool:
         """Whether the coefficients are torques; else they are shares of the friction level."""
-        return isinstance(self.effect, LearnedTorque | LearnedDrive | LearnedHysteresis)
+        return self.effect.in_torque
 
     @property
     def coefficients(self) -> Array:
@@ -73,28 +72,19 @@ class CandidateTerm:
         """The same at other coefficients."""
         return replace(self, effect=replace(self.effect, **{f"c{k}": float(c) for k, c in enumerate(values)}))
 
-    def learned(self, values: Sequence[float]) -> Effect:
+    def learned(self, values: Sequence[float]) -> LearnedEffect:
         """The effect as a card holds it."""
         form: Any = type(self.effect).__mro__[1]
         known = {one.name: getattr(self.effect, one.name) for one in fields(form)}
-        made: Effect = form(**(known | {_TABLES[form]: tuple(map(float, values))}))
+        made: LearnedEffect = form(**(known | {form.filled: tuple(map(float, values))}))
         return made
 
 
-_TABLES: dict[type[Effect], str] = {
-    LearnedTorque: "torque",
-    LearnedFriction: "level_change",
-    LearnedDrive: "missing",
-    LearnedHysteresis: "torque",
-    LearnedAfterReversal: "level_change",
-}
-
-
-_FORMS: dict[tuple[type[Effect], int], Any] = {}
+_FORMS: dict[tuple[type[LearnedEffect], int], Any] = {}
 """Forms with free coefficients; equations are kept by class, so each is made once."""
 
 
-def _form(form: type[Effect], count: int) -> Any:
+def _form(form: type[LearnedEffect], count: int) -> Any:
     """The form with `count` coefficients as parameters."""
     if (form, count) not in _FORMS:
         names = [f"c{k}" for k in range(count)]
@@ -105,7 +95,7 @@ def _form(form: type[Effect], count: int) -> Any:
     return _FORMS[form, count]
 
 
-def _term(name: str, form: type[Effect], prior: Sequence[float], **shape: Any) -> CandidateTerm:
+def _term(name: str, form: type[LearnedEffect], prior: Sequence[float], **shape: Any) -> CandidateTerm:
     return CandidateTerm(name, _form(form, len(prior))(**shape), np.asarray(prior, float))
 
 

@@ -21,6 +21,7 @@ from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
+from cosim.support.statistics import rms
 from pyfmi_models.mount import Mount
 
 Index = npt.NDArray[np.int64]
@@ -128,7 +129,7 @@ class Grams:
 
 def grams_of(comparison: Comparison, found: Fit, columns: Sequence[Array], added: Sequence[CandidateTerm]) -> Grams:
     """Gram matrices of the training recordings, beside a structure."""
-    level = float(np.sqrt(np.mean(comparison.nuisances.level**2))) or float(np.std(_torque(comparison.problem)))
+    level = rms(comparison.nuisances.level) or float(np.std(_torque(comparison.problem)))
     unit = [one.prior * (level if one.in_torque else 1.0) for one in added]
     scaled = [column[:, size > 0] * size[size > 0] for column, size in zip(columns, unit, strict=True)]
     widths = [found.slopes.shape[1], comparison.nuisances.columns.shape[1], *(one.shape[1] for one in scaled)]

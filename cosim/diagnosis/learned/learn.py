@@ -15,14 +15,13 @@ from cosim.diagnosis.entries import LearnedEntry
 from cosim.diagnosis.learned.candidate_terms import CandidateTerm, candidate_terms
 from cosim.diagnosis.learned.grams import columns_of, grams_of
 from cosim.diagnosis.learned.select import fitted, path
-from cosim.diagnosis.learned.tables import table_of
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.protocol import interval_of, residuals
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Array
 from cosim.support.statistics import rms
-from pyfmi_models.effects import Effect
+from pyfmi_models.effects.learned import LearnedEffect
 from pyfmi_models.mount import Mount
 
 LEAST_GAIN = 0.01
@@ -38,7 +37,7 @@ class Learned:
     """The delivered model with its learned terms, and what they are worth on the held-out recordings."""
 
     mount: Mount
-    effects: tuple[Effect, ...]
+    effects: tuple[LearnedEffect, ...]
     quantities: tuple[str, ...]
     size: float
     """Half the range of the terms' torque in training, outermost 5 % left out [N m or N]."""
@@ -62,7 +61,7 @@ class Learned:
         return {
             "quantities": list(self.quantities),
             "size": float(self.size),
-            "table": [table_of(effect, linear) for effect in self.effects],
+            "table": [effect.for_reader("N" if linear else "N.m") for effect in self.effects],
             "before": self.before,
             "after": self.after,
             "interval": list(self.interval),
@@ -102,7 +101,9 @@ def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], 
     return Learned(whole, effects, tuple(one.name for one in terms), 0.0, before, after, interval)
 
 
-def _allowed(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]) -> tuple[Mount, tuple[Effect, ...]]:
+def _allowed(
+    comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]
+) -> tuple[Mount, tuple[LearnedEffect, ...]]:
     """Fit terms that break no rule, with fewer waves where they would: a drive that falls where no row tells."""
     for _ in range(FEWER):
         mount, fit = fitted(comparison, found, terms)

@@ -11,7 +11,6 @@ from cosim.diagnosis.learned.grams import Grams, grams_of, with_terms
 from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array
-from pyfmi_models.effects.learned_memory import LearnedHysteresis
 from pyfmi_models.mount import Mount
 
 MOST = 3
@@ -103,7 +102,7 @@ def fitted(
 
 def _rising(term: CandidateTerm) -> CandidateTerm:
     """A hysteresis without the elements that would give energy."""
-    if not isinstance(term.effect, LearnedHysteresis) or (term.coefficients >= 0).all():
+    if not term.effect.never_negative or (term.coefficients >= 0).all():
         return term
     values = np.maximum(term.coefficients, 0.0)
     return replace(term, prior=np.where(values > 0, term.prior, 0.0)).with_coefficients(values.tolist())

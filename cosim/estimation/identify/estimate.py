@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.estimation.least_squares import least_squares
+from cosim.support.statistics import column_rms
 
 Array = npt.NDArray[np.float64]
 BLOCKS = 50
@@ -145,7 +146,7 @@ def _minimum(search: _Search, logs: Array, limits: Array | None, evaluations: in
 
 
 def _rms(residual: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean(residual**2, axis=0)) + 1e-300)
+    return column_rms(residual)
 
 
 def _covariance(outputs: Outputs, scale: Array) -> Array:
