@@ -68,7 +68,10 @@ def served(arguments: Command) -> Callable[[], object]:
     def command() -> None:
         signal.signal(signal.SIGALRM, lambda *_: signal.raise_signal(signal.SIGINT))
         signal.setitimer(signal.ITIMER_REAL, SERVED)
-        main([str(one) for one in arguments])
+        try:
+            main([str(one) for one in arguments])
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0)
 
     return command
 

@@ -1,0 +1,201 @@
+"""Small errors planted in the code, one at a time: do the tests notice?
+
+    python tests/benchmarks/mutants.py --seed 1 --count 160 --out results/mutants [--journal FILE]
+
+A mutant is a module with one operator, number or truth value changed, or one call left out (`mutations.py`). It is
+written into a copy of the tree, and the tests that are nearest to its module, by imports and names, run there until one
+fails. Killed: a test failed or no longer ended. Survived: none did.
+"""
+
+import argparse
+import ast
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from random import Random
+from shutil import copytree, ignore_patterns, rmtree
+
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+
+from mutations import mutated, sites  # noqa: E402
+
+from cosim.support.files import replacing  # noqa: E402
+from cosim.support.version import __version__  # noqa: E402
+
+HOME = Path(__file__).parents[2]
+GROUPS = {
+    "models": (
+        "pyfmi_models/*.py",
+        "pyfmi_models/adrc/*.py",
+        "pyfmi_models/friction/*.py",
+        "pyfmi_models/effects/*.py",
+    ),
+    "master": ("cosim/master/*.py", "cosim/master/loop/[!b]*.py"),
+    "hardware": ("cosim/hardware/*.py",),
+    "decision": tuple(
+        f"cosim/diagnosis/{name}.py"
+        for name in ("decision", "marginal", "rivals", "admissibility", "adequacy", "proof")
+    ),
+}
+"""Modules whose tests are tested; from each group as many mutants."""
+MOST, NEAREST = 4, 8
+"""Imports between a test and a module at most, and test files that are asked at most."""
+SECONDS = 150
+"""That a test file may take: a mutant that never ends is noticed too."""
+SLOW = ("test_attack", "test_prove", "test_proof", "test_serve", "test_benchmarks", "test_same_bits", "test_platforms")
+"""Test files that are not asked: a mutant that only they would notice counts as survived."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """A mutant: its group, module, place in the list of its sites, line, what was changed, and who noticed."""
+
+    group: str
+    module: str
+    site: int
+    line: int
+    change: str
+    noticed: str
+
+
+@cache
+def imported(path: Path) -> frozenset[Path]:
+    """Files of the tree that a file imports by itself, also inside of functions."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        names = [one.name for one in node.names] if isinstance(node, ast.Import) else []
+        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            names = [node.module, *(f"{node.module}.{one.name}" for one in node.names)]
+        for name in names:
+            stem = name.replace(".", "/")
+            files = [place / f"{stem}{end}" for place in (HOME, HOME / "tests") for end in (".py", "/__init__.py")]
+            found |= {one for one in files if one.is_file()}
+    return frozenset(found - {path})
+
+
+def distance(test: Path, module: Path) -> int:
+    """Imports from a test to a module, at most `MOST` + 1."""
+    seen, edge = {test}, {test}
+    for steps in range(1, MOST + 1):
+        edge = {one for path in edge for one in imported(path)} - seen
+        if module in edge:
+            return steps
+        seen |= edge
+    return MOST + 1
+
+
+@cache
+def belonging(module: Path) -> tuple[str, ...]:
+    """The test files nearest to a module: by imports and by words of the name, the smallest of equally near first."""
+    words = set(str(module.relative_to(HOME).with_suffix("")).replace("/", "_").split("_"))
+    ranked = []
+    for test in (HOME / "tests").glob("test_*.py"):
+        steps, shared = distance(test, module), len(words & set(test.stem.split("_")[1:]))
+        if steps <= MOST and not test.stem.startswith(SLOW):
+            ranked.append((steps - 2 * shared, test.stat().st_size, test.name))
+    return tuple(name for *_, name in sorted(ranked)[:NEAREST])
+
+
+def drawn(seed: int, count: int) -> Iterator[tuple[str, Path, int]]:
+    """Group, module and number of the site of each mutant, the groups in turn: a part of them is a fair sample."""
+    dice, lists = Random(seed), []
+    for group, patterns in GROUPS.items():
+        modules = sorted(path for pattern in patterns for path in HOME.glob(pattern))
+        every = [(group, path, site) for path in modules for site in range(len(sites(path.read_text("utf-8"))))]
+        lists.append(dice.sample(every, min(len(every), -(-count // len(GROUPS)))))
+    for turn in range(max(map(len, lists))):
+        yield from (one[turn] for one in lists if turn < len(one))
+
+
+def copied(folder: Path) -> Path:
+    """Copy the tree, with its compiled libraries."""
+    ignored = ignore_patterns(".git", ".venv", "__pycache__", "build", "results", ".*_cache")
+    return Path(copytree(HOME, folder / "tree", ignore=ignored))
+
+
+def noticed(tree: Path, tests: Sequence[str]) -> str:
+    """Run tests in a tree until one fails; its name, "time" where it did not end, empty where nobody noticed."""
+    environment = os.environ | {"PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1", "OMP_NUM_THREADS": "1"}
+    for name in tests:
+        command = [sys.executable, "-m", "pytest", "-n0", "-x", "-q", "-p", "no:cacheprovider", f"tests/{name}"]
+        try:
+            done = subprocess.run(
+                command, cwd=tree, env=environment, capture_output=True, text=True, timeout=SECONDS, check=False
+            )
+        except subprocess.TimeoutExpired:
+            return f"{name} (time)"
+        if done.returncode not in (0, 5):  # 5: no tests here
+            failed = [one for one in done.stdout.splitlines() if one.startswith(("FAILED", "ERROR"))]
+            return failed[-1].split(" - ")[0].split("::")[-1] if failed else name
+    return ""
+
+
+def attempt(tree: Path, group: str, path: Path, site: int) -> Tried:
+    """Plant one error, run the tests, take it back."""
+    source, place = path.read_text("utf-8"), tree / path.relative_to(HOME)
+    line, change, text = mutated(source, site)
+    try:
+        place.write_text(text, "utf-8")
+        return Tried(group, str(path.relative_to(HOME)), site, line, change, noticed(tree, belonging(path)))
+    finally:
+        place.write_text(source, "utf-8")
+
+
+def journalled(journal: Path) -> list[Tried]:
+    """What a journal has; nothing where there is none."""
+    return [Tried(**json.loads(one)) for one in journal.read_text("utf-8").splitlines()] if journal.exists() else []
+
+
+def page(tried: Sequence[Tried], command: str) -> str:
+    """The table for people, and the survivors."""
+    rows = []
+    for name in [*GROUPS, "all"]:
+        here = [one for one in tried if name in (one.group, "all")]
+        killed = sum(bool(one.noticed) for one in here)
+        rows.append(f"| {name} | {len(here)} | {killed} | {len(here) - killed} | {killed / max(1, len(here)):.0%} |")
+    late = sum(one.noticed.endswith("(time)") for one in tried)
+    head = "What a mutant is and which tests are asked stands at the top of `tests/benchmarks/mutants.py`"
+    lines = ["# Small errors planted in the code", "", f"    {command}", "", f"mount-cosim {__version__}. {head}."]
+    lines += [f"{late} of the killed were noticed because a test no longer ended.", ""]
+    lines += ["| modules | mutants | killed | survived | rate |", "|---|--:|--:|--:|--:|", *rows, ""]
+    lines += ["## Survivors", "", "| module | line | change |", "|---|--:|---|"]
+    lines += [f"| {one.module} | {one.line} | `{one.change}` |" for one in tried if not one.noticed]
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    """Plant, count, and write the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--count", type=int, default=160)
+    parser.add_argument("--journal", type=Path, help="file of what is done: a run that ended early goes on from there")
+    parser.add_argument("--out", type=Path, required=True)
+    given = parser.parse_args()
+    folder = Path(tempfile.mkdtemp(prefix="mutants-"))
+    journal = given.journal or folder / "journal"
+    try:
+        tree = copied(folder)
+        for group, path, site in drawn(given.seed, given.count):
+            done = {(one.module, one.site) for one in journalled(journal)}
+            if (str(path.relative_to(HOME)), site) not in done:
+                tried = attempt(tree, group, path, site)
+                print(f"{tried.module}:{tried.line} {tried.change}: {tried.noticed or 'SURVIVED'}", flush=True)
+                with journal.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(vars(tried)) + "\n")
+        tried_all = journalled(journal)
+    finally:
+        rmtree(folder, ignore_errors=True)
+    command = f"python tests/benchmarks/mutants.py --seed {given.seed} --count {given.count} --out results/mutants"
+    given.out.mkdir(parents=True, exist_ok=True)
+    with replacing(given.out / "README.md", force=True) as partial:
+        partial.write_text(page(tried_all, command), "utf-8")
+
+
+if __name__ == "__main__":
+    main()
