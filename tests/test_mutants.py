@@ -1,0 +1,120 @@
+"""Planted errors: each is one, is found where a test looks, and survives where none does."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
+
+import mutants
+from mutations import mutated, sites
+
+SOURCE = '''
+"""A module."""
+LIMIT: int = 3
+def clamp(x: float = -1.5) -> float:
+    """Hold x between -LIMIT and LIMIT."""
+    check(x)
+    if x > LIMIT and not x == 7:
+        raise ValueError(f"{x + 1} is more than {LIMIT * 2}")
+    return max(-LIMIT, x * 2) if x is not None else x % 2 == True
+'''
+
+
+def test_every_kind_of_error_is_planted_and_each_changes_one_place() -> None:
+    found = [mutated(SOURCE, site) for site in range(len(sites(SOURCE)))]
+    changes = [change for _, change, _ in found]
+    whole = ast.unparse(ast.parse(SOURCE))
+    for line, change, text in found:
+        assert text != whole, change
+        assert len(set(text.splitlines()) ^ set(whole.splitlines())) == 2, change
+        assert 1 <= line <= len(SOURCE.splitlines())
+    for wanted in (
+        "3 -> 4",
+        "-1.5 -> without minus",
+        "check(x) -> left out",
+        "x > LIMIT -> GtE",
+        "x > LIMIT -> LtE",
+        "x > LIMIT and (not x == 7) -> Or",
+        "not x == 7 -> without not",
+        "x == 7 -> NotEq",
+        "x * 2 -> Div",
+        "x is not None -> Is",
+        "x % 2 -> Mult",
+        "True -> False",
+    ):
+        assert wanted in changes
+    assert not any("LIMIT * 2" in one or "x + 1" in one for one in changes), "what is raised is only said"
+
+
+def test_the_same_seed_draws_the_same_mutants_from_every_group() -> None:
+    one = list(mutants.drawn(1, 40))
+    assert one == list(mutants.drawn(1, 40))
+    assert one != list(mutants.drawn(2, 40))
+    assert {group for group, *_ in one[:4]} == set(mutants.GROUPS)
+
+
+def test_the_tests_of_a_module_are_those_that_are_near() -> None:
+    root = mutants.HOME
+    assert mutants.belonging(root / "cosim" / "hardware" / "replay.py")[0] == "test_hardware_replay.py"
+    assert "test_adrc.py" in mutants.belonging(root / "pyfmi_models" / "adrc" / "controller.py")
+    assert "test_master.py" in mutants.belonging(root / "cosim" / "master" / "planning.py")
+
+
+def test_an_error_is_noticed_where_a_test_looks_and_survives_where_none_does(tmp_path: Path) -> None:
+    alone("noticed", tmp_path)
+
+
+@pytest.mark.parametrize("part", ["story", "clamp"])
+def test_a_sample_of_planted_errors_in_the_product_is_noticed(part: str, tmp_path: Path) -> None:
+    """A few that were drawn once; the whole table is results/mutants."""
+    alone(part, tmp_path)
+
+
+def alone(part: str, folder: Path) -> None:
+    """Run a part of this file in an interpreter of its own: tests are run in forks of it."""
+    done = subprocess.run([sys.executable, __file__, part, folder], capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+
+
+def noticed(folder: Path) -> None:
+    (folder / "tests").mkdir()
+    (folder / "held.py").write_text("def held(x):\n    return min(x, 3) + 0\n")
+    for name, body in {"looks": "from held import held\n    assert held(9) == 3", "idle": "pass"}.items():
+        (folder / "tests" / f"test_{name}.py").write_text(f"def test_{name}():\n    {body}\n")
+    assert mutants.noticed(folder, ["test_idle.py", "test_looks.py"]) == ""
+    source = (folder / "held.py").read_text()
+    for site in range(len(sites(source))):
+        _, change, text = mutated(source, site)
+        (folder / "held.py").write_text(text)
+        assert mutants.noticed(folder, ["test_idle.py"]) == "", change
+        expected = "" if change == "min(x, 3) + 0 -> Sub" else "test_looks"
+        assert mutants.noticed(folder, ["test_idle.py", "test_looks.py"]) == expected, change
+
+
+def planted(module: str, changes: tuple[str, ...]) -> Callable[[Path], None]:
+    def run(folder: Path) -> None:
+        tree, path = mutants.copied(folder), mutants.HOME / module
+        source = path.read_text("utf-8")
+        found = {mutated(source, site)[1]: site for site in range(len(sites(source)))}
+        tried = [mutants.attempt(tree, "sample", path, found[one]) for one in changes]
+        assert [one for one in tried if not one.noticed] == []
+        assert (tree / module).read_text("utf-8") == source
+
+    return run
+
+
+PARTS = {
+    "noticed": noticed,
+    "story": planted(
+        "cosim/hardware/story.py", ("now['sha256'] != seal.sha256 -> Eq", "now['story'] == seal.story -> NotEq")
+    ),
+    "clamp": planted("pyfmi_models/adrc/controller.py", ("-limit -> without minus",)),
+}
+
+if __name__ == "__main__":
+    PARTS[sys.argv[1]](Path(sys.argv[2]))
