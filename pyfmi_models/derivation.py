@@ -39,72 +39,72 @@ _OF_MOUNT = ("level", "viscous", "loads", "payload", "inertia")
 _SYMBOLS = {"position": "q", "speed": "v", "der(speed)": "a", "tau": "command", "temperature": "T"}
 """What textbooks call the motion of the axis."""
 
-Hear = Callable[[str, Variable, Scalar], None]
+Observer = Callable[[str, Variable, Scalar], None]
 
 
 def derivation_of(mount: Mount) -> Derivation:
     """Return the derivation of `mount.model()`: its quantities in the order of writing."""
-    heard: dict[str, tuple[Variable, Any]] = {}
-    point, following, shown = written(_listening_mount(mount, lambda *told: _note(heard, *told)))
-    told = ca.vertcat(ca.SX(0, 1), *(value for _, value in heard.values()))
+    observed: dict[str, tuple[Variable, Any]] = {}
+    point, following, shown = written(_listening_mount(mount, lambda *told: _note(observed, *told)))
+    told = ca.vertcat(ca.SX(0, 1), *(value for _, value in observed.values()))
     results = [following, ca.vertcat(*shown.values()), told]
     return Derivation(
-        quantities=tuple(mount.in_axis_units(variable) for variable, _ in heard.values()),
+        quantities=tuple(mount.in_axis_units(variable) for variable, _ in observed.values()),
         symbols=_SYMBOLS,
         equations=ca.Function("derivation", point, results, ["t", "x", "u", "p"], ["next", "y", "quantities"]),
     )
 
 
-def _note(heard: dict[str, tuple[Variable, Any]], name: str, variable: Variable, value: Scalar) -> None:
+def _note(observed: dict[str, tuple[Variable, Any]], name: str, variable: Variable, value: Scalar) -> None:
     """Keep a value under its name, each entry of a column under its number, a further one of the same name too."""
     entries = ca.vertsplit(ca.SX(value))
     for index, entry in enumerate(entries):
         full = f"{name}_{index + 1}" if len(entries) > 1 else name
-        again = sum(one == full or one.startswith(f"{full}_again") for one in heard)
+        again = sum(one == full or one.startswith(f"{full}_again") for one in observed)
         full = f"{full}_again{again if again > 1 else ''}" if again else full
-        heard[full] = (replace(variable, name=full), entry)
+        observed[full] = (replace(variable, name=full), entry)
 
 
-def _listening_mount(mount: Mount, hear: Hear) -> Mount:
+def _listening_mount(mount: Mount, observe: Observer) -> Mount:
     class Listening(Mount):
         def with_symbols(self, symbols: dict[str, Scalar], v: Scalar) -> Self:
             this = super().with_symbols(symbols, v)
-            _hear_pairs(mount, this, hear)
-            axis, *rest = (_listening(part, f"{prefix}.", hear) for prefix, part in this.components().items())
+            _hear_pairs(mount, this, observe)
+            axis, *rest = (_listening(part, f"{prefix}.", observe) for prefix, part in this.components().items())
             return replace(this, axis=axis, friction=rest[0], effects=tuple(rest[1:]))
 
         @property
         def law(self) -> FrictionLaw:
             law: FrictionLaw = super().law
-            return law if law is self.friction else _listening(law, "friction.", hear)
+            return law if law is self.friction else _listening(law, "friction.", observe)
 
-    copy: Mount = _listening(mount, "", hear, Listening, _OF_MOUNT)
+    copy: Mount = _listening(mount, "", observe, Listening, _OF_MOUNT)
     return copy
 
 
-def _hear_pairs(mount: Mount, this: Mount, hear: Hear) -> None:
+def _hear_pairs(mount: Mount, this: Mount, observe: Observer) -> None:
     """Name what a number that differs by direction is now."""
     for (prefix, part), symbolic in zip(mount.components().items(), this.components().values(), strict=True):
         for one in fields(part):
             if isinstance(getattr(part, one.name), Pair):
-                hear(f"{prefix}.{one.name}", one.metadata["variable"], getattr(symbolic, one.name))
+                observe(f"{prefix}.{one.name}", one.metadata["variable"], getattr(symbolic, one.name))
 
 
 def _listening(
-    part: Any, prefix: str, hear: Hear, base: type[Any] | None = None, names: tuple[str, ...] | None = None
+    part: Any, prefix: str, observe: Observer, base: type[Any] | None = None, names: tuple[str, ...] | None = None
 ) -> Any:
-    """Copy a part into a class whose methods tell `hear` what they return."""
+    """Copy a part into a class whose methods tell `observe` what they return."""
     base = base or type(part)
     wanted = [word for word in _WORDS if hasattr(base, word.name) and (names is None or word.name in names)]
-    methods = {word.name: _overheard(getattr(base, word.name), prefix, word, hear) for word in wanted}
+    methods = {word.name: _observed(getattr(base, word.name), prefix, word, observe) for word in wanted}
     return type(base.__name__, (base,), methods)(**{one.name: getattr(part, one.name) for one in fields(part)})
 
 
-def _overheard(method: Callable[..., Any], prefix: str, word: Variable, hear: Hear) -> Callable[..., Any]:
+def _observed(method: Callable[..., Any], prefix: str, word: Variable, observe: Observer) -> Callable[..., Any]:
     @wraps(method)
     def tell(*arguments: Any) -> Any:
         value = method(*arguments)
-        hear(prefix + word.name, word, value)
+        observe(prefix + word.name, word, value)
         return value
 
     return tell

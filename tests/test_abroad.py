@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from benchmarks import abroad, abroad_page
 
-from cosim_studies.proof.decks import listed
+from cosim_studies.proof.ledger import listed
 
 GENERATOR = """
 import argparse, json, pathlib

@@ -13,9 +13,9 @@ import pytest
 from effect_examples import mount
 
 from cosim_studies.proof import truth
-from cosim_studies.proof.bench import draw_bench
 from cosim_studies.proof.families import periodic_disturbance
 from cosim_studies.proof.recorder import columns_of
+from cosim_studies.proof.simulated_axis import draw_axis
 from cosim_studies.proof.truth import BLOCKS, TICK, Drive
 from pyfmi_models.effects import (
     ActuatorLag,
@@ -176,7 +176,7 @@ def test_plant_and_truth_mean_the_same(name: str) -> None:
 
 
 def test_a_periodic_disturbance_has_its_frequency_amplitude_and_phase() -> None:
-    bench = draw_bench(1, "lugre", 1.0, 1000, 2.0)
+    bench = draw_axis(1, "lugre", 1.0, 1000, 2.0)
     before = {name: drive.push for name, drive in bench.drives.items()}
     true = periodic_disturbance(bench, np.random.default_rng(1), 1.0)
     for name, phase in true["phases"].items():
@@ -187,7 +187,7 @@ def test_a_periodic_disturbance_has_its_frequency_amplitude_and_phase() -> None:
 
 
 def test_a_positive_offset_of_the_clocks_means_a_reading_ahead_of_the_torque() -> None:
-    bench = draw_bench(1, "lugre", 1.0, 1000, 2.0)
+    bench = draw_axis(1, "lugre", 1.0, 1000, 2.0)
     bench.clock = {"offset_ms": 5.0, "drift_ppm": 500.0}
     bench.noise["encoder_rms"] = 0.0
     t = truth.ticks(20_000)

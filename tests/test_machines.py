@@ -9,7 +9,7 @@ from test_truth import FRICTION, SMOOTH, still
 
 from cosim_studies.proof import truth
 from cosim_studies.proof.beyond import SHAPELESS
-from cosim_studies.proof.deck import SIZES, deal
+from cosim_studies.proof.cases import SIZES, cases_of
 from cosim_studies.proof.generator import ANY, FAMILIES, OUTSIDE, conceal, make_case, to_toml
 from cosim_studies.proof.machines import MACHINES, suited
 from cosim_studies.proof.motion import Pace
@@ -59,7 +59,7 @@ def test_a_weight_that_turns_is_concealed_on_rotary_machines_only_and_alone() ->
 
 
 def test_a_deck_spreads_its_sizes_evenly_in_their_logarithm() -> None:
-    sizes = np.log([hand.size for hand in deal(4, 400)])
+    sizes = np.log([hand.size for hand in cases_of(4, 400)])
     low, high = np.log(SIZES)
     assert low < sizes.min() < low + 0.02
     assert high - 0.02 < sizes.max() < high

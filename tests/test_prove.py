@@ -16,12 +16,12 @@ from cosim.estimation.prepare import prepare
 from cosim.support.errors import OutputError, ProofError
 from cosim.sweep.journal import RUNS
 from cosim_studies.proof import baselines, marks, power, score
+from cosim_studies.proof.cases import TOGETHER, cases_of
 from cosim_studies.proof.ceiling import _refitted, ceiling, in_card_words, judged, true_effect
 from cosim_studies.proof.conduct import Benchmark, conduct
-from cosim_studies.proof.deck import TOGETHER, deal
-from cosim_studies.proof.decks import enlist, listed
 from cosim_studies.proof.generator import FAMILIES, OUTSIDE, make_case, write_given
 from cosim_studies.proof.intervals import mean, ratio, share
+from cosim_studies.proof.ledger import enlist, listed
 from cosim_studies.proof.outside import SHAPED
 from cosim_studies.proof.page import page, proof
 from cosim_studies.proof.seal import Seals, canonical, salt_of, seal
@@ -72,13 +72,13 @@ ROWS = [
 
 
 def test_a_deck_is_drawn_from_its_seed_alone_and_a_longer_one_begins_alike() -> None:
-    assert deal(3, 40) == deal(3, 40)
-    assert deal(3, 90)[:40] == deal(3, 40)
-    assert deal(4, 40) != deal(3, 40)
+    assert cases_of(3, 40) == cases_of(3, 40)
+    assert cases_of(3, 90)[:40] == cases_of(3, 40)
+    assert cases_of(4, 40) != cases_of(3, 40)
 
 
 def test_kinds_come_in_their_shares_and_families_in_fair_rotation() -> None:
-    hands = deal(11, 420)
+    hands = cases_of(11, 420)
     kinds = [hand.kind for hand in hands]
     assert [kinds.count(kind) for kind in ("none", "one", "several", "outside")] == [105, 168, 84, 63]
     alone = [hand.effects[0] for hand in hands if hand.kind == "one"]

@@ -14,7 +14,7 @@ from cosim.support.terminal import put, put_json, say, stage
 def prove(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the proof; one begun there is continued.")],
     cases: Annotated[int, typer.Option("--cases", help="Cases in all.")] = 60,
-    seed: Annotated[int, typer.Option("--seed", help="Seed of the deck.")] = 1,
+    seed: Annotated[int, typer.Option("--seed", help="Seed of the benchmark.")] = 1,
     seconds: Annotated[float, typer.Option("--seconds", help="Length of each recording [s].")] = 60.0,
     workers: Annotated[
         int | None, typer.Option("--workers", help="Cases at a time; the cores of this machine.")
@@ -23,23 +23,24 @@ def prove(
         str, typer.Option("--purpose", help="scoring, or tuning: whether the code may be shaped by it.")
     ] = "scoring",
     decks: Annotated[
-        Path | None, typer.Option("--decks", help="List of all decks to which this one is added, for example decks.md.")
+        Path | None,
+        typer.Option("--decks", help="List of benchmarks to which this one is added, for example decks.md."),
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print proof.json instead of the scores.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Start over, whatever is there.")] = False,
 ) -> None:
     """Conceal effects in simulated recordings, seal the truth, diagnose, open, and score against the bars."""
     from cosim_studies.proof.conduct import GENERATOR, Benchmark, code, conduct
-    from cosim_studies.proof.decks import enlist
+    from cosim_studies.proof.ledger import enlist
 
     if decks is not None:
         enlist(decks, GENERATOR, seed, cases, purpose, code())
     command = f"cosim prove --cases {cases} --seed {seed} --seconds {seconds:g} --out {out}"
     try:
         with _reporting(f"{cases} concealed cases") as on_progress:
-            deck = Benchmark(seed, cases, seconds)
+            benchmark = Benchmark(seed, cases, seconds)
             found = conduct(
-                deck, out, workers=workers, force=force, on_seal=say, on_progress=on_progress, command=command
+                benchmark, out, workers=workers, force=force, on_seal=say, on_progress=on_progress, command=command
             )
     except KeyboardInterrupt:
         say(f"what was done until then is scored in {out / 'README.md'}; the same command goes on from there")

@@ -20,7 +20,7 @@ from cosim_studies.paper.margins import Margins
 from cosim_studies.paper.options import ADAPTING, LEARNING, REFERENCE, Option, options, repeating, settled
 from cosim_studies.paper.price import price
 from cosim_studies.paper.robustness import Stress, stresses
-from cosim_studies.paper.study import Place, Study, jobs, performed
+from cosim_studies.paper.study import Study, TrialKey, jobs, performed
 from cosim_studies.paper.workshop import Workshop
 
 Progress = Callable[[int, int], None]
@@ -129,11 +129,11 @@ def _places(compared: Sequence[Option], best: Sequence[Option]) -> list[Pair]:
     return found + [(repeating(condition(A)), one, FEW) for one in limits]
 
 
-def planned(workshop: Workshop, pairs: Iterable[Pair], seeds: Sequence[int]) -> Iterator[tuple[Place, Job]]:
+def planned(workshop: Workshop, pairs: Iterable[Pair], seeds: Sequence[int]) -> Iterator[tuple[TrialKey, Job]]:
     """Yield a run for each seed of each pair."""
     for where, option, count in pairs:
         for seed, job in jobs(workshop, option.under(where), option.compensation, seeds[:count]):
-            yield Place(where.key, option.key, seed), job
+            yield TrialKey(where.key, option.key, seed), job
 
 
 def _tried(workshop: Workshop, plan: Plan, on_progress: Progress) -> Iterator[Design]:

@@ -16,7 +16,7 @@ LOOSE = 1e-4
 """Tolerance of the plant's solver where noise kicks it every tick; moves an ISE by 5e-6 of itself (from 1e-8)."""
 
 
-class Place(NamedTuple):
+class TrialKey(NamedTuple):
     """Where a run stands in a study."""
 
     condition: str
@@ -63,7 +63,7 @@ def study(
 ) -> Study:
     """Run the experiment under each condition (default: all) with each case and, where there is noise, each seed."""
     planned = [
-        (Place(condition.key, case, seed), replace(one, traced=seed == seeds[0]))
+        (TrialKey(condition.key, case, seed), replace(one, traced=seed == seeds[0]))
         for condition in wanted or conditions()
         for case in cases
         for seed, one in jobs(workshop, condition, case, seeds)
@@ -72,7 +72,7 @@ def study(
 
 
 def performed(
-    planned: Sequence[tuple[Place, Job]], on_progress: Callable[[int, int], None] = lambda done, of: None
+    planned: Sequence[tuple[TrialKey, Job]], on_progress: Callable[[int, int], None] = lambda done, of: None
 ) -> Study:
     """Run all jobs on all cores."""
     trials = []

@@ -13,19 +13,19 @@ import numpy as np
 from scipy.signal import butter, sosfilt
 
 from cosim.support.statistics import rms
-from cosim_studies.proof.bench import Bench, Parameters, log_uniform
 from cosim_studies.proof.families import Family, add_push, angle, goal
+from cosim_studies.proof.simulated_axis import Parameters, SimulatedAxis, log_uniform
 from cosim_studies.proof.truth import TICK, Array
 
 
-def run_in(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def run_in(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Dry contacts that polish themselves, and forget it over night."""
     way = float(np.abs(bench.training.v).mean()) * bench.pace.duration * float(rng.uniform(0.1, 0.3))
     bench.mount |= {"run_in": size * float(rng.uniform(0.6, 1.2)), "run_in_length": way}
     return {"relative": bench.mount["run_in"], "length": way}
 
 
-def sluggish_oil(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def sluggish_oil(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """A bearing that is tight at one side, in viscous friction only."""
     cycles = max(1, round(1 / (2 * bench.pace.amplitude * bench.turn / (2 * np.pi))))
     viscous = bench.mount["viscous"] = max(bench.mount["viscous"], 0.5 * bench.mount["coulomb"] / bench.pace.speed)
@@ -35,13 +35,13 @@ def sluggish_oil(bench: Bench, rng: np.random.Generator, size: float) -> Paramet
     return {"relative": swing, "cycles_per_rev": cycles}
 
 
-def dead_band(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def dead_band(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """A bridge that does not switch for small commands."""
     bench.mount["dead_band"] = 1.5 * goal(bench, rng, size)
     return {"torque": bench.mount["dead_band"]}
 
 
-def motor_ripple(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def motor_ripple(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Magnets of unequal strength."""
     felt = rms(bench.mount["inertia"] * bench.training.a) + bench.friction_rms
     swing = min(0.5, 2 * goal(bench, rng, size) / felt)
@@ -50,14 +50,14 @@ def motor_ripple(bench: Bench, rng: np.random.Generator, size: float) -> Paramet
     return {"relative": swing, "cycles_per_rev": cycles}
 
 
-def drive_fade(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def drive_fade(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Copper and magnets lose with temperature; here the whole drive follows the bearing's."""
     bench.mount["gain_fade"] = -size * float(rng.uniform(0.02, 0.04))
     bench.shows_temperature = bool(rng.random() < 0.7)
     return {"per_degC": bench.mount["gain_fade"]}
 
 
-def payload_comes(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def payload_comes(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Somebody hangs a weight onto it while it is recorded."""
     phase, when = angle(rng), bench.pace.duration * float(rng.uniform(0.3, 0.7))
     shape = rms(np.sin(bench.training.q + phase))
@@ -65,7 +65,7 @@ def payload_comes(bench: Bench, rng: np.random.Generator, size: float) -> Parame
     return {"mgl": bench.mount["shift"], "phase": phase, "after_s": when}
 
 
-def ground(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def ground(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Bursts of a trembling floor: a torque through the unbalance of whatever the axis carries."""
     low = float(rng.uniform(2, 4))
     filtered = butter(2, (low, low * float(rng.uniform(1.5, 2.5))), "bandpass", fs=1 / TICK, output="sos")

@@ -14,16 +14,16 @@ from cosim.support.plain import Parsed
 from cosim.support.version import __version__
 from cosim.sweep.journal import Journal
 from cosim.sweep.pool import MOST, cores
-from cosim_studies.proof.deck import CaseSpec, deal
+from cosim_studies.proof.cases import CaseSpec, cases_of
 from cosim_studies.proof.page import MADE, proof, write
-from cosim_studies.proof.play import Table, Tool
+from cosim_studies.proof.play import CaseRunner, Tool
 from cosim_studies.proof.seal import Row, Seals
 from cosim_studies.proof.tool import answer
 
 OnProgress = Callable[[int, int, str], None]
 """Called after each case with cases done, cases in all, and what was the last."""
 GENERATOR = "home"
-"""What the list of decks calls the generator of this package."""
+"""What the list of benchmarks calls the generator of this package."""
 LEAST_SECONDS = 10.0
 """Shorter recordings hold less than a soft start and a swing."""
 ROOMS = ("cosim/diagnosis", "cosim_studies/proof", "cosim/estimation", "pyfmi_models")
@@ -40,7 +40,7 @@ class Benchmark:
 
 
 def conduct(
-    deck: Benchmark,
+    benchmark: Benchmark,
     out: Path,
     *,
     workers: int | None = None,
@@ -50,10 +50,10 @@ def conduct(
     tool: Tool = answer,
     command: str = "",
 ) -> Parsed:
-    """Play a deck, or what is left of it, write everything into `out`, and return what `proof.json` holds.
+    """Run a benchmark, or what is left of it, write everything into `out`, and return what `proof.json` holds.
 
     Args:
-        deck: what is played.
+        benchmark: what is played.
         out: folder; a proof begun there with the same seed and code is continued, also to more cases.
         workers: cases at a time; the cores of this machine where not given.
         force: start over.
@@ -66,39 +66,45 @@ def conduct(
         ProofError: a wish cannot be met, or a seal is broken.
         OutputError: `out` holds another proof.
     """
-    _check(deck, workers)
-    hands = deal(deck.seed, deck.cases)
+    _check(benchmark, workers)
+    wanted = cases_of(benchmark.seed, benchmark.cases)
     identity = {
         "generator": GENERATOR,
-        "seed": str(deck.seed),
-        "seconds": str(deck.seconds),
+        "seed": str(benchmark.seed),
+        "seconds": str(benchmark.seconds),
         "version": __version__,
         "code": code(),
     }
     with ExitStack() as stack:
         journal = stack.enter_context(Journal(out, identity, force, "proof", MADE))
-        table = Table(deck.seed, deck.seconds, Seals(out / "seals.jsonl"), on_seal, tool)
-        rest = [hand for hand in hands if hand.number not in journal.rows]
-        facts = {**identity, "seed": deck.seed, "seconds": deck.seconds, "cases": deck.cases, "command": command}
+        runner = CaseRunner(benchmark.seed, benchmark.seconds, Seals(out / "seals.jsonl"), on_seal, tool)
+        rest = [case for case in wanted if case.number not in journal.rows]
+        facts = {
+            **identity,
+            "seed": benchmark.seed,
+            "seconds": benchmark.seconds,
+            "cases": benchmark.cases,
+            "command": command,
+        }
         facts["calibration"] = [OFFSET, SLOPE]
-        result = stack.enter_context(_written(out, journal, table.seals, facts))
-        rows = stack.enter_context(closing(_played(table, rest, workers or cores())))
-        for done, row in enumerate(rows, deck.cases - len(rest) + 1):
+        result = stack.enter_context(_written(out, journal, runner.seals, facts))
+        rows = stack.enter_context(closing(_played(runner, rest, workers or cores())))
+        for done, row in enumerate(rows, benchmark.cases - len(rest) + 1):
             journal.append(row)
-            on_progress(done, deck.cases, _last(row))
+            on_progress(done, benchmark.cases, _last(row))
     return result
 
 
-def _check(deck: Benchmark, workers: int | None) -> None:
-    wished = (("--cases", deck.cases, 1), ("--seed", deck.seed, 0), ("--workers", workers, 1))
+def _check(benchmark: Benchmark, workers: int | None) -> None:
+    wished = (("--cases", benchmark.cases, 1), ("--seed", benchmark.seed, 0), ("--workers", workers, 1))
     for name, value, least in wished:
         if value is not None and value < least:
             raise ProofError(f"{name} {value}: it must be at least {least}.", culprit=name, value=value)
     if workers is not None and workers > MOST:
         raise ProofError(f"--workers {workers}: {MOST:,} are the most.", culprit="--workers", value=workers)
-    if deck.seconds < LEAST_SECONDS:
-        text = f"--seconds {deck.seconds:g}: a recording must last {LEAST_SECONDS:g} s at least."
-        raise ProofError(text, culprit="--seconds", value=deck.seconds)
+    if benchmark.seconds < LEAST_SECONDS:
+        text = f"--seconds {benchmark.seconds:g}: a recording must last {LEAST_SECONDS:g} s at least."
+        raise ProofError(text, culprit="--seconds", value=benchmark.seconds)
 
 
 def code() -> str:
@@ -111,10 +117,10 @@ def code() -> str:
     return whole.hexdigest()
 
 
-def _played(table: Table, hands: Sequence[CaseSpec], workers: int) -> Generator[Row, None, None]:
+def _played(table: CaseRunner, wanted: Sequence[CaseSpec], workers: int) -> Generator[Row, None, None]:
     """Yield the rows as they come; when this is closed early, what is still played is lost."""
     threads = ThreadPoolExecutor(workers, "proof")
-    pending = [threads.submit(table.play, hand) for hand in hands]
+    pending = [threads.submit(table.play, case) for case in wanted]
     try:
         for future in as_completed(pending):
             yield future.result()

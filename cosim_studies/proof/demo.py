@@ -3,9 +3,17 @@
 import numpy as np
 
 from cosim.support.plain import Parsed
-from cosim_studies.proof.bench import RECORDINGS, Bench, Parameters, believe, draw_drive, draw_motions, stream
 from cosim_studies.proof.generator import Case, assemble
 from cosim_studies.proof.motion import Pace
+from cosim_studies.proof.simulated_axis import (
+    RECORDINGS,
+    Parameters,
+    SimulatedAxis,
+    believe,
+    draw_drive,
+    draw_motions,
+    stream,
+)
 from cosim_studies.proof.truth import BLOCKS
 
 _NOISE = {
@@ -27,7 +35,7 @@ def demo_case(seed: int = 7, duration: float = 50.0) -> Case:
     drives = {name: draw_drive(stream(seed, name), motion, _NOISE) for name, motion in motions.items()}
     belief = believe(mount, _NOISE, ratio=1, rate_hz=1000)
     belief["mount"] |= {"name": "telescope mount of the paper", "torque_limit": 60.0}
-    bench = Bench(mount, belief, pace, motions, drives, dict.fromkeys(RECORDINGS, 20.0), dict(_NOISE))
+    bench = SimulatedAxis(mount, belief, pace, motions, drives, dict.fromkeys(RECORDINGS, 20.0), dict(_NOISE))
     return assemble(bench, _conceal(bench, stream(seed, "demo")), seed, 1000, {})
 
 
@@ -41,7 +49,7 @@ def _paper_mount(pace: Pace) -> Parsed:
     }
 
 
-def _conceal(bench: Bench, rng: np.random.Generator) -> list[Parsed]:
+def _conceal(bench: SimulatedAxis, rng: np.random.Generator) -> list[Parsed]:
     cycles, amplitude = int(rng.integers(12, 37)), float(rng.uniform(0.4, 0.6))
     phase, level = float(rng.uniform(-np.pi, np.pi)), float(rng.choice([-1, 1]) * rng.uniform(0.12, 0.2))
     bench.mount |= {"level_asymmetry": level, "viscous_asymmetry": 0.5 * level}

@@ -6,13 +6,13 @@ Contract between these functions and a bench, and the meaning of `size`: see `fa
 import numpy as np
 
 from cosim.support.statistics import rms
-from cosim_studies.proof.bench import Bench, Parameters, log_uniform
 from cosim_studies.proof.families import Family, angle, goal, signed
 from cosim_studies.proof.motion import Motion
+from cosim_studies.proof.simulated_axis import Parameters, SimulatedAxis, log_uniform
 from cosim_studies.proof.truth import Array
 
 
-def compliance(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def compliance(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Part of the inertia hangs on a spring; encoder and friction stay on the motor side."""
     total, hertz = bench.mount["inertia"], log_uniform(rng, 8, 40)
     share = min(0.7, size * float(rng.uniform(0.3, 0.5)))
@@ -22,19 +22,19 @@ def compliance(bench: Bench, rng: np.random.Generator, size: float) -> Parameter
     return {"antiresonance_hz": hertz, "resonance_hz": hertz / np.sqrt(1 - share), "load_share": share}
 
 
-def actuator_lag(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def actuator_lag(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """The drive follows its command late and softly."""
     bench.mount["lag"] = size * float(rng.uniform(4e-3, 10e-3))
     return {"time_constant_ms": 1e3 * bench.mount["lag"]}
 
 
-def delay(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def delay(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """The command arrives late, unchanged."""
     bench.mount["delay"] = round(size * float(rng.uniform(3e-3, 8e-3)), 5)
     return {"delay_ms": 1e3 * bench.mount["delay"]}
 
 
-def backlash(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def backlash(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Load and motor meet only at the ends of a gap."""
     total, gap = bench.mount["inertia"], size * log_uniform(rng, 3e-4, 1.5e-3)
     if bench.setup:
@@ -53,7 +53,7 @@ def backlash(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     return {"gap_rad": gap, "load_share": load / total}
 
 
-def encoder_eccentricity(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def encoder_eccentricity(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """A disc off centre: the reading errs once and twice per encoder turn, felt as torque ~ J A (n v)^2."""
     v2 = rms(bench.training.v**2)
     v2 *= bench.turn**2
@@ -68,13 +68,13 @@ def encoder_eccentricity(bench: Bench, rng: np.random.Generator, size: float) ->
     return {"cycles_per_rev": cycles, "amplitude_rad": amplitude, "phase": phase, "second": second}
 
 
-def _expected_torque(bench: Bench, motion: Motion) -> Array:
+def _expected_torque(bench: SimulatedAxis, motion: Motion) -> Array:
     """Size of the torque that inertia and friction need once the soft start is over."""
     mount, (_, v, a) = bench.mount, (part[25_000:] for part in motion)
     return np.asarray(np.abs(mount["inertia"] * a + mount["coulomb"] * np.sign(v) + mount["viscous"] * v))
 
 
-def torque_saturation(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def torque_saturation(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """The drive gives less than asked for at high torque."""
     mount, slope = bench.mount, float(rng.uniform(0.3, 0.6))
     *train, heldout = (float(np.quantile(_expected_torque(bench, motion), 0.98)) for motion in bench.motions.values())
@@ -83,7 +83,7 @@ def torque_saturation(bench: Bench, rng: np.random.Generator, size: float) -> Pa
     return {"knee_torque": mount["knee"], "slope": slope}
 
 
-def clock_skew(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def clock_skew(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Two clocks: the reading runs ahead of (or behind) the torque, by a constant or ever more."""
     bench.clock["offset_ms"] = size * signed(rng, 3, 8)
     if rng.random() < 0.5:

@@ -12,13 +12,13 @@ from dataclasses import replace
 import numpy as np
 
 from cosim.support.statistics import rms
-from cosim_studies.proof.bench import Bench, Parameters, log_uniform
+from cosim_studies.proof.simulated_axis import Parameters, SimulatedAxis, log_uniform
 from cosim_studies.proof.truth import Array, ticks
 
-Family = Callable[[Bench, np.random.Generator, float], Parameters]
+Family = Callable[[SimulatedAxis, np.random.Generator, float], Parameters]
 
 
-def goal(bench: Bench, rng: np.random.Generator, size: float) -> float:
+def goal(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> float:
     """Torque [N m rms] that an effect of this size contributes."""
     return size * float(rng.uniform(0.18, 0.28)) * bench.friction_rms
 
@@ -33,20 +33,20 @@ def signed(rng: np.random.Generator, low: float, high: float) -> float:
     return float(rng.choice([-1, 1]) * rng.uniform(low, high))
 
 
-def add_push(bench: Bench, torque: Callable[[str, Array], Array]) -> None:
+def add_push(bench: SimulatedAxis, torque: Callable[[str, Array], Array]) -> None:
     """Add a resisting torque, a function of recording and time, to every recording."""
     for name, drive in bench.drives.items():
         bench.drives[name] = replace(drive, push=drive.push + torque(name, ticks(drive.push.size)))
 
 
-def friction_asymmetry(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def friction_asymmetry(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Harder one way than the other."""
     level, viscous = size * signed(rng, 0.18, 0.3), size * signed(rng, 0.05, 0.3)
     bench.mount |= {"level_asymmetry": level, "viscous_asymmetry": viscous}
     return {"level_asymmetry": level, "viscous_asymmetry": viscous}
 
 
-def stribeck(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def stribeck(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Break-away above the Coulomb level; the card knows only the latter."""
     mount = bench.mount
     breakaway = mount["coulomb"] * (1 + size * float(rng.uniform(0.6, 1.1)))
@@ -59,7 +59,7 @@ def stribeck(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     return {"Fs": breakaway, "Vs": speed, "delta": mount["stribeck_power"], "where": where}
 
 
-def presliding(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def presliding(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """A soft contact that springs back; the card holds a static law."""
     mount = bench.mount
     reach = size * log_uniform(rng, 1e-3, 4e-3) * bench.pace.amplitude
@@ -75,7 +75,7 @@ def presliding(bench: Bench, rng: np.random.Generator, size: float) -> Parameter
     return {"sigma0": mount["stiffness"]}
 
 
-def cogging(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def cogging(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Magnets: a torque over position that does not care about speed."""
     cycles, phase = _pitch(bench, rng), angle(rng)
     second, third = (0.0, 0.0) if rng.random() < 0.5 else (float(rng.uniform(0.2, 0.5)), float(rng.uniform(0, 0.25)))
@@ -88,7 +88,7 @@ def cogging(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     return shape | {"harmonics": [second, third], "fundamental": fundamental}
 
 
-def _pitch(bench: Bench, rng: np.random.Generator) -> int:
+def _pitch(bench: SimulatedAxis, rng: np.random.Generator) -> int:
     """Cycles of a cogging: those of a direct drive, or from 1.5 to 60 within the travel and below 40 Hz."""
     if not bench.setup:
         return int(rng.integers(8, 73))
@@ -97,7 +97,7 @@ def _pitch(bench: Bench, rng: np.random.Generator) -> int:
     return max(1, round(log_uniform(rng, 1.5 / travelled, max(2.0 / travelled, min(60 / travelled, fastest)))))
 
 
-def position_friction(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def position_friction(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """A level that waves with position, or one rough spot."""
     if rng.random() < 0.5:
         return _rough_spot(bench, rng, size)
@@ -107,7 +107,7 @@ def position_friction(bench: Bench, rng: np.random.Generator, size: float) -> Pa
     return {"cycles_per_rev": cycles, "relative_amplitude": relative, "phase": phase}
 
 
-def _rough_spot(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def _rough_spot(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     center = bench.pace.home + bench.pace.amplitude * float(rng.uniform(-0.5, 0.5))
     width, relative = bench.pace.amplitude * float(rng.uniform(0.06, 0.15)), size * float(rng.uniform(0.7, 1.2))
     bench.mount |= {"spot_relative": relative, "spot_center": center, "spot_width": width}
@@ -115,7 +115,7 @@ def _rough_spot(bench: Bench, rng: np.random.Generator, size: float) -> Paramete
     return {"q_center": center, "relative_amplitude": relative, "width": width, "where": where}
 
 
-def gravity_unbalance(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def gravity_unbalance(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """A weight that was not balanced."""
     phase = angle(rng)
     mgl = 1.3 * goal(bench, rng, size) / rms(np.sin(bench.training.q + phase))
@@ -123,13 +123,13 @@ def gravity_unbalance(bench: Bench, rng: np.random.Generator, size: float) -> Pa
     return {"mgl": mgl, "phase": phase}
 
 
-def torque_offset(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def torque_offset(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """A constant pull."""
     bench.mount["offset"] = float(rng.choice([-1, 1])) * goal(bench, rng, size)
     return {"torque": bench.mount["offset"]}
 
 
-def thermal_viscosity(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def thermal_viscosity(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Grease that thins as it warms up."""
     viscous, level = -size * float(rng.uniform(0.03, 0.06)), -size * float(rng.uniform(0.02, 0.035))
     bench.mount |= {"thermal_viscous": viscous, "thermal_level": level}
@@ -139,7 +139,7 @@ def thermal_viscosity(bench: Bench, rng: np.random.Generator, size: float) -> Pa
     return {"viscous_per_degC": viscous, "coulomb_per_degC": level}
 
 
-def dwell_breakaway(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def dwell_breakaway(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Contacts that settle while the axis rests."""
     torque = size * float(rng.uniform(0.12, 0.2)) * bench.mount["coulomb"]
     onset, memory = log_uniform(rng, 0.05, 0.2), bench.pace.amplitude * log_uniform(rng, 2e-3, 1e-2)
@@ -147,13 +147,13 @@ def dwell_breakaway(bench: Bench, rng: np.random.Generator, size: float) -> Para
     return {"torque_per_efold": torque, "onset_s": onset, "memory_rad": memory}
 
 
-def quadratic_drag(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def quadratic_drag(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Wind of its own making."""
     bench.mount["quadratic"] = 2.5 * goal(bench, rng, size) / rms(bench.training.v**2)
     return {"coefficient": bench.mount["quadratic"]}
 
 
-def cable_wrap(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def cable_wrap(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """A cable that pulls towards home, harder when far."""
     home = bench.pace.home + bench.pace.amplitude * float(rng.uniform(-0.3, 0.3))
     hardening = 0.0 if rng.random() < 0.5 else float(rng.uniform(0.3, 1.5)) / bench.pace.amplitude**2
@@ -163,7 +163,7 @@ def cable_wrap(bench: Bench, rng: np.random.Generator, size: float) -> Parameter
     return {"stiffness": stiffness, "home": home, "hardening": hardening}
 
 
-def inertia_variation(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def inertia_variation(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Inertia that changes with position."""
     cycles = 2 if bench.pace.amplitude < 1 else int(rng.integers(1, 3))
     phase = angle(rng)
@@ -174,7 +174,7 @@ def inertia_variation(bench: Bench, rng: np.random.Generator, size: float) -> Pa
     return {"relative_amplitude": relative, "cycles_per_rev": cycles, "phase": phase}
 
 
-def load_dependent_friction(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def load_dependent_friction(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """A known payload presses on the bearing."""
     phase = -bench.pace.home + float(rng.choice([0.0, np.pi])) + float(rng.uniform(-0.4, 0.4))
     shape = rms(np.sin(bench.training.q + phase))
@@ -185,7 +185,7 @@ def load_dependent_friction(bench: Bench, rng: np.random.Generator, size: float)
     return {"coulomb_per_Nm": bench.mount["load_sensitivity"]}
 
 
-def periodic_disturbance(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def periodic_disturbance(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """A machine next door."""
     hertz, amplitude = log_uniform(rng, 0.7, 15), np.sqrt(2) * goal(bench, rng, size)
     phases = {name: angle(rng) for name in bench.drives}

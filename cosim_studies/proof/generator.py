@@ -20,12 +20,12 @@ import numpy as np
 import pandas as pd
 
 from cosim.support.plain import Parsed
-from cosim_studies.proof.bench import FRICTIONS, RECORDINGS, Bench, draw_bench, stream
 from cosim_studies.proof.drivetrain import BETWEEN_COMMAND_AND_READING
 from cosim_studies.proof.families import AT_THE_AXIS
 from cosim_studies.proof.machines import MACHINES
 from cosim_studies.proof.outside import OUTSIDE_EFFECTS
 from cosim_studies.proof.recorder import columns_of, decoys, oracle
+from cosim_studies.proof.simulated_axis import FRICTIONS, RECORDINGS, SimulatedAxis, draw_axis, stream
 from cosim_studies.proof.truth import TICK, Array, simulate
 from cosim_studies.proof.workshop import draw_workshop
 
@@ -73,7 +73,7 @@ def make_case(
     if machine:
         bench = draw_workshop(seed, tuple(effects or ()), duration, machine.removeprefix(ANY))
     else:
-        bench = draw_bench(seed, friction, noise, rate_hz, duration)
+        bench = draw_axis(seed, friction, noise, rate_hz, duration)
     found = [conceal(bench, name, seed, size) for name in effects or ()]
     extra = decoys(stream(seed, "decoy"), bench, bench.rate_hz) if decoy_columns else {}
     return assemble(bench, found, seed, bench.rate_hz, extra)
@@ -90,7 +90,7 @@ def _check(effects: Sequence[str], friction: str, rate_hz: int, machine: str) ->
         raise ValueError(f"rate_hz {rate_hz} does not divide the loop rate of {round(1 / TICK)} Hz")
 
 
-def conceal(bench: Bench, name: str, seed: int, size: float) -> Parsed:
+def conceal(bench: SimulatedAxis, name: str, seed: int, size: float) -> Parsed:
     """Write the effect into the bench; its entry of the truth."""
     parameters = EFFECTS[name](bench, stream(seed, f"effect {name}"), size)
     where = parameters.pop("where", None)
@@ -98,7 +98,9 @@ def conceal(bench: Bench, name: str, seed: int, size: float) -> Parsed:
     return dict(plain(entry | ({"where": where} if where else {})))
 
 
-def assemble(bench: Bench, found: list[Parsed], seed: int, rate_hz: int, extra: dict[str, dict[str, Array]]) -> Case:
+def assemble(
+    bench: SimulatedAxis, found: list[Parsed], seed: int, rate_hz: int, extra: dict[str, dict[str, Array]]
+) -> Case:
     """Run the three recordings and put card and truth beside them."""
     bench.mount["loop_inertia"] = 0.0
     card = perturbed(bench, stream(seed, "card"), 0.25 if bench.setup else 0.15)
@@ -130,7 +132,7 @@ def plain(value: Any) -> Any:
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
 
-def facts(bench: Bench) -> Parsed:
+def facts(bench: SimulatedAxis) -> Parsed:
     """True base parameters and noise levels, as plain numbers and lists."""
     return {
         "mount": plain(bench.mount),
@@ -141,7 +143,7 @@ def facts(bench: Bench) -> Parsed:
     }
 
 
-def perturbed(bench: Bench, rng: np.random.Generator, by: float = 0.15) -> dict[str, Parsed]:
+def perturbed(bench: SimulatedAxis, rng: np.random.Generator, by: float = 0.15) -> dict[str, Parsed]:
     """The card: the owner's belief with every number of inertia and friction off by about as much."""
     card = {section: dict(values) for section, values in bench.belief.items()}
     card["mount"]["inertia"] *= 1 + float(rng.uniform(-by, by))

@@ -1,4 +1,4 @@
-"""Classes of machines from which a deck draws, wider than any of them is built: ranges, loops, rates, set points.
+"""Classes of machines from which a benchmark draws, wider than any of them is built: ranges, loops, rates, set points.
 
 A range is drawn evenly in its logarithm. Inertia is in kg m2 or kg, travel (half of it) in rad or m, speed (a typical
 peak) in rad/s or m/s; friction is the Coulomb level over the peak inertia torque.

@@ -6,12 +6,12 @@ The process that runs the tool gets the folder and nothing else.
 from pathlib import Path
 
 from cosim.support.plain import Parsed
-from cosim_studies.proof.deck import CaseSpec
+from cosim_studies.proof.cases import CaseSpec
 from cosim_studies.proof.generator import ANY, make_case, write_given
 
 
-def make(hand: CaseSpec, seconds: float, folder: str) -> Parsed:
+def make(wanted: CaseSpec, seconds: float, folder: str) -> Parsed:
     """Write what the tool may see into `folder` and return the truth."""
-    case = make_case(hand.seed, hand.effects, hand.size, duration=seconds, machine=ANY)
+    case = make_case(wanted.seed, wanted.effects, wanted.size, duration=seconds, machine=ANY)
     write_given(case, Path(folder))
     return case.truth

@@ -9,41 +9,41 @@ from dataclasses import replace
 import numpy as np
 
 from cosim.support.statistics import rms
-from cosim_studies.proof.bench import Bench, Parameters, drift
 from cosim_studies.proof.beyond import SHAPELESS
 from cosim_studies.proof.families import Family, add_push, goal, signed
+from cosim_studies.proof.simulated_axis import Parameters, SimulatedAxis, drift
 from cosim_studies.proof.truth import ticks
 
 
-def acceleration_drag(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def acceleration_drag(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Drag that needs speed and acceleration at once: c |a| v."""
     shape = rms(bench.training.a * bench.training.v)
     bench.mount["swerve"] = 1.6 * goal(bench, rng, size) / shape
     return {"coefficient": bench.mount["swerve"]}
 
 
-def remanence(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def remanence(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Magnetised iron: a hysteretic spring with a long stroke."""
     length = bench.pace.amplitude * float(rng.uniform(0.3, 0.8))
     bench.mount |= {"remanence": 2 * goal(bench, rng, size), "remanence_length": length}
     return {"torque": bench.mount["remanence"], "length_rad": length}
 
 
-def reversal_kick(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def reversal_kick(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """A squeezed oil film: extra drag that fades with the time since the last reversal."""
     fade = float(rng.uniform(0.25, 0.8))
     bench.mount |= {"kick": 3 * goal(bench, rng, size), "kick_time": fade}
     return {"torque": bench.mount["kick"], "fade_s": fade}
 
 
-def random_walk(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def random_walk(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """A torque that wanders off and never returns for long."""
     rms = 1.3 * goal(bench, rng, size)
     add_push(bench, lambda _, t: drift(rng, t.size, rms, 4.0))
     return {"rms": rms, "correlation_s": 4.0}
 
 
-def rubbing(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def rubbing(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Something rubs for a few seconds, now and then."""
     extra, spans = size * float(rng.uniform(0.6, 1.0)), {}
     for name, drive in bench.drives.items():
@@ -55,7 +55,7 @@ def rubbing(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
     return {"relative": extra, "where": {"axis": "time", "intervals": spans}}
 
 
-def thermal_tilt(bench: Bench, rng: np.random.Generator, size: float) -> Parameters:
+def thermal_tilt(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
     """Friction that depends on the product of position and temperature."""
     spread = 6.0 * bench.pace.amplitude
     bench.mount["thermal_tilt"] = size * signed(rng, 0.6, 1.0) / spread

@@ -33,7 +33,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from cosim.support.files import replacing
 from cosim.support.plain import JsonObject
 from cosim_studies.proof import marks, power, score
-from cosim_studies.proof.deck import SHARES, SIZES
+from cosim_studies.proof.cases import SHARES, SIZES
 from cosim_studies.proof.figures import draw_calibration, draw_confusion, draw_gaps, draw_powers
 from cosim_studies.proof.marks import Row
 from cosim_studies.proof.outside import SHAPED

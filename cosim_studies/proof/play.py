@@ -1,7 +1,7 @@
-"""One case from its hand to its row: make, seal, ask the tool, open, measure.
+"""One case from its specification to its row: make, seal, ask the tool, open, measure.
 
 A row of `runs.jsonl` and of `proof.json`:
-    run, seed, kind, effects, size       the hand
+    run, seed, kind, effects, size       what was drawn
     seal, salt, truth              SHA-256 written before the tool ran, and what it seals (`seal.py`)
     status, reason                 "ok", or how the tool ended instead: "crashed", "timeout", "failed"
     answer                         what the tool said (`tool.py`), with the baselines' answers
@@ -18,8 +18,8 @@ from typing import Any
 from cosim.support.cell import Cell, LostError
 from cosim.support.errors import InputError, ProofError
 from cosim.support.plain import Parsed
+from cosim_studies.proof.cases import CaseSpec
 from cosim_studies.proof.ceiling import ceiling
-from cosim_studies.proof.deck import CaseSpec
 from cosim_studies.proof.make import make
 from cosim_studies.proof.seal import Row, Seals, salt_of, seal
 from cosim_studies.proof.tool import answer
@@ -30,11 +30,11 @@ TIMEOUT = 600.0
 """Seconds after which a tool is given up."""
 
 
-class Table:
-    """Where the cases of a deck are played, by several threads at once.
+class CaseRunner:
+    """Where the cases of a benchmark are run, by several threads at once.
 
     Args:
-        seed: of the deck.
+        seed: of the benchmark.
         seconds: length of a recording.
         seals: where each truth is sealed.
         on_seal: told each seal before the tool runs.
@@ -47,20 +47,20 @@ class Table:
         self.seed, self.seconds, self.seals, self.on_seal, self.tool = seed, seconds, seals, on_seal, tool
         self._own, self._cells = local(), list[Cell]()
 
-    def play(self, hand: CaseSpec) -> Row:
-        """Play one hand.
+    def play(self, case: CaseSpec) -> Row:
+        """Run one case.
 
         Raises:
             ProofError: it was sealed before with another truth, or could not be made.
         """
         maker, user = self._processes()
-        head = {"run": hand.number, "seed": hand.seed, "kind": hand.kind, "effects": list(hand.effects)}
-        head |= {"size": hand.size}
+        head = {"run": case.number, "seed": case.seed, "kind": case.kind, "effects": list(case.effects)}
+        head |= {"size": case.size}
         with TemporaryDirectory(prefix="cosim-prove-") as folder:
             begun = perf_counter()
-            truth = _made(maker, hand, self.seconds, folder)
+            truth = _made(maker, case, self.seconds, folder)
             made = perf_counter() - begun
-            opened = self._sealed(hand, truth)
+            opened = self._sealed(case, truth)
             said = _asked(user, self.tool, folder)
             knows = bool(truth["effects"]) and said["status"] == "ok"
             best = _asked(user, ceiling, folder, truth["effects"], truth["mount"]) if knows else {"seconds": 0.0}
@@ -72,11 +72,11 @@ class Table:
         for cell in self._cells:
             cell.close()
 
-    def _sealed(self, hand: CaseSpec, truth: Parsed) -> Parsed:
-        salt = salt_of(self.seed, hand.number)
+    def _sealed(self, case: CaseSpec, truth: Parsed) -> Parsed:
+        salt = salt_of(self.seed, case.number)
         sealed = seal(truth, salt)
-        self.seals.write(hand.number, sealed)
-        self.on_seal(f"case {hand.number}: truth sealed, SHA-256 {sealed}")
+        self.seals.write(case.number, sealed)
+        self.on_seal(f"case {case.number}: truth sealed, SHA-256 {sealed}")
         return {"seal": sealed, "salt": salt, "truth": truth}
 
     def _processes(self) -> tuple[Cell, Cell]:
@@ -88,11 +88,11 @@ class Table:
         return cells
 
 
-def _made(maker: Cell, hand: CaseSpec, seconds: float, folder: str) -> Parsed:
+def _made(maker: Cell, case: CaseSpec, seconds: float, folder: str) -> Parsed:
     try:
-        truth: Parsed = maker.call(make, hand, seconds, folder, timeout=TIMEOUT)
+        truth: Parsed = maker.call(make, case, seconds, folder, timeout=TIMEOUT)
     except LostError as loss:
-        raise ProofError(f"Case {hand.number} could not be made: {loss}", culprit=hand.label) from loss
+        raise ProofError(f"Case {case.number} could not be made: {loss}", culprit=case.label) from loss
     return truth
 
 

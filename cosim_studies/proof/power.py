@@ -1,7 +1,7 @@
 """Power: how often an effect is found, by how large it was drawn and by how much there was to gain.
 
-The size of a case is drawn evenly in its logarithm from the deck's range. For each effect a logistic curve over
-ln(size) is fitted to the cases with it alone (right name first or not), with weak priors since a deck holds few:
+The size of a case is drawn evenly in its logarithm from the benchmark's range. For each effect a logistic curve over
+ln(size) is fitted to the cases with it alone (right name first or not), with weak priors since a benchmark holds few:
 
     p(size) = 1 / (1 + exp(-(a + b ln size))),   a ~ N(0, 3^2),   ln b ~ N(ln 2, 1)
 """

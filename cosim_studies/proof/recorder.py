@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from cosim_studies.proof.bench import RECORDINGS, Bench, drift
+from cosim_studies.proof.simulated_axis import RECORDINGS, SimulatedAxis, drift
 from cosim_studies.proof.truth import TICK, Array
 
 _DECOYS: dict[str, tuple[float, float, float]] = {  # mean, rms, correlation [s]
@@ -30,7 +30,9 @@ def centred_mean(held: Array, every: int, rows: NDArray[np.int64]) -> Array:
     return np.asarray((np.interp(rows + half, edge, total) - np.interp(rows - half, edge, total)) / every)
 
 
-def columns_of(bench: Bench, name: str, raw: dict[str, Array], rate_hz: int, rng: np.random.Generator) -> pd.DataFrame:
+def columns_of(
+    bench: SimulatedAxis, name: str, raw: dict[str, Array], rate_hz: int, rng: np.random.Generator
+) -> pd.DataFrame:
     """`t`, `tau` (mean command around t), `q` (reading at t), `q_d`, and `temperature` where there is a sensor."""
     every, rows = _ticks(raw["command"].size, rate_hz)
     columns: dict[str, Any] = {"t": rows * TICK, "tau": centred_mean(raw["command"], every, rows)}
@@ -42,7 +44,7 @@ def columns_of(bench: Bench, name: str, raw: dict[str, Array], rate_hz: int, rng
     return pd.DataFrame(columns)
 
 
-def _readings(bench: Bench, raw: dict[str, Array], rows: NDArray[np.int64], rng: np.random.Generator) -> Array:
+def _readings(bench: SimulatedAxis, raw: dict[str, Array], rows: NDArray[np.int64], rng: np.random.Generator) -> Array:
     """The controller's own readings; with a skewed clock the encoder is read again at other times."""
     offset, skew = bench.clock["offset_ms"] * 1e-3, bench.clock["drift_ppm"] * 1e-6
     if offset == 0 and skew == 0:
@@ -53,14 +55,14 @@ def _readings(bench: Bench, raw: dict[str, Array], rows: NDArray[np.int64], rng:
     return np.asarray(np.round(noisy / bench.noise["quantum"]) * bench.noise["quantum"])
 
 
-def decoys(rng: np.random.Generator, bench: Bench, rate_hz: int) -> dict[str, dict[str, Array]]:
+def decoys(rng: np.random.Generator, bench: SimulatedAxis, rate_hz: int) -> dict[str, dict[str, Array]]:
     """In half of the cases one or two columns that have nothing to do with the torque."""
     count = int(rng.choice([0, 0, 1, 2]))
     names = rng.choice(list(_DECOYS), count, replace=False)
     return {recording: {name: _decoy(rng, bench, name, rate_hz) for name in names} for recording in RECORDINGS}
 
 
-def _decoy(rng: np.random.Generator, bench: Bench, name: str, rate_hz: int) -> Array:
+def _decoy(rng: np.random.Generator, bench: SimulatedAxis, name: str, rate_hz: int) -> Array:
     mean, rms, correlation = _DECOYS[name]
     n = bench.motions[RECORDINGS[0]].q.size
     return np.asarray(mean + drift(rng, n, rms, correlation)[_ticks(n, rate_hz)[1]])

@@ -2,7 +2,7 @@
 
     seal = SHA-256(salt, newline, truth as JSON with sorted keys and no spaces), the salt 16 bytes in hexadecimal
 
-Without the salt the few possible truths could be tried; it is drawn from the seed of the deck, so that the same
+Without the salt the few possible truths could be tried; it is drawn from the seed of the benchmark, so that the same
 command gives the same seals.
 """
 
@@ -16,13 +16,13 @@ from typing import Any
 from cosim.support.errors import ProofError
 from cosim.support.interrupts import uninterrupted
 from cosim.support.plain import Parsed
-from cosim_studies.proof.bench import stream
+from cosim_studies.proof.simulated_axis import stream
 
 Row = Parsed
 
 
 def salt_of(seed: int, number: int) -> str:
-    """The salt of a case of the deck of a seed."""
+    """The salt of a case of the benchmark of a seed."""
     return stream(seed, f"salt {number}").bytes(16).hex()
 
 

@@ -13,7 +13,7 @@ from cosim.diagnosis.result import Diagnosis
 from cosim.reading import read_recordings
 from cosim.support.plain import JsonObject, Parsed
 from cosim_studies.proof.baselines import compared
-from cosim_studies.proof.bench import RECORDINGS
+from cosim_studies.proof.simulated_axis import RECORDINGS
 from pyfmi_models.card import Card, read_card
 
 KEPT = ("verdict", "ambiguous_with", "friction_law", "intervals", "depends_on", "seconds", "version")

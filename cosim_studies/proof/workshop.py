@@ -7,9 +7,17 @@ linear axis, and no known payload stands beside a concealed weight, whose sum is
 import numpy as np
 
 from cosim.support.plain import Parsed
-from cosim_studies.proof.bench import RECORDINGS, Bench, Parameters, believe, draw_drive, log_uniform, stream
 from cosim_studies.proof.machines import MACHINES, Machine, suited
 from cosim_studies.proof.motion import MOTIONS, Motion, Pace, with_tremble
+from cosim_studies.proof.simulated_axis import (
+    RECORDINGS,
+    Parameters,
+    SimulatedAxis,
+    believe,
+    draw_drive,
+    log_uniform,
+    stream,
+)
 from cosim_studies.proof.strokes import STROKES
 from cosim_studies.proof.truth import BLOCKS, TICK
 
@@ -32,7 +40,7 @@ ALONE = ("gravity_unbalance", "load_dependent_friction", "payload_comes")
 """Concealed weights: beside them a known payload would be one with them, or they bring their own."""
 
 
-def draw_workshop(seed: int, effects: tuple[str, ...], duration: float, machine: str = "") -> Bench:
+def draw_workshop(seed: int, effects: tuple[str, ...], duration: float, machine: str = "") -> SimulatedAxis:
     """Draw a machine (of a class, or of any that suits the effects) with nothing concealed."""
     rng = stream(seed, "workshop")
     name = machine or str(rng.choice(suited(effects)))
@@ -50,7 +58,7 @@ def draw_workshop(seed: int, effects: tuple[str, ...], duration: float, machine:
     warm = {each: float(drive.ambient[0] + rng.uniform(0, 3)) for each, drive in drives.items()}
     rate = int(rng.choice(kind.rates))
     belief = _belief(card, mount, levels, int(rng.choice(kind.ratios)), rate, kind)
-    bench = Bench(mount, belief, pace, motions, drives, warm, levels, shows_temperature=rng.random() < 0.4)
+    bench = SimulatedAxis(mount, belief, pace, motions, drives, warm, levels, shows_temperature=rng.random() < 0.4)
     bench.rate_hz, bench.turn = rate, 1.0 if kind.motion == "rotary" else 2 * np.pi
     bench.shows_set_point = rng.random() > NO_SET_POINT
     known = kind.motion == "rotary" and rng.random() < PAYLOAD and not set(effects) & set(ALONE)
@@ -169,7 +177,7 @@ def _belief(
     return belief
 
 
-def _weigh(rng: np.random.Generator, bench: Bench) -> None:
+def _weigh(rng: np.random.Generator, bench: SimulatedAxis) -> None:
     """A payload that the card knows to some per cent."""
     size = log_uniform(rng, 0.3, 2.0) * bench.friction_rms
     phase = float(rng.uniform(-np.pi, np.pi))

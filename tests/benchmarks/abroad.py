@@ -30,7 +30,7 @@ sys.path.append(str(Path(__file__).parent))
 from abroad_page import write  # noqa: E402
 
 from cosim_studies.proof.conduct import code  # noqa: E402
-from cosim_studies.proof.decks import enlist  # noqa: E402
+from cosim_studies.proof.ledger import enlist  # noqa: E402
 
 GENERATOR = "abroad"
 RECORDINGS = ("train_1", "train_2", "heldout")

@@ -13,8 +13,8 @@ import numpy as np
 
 from cosim.support.files import replacing
 from cosim.support.version import __version__
-from cosim_studies.proof.decks import commit
 from cosim_studies.proof.intervals import Estimate, bootstrap, mean, median, ratio, share
+from cosim_studies.proof.ledger import commit
 from cosim_studies.proof.page import estimate, met
 from cosim_studies.proof.score import Bar, calibration_error_of, judged
 

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import cosim
-from cosim_studies.proof.bench import RECORDINGS
 from cosim_studies.proof.generator import make_case, write_case
+from cosim_studies.proof.simulated_axis import RECORDINGS
 
 COMMAND = "python tests/benchmarks/diagnosis_cost.py --out results/diagnosis_cost"
 EFFECTS = ("cogging", "delay")

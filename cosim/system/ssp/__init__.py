@@ -39,10 +39,10 @@ def _unpacked(structure: Structure) -> dict[tuple[str, ...], Path]:
     """Put the FMUs where they can be opened, and return their files by their element."""
     wanted: dict[Archive, list[str]] = {}
     for node in structure.components.values():
-        wanted.setdefault(node.place.archive, []).append(node.place.path(node.source))
+        wanted.setdefault(node.file.archive, []).append(node.file.path(node.source))
     found = {archive: archive.unpacked(sources) for archive, sources in wanted.items()}
     nodes = structure.components.items()
-    return {path: found[node.place.archive][node.place.path(node.source)] for path, node in nodes}
+    return {path: found[node.file.archive][node.file.path(node.source)] for path, node in nodes}
 
 
 __all__ = ["read_ssp"]

@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 from cosim.support.errors import UnitError
 from cosim.system.ssp.archive import child, children
-from cosim.system.ssp.place import Place, units_of
+from cosim.system.ssp.ssp_file import SspFile, units_of
 from cosim.system.ssp.structure import End, Link, Path, Structure, name_of
 from cosim.system.ssp.transformation import Effect, Transformation, Value, transformation_of
 
@@ -32,12 +32,12 @@ class Setting:
     unit: str = ""
     transformation: Transformation = field(default_factory=Transformation)
 
-    def arriving(self, place: Place, name: str, unit: str) -> Values:
+    def arriving(self, file: SspFile, name: str, unit: str) -> Values:
         """Return the value in the unit of the variable called `name`."""
         try:
             effect = Effect(unit=self.unit).then(self.transformation, unit)
         except UnitError as error:
-            raise place.error(f'"{name}" is given in {self.unit}: {str(error).rstrip(".")}') from error
+            raise file.error(f'"{name}" is given in {self.unit}: {str(error).rstrip(".")}') from error
         if isinstance(self.value, list):
             return [effect.apply(one) for one in self.value]
         return effect.apply(self.value)
@@ -51,9 +51,9 @@ def settings_of(structure: Structure, path: Path) -> dict[str, Setting]:
     found: dict[str, Setting] = {}
     for depth in range(len(path), -1, -1):
         below = "".join(f"{name}." for name in path[depth:])
-        for holder, place in structure.nodes[path[:depth]].bindings:
+        for holder, file in structure.nodes[path[:depth]].bindings:
             for binding in children(holder, "ssd:ParameterBindings", "ssd:ParameterBinding"):
-                values = _binding(place, binding)
+                values = _binding(file, binding)
                 found |= {name.removeprefix(below): one for name, one in values if name.startswith(below)}
     return found
 
@@ -69,67 +69,69 @@ def given(structure: Structure, chain: tuple[Link, ...], own: Mapping[End, Setti
 
 def _carried(structure: Structure, setting: Setting, chain: tuple[Link, ...]) -> Setting:
     """Take a value along links; its last transformation is left to be done in the unit of the variable itself."""
-    place = structure.place
+    file = structure.file
     connector = structure.nodes[chain[0].start[0]].connectors[chain[0].start[1]]
-    value, unit = setting.arriving(place, name_of(chain[0].start), connector.unit), connector.unit or setting.unit
+    value, unit = setting.arriving(file, name_of(chain[0].start), connector.unit), connector.unit or setting.unit
     for link in chain[:-1]:
         stated = structure.nodes[link.end[0]].connectors[link.end[1]].unit
-        value = Setting(value, unit, link.transformation).arriving(place, name_of(link.end), stated)
+        value = Setting(value, unit, link.transformation).arriving(file, name_of(link.end), stated)
         unit = stated or unit
     return Setting(value, unit, chain[-1].transformation)
 
 
-def _binding(place: Place, binding: Element) -> Iterator[tuple[str, Setting]]:
-    values = _content(place, binding, "ssd:ParameterValues", "ssv:ParameterSet")
+def _binding(file: SspFile, binding: Element) -> Iterator[tuple[str, Setting]]:
+    values = _content(file, binding, "ssd:ParameterValues", "ssv:ParameterSet")
     mapping, prefix = child(binding, "ssd:ParameterMapping"), binding.get("prefix", "")
-    entries = None if mapping is None else list(children(_mapping(place, mapping), "ssm:MappingEntry"))
-    units = place.units | units_of(place.archive, values, "ssv:Units")
+    entries = None if mapping is None else list(children(_mapping(file, mapping), "ssm:MappingEntry"))
+    units = file.units | units_of(file.archive, values, "ssv:Units")
     for parameter in children(values, "ssv:Parameters", "ssv:Parameter"):
-        name, setting = prefix + parameter.get("name", ""), _setting(place, parameter, units)
+        name, setting = prefix + parameter.get("name", ""), _setting(file, parameter, units)
         if entries is None:
             yield name, setting
         for entry in entries or ():
             if entry.get("source") == name:
                 target = entry.get("target", "")
-                yield target, Setting(setting.value, setting.unit, transformation_of(place, entry, target))
+                yield target, Setting(setting.value, setting.unit, transformation_of(file, entry, target))
 
 
-def _content(place: Place, holder: Element, inline: str, tag: str) -> Element:
+def _content(file: SspFile, holder: Element, inline: str, tag: str) -> Element:
     """Return what a binding holds, in its file or inline."""
-    _check_base(place, holder)
+    _check_base(file, holder)
     if holder.get("source"):
-        return place.xml(holder.get("source", ""), tag)
+        return file.xml(holder.get("source", ""), tag)
     found = child(holder, inline, tag)
     if found is None:
-        raise place.error(f"a parameter binding has neither a source nor a {tag} of its own")
+        raise file.error(f"a parameter binding has neither a source nor a {tag} of its own")
     return found
 
 
-def _mapping(place: Place, mapping: Element) -> Element:
-    _check_base(place, mapping)
+def _mapping(file: SspFile, mapping: Element) -> Element:
+    _check_base(file, mapping)
     if mapping.get("source"):
-        return place.xml(mapping.get("source", ""), "ssm:ParameterMapping")
+        return file.xml(mapping.get("source", ""), "ssm:ParameterMapping")
     found = child(mapping, "ssm:ParameterMapping")
     return mapping if found is None else found
 
 
-def _check_base(place: Place, holder: Element) -> None:
+def _check_base(file: SspFile, holder: Element) -> None:
     if holder.get("sourceBase", "SSD") != "SSD":
-        raise place.error(f'"{holder.get("source")}" lies inside a component, and only the SSP\'s own files are read')
+        raise file.error(f'"{holder.get("source")}" lies inside a component, and only the SSP\'s own files are read')
 
 
-def _setting(place: Place, parameter: Element, units: Mapping[str, str]) -> Setting:
+def _setting(file: SspFile, parameter: Element, units: Mapping[str, str]) -> Setting:
     name = parameter.get("name", "")
     for kind, read in (("Boolean", _boolean), *_READERS):
         one = child(parameter, f"ssv:{kind}")
         if one is not None:
             unit = one.get("unit", "")
-            return Setting(_read(place, parameter, one, name, kind, read), units.get(unit, unit))
+            return Setting(_read(file, parameter, one, name, kind, read), units.get(unit, unit))
     choices = ("Boolean", *(kind for kind, _ in _READERS))
-    raise place.error(f'the parameter "{name}" is of a kind that is not read', *choices)
+    raise file.error(f'the parameter "{name}" is of a kind that is not read', *choices)
 
 
-def _read(place: Place, parameter: Element, one: Element, name: str, kind: str, read: Callable[[str], Value]) -> Values:
+def _read(
+    file: SspFile, parameter: Element, one: Element, name: str, kind: str, read: Callable[[str], Value]
+) -> Values:
     """Read a value, or the list of an array in row-major order."""
     several = [text.get("value", "") for text in children(one, "ssv:Value")]
     array = child(parameter, "ssc:Dimension") is not None or len(several) > 1
@@ -137,7 +139,7 @@ def _read(place: Place, parameter: Element, one: Element, name: str, kind: str, 
     try:
         values = [read(text) for text in texts]
     except ValueError as error:
-        raise place.error(f'the parameter "{name}" = "{one.get("value")}" is no {kind}') from error
+        raise file.error(f'the parameter "{name}" = "{one.get("value")}" is no {kind}') from error
     return values if array else values[0]
 
 

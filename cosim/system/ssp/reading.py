@@ -4,7 +4,7 @@ import posixpath
 from xml.etree.ElementTree import Element
 
 from cosim.system.ssp.archive import Archive, child, children, tagged
-from cosim.system.ssp.place import Place
+from cosim.system.ssp.ssp_file import SspFile
 from cosim.system.ssp.structure import (
     GIVES,
     TAKES,
@@ -35,104 +35,106 @@ def read_structure(archive: Archive) -> Structure:
     Raises:
         ScenarioError: it breaks a rule of SSP, or has what is not read here.
     """
-    place = _opened(archive, _MAIN)
-    structure = Structure(place)
-    _add_system(structure, _system(place), place, ())
+    file = _opened(archive, _MAIN)
+    structure = Structure(file)
+    _add_system(structure, _system(file), file, ())
     if not structure.components:
         raise archive.error("it has no component that is an FMU" if len(structure.nodes) > 1 else "it has no component")
     return structure
 
 
-def _opened(archive: Archive, source: str) -> Place:
+def _opened(archive: Archive, source: str) -> SspFile:
     root = archive.xml(source, "ssd:SystemStructureDescription")
     if root.get("version", "").partition(".")[0] not in ("1", "2"):
         raise archive.error(f'{source} is of version "{root.get("version")}", and only SSP 1 and 2 are read')
-    return Place(archive, root, posixpath.dirname(source))
+    return SspFile(archive, root, posixpath.dirname(source))
 
 
-def _system(place: Place) -> Element:
-    system = child(place.root, "ssd:System")
+def _system(file: SspFile) -> Element:
+    system = child(file.root, "ssd:System")
     if system is None:
-        raise place.error("SystemStructure.ssd has no ssd:System")
+        raise file.error("SystemStructure.ssd has no ssd:System")
     return system
 
 
-def _add_system(structure: Structure, system: Element, place: Place, path: Path, *outer: tuple[Element, Place]) -> None:
+def _add_system(
+    structure: Structure, system: Element, file: SspFile, path: Path, *outer: tuple[Element, SspFile]
+) -> None:
     """Add a system and all in it; `outer` is the component in its place, whose bindings are stronger."""
     if len(structure.nodes) > MOST:
-        raise place.error(f"it has more than {MOST:,} elements, counting those of a system as often as it is used")
+        raise file.error(f"it has more than {MOST:,} elements, counting those of a system as often as it is used")
     if len(path) > DEEPEST:
-        raise place.error(f'"{".".join(path[:3])}..." nests systems more than {DEEPEST} deep')
-    structure.nodes[path] = Node(system, place, connectors_of(place, system), bindings=((system, place), *outer))
-    _add_dictionaries(structure, system, place, path)
+        raise file.error(f'"{".".join(path[:3])}..." nests systems more than {DEEPEST} deep')
+    structure.nodes[path] = Node(system, file, connectors_of(file, system), bindings=((system, file), *outer))
+    _add_dictionaries(structure, system, file, path)
     for element in (one for group in children(system, "ssd:Elements") for one in group):
         inner = (*path, element.get("name", ""))
         if inner in structure.nodes or inner in structure.dictionaries:
-            raise place.error(f'two elements are called "{".".join(inner)}"')
+            raise file.error(f'two elements are called "{".".join(inner)}"')
         if element.tag == _SYSTEM:
-            _add_system(structure, element, place, inner)
+            _add_system(structure, element, file, inner)
         elif element.tag == _REFERENCE:
-            structure.dictionaries[inner] = _looked_up(structure, element, place, inner)
+            structure.dictionaries[inner] = _looked_up(structure, element, file, inner)
         elif element.tag == _COMPONENT:
-            _add_component(structure, element, place, inner)
+            _add_component(structure, element, file, inner)
         else:
             kind = element.tag.partition("}")[2]
-            raise place.error(f'"{".".join(inner)}" is a {kind}, and only FMUs and systems of them are read')
+            raise file.error(f'"{".".join(inner)}" is a {kind}, and only FMUs and systems of them are read')
     for connection in children(system, "ssd:Connections", "ssd:Connection"):
-        _add_link(structure, connection, place, path)
+        _add_link(structure, connection, file, path)
 
 
-def _add_component(structure: Structure, element: Element, place: Place, path: Path) -> None:
+def _add_component(structure: Structure, element: Element, file: SspFile, path: Path) -> None:
     kind, source = (element.get("type") or FMU).partition(";")[0].strip(), element.get("source")
-    own = (element, place)
+    own = (element, file)
     if source is None:
         structure.notes.append(f'The component "{".".join(path)}" has no source, so nothing comes out of it.')
-        structure.nodes[path] = Node(element, place, connectors_of(place, element))
+        structure.nodes[path] = Node(element, file, connectors_of(file, element))
     elif source.startswith("#"):
-        system = next((one for one in place.root.iter(_SYSTEM) if one.get("id") == source[1:]), None)
+        system = next((one for one in file.root.iter(_SYSTEM) if one.get("id") == source[1:]), None)
         if system is None:
-            raise place.error(f'"{".".join(path)}" is a "{source}", and no system has that id')
-        _add_system(structure, system, place, path, own)
+            raise file.error(f'"{".".join(path)}" is a "{source}", and no system has that id')
+        _add_system(structure, system, file, path, own)
     elif kind in (SSD, SSP):
-        inner = _inner(place, kind, source)
+        inner = _inner(file, kind, source)
         _add_system(structure, _system(inner), inner, path, own)
     elif kind == FMU:
-        structure.nodes[path] = Node(element, place, connectors_of(place, element), source, bindings=(own,))
+        structure.nodes[path] = Node(element, file, connectors_of(file, element), source, bindings=(own,))
     else:
-        raise place.error(f'"{".".join(path)}" is of the kind {kind}, and only FMUs and systems of them are read')
+        raise file.error(f'"{".".join(path)}" is of the kind {kind}, and only FMUs and systems of them are read')
 
 
-def _inner(place: Place, kind: str, source: str) -> Place:
+def _inner(file: SspFile, kind: str, source: str) -> SspFile:
     if kind == SSD:
-        return _opened(place.archive, place.path(source))
-    file, _, variant = source.partition("#")
-    return _opened(place.archive.nested(place.path(file)), variant or _MAIN)
+        return _opened(file.archive, file.path(source))
+    inner, _, variant = source.partition("#")
+    return _opened(file.archive.nested(file.path(inner)), variant or _MAIN)
 
 
-def _add_dictionaries(structure: Structure, system: Element, place: Place, path: Path) -> None:
+def _add_dictionaries(structure: Structure, system: Element, file: SspFile, path: Path) -> None:
     """Add the signal dictionaries of a system as elements whose connectors are their entries."""
     for one in children(system, "ssd:SignalDictionaries", "ssd:SignalDictionary"):
         source, inline = one.get("source"), child(one, "ssb:SignalDictionary")
-        root = place.xml(source, "ssb:SignalDictionary") if source else inline
+        root = file.xml(source, "ssb:SignalDictionary") if source else inline
         if root is None:
-            raise place.error(f'the signal dictionary "{one.get("name")}" has neither a source nor entries')
-        own = Place(place.archive, root, place.folder)
+            raise file.error(f'the signal dictionary "{one.get("name")}" has neither a source nor entries')
+        own = SspFile(file.archive, root, file.folder)
         entries = connectors_of(own, root, "ssb:DictionaryEntry")
         structure.nodes[(*path, f"({one.get('name')})")] = Node(root, own, entries)
 
 
-def _looked_up(structure: Structure, element: Element, place: Place, path: Path) -> tuple[Path, dict[str, Connector]]:
+def _looked_up(structure: Structure, element: Element, file: SspFile, path: Path) -> tuple[Path, dict[str, Connector]]:
     """Find the dictionary that a reference means: in its own system, then outwards."""
     name = element.get("dictionary", "")
     for depth in range(len(path) - 1, -1, -1):
         found = (*path[:depth], f"({name})")
         if found in structure.nodes:
-            return found, connectors_of(place, element)
-    raise place.error(f'"{".".join(path)}" refers to the signal dictionary "{name}", which does not exist')
+            return found, connectors_of(file, element)
+    raise file.error(f'"{".".join(path)}" refers to the signal dictionary "{name}", which does not exist')
 
 
-def _add_link(structure: Structure, connection: Element, place: Place, path: Path) -> None:
-    sides = [(_end(structure, connection, place, side, path)) for side in ("start", "end")]
+def _add_link(structure: Structure, connection: Element, file: SspFile, path: Path) -> None:
+    sides = [(_end(structure, connection, file, side, path)) for side in ("start", "end")]
     ends, gives = [end for end, _ in sides], [given for _, given in sides]
     indices = [connection.get(f"{side}Indices", "").strip() for side in ("start", "end")]
     if gives in ([False, True], [None, True], [False, None]):  # SSP names ends; data may flow from either
@@ -140,39 +142,39 @@ def _add_link(structure: Structure, connection: Element, place: Place, path: Pat
         indices.reverse()
     elif gives not in ([True, False], [None, False], [True, None]):
         says = f'"{name_of(ends[0])}" is joined to "{name_of(ends[1])}"'
-        raise place.error(f"{says}, and a connection goes from an output to an input")
+        raise file.error(f"{says}, and a connection goes from an output to an input")
     start, end = ends
     fed = structure.links.setdefault(end, {})
     if indices[1] in fed or (fed and not (indices[1] and all(fed))):
         other = name_of(next(iter(fed.values())).start)
-        raise place.error(f'"{name_of(end)}" is fed twice, by "{other}" and by "{name_of(start)}"')
-    fed[indices[1]] = Link(start, end, transformation_of(place, connection, name_of(end)), (indices[0], indices[1]))
+        raise file.error(f'"{name_of(end)}" is fed twice, by "{other}" and by "{name_of(start)}"')
+    fed[indices[1]] = Link(start, end, transformation_of(file, connection, name_of(end)), (indices[0], indices[1]))
 
 
-def _end(structure: Structure, connection: Element, place: Place, side: str, path: Path) -> tuple[End, bool | None]:
+def _end(structure: Structure, connection: Element, file: SspFile, side: str, path: Path) -> tuple[End, bool | None]:
     """Return a connector, and whether values come out of it, seen from inside the system at `path`; None: either."""
     element, connector = connection.get(f"{side}Element"), connection.get(f"{side}Connector", "")
     owner = (*path, element) if element else path
     if owner in structure.dictionaries:
-        return _entry(structure, place, owner, connector)
+        return _entry(structure, file, owner, connector)
     if owner not in structure.nodes:
         here = [".".join(one) for one in (*structure.nodes, *structure.dictionaries) if one[:-1] == path and one]
-        raise place.error(f'a connection names "{".".join(owner)}", which does not exist', *here)
+        raise file.error(f'a connection names "{".".join(owner)}", which does not exist', *here)
     connectors = structure.nodes[owner].connectors
     if connector not in connectors:
-        raise place.error(f'"{name_of((owner, connector))}" is no connector', *connectors)
+        raise file.error(f'"{name_of((owner, connector))}" is no connector', *connectors)
     kind = connectors[connector].kind
     if kind not in (*GIVES, *TAKES):
-        raise place.error(f'"{name_of((owner, connector))}" is connected, and its kind "{kind}" says no direction')
+        raise file.error(f'"{name_of((owner, connector))}" is connected, and its kind "{kind}" says no direction')
     return (owner, connector), (kind in GIVES) != (owner == path)
 
 
-def _entry(structure: Structure, place: Place, owner: Path, connector: str) -> tuple[End, bool | None]:
+def _entry(structure: Structure, file: SspFile, owner: Path, connector: str) -> tuple[End, bool | None]:
     """Return the entry of the dictionary behind a reference, and whether the reference gives it."""
     dictionary, connectors = structure.dictionaries[owner]
     entries = structure.nodes[dictionary].connectors
     if connector not in connectors or connector not in entries:
-        raise place.error(
+        raise file.error(
             f'"{name_of((owner, connector))}" is no connector', *(one for one in connectors if one in entries)
         )
     return (dictionary, connector), {"output": True, "input": False}.get(connectors[connector].kind)

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path as File
 from typing import Any
 
-from cosim.system.ssp.meaning import Meaning
+from cosim.system.ssp.interpretation import Interpretation
 from cosim.system.ssp.structure import Path, Structure
 
 _INTERFACES = {"CoSimulation": {"interface": "co-simulation"}, "ModelExchange": {"interface": "model-exchange"}}
@@ -13,25 +13,25 @@ _INTERFACES = {"CoSimulation": {"interface": "co-simulation"}, "ModelExchange": 
 
 def scenario_of(structure: Structure, files: Mapping[Path, File]) -> str:
     """Write the scenario; `files` are the FMUs by their element."""
-    meaning = Meaning(structure, files)
-    start, stop, step, assumed = meaning.experiment()
-    parameters = {path: meaning.parameters(path) for path in structure.components}
+    interpretation = Interpretation(structure, files)
+    start, stop, step, assumed = interpretation.experiment()
+    parameters = {path: interpretation.parameters(path) for path in structure.components}
     strange = [name for _, names in parameters.values() for name in names]
     described = structure.nodes[()].element.get("description", "").rstrip(".")
     said = [f"{described}." if described else "", assumed, *structure.notes]
     said += [f"Not set, because their FMUs do not have them: {', '.join(strange)}."] if strange else []
-    head = {"name": structure.place.root.get("name") or "system", "description": " ".join(filter(None, said))}
+    head = {"name": structure.file.root.get("name") or "system", "description": " ".join(filter(None, said))}
     lines = _table("", head | ({"start": start} if start else {}) | {"step": step, "stop": stop})
     for path, node in structure.components.items():
-        name = _text(meaning.names[path])
+        name = _text(interpretation.names[path])
         interface = _INTERFACES.get(node.element.get("implementation", ""), {})
         lines += _table(f"[components.{name}]", {"fmu": str(files[path])} | interface)
         lines += _table(f"[components.{name}.parameters]", parameters[path][0])
-        for variable, stated in meaning.units(path).items():
+        for variable, stated in interpretation.units(path).items():
             lines += _table(f"[components.{name}.variables.{_text(variable)}]", {"name": variable, "unit": stated})
-    for wire in meaning.wires():
+    for wire in interpretation.wires():
         lines += _table("[[connections]]", wire)
-    return "\n".join(lines + _table("[record.signals]", meaning.records())) + "\n"
+    return "\n".join(lines + _table("[record.signals]", interpretation.records())) + "\n"
 
 
 def _table(head: str, values: Mapping[str, Any]) -> list[str]:

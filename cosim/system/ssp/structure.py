@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from xml.etree.ElementTree import Element
 
 from cosim.system.ssp.archive import Archive, child, children
-from cosim.system.ssp.place import Place
+from cosim.system.ssp.ssp_file import SspFile
 from cosim.system.ssp.transformation import Transformation
 
 Path = tuple[str, ...]
@@ -39,10 +39,10 @@ class Node:
     """
 
     element: Element
-    place: Place
+    file: SspFile
     connectors: Mapping[str, Connector]
     source: str = ""
-    bindings: tuple[tuple[Element, Place], ...] = ()
+    bindings: tuple[tuple[Element, SspFile], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class Link:
 class Structure:
     """All elements by their path, and the links by the end (and index) they feed."""
 
-    place: Place
+    file: SspFile
     nodes: dict[Path, Node] = field(default_factory=dict)
     links: dict[End, dict[str, Link]] = field(default_factory=dict)
     dictionaries: dict[Path, tuple[Path, Mapping[str, Connector]]] = field(default_factory=dict)
@@ -68,7 +68,7 @@ class Structure:
     @property
     def archive(self) -> Archive:
         """The archive that was opened."""
-        return self.place.archive
+        return self.file.archive
 
     @property
     def components(self) -> dict[Path, Node]:
@@ -99,14 +99,14 @@ def name_of(end: End) -> str:
     return ".".join((*end[0], end[1]))
 
 
-def connectors_of(place: Place, element: Element, *path: str) -> dict[str, Connector]:
+def connectors_of(file: SspFile, element: Element, *path: str) -> dict[str, Connector]:
     """Read the connectors of an element (or, with another path, the entries of a signal dictionary)."""
     found = {}
     for one in children(element, *(path or ("ssd:Connectors", "ssd:Connector"))):
         typed = next((kind for kind in _KINDS if child(one, f"ssc:{kind}") is not None), "")
         unit = "" if not typed else child_of(one, typed).get("unit", "")
         found[one.get("name", "")] = Connector(
-            one.get("kind", ""), place.units.get(unit, unit), _TYPES.get(typed, typed)
+            one.get("kind", ""), file.units.get(unit, unit), _TYPES.get(typed, typed)
         )
     return found
 

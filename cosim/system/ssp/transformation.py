@@ -11,7 +11,7 @@ from xml.etree.ElementTree import Element
 
 from cosim.support.units import conversion
 from cosim.system.ssp.archive import child, children
-from cosim.system.ssp.place import Place
+from cosim.system.ssp.ssp_file import SspFile
 
 Value = float | int | bool | str
 _TABLES = ("Boolean", "Integer", "Enumeration")
@@ -58,37 +58,37 @@ class Effect:
         return self.gain * value + self.offset
 
 
-def transformation_of(place: Place, element: Element, name: str) -> Transformation:
+def transformation_of(file: SspFile, element: Element, name: str) -> Transformation:
     """Read the transformation of a connection or mapping entry, for the variable called `name`."""
     keep = element.get("suppressUnitConversion", "false") in ("true", "1")
     linear = child(element, "ssc:LinearTransformation")
     if linear is not None:
-        return Transformation(place.number(linear, "factor", 1.0), place.number(linear, "offset"), keep=keep)
+        return Transformation(file.number(linear, "factor", 1.0), file.number(linear, "offset"), keep=keep)
     for kind in _TABLES:
         mapping = child(element, f"ssc:{kind}MappingTransformation")
         if mapping is not None:
-            return Transformation(table=_table(place, mapping, kind, name), keep=keep)
+            return Transformation(table=_table(file, mapping, kind, name), keep=keep)
     return Transformation(keep=keep)
 
 
-def _table(place: Place, mapping: Element, kind: str, name: str) -> dict[str, str]:
+def _table(file: SspFile, mapping: Element, kind: str, name: str) -> dict[str, str]:
     """Read a table; booleans and integers are written as whole numbers, items of enumerations by their names."""
     found: dict[str, str] = {}
     for entry in children(mapping, "ssc:MapEntry"):
-        source, target = (_entry(place, entry.get(key, ""), kind, name) for key in ("source", "target"))
+        source, target = (_entry(file, entry.get(key, ""), kind, name) for key in ("source", "target"))
         if source in found:
-            raise place.error(f'the {kind} mapping of "{name}" names "{source}" twice')
+            raise file.error(f'the {kind} mapping of "{name}" names "{source}" twice')
         found[source] = target
     return found
 
 
-def _entry(place: Place, text: str, kind: str, name: str) -> str:
+def _entry(file: SspFile, text: str, kind: str, name: str) -> str:
     if kind == "Enumeration":
         return text
     try:
         return str(_TRUTH[text] if kind == "Boolean" else int(text))
     except (KeyError, ValueError) as error:
-        raise place.error(f'the {kind} mapping of "{name}" holds "{text}", which is no {kind}') from error
+        raise file.error(f'the {kind} mapping of "{name}" holds "{text}", which is no {kind}') from error
 
 
 def _word(value: Value) -> str:

@@ -14,7 +14,7 @@ from cosim.system.ssp.archive import Archive, child, children
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class SspFile:
     """A file of an archive: its root element, and the folder in the archive that holds it."""
 
     archive: Archive

@@ -1,6 +1,6 @@
-"""The list of all decks that were ever played with known truth, one line each: what was tuned on is not scored.
+"""The list of all benchmarks that were ever run with known truth, one line each: what was tuned on is not scored.
 
-A deck is fresh if its generator and seed stand in no earlier line of another code.
+A benchmark is fresh if its generator and seed stand in no earlier line of another code.
 """
 
 import subprocess
@@ -42,7 +42,7 @@ def listed(path: Path) -> list[Played]:
 
 
 def enlist(path: Path, generator: str, seed: int, cases: int, purpose: str, code: str) -> None:
-    """Append a deck, or lengthen its line where the same code has played its beginning.
+    """Append a benchmark, or lengthen its line where the same code has played its beginning.
 
     Raises:
         ProofError: no such purpose.

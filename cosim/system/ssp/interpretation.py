@@ -29,7 +29,7 @@ _OMS = "{https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schem
 
 
 @dataclass(frozen=True)
-class Meaning:
+class Interpretation:
     """A structure with the files of its FMUs by their element."""
 
     structure: Structure
@@ -68,11 +68,11 @@ class Meaning:
 
     def experiment(self) -> tuple[float, float, float, str]:
         """Return start, stop and step [s], and a sentence where they are assumed."""
-        place = self.structure.place
-        experiment = child(place.root, "ssd:DefaultExperiment")
-        start = 0.0 if experiment is None else place.number(experiment, "startTime")
+        file = self.structure.file
+        experiment = child(file.root, "ssd:DefaultExperiment")
+        start = 0.0 if experiment is None else file.number(experiment, "startTime")
         if start < 0:
-            raise place.error(f"it starts at {start:g} s; a run starts at 0 s or later")
+            raise file.error(f"it starts at {start:g} s; a run starts at 0 s or later")
         stop = _positive(None if experiment is None else experiment.get("stopTime"))
         step = _positive(_annotated_step(experiment, self.structure.nodes[()].element))
         step = step or min(self._proposed("stepSize"), default=0.0)
@@ -80,7 +80,7 @@ class Meaning:
         said = f"It says no {assumed}, which is assumed." if assumed else ""
         stop = stop or start + max(self._proposed("stopTime"), default=STOP)
         if stop <= start:
-            raise place.error(f"it starts at {start:g} s and stops at {stop:g} s; it must stop later than it starts")
+            raise file.error(f"it starts at {start:g} s and stops at {stop:g} s; it must stop later than it starts")
         whole, step = _whole(stop - start, step or (stop - start) / STEPS)
         end = stop if whole == stop - start else start + whole
         cut = "" if end == stop else f"Its stop of {stop:g} s is no whole number of steps; the run ends at {end:g} s."
@@ -90,10 +90,10 @@ class Meaning:
         """Return the values for the variables of a component in its units, and the names that it does not have."""
         ports, settings = self.ports[path], self._settings(path)
         strange = [name_of((path, name)) for name in settings if name not in ports]
-        place = self.structure.nodes[path].place
+        file = self.structure.nodes[path].file
         known = {name: one for name, one in settings.items() if name in ports}
         return {
-            name: one.arriving(place, name_of((path, name)), ports[name].unit) for name, one in known.items()
+            name: one.arriving(file, name_of((path, name)), ports[name].unit) for name, one in known.items()
         }, strange
 
     def wires(self) -> Iterator[dict[str, Any]]:

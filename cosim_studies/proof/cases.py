@@ -1,7 +1,7 @@
-"""The deck of a proof: what each case conceals, drawn from one seed.
+"""The cases of a benchmark: what each case conceals, drawn from one seed.
 
-Kinds of case in fixed shares, families in fair rotation: each is dealt once before any is dealt again. A deck of 60
-cases is the beginning of the deck of 200 with the same seed, so a proof can be made longer.
+Kinds of case in fixed shares, families in fair rotation: each comes once before any comes again. A benchmark of 60
+cases is the beginning of the one of 200 with the same seed, so a proof can be made longer.
 """
 
 from collections.abc import Iterator, Sequence
@@ -10,8 +10,8 @@ from itertools import count, islice
 
 import numpy as np
 
-from cosim_studies.proof.bench import log_uniform, stream
 from cosim_studies.proof.generator import FAMILIES, OUTSIDE
+from cosim_studies.proof.simulated_axis import log_uniform, stream
 
 SHARES = {"none": 0.25, "one": 0.4, "several": 0.2, "outside": 0.15}
 """Kinds of case: nothing concealed, one effect, two or three, one that is outside the list."""
@@ -45,12 +45,12 @@ class CaseSpec:
         return " + ".join(self.effects) or "none"
 
 
-def deal(seed: int, cases: int) -> list[CaseSpec]:
-    """The first `cases` hands of the deck of a seed."""
-    return list(islice(_hands(stream(seed, "deck")), cases))
+def cases_of(seed: int, cases: int) -> list[CaseSpec]:
+    """The first `cases` of the benchmark of a seed."""
+    return list(islice(_cases(stream(seed, "deck")), cases))
 
 
-def _hands(rng: np.random.Generator) -> Iterator[CaseSpec]:
+def _cases(rng: np.random.Generator) -> Iterator[CaseSpec]:
     families, first, foreign = (_rotation(rng.spawn(1)[0], names) for names in (FAMILIES, FAMILIES, OUTSIDE))
     several = count(1)
     for number, kind in enumerate(_kinds()):

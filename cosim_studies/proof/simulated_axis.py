@@ -30,7 +30,7 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 @dataclass
-class Bench:
+class SimulatedAxis:
     """Everything that `truth.simulate` needs, and the owner's belief; effects write into it."""
 
     mount: Parsed
@@ -48,7 +48,7 @@ class Bench:
     """Radians by which waves over position turn in a unit of it: 1, or 2 pi where that is a metre."""
     setup: Parameters = field(default_factory=dict)
     """What was drawn besides numbers: class of machine, card, contact, loop, set points; empty for the telescope mount
-    that `draw_bench` draws."""
+    that `draw_axis` draws."""
 
     @property
     def training(self) -> Motion:
@@ -167,7 +167,7 @@ def believe(mount: Parsed, noise: dict[str, float], ratio: int, rate_hz: int) ->
     }
 
 
-def draw_bench(seed: int, friction: str, noise: float, rate_hz: int, duration: float) -> Bench:
+def draw_axis(seed: int, friction: str, noise: float, rate_hz: int, duration: float) -> SimulatedAxis:
     """A mount with nothing concealed."""
     rng = stream(seed, "bench")
     pace = draw_pace(rng, duration)
@@ -178,6 +178,6 @@ def draw_bench(seed: int, friction: str, noise: float, rate_hz: int, duration: f
     drives = {name: draw_drive(stream(seed, name), motion, levels) for name, motion in motions.items()}
     warm = {name: float(drive.ambient[0] + rng.uniform(0, 3)) for name, drive in drives.items()}
     belief = believe(mount, levels, int(rng.choice([1, 4, 8, 16, 32])), rate_hz)
-    return Bench(
+    return SimulatedAxis(
         mount, belief, pace, motions, drives, warm, levels, shows_temperature=rng.random() < 0.5, rate_hz=rate_hz
     )
