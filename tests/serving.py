@@ -1,6 +1,7 @@
 """Help for the tests of the page: a desk, a client that has the token, recordings and a card."""
 
 import atexit
+import os
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,6 +11,7 @@ from typing import Any
 import httpx2
 import numpy as np
 import pytest
+import serve_work
 
 pytest.importorskip("starlette", reason="the extra [serve] is not installed")
 from starlette.testclient import TestClient
@@ -91,6 +93,12 @@ READER = Reader()
 atexit.register(READER.close)
 
 
+def kept(desk: Desk) -> list[str]:
+    """Every file that is not a job's own note."""
+    files = (one for one in desk.store.home.rglob("*") if one.is_file())
+    return sorted(one.name for one in files if one.name != "job.json" and one.parent.name != "views")
+
+
 @contextmanager
 def desk_at(home: Path, work: Callable[..., Any], limits: Limits | None = None) -> Iterator[Desk]:
     """A desk whose diagnosis is replaced, and its end."""
@@ -99,3 +107,22 @@ def desk_at(home: Path, work: Callable[..., Any], limits: Limits | None = None) 
         yield desk
     finally:
         desk.queue.close()
+
+
+@pytest.fixture(autouse=True)
+def _path(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The process of a diagnosis imports the work that replaces it."""
+    monkeypatch.setenv("PYTHONPATH", f"{HERE}{os.pathsep}{HERE.parent}")
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Iterator[Desk]:
+    """A desk whose diagnoses end at once."""
+    with desk_at(tmp_path / "data", serve_work.quickly) as made:
+        yield made
+
+
+@pytest.fixture
+def client(desk: Desk) -> TestClient:
+    """A client of it that has the token."""
+    return client_of(desk)

@@ -150,7 +150,10 @@ def test_a_long_run_says_how_long_and_an_absurd_one_is_refused(
 
     told: list[str] = []
     with monkeypatch.context() as clock:
-        clock.setattr(cosim.cli.run, "perf_counter", iter([0.0, 2.0, 4.0]).__next__)
+        clock.setattr(cosim.cli.run, "perf_counter", iter([45.0, 45.01, 2.0, 4.0]).__next__)
+        loaded_late = cosim.cli.run.with_forecast(lambda done, of: None, 8000, told.append)
+        loaded_late(100, 500)
+        loaded_late(200, 500)
         progress = cosim.cli.run.with_forecast(lambda done, of: None, 2_000_000_000, told.append)
         progress(1000, 7_201_000)
         progress(2000, 7_201_000)

@@ -5,12 +5,12 @@ import re
 import shutil
 import subprocess
 import time
-from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 import pytest
+from browsing import PATIENCE, axe_script, browser, violations
 from report_example import diagnosis
 from test_cli_run import call, scenario
 from tiny_fmu import tiny
@@ -20,10 +20,8 @@ from pyfmi_models.card import read_card
 from pyfmi_models.export.codegen import generate
 from pyfmi_models.export.documentation import documentation
 
-__all__ = ["scenario", "tiny"]
+__all__ = ["browser", "scenario", "tiny"]
 
-PATIENCE = 300_000
-"""ms for a browser that has a busy processor."""
 SIZES = {"desk": (1280, 800), "phone": (390, 844)}
 
 
@@ -102,18 +100,6 @@ def test_a_picture_of_correlations_says_what_its_colours_mean() -> None:
     assert [text.get_text() for text in sheet.axes[1].get_yticklabels()] == ["opposite", "none", "alike"]
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    chromium = shutil.which("chromium")
-    if chromium is None:
-        pytest.skip("chromium is not installed")
-    with api.sync_playwright() as started:
-        opened = started.chromium.launch(executable_path=chromium, args=["--no-sandbox"], timeout=PATIENCE)
-        yield opened
-        opened.close()
-
-
 REPORTS = {
     "two": ("two", "rotary"),
     "none": ("none", "rotary"),
@@ -124,17 +110,14 @@ REPORTS = {
 
 def check_by_axe(browser: Any, html: str, folder: Path) -> None:
     """Nothing is found, and nothing is wider than the screen, with everything unfolded."""
-    axe = pytest.importorskip("axe_core_python", reason="axe-core-python is not installed")
-    script = (Path(axe.__file__).parent / "axe.min.js").read_text("utf-8")
+    script = axe_script()
     (folder / "page.html").write_text(html, "utf-8")
     for (width, height), scheme in ((SIZES["desk"], "light"), (SIZES["phone"], "light"), (SIZES["desk"], "dark")):
         page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme, bypass_csp=True)
         page.set_default_timeout(PATIENCE)
         page.goto((folder / "page.html").as_uri())
         page.evaluate("document.querySelectorAll('details').forEach(one => one.open = true)")
-        page.evaluate(script)
-        found = page.evaluate("axe.run()")["violations"]
-        assert [(one["id"], one["nodes"][0]["html"][:120]) for one in found] == [], (width, scheme)
+        assert violations(page, script) == [], (width, scheme)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
         page.close()
 

@@ -134,6 +134,11 @@ SENTENCES: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "zero bytes only": ("run.csv", lambda: bytes(4096), "holds no table|is no text|zero byte"),
     "words": ("run.csv", lambda: b"hello world\nand so on\n", "no table of numbers; its first line is: 'hello world'"),
     "JSON": ("run.csv", lambda: json.dumps({"t": [0.1]}, indent=1).encode(), "no table of numbers|at least 2 are"),
+    "UTF-8 that is none later": (
+        "run.csv",
+        lambda: b"\xef\xbb\xbf" + csv_text(TABLE).encode() + b"0.1,\x9d,3,4\n1,2,3\n",
+        "holds bytes that are no UTF-8; --layout encoding=cp1252",
+    ),
     "half a gzip": ("run.csv.gz", lambda: gzip.compress(csv_text(TABLE).encode())[:-900], "cannot be read as .csv.gz"),
     "no gzip": ("run.csv.gz", lambda: b"t,tau,q\n1,2,3\n", "cannot be read as .csv.gz: Not a gzipped file"),
     "no Parquet": ("run.parquet", lambda: b"PAR1" + bytes(90), "cannot be read as .parquet"),

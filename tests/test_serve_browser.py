@@ -1,7 +1,5 @@
 """The page in a real browser: dropped files to the report, by mouse, on a phone's width, by keyboard, read aloud."""
 
-import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -14,37 +12,23 @@ from typing import Any
 
 import pytest
 import serve_work
-from serving import CARD, HERE, READER, TOKEN, recording, until  # skips without the extra [serve]
+from browsing import DESK, PATIENCE, PHONE, axe_script, browser, dropped, opened, processor, violations
+from serving import CARD, HERE, READER, TOKEN, _path, recording, until  # skips without the extra [serve]
 
 from cosim.serve.app import make_app
 from cosim.serve.desk import Desk
 from cosim.serve.server import listening
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 uvicorn = pytest.importorskip("uvicorn", reason="the extra [serve] is not installed")
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium on this machine")
+__all__ = ["_path", "browser"]
 Page = Any
-PHONE, DESK = {"width": 390, "height": 844}, {"width": 1280, "height": 800}
 FIRST = 30.0
 """Seconds of processor in which the first answer for the demo's files must be there."""
 LARGEST = 1_000_000
 """Bytes of a report."""
 TOUCH = 44
 """Least height of what is touched, in CSS pixels (WCAG 2.2, 2.5.5)."""
-REFUSED = "400 (Bad Request)"
-"""Part of what the browser itself says when the server refuses a form; the page says why."""
-PATIENCE = 300_000
-"""Milliseconds for a diagnosis on a machine that is busy with other things."""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    with sync_api.sync_playwright() as tool:
-        chromium = tool.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield chromium
-        chromium.close()
 
 
 @contextmanager
@@ -74,48 +58,9 @@ def files(tmp_path: Path) -> list[Path]:
     return [tmp_path / name for name in made]
 
 
-@pytest.fixture(autouse=True)
-def _path(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PYTHONPATH", f"{HERE}{os.pathsep}{HERE.parent}")
-
-
-@contextmanager
-def opened(browser: Any, address: str, size: dict[str, int], scheme: str = "light") -> Iterator[Page]:
-    """A page in a browser of its own; every message, error and request elsewhere fails the test."""
-    context = browser.new_context(viewport=size, color_scheme=scheme)
-    page, said = context.new_page(), []
-    home = address.partition("?")[0]
-    page.on("console", lambda message: REFUSED in message.text or said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("request", lambda request: request.url.startswith((home, "blob:")) or said.append(request.url))
-    page.on("dialog", lambda dialog: dialog.accept())
-    page.goto(address)
-    try:
-        yield page
-    finally:
-        context.close()
-    assert said == []
-
-
 def holds(page: Page, code: str, seconds: float = 60.0) -> None:
     """Wait until an expression is true; the page's policy forbids the browser to be told to wait for it."""
     until(lambda: page.evaluate(f"Boolean({code})"), seconds)
-
-
-def dropped(page: Page, paths: list[Path]) -> None:
-    """Drop files on the page as a mouse does."""
-    import base64
-
-    content = [[path.name, base64.b64encode(path.read_bytes()).decode()] for path in paths]
-    code = """(files) => {
-      const data = new DataTransfer();
-      for (const [name, text] of files)
-        data.items.add(new File([Uint8Array.from(atob(text), (one) => one.charCodeAt(0))], name));
-      const zone = document.querySelector("[data-drop]");
-      for (const kind of ["dragenter", "dragover", "drop"])
-        zone.dispatchEvent(new DragEvent(kind, { bubbles: true, cancelable: true, dataTransfer: data }));
-    }"""
-    page.evaluate(code, content)
 
 
 def ready(page: Page, paths: list[Path]) -> None:
@@ -135,19 +80,6 @@ def night(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("demo") / "night"
     write_case(demo_case(SEED, SECONDS), folder)
     return folder
-
-
-def processor(pid: int) -> float:
-    """Seconds of processor of a process and of all that it started."""
-    total = 0.0
-    for path in Path("/proc").glob("[0-9]*/stat"):
-        try:
-            words = path.read_text().rpartition(")")[2].split()
-        except OSError:
-            continue
-        if path.parent.name == str(pid) or words[1] == str(pid):
-            total += sum(map(int, words[11:15])) / os.sysconf("SC_CLK_TCK")
-    return total
 
 
 @pytest.mark.skipif(not Path("/proc").exists(), reason="the time of a process is looked up in /proc")
@@ -230,7 +162,9 @@ def test_it_is_used_by_keyboard_alone(browser: Any, files: list[Path], tmp_path:
         page.keyboard.press("Tab")
         assert page.evaluate("document.activeElement.textContent") == "To the content"
         to(page, "files")
-        page.locator("#files").set_input_files(files)  # the window that chooses files is the browser's own
+        with page.expect_file_chooser() as chooser:  # the window itself is the browser's own
+            page.keyboard.press("Space")
+        chooser.value.set_files(files)
         page.wait_for_selector("#start")
         to(page, "role-2")
         page.keyboard.press("ArrowDown")
@@ -300,8 +234,7 @@ def check_phone(page: Page, scheme: str) -> None:
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_axe_finds_nothing(browser: Any, files: list[Path], tmp_path: Path, scheme: str) -> None:
-    axe = pytest.importorskip("axe_core_python", reason="axe-core-python is not installed")
-    code = (Path(axe.__file__).parent / "axe.min.js").read_text("utf-8")
+    code = axe_script()
     (tmp_path / "open.csv").write_bytes((HERE / "samples" / "odrive.csv").read_bytes())
     with (
         serving(tmp_path / "data", serve_work.for_ever) as (desk, address),
@@ -332,12 +265,7 @@ def test_axe_finds_nothing(browser: Any, files: list[Path], tmp_path: Path, sche
 
 
 def check_axe(page: Page, code: str) -> None:
-    page.evaluate(code)
-    found = page.evaluate(
-        "axe.run(document, { runOnly: ['wcag2a', 'wcag2aa', 'wcag21aa', 'wcag22aa', 'best-practice'] })"
-    )
-    told = [(one["id"], one["impact"], [node["html"][:120] for node in one["nodes"]]) for one in found["violations"]]
-    assert told == []
+    assert violations(page, code) == []
 
 
 def test_a_server_that_is_gone_is_said(browser: Any, files: list[Path], tmp_path: Path) -> None:

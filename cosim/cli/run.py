@@ -92,16 +92,21 @@ def _run(scenario: "Scenario", delivery: "Delivery") -> "RunResult":
 
 def with_forecast(shown: Progress, size: int, say: Callable[[str], None]) -> Progress:
     """Return a progress that also says once how long a long run will take, and how large its recording gets."""
-    begun, told = perf_counter(), [False]
+    first: list[tuple[float, int]] = []  # when steps began to be counted: loading is no sign of the speed
+    told = [False]
 
     def progress(done: int, of: int) -> None:
         shown(done, of)
-        spent = perf_counter() - begun
-        if not told[0] and spent > SURE:
-            told[0] = True
-            left = spent * (of - done) / done
-            if left > LONG:
-                say(f"about {in_time(left)} to go; the recording grows to {in_bytes(size)}")
+        now = perf_counter()
+        if not first:
+            first.append((now, done))
+        begun, before = first[0]
+        if told[0] or now - begun <= SURE or done <= before:
+            return
+        told[0] = True
+        left = (now - begun) * (of - done) / (done - before)
+        if left > LONG:
+            say(f"about {in_time(left)} to go; the recording grows to {in_bytes(size)}")
 
     return progress
 

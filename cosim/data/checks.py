@@ -111,7 +111,11 @@ def check_time(path: Path, t: np.ndarray, minimum: int) -> None:
         row, before, after = wrong[0] + 2, t[wrong[0]], t[wrong[0] + 1]
         how = "runs backwards" if after < before else "stands still"
         span = f"({before:.9g} s to {after:.9g} s)"
-        message = f"{path}: time {how} at row {row:,} {span}. Split the file there."
+        again = int(np.count_nonzero(np.diff(t) < 0))
+        todo = "Split the file there."
+        if again > 1:
+            todo = f"It does so {again:,} times: these are {again + 1:,} recordings; write each into a file of its own."
+        message = f"{path}: time {how} at row {row:,} {span}. {todo}"
         raise RecordingError(message, culprit=str(path), value=float(after))
 
 

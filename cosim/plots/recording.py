@@ -57,13 +57,17 @@ def facts_of(recording: Recording) -> JsonObject:
     return told | {f"note {number}": note for number, note in enumerate(recording.quality(), 1)}
 
 
+TAKEN_AS = {"tau": "N.m or N", "q": "rad or m", "q_d": "rad or m", "v": "rad/s or m/s", "temperature": "degC"}
+"""Units that are taken where a file states none: those of a rotary axis or of a linear one, as the card says."""
+
+
 def rows(recording: Recording, sources: Mapping[str, str] | None = None) -> list[dict[str, str]]:
     """Return one row a column: its name in the file, what it serves as, its unit, its range and how it goes."""
     return [
         {
             "column": (sources or {}).get(name, name),
             "serves as": _serving(name),
-            "unit": recording.units.get(name, "?"),
+            "unit": recording.units.get(name, TAKEN_AS.get(name, "?")),
             "least": f"{recording[name].min():.6g}",
             "greatest": f"{recording[name].max():.6g}",
             "mean": f"{recording[name].mean():.6g}",

@@ -53,6 +53,8 @@ def _parsed(path: Path, body: bytes, layout: Layout) -> tuple[Any, tuple[str, ..
         if "Expected" not in str(error):
             raise
 
+    _check_utf8(path, body)  # the parser cannot hand over a row that is none
+
     def skip(row: Any) -> str:
         odd.append(row)
         return "skip"
@@ -64,6 +66,18 @@ def _parsed(path: Path, body: bytes, layout: Layout) -> tuple[Any, tuple[str, ..
         raise RecordingError(f"{text}{short(torn.text)!r}.", culprit=str(path), value=torn.actual_columns)
     lines = f"{len(odd)} lines that are no samples were" if len(odd) > 1 else "one line that is no sample was"
     return table, (f"{path.stem}: {lines} left out, such as {short(odd[-1].text)!r}.",)
+
+
+def _check_utf8(path: Path, body: bytes) -> None:
+    """Refuse a text whose head was UTF-8, and that later is not."""
+    try:
+        body.decode()
+    except UnicodeDecodeError as error:
+        row = body.count(b"\n", 0, error.start) + 1
+        text = (
+            f"{path}: row {row:,} holds bytes that are no UTF-8; --layout encoding=cp1252 (or another) says what it is."
+        )
+        raise RecordingError(text, culprit=str(path), value=row) from None
 
 
 def _is_remark(text: str) -> bool:

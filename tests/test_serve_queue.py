@@ -1,0 +1,140 @@
+"""One diagnosis after the other: waiting, cancelled, failed, interrupted, kept over a restart."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import serve_work
+from serve_work import NOTE
+from serving import (
+    _path,
+    act,
+    alive,
+    client,
+    client_of,
+    desk,
+    desk_at,
+    id_of,
+    kept,
+    put,
+    ready,
+    recording,
+    until,
+)
+from serving import state as state_of
+from starlette.testclient import TestClient
+
+from cosim.serve.desk import Desk
+from cosim.serve.store import Store
+
+__all__ = ["_path", "client", "desk"]
+
+
+@pytest.fixture
+def slow(tmp_path: Path) -> Iterator[Desk]:
+    with desk_at(tmp_path / "data", serve_work.for_ever) as made:
+        yield made
+
+
+def test_a_diagnosis_leads_to_its_report_and_files(client: TestClient, desk: Desk) -> None:
+    job = ready(client)
+    act(client, job, "start")
+    until(lambda: not state_of(desk, job).live)
+    page = client.get(job).text
+    assert "One effect is missing from the model" in page
+    report = client.get(f"{job}/result/report.html")
+    assert report.headers["content-type"].startswith("text/html")
+    assert "frame-ancestors 'self'" in report.headers["content-security-policy"]
+    card = client.get(f"{job}/result/card.toml")
+    assert "attachment" in card.headers["content-disposition"]
+    assert card.text == serve_work.CARD
+    assert "One effect is missing" in client.get("/").text
+    copy = str(act(client, job, "again").url.path)
+    assert copy != job
+    assert [one.name for one in state_of(desk, copy).uploads] == ["run1.csv", "heldout.csv"]
+    act(client, job, "remove")
+    assert client.get(job).status_code == 404
+    assert put(client, copy, "run2.csv", recording()).status_code == 201
+    act(client, copy, "start")
+    until(lambda: state_of(desk, copy).state == "done")
+
+
+def test_one_diagnosis_at_a_time_and_the_next_when_it_is_gone(slow: Desk) -> None:
+    client = client_of(slow)
+    first, second, third = ready(client), ready(client), ready(client)
+    for job in (first, second, third):
+        act(client, job, "start")
+    until(lambda: slow.queue.progress.answer)
+    assert [state_of(slow, job).state for job in (first, second, third)] == ["running", "queued", "queued"]
+    page = client.get(first).text
+    assert "Friction asymmetry (2 of 5)" in page
+    assert "First answer" in page
+    assert "1 diagnosis comes before this one" in client.get(second).text
+    assert "2 diagnoses come before this one" in client.get(third).text
+    assert put(client, first, "late.csv", recording()).status_code == 400
+    act(client, second, "cancel")
+    act(client, first, "cancel")
+    until(lambda: state_of(slow, third).state == "running")
+    assert [state_of(slow, job).state for job in (first, second)] == ["cancelled", "cancelled"]
+
+
+def test_a_cancelled_diagnosis_leaves_no_process_and_no_result(slow: Desk) -> None:
+    client = client_of(slow)
+    job = ready(client)
+    act(client, job, "start")
+    note = slow.store.home / id_of(job) / NOTE
+    until(lambda: note.exists() and note.read_text())
+    pids = [int(word) for word in note.read_text().split()]
+    assert all(map(alive, pids))
+    assert slow.store.result(id_of(job)).is_dir()
+    act(client, job, "cancel")
+    until(lambda: not any(map(alive, pids)), 5)
+    assert not slow.store.result(id_of(job)).exists()
+    note.unlink()
+    assert kept(slow) == ["card.toml", "heldout.csv", "run1.csv"]
+    assert slow.queue.pid() == 0
+    act(client, job, "again")
+    assert state_of(slow, job).state == "draft"
+
+
+@pytest.mark.parametrize(
+    ("work", "said"),
+    [(serve_work.refusing, "run1.csv does not move."), (serve_work.crashing, "The diagnosis ended before")],
+)
+def test_a_diagnosis_that_fails_says_why_and_the_next_one_runs(tmp_path: Path, work: object, said: str) -> None:
+    with desk_at(tmp_path / "data", work) as desk:  # type: ignore[arg-type]
+        client = client_of(desk)
+        jobs = [ready(client), ready(client)]
+        for job in jobs:
+            act(client, job, "start")
+        for job in jobs:
+            until(lambda job=job: state_of(desk, job).state == "failed")  # type: ignore[misc]
+            assert said in client.get(job).text
+
+
+def test_history_survives_a_restart_what_ran_is_interrupted_and_what_waited_goes_on(tmp_path: Path) -> None:
+    home = tmp_path / "data"
+    with desk_at(home, serve_work.for_ever) as desk:
+        client = client_of(desk)
+        ran, waited, draft = ready(client), ready(client), ready(client)
+        act(client, ran, "start")
+        act(client, waited, "start")
+        until(lambda: desk.queue.progress.answer)
+    assert state_of(desk, ran).state == "interrupted"
+    with desk_at(home, serve_work.quickly) as desk:
+        until(lambda: state_of(desk, waited).state == "done")
+        assert [state_of(desk, job).state for job in (ran, draft)] == ["interrupted", "draft"]
+        page = client_of(desk).get("/").text
+        assert all(id_of(job) in page for job in (ran, waited, draft))
+        assert "<polyline" in client_of(desk).get(draft).text
+
+
+def test_a_server_that_was_killed_left_jobs_that_can_be_read(tmp_path: Path) -> None:
+    store = Store(tmp_path)
+    job = store.new()
+    store.put(job.id, state="running")
+    (tmp_path / "20260101-000000-abcdef").mkdir()
+    (tmp_path / "20260101-000000-abcdee").mkdir()
+    (tmp_path / "20260101-000000-abcdee" / "job.json").write_text('{"id": ', "utf-8")
+    with desk_at(tmp_path, serve_work.quickly) as desk:
+        assert [(one.id, one.state) for one in desk.store.all()] == [(job.id, "interrupted")]
