@@ -26,12 +26,13 @@ autodoc_typehints, autodoc_member_order = "description", "bysource"
 autodoc_default_options: dict[str, bool | str] = {"members": True, "exclude-members": "__init__,__new__"}
 add_module_names = False
 nitpicky = False
-OUTSIDE = re.compile(r"\[([^\]]+)\]\(\.\./([^)#]+)(?:#[^)]*)?\)")
+OUTSIDE = r"\[([^\]]+)\]\({up}([^)#]+)(?:#[^)]*)?\)"
 
 
 def inside_the_site(app: Any, name: str, source: list[str]) -> None:
     """A link that leaves this folder leads to the source tree, which is not on the site: its path is said instead."""
-    source[0] = OUTSIDE.sub(lambda link: f"{link[1]} (`{link[2]}` in the source)", source[0])
+    leaves = OUTSIDE.format(up=re.escape("../" * (name.count("/") + 1)))
+    source[0] = re.sub(leaves, lambda link: f"{link[1]} (`{link[2]}` in the source)", source[0])
 
 
 def draw(app: Any) -> None:
