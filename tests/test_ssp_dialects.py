@@ -221,6 +221,18 @@ def test_the_step_of_omsimulator_counts_and_a_stop_between_steps_is_cut(read) ->
     assert "Its stop of 0.01 s is no whole number of steps; the run ends at 0.009 s." in scenario.description
 
 
+@pytest.mark.parametrize(("stop", "step"), [("1e300", "1e-14"), ("1e11", "1e-9"), ("1e308", "1e-308"), ("1e-300", "1")])
+def test_more_steps_than_can_be_counted_are_a_sentence(read, stop: str, step: str) -> None:
+    oms = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
+    master = (
+        f'<o:SimulationInformation xmlns:o="{oms}"><o:FixedStepMaster stepSize="{step}"/></o:SimulationInformation>'
+    )
+    said = f'<ssd:Annotations><ssc:Annotation type="org.openmodelica">{master}</ssc:Annotation></ssd:Annotations>'
+    inside = system(component("one")).replace("</ssd:System>", said + "</ssd:System>")
+    with pytest.raises(ScenarioError):
+        read(inside, experiment=f'<ssd:DefaultExperiment stopTime="{stop}"/>')
+
+
 def test_an_fmu_without_a_binary_for_this_machine_is_named_by_its_component(
     tiny: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -36,12 +36,12 @@ VERBS = ("demo", "export", "run", "identify", "diagnose", "prove", "paper", "swe
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and leave with its exit code."""
-    end_well()
-    keep_stdout()
     given = list(sys.argv[1:] if arguments is None else arguments)
     debug = "--debug" in given
-    rest = repeated([argument for argument in given if argument != "--debug"])
     try:
+        end_well()
+        keep_stdout()
+        rest = repeated([argument for argument in given if argument != "--debug"])
         application(rest, debug)(rest, prog_name="cosim")
     except KeyboardInterrupt as error:  # while a verb was loaded, or after it had ended
         if debug:

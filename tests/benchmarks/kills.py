@@ -5,7 +5,9 @@
 Each command is run once to its end, and then again and again, ended by SIGKILL, SIGINT or SIGTERM at a moment drawn
 from that time. Afterwards every file under its own name must be whole. After SIGINT and SIGTERM there must be no
 partial file and no temporary folder, and the exit code says how it ended. After SIGKILL nobody is left to tidy up: what
-is partial then is named so, and is counted; the same command, run again, must end well and remove it.
+is partial then is named so, and is counted; the same command, run again, must end well and remove it. Folders for
+temporary files (unpacked FMUs) stay where SIGKILL came. Before its first line of ours Python answers SIGINT with a
+traceback of its own and exit code 1: such a wrong code without a traceback of ours is Python's.
 """
 
 import argparse
@@ -173,6 +175,8 @@ def page(found: dict[tuple[str, str], Counts], undone: dict[str, int], command: 
             f"| {name} | {how} | {one.trials} | " + " | ".join(str(one.found[key]) for key in COUNTED) + " |"
             for (name, how), one in found.items()
         ),
+        "",
+        "Where there are fewer trials than asked for, that part was run with fewer.",
         "",
         "Run again after the last SIGKILL, what was wrong: "
         + ", ".join(f"{name} {count}" for name, count in undone.items())

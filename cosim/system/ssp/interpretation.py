@@ -16,6 +16,7 @@ from cosim.fmi.description import check_binary, describe
 from cosim.fmi.settings import STRUCTURAL
 from cosim.fmi.variables import ports_of
 from cosim.support.errors import FmuError, UnitError
+from cosim.support.numbers import COUNT
 from cosim.support.units import unit
 from cosim.system.ssp.archive import child, children
 from cosim.system.ssp.parameters import Setting, Values, given, settings_of
@@ -222,6 +223,8 @@ def _whole(stop: float, step: float) -> tuple[float, float]:
     if step >= stop:
         return stop, stop
     steps = stop / step
+    if steps > COUNT:
+        return stop, step  # which the scenario refuses
     return (stop if abs(steps - round(steps)) <= 1e-6 * steps else floor(steps) * step), step
 
 
