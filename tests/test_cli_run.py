@@ -15,7 +15,7 @@ from test_scenario import TEXT
 from tiny_fmu import tiny
 
 import cosim.models.cache
-from cosim.cli import main
+from cosim.cli import guarded, main
 from cosim.data.recording import Recording
 
 __all__ = ["tiny"]
@@ -295,3 +295,13 @@ def test_a_signal_that_comes_before_a_verb_begins_is_told_by_the_exit_code(
         for one, handler in before.items():
             signal.signal(one, handler)
     assert "cosim: terminated" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("cause", "code"), [(KeyboardInterrupt(), 130), (ValueError(), None)])
+def test_a_signal_while_a_c_extension_is_loaded_is_an_interrupt(cause: BaseException, code: int | None) -> None:
+    def verb() -> None:
+        raise ImportError("initialization failed") from cause
+
+    with pytest.raises(ImportError if code is None else SystemExit) as ended:
+        guarded(verb, False)()
+    assert getattr(ended.value, "code", None) == code

@@ -123,6 +123,10 @@ def guarded(verb: Callable[..., Any], debug: bool) -> Callable[..., Any]:
             if debug:
                 raise
             leave(error)
+        except ImportError as error:  # what a C extension makes of a signal while it is loaded
+            if debug or not isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+                raise
+            leave(Terminated() if is_terminated() else KeyboardInterrupt())
 
     return call
 
