@@ -11,7 +11,7 @@ from cosim.support.terminal import put, put_json, say, stage
 
 def paper(
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for tables and figures.")],
-    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Seeds for the conditions with noise.")] = 20,
+    seeds: Annotated[int, typer.Option("--seeds", min=1, help="Seeds for the conditions with noise.", max=10_000)] = 20,
     seed: Annotated[int, typer.Option("--seed", min=0, help="The first seed.")] = 1000,
     full: Annotated[
         bool, typer.Option("--full", help="Compare better controllers too: ten minutes on two cores.")
