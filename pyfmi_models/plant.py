@@ -92,8 +92,12 @@ def _accelerations(
     near = this.inertia(inertia, motion, own)
     bodies[axis] = (near, push - _change(this, near, motion) * motion.v)
     found = [torque / inertia for inertia, torque in bodies]
-    rates = {name: ca.vertcat(own[name][1], found[k] - found[k + 1]) for k, name in enumerate(names)}
-    return found[axis], rates
+    rates = {name: [own[name][1], found[k] - found[k + 1]] for k, name in enumerate(names)}
+    speed = motion.v
+    for name, coupling in this.trailing():
+        speed = speed - own[name][1]
+        rates[name] += coupling.further_rates(speed, own[name])
+    return found[axis], {name: ca.vertcat(*rate) for name, rate in rates.items()}
 
 
 def _motors(this: Assembly, push: Scalar, own: Mapping[str, Any]) -> tuple[list[Body], Scalar, Scalar]:
@@ -116,7 +120,7 @@ def _behind(this: Assembly, motion: Motion, inertia: Scalar, push: Scalar, own: 
         passed = coupling.torque(twist, rate, far)
         bodies.append((inertia - far, push - passed))
         speed = speed - rate
-        inertia, push = far, passed - coupling.drag(speed)
+        inertia, push = far, passed - coupling.drag(speed, own[name])
     return [*bodies, (inertia, push)]
 
 

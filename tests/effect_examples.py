@@ -34,7 +34,7 @@ NUMBERS: dict[str, dict[str, Any]] = {
     "LoadSideCompliance": {"resonance_hz": 60.0, "encoder_share": 0.6},
     "ActuatorLag": {"time_constant_ms": 4.0},
     "Delay": {"delay_ms": 4.0},
-    "Backlash": {"gap_rad": 1e-2, "load_friction": 0.1},
+    "Backlash": {"gap_rad": 1e-2, "load_friction": 0.1, "load_deflection": 1e-3},
     "EncoderEccentricity": {"cycles_per_rev": 8, "amplitude_rad": 1e-3, "phase": 0.3, "second": 0.2},
     "QuadraticDrag": {"coefficient": 2.0},
     "CableWrap": {"stiffness": 3.0, "home": 0.2, "hardening": 0.5},

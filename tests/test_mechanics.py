@@ -1,5 +1,7 @@
 """Axes that are not rigid, and inertia that changes: Newton for every body, no energy from nowhere."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from effect_examples import INERTIA, evaluate, linear, mount, response, simulate
@@ -97,6 +99,15 @@ def test_inside_the_gap_no_torque_passes(twist: float, rate: float) -> None:
     found = evaluate(mount(PLAY, friction=FREE).model(), tau=1.0, **{"backlash.twist": twist})
     assert found["der(speed)"] == pytest.approx(1.0 / (0.6 * INERTIA))  # only the near part is felt
     assert found["der(backlash.twist_rate)"] == found["der(speed)"]  # and the far part stays as it is
+
+
+def test_the_friction_of_a_far_side_is_a_bristle() -> None:
+    play = replace(PLAY, load_friction=0.3, load_viscous=0.5, load_deflection=1e-4)
+    at = {"speed": 0.1, "backlash.twist_rate": 0.3, "backlash.bristle": 5e-5}  # it goes backwards, bent forwards
+    found = evaluate(mount(play, friction=FREE).model(), **at)
+    assert found["der(backlash.bristle)"] == pytest.approx(-0.2 - 0.2 * 0.5)
+    far = found["der(speed)"] - found["der(backlash.twist_rate)"]
+    assert far * 0.4 * INERTIA == pytest.approx(-(0.3 * 0.5 - 0.5 * 0.2))
 
 
 @pytest.mark.parametrize("rate", [-10.0, -0.1, 0.0, 0.1, 10.0])

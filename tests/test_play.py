@@ -35,6 +35,14 @@ def test_pushed_on_for_long_the_far_side_follows_and_needs_its_inertia_and_its_f
     np.testing.assert_allclose(passed[-500:], side * (FAR * 0.4 + 0.3 + 0.5 * 0.4 * t[-500:]), rtol=0.01)
 
 
+def test_a_far_side_bends_its_friction_before_it_slides() -> None:
+    """Pushed slowly over twice the deflection it takes `F (1 - exp(-x / deflection))`, and a little to be pressed."""
+    play = Backlash(gap_rad=0.0, load_friction=0.3, load_deflection=1e-3)
+    x = 1e-4 * DT * np.arange(20000)
+    passed = torque(play, np.full_like(x, 1e-4))
+    np.testing.assert_allclose(passed[2000:], 0.3 * (1 - np.exp(-x[2000:] / 1e-3)), atol=3e-3)
+
+
 def test_a_near_side_that_stops_is_left_for_as_long_as_the_gap_is_wide() -> None:
     """At rest from 1 s on, it is left with 0.1 rad/s; friction takes 0.05 rad/s2, so 20 mrad are crossed in 212 ms."""
     t = DT * np.arange(3000)

@@ -96,7 +96,13 @@ class Gain:
         return min(self.plain, self.protocol) >= policy.halved and self.nats > -policy.floor
 
     def raises(self, policy: Policy) -> bool:
-        """Whether the plain error is raised, in both bands or by much in one."""
+        """Whether the plain error is raised, in both bands or by much in one.
+
+        What surely predicts and halves the error that is printed may raise it in the narrower band: a bristle at rest
+        creeps with each vibration that a filter leaves, the less of them the more a model keeps of a wrong torque.
+        """
+        if self.protocol >= policy.halved and self.nats >= policy.sure_predicted:
+            return False
         return max(self.plain, self.protocol) < 0 or min(self.plain, self.protocol) < -policy.most_raised
 
 
@@ -127,9 +133,15 @@ def is_left(effects: Sequence[EffectScores], residual: ResidualScores, policy: P
 
 def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:
     """Whether what the residual follows is more than a friction law's misfit: sure, or held out as well as trained."""
-    sure = term.share >= -policy.contradicted or term.evidence >= policy.sure_floor
     there = term.evidence >= policy.least_followed and term.share >= policy.follows
-    return term.evidence >= least and (there or (term.evidence >= policy.floor and sure))
+    return term.evidence >= least and (there or term.evidence >= _floor_of(term, policy))
+
+
+def _floor_of(term: TermScores, policy: Policy) -> float:
+    """Evidence that a term must have: the less, the more the held-out recordings agree."""
+    if term.share < -policy.contradicted or term.predicted < -policy.denied * term.evidence:
+        return policy.sure_floor
+    return policy.floor if term.share >= policy.supported else policy.floor_alone
 
 
 def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:

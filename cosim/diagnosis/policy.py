@@ -71,10 +71,18 @@ class Policy:
     """Energy that an effect must remove, relative to what the base leaves: less may be the form of another effect.
     Unit: 1."""
     floor: float = 26.0
-    """Evidence of a flexible term that no misfit of a friction law reaches ... Unit: nats."""
+    """Evidence of a flexible term that no misfit of a friction law reaches and held-out recordings support ... Unit:
+    nats."""
+    supported: float = 0.05
+    """... by this share of the held-out residual that it predicts. Unit: 1 ..."""
+    floor_alone: float = 40.0
+    """... or that has this evidence, and they do not contradict it. Unit: nats. A level that wanders follows anything
+    slow by chance: nulls have 36 to 49 ..."""
     contradicted: float = 0.05
-    """... if it does not add more than this share to the held-out residual. Unit: 1. A level that wanders follows
-    anything slow by chance: of four nulls with 31 to 77 nats two added .7 and 10 ..."""
+    """... by this share that it adds to the held-out residual, Unit: 1 ..."""
+    denied: float = 5.0
+    """... or by so many times the evidence there against it. Unit: 1. Of seven nulls with 31 to 77 nats two added .7
+    and 10 to the residual, two lost 7 and 8 times as much; where something is missing it was 3 times at most ..."""
     sure_floor: float = 100.0
     """... or that none reaches whatever held-out recordings say, where a motion of another kind may hide it. Unit:
     nats ..."""

@@ -34,9 +34,11 @@ def revived(problem: Problem, found: Fit, start: Effect) -> Fit:
     return min((found, other), key=problem.error)
 
 
-def refound(problem: Problem, found: Fit, evidence: Callable[[Fit], float], others: Sequence[Effect]) -> Fit:
+def refound(
+    problem: Problem, found: Fit, evidence: Callable[[Fit], float], others: Sequence[Effect], steps: int = 12
+) -> Fit:
     """The best of a fit and those from other starts: a start is known to an order of magnitude at most."""
-    tried = [problem.fit(replace(found.mount, effects=(*found.mount.effects[:-1], one)), 12) for one in others]
+    tried = [problem.fit(replace(found.mount, effects=(*found.mount.effects[:-1], one)), steps) for one in others]
     return max((found, *tried), key=evidence)
 
 

@@ -27,7 +27,7 @@ def stepped_torque(coupling: Coupling, far: float, v: Array, a: Array, dt: float
     numbers = np.array([far, *(getattr(coupling, name) for name in fields_of(coupling))])
     columns = np.vstack([v[:-1], v[1:], np.full(len(v) - 1, dt)])
     kind: Any = type(coupling)
-    passed = _walk(kind, fields_of(coupling))(columns, numbers)[2]
+    passed = _walk(kind, fields_of(coupling))(columns, numbers)[-1]
     # A step's torque is that of its middle: a row has half of the step before it and half of the one after it.
     return np.asarray((passed + np.append(passed[1:], passed[-1])) / 2 - far * a)
 
@@ -51,9 +51,11 @@ def _searched(piece: Piece, gap: float, slowing: float, ratio: float) -> Array:
 
 @cache
 def _walk(kind: type[Coupling], names: tuple[str, ...]) -> Stepwise:
-    """Twist, its rate and the torque passed on, from speeds before and after each step and dt."""
-    state, column, numbers = ca.SX.sym("state", 3), ca.SX.sym("column", 3), ca.SX.sym("numbers", 1 + len(names))
+    """The states and the torque passed on, from speeds before and after each step and dt."""
+    column, numbers = ca.SX.sym("column", 3), ca.SX.sym("numbers", 1 + len(names))
     play = kind(**{name: numbers[1 + k] for k, name in enumerate(names)})
+    state = ca.SX.sym("state", len(play.states()) + 1)  # the torque passed on comes last, and nothing follows from it
     before, after, dt = ca.vertsplit(column)
-    twist, speed, torque = play.advance(state[0], before - state[1], after, dt, numbers[0])
-    return Stepwise(state, column, numbers, ca.vertcat(twist, after - speed, torque))
+    twist, rate, *further = ca.vertsplit(state)[:-1]
+    twist, speed, *others = play.advance(twist, before - rate, further, after, dt, numbers[0])
+    return Stepwise(state, column, numbers, ca.vertcat(twist, after - speed, *others))

@@ -16,7 +16,7 @@ a reading:
 Signs: an effect torque resists, J q'' = tau - tau_f - loads - effects. Effects of one place act in the card's order.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
@@ -222,9 +222,13 @@ class Coupling(Effect):
         """Torque passed on to the far side [N m], whose inertia is `far` [kg m2]."""
         raise TypeError(f"{type(self).__name__} has no torque")
 
-    def drag(self, speed: Scalar) -> Scalar:
-        """Friction torque on the far side [N m] at its speed, resists."""
+    def drag(self, speed: Scalar, state: Any) -> Scalar:
+        """Friction torque on the far side [N m] at its speed, resists; `state` as `states` lists it."""
         return 0 * speed
+
+    def further_rates(self, speed: Scalar, state: Any) -> tuple[Scalar, ...]:
+        """Rates of the states beyond the twist and its rate, the far side moving at `speed`."""
+        return ()
 
     def carried(self, omega: npt.NDArray[np.float64]) -> npt.NDArray[np.complex128] | None:
         """Acceleration of the far mass per near acceleration at angular frequencies omega [rad/s]; 1 where it is rigid.
@@ -233,8 +237,10 @@ class Coupling(Effect):
         """
         return None
 
-    def advance(self, twist: Scalar, far_speed: Scalar, speed: Scalar, dt: Scalar, far: Scalar) -> tuple[Scalar, ...]:
-        """Twist, speed of the far side and torque passed on [N m] after dt, the near side moving at `speed`."""
+    def advance(
+        self, twist: Scalar, far_speed: Scalar, further: Sequence[Scalar], speed: Scalar, dt: Scalar, far: Scalar
+    ) -> tuple[Scalar, ...]:
+        """Twist, speed of the far side, further states, torque passed on [N m] after dt, the near at `speed`."""
         raise TypeError(f"{type(self).__name__} has no advance")
 
 

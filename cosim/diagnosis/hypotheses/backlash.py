@@ -2,15 +2,18 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from cosim.diagnosis.candidates import Candidate, Span, has, of_both_ways
-from cosim.diagnosis.hypotheses.base import Hypothesis, Reach, Seen, with_numbers
+from cosim.diagnosis.hypotheses.base import Evidence, Hypothesis, Reach, Seen, with_numbers
 from cosim.diagnosis.result import Where
+from cosim.diagnosis.tuning import refound
+from cosim.estimation.fit import Fit
 from cosim.estimation.play import far_torques
 from cosim.estimation.prepare import Array
+from cosim.estimation.problem import Problem
 from cosim.support.statistics import rms
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.backlash import Backlash
@@ -18,6 +21,8 @@ from pyfmi_models.mount import Mount
 
 SHARE = 0.3
 """Share of the inertia that is behind the play of a middling candidate."""
+LEAST_SHARE = 0.03
+"""Share of the inertia below which nothing is driven through the play. In nulls it was .02 at most, true ones .2."""
 GAPS = np.geomspace(1e-4, 1e-2, 10)
 """Gaps that are looked at, relative to the motion ..."""
 COASTING = np.geomspace(0.03, 1.0, 11)
@@ -25,6 +30,8 @@ COASTING = np.geomspace(0.03, 1.0, 11)
 that slows down more than the near one never leaves its flank."""
 PROPORTIONAL = ("load_share", "load_friction", "load_viscous")
 """Numbers of a play that its torque is proportional to: the motion of the far side stays."""
+AROUND = (0.5, 1.0, 2.0)
+"""Gaps from which a fit goes on, relative to the one that it found."""
 BEST = 4
 """Plays on that grid that become candidates."""
 
@@ -36,6 +43,7 @@ class Play(Hypothesis[Backlash]):
     """Plays of a grid that look most like the residual; it is fine, as what happens in a gap happens or does not."""
 
     forms = (Backlash,)
+    is_common_misfit: ClassVar[bool] = True
     easiest: ClassVar[int] = 1
     rank: ClassVar[float] = 21
     view = "since reversal"
@@ -44,8 +52,10 @@ class Play(Hypothesis[Backlash]):
         """The best of the grid."""
         if has(mount, Backlash):
             return
-        level, viscous = (of_both_ways(getattr(mount.friction, name, None)) for name in ("Fc", "sigma2"))
-        ratio = float(f"{viscous / level:.1g}") if level else 0.0
+        law = {name: of_both_ways(getattr(mount.friction, name, None)) for name in ("Fc", "Fs", "sigma2", "sigma0")}
+        level = max(law["Fc"], law["Fs"])  # a refitted law may put all of it in the break-away level
+        ratio = float(f"{law['sigma2'] / level:.1g}") if level else 0.0
+        bent = {"load_deflection": float(f"{level / law['sigma0']:.1g}")} if law["sigma0"] and level else {}
         size = rms(span.prepared.stacked("a"))
         numbers = [(float(gap) * span.reach, float(slowing) * size) for gap in GAPS for slowing in COASTING]
         columns = far_torques(span.prepared, tuple(numbers), ratio)
@@ -53,7 +63,7 @@ class Play(Hypothesis[Backlash]):
             gap, slowing = numbers[index]
             far = SHARE * float(mount.axis.inertia)
             middling = Backlash(
-                gap_rad=gap, load_share=SHARE, load_friction=far * slowing, load_viscous=far * slowing * ratio
+                gap_rad=gap, load_share=SHARE, load_friction=far * slowing, load_viscous=far * slowing * ratio, **bent
             )
 
             def start(c: Array, middling: Backlash = middling) -> Effect:
@@ -61,6 +71,15 @@ class Play(Hypothesis[Backlash]):
                 return replace(middling, **{name: times * getattr(middling, name) for name in PROPORTIONAL})
 
             yield Candidate("backlash", (middling,), (), start)
+
+    def tuned(self, problem: Problem, found: Fit, start: Backlash, evidence: Evidence) -> Fit:
+        """Go on from gaps around the one that was found: whether a flank is met jumps with the gap."""
+        play: Any = found.mount.effects[-1]
+        return refound(problem, found, evidence, [replace(play, gap_rad=times * play.gap_rad) for times in AROUND], 25)
+
+    def is_degenerate(self, problem: Problem, effect: Backlash) -> bool:
+        """With hardly anything behind it the play is one more bristle of the friction."""
+        return bool(effect.load_share < LEAST_SHARE)
 
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """Gaps all over the range, with what stops the far side as the likeliest candidate has it."""

@@ -2,11 +2,14 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
+from math import inf
 from typing import ClassVar
 
 from cosim.diagnosis.candidates import Candidate, Span, contact_level, has
 from cosim.diagnosis.hypotheses.base import Hypothesis
+from cosim.diagnosis.policy import POLICY
 from cosim.estimation.prepare import Array
+from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.dwell_breakaway import DwellBreakaway
 from pyfmi_models.mount import Mount
@@ -19,6 +22,15 @@ class Settling(Hypothesis[DwellBreakaway]):
     member: ClassVar[str] = "memory_rad"
     rank: ClassVar[float] = 6
     view = "rest before a start"
+
+    def is_degenerate(self, problem: Problem, effect: DwellBreakaway) -> bool:
+        """What a friction level wanders by, whatever rest was before, is no settling; nor is what no slip renews.
+
+        A contact that bends before it slides is not renewed while it bends.
+        """
+        level = contact_level(problem.mount)
+        bent = level / float(getattr(problem.mount.friction, "sigma0", inf))
+        return bool(effect.torque_per_efold < POLICY.wander_prior * level or effect.memory_rad < bent)
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Ages of the contact that a small or a larger slip renews."""
