@@ -85,12 +85,15 @@ def test_nothing_is_unknown_where_nothing_is_left_and_what_is_left_says_what_it_
 
 
 def test_what_the_held_out_recordings_contradict_is_unknown_only_where_training_is_sure() -> None:
-    def is_unknown(evidence: float, share: float) -> bool:
-        term = TermScores("temperature", evidence, 0.0, share)
+    def is_unknown(evidence: float, share: float, predicted: float = 0.0) -> bool:
+        term = TermScores("temperature", evidence, predicted, share)
         return decide([], ResidualScores(0.0, 0.0, [term]), POLICY).is_unknown
 
-    assert not is_unknown(POLICY.floor + 5, -2 * POLICY.contradicted)
-    assert is_unknown(POLICY.floor + 5, 0.0)
+    assert not is_unknown(POLICY.floor_alone + 5, -2 * POLICY.contradicted)
+    assert not is_unknown(POLICY.floor_alone + 5, 0.0, -2 * POLICY.denied * POLICY.floor_alone)
+    assert is_unknown(POLICY.floor_alone + 5, 0.0)
+    assert not is_unknown(POLICY.floor + 5, 0.0)
+    assert is_unknown(POLICY.floor + 5, 2 * POLICY.supported)
     assert is_unknown(POLICY.sure_floor, -2 * POLICY.contradicted)
     assert is_unknown(POLICY.least_followed, POLICY.follows)
     assert not is_unknown(POLICY.least_followed, POLICY.follows / 2)

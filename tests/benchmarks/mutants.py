@@ -153,13 +153,18 @@ def _tested(tree: Path, name: str, said: Path) -> int:
     os.setsid()
     os.chdir(tree)
     os.environ |= {"PYTHONPATH": str(tree), "OMP_NUM_THREADS": "1"}
-    sys.path[:] = [str(tree), *(one for one in sys.path if not one.startswith(str(HOME) + os.sep) and one != str(HOME))]
+    sys.path[:] = [str(tree), *(one for one in sys.path if not _is_of_home(one))]
     for module in [one for one in sys.modules if one.split(".")[0] in OURS]:
         del sys.modules[module]
     with said.open("w") as file:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
     return int(pytest.main(["-n0", "-x", "-q", "-p", "no:cacheprovider", f"tests/{name}"]))
+
+
+def _is_of_home(folder: str) -> bool:
+    """Whether modules there are the tree's that errors are planted in a copy of; a virtual environment may lie in it."""
+    return (folder == str(HOME) or folder.startswith(str(HOME) + os.sep)) and not folder.startswith(sys.prefix + os.sep)
 
 
 def attempt(tree: Path, group: str, path: Path, site: int) -> Tried:
