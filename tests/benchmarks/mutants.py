@@ -163,7 +163,7 @@ def _tested(tree: Path, name: str, said: Path) -> int:
 
 
 def _is_of_home(folder: str) -> bool:
-    """Whether modules there are the tree's that errors are planted in a copy of; a virtual environment may lie in it."""
+    """Whether modules there are those of which a copy is changed; a virtual environment may lie in their tree."""
     return (folder == str(HOME) or folder.startswith(str(HOME) + os.sep)) and not folder.startswith(sys.prefix + os.sep)
 
 
