@@ -27,6 +27,8 @@ from cosim.support.statistics import column_rms, rms
 
 DRAWS = 199
 """Nulls; the smallest p that can be told is one in 200."""
+LEAST_SIZE = 1e-100
+"""Size of a column that is nothing, for which any coefficient would do."""
 ALPHA = 0.05
 """Share of the nulls above the threshold that is told."""
 
@@ -92,10 +94,11 @@ class Scores:
         towards = self._tests.T @ residuals
         best = np.full(residuals.shape[1], -np.inf)
         for place, prior, price in self._groups:
-            normal = self._gram[np.ix_(place, place)] + np.diag(1 / prior**2)
-            z = towards[place]
-            log_normal = np.linalg.slogdet(normal * np.outer(prior, prior))[1]
-            score = 0.5 * (np.einsum("ij,ij->j", z, np.linalg.solve(normal, z)) - log_normal) - price
+            # In units of the prior; no energy is below nothing: of a column that is known, rounding is left.
+            energy, axes = np.linalg.eigh(self._gram[np.ix_(place, place)] * np.outer(prior, prior))
+            odds = 1 + np.maximum(energy, 0)
+            z = axes.T @ (prior[:, None] * towards[place])
+            score = 0.5 * (np.sum(z**2 / odds[:, None], axis=0) - np.sum(np.log(odds))) - price
             best = np.maximum(best, score)
         return best
 
@@ -106,6 +109,6 @@ def _groups(tried: Sequence[Candidate], columns: Sequence[Array], torque: float)
     first = 0
     for one, own, form in zip(tried, columns, forms, strict=True):
         size = column_rms(own)
-        prior = np.ones(own.shape[1]) if one.finite else 0.5 * torque / size
+        prior = np.ones(own.shape[1]) if one.finite else 0.5 * torque / np.maximum(size, LEAST_SIZE)
         yield np.arange(first, first + own.shape[1]), prior, log(forms.count(form))
         first += own.shape[1]
