@@ -79,8 +79,14 @@ def parts(extra: Extra) -> tuple[Comparison, Fit, Predictive]:
 
 
 @cache
-def learned(extra: Extra) -> Learned | None:
+def tried(extra: Extra) -> Learned | None:
     return learn(*parts(extra))
+
+
+def learned(extra: Extra) -> Learned | None:
+    """What is delivered."""
+    found = tried(extra)
+    return found if found and found.helps else None
 
 
 @pytest.mark.parametrize(
@@ -117,7 +123,10 @@ def test_no_recording_is_worse_off_than_before() -> None:
     comparison, base, _ = parts(iron)
     there = [recording(iron, 3), recording(nothing, 4)]
     held = Predictive.of(comparison, prepare(there, 10.0), base.mount, prepare(there, CUTOFF))
-    assert learn(comparison, base, held) is None
+    found = learn(comparison, base, held)
+    assert found is not None
+    assert not found.helps
+    assert "is not in the model" in found.sentence()
 
 
 def test_columns_of_a_term_are_what_its_coefficients_add() -> None:
@@ -186,6 +195,8 @@ def test_a_diagnosis_says_unknown_delivers_the_term_and_its_card_holds_it(tmp_pa
     said = as_json(outcome.diagnosis)["learned"]
     assert outcome.diagnosis.heldout.after_rms < outcome.diagnosis.heldout.before_rms
     assert said["after"] < 0.5 * said["before"]
+    assert said["after"] == pytest.approx(outcome.diagnosis.heldout.after_rms, rel=1e-9)
+    assert said["cutoff_hz"] == outcome.diagnosis.heldout.cutoff_hz
     assert len(said["table"]) == len(said["range"]) == len(said["quantities"])
     deliver_quickly(outcome, train, there, card, tmp_path, "cosim diagnose")
     back = read_card(tmp_path / "card.toml")

@@ -53,7 +53,7 @@ def deliver_quickly(
     directory(out)
     found, better = _signed(outcome, train, heldout, card, command, base)
     _write_card(better, found, out)
-    improved = Improved(card=CARD) | _proven_range(found) if _adds_physics(found) else Improved()
+    improved = Improved(card=CARD) | _proven_range(found) if found.adds_physics else Improved()
     found = replace(without_files(found), improved=improved, files=(DOCUMENT,))
     _write_json(found, out)
     return found
@@ -89,7 +89,7 @@ def deliver(
     loops.close("before", outcome.refitted.plant())
     found, better = _signed(outcome, train, heldout, card, command, base)
     _write_card(better, found, out)
-    if _adds_physics(found):
+    if found.adds_physics:
         on_progress("building the improved FMU")
         improved = Improved(card=CARD) | _fmus(better, found, out) | _proven_range(found) | more(better, out)
         found = replace(found, improved=improved)
@@ -141,6 +141,7 @@ def as_json(found: Diagnosis) -> JsonObject:
         "intervals": {trace.name: [list(span) for span in trace.intervals] for trace in found.traces},
         "depends_on": list(found.depends_on),
         "learned": found.learned,
+        "not_learned": found.not_learned,
         "data_quality": list(found.data_quality),
         "sanity": [one.as_json() for one in found.sanity],
         "global_test": found.global_test,
@@ -215,10 +216,6 @@ def _heldout(held: HeldOut) -> JsonObject:
     }
 
 
-def _adds_physics(found: Diagnosis) -> bool:
-    return bool(found.in_model or found.learned)
-
-
 def _provenance(train: Sequence[Recording], heldout: Sequence[Recording], card: Card, command: str) -> Provenance:
     recordings: list[Source] = [
         {
@@ -253,7 +250,7 @@ def _origin(found: Diagnosis, provenance: Provenance) -> JsonObject:
 
 
 def _comment(found: Diagnosis) -> str:
-    if not _adds_physics(found):
+    if not found.adds_physics:
         return "The base with its parameters refitted; no physics was added."
     learned = [f"something learned {span}" for span in found.learned.get("range", ())]
     titles = ", ".join([*(finding.title.lower() for finding in found.in_model), *learned])

@@ -14,18 +14,19 @@ from cosim.diagnosis.breakdown import parts
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.decision import Decision, EffectScores, ResidualScores, decide
 from cosim.diagnosis.delivered import standing
+from cosim.diagnosis.entries import NotLearnedEntry
 from cosim.diagnosis.experiment import Experiment, best, told
 from cosim.diagnosis.findings import accepted, rival_finding, standard_errors
 from cosim.diagnosis.flexible import flexible_terms
 from cosim.diagnosis.global_test import global_test
 from cosim.diagnosis.law_selection import proposed_law
-from cosim.diagnosis.learned.learn import Learned, learn
+from cosim.diagnosis.learned.learn import NOTHING_TRIED, Learned, learn
 from cosim.diagnosis.locate import regions
 from cosim.diagnosis.loop_bias import loop_bias
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.proof import Proof, prove
-from cosim.diagnosis.protocol import CUTOFF, Structures, heldout_rms, judge, traces
+from cosim.diagnosis.protocol import CUTOFF, Structures, heldout_rms, judge, judged_band, traces
 from cosim.diagnosis.regression import black_box_rms
 from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
 from cosim.diagnosis.rivals import Examined, examine, explains, margins
@@ -115,7 +116,8 @@ def diagnose(
     examined = examine(comparison, search(comparison, base, on_progress), on_progress)
     on_progress("proving on the recording that was not fitted")
     answer = _answer(comparison, examined, heldout)
-    learned = learn(comparison, answer.chosen, answer.held) if answer.decision.is_unknown else None
+    tried = _learned(answer, heldout) if answer.decision.is_unknown else None
+    learned = tried if tried and tried.helps else None
     model = learned.mount if learned else answer.chosen.mount
     delivered, first = (_improved(card, one) for one in (model, examined.chosen.mount))
     on_model_ready("after", delivered.plant())
@@ -123,6 +125,7 @@ def diagnose(
     described = _with_learned(_described(answer, train, heldout, card.mount.name), answer, learned, train, heldout)
     diagnosis = replace(
         described,
+        not_learned=_not_learned(tried) if answer.decision.is_unknown else {},
         sanity=sanity,
         global_test=global_test(comparison, base).as_json(),
         heldout=replace(
@@ -208,6 +211,21 @@ def _with_learned(
         regions_after=regions(signals, True, problem.mount.motion == "linear"),
         base_parameters=_base_parameters(models),
     )
+
+
+def _learned(answer: Answer, heldout: Sequence[Recording]) -> Learned | None:
+    """What is learned for what has no name, its errors in the band of the headline's."""
+    learned, problem = learn(answer.comparison, answer.chosen, answer.held), answer.comparison.problem
+    if not learned:
+        return None
+    after = learned.mount if learned.helps else answer.chosen.mount
+    models = Structures(problem.mount, answer.base.mount, after)
+    return learned.judged_in(judged_band(heldout, models, problem.prepared.cutoff), answer.chosen.mount)
+
+
+def _not_learned(tried: Learned | None) -> NotLearnedEntry:
+    """What is said of a term that is not delivered, and that there was none; {} of one that is."""
+    return NOTHING_TRIED if not tried else {} if tried.helps else tried.refused()
 
 
 def _experiment(answer: Answer) -> Experiment | None:

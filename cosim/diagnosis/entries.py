@@ -30,9 +30,20 @@ class LearnedEntry(TypedDict, total=False):
     before: float
     after: float
     interval: list[float]
+    cutoff_hz: float
     range: list[str]
     evidence: list[float]
     predicted: list[float]
+    statement: str
+
+
+class NotLearnedEntry(TypedDict, total=False):
+    """The term that was tried for what has no name and that the held-out recordings do not prove, with its errors."""
+
+    quantities: list[str]
+    before: float
+    after: float
+    cutoff_hz: float
     statement: str
 
 

@@ -60,10 +60,7 @@ def judge(recordings: Sequence[Recording], models: Structures, cutoff: float) ->
 
     Where the protocol's band is mostly noise, the band of the analysis (`cutoff`, Hz) is what is judged.
     """
-    both = [
-        [heldout_rms(recordings, one, band) ** 2 for one in (models.before, models.after)] for band in (cutoff, CUTOFF)
-    ]
-    prepared = prepare(recordings, cutoff if is_noise(*both) else CUTOFF)
+    prepared = judged_band(recordings, models, cutoff)
     inside = np.concatenate([piece.inside for piece in prepared.pieces])
     left = {
         name: np.concatenate(residuals(prepared, mount))[inside]
@@ -79,6 +76,14 @@ def judge(recordings: Sequence[Recording], models: Structures, cutoff: float) ->
         sliding=_sliding(recordings, models, cutoff),
         cutoff_hz=prepared.cutoff,
     )
+
+
+def judged_band(recordings: Sequence[Recording], models: Structures, cutoff: float) -> Prepared:
+    """Recordings in the band in which `judge` compares models on them."""
+    both = [
+        [heldout_rms(recordings, one, band) ** 2 for one in (models.before, models.after)] for band in (cutoff, CUTOFF)
+    ]
+    return prepare(recordings, cutoff if is_noise(*both) else CUTOFF)
 
 
 def heldout_rms(recordings: Sequence[Recording], mount: Mount, cutoff: float = CUTOFF) -> float:

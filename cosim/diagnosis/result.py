@@ -12,7 +12,15 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.diagnosis import policy
-from cosim.diagnosis.entries import BiasEntry, Improved, LawProposal, LearnedEntry, NextExperiment, Provenance
+from cosim.diagnosis.entries import (
+    BiasEntry,
+    Improved,
+    LawProposal,
+    LearnedEntry,
+    NextExperiment,
+    NotLearnedEntry,
+    Provenance,
+)
 from cosim.diagnosis.sanity.entry import Sanity
 from pyfmi_models.effects import CATALOGUE, Effect
 
@@ -183,6 +191,8 @@ class Diagnosis:
     depends_on: tuple[str, ...] = ()
     learned: LearnedEntry = field(default_factory=LearnedEntry)
     """The term that was learned for what has no name; {} where there is none or it is not proven."""
+    not_learned: NotLearnedEntry = field(default_factory=NotLearnedEntry)
+    """Where the verdict holds "unknown" and nothing was learned: what was tried, and why it is not in the model."""
     data_quality: tuple[str, ...] = ()
     sanity: tuple[Sanity, ...] = ()
     """Doubts about the recordings themselves, gravest first."""
@@ -203,3 +213,8 @@ class Diagnosis:
     def in_model(self) -> tuple[Finding, ...]:
         """Effects that the delivered model holds: those found, and the first member of each set."""
         return tuple(one for one in self.findings if one.answer in ("found", "ambiguous") and one.where is not None)
+
+    @property
+    def adds_physics(self) -> bool:
+        """Whether the delivered model holds more than the refitted base."""
+        return bool(self.in_model or self.learned)

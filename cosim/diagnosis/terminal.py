@@ -52,7 +52,7 @@ def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -
         [line for block in blocks(diagnosis) for line in _block(block, scales)],
         _goes_with(diagnosis),
         _rest(diagnosis, scales),
-        _wrapped(diagnosis.learned.get("statement", ""), 0),
+        _wrapped(diagnosis.learned.get("statement", "") or diagnosis.not_learned.get("statement", ""), 0),
         _wrapped(law(diagnosis), 0),
         _error(diagnosis, scales),
         _next(diagnosis),
@@ -158,6 +158,7 @@ def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     before, after, noise = (unit.number(x) for x in (held.before_rms, held.after_rms, held.floor_rms))
     added = len({finding.effect for finding in diagnosis.in_model})
     improved = f" with the effect{'s' if added > 1 else ''} {after}," if added else ""
+    improved = f" with what was learned {after}," if diagnosis.learned else improved
     return _wrapped(
         f"Error on the recording not fitted, RMS [{unit.unit}]: refitted {before},{improved} noise {noise}", 0
     )

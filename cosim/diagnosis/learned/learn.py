@@ -11,15 +11,17 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.entries import LearnedEntry
+from cosim.diagnosis.entries import LearnedEntry, NotLearnedEntry
 from cosim.diagnosis.learned.candidate_terms import CandidateTerm, candidate_terms
 from cosim.diagnosis.learned.grams import columns_of, grams_of
+from cosim.diagnosis.learned.partial import partial
 from cosim.diagnosis.learned.select import fitted, path
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.protocol import interval_of, residuals
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
-from cosim.estimation.prepare import Array
+from cosim.estimation.prepare import Array, Prepared
+from cosim.support.plain import JsonObject
 from cosim.support.statistics import rms
 from pyfmi_models.effects.learned import LearnedEffect
 from pyfmi_models.mount import Mount
@@ -34,7 +36,7 @@ MIDDLE = (0.025, 0.975)
 
 @dataclass(frozen=True)
 class Learned:
-    """The delivered model with its learned terms, and what they are worth on the held-out recordings."""
+    """A model with learned terms, and what they are worth on the held-out recordings."""
 
     mount: Mount
     effects: tuple[LearnedEffect, ...]
@@ -45,60 +47,112 @@ class Learned:
     after: float
     interval: tuple[float, float]
     """95 % range of before - after."""
+    cutoff: float
+    """Of the low-pass in front of these errors [Hz]."""
+    helps: bool
+    """Whether the held-out recordings prove it: else it is no part of the delivered model."""
     evidence: tuple[float, ...] = field(default=())
     predicted: tuple[float, ...] = field(default=())
+    data: tuple[JsonObject, ...] = field(default=())
+    """What the training recordings leave without each term, over what it goes over."""
+
+    @property
+    def unit(self) -> str:
+        """Of its errors."""
+        return "N" if self.mount.motion == "linear" else "N·m"
+
+    def judged_in(self, band: Prepared, without: Mount) -> "Learned":
+        """The same with its errors on recordings in another band, in which too it must help."""
+        old, new = (np.concatenate(_left(band, one)) for one in (without, self.mount))
+        interval = interval_of(old, new, band.pieces[0].dt)
+        helps = self.helps and interval[0] > 0
+        told = replace(self, before=rms(old), after=rms(new), interval=interval, cutoff=band.cutoff)
+        return replace(told, helps=helps)
 
     def sentence(self) -> str:
         """Say it to a mechanic."""
-        unit, (low, high) = "N" if self.mount.motion == "linear" else "N·m", self.interval
-        depends = ", and on ".join(self.quantities)
-        error = f"held-out error {self.before:.2g} -> {self.after:.2g} {unit} [less by {low:.2g} to {high:.2g}]"
-        return f"Something that depends on {depends}, {self.size:.2g} {unit}; modelled as a table; {error}."
+        depends, (low, high) = ", and on ".join(self.quantities), self.interval
+        error = f"held-out error {self.before:.2g} -> {self.after:.2g} {self.unit}"
+        if not self.helps:
+            return (
+                f"A table over {depends} was tried for what has no name and is not in the model: {error}, "
+                "not clearly less, or more on one recording."
+            )
+        said = f"Something that depends on {depends}, {self.size:.2g} {self.unit}; modelled as a table"
+        return f"{said}; {error} [less by {low:.2g} to {high:.2g}]."
 
     def as_json(self) -> LearnedEntry:
         """Return what `diagnosis.json` holds under `learned`."""
         linear = self.mount.motion == "linear"
+        tables = [effect.for_reader("N" if linear else "N.m") for effect in self.effects]
         return {
             "quantities": list(self.quantities),
             "size": float(self.size),
-            "table": [effect.for_reader("N" if linear else "N.m") for effect in self.effects],
+            "table": [{**table, "data": one} for table, one in zip(tables, self.data, strict=True)],
             "before": self.before,
             "after": self.after,
             "interval": list(self.interval),
+            "cutoff_hz": self.cutoff,
             "range": [effect.learned_in(linear) for effect in self.effects],
             "evidence": [float(one) for one in self.evidence],
             "predicted": [float(one) for one in self.predicted],
             "statement": self.sentence(),
         }
 
+    def refused(self) -> NotLearnedEntry:
+        """Return what `diagnosis.json` holds under `not_learned`."""
+        return {
+            "quantities": list(self.quantities),
+            "before": self.before,
+            "after": self.after,
+            "cutoff_hz": self.cutoff,
+            "statement": self.sentence(),
+        }
+
+
+NOTHING_TRIED: NotLearnedEntry = {
+    "quantities": [],
+    "statement": "No table over what was recorded predicts what has no name, so none was added to the model.",
+}
+
 
 def learn(comparison: Comparison, found: Fit, held: Predictive) -> Learned | None:
-    """Learn what a structure leaves; None where nothing that was learned is better on the held-out recordings."""
+    """Learn what a structure leaves; None where no term predicts training recordings that were left out.
+
+    Where nothing is better on the held-out recordings, what came nearest is returned, and does not help.
+    """
     tried = [one for one in candidate_terms(found.mount, comparison.problem.prepared) if _is_recorded(one, held)]
     columns = [columns_of(found.mount, one, comparison.problem.prepared) for one in tried]
     chosen = path(grams_of(comparison, found, columns, tried), range(len(tried)))
     best: Learned | None = None
     for count in range(1, len(chosen.order) + 1):
         own = _judged(comparison, found, [tried[k] for k in chosen.order[:count]], held)
-        if own and (best is None or own.after < best.after):
+        if own and (best is None or (not own.helps, own.after) < (not best.helps, best.after)):
             best = replace(own, evidence=chosen.evidence[:count], predicted=chosen.predicted[:count])
-    return replace(best, size=_size(comparison, best)) if best else None
+    return _measured(comparison, best) if best and best.helps else best
+
+
+def _measured(comparison: Comparison, learned: Learned) -> Learned:
+    """Add the size of the terms and the data that they were learned from."""
+    problem, first = comparison.problem, len(learned.mount.effects) - len(learned.effects)
+    rows = [partial(learned.mount, first + k, problem.prepared, problem.weight) for k in range(len(learned.effects))]
+    return replace(learned, size=_size(comparison, learned), data=tuple(one.data() for one in rows))
 
 
 def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], held: Predictive) -> Learned | None:
-    """Fit some terms and ask the held-out recordings; None where they veto."""
+    """Fit some terms and ask the held-out recordings, which may veto; None where no fit breaks no rule."""
     whole, effects = _allowed(comparison, found, terms)
     if not effects:
         return None
-    pairs = list(zip(_left(held, found.mount), _left(held, whole), strict=True))
+    pairs = list(zip(_left(held.protocol, found.mount), _left(held.protocol, whole), strict=True))
     left = [np.concatenate(parts) for parts in zip(*pairs, strict=True)]
     before, after = map(rms, left)
     gain = held.log_likelihood(held.residual(whole)) - held.log_likelihood(held.residual(found.mount))
     worse = any(rms(new) > rms(old) for old, new in pairs)
     interval = interval_of(left[0], left[1], held.protocol.pieces[0].dt)
-    if worse or gain < comparison.policy.least_predicted or after > (1 - LEAST_GAIN) * before or interval[0] <= 0:
-        return None
-    return Learned(whole, effects, tuple(one.name for one in terms), 0.0, before, after, interval)
+    refused = worse or gain < comparison.policy.least_predicted or after > (1 - LEAST_GAIN) * before or interval[0] <= 0
+    names = tuple(one.name for one in terms)
+    return Learned(whole, effects, names, 0.0, before, after, interval, held.protocol.cutoff, not refused)
 
 
 def _allowed(
@@ -115,10 +169,10 @@ def _allowed(
     return found.mount, ()
 
 
-def _left(held: Predictive, mount: Mount) -> list[Array]:
+def _left(held: Prepared, mount: Mount) -> list[Array]:
     """What a model leaves of each held-out recording, by the protocol."""
-    pieces = held.protocol.pieces
-    left = [one[piece.inside] for one, piece in zip(residuals(held.protocol, mount), pieces, strict=True)]
+    pieces = held.pieces
+    left = [one[piece.inside] for one, piece in zip(residuals(held, mount), pieces, strict=True)]
     owners = [piece.recording for piece in pieces]
     return [
         np.concatenate([one for one, own in zip(left, owners, strict=True) if own == number])

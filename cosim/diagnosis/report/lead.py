@@ -88,6 +88,8 @@ def _doubts(found: list[Block]) -> list[str]:
 
 def _written(diagnosis: Diagnosis) -> str:
     """Say that there is no improved model, where there is none."""
+    if diagnosis.learned:
+        return "The improved model holds it as a table: see What has no name."
     return "" if diagnosis.in_model else "No improved model was written."
 
 
@@ -114,8 +116,8 @@ def _unknown(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     own = next((stated(finding) for finding in diagnosis.findings if finding.effect == "unknown"), "")
     others = [f for f in diagnosis.findings if f.effect != "unknown" and f.answer in ("not_seen", "not_proven")]
     none = f"None of the {len(others)} {'other ' if named else ''}known effects that could be tested "
-    none += "explains the rest." if named else "lowers it."
-    numbers = _numbers(diagnosis, scales)
+    none += "explains the rest." if named or diagnosis.learned else "lowers it."
+    numbers = improvement(diagnosis, scales) if diagnosis.learned else _numbers(diagnosis, scales)
     return [*said, *_doubts(found), _either(diagnosis, "The error"), own, numbers, none, _written(diagnosis)]
 
 

@@ -16,6 +16,7 @@ from cosim.diagnosis.report.figures_time import WIDE, overlay, recording
 from cosim.diagnosis.report.figures_where import plane, region, strongest
 from cosim.diagnosis.report.findings import block
 from cosim.diagnosis.report.lead import heading, lead
+from cosim.diagnosis.report.learned import nameless
 from cosim.diagnosis.report.next_experiment import next_experiment
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture
@@ -48,7 +49,7 @@ def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, o
         "unseen": "" if kind == "none" else tables.unseen(diagnosis),
         "proof": proof(diagnosis, rows, scales),
         "parts_table": tables.parts(rows, scales),
-        "added": bool(diagnosis.in_model),
+        "added": diagnosis.adds_physics,
         "with_effects": _with_effects(diagnosis),
         "box": _box(diagnosis, [row.label for row in rows if row.change == "worse"], scales),
         "noun": "torque" if diagnosis.motion == "rotary" else "force",
@@ -74,6 +75,8 @@ def _rate(hertz: float) -> str:
 
 def _with_effects(diagnosis: Diagnosis) -> str:
     held = len({finding.effect for finding in diagnosis.in_model})
+    if diagnosis.learned:
+        return "with what was learned" if not held else "with the effects and what was learned"
     if held and words.verdict(diagnosis) == "either":
         return "with the likeliest cause"
     return {0: "after (nothing added)", 1: "with the effect"}.get(held, f"with the {words.count(held).lower()} effects")
@@ -107,6 +110,7 @@ def _middle(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, 
         "looked": tables.looked(diagnosis, scales),
         "looked_picture": looked_for(diagnosis.findings, diagnosis.ambiguous_with),
         "meanings": words.MEANINGS,
+        "nameless": nameless(diagnosis, scales),
         "unexplained": unexplained(diagnosis, scales),
         "spans": tables.spans(diagnosis),
         "proof_table": tables.proof(diagnosis, scales),
@@ -132,7 +136,7 @@ def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
 def _proof_sentence(diagnosis: Diagnosis, scales: Scales) -> str:
     held, unit = diagnosis.heldout, scales.torque
     kept = f"{held.name} was not used for fitting."
-    if not diagnosis.in_model:
+    if not diagnosis.adds_physics:
         return f"{kept} Nothing was added to the model, so there is no gain to prove."
     low, high = held.confidence_interval
     sure = "" if low > 0 else " That range includes zero: no clear change." if high >= 0 else " It is worse."

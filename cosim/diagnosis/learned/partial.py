@@ -1,0 +1,137 @@
+"""What recordings say about one learned term: the rest that a model leaves without it, over what the term goes over.
+
+    left = tau - needed(without the term) = f g,   g = needed(with a term of one) - needed(without)
+
+f is the term's value, a torque or a relative change of the friction level; of the latter g is the friction itself.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import log
+from typing import Any
+
+import numpy as np
+
+from cosim.estimation.blocks import Blocks
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.prepare import Array, Prepared
+from cosim.support.plain import JsonObject
+from cosim.support.statistics import Z95
+from pyfmi_models.effects.learned import LearnedDrive, LearnedEffect, LearnedFriction, LearnedTorque
+from pyfmi_models.mount import Mount
+from pyfmi_models.waves import INPUT
+
+BINS, COARSE = 24, (12, 5)
+"""Bins over one quantity, and over two."""
+FEWEST = 8
+"""Rows below which a bin says nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Partial:
+    """Kept rows of one term, one value a row."""
+
+    effect: LearnedEffect
+    over: Array
+    """The quantity; of a term that remembers, the torque that it says."""
+    by: Array | None
+    left: Array
+    unit: Array
+    """g of the module."""
+    weight: Array
+    blocks: Blocks
+
+    def data(self) -> JsonObject:
+        """Return the mean of f over bins with its 95 % band; None where a bin holds too few rows."""
+        edges = [_edges(one, count) for one, count in zip(self._quantities(), self._bins(), strict=True)]
+        cell, shape = self._cells(edges)
+        mean, half = self._means(cell, int(np.prod(shape)))
+        told: JsonObject = {"at": _centres(edges[0])}
+        if self.by is not None:
+            told["by_at"] = _centres(edges[1])
+        return {**told, "value": _listed(mean.reshape(shape)), "band": _listed(half.reshape(shape))}
+
+    def _quantities(self) -> tuple[Array, ...]:
+        return (self.over,) if self.by is None else (self.over, self.by)
+
+    def _bins(self) -> tuple[int, ...]:
+        return (BINS,) if self.by is None else COARSE
+
+    def _cells(self, edges: Sequence[Array]) -> tuple[Any, tuple[int, ...]]:
+        shape = tuple(len(one) - 1 for one in edges)
+        places = [
+            np.clip(np.searchsorted(edge, one, "right") - 1, 0, len(edge) - 2)
+            for one, edge in zip(self._quantities(), edges, strict=True)
+        ]
+        return np.ravel_multi_index(places, shape), shape
+
+    def _means(self, cell: Any, many: int) -> tuple[Array, Array]:
+        """Weighted mean of each cell, and its half band from what blocks of rows differ by."""
+        weight = self.weight**2
+        power, rows = np.bincount(cell, weight * self.unit**2, many), np.bincount(cell, minlength=many)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            mean = np.bincount(cell, weight * self.unit * self.left, many) / power
+            mean[(rows < FEWEST) | (power <= 1e-9 * power.max())] = np.nan
+        score = weight * self.unit * (self.left - self.unit * np.nan_to_num(mean)[cell])
+        sums = np.array([np.bincount(cell[own], score[own], many) for own in self.blocks.rows])
+        return mean, np.asarray(Z95 * np.sqrt((sums**2).sum(0)) / np.maximum(power, 1e-300))
+
+
+def partial(mount: Mount, which: int, prepared: Prepared, weight: Array) -> Partial:
+    """Rows of the learned effect number `which` of a mount, beside all its others."""
+    effect = mount.effects[which]
+    assert isinstance(effect, LearnedEffect)
+    without = needed(replace(mount, effects=_but(mount, which)), prepared)
+    one = unit_of(effect)
+    added = needed(replace(mount, effects=_but(mount, which, one or effect)), prepared) - without
+    over, by = _quantity(effect, prepared) if one else (added, None)
+    left, blocks = prepared.stacked("tau") - without, Blocks.of(prepared)
+    return Partial(effect, over, by, left, added if one else np.ones_like(added), weight, blocks)
+
+
+def needed(mount: Mount, prepared: Prepared) -> Array:
+    """Torque that a mount needs at the kept rows."""
+    return stacked(Inverse(mount, ()), prepared.pieces, np.zeros(0))[0]
+
+
+def unit_of(effect: LearnedEffect) -> LearnedEffect | None:
+    """The effect whose value is one everywhere; None of a term that remembers."""
+    count = len(effect.coefficients())
+    if isinstance(effect, LearnedTorque):
+        return replace(effect, torque=(1.0, *[0.0] * (count - 1)))
+    if isinstance(effect, LearnedFriction):
+        return replace(effect, level_change=(log(2.0), *[0.0] * (count - 1)))
+    return replace(effect, missing=(1.0, *[0.0] * (count - 1))) if isinstance(effect, LearnedDrive) else None
+
+
+def _but(mount: Mount, which: int, *instead: LearnedEffect) -> tuple[Any, ...]:
+    return (*mount.effects[:which], *instead, *mount.effects[which + 1 :])
+
+
+def _quantity(effect: LearnedEffect, prepared: Prepared) -> tuple[Array, Array | None]:
+    if isinstance(effect, LearnedDrive):
+        return prepared.stacked("tau"), None
+    assert isinstance(effect, LearnedTorque | LearnedFriction)
+    return _recorded(effect.over, prepared), _recorded(effect.by, prepared) if effect.by else None
+
+
+def _recorded(name: str, prepared: Prepared) -> Array:
+    own = {"position": "q", "speed": "v", "turn": "q"}
+    if name in own:
+        found = prepared.stacked(own[name])
+        return np.mod(found + np.pi, 2 * np.pi) - np.pi if name == "turn" else found
+    return np.concatenate([piece.extras[name.removeprefix(INPUT)][piece.kept] for piece in prepared.pieces])
+
+
+def _edges(values: Array, count: int) -> Array:
+    low, high = float(values.min()), float(values.max())
+    return np.linspace(low, high if high > low else low + 1.0, count + 1)
+
+
+def _centres(edges: Array) -> list[Any]:
+    return [float(one) for one in (edges[1:] + edges[:-1]) / 2]
+
+
+def _listed(values: Array) -> list[Any]:
+    """Numbers of JSON, which has no NaN; a band of nothing stays a number nobody reads."""
+    return [_listed(one) if one.ndim else (float(one) if np.isfinite(one) else None) for one in values]
