@@ -25,8 +25,7 @@ from cosim.estimation.row_weights import described_rows
 from cosim.estimation.spectrum import Spectrum
 from cosim.estimation.tonal_disturbance import Tone, in_phase, phases_of
 from pyfmi_models.effects import ClockEffect, DriveEffect, Effect
-from pyfmi_models.effects.base import Transmission
-from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
+from pyfmi_models.effects.base import TonalEffect, Transmission
 from pyfmi_models.model import with_symbols
 from pyfmi_models.mount import Mount
 
@@ -241,7 +240,7 @@ class Inverse:
 
     def _with_tones(self, piece: Piece, columns: Array, full: Array) -> Array:
         """Add what shakes the axis, in the phase that the torque recorded in this piece tells, and its derivatives."""
-        prefixes = self._parts(PeriodicDisturbance)
+        prefixes = self._parts(TonalEffect)
         if not prefixes:
             return columns
         residual, rows = piece.tau - columns[:, 0], self._telling(piece)
@@ -253,8 +252,8 @@ class Inverse:
 
     def _tones(self, full: Array) -> list[Tone]:
         """What shakes the axis, as the torque in front of the drive shows it."""
-        parts = [self._set(prefix, full) for prefix in self._parts(PeriodicDisturbance)]
-        return [Tone(one.frequency_hz, one.amplitude / abs(self._drive(full, one.frequency_hz))) for one in parts]
+        waves = [self._set(prefix, full).wave() for prefix in self._parts(TonalEffect)]
+        return [Tone(hertz, amplitude / abs(self._drive(full, hertz))) for hertz, amplitude in waves]
 
     def _drive(self, full: Array, hertz: float) -> complex:
         """Response of the drive, from command to the torque on the axis, at one frequency."""

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.estimation.prepare import Array, Piece, Prepared, gain
-from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
+from pyfmi_models.effects.base import TonalEffect
 from pyfmi_models.mount import Mount
 
 LEAST_WAVES = 6
@@ -23,13 +23,13 @@ Rows = npt.NDArray[np.bool_]
 
 def without_tones(mount: Mount) -> Mount:
     """The mount without what shakes it in time."""
-    rest = tuple(effect for effect in mount.effects if not isinstance(effect, PeriodicDisturbance))
+    rest = tuple(effect for effect in mount.effects if not isinstance(effect, TonalEffect))
     return mount if len(rest) == len(mount.effects) else replace(mount, effects=rest)
 
 
 def phases_of(mount: Mount) -> tuple[str, ...]:
     """Names of the phases that are each recording's own."""
-    return tuple(f"{name}.phase" for name, _ in mount.of_kind(PeriodicDisturbance))
+    return tuple(f"{name}.{effect.own_phase}" for name, effect in mount.of_kind(TonalEffect))
 
 
 def detectable_band(prepared: Prepared) -> tuple[float, float]:

@@ -78,7 +78,7 @@ def _ignore(done: int, of: int) -> None:
 
 
 @dataclass(frozen=True)
-class Place:
+class Call:
     """Where a process is: in which call of which component, or in none; at which tick."""
 
     component: str
@@ -86,7 +86,7 @@ class Place:
     tick: int
 
     @classmethod
-    def of(cls, board: Board) -> "Place":
+    def of(cls, board: Board) -> "Call":
         """Read it from the board of a process."""
         loop = board.read_loop(CLoop)
         component, what = board.work
@@ -107,28 +107,28 @@ class Watch:
 
     def __init__(self, board: Board, step: float, limit: float, clock: Callable[[], float] = monotonic) -> None:
         self._board, self._step, self._limit, self._clock = board, step, limit, clock
-        self._place, self._since = Place.of(board), clock()
+        self._call, self._since = Call.of(board), clock()
 
     def overdue(self) -> str:
         """Say that the component being called has not returned in time; empty as long as it may."""
-        place, now = Place.of(self._board), self._clock()
-        if place != self._place or not place.component:
-            self._place, self._since = place, now
+        call, now = Call.of(self._board), self._clock()
+        if call != self._call or not call.component:
+            self._call, self._since = call, now
         return "a call did not return" if now - self._since > self._limit else ""
 
     def error(self, loss: LostError, scenario: Scenario) -> LostComponentError:
         """Say in a sentence what became of the process."""
-        place = Place.of(self._board)
-        section = scenario.components.get(place.component)
+        call = Call.of(self._board)
+        section = scenario.components.get(call.component)
         source = (section.fmu or section.python) if section else None
-        who = f"{place.component} ({source})" if source else place.component or "The process of the run"
-        when = f" at tick {place.tick:,} ({place.tick * self._step:.9g} s)" if place.what == "stepped" else ""
-        where = f" while it was {place.what}{when}" if place.component else ""
+        who = f"{call.component} ({source})" if source else call.component or "The process of the run"
+        when = f" at tick {call.tick:,} ({call.tick * self._step:.9g} s)" if call.what == "stepped" else ""
+        where = f" while it was {call.what}{when}" if call.component else ""
         if loss.status == "timeout":
             message = f"{who} did not return within {self._limit:g} s{where}; --call-timeout lets it take longer."
         else:
             message = f"{who} {_end(loss.code)}{where}; a component must return from its calls."
-        return LostComponentError(f"{message} Nothing was recorded.", component=place.component, reason=str(loss))
+        return LostComponentError(f"{message} Nothing was recorded.", component=call.component, reason=str(loss))
 
 
 def _end(code: int) -> str:

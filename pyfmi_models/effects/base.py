@@ -6,7 +6,8 @@ a reading:
 
     DriveEffect      torque path: between commanded and applied torque
     FrictionEffect   on the contact, the level or the viscous part of friction
-    LoadEffect       a torque that resists, beside friction; a PayloadEffect also presses on the bearings
+    LoadEffect       a torque that resists, beside friction; a PayloadEffect also presses on the bearings,
+                     a TonalEffect is a wave in time
     InertiaEffect    on the inertia
     Coupling         splits the inertia in two, with something between that is not rigid
     Transmission     a coupling in front of the axis: only the drive is on its other side
@@ -180,6 +181,18 @@ class LoadEffect(MotionEffect):
 @dataclass(frozen=True, kw_only=True)
 class PayloadEffect(LoadEffect):
     """A weight on the axis: beside its torque it presses on the bearings, which friction may feel."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class TonalEffect(LoadEffect):
+    """A wave in time that knows nothing of the axis: each recording begins at another moment of it."""
+
+    own_phase: ClassVar[str]
+    """The parameter [rad] that is each recording's own, where the others are the mount's."""
+
+    def wave(self) -> tuple[Any, Any]:
+        """Frequency [Hz] and half the peak-to-peak torque [N m]."""
+        raise TypeError(f"{type(self).__name__} has no wave")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,18 +6,19 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import LoadEffect, Main, Motion, times
+from pyfmi_models.effects.base import Main, Motion, TonalEffect, times
 from pyfmi_models.model import Scalar, parameter
 
 
 @dataclass(frozen=True, kw_only=True)
-class PeriodicDisturbance(LoadEffect):
+class PeriodicDisturbance(TonalEffect):
     """External torque periodic in time: torque = amplitude sin(2 pi f t + phase), t the time of the simulation."""
 
     id: ClassVar[str] = "periodic_disturbance"
     title: ClassVar[str] = "Periodic disturbance"
     equation: ClassVar[str] = "a sin(2π f t + φ)"
     main: ClassVar[Main] = Main("amplitude")
+    own_phase: ClassVar[str] = "phase"
     to_record: ClassVar[str] = "record a minute of motion that does not repeat"
     rivals: ClassVar[tuple[str, ...]] = ("cogging", "position_friction", "compliance")
     told_apart_by: ClassVar[str] = "its frequency stays when the speed changes; that of cogging follows the speed"
@@ -29,6 +30,10 @@ class PeriodicDisturbance(LoadEffect):
     def load(self, motion: Motion) -> Scalar:
         """`amplitude sin(2 pi f t + phase)`."""
         return self.amplitude * ca.sin(2 * pi * self.frequency_hz * motion.t + self.phase)
+
+    def wave(self) -> tuple[Scalar, Scalar]:
+        """As the parameters give it."""
+        return self.frequency_hz, self.amplitude
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
