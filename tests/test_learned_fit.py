@@ -107,6 +107,19 @@ def test_what_has_no_name_is_modelled_and_the_held_out_error_falls(extra: Extra,
     assert found.sentence().startswith(f"Something that depends on {quantity}")
 
 
+def test_the_formula_of_what_was_missing_is_proposed_in_the_place_of_its_table() -> None:
+    """0.15 (T - 20) exp(-(q / 0.15)^2) N m beside 2 N m of friction."""
+    found = learned(warm_place)
+    assert found is not None
+    (said,) = found.as_json()["formula"]
+    numbers = {name: one["value"] for name, one in said["parameters"].items()}
+    assert said["over"] == ["position", "temperature"]
+    assert "exp(−((q − centre)/width)²)" in said["equation"]
+    assert numbers["width"] == pytest.approx(0.15, rel=0.1)
+    assert -numbers["k1"] / numbers["k2"] == pytest.approx(20.0, abs=0.5)
+    assert numbers["k2"] == pytest.approx(0.075, rel=0.15)
+
+
 def test_the_size_of_a_term_is_that_of_what_was_missing() -> None:
     found = learned(iron)
     assert found is not None

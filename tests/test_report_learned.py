@@ -33,6 +33,10 @@ MEMORY = {"kind": "hysteresis", "unit": "N.m", "strokes": [0.1], "torque": [0.4]
 TOLD: dict[str, Any] = {
     "quantities": ["position and temperature", "torque"], "size": 0.31, "table": [CURVE, MAP, DRIVE, MEMORY],
     "before": 0.42, "after": 0.15, "interval": [0.21, 0.33], "cutoff_hz": 10.0,
+    "formula": [{
+        "table": 0, "kind": "torque", "over": ["position"], "equation": "torque = k1 q³",
+        "parameters": {"k1": {"value": 0.31, "interval": [0.29, 0.33], "unit": "N.m/rad3"}},
+    }],
     "range": ["over position -1 to 1 rad", "over temperature 18 to 26 degC"],
     "statement": "Something that depends on position and temperature, and on torque, 0.31 N·m; modelled as a table.",
 }  # fmt: skip
@@ -54,6 +58,7 @@ def test_what_was_learned_is_said_with_size_error_range_and_band() -> None:
     for part in ("position and temperature", "0.31 N·m", "0.42 → 0.15 N·m", "0.21 to 0.33 N·m", "below 10 Hz"):
         assert part in said
     assert "temperature 18 to 26 °C" in said
+    assert "torque = k1 q³; k1 0.310 N·m/rad³ (0.290 to 0.330)" in said
 
 
 def test_each_table_has_a_figure_with_the_data_beside() -> None:

@@ -27,6 +27,7 @@ class LearnedEntry(TypedDict, total=False):
     quantities: list[str]
     size: float
     table: list[JsonObject]
+    formula: list[JsonObject]
     before: float
     after: float
     interval: list[float]

@@ -12,10 +12,13 @@ import numpy as np
 
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.entries import LearnedEntry, NotLearnedEntry
+from cosim.diagnosis.learned.agreement import formula_of
 from cosim.diagnosis.learned.candidate_terms import CandidateTerm, candidate_terms
+from cosim.diagnosis.learned.formula import Formula
 from cosim.diagnosis.learned.grams import columns_of, grams_of
 from cosim.diagnosis.learned.partial import partial
 from cosim.diagnosis.learned.select import fitted, path
+from cosim.diagnosis.learned.spelled import Spelled
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.protocol import interval_of, residuals
 from cosim.estimation.fit import Fit
@@ -55,6 +58,8 @@ class Learned:
     predicted: tuple[float, ...] = field(default=())
     data: tuple[JsonObject, ...] = field(default=())
     """What the training recordings leave without each term, over what it goes over."""
+    formulas: tuple[Formula | None, ...] = field(default=())
+    """Of each term, where one is as good as its table."""
 
     @property
     def unit(self) -> str:
@@ -89,6 +94,7 @@ class Learned:
             "quantities": list(self.quantities),
             "size": float(self.size),
             "table": [{**table, "data": one} for table, one in zip(tables, self.data, strict=True)],
+            "formula": self._spelled(linear),
             "before": self.before,
             "after": self.after,
             "interval": list(self.interval),
@@ -98,6 +104,10 @@ class Learned:
             "predicted": [float(one) for one in self.predicted],
             "statement": self.sentence(),
         }
+
+    def _spelled(self, linear: bool) -> list[JsonObject]:
+        pairs = enumerate(zip(self.effects, self.formulas, strict=True))
+        return [{"table": k, **Spelled(effect, one, linear).as_json()} for k, (effect, one) in pairs if one]
 
     def refused(self) -> NotLearnedEntry:
         """Return what `diagnosis.json` holds under `not_learned`."""
@@ -129,14 +139,16 @@ def learn(comparison: Comparison, found: Fit, held: Predictive) -> Learned | Non
         own = _judged(comparison, found, [tried[k] for k in chosen.order[:count]], held)
         if own and (best is None or (not own.helps, own.after) < (not best.helps, best.after)):
             best = replace(own, evidence=chosen.evidence[:count], predicted=chosen.predicted[:count])
-    return _measured(comparison, best) if best and best.helps else best
+    return _measured(comparison, found, best, held) if best and best.helps else best
 
 
-def _measured(comparison: Comparison, learned: Learned) -> Learned:
-    """Add the size of the terms and the data that they were learned from."""
+def _measured(comparison: Comparison, found: Fit, learned: Learned, held: Predictive) -> Learned:
+    """Add the size of the terms, the data that they were learned from, and formulas that are as good."""
     problem, first = comparison.problem, len(learned.mount.effects) - len(learned.effects)
     rows = [partial(learned.mount, first + k, problem.prepared, problem.weight) for k in range(len(learned.effects))]
-    return replace(learned, size=_size(comparison, learned), data=tuple(one.data() for one in rows))
+    formulas = (formula_of(learned.mount, first + k, found, comparison, held) for k in range(len(learned.effects)))
+    data = tuple(one.data() for one in rows)
+    return replace(learned, size=_size(comparison, learned), data=data, formulas=tuple(formulas))
 
 
 def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], held: Predictive) -> Learned | None:

@@ -81,12 +81,17 @@ def partial(mount: Mount, which: int, prepared: Prepared, weight: Array) -> Part
     """Rows of the learned effect number `which` of a mount, beside all its others."""
     effect = mount.effects[which]
     assert isinstance(effect, LearnedEffect)
-    without = needed(replace(mount, effects=_but(mount, which)), prepared)
+    bare = needed(without(mount, which), prepared)
     one = unit_of(effect)
-    added = needed(replace(mount, effects=_but(mount, which, one or effect)), prepared) - without
+    added = needed(replace(mount, effects=_but(mount, which, one or effect)), prepared) - bare
     over, by = _quantity(effect, prepared) if one else (added, None)
-    left, blocks = prepared.stacked("tau") - without, Blocks.of(prepared)
+    left, blocks = prepared.stacked("tau") - bare, Blocks.of(prepared)
     return Partial(effect, over, by, left, added if one else np.ones_like(added), weight, blocks)
+
+
+def without(mount: Mount, which: int) -> Mount:
+    """The mount without its effect number `which`."""
+    return replace(mount, effects=_but(mount, which))
 
 
 def needed(mount: Mount, prepared: Prepared) -> Array:

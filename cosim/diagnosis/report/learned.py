@@ -2,15 +2,16 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture, Sheet, heading
 from cosim.diagnosis.result import Array, Diagnosis
-from cosim.plots.quantities import Scale, minus
+from cosim.plots.quantities import Scale, decimals, joined, minus, raised
 from cosim.plots.style import AFTER, GREY, LINE, MEASURED, Style
+from cosim.support.plain import JsonObject
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,7 +54,20 @@ def _rows(diagnosis: Diagnosis, scales: Scales) -> Iterator[tuple[str, str]]:
     band = f"below {told['cutoff_hz']:.3g} Hz"
     change = f"{unit.number(told['before'])} → {unit.text(told['after'])}"
     yield "Unseen runs", f"error {change}, less by {unit.span(low, high)} (95 %), {band}"
+    for one in told.get("formula", ()):
+        yield "Formula", f"{one['equation']}; {_numbers_of(one)}. As good on unseen runs, proposed, in no model."
     yield "Seen", minus("; ".join(told["range"])).replace(" degC", " °C")
+
+
+def _numbers_of(formula: JsonObject) -> str:
+    """The numbers of a formula with their 95 % ranges."""
+    told = cast(dict[str, dict[str, Any]], formula["parameters"])
+    said = []
+    for name, one in told.items():
+        value, low, high = decimals((one["value"], *one["interval"]), 3)
+        unit = "" if one["unit"] == "1" else raised(one["unit"])
+        said.append(f"{name} {joined(value, unit)} ({low} to {high})")
+    return ", ".join(said)
 
 
 def _picture(number: int, table: dict[str, Any], scales: Scales) -> Picture:

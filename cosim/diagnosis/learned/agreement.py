@@ -1,0 +1,77 @@
+"""Whether a formula is as good as the table it would stand for, on recordings that neither has seen."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.learned.formula import Formula, Rows, complete, shortest
+from cosim.diagnosis.learned.partial import Partial, partial, unit_of, without
+from cosim.diagnosis.predictive import Predictive
+from cosim.estimation.blocks import Blocks
+from cosim.estimation.fit import Fit
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.prepare import Array
+from pyfmi_models.effects.learned import LearnedEffect
+from pyfmi_models.mount import Mount
+
+KEPT = 0.8
+"""Share of the table's held-out gain that a formula must keep."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unseen:
+    """Held-out rows of a term, and the weighted errors there: with the table, and without any term."""
+
+    rows: Rows
+    blocks: Blocks
+    table: Array
+    nothing: Array
+
+    def losses(self, error: Array) -> Array:
+        """Mean square of each block."""
+        return np.array([float(np.mean(error[own] ** 2)) for own in self.blocks.rows])
+
+    def left(self, formula: Formula, moved: Array) -> Array:
+        """Weighted error with a formula, the base moved as it was in training."""
+        value = formula.value(self.rows.quantities)
+        return np.asarray(self.rows.left - self.rows.unit * value - self.rows.slopes @ moved)
+
+    def is_as_good(self, formula: Formula, moved: Array) -> bool:
+        """Whether the loss is within a standard error of the table's, and most of what that gained is kept."""
+        own, table, nothing = (self.losses(one) for one in (self.left(formula, moved), self.table, self.nothing))
+        error = float(np.std(table, ddof=1) / np.sqrt(len(table))) if len(table) > 1 else 0.0
+        gained = nothing.mean() - own.mean() >= KEPT * (nothing.mean() - table.mean())
+        return bool(own.mean() <= table.mean() + error and gained)
+
+
+def proposed(part: Partial, train: Rows, unseen: Unseen) -> Formula | None:
+    """The shortest formula that is as good as the table; None where none is."""
+    return first_as_good(shortest(train), part, train, unseen)
+
+
+def first_as_good(formulas: Sequence[Formula], part: Partial, train: Rows, unseen: Unseen) -> Formula | None:
+    """The first of some formulas, fitted to all rows of training, that is as good as the table."""
+    for formula in formulas:
+        found = complete(formula, train, part)
+        if found and unseen.is_as_good(*found):
+            return found[0]
+    return None
+
+
+def formula_of(learned: Mount, which: int, found: Fit, comparison: Comparison, held: Predictive) -> Formula | None:
+    """The formula of learned effect number `which` of a mount; None where none is as good, or it remembers."""
+    effect, problem = learned.effects[which], comparison.problem
+    if not isinstance(effect, LearnedEffect) or unit_of(effect) is None:
+        return None
+    part, there = (
+        partial(learned, which, prepared, weight)
+        for prepared, weight in ((problem.prepared, problem.weight), (held.prepared, held.weight))
+    )
+    inverse = Inverse(without(learned, which), found.free)  # with the table in it a level's slope would be the table
+    slopes, own = (
+        stacked(inverse, prepared.pieces, inverse.present)[1] for prepared in (problem.prepared, held.prepared)
+    )
+    errors = (held.weight * held.residual(mount) for mount in (learned, found.mount))
+    return proposed(part, Rows.of(part, slopes), Unseen(Rows.of(there, own), there.blocks, *errors))

@@ -1,0 +1,104 @@
+"""A formula in words: equation, numbers with unit and 95 % range, as diagnosis.json and the report have them."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from cosim.diagnosis.learned.formula import Formula, Shape, interval
+from cosim.support.plain import JsonObject
+from pyfmi_models.effects.learned import LearnedDrive, LearnedEffect
+from pyfmi_models.waves import INPUT, UNITS, spoken
+
+LETTERS = {"position": "q", "turn": "q", "speed": "v", "command": "u", "temperature": "T", "payload": "M"}
+
+
+@dataclass(frozen=True)
+class Spelled:
+    """A formula of one learned effect."""
+
+    effect: LearnedEffect
+    formula: Formula
+    linear: bool
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Quantities, as a card names them."""
+        if isinstance(self.effect, LearnedDrive):
+            return ("command",)
+        return tuple(name for name in (getattr(self.effect, "over", ""), getattr(self.effect, "by", "")) if name)
+
+    @property
+    def letters(self) -> tuple[str, ...]:
+        """Quantities, as an equation has them."""
+        return tuple(LETTERS.get(name, name.removeprefix(INPUT)) for name in self.names)
+
+    @property
+    def inner_names(self) -> tuple[str, ...]:
+        """Names of the numbers inside the forms: width, centre2, ..."""
+        own = [number for _, form in self.formula.forms for number in form.numbers]
+        return tuple(f"{name}{k + 1}" if own.count(name) > 1 else name for k, name in enumerate(own))
+
+    @property
+    def outer_names(self) -> tuple[str, ...]:
+        """Names of the coefficients."""
+        return tuple(f"k{k}" for k in range(1, len(self.formula.shapes) + 1))
+
+    def equation(self) -> str:
+        """Return the formula for a reader."""
+        left = {"torque": "torque", "missing": "not given"}.get(self.effect.filled, "friction × (1 + f), f")
+        pairs = zip(self.outer_names, self.formula.shapes, strict=True)
+        return f"{left} = " + " + ".join(" ".join([name, *self._factors(shape)]) for name, shape in pairs)
+
+    def _factors(self, shape: Shape) -> Iterator[str]:
+        placed = self.formula.placed()
+        for k, form in shape.parts:
+            own = [self.inner_names[i] for i in placed.get((k, form), ())]
+            words = {f"p{i}": name for i, name in enumerate(own)}
+            top = f"{self.formula.tops[k]:.4g}"
+            yield form.text.replace("{top}", top).format(x=self.letters[k], **words)
+
+    def units(self) -> tuple[str, ...]:
+        """Units of the inner numbers, then of the coefficients."""
+        own = [self._unit(k) for k in range(len(self.names))]
+        powers = {"exponent": 0, "rate": -1}
+        numbers = [(k, powers.get(number, 1)) for k, form in self.formula.forms for number in form.numbers]
+        inner = [own[k] if power > 0 else _over("1", [(own[k], -power)]) for k, power in numbers]
+        base = ("N" if self.linear else "N.m") if self.effect.in_torque else "1"
+        outer = [_over(base, [(own[k], form.power) for k, form in shape.parts]) for shape in self.formula.shapes]
+        return (*inner, *outer)
+
+    def _unit(self, which: int) -> str:
+        unit = UNITS.get(self.names[which], "1")
+        return unit.replace("rad", "m").replace("N.m", "N") if self.linear else unit
+
+    def numbers(self) -> tuple[tuple[str, float, float, str], ...]:
+        """Name, value, standard error and unit of every number."""
+        values = (*self.formula.inner, *self.formula.coefficients)
+        names = (*self.inner_names, *self.outer_names)
+        return tuple(zip(names, values, self.formula.errors, self.units(), strict=True))
+
+    def as_json(self) -> JsonObject:
+        """Return what `diagnosis.json` holds of it under `learned.formula`."""
+        told: dict[str, JsonObject] = {
+            name: {"value": v, "interval": [*interval(v, e)], "unit": u} for name, v, e, u in self.numbers()
+        }
+        kind = {"torque": "torque", "missing": "drive"}.get(self.effect.filled, "friction")
+        return {
+            "kind": kind,
+            "over": [spoken(name) for name in self.names],
+            "equation": self.equation(),
+            "parameters": told,
+        }
+
+
+def _over(base: str, powers: Sequence[tuple[str, int]]) -> str:
+    parts = [_plain(unit, power) for unit, power in powers if power and unit != "1"]
+    if not parts:
+        return base
+    return f"{base}/{parts[0]}" if len(parts) == 1 and "." not in parts[0] else f"{base}/({'.'.join(parts)})"
+
+
+def _plain(unit: str, power: int) -> str:
+    """A power of a unit without a slash: rad2.s-2."""
+    above, _, below = unit.partition("/")
+    raised = [f"{one}{power if power > 1 else ''}" for one in above.split(".")]
+    return ".".join(raised + ([f"{below}-{power}"] if below else []))

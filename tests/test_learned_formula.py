@@ -1,0 +1,119 @@
+"""A closed form in the place of a learned table: the right one where there is one, none where there is none."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+import pytest
+
+from cosim.diagnosis.learned.agreement import Unseen, proposed
+from cosim.diagnosis.learned.formula import Formula, Rows
+from cosim.diagnosis.learned.partial import Partial
+from cosim.diagnosis.learned.spelled import Spelled
+from cosim.estimation.blocks import Blocks
+from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque
+
+Array = np.ndarray
+NOISE = 0.05
+POSITION = LearnedTorque(over="position", seen=(-0.8, 1.0), torque=(0.0, 0.1))
+WARM = LearnedFriction(
+    over="position", seen=(-0.8, 1.0), by="temperature", by_seen=(10.0, 25.0), waves=(1, 1), level_change=(0.1,) * 4
+)
+
+
+def saw(x: Array) -> Array:
+    """Of many corners at places of no order: no short formula has it."""
+    corners = np.sort(np.random.default_rng(5).uniform(-0.8, 1.0, 14))
+    return np.interp(x, corners, np.random.default_rng(6).uniform(-0.6, 0.6, 14))
+
+
+LAWS = {
+    "bump": lambda x: 0.7 * np.exp(-(((x - 0.3) / 0.12) ** 2)),
+    "sine": lambda x: 0.4 * np.sin(2 * np.pi * (x - 0.1) / 0.37),
+    "exponential": lambda x: 0.2 * np.exp(x / 0.4),
+    "cube": lambda x: 0.9 * x**3,
+    "tanh": lambda x: 0.5 * np.tanh(x / 0.08),
+    "power": lambda x: 0.6 * np.sign(x) * np.abs(x) ** 0.4,
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    part: Partial
+    train: Rows
+    unseen: Unseen
+
+
+def blocks(many: int) -> Blocks:
+    return Blocks(tuple(np.array_split(np.arange(many), 20)), np.repeat([0, 1], 10))
+
+
+def made(effect, law, seed: int) -> tuple[Partial, Array]:
+    """Rows of a term beside a base with an unknown level and slope, and the value of the law there."""
+    rng, many = np.random.default_rng(seed), 4000
+    x, y = rng.uniform(-0.8, 1.0, many), rng.uniform(10.0, 25.0, many)
+    sign = np.sign(rng.standard_normal(many))
+    two = isinstance(effect, LearnedFriction)
+    unit, value = 2.0 * sign if two else np.ones(many), law(x, y) if two else law(x)
+    left = unit * value + 0.1 * sign + NOISE * rng.standard_normal(many)
+    part = Partial(effect, x, y if two else None, left, unit, np.ones(many), blocks(many))
+    return part, np.column_stack([sign, rng.standard_normal(many)])
+
+
+@cache
+def case(name: str) -> Case:
+    effect, law = (WARM, lambda x, y: 0.05 * (y - 18) * np.exp(-((x / 0.2) ** 2))) if name == "warm" else (
+        POSITION, saw if name == "saw" else LAWS[name],
+    )  # fmt: skip
+    (part, slopes), (there, own) = made(effect, law, 1), made(effect, law, 2)
+    noise = there.left - there.unit * (law(there.over, there.by) if name == "warm" else law(there.over))
+    unseen = Unseen(Rows.of(there, own), there.blocks, noise - 0.1 * own[:, 0], there.left)
+    return Case(part, Rows.of(part, slopes), unseen)
+
+
+@cache
+def found(name: str) -> Formula | None:
+    now = case(name)
+    return proposed(now.part, now.train, now.unseen)
+
+
+def forms(formula: Formula) -> set[str]:
+    return {form.name for shape in formula.shapes for _, form in shape.parts}
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_right_form_is_found_with_its_numbers_in_their_ranges(name: str) -> None:
+    formula = found(name)
+    assert formula is not None
+    assert name in forms(formula)
+    x = np.linspace(-0.75, 0.95, 200)
+    np.testing.assert_allclose(
+        formula.value([x]) - formula.value([x]).mean(), LAWS[name](x) - LAWS[name](x).mean(), atol=0.03
+    )
+
+
+def test_a_product_of_two_quantities_has_both_and_where_the_line_begins() -> None:
+    formula = found("warm")
+    assert formula is not None
+    assert forms(formula) == {"bump", "line"}
+    told = {name: (value, error) for name, value, error, _ in Spelled(WARM, formula, False).numbers()}
+    assert abs(told["centre"][0]) < 4 * told["centre"][1]
+    assert abs(told["width"][0] - 0.2) < 4 * told["width"][1]
+    assert -told["k1"][0] / told["k2"][0] == pytest.approx(18.0, abs=0.3)
+
+
+def test_where_no_form_fits_there_is_no_formula() -> None:
+    assert found("saw") is None
+
+
+def test_numbers_have_intervals_that_hold_them_and_units_that_fit() -> None:
+    said = Spelled(POSITION, found("bump"), False).as_json()
+    assert said["equation"] == "torque = k1 exp(−((q − centre)/width)²)"
+    for name, true, unit in (("centre", 0.3, "rad"), ("width", 0.12, "rad"), ("k1", 0.7, "N.m")):
+        told = said["parameters"][name]
+        low, high = told["interval"]
+        assert low - 0.02 < true < high + 0.02
+        assert high - low < 0.1
+        assert told["unit"] == unit
+    cubed = Spelled(POSITION, found("cube"), True).as_json()
+    assert cubed["parameters"]["k1"]["unit"] == "N/m3"
