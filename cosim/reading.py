@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from cosim.data.recording import Recording
+from cosim.data.runs import split
 from cosim.support.errors import InputError, UnitError
 from cosim.support.units import unit
 
@@ -82,7 +83,8 @@ def _by_file(option: str, given: Sequence[str] | None, paths: Sequence[Path]) ->
 
 def _places(option: str, file: str, paths: Sequence[Path]) -> list[int]:
     """Return which of the files is meant: by its path, its name, or its name without suffixes."""
-    names = [{str(path), path.name, path.name.partition(".")[0]} for path in paths]
+    files = [(path, split(path)[0]) for path in paths]
+    names = [{*map(str, pair), *(one.name for one in pair), pair[1].name.partition(".")[0]} for pair in files]
     places = [place for place, one in enumerate(names) if file in one]
     if not places:
         have = tuple(dict.fromkeys(path.name for path in paths))

@@ -43,6 +43,8 @@ NUMBERS: dict[str, dict[str, Any]] = {
     "AzimuthCentrifugal": {"tube_inertia": 3.0},
     "LoadDependentFriction": {"coulomb_per_Nm": 0.2},
     "TorqueSaturation": {"knee_torque": 5.0, "slope": 0.4},
+    "DeadBand": {"band": 0.5},
+    "ConcaveViscous": {"thinning_speed": 0.3, "exponent": -0.4},
     "PeriodicDisturbance": {"frequency_hz": 3.0, "amplitude": 0.6, "phase": 0.2},
     "LearnedTorque": {"over": "position", "seen": (-1.0, 1.2), "torque": (0.3, 0.5, -0.2, 0.1)},
     "LearnedFriction": {

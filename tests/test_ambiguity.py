@@ -11,7 +11,7 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.absent import not_found
 from cosim.diagnosis.admissibility import in_time, is_degenerate
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import EffectScores, ResidualScores, TermScores, decide, doubted, open_rivals
+from cosim.diagnosis.decision import EffectScores, ResidualScores, TermScores, decide, doubted, least_left, open_rivals
 from cosim.diagnosis.hypotheses import hypothesis_of
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.search import CandidateFit
@@ -82,6 +82,18 @@ def test_nothing_is_unknown_where_nothing_is_left_and_what_is_left_says_what_it_
     large = decide([], ResidualScores(POLICY.large_residual + 0.01, 0.0, (), "time"), POLICY)
     assert large.is_unknown
     assert large.depends_on == ("time",)
+
+
+def test_what_was_surely_learned_is_unknown_too_and_names_stay() -> None:
+    named = decide([scores("cogging", 60.0)], QUIET, POLICY)
+    more = named.with_rest(("position",))
+    assert (more.is_unknown, more.depends_on, more.sets) == (True, ("position",), named.sets)
+    assert more.with_rest(("speed",)) == more
+
+
+def test_what_is_left_must_be_more_than_what_the_equations_of_strong_names_lack() -> None:
+    assert least_left([], POLICY) == 0.0
+    assert least_left([scores("cogging", 60.0), scores("cable_wrap", 200.0)], POLICY) == POLICY.imitation * 200.0
 
 
 def test_what_the_held_out_recordings_contradict_is_unknown_only_where_training_is_sure() -> None:

@@ -210,6 +210,7 @@ def test_export_writes_plant_and_controller_for_both_versions(
                 "scenario: sidereal",
                 "─ tau ───────────▶ mount.tau       1 tick, 0.1 ms",
                 "15 s (150,000 steps)",
+                "rows: every step",
                 "→ mount: 2 ticks, 0.2 ms",
             ],
         ),

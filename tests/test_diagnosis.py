@@ -319,8 +319,10 @@ class TestCommand:
         self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ) -> None:
         out = tmp_path / "quick"
-        assert self.run(self.arguments(folder, out, "--quick")) == 0
-        printed = capsys.readouterr().out
+        assert self.run(self.arguments(folder, out, "--quick", "--propose", str(tmp_path / "proposed"))) == 0
+        printed, said = capsys.readouterr()
+        assert "Nothing to propose: nothing is left without a name." in said
+        assert not (tmp_path / "proposed").exists()
         assert {path.name for path in out.iterdir()} == {"diagnosis.json", "card.toml"}
         assert "Wrote diagnosis.json card.toml" in printed
         assert "report.html" not in printed
@@ -328,7 +330,7 @@ class TestCommand:
         schema = json.loads((files("cosim") / "diagnosis" / "schema.json").read_text())
         jsonschema.Draft202012Validator(schema).validate(told)
         assert sorted(told["verdict"]) == ["cogging", "friction_asymmetry"]
-        assert told["provenance"]["command"].endswith("--quick")
+        assert told["provenance"]["command"].endswith(f"--propose {tmp_path / 'proposed'} --quick")
         assert told["provenance"]["card"]["sha256"] == hashlib.sha256((folder / "card.toml").read_bytes()).hexdigest()
         assert not {"fmu", "scenario"} & (set(told["improved"]) | set(told["next_experiment"]))
         assert {effect.id for effect in read_card(out / "card.toml").effects} == {"cogging", "friction_asymmetry"}

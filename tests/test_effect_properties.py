@@ -48,6 +48,7 @@ NEUTRAL = {
     "TorqueSaturation": {"slope": 1.0},
     "PeriodicDisturbance": {"amplitude": 0.0},
     "ClockSkew": {"drift_ppm": 0.0, "offset_ms": 0.0},
+    "ConcaveViscous": {"exponent": 1.0},
     "LearnedTorque": {"share": 0.0},
     "LearnedFriction": {"share": 0.0},
     "LearnedDrive": {"share": 0.0},

@@ -48,7 +48,7 @@ def predicted(recording: Recording, effect: object) -> float:
     problem = Problem(axis(), prepared, np.ones(len(prepared.recording_of)), 1 / RATE)
     base = problem.fit(axis(), 10)
     held = Predictive.of(
-        Comparison.of(problem, base, POLICY), prepare([recording], 30.0), axis(), prepare([recording], 30.0)
+        Comparison.of(problem, base, POLICY), prepare([recording], 30.0), base, prepare([recording], 30.0)
     )
     with_it, without = (held.log_likelihood(held.residual(mount)) for mount in (axis(effect), axis()))
     return with_it - without
@@ -73,6 +73,16 @@ def test_what_acts_in_one_second_of_a_minute_predicts() -> None:
     v = 1 + 2 * np.exp(-(((t - 30.5) / 0.15) ** 2)) + 0.1 * np.sin(t)
     recording = held_out(white(2) + 0.3 * v**2, v)
     assert predicted(recording, QuadraticDrag(coefficient=0.3)) > POLICY.least_predicted
+
+
+@pytest.mark.parametrize("factor", [0.8, 1.2])
+def test_an_offset_is_told_beside_friction_and_load_of_another_day(factor: float) -> None:
+    """Every number of the base is off by a fifth, twenty times the offset: that alone decides nothing."""
+    offset, v = 0.2 * NOISE, np.sin(np.arange(SECONDS * RATE) / RATE)
+    base = 5 * np.gradient(v, 1 / RATE) + 2 * np.sign(v) + v
+    recording = held_out(white(5) + offset + (factor - 1) * base, v)
+    assert predicted(recording, TorqueOffset(torque=offset)) > 10 * POLICY.least_predicted
+    assert predicted(recording, TorqueOffset(torque=-offset)) < 0
 
 
 def test_what_raises_the_held_out_error_does_not_predict() -> None:

@@ -21,6 +21,7 @@ from cosim.master.isolated import run_isolated
 from cosim.master.simulate import Options
 from cosim.support.activity import SIZE, Board
 from cosim.support.errors import LostComponentError
+from cosim.support.scratch import PREFIX
 from cosim.system.scenario import read_scenario
 
 __all__ = ["scenario", "tiny"]
@@ -295,7 +296,7 @@ def test_a_lock_survives_the_file_being_removed(tmp_path: Path) -> None:
 def test_a_process_whose_parent_is_gone_in_the_middle_of_a_call_ends_without_a_trace(
     tmp_path: Path, call: bytes, orphan: bool
 ) -> None:
-    folder = tmp_path / "cosim-own"
+    folder = tmp_path / f"{PREFIX}own"
     folder.mkdir()
     (folder / "board").write_bytes(bytes(SIZE))
     parent = ["1"] if orphan else [str(os.getpid())]  # one that ended before its child had begun
@@ -309,7 +310,7 @@ def test_a_process_whose_parent_is_gone_in_the_middle_of_a_call_ends_without_a_t
 
 @linux
 def test_a_process_whose_parent_was_gone_before_it_began_does_not_work_on(tmp_path: Path) -> None:
-    folder = tmp_path / "cosim-own"
+    folder = tmp_path / f"{PREFIX}own"
     folder.mkdir()
     (folder / "board").write_bytes(bytes(SIZE))
     command = [sys.executable, "-m", "cosim.support.child", str(folder / "board"), "1"]

@@ -15,7 +15,7 @@ from cosim.diagnosis.deliver import as_json, deliver_quickly
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.learned.candidate_terms import candidate_terms
 from cosim.diagnosis.learned.grams import columns_of, with_terms
-from cosim.diagnosis.learned.learn import Learned, learn
+from cosim.diagnosis.learned.learn import SURE, Learned, learn
 from cosim.diagnosis.learned.select import LEAST_EVIDENCE, path
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.predictive import Predictive
@@ -75,7 +75,11 @@ def parts(extra: Extra) -> tuple[Comparison, Fit, Predictive]:
     problem = Problem(MOUNT, prepared, np.asarray(v > 0.02 * v.max(), float), 0.01)
     base = problem.fit(MOUNT, 25)
     comparison = Comparison.of(problem, base, POLICY)
-    return comparison, base, Predictive.of(comparison, prepare(there, 10.0), base.mount, prepare(there, CUTOFF))
+    return (
+        comparison,
+        base,
+        Predictive.of(comparison, prepare(there, 10.0), base, prepare(there, CUTOFF)).as_delivered(),
+    )
 
 
 @cache
@@ -120,6 +124,30 @@ def test_the_formula_of_what_was_missing_is_proposed_in_the_place_of_its_table()
     assert numbers["k2"] == pytest.approx(0.075, rel=0.15)
 
 
+def test_what_a_drive_holds_back_is_told_over_the_command_that_the_model_needs() -> None:
+    """Over the recorded command a line would say all: it holds what is left, and a line is a scale of the base."""
+    found = learned(droop)
+    assert found is not None
+    assert all(one["equation"] != "not given = k1 u" for one in found.as_json()["formula"])
+
+
+def test_sure_is_what_three_kinds_of_recordings_prove_each_for_itself() -> None:
+    found = learned(warm_place)
+    assert found is not None
+    assert found.is_sure
+    weak = SURE - 1
+    for less in ({"evidence": (weak,)}, {"predicted": (weak,)}, {"gain": weak}, {"helps": False}):
+        assert not replace(found, **less).is_sure
+
+
+def test_what_is_sure_but_a_small_share_of_the_rest_or_of_a_name_does_not_say_unknown() -> None:
+    found = learned(warm_place)
+    assert found is not None
+    assert found.says_unknown(POLICY, 0.0)
+    assert not replace(found, after=0.95 * found.before).says_unknown(POLICY, 0.0)
+    assert not found.says_unknown(POLICY, min(found.evidence) + 1)
+
+
 def test_the_size_of_a_term_is_that_of_what_was_missing() -> None:
     found = learned(iron)
     assert found is not None
@@ -135,7 +163,7 @@ def test_no_recording_is_worse_off_than_before() -> None:
     """A night night that has less of it than the others vetoes what they propose."""
     comparison, base, _ = parts(iron)
     there = [recording(iron, 3), recording(nothing, 4)]
-    held = Predictive.of(comparison, prepare(there, 10.0), base.mount, prepare(there, CUTOFF))
+    held = Predictive.of(comparison, prepare(there, 10.0), base, prepare(there, CUTOFF)).as_delivered()
     found = learn(comparison, base, held)
     assert found is not None
     assert not found.helps
@@ -216,6 +244,9 @@ def test_a_diagnosis_says_unknown_delivers_the_term_and_its_card_holds_it(tmp_pa
     assert back.effects == outcome.card.effects
     assert "something learned over position" in (tmp_path / "card.toml").read_text("utf-8")
     assert json.loads((tmp_path / "diagnosis.json").read_text("utf-8"))["improved"]["card"] == "card.toml"
+    (proposal,) = outcome.proposals
+    assert proposal.id == "proposed_friction_over_position_and_temperature"
+    assert said["formula"][0]["equation"] in proposal.text()
 
 
 def test_a_memory_of_reversals_is_learned_or_refused_but_never_worse() -> None:

@@ -1,13 +1,14 @@
 """A closed form in the place of a learned table: the right one where there is one, none where there is none."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 import pytest
 
 from cosim.diagnosis.learned.agreement import Unseen, proposed
-from cosim.diagnosis.learned.formula import Formula, Rows
+from cosim.diagnosis.learned.forms import FORMS
+from cosim.diagnosis.learned.formula import Formula, Rows, Shape
 from cosim.diagnosis.learned.partial import Partial
 from cosim.diagnosis.learned.spelled import Spelled
 from cosim.estimation.blocks import Blocks
@@ -33,6 +34,7 @@ LAWS = {
     "exponential": lambda x: 0.2 * np.exp(x / 0.4),
     "cube": lambda x: 0.9 * x**3,
     "tanh": lambda x: 0.5 * np.tanh(x / 0.08),
+    "pulse": lambda x: 2.0 * x * np.exp(-((x / 0.2) ** 2)),
     "power": lambda x: 0.6 * np.sign(x) * np.abs(x) ** 0.4,
 }
 
@@ -102,6 +104,18 @@ def test_a_product_of_two_quantities_has_both_and_where_the_line_begins() -> Non
     assert -told["k1"][0] / told["k2"][0] == pytest.approx(18.0, abs=0.3)
 
 
+def test_a_product_that_begins_anywhere_is_read_as_one_of_lines() -> None:
+    """0.05 (y - 18) (x - 0.3), which three coefficients hold and no product of two forms does."""
+    (part, slopes), (there, own) = (made(WARM, lambda x, y: 0.05 * (y - 18) * (x - 0.3), seed) for seed in (1, 2))
+    noise = there.left - there.unit * 0.05 * (there.by - 18) * (there.over - 0.3)
+    unseen = Unseen(Rows.of(there, own), there.blocks, noise - 0.1 * own[:, 0], there.left)
+    formula = proposed(part, Rows.of(part, slopes), unseen)
+    assert formula is not None
+    assert forms(formula) == {"line"}
+    k1, k2, k3 = formula.coefficients  # of x, x y, y
+    assert (-k1 / k2, -k3 / k2, k2) == pytest.approx((18.0, 0.3, 0.05), rel=0.05)
+
+
 def test_where_no_form_fits_there_is_no_formula() -> None:
     assert found("saw") is None
 
@@ -117,3 +131,12 @@ def test_numbers_have_intervals_that_hold_them_and_units_that_fit() -> None:
         assert told["unit"] == unit
     cubed = Spelled(POSITION, found("cube"), True).as_json()
     assert cubed["parameters"]["k1"]["unit"] == "N/m3"
+
+
+def test_a_loss_of_all_torque_in_a_machine_that_needs_none_is_no_formula() -> None:
+    """What is linear in the command and taken out of the base again leaves no error, and says nothing."""
+    now = case("saw")
+    much = 100.0 * float(np.std(now.unseen.rows.left))
+    line = Formula((Shape(FORMS[0]),), (1.0,), (), (much,))
+    assert not now.unseen.is_of_its_size(line)
+    assert now.unseen.is_of_its_size(replace(line, coefficients=(0.01 * much,)))

@@ -186,3 +186,14 @@ def test_no_printed_page_holds_a_single_row(browser: Any, tmp_path: Path) -> Non
         command = ["pdftotext", "-layout", str(tmp_path / "report.pdf"), "-"]
         text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
         assert all(len(sheet.split()) > 25 for sheet in text.strip("\f\n").split("\f"))
+
+
+def test_what_a_sign_of_a_legend_means_is_printed_too(browser: Any, tmp_path: Path) -> None:
+    """A browser prints no backgrounds unless it is told to, and some signs are nothing else."""
+    (tmp_path / "report.html").write_text(render(diagnosis("two")), "utf-8")
+    page = browser.new_page()
+    page.goto((tmp_path / "report.html").as_uri())
+    page.emulate_media(media="print")
+    signs = "[...document.querySelectorAll('.key span')].map(one => getComputedStyle(one, '::before'))"
+    assert set(page.evaluate(f"{signs}.map(style => style.printColorAdjust)")) == {"exact"}
+    page.close()

@@ -124,3 +124,11 @@ def test_every_result_is_told_how_it_is_rebuilt() -> None:
     table = (ROOT / "results" / "README.md").read_text("utf-8")
     untold = [one.name for one in (ROOT / "results").iterdir() if one.name != "README.md" and one.name not in table]
     assert not untold, f"results/README.md does not say how these are rebuilt: {', '.join(untold)}"
+
+
+def test_no_result_names_a_folder_of_the_machine_that_made_it() -> None:
+    """Whoever rebuilds it has no such folder: a command is given with paths that begin in the project."""
+    absolute = re.compile(r"(?<![\w./~-])/(?:work|root|home|tmp|mnt|Users)/\w")
+    files = [one for one in (ROOT / "results").rglob("*") if one.suffix in {".md", ".json", ".jsonl", ".csv", ".toml"}]
+    named = [str(one.relative_to(ROOT)) for one in files if absolute.search(one.read_text("utf-8"))]
+    assert not named, f"these results name a folder of one machine: {', '.join(named)}"

@@ -91,7 +91,7 @@ def test_each_gain_is_what_the_written_model_loses_without_the_effect(delivered:
         without = problem.fit(replace(mount, effects=rest), 15)
         gain = 1 - whole / energy(problem.weight, without.residual)
         assert told["gain"] == pytest.approx(gain, abs=CONVERGED), told["effect"]
-        assert f"removes {told['gain']:.0%} of the error energy" in told["evidence"]
+        assert f"removes {100 * told['gain']:.0f} % of the error energy" in told["evidence"]
 
 
 def test_the_ranges_are_the_standard_errors_of_the_written_numbers(delivered: Delivered) -> None:

@@ -17,8 +17,8 @@ from cosim.diagnosis.report import lead, render, words
 from cosim.diagnosis.report.figures_dynamic import effect as draw
 from cosim.diagnosis.report.figures_proof import looked_for
 from cosim.diagnosis.report.figures_time import recording
-from cosim.diagnosis.report.findings import block, where
-from cosim.diagnosis.report.page import identity
+from cosim.diagnosis.report.findings import block, do, where
+from cosim.diagnosis.report.page import identity, unexplained
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.report.tables import looked, proof
@@ -93,7 +93,7 @@ def test_a_probability_stands_beside_what_was_found_and_a_small_one_is_said() ->
     first = text_of(render(whole)).split("Findings")[0]
     assert "probability 0.53" in first
     assert "probability 0.93" in first
-    assert "Cogging is likely, not certain: its probability is 0.53." in first
+    assert "Cogging is not certain: its probability is 0.53." in first
     assert "Friction asymmetry is likely, not certain" not in first
     assert "probability 0.53" in " ".join(summary(whole).split())
 
@@ -106,6 +106,31 @@ def test_what_was_not_seen_has_a_limit_even_where_its_number_is_no_size() -> Non
     assert re.fullmatch(r"0\.0\d+\N{NO-BREAK SPACE}N·m RMS", limit)
     assert looked(whole, Scales.of(whole)).rows[-1][-1] == f"a torque of {limit}"
     assert "compliance (< 0.0" in " ".join(summary(whole).split())
+
+
+def test_a_limit_that_is_known_is_the_same_on_the_page_and_on_the_terminal() -> None:
+    absent: Any = {"answer": "not_seen", "probability": 0, "gain": 0}
+    skew = Finding(effect="clock_skew", title="Clock skew", evidence="from 18 ms", **absent)
+    play = Finding(effect="backlash", title="Backlash", evidence="wider than 0.001 rad", **absent)
+    whole = replace(diagnosis("two"), findings=(*FOUND, skew, play))
+    assert [row[-1] for row in looked(whole, Scales.of(whole)).rows[-2:]] == ["18 ms", "wider than 3.4′"]
+    assert "clock skew (< 18 ms), backlash (wider than 3.4′)" in " ".join(summary(whole).split())
+
+
+def test_an_experiment_is_ordered_for_the_causes_that_it_separates_and_no_others() -> None:
+    warm = replace(RIVALS[0], effect="thermal_viscosity", title="Thermal friction", action="Let it warm up.")
+    whole = replace(diagnosis("two"), findings=(*FOUND, *RIVALS, warm))
+    orders = {one.first.effect: do(one, whole) for one in words.blocks(whole) if one.answer == "ambiguous"}
+    assert orders["gravity_unbalance"].startswith("Record one turn")
+    assert orders["thermal_viscosity"] == "Let it warm up."
+
+
+def test_of_a_rest_that_was_not_asked_what_it_goes_with_nothing_of_the_kind_is_said() -> None:
+    none = diagnosis("none")
+    loud = replace(none, heldout=replace(none.heldout, after_rms=2 * none.heldout.floor_rms))
+    said = " ".join(unexplained(loud, Scales.of(loud)))
+    assert "stays unexplained, beyond the noise. A friction law that is not quite the machine's" in said
+    assert "goes with" not in said
 
 
 def test_angles_and_lengths_are_in_units_that_need_no_zeros() -> None:
@@ -147,7 +172,7 @@ def test_a_black_line_over_nearly_everything_is_a_number_instead() -> None:
     often, seldom = (replace(whole.traces[0], intervals=((0.0, end),)) for end in (54.0, 5.0))
     with mpl.rc_context(STYLE):
         said = [recording(0, one, scales, (1.0, 1.0)).caption for one in (often, seldom)]
-    assert "Outside the band for long during 90 % of the time." in said[0]
+    assert "Louder than the noise for 90 % of the time, rests and short returns counted." in said[0]
     assert "Black line" in said[1]
 
 
@@ -195,7 +220,7 @@ def test_the_first_of_several_possible_causes_is_said_to_be_in_the_model() -> No
 
 def test_the_terminal_begins_with_the_verdict_what_to_do_and_the_file_to_open() -> None:
     lines = summary(diagnosis("two"), out=Path("result")).splitlines()
-    assert lines[0] == "2 effects are missing from mount.toml"
+    assert lines[0] == "Two effects are missing from mount.toml"
     assert lines[1].startswith("Do        Cogging: use the improved FMU")
     assert [line for line in lines if line.startswith("Open")] == [f"Open      {Path('result') / 'report.html'}"]
     last_order = next(row for row, line in enumerate(lines) if line.startswith("Use"))

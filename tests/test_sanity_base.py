@@ -42,12 +42,12 @@ def test_another_inertia_is_said_with_both_numbers(inertia: float, words: str) -
     (text,) = said(axis(), axis(inertia))
     assert text.startswith("Refitted, the inertia is ")
     assert words in text
-    assert f"5 -> {inertia:.3g} kg.m2" in text
+    assert f"5 → {inertia:.3g} kg·m²" in text
 
 
 def test_friction_that_ends_at_a_bound_is_said_and_one_that_is_not_felt_is_not() -> None:
     (text,) = said(axis(), axis(Fc=0.0, sigma2=6.0))[:1]
-    assert "Coulomb friction ends at a bound of the fit (2 -> 0 N.m)" in text
+    assert "Coulomb friction ends at a bound of the fit (2 → 0 N·m)" in text
     assert said(axis(sigma2=0.01), axis(sigma2=0.0)) == []
 
 

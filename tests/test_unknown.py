@@ -56,7 +56,7 @@ def left(extra: Extra) -> tuple[ResidualScores, Decision]:
     problem = Problem(mount, prepared, np.asarray(v > 0.02 * v.max(), float), 0.01)
     base = problem.fit(mount, 25)
     comparison = Comparison.of(problem, base, POLICY)
-    held = Predictive.of(comparison, there, base.mount, there)
+    held = Predictive.of(comparison, there, base, there)
     sizes = share_left(comparison, base), share_there(comparison, held.residual(base.mount), held)
     residual = ResidualScores(*sizes, flexible_terms(comparison, base, held), over_time(comparison, base))
     return residual, decide([], residual, POLICY)

@@ -13,6 +13,7 @@ from cosim.diagnosis.correction_fmu import Correction, motion_of
 from cosim.diagnosis.deliver import FILES, QUICK, as_json, check_out, deliver, deliver_quickly, without_files
 from cosim.diagnosis.diagnose import diagnose as find
 from cosim.diagnosis.entries import Improved
+from cosim.diagnosis.learned.proposal import Proposal, write_proposals
 from cosim.diagnosis.result import Diagnosis, Finding
 from cosim.diagnosis.terminal import summary
 from cosim.fmi.alias import Alias
@@ -33,6 +34,8 @@ class DiagnosisResult:
     """The card refitted, with the effects that were found and stand."""
     refitted: Card
     """The card refitted, without any effect."""
+    proposals: tuple[Proposal, ...] = ()
+    """Effect files for a person to review, of formulas that are as good as what was learned for what has no name."""
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -47,6 +50,17 @@ class DiagnosisResult:
     def as_json(self) -> JsonObject:
         """Return everything as plain data, as diagnosis.json holds it."""
         return as_json(self.diagnosis)
+
+    def propose(self, folder: str | Path, force: bool = False) -> tuple[Path, ...]:
+        """Write each proposal as the file of an effect, in the form of docs/adding_physics.md; nothing loads it.
+
+        Returns:
+            The files; none, and no folder is made, where there is nothing to propose.
+
+        Raises:
+            OutputError: the folder holds a proposal and `force` is not set, or effects are loaded from it.
+        """
+        return write_proposals(self.proposals, Path(folder), force)
 
     def __str__(self) -> str:
         return summary(self.diagnosis)
@@ -159,7 +173,7 @@ def _found(given: _Given, out: Path | None, command: str, listeners: _Listeners)
     done = without_files(outcome.diagnosis)
     if out:
         done = deliver_quickly(outcome, given.train, given.heldout, given.card, out, command, given.base)
-    return DiagnosisResult(done, outcome.card, outcome.refitted)
+    return DiagnosisResult(done, outcome.card, outcome.refitted, outcome.proposals)
 
 
 def _delivered(given: _Given, out: Path, command: str, listeners: _Listeners) -> DiagnosisResult:
@@ -172,13 +186,13 @@ def _delivered(given: _Given, out: Path, command: str, listeners: _Listeners) ->
         done = deliver(
             outcome, train, heldout, card, out, command, loops, listeners.on_progress, given.more, given.base
         )
-    return DiagnosisResult(done, outcome.card, outcome.refitted)
+    return DiagnosisResult(done, outcome.card, outcome.refitted, outcome.proposals)
 
 
 def check_split(train: Sequence[Recording], heldout: Sequence[Recording]) -> None:
     """Refuse a recording that is fitted and held out (raises InputError)."""
-    hashes = {recording.sha256 for recording in train} - {""}
+    known = {recording.identity for recording in train if recording.sha256}
     for one in heldout:
-        if one.sha256 in hashes or any(one is other for other in train):
+        if one.identity in known or any(one is other for other in train):
             text = f"{one.name} is held out and among the training recordings; a proof needs a recording of its own."
             raise InputError(text, culprit=one.name)

@@ -7,8 +7,9 @@ from typing import Any
 
 from cosim.data.preview import preview
 from cosim.data.recording import Recording
+from cosim.data.runs import Run, taken
 from cosim.plots import recording as told
-from cosim.support.errors import InputError
+from cosim.support.errors import InputError, ManyRecordingsError
 from cosim.support.html import facts as html_facts
 from cosim.support.html import table as html_table
 from cosim.support.html import text as html_text
@@ -110,11 +111,24 @@ def describe(file: str) -> tuple[Facts, Tables]:
 
 
 def _of_file(path: Path, options: Mapping[str, Mapping[str, str]], picture: str | Path | None, force: bool) -> Shown:
-    seen = preview(path, options)
+    try:
+        seen = preview(path, options)
+    except ManyRecordingsError as error:
+        return _of_many(path, error.runs)
     drawn = {"picture": str(told.draw(seen.recording, seen.sources, Path(picture), force))} if picture else {}
     return Shown(
         {"recording": str(path)} | told.facts(seen) | drawn, {"columns": told.rows(seen.recording, seen.sources)}
     )
+
+
+def _of_many(path: Path, runs: Sequence[Run]) -> Shown:
+    """Tell of the recordings that a file holds, and how one is taken."""
+    rows: list[Row] = [
+        {"number": f"#{number}", "recording": one.which, "rows": one.rows, "duration": f"{one.seconds:.6g} s"}
+        for number, one in enumerate(runs, 1)
+    ]
+    facts: Facts = {"recording": str(path), "holds": f"{len(runs):,} recordings", "take one": taken(path, runs)}
+    return Shown(facts, {"recordings": rows})
 
 
 def _of_recording(recording: Recording, picture: str | Path | None, force: bool) -> Shown:
@@ -207,7 +221,7 @@ def _scenario(file: str) -> tuple[Facts, Tables]:
         "step": f"{scenario.step:g} s",
         "stop": f"{scenario.stop:g} s ({scenario.ticks:,} steps)",
         "algorithm": in_short(scenario),
-        "rows": f"one in {scenario.decimation} steps",
+        "rows": "every step" if scenario.decimation == 1 else f"one in {scenario.decimation:,} steps",
     }
     components = [
         {"component": name, "from": origin(one), "steps every": f"{scenario.every.get(name, 1) * scenario.step:g} s"}

@@ -37,16 +37,23 @@ def diagnose(
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
     check: Annotated[bool, typer.Option("--check", help="Exit with 1 if something is missing.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="The answer and the card alone: no FMU, no report.")] = False,
+    propose: Annotated[
+        Path | None,
+        typer.Option("--propose", help="Folder for the formula of what has no name, as an effect to review."),
+    ] = None,
     force: Force = False,
 ) -> None:
     """Say which physics a card lacks, and prove it on a recording that was never fitted."""
     from cosim.api.diagnose import diagnose as find
     from cosim.diagnosis.deliver import FILES, QUICK, check_out
-    from cosim.diagnosis.terminal import summary
+    from cosim.diagnosis.learned.proposal import check_folder
+    from cosim.diagnosis.terminal import proposed, summary
     from pyfmi_models.card import read_card
 
     keep_freed_memory()
     check_out(out, force, QUICK if quick else FILES)
+    if propose:
+        check_folder(propose, force)
     believed = read_card(card)
     recordings = read_recordings((*train, *heldout), believed.columns, columns, units, believed.mount.motion, layout)
     seconds = sum(recording.duration for recording in recordings)
@@ -54,6 +61,7 @@ def diagnose(
     given: dict[str, Sequence[object]] = {"--heldout": heldout, "--card": [card], "--out": [out]}
     given |= {"--columns": columns or (), "--units": units or (), "--layout": layout or ()}
     given |= {"--fmu": [fmu] if fmu else (), "--variables": variables or ()}
+    given |= {"--propose": [propose] if propose else ()}
     command = _command(train, given) + (" --quick" if quick else "")
     with stage("looking for what the model lacks") as progress:
         found = find(
@@ -68,10 +76,13 @@ def diagnose(
             command=command,
             on_progress=progress.tell,
         )
+    files = found.propose(propose, force) if propose else ()
     if as_json:
         put_json(found.as_json())
     else:
         put(summary(found.diagnosis, out=out))
+    if propose:
+        say(proposed(found.diagnosis, files))
     if check and found.missing:
         sys.exit(1)
 

@@ -20,7 +20,7 @@ def identify(
         list[str] | None, typer.Option("--free", help="A parameter to identify: sigma0, Fc, inertia ... [all]")
     ] = None,
     cut: Annotated[
-        float | None, typer.Option("--cut", help="Slowest speed of the friction map [rad/s or m/s].")
+        float | None, typer.Option("--cut", min=0.0, help="Slowest speed of the friction map [rad/s or m/s].")
     ] = None,
     keep_inertia: Annotated[
         bool, typer.Option("--keep-inertia/--drop-inertia", help="Friction map: tau - J q'', or tau alone.")

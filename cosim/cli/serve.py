@@ -10,7 +10,7 @@ from cosim.support.terminal import put, say
 
 
 def serve(
-    port: Annotated[int, typer.Option("--port", help="Port on 127.0.0.1; 0: any that is free.")] = 0,
+    port: Annotated[int, typer.Option("--port", min=0, max=65_535, help="Port on 127.0.0.1; 0: any that is free.")] = 0,
     browser: Annotated[bool, typer.Option("--browser/--no-browser", help="Open the page in the browser.")] = True,
     data: Annotated[
         Path | None, typer.Option("--data", help="Folder of what was diagnosed; by default the user's own.")

@@ -11,6 +11,7 @@ import numpy as np
 
 from cosim.data.limits import LARGEST, listed, short
 from cosim.data.questions import untimed
+from cosim.data.runs import many, split
 from cosim.support.errors import RecordingError
 
 SLOWEST = 10.0
@@ -101,8 +102,8 @@ def _is_number(value: Any) -> bool:
     return True
 
 
-def check_time(path: Path, t: np.ndarray, minimum: int) -> None:
-    """Refuse a table that is too short or whose time does not grow."""
+def check_time(path: Path, t: np.ndarray, minimum: int, values: Mapping[str, np.ndarray]) -> None:
+    """Refuse a table that is too short or whose time does not grow; `values` are its columns by their own names."""
     if len(t) < minimum:
         message = f"{path} has {len(t)} rows; at least {minimum} are needed."
         raise RecordingError(message, culprit=str(path), value=len(t))
@@ -111,12 +112,10 @@ def check_time(path: Path, t: np.ndarray, minimum: int) -> None:
         row, before, after = wrong[0] + 2, t[wrong[0]], t[wrong[0] + 1]
         how = "runs backwards" if after < before else "stands still"
         span = f"({before:.9g} s to {after:.9g} s)"
-        again = int(np.count_nonzero(np.diff(t) < 0))
-        todo = "Split the file there."
-        if again > 1:
-            todo = f"It does so {again:,} times: these are {again + 1:,} recordings; write each into a file of its own."
-        message = f"{path}: time {how} at row {row:,} {span}. {todo}"
-        raise RecordingError(message, culprit=str(path), value=float(after))
+        message = f"{path}: time {how} at row {row:,} {span}."
+        if after < before and split(path)[0].is_file():
+            raise many(path, values, t, message)
+        raise RecordingError(f"{message} Split the file there.", culprit=str(path), value=float(after))
 
 
 def check_motion(path: Path, table: dict[str, np.ndarray], needed: tuple[str, ...]) -> None:

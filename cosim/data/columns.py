@@ -29,6 +29,7 @@ class Columns:
         roles: columns whose meaning the format fixes, {"q": "POSITION"}; they need no guess.
         lacks: why there is no column of a meaning, {"tau": "a guide log holds no torque"}.
         notes: sentences on what was left out.
+        rows: which rows of the file these are, where they are one recording of many: "4,378 to 8,755".
         numbered: the file names no columns; they are called #1, #2 ...
     """
 
@@ -41,4 +42,5 @@ class Columns:
     roles: dict[str, str] = field(default_factory=dict)
     lacks: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    rows: str = ""
     numbered: bool = False

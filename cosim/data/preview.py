@@ -8,8 +8,10 @@ from shlex import quote
 from cosim.data.assign import assign
 from cosim.data.columns import Columns
 from cosim.data.formats import read_columns
+from cosim.data.one_run import one_run
 from cosim.data.questions import PERIOD
 from cosim.data.recording import REQUIRED, Recording
+from cosim.data.runs import named, split
 from cosim.data.spacing import with_time
 from cosim.support.errors import RecordingError, UndecidedError
 from cosim.support.files import sha256
@@ -58,9 +60,10 @@ def preview(path: Path, options: Mapping[str, Mapping[str, str]] | None = None) 
     """
     said: Options = {name: dict((options or {}).get(name, {})) for name in ("columns", "units", "layout")}
     layout = {key: text for key, text in said["layout"].items() if key != PERIOD}
-    found = read_columns(path, layout)
+    file, _ = split(path)
+    found = read_columns(file, layout)
     undecided: list[str] = []
-    own = sha256(path)
+    own = sha256(file)
     for _ in range(TRIES):
         try:
             return _judged(path, own, found, said, tuple(undecided))
@@ -71,14 +74,15 @@ def preview(path: Path, options: Mapping[str, Mapping[str, str]] | None = None) 
 
 
 def _judged(path: Path, own: str, found: Columns, said: Options, undecided: tuple[str, ...]) -> Preview:
-    timed, refused = with_time(found, said["layout"]), ""
+    timed = one_run(path, with_time(found, said["layout"]), said["columns"], said["units"])
+    refused, name = "", named(path)
     required: tuple[str, ...] = REQUIRED
     try:
-        recording = Recording.judged(path, path.stem, timed, own, said["columns"], said["units"], REQUIRED)
+        recording = Recording.judged(path, name, timed, own, said["columns"], said["units"], REQUIRED)
     except UndecidedError:
         raise
     except RecordingError as error:
         refused, required = str(error), ()
-        recording = Recording.judged(path, path.stem, timed, own, said["columns"], said["units"], ())
+        recording = Recording.judged(path, name, timed, own, said["columns"], said["units"], ())
     served = assign(path, timed, said["columns"], said["units"], required)
     return Preview(recording, timed, served.sources, said, undecided, refused)

@@ -18,7 +18,9 @@ from cosim.data.assign import assign
 from cosim.data.checks import check_motion, check_names, check_sampling, check_time, chosen, numbers
 from cosim.data.columns import Columns
 from cosim.data.formats import read_columns
+from cosim.data.one_run import one_run
 from cosim.data.questions import PERIOD
+from cosim.data.runs import named, split
 from cosim.data.spacing import with_time
 from cosim.data.times import read_clock
 from cosim.support.errors import OutputError
@@ -73,7 +75,8 @@ class Recording:
         """Read and judge a recording.
 
         Args:
-            path: text of any layout (also .gz), Parquet, MAT, HDF5, MDF4, MCAP file or bag of ROS 2.
+            path: text of any layout (also .gz), Parquet, MAT, HDF5, MDF4, MCAP file or bag of ROS 2; of a file
+                of many recordings one, "many.parquet:run=3" by a column or "many.csv:#3" by number.
             columns: our name to the file's name, {"tau": "force"}; `#3` is the third column.
             units: our name to the unit in the file, {"q": "arcsec"}; values become SI. `q_d` is in the unit of `q`
                 unless it is given its own.
@@ -86,9 +89,10 @@ class Recording:
             UnitError: a unit is unknown.
         """
         path, layout = Path(path), dict(layout or {})
-        found = read_columns(path, {key: text for key, text in layout.items() if key != PERIOD})
-        found = with_time(found, layout)
-        return cls.judged(path, path.stem, found, sha256(path), columns or {}, units or {}, required)
+        file, _ = split(path)
+        found = read_columns(file, {key: text for key, text in layout.items() if key != PERIOD})
+        found = one_run(path, with_time(found, layout), columns or {}, units or {})
+        return cls.judged(path, named(path), found, sha256(file), columns or {}, units or {}, required)
 
     @classmethod
     def of(
@@ -132,11 +136,12 @@ class Recording:
         table, notes = numbers(path, numeric, ("t", *chosen(values, required)))
         si = {column: unit(text) for column, text in stated.items() if column in table}
         table = {key: si[key].to_si(column) if key in si else column for key, column in table.items()}
-        check_time(path, table["t"], MINIMUM_ROWS if required else 2)
+        check_time(path, table["t"], MINIMUM_ROWS if required else 2, found.values)
         check_motion(path, table, chosen(values, required))
         if required:
             check_sampling(path, table["t"])
-        origin = found.origin | {"file": {"name": path.name, "sha256": sha256}}
+        rows: JsonObject = {"rows": found.rows} if found.rows else {}
+        origin = found.origin | {"file": {"name": path.name, "sha256": sha256} | rows}
         origin |= {"start": found.start or clock.start} if found.start or clock.start else {}
         notes = (*found.notes, *served.notes, *clock.notes, *notes)
         return cls(name, table, {"t": "s"} | {key: one.si for key, one in si.items()}, origin, notes, others)
@@ -193,6 +198,12 @@ class Recording:
         """SHA-256 of the file this was read from; empty for one made here."""
         file = self.origin.get("file")
         return str(file.get("sha256", "")) if isinstance(file, Mapping) else ""
+
+    @property
+    def identity(self) -> tuple[str, str]:
+        """What no two recordings share: the hash of the file, and the rows of it where it holds many."""
+        file = self.origin.get("file")
+        return self.sha256, str(file.get("rows", "")) if isinstance(file, Mapping) else ""
 
     @property
     def duration(self) -> float:

@@ -15,7 +15,6 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from math import ceil
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from scipy.interpolate import BPoly, make_interp_spline
@@ -28,6 +27,7 @@ from cosim.fmi.alias import Alias
 from cosim.master.simulate import simulate
 from cosim.support.errors import InputError, StepError
 from cosim.support.files import sha256
+from cosim.support.scratch import Scratch
 from cosim.support.statistics import rms
 from cosim.system.system import System
 from cosim.system.wire import Record, Wire
@@ -95,7 +95,7 @@ def as_base(
     cutoff = choose_cutoff(train, card.mount.inertia)
     recordings = (*train, *heldout)
     prepared = [prepare([one], cutoff) for one in recordings]
-    with TemporaryDirectory() as folder:
+    with Scratch() as folder:
         follower = _Follower(box, card, Path(folder), _start(box)).fitting(prepared[0].pieces[0])
         followed = []
         for one in prepared:

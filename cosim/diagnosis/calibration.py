@@ -15,6 +15,9 @@ Reference: Platt, Advances in Large Margin Classifiers, 1999.
 from math import exp, log
 
 OFFSET, SLOPE = 1.7, 1.05
+LIKELY, SURE = 0.5, 0.8
+"""Probabilities from which an effect is called found (it is more likely there than not), and from which no word of
+doubt stands beside it. Report, terminal and page follow `Finding.answer`, which is decided with the former."""
 LEAST = 1e-4
 """Shares nearer to 0 or 1 than this are not told apart."""
 

@@ -9,7 +9,6 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from cosim.estimation.prepare import Array, lowpass
 from cosim.estimation.set_point import set_point
 from cosim.master.simulate import simulate
 from cosim.support.errors import StepError
+from cosim.support.scratch import Scratch
 from cosim.support.statistics import rms
 from cosim.system.system import System
 from cosim.system.wire import Record, Wire
@@ -109,7 +109,7 @@ class Loops:
 
     def __enter__(self) -> "Loops":
         self._threads = ThreadPoolExecutor(AT_ONCE, "loop")
-        self._folder = TemporaryDirectory(prefix="cosim-loop-")
+        self._folder = Scratch()
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,7 +1,7 @@
 """The decision, from scores alone: what is named, what stays open, whether something unknown is left. No data here."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp
 
 from cosim.diagnosis.calibration import calibrated
@@ -57,6 +57,10 @@ class Decision:
     doubtful: tuple[str, ...] = ()
     """Names that help, and may yet imitate what is unknown."""
 
+    def with_rest(self, follows: tuple[str, ...]) -> "Decision":
+        """The same where something without a name is left, that follows some quantities; what is decided stays."""
+        return self if self.is_unknown else replace(self, is_unknown=True, depends_on=follows)
+
 
 def decide(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Decision:
     """Decide what is named, what stays open and whether something without a name is left."""
@@ -80,30 +84,30 @@ def doubted(effects: Sequence[EffectScores], residual: ResidualScores, policy: P
 class Gain:
     """What held-out recordings gain by an effect: nats, and shares of the plain residual energy in two bands.
 
-    The bands are those of the analysis and of the protocol: fast effects show in the wider one, and in either a few
-    rows of noise may hide what the other shows.
+    The bands are those of the analysis and of the protocol, the wider one last: fast effects show in the wider one, and
+    in either a few rows of noise may hide what the other shows.
     """
 
     nats: float
-    plain: float
-    protocol: float
+    narrow: float
+    wide: float
 
     def halves(self, policy: Policy) -> bool:
         """Whether the plain error energy is halved in both bands, and the likelihood does not clearly speak against it.
 
         What is slow is free to wander in the likelihood, so that an effect of it may gain nothing there.
         """
-        return min(self.plain, self.protocol) >= policy.halved and self.nats > -policy.floor
+        return min(self.narrow, self.wide) >= policy.halved and self.nats > -policy.floor
 
     def raises(self, policy: Policy) -> bool:
         """Whether the plain error is raised, in both bands or by much in one.
 
-        What surely predicts and halves the error that is printed may raise it in the narrower band: a bristle at rest
+        What surely predicts and halves the error in the wider band may raise it in the narrower one: a bristle at rest
         creeps with each vibration that a filter leaves, the less of them the more a model keeps of a wrong torque.
         """
-        if self.protocol >= policy.halved and self.nats >= policy.sure_predicted:
+        if self.wide >= policy.halved and self.nats >= policy.sure_predicted:
             return False
-        return max(self.plain, self.protocol) < 0 or min(self.plain, self.protocol) < -policy.most_raised
+        return max(self.narrow, self.wide) < 0 or min(self.narrow, self.wide) < -policy.most_raised
 
 
 def stands(gain: Gain, share: float, policy: Policy) -> bool:
@@ -126,9 +130,14 @@ def open_rivals(one: EffectScores, policy: Policy) -> tuple[str, ...]:
 def is_left(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> bool:
     """Whether something is left that is no misfit of a friction law, nor of the equations of what is named."""
     large = residual.share > policy.large_residual or residual.share_there > policy.large_residual_there
-    sure = set(one.effect for one in effects) - set(doubted(effects, residual, policy))
-    largest = max((one.evidence for one in effects if one.effect in sure), default=0.0)
-    return large or any(_is_no_misfit(one, policy.imitation * largest, policy) for one in residual.terms)
+    doubtful = doubted(effects, residual, policy)
+    least = least_left([one for one in effects if one.effect not in doubtful], policy)
+    return large or any(_is_no_misfit(one, least, policy) for one in residual.terms)
+
+
+def least_left(named: Sequence[EffectScores], policy: Policy) -> float:
+    """Evidence [nats] below which what is left may be no more than what the equations of the names lack."""
+    return policy.imitation * max((one.evidence for one in named), default=0.0)
 
 
 def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:

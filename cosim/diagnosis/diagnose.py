@@ -10,9 +10,10 @@ from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
 from cosim.diagnosis.absent import not_found
 from cosim.diagnosis.adequacy import over_time, share_left, share_there
+from cosim.diagnosis.band import in_band
 from cosim.diagnosis.breakdown import parts
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import Decision, EffectScores, ResidualScores, decide
+from cosim.diagnosis.decision import Decision, EffectScores, ResidualScores, decide, least_left
 from cosim.diagnosis.delivered import standing
 from cosim.diagnosis.entries import NotLearnedEntry
 from cosim.diagnosis.experiment import Experiment, best, told
@@ -21,6 +22,7 @@ from cosim.diagnosis.flexible import flexible_terms
 from cosim.diagnosis.global_test import global_test
 from cosim.diagnosis.law_selection import proposed_law
 from cosim.diagnosis.learned.learn import NOTHING_TRIED, Learned, learn
+from cosim.diagnosis.learned.proposal import Proposal
 from cosim.diagnosis.locate import regions
 from cosim.diagnosis.loop_bias import loop_bias
 from cosim.diagnosis.policy import POLICY
@@ -36,7 +38,7 @@ from cosim.diagnosis.search import search
 from cosim.diagnosis.withheld import without_names
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import Fit
-from cosim.estimation.prepare import Array, Prepared, choose_cutoff, prepare, quality
+from cosim.estimation.prepare import Array, Prepared, prepare, quality
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import weights
 from pyfmi_models.card import Card
@@ -55,6 +57,8 @@ class Outcome:
     proposed: Card
     refitted: Card
     experiment: Experiment | None = None
+    proposals: tuple[Proposal, ...] = ()
+    """Effect files for a person to review, of formulas that are as good as what was learned."""
 
 
 @dataclass(frozen=True)
@@ -116,7 +120,7 @@ def diagnose(
     examined = examine(comparison, search(comparison, base, on_progress), on_progress)
     on_progress("proving on the recording that was not fitted")
     answer = _answer(comparison, examined, heldout)
-    tried = _learned(answer, heldout) if answer.decision.is_unknown else None
+    answer, tried = _learned(answer, heldout)
     learned = tried if tried and tried.helps else None
     model = learned.mount if learned else answer.chosen.mount
     delivered, first = (_improved(card, one) for one in (model, examined.chosen.mount))
@@ -134,11 +138,12 @@ def diagnose(
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,
     )
-    return Outcome(diagnosis, delivered, first, refitted, experiment)
+    return Outcome(diagnosis, delivered, first, refitted, experiment, learned.proposals() if learned else ())
 
 
 def _problem(train: Sequence[Recording], card: Card) -> Problem:
-    mount, prepared = card.plant(), prepare(train, choose_cutoff(train, card.mount.inertia))
+    mount = card.plant()
+    prepared = in_band(train, mount)
     slowest = max(recording.sample_time for recording in train)
     return Problem(mount, prepared, _weight(mount, prepared), slowest)
 
@@ -146,7 +151,7 @@ def _problem(train: Sequence[Recording], card: Card) -> Problem:
 def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Recording]) -> Answer:
     """Prove, measure what is left, decide."""
     prepared = prepare(heldout, comparison.problem.prepared.cutoff)
-    held = Predictive.of(comparison, prepared, examined.base.mount, prepare(heldout, CUTOFF))
+    held = Predictive.of(comparison, prepared, examined.base, prepare(heldout, CUTOFF))
     proof = prove(comparison, examined, held)
     residual, policy = _residual_scores(comparison, proof, held), comparison.policy
     return Answer(comparison, examined.base, proof, decide(_scores(proof), residual, policy), held)
@@ -213,14 +218,18 @@ def _with_learned(
     )
 
 
-def _learned(answer: Answer, heldout: Sequence[Recording]) -> Learned | None:
-    """What is learned for what has no name, its errors in the band of the headline's."""
-    learned, problem = learn(answer.comparison, answer.chosen, answer.held), answer.comparison.problem
-    if not learned:
-        return None
-    after = learned.mount if learned.helps else answer.chosen.mount
+def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Learned | None]:
+    """What is learned for what has no name, its errors in the band of the headline's; surely learned, it is unknown."""
+    tried, problem = learn(answer.comparison, answer.chosen, answer.held.as_delivered()), answer.comparison.problem
+    if not tried:
+        return answer, None
+    after = tried.mount if tried.helps else answer.chosen.mount
     models = Structures(problem.mount, answer.base.mount, after)
-    return learned.judged_in(judged_band(heldout, models, problem.prepared.cutoff), answer.chosen.mount)
+    told = tried.judged_in(judged_band(heldout, models, problem.prepared.cutoff), answer.chosen.mount)
+    policy = answer.comparison.policy
+    if told.says_unknown(policy, least_left(_scores(answer.proof), policy)):
+        answer = replace(answer, decision=answer.decision.with_rest(told.quantities))
+    return answer, told if answer.decision.is_unknown else None
 
 
 def _not_learned(tried: Learned | None) -> NotLearnedEntry:

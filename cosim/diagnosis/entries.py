@@ -3,6 +3,7 @@
 from typing import TypedDict
 
 from cosim.support.plain import JsonObject
+from pyfmi_models.effects.learned_table import LearnedTable
 
 
 class LawProposal(TypedDict, total=False):
@@ -21,13 +22,46 @@ class BiasEntry(TypedDict, total=False):
     moved: dict[str, float]
 
 
+class BinsEntry(TypedDict, total=False):
+    """What training recordings leave without a term: mean and 95 % band of bins, (at,) or (at, by_at); None: empty."""
+
+    at: list[float]
+    by_at: list[float]
+    value: list[float | None] | list[list[float | None]]
+    band: list[float | None] | list[list[float | None]]
+
+
+class TableEntry(LearnedTable, total=False):
+    """A learned term, and what the training recordings say beside it."""
+
+    data: BinsEntry
+
+
+class NumberEntry(TypedDict):
+    """A number of a formula, its 95 % range and unit."""
+
+    value: float
+    interval: list[float]
+    unit: str
+
+
+class FormulaEntry(TypedDict, total=False):
+    """A closed form that is as good on unseen recordings as table number `table`."""
+
+    table: int
+    kind: str
+    over: list[str]
+    equation: str
+    parameters: dict[str, NumberEntry]
+
+
 class LearnedEntry(TypedDict, total=False):
     """The term learned for what has no name, and the held-out error before and after it [N m or N]."""
 
     quantities: list[str]
     size: float
-    table: list[JsonObject]
-    formula: list[JsonObject]
+    table: list[TableEntry]
+    formula: list[FormulaEntry]
     before: float
     after: float
     interval: list[float]

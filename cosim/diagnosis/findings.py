@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.diagnosis.advice import advice
+from cosim.diagnosis.calibration import LIKELY
 from cosim.diagnosis.hypotheses import hypothesis_of
 from cosim.diagnosis.locate import where
-from cosim.diagnosis.result import Finding, Trace
+from cosim.diagnosis.result import Answer, Finding, Trace
 from cosim.diagnosis.rivals import AcceptedEffect
 from cosim.diagnosis.search import CandidateFit
 from cosim.estimation.blocks import Blocks, sandwich
@@ -68,7 +69,7 @@ def accepted(
     return Finding(
         effect=effect.id,
         title=effect.title,
-        answer="ambiguous" if members or not is_told(effect, numbers, mount) else "found",
+        answer=answered(probability, members, is_told(effect, numbers, mount)),
         probability=probability,
         gain=one.own.plain_gain,
         parameters=numbers.values,
@@ -84,10 +85,15 @@ def accepted(
         less_likely=tuple(_behind(one, members, False)),
         told_apart_by=effect.told_apart_by,
         action=effect.action,
-        evidence=f"removes {one.own.plain_gain:.0%} of the error energy in training (evidence {one.own.evidence:.0f} "
-        f"nats; {predicted:.0f} nats on the held-out recordings){own.caveat}",
+        evidence=f"removes {100 * one.own.plain_gain:.0f} % of the error energy in training "
+        f"(evidence {one.own.evidence:.0f} nats; {predicted:.0f} nats on the held-out recordings){own.caveat}",
         visible_from=_visible_from(effect, numbers),
     )
+
+
+def answered(probability: float, members: Sequence[str], is_told: bool) -> Answer:
+    """Found is what no rival of the set can be, is more likely there than not, and has a size that is told."""
+    return "found" if not members and probability >= LIKELY and is_told else "ambiguous"
 
 
 def _behind(one: AcceptedEffect, members: Sequence[str], far: bool) -> Iterator[str]:
@@ -97,7 +103,7 @@ def _behind(one: AcceptedEffect, members: Sequence[str], far: bool) -> Iterator[
         if rival.effect.id not in one.effect.rivals or rival.effect.id in members:
             continue
         if (margin >= EXCLUDED_NATS and lead >= EXCLUDED_SHARE) == far:
-            both = f"{rival.plain_gain:.1%} of the error energy, this {one.own.plain_gain:.1%}"
+            both = f"{100 * rival.plain_gain:.1f} % of the error energy, this {100 * one.own.plain_gain:.1f} %"
             yield f"{rival.effect.title}: removes {both} ({margin:.0f} nats behind)"
 
 

@@ -17,7 +17,6 @@ from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
 from cosim.support.statistics import column_rms, rms
 from pyfmi_models.effects import Effect
-from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.model import parameters_of
 from pyfmi_models.mount import Mount
 
@@ -66,7 +65,7 @@ def members(problem: Problem, mount: Mount, span: Span, tried: Sequence[Candidat
         for member in one.concealed(mount, span, [c for c in tried if isinstance(c.instances[0], one.forms)])
         if not needs_turns(member.instances[0], mount, problem.prepared)
     ]
-    even = [one for one in chosen if not isinstance(one.instances[0], PeriodicDisturbance)]
+    even = [one for one in chosen if not hypothesis_of(one.instances[0]).has_own_phase]
     columns = columns_of(mount, even, problem.prepared, values)
     torque = rms(problem.prepared.stacked("tau"))
     many = {name: sum(one.effect == name for one in tried) for name in {one.effect for one in chosen}}
@@ -74,7 +73,7 @@ def members(problem: Problem, mount: Mount, span: Span, tried: Sequence[Candidat
         _member(one, own, mount, torque, many[one.effect], problem.sample_time)
         for one, own in zip(even, columns, strict=True)
     ]
-    tones = [one for one in chosen if isinstance(one.instances[0], PeriodicDisturbance)]
+    tones = [one for one in chosen if hypothesis_of(one.instances[0]).has_own_phase]
     return [*made, *_tones(problem.prepared, tones, torque, many)]
 
 

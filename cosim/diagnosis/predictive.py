@@ -1,18 +1,23 @@
 """Predictive likelihood: the same evidence on recordings to which nothing was fitted.
 
-No parameter is free there; only the nuisances are (what friction laws cannot agree on, a wandering level), with sizes
-and noise estimated as in training. So a gain here is one of prediction, in the same unit, with nothing to be priced.
+No parameter is fitted there; only the nuisances are free (what friction laws cannot agree on, a wandering level, and
+how far the base's own numbers are from those of training), with sizes and noise estimated as in training. So a gain
+here is one of prediction, in the same unit, with nothing to be priced.
+
+Friction and load are not the same on two days, and what training cannot tell of the base shows in another motion. Both
+are common to a model with an effect and without it, and far larger than many an effect: they must not decide.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from cosim.diagnosis.bands import Bands
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.discrepancy import Discrepancy, discrepancy
+from cosim.diagnosis.discrepancy import Discrepancy, Shapes, discrepancy
 from cosim.diagnosis.marginal import Group, marginal
+from cosim.diagnosis.policy import Policy
 from cosim.diagnosis.protocol import is_noise, residuals
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse, stacked
@@ -23,6 +28,8 @@ from pyfmi_models.mount import Mount
 AMPLIFIED = 2.0
 """Growth of the protocol's energy from which a model amplifies noise, which it may only if it halves the error that is
 no noise."""
+BASE = "base"
+"""Name of the nuisances that are the base's own numbers, the last ones."""
 POINTS = 500
 """Frequencies at which noise is added up."""
 LEAST_BEYOND = 0.1
@@ -43,10 +50,10 @@ class Predictive:
     """The same recordings in the band of the protocol, whose error is what is printed."""
 
     @classmethod
-    def of(cls, comparison: Comparison, prepared: Prepared, base: Mount, protocol: Prepared) -> "Predictive":
+    def of(cls, comparison: Comparison, prepared: Prepared, base: Fit, protocol: Prepared) -> "Predictive":
         """Weigh held-out rows as the training rows are."""
-        many = len(prepared.recording_of)
-        weight = np.ones(many) if base.friction.key == "none" else weights(base.friction, prepared)
+        many, friction = len(prepared.recording_of), base.mount.friction
+        weight = np.ones(many) if friction.key == "none" else weights(friction, prepared)
         scale = comparison.noise.at(prepared.stacked("v"))
         bands = Bands.of(prepared, weight, scale, comparison.policy)
         floor = bands.least_noise(prepared, comparison.inertia, comparison.policy)
@@ -54,11 +61,17 @@ class Predictive:
             prepared,
             weight,
             bands,
-            discrepancy(base, prepared, comparison.policy),
+            _moved(discrepancy(base.mount, prepared, comparison.policy), base, prepared, comparison.policy),
             floor,
             comparison.policy.halved,
             protocol,
         )
+
+    def as_delivered(self) -> "Predictive":
+        """The same with the base's numbers as they are: what is delivered as a model must predict with them."""
+        rest = tuple(one for one in self.nuisances.groups if one.name != BASE)
+        columns = self.nuisances.columns[:, : sum(len(one.columns) for one in rest)]
+        return replace(self, nuisances=replace(self.nuisances, columns=columns, groups=rest))
 
     def residual(self, mount: Mount) -> Array:
         """Measured minus model torque at the kept rows."""
@@ -85,7 +98,9 @@ class Predictive:
         return marginal(grams, free, groups, self.bands.count, self.bands.effective, self.floor).log_likelihood
 
     def plain_gains(self, without: Mount, mount: Mount) -> tuple[float, float]:
-        """Share of the plain residual energy that a model removes, in the band of the analysis and of the protocol.
+        """Share of the plain residual energy that a model removes, in the bands of the analysis and of the protocol.
+
+        The wider band comes last.
 
         What the noise of the reading gives to a model's torque is no error of it: a base whose inertia is nothing has
         none of that. Where the protocol's band still holds mostly noise, which the model does not amplify, it says
@@ -100,7 +115,7 @@ class Predictive:
         amplified = wide[1] > AMPLIFIED * wide[0] and narrow[1] > (1 - self.halved) * narrow[0]
         pairs = (narrow, narrow if is_noise(narrow, wide) and not amplified else wide)
         first, second = (1 - after / max(before, 1e-300) for before, after in pairs)
-        return first, second
+        return (first, second) if self.prepared.cutoff <= self.protocol.cutoff else (second, first)
 
     def _protocol_energy(self, mount: Mount) -> float:
         left = zip(residuals(self.protocol, mount), self.protocol.pieces, strict=True)
@@ -113,6 +128,16 @@ class Predictive:
     @cached_property
     def _nuisance_grams(self) -> Array:
         return self.bands.grams(self._nuisances)
+
+
+def _moved(others: Discrepancy, base: Fit, prepared: Prepared, policy: Policy) -> Discrepancy:
+    """Nuisances with the base's numbers beside the others, each in units of its own size."""
+    own = stacked(Inverse(base.mount, base.free), prepared.pieces, base.values)[1] * base.values
+    own = own[:, np.abs(own).max(axis=0, initial=0.0) > 0]
+    first = others.columns.shape[1]
+    moved = Shapes(tuple(range(first, first + own.shape[1])), policy.moved_prior, BASE)
+    groups = (*others.groups, moved) if own.shape[1] else others.groups
+    return replace(others, columns=np.column_stack([others.columns, own]), groups=groups)
 
 
 def reading_noise(prepared: Prepared, mount: Mount) -> float:

@@ -1,7 +1,8 @@
 """The proof: torque residuals on recordings, the one that was never fitted first of all.
 
-Protocol: low-pass of 30 Hz (lower for slow recordings, and where that band is mostly noise, then that of the
-analysis) on both sides, five-point differences, RMS over 3 s .. end - 0.5 s (shorter recordings: 5 % off each end).
+Protocol: low-pass of 30 Hz on both sides (lower for slow recordings; the band of the analysis where 30 Hz is mostly
+noise, or where most of what the base leaves lies above 30 Hz inside that band), five-point differences, RMS over 3 s ..
+end - 0.5 s (shorter recordings: 5 % off each end).
 Beside it the same over clear motion only, in the band of the analysis.
 """
 
@@ -80,10 +81,11 @@ def judge(recordings: Sequence[Recording], models: Structures, cutoff: float) ->
 
 def judged_band(recordings: Sequence[Recording], models: Structures, cutoff: float) -> Prepared:
     """Recordings in the band in which `judge` compares models on them."""
-    both = [
+    own, protocol = (
         [heldout_rms(recordings, one, band) ** 2 for one in (models.before, models.after)] for band in (cutoff, CUTOFF)
-    ]
-    return prepare(recordings, cutoff if is_noise(*both) else CUTOFF)
+    )
+    is_above = cutoff > CUTOFF and own[0] > 2 * protocol[0]
+    return prepare(recordings, cutoff if is_above or is_noise(own, protocol) else CUTOFF)
 
 
 def heldout_rms(recordings: Sequence[Recording], mount: Mount, cutoff: float = CUTOFF) -> float:

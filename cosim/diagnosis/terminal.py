@@ -3,31 +3,33 @@
 import os
 import sys
 import textwrap
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TextIO
 
 from cosim.diagnosis.report.findings import do, where
 from cosim.diagnosis.report.lead import heading
+from cosim.diagnosis.report.next_experiment import to_record
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.words import (
+    ANSWERS,
     Block,
     blocks,
     delivered,
     law,
     left_out,
+    limit,
     lowered,
     model,
     proven_range,
-    shows_from,
     sized,
     unseen_torque,
-    verdict,
 )
 from cosim.diagnosis.result import Diagnosis, Finding
 
 WIDTH = 80
 REPORT = "report.html"
-WORDS = {"found": "FOUND", "not_proven": "unproven", "ambiguous": "MAYBE"}
+WORDS = {"found": ANSWERS["found"].upper(), "ambiguous": ANSWERS["ambiguous"].upper(), "not_proven": "unproven"}
 NAME, SIZE, RANGE = 21, 12, 16
 ORDER = 10
 """Columns of what to do, before the text."""
@@ -53,6 +55,7 @@ def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -
         _goes_with(diagnosis),
         _rest(diagnosis, scales),
         _wrapped(diagnosis.learned.get("statement", "") or diagnosis.not_learned.get("statement", ""), 0),
+        _formulas(diagnosis),
         _wrapped(law(diagnosis), 0),
         _error(diagnosis, scales),
         _next(diagnosis),
@@ -96,10 +99,8 @@ def styled(stream: TextIO) -> bool:
 
 def _title(diagnosis: Diagnosis) -> str:
     card = model(diagnosis) or diagnosis.mount
-    found = sum(finding.answer == "found" for finding in diagnosis.findings)
-    if verdict(diagnosis) == "found":
-        return f"{found} effect{'s are' if found != 1 else ' is'} missing from {card}"
-    return f"{heading(diagnosis)} ({card})"
+    title = heading(diagnosis, card)
+    return title if card in title else f"{title} ({card})"
 
 
 def _block(block: Block, scales: Scales) -> list[str]:
@@ -133,6 +134,29 @@ def _goes_with(diagnosis: Diagnosis) -> list[str]:
     return _wrapped(f"The rest goes with: {', '.join(diagnosis.depends_on)}", 2) if diagnosis.depends_on else []
 
 
+def _formulas(diagnosis: Diagnosis) -> list[str]:
+    """Return each closed form that is as good on unseen recordings as what was learned, with its numbers."""
+    lines = []
+    for one in diagnosis.learned.get("formula", ()):
+        numbers = ", ".join(
+            f"{name} {told['value']:.3g}{'' if told['unit'] == '1' else ' ' + told['unit']}"
+            for name, told in one["parameters"].items()
+        )
+        lines += _wrapped(f"As good, and shorter: {one['equation']}; {numbers}", 0)
+    return lines
+
+
+def proposed(diagnosis: Diagnosis, files: Sequence[Path]) -> str:
+    """Say where the formulas were written as effects, or why there is nothing to propose."""
+    if files:
+        return f"Proposed, for you to review: {', '.join(map(str, files))}; no model holds it."
+    if diagnosis.learned:
+        return "Nothing to propose: no formula is as good as what was learned."
+    unknown = "unknown" in diagnosis.verdict
+    reason = "nothing was learned for what has no name" if unknown else "nothing is left without a name"
+    return f"Nothing to propose: {reason}."
+
+
 def _rest(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     """Return what was not seen, with the size that would have shown, and what could not be tested."""
     lines: list[str] = []
@@ -146,11 +170,13 @@ def _rest(diagnosis: Diagnosis, scales: Scales) -> list[str]:
 
 
 def _limit(finding: Finding, least: str) -> str:
-    """Return a name with the size from which it would have shown, as a torque where its number is no size."""
-    from_size = shows_from(finding) or (least if finding.answer == "not_seen" else "")
-    limit = f"< {from_size}" if from_size else finding.evidence if finding.answer == "not_testable" else ""
-    limit = limit.replace("\N{NO-BREAK SPACE}", " ")
-    return lowered(finding.title) + (f" ({limit.rstrip('.')})" if limit else "")
+    """Return a name with the size from which it would have shown, or why it cannot be tested."""
+    said = finding.evidence
+    if finding.answer == "not_seen":
+        said = limit(finding) or least
+        said = f"< {said}" if said[:1].isdigit() else said
+    said = said.replace("\N{NO-BREAK SPACE}", " ")
+    return lowered(finding.title) + (f" ({said.rstrip('.')})" if said else "")
 
 
 def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:
@@ -167,7 +193,7 @@ def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:
 def _next(diagnosis: Diagnosis) -> list[str]:
     """Return the one experiment that would tell more, and its command."""
     plan = diagnosis.next_experiment
-    said = [str(plan["description"])] if plan.get("description") else []
+    said = [to_record(diagnosis)] if plan.get("description") else []
     said += [f"cosim run {plan['scenario']} --out next"] if plan.get("scenario") else []
     said += [str(plan["command"])] if plan.get("command") else []
     return _wrapped("Next: " + ", then: ".join(said), 0) if said else []
@@ -184,4 +210,4 @@ def printable(text: str) -> str:
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
-__all__ = ["print_summary", "printable", "styled", "summary"]
+__all__ = ["print_summary", "printable", "proposed", "styled", "summary"]

@@ -228,17 +228,17 @@ def _inside(t: Array, start: float, end: float) -> npt.NDArray[np.bool_]:
     return np.asarray((t >= start + lead) & (t <= end - tail))
 
 
-def choose_cutoff(recordings: Sequence[Recording], inertia: float) -> float:
+def choose_cutoff(recordings: Sequence[Recording], inertia: float, noise_share: float = NOISE_SHARE) -> float:
     """Widest band in which encoder noise, differentiated twice, is a small torque [Hz].
 
     Differentiated noise in the model torque is not only error: the controller answers the same noise, and the two
     together look like a delay. So the band ends where inertia times the noise of the acceleration reaches
-    `NOISE_SHARE` of the torque.
+    `noise_share` of the torque.
     """
-    return min(_cutoff(recording, inertia) for recording in recordings)
+    return min(_cutoff(recording, inertia, noise_share) for recording in recordings)
 
 
-def _cutoff(recording: Recording, inertia: float) -> float:
+def _cutoff(recording: Recording, inertia: float, noise_share: float) -> float:
     dt, size = recording.sample_time, float(np.std(recording["tau"]))
     name, power = ("q", 4) if "q" in recording else ("v", 2)
     noise = noise_of(recording[name], dt)
@@ -246,7 +246,7 @@ def _cutoff(recording: Recording, inertia: float) -> float:
         if cutoff < 0.3 / dt:
             omega = 2 * np.pi * cutoff
             share = 2 * cutoff * dt / (power + 1)
-            if inertia * noise * omega ** (power / 2) * np.sqrt(share) <= NOISE_SHARE * size:
+            if inertia * noise * omega ** (power / 2) * np.sqrt(share) <= noise_share * size:
                 return cutoff
     return CUTOFFS[-1]
 

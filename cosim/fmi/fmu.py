@@ -4,7 +4,6 @@ FMI 2.0 and 3.0, co-simulation. Unpacked files live in a temporary directory tha
 """
 
 import ctypes
-import tempfile
 from collections import deque
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -30,6 +29,7 @@ from cosim.fmi.variables import ports_of
 from cosim.support.activity import doing
 from cosim.support.archive import unpack
 from cosim.support.errors import CosimError, FmuError
+from cosim.support.scratch import Scratch
 
 _TERMINATED = 3
 """fmi2Terminated of fmi2StatusKind."""
@@ -73,7 +73,7 @@ class FmuComponent:
         self._started = False
         self._worst = OK
         self._state = ctypes.c_void_p()
-        self._directory = tempfile.TemporaryDirectory(prefix="cosim-", ignore_cleanup_errors=True)
+        self._directory = Scratch()
         try:
             with doing(self.name, "loaded"):
                 self._fmu = self._instantiate()

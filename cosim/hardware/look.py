@@ -1,6 +1,5 @@
 """A look at a machine before any torque: does the drive answer, does its encoder live, does this computer keep time."""
 
-import tempfile
 from pathlib import Path
 
 from cosim.hardware.blackbox import read_black_box, recording_of
@@ -9,6 +8,7 @@ from cosim.hardware.session import Session
 from cosim.hardware.words import LIMITS
 from cosim.support.errors import HardwareError
 from cosim.support.plain import JsonObject
+from cosim.support.scratch import Scratch
 from cosim.system.scenario import Scenario
 
 SHOWN = ("cycles", "late_cycles", "worst_wake_up_us", "fifo", "memory_locked", "link")
@@ -21,7 +21,7 @@ def look(scenario: Scenario, machine: Machine, seconds: float) -> JsonObject:
     Raises:
         HardwareError: scenario and machine do not fit, the drive does not answer, or its encoder gives nothing new.
     """
-    with tempfile.TemporaryDirectory(prefix="cosim-") as folder:
+    with Scratch() as folder:
         box = Path(folder) / "box"
         with Session(scenario, machine, box) as session:
             session.advance(max(100, round(seconds / scenario.step)))

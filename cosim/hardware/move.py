@@ -10,7 +10,6 @@ does. The scenario's own plant, moved in the same way, says what J_seen should b
 much shows about J / s.
 """
 
-import tempfile
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +22,7 @@ from cosim.hardware.machine import Machine
 from cosim.hardware.session import Session
 from cosim.hardware.words import ENTERED
 from cosim.support.errors import HardwareError
+from cosim.support.scratch import Scratch
 from cosim.system.scenario import Scenario
 
 FREQUENCY, PERIODS, SETTLING = 10.0, 6, 2
@@ -92,7 +92,7 @@ def _model(scenario: Scenario, machine: Machine) -> tuple[float, float, float]:
 
 def _moved(scenario: Scenario, machine: Machine, way: float, needed: float, fast: bool) -> Recording:
     """Return the recording of a move, from the first cycle of the controller on."""
-    with tempfile.TemporaryDirectory(prefix="cosim-") as folder:
+    with Scratch() as folder:
         path = Path(folder) / "box"
         with Session(scenario, machine, path, fast=fast) as session:
             session.advance(100)

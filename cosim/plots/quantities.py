@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from math import floor, isfinite, log10, pi
 
-_TIGHT = ("°", "′", "″", "%")
+_TIGHT = ("°", "′", "″")
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ FAMILIES = {"rad": ANGLE, "rad/s": TURNING, "m": LENGTH, "m/s": MOVING, "N.m": T
 
 
 def joined(value: str, unit: str) -> str:
-    """Join number and unit; a narrow degree sign sticks, other units follow a hard space."""
+    """Join number and unit; an angle's sign sticks, other units follow a hard space."""
     return f"{value}{unit}" if not unit or unit.startswith(_TIGHT) else f"{value}\N{NO-BREAK SPACE}{unit}"
 
 

@@ -68,7 +68,7 @@ class Desk:
     def place(self, name: str, given: str) -> tuple[Path, int]:
         """Return where a recording of this name goes, and how many bytes it may have (InputError)."""
         job, file = self.draft(name), safe_name(given, self.limits.name)
-        if any(one.name == file for one in job.uploads):
+        if any(one.file == file for one in job.uploads):
             raise InputError(f"There is a recording {file} already; remove it first, or rename this one.", culprit=file)
         if len(job.uploads) >= self.limits.files:
             raise InputError(f"A diagnosis takes at most {self.limits.files} recordings.", culprit=file)
@@ -88,9 +88,29 @@ class Desk:
         columns = self.store.view(name, CARD_VIEW).get("columns", {}) | one.options.get("columns", {})
         seen = self.reader.look(str(self.store.recording(job, file)), one.options | {"columns": columns})
         self.store.put_view(name, view_key(file), seen)
+        if parts := seen.get("parts", {}):
+            self._spread(name, one, parts)
+
+    def _spread(self, name: str, whole: Upload, parts: Mapping[str, float]) -> None:
+        """Put the recordings of a file of many in its place, left out until somebody says what each is for."""
+        job = self.store.get(name)
+        room = self.limits.files - len(job.uploads) + 1
+        if len(parts) > room:
+            text = f"{whole.name} holds {len(parts):,} recordings; here is room for {room}."
+            text += " cosim diagnose takes any of them."
+            self.store.put_view(name, view_key(whole.name), {"problem": text})
+            return
+        made = tuple(
+            replace(whole, name=f"{whole.name}:{which}", size=round(share * whole.size), role="out")
+            for which, share in parts.items()
+        )
+        others = [one for one in job.uploads if one.name != whole.name]
+        self.store.put(name, uploads=(*others, *made))
+        for one in made:
+            self.look(name, one.name)
 
     def correct(self, name: str, file: str, form: Mapping[str, str]) -> None:
-        """Take what a form says of a recording: role, columns, units, layout (InputError, KeyError)."""
+        """Take what a form says of a recording: role; columns, units, layout of its file (InputError, KeyError)."""
         self.draft(name).upload(file)
         options: Options = {"columns": {}, "units": {}, "layout": {}}
         for key, names in (("columns", OURS), ("units", OURS), ("layout", LAYOUT)):
@@ -98,8 +118,16 @@ class Desk:
                 value = form.get(f"{key}.{ours}", "").strip()[:LONGEST]
                 if value:
                     options[key][ours] = value
-        self.store.put_upload(name, file, options=options, role=_role(form.get("role", "train")))
-        self.look(name, file)
+        self.store.put_upload(name, file, role=_role(form.get("role", "train")))
+        self._read_so(name, file, options)
+
+    def _read_so(self, name: str, file: str, options: Options) -> None:
+        """Read a recording, and all others of its file, with these options."""
+        job = self.store.get(name)
+        for one in job.uploads:
+            if one.file == job.upload(file).file:
+                self.store.put_upload(name, one.name, options=options)
+                self.look(name, one.name)
 
     def set_role(self, name: str, file: str, role: str) -> None:
         """Say what a recording is for (InputError, KeyError)."""
@@ -110,15 +138,17 @@ class Desk:
         """Take the example with which an open question of a recording was answered to look at it."""
         self.draft(name).upload(file)
         options = self.store.view(name, view_key(file)).get("options", {})
-        self.store.put_upload(name, file, options=options)
-        self.look(name, file)
+        self._read_so(name, file, options)
 
     def drop(self, name: str, file: str) -> None:
         """Remove a recording from a draft."""
         job = self.draft(name)
-        path = self.store.recording(job, job.upload(file).name)
-        self.store.change(name, lambda one: replace(one, uploads=tuple(u for u in one.uploads if u.name != file)))
-        path.unlink(missing_ok=True)
+        own = job.upload(file).file
+        kept = self.store.change(
+            name, lambda one: replace(one, uploads=tuple(u for u in one.uploads if u.name != file))
+        )
+        if not any(one.file == own for one in kept.uploads):
+            self.store.recording(job, own).unlink(missing_ok=True)
 
     def give_card(self, name: str, text: str, called: str) -> None:
         """Take a card; one that is not good is kept too, with its problem."""

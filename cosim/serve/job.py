@@ -16,12 +16,17 @@ KEPT_BACK = ("heldout", "held_out", "held-out", "holdout", "validation", "proof"
 
 @dataclass(frozen=True, kw_only=True)
 class Upload:
-    """A recording that was dropped."""
+    """A recording that was dropped; one of a file of many is called as on a command line, "many.parquet:run=3"."""
 
     name: str
     size: int
     role: Role = "train"
     options: Options = field(default_factory=dict)
+
+    @property
+    def file(self) -> str:
+        """The name of its file; a file that was dropped has no colon in its name."""
+        return self.name.partition(":")[0]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,7 +11,7 @@ from cosim.data.preview import Preview, preview
 from cosim.data.recording import Recording
 from cosim.plots.recording import MEANINGS, facts
 from cosim.serve.job import Options
-from cosim.support.errors import CosimError, InputError
+from cosim.support.errors import CosimError, InputError, ManyRecordingsError
 from cosim.support.plain import Parsed
 from pyfmi_models.errors import ModelError
 
@@ -24,13 +24,23 @@ NAMES = 200
 
 
 def look(path: str, options: Options) -> Parsed:
-    """Tell what a recording holds; {"problem": sentence} if it cannot be read."""
+    """Tell what a recording holds; {"problem": sentence} if it cannot be read.
+
+    Of a file of many recordings "parts" are what tells each apart, with its share of the rows.
+    """
     file = Path(path)
     try:
         seen = preview(file, options)
         return _told(file, seen)
+    except ManyRecordingsError as error:
+        rows = sum(one.rows for one in error.runs)
+        return {"problem": _said(error, file), "parts": {one.which: one.rows / rows for one in error.runs}}
     except (CosimError, ModelError) as error:
-        return {"problem": str(error).replace(str(file), file.name)}
+        return {"problem": _said(error, file)}
+
+
+def _said(error: Exception, file: Path) -> str:
+    return str(error).replace(str(file), file.name)
 
 
 def look_at_card(text: str, name: str) -> Parsed:

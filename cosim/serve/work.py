@@ -78,12 +78,12 @@ def command(order: Order) -> str:
     words += [f"--heldout {quote(name)}" for name in held]
     words.append(f"--card {quote(order.called)}")
     for key in ("columns", "units", "layout"):
-        pairs = [
-            quote(f"{one.name}:{ours}={theirs}")
+        pairs = dict.fromkeys(
+            quote(f"{one.file}:{ours}={theirs}")
             for one in order.uploads
             for ours, theirs in one.options.get(key, {}).items()
             if one.role != "out"
-        ]
+        )
         words += [f"--{key} {' '.join(pairs)}"] if pairs else []
     return " ".join([*words, "--out result"])
 

@@ -18,8 +18,8 @@ from time import monotonic
 from typing import IO, Any
 
 from cosim.support.activity import SIZE, Board
-from cosim.support.child import PREFIX
 from cosim.support.errors import CosimError
+from cosim.support.scratch import Scratch
 
 GRACE = 2.0
 """Seconds that a process which gave no answer has to end by itself."""
@@ -53,7 +53,7 @@ class Cell:
         self._quiet, self._keep = quiet, keep
         self._process: subprocess.Popen[bytes] | None = None
         self._said: IO[bytes] | None = None
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._folder: Scratch | None = None
 
     def call(
         self,
@@ -126,7 +126,7 @@ class Cell:
     def begin(self) -> "subprocess.Popen[bytes]":
         """Start a process, which then makes itself ready; the one before is ended."""
         self.close()
-        self._folder = tempfile.TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True)
+        self._folder = Scratch()
         folder = self._folder.name
         _reserve(Path(folder) / BOARD, self._folder)
         self._said = tempfile.TemporaryFile("a+b") if self._quiet else None  # noqa: SIM115 it lives as long as the process
@@ -205,7 +205,7 @@ class Cell:
         return f'; it last said "{lines[-1].strip()}"' if lines else ""
 
 
-def _reserve(board: Path, folder: "tempfile.TemporaryDirectory[str]") -> None:
+def _reserve(board: Path, folder: Scratch) -> None:
     """Make the file of the board with all its bytes: writing to mapped memory for which there is no room is a crash."""
     try:
         board.write_bytes(bytes(SIZE))

@@ -19,9 +19,8 @@ from cosim.support.activity import watched
 from cosim.support.errors import CosimError
 from cosim.support.files import forget_partials
 from cosim.support.interrupts import ENDING, end_well
+from cosim.support.scratch import PREFIX
 
-PREFIX = "cosim-"
-"""Of the names of folders for temporary files."""
 PAUSE, GRACE = 0.5, 2.0
 """Seconds between two looks for the parent; seconds to end well once it is gone."""
 _ANSWERS: list[IO[bytes]] = []

@@ -3,7 +3,8 @@
 CosimError                  everything this package raises on purpose
 ├── InputError              something the user gave breaks a rule: culprit, value, rule, choices
 │   ├── RecordingError      a recording is missing, unreadable, or its numbers break a rule
-│   │   └── UndecidedError  a recording can be read in two ways; options that would decide
+│   │   ├── UndecidedError  a recording can be read in two ways; options that would decide
+│   │   └── ManyRecordingsError  a file holds many recordings where one is needed
 │   ├── UnitError           a unit is unknown or is of another kind than needed
 │   ├── SignalError         a set-point generator or recorded signal cannot be made
 │   ├── ScenarioError       a scenario file is missing, unreadable, or a key or value breaks a rule
@@ -72,6 +73,20 @@ class UndecidedError(RecordingError):
     def _meant(self, message: str, culprit: str, value: Any, choices: tuple[str, ...]) -> str:
         """Return nothing: each of the choices may be meant."""
         return ""
+
+
+class ManyRecordingsError(RecordingError):
+    """A file holds many recordings where one is needed.
+
+    Args:
+        message: one sentence that says how one is taken.
+        runs: its recordings (`cosim.data.runs.Run`).
+        more: culprit, value and choices of an `InputError`.
+    """
+
+    def __init__(self, message: str, *, runs: tuple[Any, ...], **more: Any) -> None:
+        super().__init__(message, **more)
+        self.runs = runs
 
 
 class UnitError(InputError):

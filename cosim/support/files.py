@@ -32,6 +32,8 @@ def check_free(path: Path, force: bool) -> None:
     Raises:
         OutputError: the file exists and `force` is not set.
     """
+    if path.parent.is_file():
+        raise _no_directory(path.parent, path.parent)
     if path.exists() and not force:
         raise OutputError(f"{path} exists already; give --force to overwrite it.", culprit=str(path))
 
@@ -46,9 +48,14 @@ def directory(path: Path) -> Path:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         file = next((one for one in (path, *path.parents) if one.is_file()), None)
-        reason = f"{file} is a file" if file else (error.strerror or str(error)).lower()
-        raise OutputError(f"The directory {path} cannot be made: {reason}.", culprit=str(path)) from error
+        raise _no_directory(path, file or (error.strerror or str(error)).lower()) from error
     return path
+
+
+def _no_directory(path: Path, why: Path | str) -> OutputError:
+    """The refusal of a folder for results: a file has its name, or the system's own reason."""
+    reason = f"{why} is a file" if isinstance(why, Path) else why
+    return OutputError(f"The directory {path} cannot be made: {reason}.", culprit=str(path))
 
 
 def check_room(path: Path | None, size: int, advice: str) -> None:

@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.band import in_band
 from cosim.diagnosis.protocol import heldout_rms
 from cosim.estimation.fit import fit
-from cosim.estimation.prepare import Array, Prepared, choose_cutoff, prepare
+from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.row_weights import described_rows
 from cosim.support.plain import Parsed
 from cosim_studies.proof.tool import given
@@ -59,7 +60,8 @@ def ceiling(folder: str, entries: Sequence[Mapping[str, Any]], truth: Mapping[st
     if foreign := [entry["effect"] for entry in entries if not entry["listed"]]:
         return {"reason": f"{foreign[0]} has no structure in the library"}
     card, train, held = given(folder)
-    mount, prepared = card.plant(), prepare(train, choose_cutoff(train, card.mount.inertia))
+    mount = card.plant()
+    prepared = in_band(train, mount)
     effects = [_rubbing(true_effect(entry), mount) for entry in entries]
     starts = [mount, *([_as_made(mount, truth)] if truth else [])]
     return judged([held], *_refitted(starts, effects, prepared))

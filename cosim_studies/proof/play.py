@@ -10,7 +10,6 @@ A row of `runs.jsonl` and of `proof.json`:
 """
 
 from collections.abc import Callable
-from tempfile import TemporaryDirectory
 from threading import local
 from time import perf_counter
 from typing import Any
@@ -18,6 +17,7 @@ from typing import Any
 from cosim.support.cell import Cell, LostError
 from cosim.support.errors import InputError, ProofError
 from cosim.support.plain import Parsed
+from cosim.support.scratch import Scratch
 from cosim_studies.proof.cases import CaseSpec
 from cosim_studies.proof.ceiling import ceiling
 from cosim_studies.proof.make import make
@@ -56,7 +56,7 @@ class CaseRunner:
         maker, user = self._processes()
         head = {"run": case.number, "seed": case.seed, "kind": case.kind, "effects": list(case.effects)}
         head |= {"size": case.size}
-        with TemporaryDirectory(prefix="cosim-prove-") as folder:
+        with Scratch() as folder:
             begun = perf_counter()
             truth = _made(maker, case, self.seconds, folder)
             made = perf_counter() - begun

@@ -8,7 +8,7 @@ from typing import ClassVar
 import casadi as ca
 import numpy as np
 
-from pyfmi_models.effects.base import LoadEffect, Main, Motion
+from pyfmi_models.effects.base import LoadEffect, Main, Motion, times
 from pyfmi_models.model import Scalar, parameter, structure
 
 
@@ -47,7 +47,7 @@ class Cogging(LoadEffect):
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         per = "metre" if unit == "N" else "turn"
-        return f"The motor tugs {self.cycles_per_rev:.5g} times per {per}, {self.amplitude:.3g} {unit} each way."
+        return f"The motor tugs {times(self.cycles_per_rev)} per {per}, {self.amplitude:.3g} {unit} each way."
 
 
 def _wave(turn: Scalar, harmonics: tuple[float, ...]) -> Scalar:

@@ -39,4 +39,4 @@ class InertiaVariation(InertiaEffect):
         """Say it to a mechanic."""
         name, per = ("moving mass", "metre") if unit == "N" else ("inertia", "turn")
         size = 100 * self.relative_amplitude
-        return f"The {name} rises and falls by {size:.2g} % {times(self.cycles_per_rev)} per {per}."
+        return f"The {name} rises and falls by {size:.2g} %, {times(self.cycles_per_rev)} per {per}."

@@ -10,14 +10,16 @@ Waves that are level at both ends are the basis of smoothing splines: Solin and 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from dataclasses import dataclass, replace
+from math import log
+from typing import ClassVar, Self
 
 import casadi as ca
 import numpy as np
 import numpy.typing as npt
 
 from pyfmi_models.effects.base import DriveEffect, Effect, FrictionEffect, LoadEffect, Main, Motion, MotionEffect
+from pyfmi_models.effects.learned_table import LearnedTable
 from pyfmi_models.model import Scalar, Variable, parameter, structure, word
 from pyfmi_models.waves import INPUT, broken_range, input_of, span, spoken, waves
 
@@ -33,8 +35,12 @@ COLUMNS = 5
 class LearnedEffect(Effect):
     """What a learned term declares beside its equation."""
 
+    kind: ClassVar[str]
+    """What its values are: torque, friction, drive, ..."""
     filled: ClassVar[str]
     """Field that holds the coefficients."""
+    unit_value: ClassVar[float] = 1.0
+    """First coefficient of a table that is one everywhere: of a relative change, one that doubles."""
     in_torque: ClassVar[bool] = True
     """Whether the coefficients are torques; else they are shares of the friction level."""
     never_negative: ClassVar[bool] = False
@@ -45,7 +51,18 @@ class LearnedEffect(Effect):
         found: Sequence[Scalar] = getattr(self, self.filled)
         return found
 
-    def for_reader(self, unit: str) -> dict[str, Any]:
+    def quantities(self) -> tuple[str, ...]:
+        """What it goes over, as a card names it; nothing where it remembers the motion."""
+        return ()
+
+    def of_one(self) -> Self | None:
+        """The same effect with the value one everywhere; None where it remembers."""
+        if not self.quantities():
+            return None
+        changed: Self = replace(self, **{self.filled: (self.unit_value, *[0.0] * (len(self.coefficients()) - 1))})
+        return changed
+
+    def for_reader(self, unit: str) -> LearnedTable:
         """The term as a table of plain numbers: quantity, values, their unit; `unit` is that of a torque."""
         raise TypeError(f"{type(self).__name__} has no table")
 
@@ -66,6 +83,10 @@ class _Table(LearnedEffect, MotionEffect):
     by_seen: tuple[float, ...] = structure("1", "Lowest and highest value seen of it", low=-1e9, high=1e9)
     waves: tuple[float, ...] = structure("1", "Highest wave over each quantity", low=0, high=MOST_WAVES)
     share: Scalar = parameter("1", "Share of the table that acts", default=1.0, low=0, high=1, fitted=False)
+
+    def quantities(self) -> tuple[str, ...]:
+        """`over`, and `by` of a table of products."""
+        return tuple(filter(None, (self.over, self.by)))
 
     def inputs(self) -> tuple[Variable, ...]:
         """What is not the axis's own business."""
@@ -107,7 +128,7 @@ class _Table(LearnedEffect, MotionEffect):
 
     def follows(self) -> str:
         """Say over what the table goes."""
-        return " and ".join(spoken(name) for name in (self.over, self.by) if name)
+        return " and ".join(map(spoken, self.quantities()))
 
     def values(self, count: int = 201, other: float | None = None) -> tuple[Array, Array]:
         """Values of the quantity over its range, and of the table there.
@@ -142,11 +163,11 @@ class _Table(LearnedEffect, MotionEffect):
     def _sized(self, unit: str) -> str:
         return f"{self.size():.2g} {unit}"
 
-    def for_reader(self, unit: str) -> dict[str, Any]:
+    def for_reader(self, unit: str) -> LearnedTable:
         """A torque, or a share of the friction level, over the range seen of one quantity or of two."""
-        kind, unit = ("torque", unit) if self.in_torque else ("friction", "1")
+        unit = unit if self.in_torque else "1"
         at, values = self.values(ROWS)
-        named = {"kind": kind, "unit": unit, "over": spoken(self.over), "at": at.tolist()}
+        named: LearnedTable = {"kind": self.kind, "unit": unit, "over": spoken(self.over), "at": at.tolist()}
         if not self.by:
             return {**named, "value": self._acts(values).tolist()}
         others = np.linspace(self.by_seen[0], self.by_seen[1], COLUMNS)
@@ -167,6 +188,7 @@ class LearnedTorque(_Table, LoadEffect):
     It may take or give energy over a round trip where it goes over the speed. Constant outside the range `seen`.
     """
 
+    kind: ClassVar[str] = "torque"
     filled: ClassVar[str] = "torque"
     torque: tuple[float, ...] = structure("N.m", "Coefficients of the waves", low=-1e9, high=1e9)
 
@@ -184,7 +206,9 @@ class LearnedFriction(_Table, FrictionEffect):
     To first order the table is the relative change of the level. Constant outside the range `seen`.
     """
 
+    kind: ClassVar[str] = "friction"
     filled: ClassVar[str] = "level_change"
+    unit_value: ClassVar[float] = log(2.0)
     in_torque: ClassVar[bool] = False
     level_change: tuple[float, ...] = structure("1", "Coefficients of the waves", low=-5, high=5)
 
@@ -211,6 +235,7 @@ class LearnedDrive(LearnedEffect, DriveEffect):
     main: ClassVar[Main] = Main("share", unit="1", is_size=False)
     told_apart_by: ClassVar[str] = _Table.told_apart_by
     action: ClassVar[str] = "Measure what the drive gives at small and at large commands."
+    kind: ClassVar[str] = "drive"
     filled: ClassVar[str] = "missing"
     command_seen: tuple[float, ...] = structure("N.m", "Lowest and highest command seen", low=-1e9, high=1e9)
     missing: tuple[float, ...] = structure("N.m", "Coefficients of the waves", low=-1e9, high=1e9)
@@ -243,10 +268,14 @@ class LearnedDrive(LearnedEffect, DriveEffect):
         command = np.linspace(self.command_seen[0], self.command_seen[1], count)
         return command, command - np.asarray(ca.DM(self.applied((), ca.DM(command))).full().ravel())
 
-    def for_reader(self, unit: str) -> dict[str, Any]:
+    def quantities(self) -> tuple[str, ...]:
+        """The command."""
+        return ("command",)
+
+    def for_reader(self, unit: str) -> LearnedTable:
         """What is missing of commands over the range seen."""
         command, missing = self.curve(ROWS)
-        return {"kind": "drive", "command": command.tolist(), "missing": missing.tolist(), "unit": unit}
+        return {"kind": self.kind, "command": command.tolist(), "missing": missing.tolist(), "unit": unit}
 
     def _falls(self) -> bool:
         command, missing = self.curve(2001)

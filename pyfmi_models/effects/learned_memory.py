@@ -8,6 +8,7 @@ import casadi as ca
 
 from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Main, Motion, MotionEffect
 from pyfmi_models.effects.learned import LearnedEffect
+from pyfmi_models.effects.learned_table import LearnedTable
 from pyfmi_models.model import Scalar, Variable, parameter, structure
 
 MOST = 12
@@ -60,6 +61,7 @@ class LearnedHysteresis(_Memory, LoadEffect):
     Reference: Dahl, AIAA Journal 14 (1976) 1675.
     """
 
+    kind: ClassVar[str] = "hysteresis"
     filled: ClassVar[str] = "torque"
     never_negative: ClassVar[bool] = True
     strokes: tuple[float, ...] = structure("rad", "Ways over which the elements turn round", low=SHORTEST, high=1e9)
@@ -69,9 +71,9 @@ class LearnedHysteresis(_Memory, LoadEffect):
         """`strokes`."""
         return self.strokes
 
-    def for_reader(self, unit: str) -> dict[str, Any]:
+    def for_reader(self, unit: str) -> LearnedTable:
         """The elements."""
-        return {"kind": "hysteresis", "strokes": list(self.strokes), "torque": list(self.torque), "unit": unit}
+        return {"kind": self.kind, "strokes": list(self.strokes), "torque": list(self.torque), "unit": unit}
 
     def rate(self, motion: Motion) -> Any:
         """`(v - |v| y) / stroke`."""
@@ -102,6 +104,7 @@ class LearnedAfterReversal(_Memory, FrictionEffect):
     m_k is 1 right after a reversal and falls to 0. The level stays above zero, so friction never drives.
     """
 
+    kind: ClassVar[str] = "friction after a reversal"
     filled: ClassVar[str] = "level_change"
     in_torque: ClassVar[bool] = False
     ways: tuple[float, ...] = structure("rad", "Ways over which the elements forget", low=SHORTEST, high=1e9)
@@ -115,10 +118,10 @@ class LearnedAfterReversal(_Memory, FrictionEffect):
         """`ways`, then `times`."""
         return (*self.ways, *self.times)
 
-    def for_reader(self, unit: str) -> dict[str, Any]:
+    def for_reader(self, unit: str) -> LearnedTable:
         """The elements, of the level."""
-        own = {"ways": list(self.ways), "times": list(self.times), "level_change": list(self.level_change)}
-        return {"kind": "friction after a reversal", **own, "unit": "1"}
+        ways, times, change = (list(one) for one in (self.ways, self.times, self.level_change))
+        return {"kind": self.kind, "ways": ways, "times": times, "level_change": change, "unit": "1"}
 
     def rate(self, motion: Motion) -> Any:
         """The equations above."""

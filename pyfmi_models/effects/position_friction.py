@@ -37,7 +37,7 @@ class PeriodicFriction(_PositionFriction):
         """Say it to a mechanic."""
         per = "metre" if unit == "N" else "turn"
         size = 100 * self.relative_amplitude
-        return f"Friction rises and falls by {size:.0f} % {times(self.cycles_per_rev)} per {per}."
+        return f"Friction rises and falls by {size:.2g} %, {times(self.cycles_per_rev)} per {per}."
 
 
 @dataclass(frozen=True, kw_only=True)

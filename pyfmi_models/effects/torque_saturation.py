@@ -41,7 +41,7 @@ class TorqueSaturation(DriveEffect):
 
     def applied(self, state: Any, command: Scalar) -> Scalar:
         """The equation above."""
-        over, under = (_soft(side * command - self.knee_torque, SOFTNESS * self.knee_torque) for side in (1, -1))
+        over, under = (soft(side * command - self.knee_torque, SOFTNESS * self.knee_torque) for side in (1, -1))
         return command - (1 - self.slope) * (over - under)
 
     def fit_bounds(self, variable: Variable, recorded: Recorded) -> tuple[float, float]:
@@ -55,6 +55,6 @@ class TorqueSaturation(DriveEffect):
         return f"The drive saturates at {self.knee_torque:.3g} {unit}: {share}."
 
 
-def _soft(x: Scalar, width: Scalar) -> Scalar:
+def soft(x: Scalar, width: Scalar) -> Scalar:
     """`width ln(1 + exp(x / width))`, without overflow."""
     return (x + ca.fabs(x)) / 2 + width * ca.log1p(ca.exp(-ca.fabs(x) / width))

@@ -9,6 +9,7 @@ and the median of the pairs counts.
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
@@ -21,6 +22,7 @@ from pyfmi_models.effects import Effect
 from pyfmi_models.effects.learned import LearnedDrive, LearnedFriction, LearnedTorque
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHysteresis
 from pyfmi_models.export import build_library
+from pyfmi_models.model import Model
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
@@ -53,6 +55,11 @@ def ratio(effect: Effect, rounds: int) -> float:
     """Time of a step with the term over that of one without."""
     plain = read_card("paper_mount")
     models = [card.plant().model() for card in (plain, replace(plain, effects=(*plain.effects, effect)))]
+    return ratio_of(models, rounds)
+
+
+def ratio_of(models: Sequence[Model], rounds: int) -> float:
+    """Time of a step of the second model over that of the first."""
     drivers = [Driver(model, build_library(model), 3) for model in models]
     for driver in drivers:
         driver.start()

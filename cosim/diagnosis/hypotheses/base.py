@@ -89,6 +89,8 @@ class Hypothesis(Generic[Form]):
     """Whether it must remove more energy than the noise of the reading holds."""
     is_timing: ClassVar[bool] = False
     """Whether it is told by changes of the torque alone."""
+    has_own_phase: ClassVar[bool] = False
+    """Whether its phase is another in each recording."""
     view: ClassVar[View] = "position"
     easiest: ClassVar[int] = 0
     """Where the main number says where the effect sets in: whether less (-1) or more (1) of it is easier to find."""

@@ -16,6 +16,10 @@ from pyfmi_models.mount import Mount
 MOST_CYCLES = 40.0
 """Cycles a turn up to which a false reading is concealed."""
 
+MOST_SLOPE = 0.25
+"""Error of the reading for a way, relative to it: a disc of radius R off by e errs by e/R of the way, twice that with
+an oval one; a quarter is no disc any more, but a ripple whose torque the reading would have to make. Unit: 1."""
+
 
 class Eccentricity(Hypothesis[EncoderEccentricity]):
     """A false reading once a turn of the disc."""
@@ -37,6 +41,11 @@ class Eccentricity(Hypothesis[EncoderEccentricity]):
 
             pair = tuple(EncoderEccentricity(cycles_per_rev=cycles, amplitude_rad=0.0, phase=p) for p in (0.0, pi / 2))
             yield Candidate("encoder_eccentricity", pair, ("amplitude_rad",), start)
+
+    def is_plausible(self, effect: EncoderEccentricity, mount: Mount) -> bool:
+        """The reading goes on where the axis does: it errs by less of the way than `MOST_SLOPE`."""
+        slope = effect.amplitude_rad * effect.cycles_per_rev * (1 + 2 * abs(effect.second))
+        return bool(slope < MOST_SLOPE)
 
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """Few cycles: bearing and disc make no more."""

@@ -26,6 +26,7 @@ class Tone(Hypothesis[PeriodicDisturbance]):
     member: ClassVar[str] = "frequency_hz"
     rank: ClassVar[float] = 12
     needs_position: ClassVar[bool] = False
+    has_own_phase: ClassVar[bool] = True
     view = "spectrum"
     caveat: ClassVar[str] = (
         "; its phase is that of each recording, told by the recording itself, by the one not "

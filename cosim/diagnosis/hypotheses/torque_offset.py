@@ -5,8 +5,8 @@ from typing import ClassVar
 
 from cosim.diagnosis.candidates import Candidate, Span, has
 from cosim.diagnosis.hypotheses.base import Hypothesis
-from cosim.estimation.prepare import Array
-from pyfmi_models.effects import Effect, TorqueOffset
+from cosim.estimation.prepare import Array, Prepared
+from pyfmi_models.effects import Effect, FrictionAsymmetry, TorqueOffset
 from pyfmi_models.mount import Mount
 
 
@@ -26,3 +26,9 @@ class Offset(Hypothesis[TorqueOffset]):
             return TorqueOffset(torque=float(c[0]))
 
         yield Candidate("torque_offset", (TorqueOffset(torque=0.0),), ("torque",), start)
+
+    def why_not(self, mount: Mount, prepared: Prepared) -> str:
+        """A law that says nothing of rest cannot tell it from friction that differs between the directions."""
+        if not mount.friction.states() and has(mount, FrictionAsymmetry) and not has(mount, TorqueOffset):
+            return "alike to the friction asymmetry that was found, as the card's friction law says nothing of rest"
+        return super().why_not(mount, prepared)

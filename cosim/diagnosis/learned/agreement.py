@@ -7,17 +7,21 @@ import numpy as np
 
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.learned.formula import Formula, Rows, complete, shortest
-from cosim.diagnosis.learned.partial import Partial, partial, unit_of, without
+from cosim.diagnosis.learned.partial import Partial, partial, without
 from cosim.diagnosis.predictive import Predictive
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array
+from cosim.support.statistics import rms
 from pyfmi_models.effects.learned import LearnedEffect
 from pyfmi_models.mount import Mount
 
 KEPT = 0.8
 """Share of the table's held-out gain that a formula must keep."""
+LARGEST = 3.0
+"""RMS of what a formula says, at most, relative to what is left without it. A larger one lives by what it takes out of
+the base: a loss of all of the drive's torque, and a machine that needs none, leave no error either."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +42,11 @@ class Unseen:
         value = formula.value(self.rows.quantities)
         return np.asarray(self.rows.left - self.rows.unit * value - self.rows.slopes @ moved)
 
+    def is_of_its_size(self, formula: Formula) -> bool:
+        """Whether a formula says no more than what there is to be said."""
+        said = self.rows.unit * formula.value(self.rows.quantities)
+        return rms(said) <= LARGEST * rms(self.rows.left)
+
     def is_as_good(self, formula: Formula, moved: Array) -> bool:
         """Whether the loss is within a standard error of the table's, and most of what that gained is kept."""
         own, table, nothing = (self.losses(one) for one in (self.left(formula, moved), self.table, self.nothing))
@@ -55,21 +64,24 @@ def first_as_good(formulas: Sequence[Formula], part: Partial, train: Rows, unsee
     """The first of some formulas, fitted to all rows of training, that is as good as the table."""
     for formula in formulas:
         found = complete(formula, train, part)
-        if found and unseen.is_as_good(*found):
+        if found and unseen.is_of_its_size(found[0]) and unseen.is_as_good(*found):
             return found[0]
     return None
 
 
-def formula_of(learned: Mount, which: int, found: Fit, comparison: Comparison, held: Predictive) -> Formula | None:
-    """The formula of learned effect number `which` of a mount; None where none is as good, or it remembers."""
-    effect, problem = learned.effects[which], comparison.problem
-    if not isinstance(effect, LearnedEffect) or unit_of(effect) is None:
+def formula_of(
+    learned: Mount, effect: LearnedEffect, found: Fit, comparison: Comparison, held: Predictive
+) -> Formula | None:
+    """The formula of a learned effect of a mount; None where none is as good, or it remembers."""
+    problem = comparison.problem
+    if effect.of_one() is None:
         return None
     part, there = (
-        partial(learned, which, prepared, weight)
+        partial(learned, effect, prepared, weight)
         for prepared, weight in ((problem.prepared, problem.weight), (held.prepared, held.weight))
     )
-    inverse = Inverse(without(learned, which), found.free)  # with the table in it a level's slope would be the table
+    moving = found.free if effect.at_once else ()  # a line of the command is a scale of all numbers of the base at once
+    inverse = Inverse(without(learned, effect), moving)  # with the table in it a level's slope would be the table
     slopes, own = (
         stacked(inverse, prepared.pieces, inverse.present)[1] for prepared in (problem.prepared, held.prepared)
     )

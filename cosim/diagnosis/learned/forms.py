@@ -120,6 +120,15 @@ FORMS = (
         lambda low, high: ((low, 0.01 * (high - low)), (high, 2 * (high - low))),
     ),
     Form(
+        "pulse",
+        "x * ca.exp(-(x / p0) * (x / p0))",
+        "{x} exp(−({x}/{p0})²)",
+        1,
+        ("width",),
+        _widths(0.02, 0.06, 0.2),
+        _within(1e-3, 2.0),
+    ),
+    Form(
         "sine",
         "ca.sin(6.283185307179586 * (x - p0) / p1)",
         "sin(2π({x} − {p0})/{p1})",

@@ -71,9 +71,9 @@ class Formula:
 
     @property
     def length(self) -> int:
-        """Numbers and forms: how much there is to read."""
+        """Numbers and forms: how much there is to read; a number inside a form is read twice."""
         parts = sum(len(shape.parts) for shape in self.shapes)
-        return len(self.shapes) + parts + sum(len(form.numbers) for _, form in self.forms)
+        return len(self.shapes) + parts + 2 * sum(len(form.numbers) for _, form in self.forms)
 
     def placed(self) -> dict[tuple[int, Form], range]:
         """Where the numbers of each form are, among the inner ones."""
@@ -211,7 +211,10 @@ CONSTANT = Shape(None)
 
 
 def _singles(quantities: int) -> Iterator[tuple[Shape, ...]]:
-    """One form, also beside a constant, or a product of two; (a + b y) A(x) says where a line of y begins."""
+    """One form, also beside a constant, or a product of two.
+
+    (a + b y) A(x) says where a line of y begins, and with c y beside it where A does.
+    """
     for form in FORMS:
         yield (Shape(form),)
         yield (Shape(form), CONSTANT)
@@ -220,6 +223,7 @@ def _singles(quantities: int) -> Iterator[tuple[Shape, ...]]:
         for form in FORMS:
             yield (Shape(form, second),)
             yield (Shape(form), Shape(form, second))
+            yield (Shape(form), Shape(form, second), Shape(None, second))
 
 
 def _sums(best: Sequence[Formula], quantities: int) -> Iterator[tuple[Shape, ...]]:

@@ -11,20 +11,21 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.entries import LearnedEntry, NotLearnedEntry
+from cosim.diagnosis.entries import BinsEntry, LearnedEntry, NotLearnedEntry
 from cosim.diagnosis.learned.agreement import formula_of
 from cosim.diagnosis.learned.candidate_terms import CandidateTerm, candidate_terms
 from cosim.diagnosis.learned.formula import Formula
 from cosim.diagnosis.learned.grams import columns_of, grams_of
 from cosim.diagnosis.learned.partial import partial
+from cosim.diagnosis.learned.proposal import Proposal
 from cosim.diagnosis.learned.select import fitted, path
 from cosim.diagnosis.learned.spelled import Spelled
+from cosim.diagnosis.policy import Policy
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.protocol import interval_of, residuals
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Array, Prepared
-from cosim.support.plain import JsonObject
 from cosim.support.statistics import rms
 from pyfmi_models.effects.learned import LearnedEffect
 from pyfmi_models.mount import Mount
@@ -33,6 +34,10 @@ LEAST_GAIN = 0.01
 """Share of the held-out error that a term must remove: less is no better model, only a larger one. Unit: 1."""
 FEWER = 3
 """How often the waves of a term are halved before it is given up."""
+SURE = 10.0
+"""Nats that a term must have three times over (training, training recordings left out one by one, held-out ones) where
+nothing else says that something without a name is left. Of 43 nulls of a generator by others one has a term
+that helps the held-out recordings alone, none one that is sure."""
 MIDDLE = (0.025, 0.975)
 """Quantiles of a term's torque between which its size is told."""
 
@@ -56,10 +61,22 @@ class Learned:
     """Whether the held-out recordings prove it: else it is no part of the delivered model."""
     evidence: tuple[float, ...] = field(default=())
     predicted: tuple[float, ...] = field(default=())
-    data: tuple[JsonObject, ...] = field(default=())
+    gain: float = 0.0
+    """What the held-out recordings gain by the terms. Unit: nats."""
+    data: tuple[BinsEntry, ...] = field(default=())
     """What the training recordings leave without each term, over what it goes over."""
     formulas: tuple[Formula | None, ...] = field(default=())
     """Of each term, where one is as good as its table."""
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether training, what training left out and the held-out recordings each prove it for themselves."""
+        return self.helps and min(*self.evidence, *self.predicted, self.gain) >= SURE
+
+    def says_unknown(self, policy: Policy, least: float) -> bool:
+        """Whether it says alone that something has no name: sure, a large share of the rest, `least` nats or more."""
+        follows = 1 - (self.after / self.before) ** 2 >= policy.follows
+        return self.is_sure and follows and min(self.evidence) >= least
 
     @property
     def unit(self) -> str:
@@ -77,7 +94,7 @@ class Learned:
     def sentence(self) -> str:
         """Say it to a mechanic."""
         depends, (low, high) = ", and on ".join(self.quantities), self.interval
-        error = f"held-out error {self.before:.2g} -> {self.after:.2g} {self.unit}"
+        error = f"held-out error {self.before:.2g} → {self.after:.2g} {self.unit}"
         if not self.helps:
             return (
                 f"A table over {depends} was tried for what has no name and is not in the model: {error}, "
@@ -94,7 +111,7 @@ class Learned:
             "quantities": list(self.quantities),
             "size": float(self.size),
             "table": [{**table, "data": one} for table, one in zip(tables, self.data, strict=True)],
-            "formula": self._spelled(linear),
+            "formula": [{"table": k, **one.as_json()} for k, one in self._spelled().items()],
             "before": self.before,
             "after": self.after,
             "interval": list(self.interval),
@@ -105,9 +122,14 @@ class Learned:
             "statement": self.sentence(),
         }
 
-    def _spelled(self, linear: bool) -> list[JsonObject]:
-        pairs = enumerate(zip(self.effects, self.formulas, strict=True))
-        return [{"table": k, **Spelled(effect, one, linear).as_json()} for k, (effect, one) in pairs if one]
+    def proposals(self) -> tuple[Proposal, ...]:
+        """The formulas, as effect files that nobody has reviewed."""
+        return tuple(Proposal(one, self.sentence()) for one in self._spelled().values())
+
+    def _spelled(self) -> dict[int, Spelled]:
+        """The formulas in words, by the number of the table each stands for."""
+        linear, pairs = self.mount.motion == "linear", enumerate(zip(self.effects, self.formulas, strict=True))
+        return {k: Spelled(effect, one, linear) for k, (effect, one) in pairs if one}
 
     def refused(self) -> NotLearnedEntry:
         """Return what `diagnosis.json` holds under `not_learned`."""
@@ -144,9 +166,9 @@ def learn(comparison: Comparison, found: Fit, held: Predictive) -> Learned | Non
 
 def _measured(comparison: Comparison, found: Fit, learned: Learned, held: Predictive) -> Learned:
     """Add the size of the terms, the data that they were learned from, and formulas that are as good."""
-    problem, first = comparison.problem, len(learned.mount.effects) - len(learned.effects)
-    rows = [partial(learned.mount, first + k, problem.prepared, problem.weight) for k in range(len(learned.effects))]
-    formulas = (formula_of(learned.mount, first + k, found, comparison, held) for k in range(len(learned.effects)))
+    problem, whole = comparison.problem, learned.mount
+    rows = [partial(whole, one, problem.prepared, problem.weight) for one in learned.effects]
+    formulas = (formula_of(whole, one, found, comparison, held) for one in learned.effects)
     data = tuple(one.data() for one in rows)
     return replace(learned, size=_size(comparison, learned), data=data, formulas=tuple(formulas))
 
@@ -164,7 +186,7 @@ def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], 
     interval = interval_of(left[0], left[1], held.protocol.pieces[0].dt)
     refused = worse or gain < comparison.policy.least_predicted or after > (1 - LEAST_GAIN) * before or interval[0] <= 0
     names = tuple(one.name for one in terms)
-    return Learned(whole, effects, names, 0.0, before, after, interval, held.protocol.cutoff, not refused)
+    return Learned(whole, effects, names, 0.0, before, after, interval, held.protocol.cutoff, not refused, gain=gain)
 
 
 def _allowed(

@@ -7,17 +7,17 @@ f is the term's value, a torque or a relative change of the friction level; of t
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import log
 from typing import Any
 
 import numpy as np
 
+from cosim.diagnosis.entries import BinsEntry
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
-from cosim.support.plain import JsonObject
 from cosim.support.statistics import Z95
-from pyfmi_models.effects.learned import LearnedDrive, LearnedEffect, LearnedFriction, LearnedTorque
+from pyfmi_models.effects import Effect
+from pyfmi_models.effects.learned import LearnedEffect
 from pyfmi_models.mount import Mount
 from pyfmi_models.waves import INPUT
 
@@ -41,15 +41,14 @@ class Partial:
     weight: Array
     blocks: Blocks
 
-    def data(self) -> JsonObject:
+    def data(self) -> BinsEntry:
         """Return the mean of f over bins with its 95 % band; None where a bin holds too few rows."""
         edges = [_edges(one, count) for one, count in zip(self._quantities(), self._bins(), strict=True)]
         cell, shape = self._cells(edges)
         mean, half = self._means(cell, int(np.prod(shape)))
-        told: JsonObject = {"at": _centres(edges[0])}
-        if self.by is not None:
-            told["by_at"] = _centres(edges[1])
-        return {**told, "value": _listed(mean.reshape(shape)), "band": _listed(half.reshape(shape))}
+        value, band = (_listed(one.reshape(shape)) for one in (mean, half))
+        told: BinsEntry = {"at": _centres(edges[0]), "value": value, "band": band}
+        return told if self.by is None else {**told, "by_at": _centres(edges[1])}
 
     def _quantities(self) -> tuple[Array, ...]:
         return (self.over,) if self.by is None else (self.over, self.by)
@@ -77,21 +76,20 @@ class Partial:
         return mean, np.asarray(Z95 * np.sqrt((sums**2).sum(0)) / np.maximum(power, 1e-300))
 
 
-def partial(mount: Mount, which: int, prepared: Prepared, weight: Array) -> Partial:
-    """Rows of the learned effect number `which` of a mount, beside all its others."""
-    effect = mount.effects[which]
-    assert isinstance(effect, LearnedEffect)
-    bare = needed(without(mount, which), prepared)
-    one = unit_of(effect)
-    added = needed(replace(mount, effects=_but(mount, which, one or effect)), prepared) - bare
-    over, by = _quantity(effect, prepared) if one else (added, None)
-    left, blocks = prepared.stacked("tau") - bare, Blocks.of(prepared)
-    return Partial(effect, over, by, left, added if one else np.ones_like(added), weight, blocks)
+def partial(mount: Mount, effect: LearnedEffect, prepared: Prepared, weight: Array) -> Partial:
+    """Rows of one learned effect of a mount, beside all its others."""
+    bare, one = without(mount, effect), effect.of_one()
+    base = needed(bare, prepared)
+    added = needed(replace(bare, effects=(*bare.effects, one or effect)), prepared) - base
+    over, *by = [_quantity(name, mount, prepared) for name in effect.quantities()] or [added]
+    unit = added if one else np.ones_like(added)
+    left, blocks = prepared.stacked("tau") - base, Blocks.of(prepared)
+    return Partial(effect, over, by[0] if by else None, left, unit, weight, blocks)
 
 
-def without(mount: Mount, which: int) -> Mount:
-    """The mount without its effect number `which`."""
-    return replace(mount, effects=_but(mount, which))
+def without(mount: Mount, effect: Effect) -> Mount:
+    """The mount without one of its effects."""
+    return replace(mount, effects=tuple(one for one in mount.effects if one is not effect))
 
 
 def needed(mount: Mount, prepared: Prepared) -> Array:
@@ -99,25 +97,12 @@ def needed(mount: Mount, prepared: Prepared) -> Array:
     return stacked(Inverse(mount, ()), prepared.pieces, np.zeros(0))[0]
 
 
-def unit_of(effect: LearnedEffect) -> LearnedEffect | None:
-    """The effect whose value is one everywhere; None of a term that remembers."""
-    count = len(effect.coefficients())
-    if isinstance(effect, LearnedTorque):
-        return replace(effect, torque=(1.0, *[0.0] * (count - 1)))
-    if isinstance(effect, LearnedFriction):
-        return replace(effect, level_change=(log(2.0), *[0.0] * (count - 1)))
-    return replace(effect, missing=(1.0, *[0.0] * (count - 1))) if isinstance(effect, LearnedDrive) else None
+def _quantity(name: str, mount: Mount, prepared: Prepared) -> Array:
+    """A quantity at the kept rows.
 
-
-def _but(mount: Mount, which: int, *instead: LearnedEffect) -> tuple[Any, ...]:
-    return (*mount.effects[:which], *instead, *mount.effects[which + 1 :])
-
-
-def _quantity(effect: LearnedEffect, prepared: Prepared) -> tuple[Array, Array | None]:
-    if isinstance(effect, LearnedDrive):
-        return prepared.stacked("tau"), None
-    assert isinstance(effect, LearnedTorque | LearnedFriction)
-    return _recorded(effect.over, prepared), _recorded(effect.by, prepared) if effect.by else None
+    The command is that which the model needs: over the recorded one, which holds what is left, anything goes a little.
+    """
+    return needed(mount, prepared) if name == "command" else _recorded(name, prepared)
 
 
 def _recorded(name: str, prepared: Prepared) -> Array:

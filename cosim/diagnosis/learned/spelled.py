@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from cosim.diagnosis.entries import FormulaEntry, NumberEntry
 from cosim.diagnosis.learned.formula import Formula, Shape, interval
-from cosim.support.plain import JsonObject
-from pyfmi_models.effects.learned import LearnedDrive, LearnedEffect
+from pyfmi_models.effects.learned import LearnedEffect
 from pyfmi_models.waves import INPUT, UNITS, spoken
 
 LETTERS = {"position": "q", "turn": "q", "speed": "v", "command": "u", "temperature": "T", "payload": "M"}
@@ -22,9 +22,7 @@ class Spelled:
     @property
     def names(self) -> tuple[str, ...]:
         """Quantities, as a card names them."""
-        if isinstance(self.effect, LearnedDrive):
-            return ("command",)
-        return tuple(name for name in (getattr(self.effect, "over", ""), getattr(self.effect, "by", "")) if name)
+        return self.effect.quantities()
 
     @property
     def letters(self) -> tuple[str, ...]:
@@ -44,7 +42,7 @@ class Spelled:
 
     def equation(self) -> str:
         """Return the formula for a reader."""
-        left = {"torque": "torque", "missing": "not given"}.get(self.effect.filled, "friction × (1 + f), f")
+        left = {"torque": "torque", "drive": "not given"}.get(self.effect.kind, "friction × (1 + f), f")
         pairs = zip(self.outer_names, self.formula.shapes, strict=True)
         return f"{left} = " + " + ".join(" ".join([name, *self._factors(shape)]) for name, shape in pairs)
 
@@ -58,7 +56,7 @@ class Spelled:
 
     def units(self) -> tuple[str, ...]:
         """Units of the inner numbers, then of the coefficients."""
-        own = [self._unit(k) for k in range(len(self.names))]
+        own = [self.unit(k) for k in range(len(self.names))]
         powers = {"exponent": 0, "rate": -1}
         numbers = [(k, powers.get(number, 1)) for k, form in self.formula.forms for number in form.numbers]
         inner = [own[k] if power > 0 else _over("1", [(own[k], -power)]) for k, power in numbers]
@@ -66,7 +64,8 @@ class Spelled:
         outer = [_over(base, [(own[k], form.power) for k, form in shape.parts]) for shape in self.formula.shapes]
         return (*inner, *outer)
 
-    def _unit(self, which: int) -> str:
+    def unit(self, which: int) -> str:
+        """Unit of quantity number `which`."""
         unit = UNITS.get(self.names[which], "1")
         return unit.replace("rad", "m").replace("N.m", "N") if self.linear else unit
 
@@ -76,14 +75,13 @@ class Spelled:
         names = (*self.inner_names, *self.outer_names)
         return tuple(zip(names, values, self.formula.errors, self.units(), strict=True))
 
-    def as_json(self) -> JsonObject:
+    def as_json(self) -> FormulaEntry:
         """Return what `diagnosis.json` holds of it under `learned.formula`."""
-        told: dict[str, JsonObject] = {
+        told: dict[str, NumberEntry] = {
             name: {"value": v, "interval": [*interval(v, e)], "unit": u} for name, v, e, u in self.numbers()
         }
-        kind = {"torque": "torque", "missing": "drive"}.get(self.effect.filled, "friction")
         return {
-            "kind": kind,
+            "kind": self.effect.kind,
             "over": [spoken(name) for name in self.names],
             "equation": self.equation(),
             "parameters": told,
@@ -92,8 +90,8 @@ class Spelled:
 
 def _over(base: str, powers: Sequence[tuple[str, int]]) -> str:
     parts = [_plain(unit, power) for unit, power in powers if power and unit != "1"]
-    if not parts:
-        return base
+    if not parts or parts == [base]:
+        return "1" if parts else base
     return f"{base}/{parts[0]}" if len(parts) == 1 and "." not in parts[0] else f"{base}/({'.'.join(parts)})"
 
 

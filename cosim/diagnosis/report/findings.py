@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from cosim.diagnosis.report import tables, words
 from cosim.diagnosis.report.equations import equation
 from cosim.diagnosis.report.lead import led
+from cosim.diagnosis.report.next_experiment import is_about, to_record
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.result import Diagnosis, Finding, is_special
@@ -100,8 +101,9 @@ def do(one: words.Block, diagnosis: Diagnosis) -> str:
     """Return the action; rivals ask for the next experiment, and what did not prove itself for nothing."""
     if one.answer == "not_proven":
         return NOTHING_YET
-    if one.answer == "ambiguous" and diagnosis.next_experiment.get("description"):
-        return words.started(str(diagnosis.next_experiment["description"]))
+    own = [finding.effect for finding in one.findings]
+    if one.answer == "ambiguous" and is_about(diagnosis, own) and (order := to_record(diagnosis)):
+        return words.started(order)
     files = words.delivered(diagnosis)
     return one.first.action or (f"Use {files[0]}" if files and one.answer == "found" else "")
 

@@ -1,39 +1,51 @@
 """The first sentences: the verdict as a heading, and what must be said below it."""
 
+from cosim.diagnosis.calibration import LIKELY, SURE
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.words import Block, blocks, count, lowered, stated, verdict
 from cosim.diagnosis.result import Diagnosis
 from cosim.plots.quantities import joined
 
-SURE = 0.8
-"""Probability from which an effect that was found needs no word of doubt."""
 LED = 3
 """Findings whose statement stands in the lead; of further ones it stands with the finding."""
 
 
-def heading(diagnosis: Diagnosis) -> str:
-    """Return the verdict as a heading."""
-    found = sum(finding.answer == "found" for finding in diagnosis.findings)
-    many = f"{count(found)} effect{'s are' if found != 1 else ' is'} missing from the model"
+def heading(diagnosis: Diagnosis, model: str = "the model") -> str:
+    """Return the verdict as a heading; effects are missing from `model`."""
     match verdict(diagnosis):
         case "withheld":
             return "Check the recordings first: no effect can be named"
         case "unknown":
-            return f"{many}, and something unknown" if found else _BESIDE_RIVALS if _named(diagnosis) else _UNKNOWN
-        case "either":
-            return "Something is missing, with more than one possible cause"
+            return f"{_open(diagnosis, model)}, and something unknown" if _named(diagnosis) else _UNKNOWN
         case "none":
             return f"Nothing missing that {_these(diagnosis)} can show"
-    return many
+    return _open(diagnosis, model)
 
 
 _UNKNOWN = "Something is missing, and it is none of the effects cosim knows"
-_BESIDE_RIVALS = "Something is missing, with more than one possible cause, and something unknown"
 
 
 def _named(diagnosis: Diagnosis) -> bool:
     """Whether the verdict names an effect, be it one of several rivals."""
     return any(name != "unknown" for name in diagnosis.verdict)
+
+
+def _open(diagnosis: Diagnosis, model: str) -> str:
+    """Count what was found apart from what is only possible: a cause alone, or several of which one is true."""
+    found = sum(finding.answer == "found" for finding in diagnosis.findings)
+    asked = _ambiguous(diagnosis)
+    if found:
+        alone = sum(len(block.findings) == 1 for block in asked)
+        more = f", perhaps {count(alone).lower()} more" if alone else ""
+        return f"{count(found)} effect{'s are' if found != 1 else ' is'} missing from {model}{more}"
+    if any(len(block.findings) > 1 for block in asked):
+        return "Something is missing, with more than one possible cause"
+    many = count(len(asked))
+    return f"{many} effect{'s' if len(asked) != 1 else ''} may be missing from {model}"
+
+
+def _ambiguous(diagnosis: Diagnosis) -> list[Block]:
+    return [block for block in blocks(diagnosis) if block.answer == "ambiguous"]
 
 
 def _these(diagnosis: Diagnosis) -> str:
@@ -61,16 +73,21 @@ def _rival(diagnosis: Diagnosis, scales: Scales) -> list[str]:
 
 
 def _either(diagnosis: Diagnosis, subject: str) -> str:
-    """Name the first set of rivals."""
-    sets = [block for block in blocks(diagnosis) if block.answer == "ambiguous"]
-    if not sets:
-        return ""
-    causes = " or ".join(lowered(rival.title) for rival in sets[0].findings)
-    if len(sets[0].findings) == 1:
-        return f"{subject} may come from {causes}; that is not certain."
-    many = count(len(sets[0].findings)).lower()
-    held = "; the first is in the improved model" if sets[0].first in diagnosis.in_model else ""
-    return f"{subject} has {many} possible causes: {causes}{held}."
+    """Name each set of rivals, and each cause that is only possible."""
+    said = []
+    for block in _ambiguous(diagnosis):
+        said.append(f"{subject} {_causes(block, diagnosis)}")
+        subject = "A further error"
+    return " ".join(said)
+
+
+def _causes(block: Block, diagnosis: Diagnosis) -> str:
+    causes = " or ".join(lowered(rival.title) for rival in block.findings)
+    if len(block.findings) == 1:
+        unlikely = block.first.probability < LIKELY
+        return f"may come from {causes}: {_probability(block) if unlikely else 'that is not certain'}."
+    held = "; the first is in the improved model" if block.first in diagnosis.in_model else ""
+    return f"has {count(len(block.findings)).lower()} possible causes: {causes}{held}."
 
 
 def _stated(block: Block) -> str:
@@ -80,10 +97,12 @@ def _stated(block: Block) -> str:
 def _doubts(found: list[Block]) -> list[str]:
     """Say of what was found that it is not sure."""
     return [
-        f"{block.title} is likely, not certain: its probability is {block.first.probability:.2f}."
-        for block in found
-        if block.first.probability < SURE
+        f"{block.title} is not certain: {_probability(block)}." for block in found if block.first.probability < SURE
     ]
+
+
+def _probability(block: Block) -> str:
+    return f"its probability is {block.first.probability:.2f}"
 
 
 def _written(diagnosis: Diagnosis) -> str:

@@ -2,16 +2,16 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cosim.diagnosis.entries import FormulaEntry, TableEntry
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture, Sheet, heading
 from cosim.diagnosis.result import Array, Diagnosis
 from cosim.plots.quantities import Scale, decimals, joined, minus, raised
 from cosim.plots.style import AFTER, GREY, LINE, MEASURED, Style
-from cosim.support.plain import JsonObject
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,36 +56,35 @@ def _rows(diagnosis: Diagnosis, scales: Scales) -> Iterator[tuple[str, str]]:
     yield "Unseen runs", f"error {change}, less by {unit.span(low, high)} (95 %), {band}"
     for one in told.get("formula", ()):
         yield "Formula", f"{one['equation']}; {_numbers_of(one)}. As good on unseen runs, proposed, in no model."
-    yield "Seen", minus("; ".join(told["range"])).replace(" degC", " °C")
+    yield "Seen", minus("; ".join(told["range"])).replace(" degC", " °C").replace("N.m", "N·m")
 
 
-def _numbers_of(formula: JsonObject) -> str:
+def _numbers_of(formula: FormulaEntry) -> str:
     """The numbers of a formula with their 95 % ranges."""
-    told = cast(dict[str, dict[str, Any]], formula["parameters"])
     said = []
-    for name, one in told.items():
+    for name, one in formula["parameters"].items():
         value, low, high = decimals((one["value"], *one["interval"]), 3)
         unit = "" if one["unit"] == "1" else raised(one["unit"])
         said.append(f"{name} {joined(value, unit)} ({low} to {high})")
     return ", ".join(said)
 
 
-def _picture(number: int, table: dict[str, Any], scales: Scales) -> Picture:
+def _picture(number: int, table: TableEntry, scales: Scales) -> Picture:
     """Draw one table: a curve over one quantity, a map over two, and of a memory how well it says what is missing."""
     sheet, name = Sheet(f"learned-{number}", HEIGHT, plate="by" in table), _title(table)
     caption = _maps(sheet, table, scales) if "by" in table else _curve(sheet.axes(), table, scales)
     return sheet.picture(f"{name}. {caption}", caption, name)
 
 
-def _title(table: dict[str, Any]) -> str:
+def _title(table: TableEntry) -> str:
     over = str(table.get("over", "command" if table["kind"] == "drive" else ""))
     places = " and ".join(filter(None, (over, str(table.get("by", "")))))
     return f"{table['kind'].capitalize()} over {places}" if places else table["kind"].capitalize()
 
 
-def _curve(axes: "Axes", table: dict[str, Any], scales: Scales) -> str:
+def _curve(axes: "Axes", table: TableEntry, scales: Scales) -> str:
     data, shown, unit = table["data"], _value_unit(table, scales), _place_unit(table, scales)
-    at, value, band = (_numbers(data[name]) for name in ("at", "value", "band"))
+    at, value, band = (_numbers(one) for one in (data["at"], data["value"], data["band"]))
     style: Style = {"ls": "", "marker": "o", "ms": 4, "color": MEASURED, "elinewidth": 1}
     axes.errorbar(at * unit.factor, value * shown.factor, yerr=band * shown.factor * np.isfinite(value), **style)
     x, y = _line(table, at)
@@ -98,17 +97,16 @@ def _curve(axes: "Axes", table: dict[str, Any], scales: Scales) -> str:
     return f"Dots: mean of what training recordings leave without it, 95 % bars. Line: {line}."
 
 
-def _where(table: dict[str, Any]) -> Sequence[float]:
-    found: Sequence[float] = table.get("at") or table.get("command") or ()
-    return found
+def _where(table: TableEntry) -> Sequence[float]:
+    return table.get("at") or table.get("command") or ()
 
 
-def _line(table: dict[str, Any], at: Array) -> tuple[Array, Array]:
+def _line(table: TableEntry, at: Array) -> tuple[Array, Array]:
     where = _where(table)
     return (np.array(where), np.array(table.get("value") or table["missing"])) if len(where) else (at, at)
 
 
-def _maps(sheet: Sheet, table: dict[str, Any], scales: Scales) -> str:
+def _maps(sheet: Sheet, table: TableEntry, scales: Scales) -> str:
     """Draw the table above and what recordings say below, on one scale."""
     data, unit = table["data"], _place_unit(table, scales)
     seen = _numbers(data["value"])
@@ -148,9 +146,9 @@ def _map(axes: "Axes", grid: Array, x: Array, y: Array) -> None:
     axes.locator_params(axis="x", nbins=4)
 
 
-def _looked_up(table: dict[str, Any], at: Array, by: Array) -> Array:
+def _looked_up(table: TableEntry, at: Array, by: Array) -> Array:
     """The table at the centres of the data's cells, (at, by_at)."""
-    value, over, other = (np.array(table[name]) for name in ("value", "at", "by_at"))
+    value, over, other = (_numbers(one) for one in (table["value"], table["at"], table["by_at"]))
     along = np.array([np.interp(at, over, column) for column in value.T])
     return np.array([np.interp(by, other, row) for row in along.T])
 
@@ -164,11 +162,11 @@ def _numbers(values: Any) -> Array:
     return np.array(values, dtype=float)
 
 
-def _value_unit(table: dict[str, Any], scales: Scales) -> Scale:
+def _value_unit(table: TableEntry, scales: Scales) -> Scale:
     return Scale(100.0, "%") if table["unit"] == "1" else scales.torque
 
 
-def _place_unit(table: dict[str, Any], scales: Scales) -> Scale:
+def _place_unit(table: TableEntry, scales: Scales) -> Scale:
     return _unit_of(str(table.get("over", "")), scales)
 
 

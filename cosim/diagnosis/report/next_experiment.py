@@ -1,6 +1,6 @@
 """What one more recording would tell, and how to take it."""
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from cosim.diagnosis.report import words
 from cosim.diagnosis.report.motion import motion
@@ -9,6 +9,8 @@ from cosim.diagnosis.result import Diagnosis
 
 SMALL = 0.1
 """A difference below this share of the noise takes longer to show than a recording lasts."""
+FURTHER = "record motion that goes further or faster than in these recordings, where the axis may"
+FURTHER_STILL = "Where the axis may go further or faster than in these recordings, record that instead."
 
 
 def next_experiment(diagnosis: Diagnosis, scales: Scales) -> dict[str, object] | None:
@@ -21,20 +23,35 @@ def next_experiment(diagnosis: Diagnosis, scales: Scales) -> dict[str, object] |
     said = [words.started(words.closed(str(plan.get("description", ""))))]
     if how := motion(plan.get("set_point", {}), scales):
         said.append(words.closed(f"That is {how}, measured from the middle of what was visited"))
-    said.append(f"It separates {' from '.join(names)}." if len(names) > 1 else "")
-    gap = float(plan.get("expected_difference") or 0.0)
-    said.append(_difference(gap, diagnosis.heldout.floor_rms, scales) if gap and len(names) > 1 else "")
+    said.append(_difference(diagnosis, " from ".join(names), scales) if len(names) > 1 else "")
     return {"sentences": [text for text in said if text], "steps": list(_steps(diagnosis))}
 
 
-def _difference(gap: float, noise: float, scales: Scales) -> str:
-    text = scales.torque.text(gap)
-    if gap >= SMALL * noise:
-        return f"They will then differ by {text}."
-    return (
-        f"They will then differ by only {text}, far below the noise: where the axis may move further or faster than in "
-        "these recordings, record that instead."
-    )
+def is_weak(diagnosis: Diagnosis) -> bool:
+    """Whether rivals would differ by too little, whatever motion within what was visited is recorded."""
+    gap = float(diagnosis.next_experiment.get("expected_difference") or 0.0)
+    return 0.0 < gap < SMALL * diagnosis.heldout.floor_rms
+
+
+def to_record(diagnosis: Diagnosis) -> str:
+    """Return what to record next, as an order; empty where nothing is open."""
+    return FURTHER if is_weak(diagnosis) else str(diagnosis.next_experiment.get("description", ""))
+
+
+def is_about(diagnosis: Diagnosis, effects: Collection[str]) -> bool:
+    """Whether the next experiment is about these effects; one that separates no others is about whatever is open."""
+    separates = diagnosis.next_experiment.get("separates", ())
+    return not separates or not set(effects).isdisjoint(separates)
+
+
+def _difference(diagnosis: Diagnosis, names: str, scales: Scales) -> str:
+    gap, unit = float(diagnosis.next_experiment.get("expected_difference") or 0.0), scales.torque
+    if not gap:
+        return f"It separates {names}."
+    ends = f"they then differ by {unit.text(gap)} RMS; noise is {unit.text(diagnosis.heldout.floor_rms)}"
+    if is_weak(diagnosis):
+        return f"Of motions within what was visited it best separates {names}, and hardly: {ends}. {FURTHER_STILL}"
+    return f"It separates {names}: {ends}."
 
 
 def _steps(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:

@@ -119,6 +119,10 @@ def _middle(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, 
     }
 
 
+MISFIT = "A friction law that is not quite the machine's leaves as much: that is no proof of another effect."
+"""What can be said of a rest that was judged to be no effect: what it goes with was not asked."""
+
+
 def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     """Say how much error is left above the noise, and what it goes with."""
     held, unit = diagnosis.heldout, scales.torque
@@ -129,8 +133,8 @@ def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     else:
         left = f"{unit.text(rest)} of error on unseen runs stays unexplained, beyond the noise."
     goes = f"It goes with {', '.join(diagnosis.depends_on)}." if diagnosis.depends_on else ""
-    nothing = "" if goes or rest <= 0.5 * held.floor_rms else "It goes with nothing that was recorded."
-    return [text for text in (left, goes, nothing) if text]
+    misfit = "" if goes or rest <= 0.5 * held.floor_rms or words.verdict(diagnosis) == "withheld" else MISFIT
+    return [text for text in (left, goes, misfit) if text]
 
 
 def _proof_sentence(diagnosis: Diagnosis, scales: Scales) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from cosim.diagnosis.breakdown import bars
 from cosim.diagnosis.entries import Source
 from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.words import ANSWERS, in_handy_units, lowered, shows_from, sized, unseen_torque
+from cosim.diagnosis.report.words import ANSWERS, limit, lowered, shows_from, sized, unseen_torque
 from cosim.diagnosis.result import Diagnosis, Finding, Part, Trace
 from cosim.plots.quantities import decimals, number, scale_of
 
@@ -35,7 +35,7 @@ def _from(finding: Finding, least: str) -> str:
     if finding.answer in ("found", "ambiguous", "not_proven"):
         return shows_from(finding)
     if finding.answer != "not_testable":
-        return in_handy_units(shows_from(finding) or finding.evidence) or f"a torque of {least}" * bool(least)
+        return limit(finding) or f"a torque of {least}" * bool(least)
     return "; ".join(text.rstrip(".") for text in (finding.evidence, finding.action) if text)
 
 

@@ -4,6 +4,7 @@ import numpy as np
 
 from cosim.diagnosis.breakdown import bars
 from cosim.diagnosis.report.figures_where import NAMES, runs
+from cosim.diagnosis.report.next_experiment import is_about, to_record
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.tables import Table
 from cosim.diagnosis.result import Array, Diagnosis, Finding, Region
@@ -69,5 +70,9 @@ def _size(diagnosis: Diagnosis, own: Finding | None, scales: Scales) -> str:
 def _action(diagnosis: Diagnosis, own: Finding | None) -> str:
     if own and own.action:
         return own.action
-    with_ = f"vary {diagnosis.depends_on[0]} alone" if diagnosis.depends_on else "look at the machine there"
-    return str(diagnosis.next_experiment.get("description", f"{with_}, then repeat the run"))
+    if is_about(diagnosis, ("unknown",)) and (order := to_record(diagnosis)):
+        return order
+    on = diagnosis.depends_on[0] if diagnosis.depends_on else ""
+    if on.endswith("time"):
+        return "repeat the same run, cold and warm, and compare"
+    return f"{f'vary {on} alone' if on else 'look at the machine there'}, then repeat the run"

@@ -12,14 +12,19 @@ from cosim.plots.quantities import decimals, joined, minus, number, raised, scal
 COUNTS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
 ANSWERS = {
     "found": "Found",
-    "ambiguous": "Possible cause",
+    "ambiguous": "Maybe",
     "not_proven": "Not proven",
     "not_seen": "Not seen",
     "not_testable": "Cannot be tested",
     "unknown": "Unknown",
 }
 MEANINGS = (
-    ("found", "Found", "The error on unseen runs falls, and every rival fits worse; its probability stands beside it."),
+    (
+        "found",
+        "Found",
+        "The error on unseen runs falls, and every rival fits worse. Its probability, 0.5 or more, stands beside it.",
+    ),
+    ("ambiguous", "Maybe", "The error on unseen runs falls, but its probability is below 0.5 or its size is not told."),
     (
         "ambiguous",
         "Two possible causes",
@@ -54,6 +59,8 @@ class Block:
 
 NAMES = ("Stribeck",)
 """Names of people with which titles begin."""
+FROM = "from "
+"""Begins what is said of an effect whose number is no size of it, but grows with it."""
 SEEN = 0.05
 """Share of the residual energy that an effect must hold to be seen."""
 
@@ -167,7 +174,7 @@ def _handy(found: re.Match[str]) -> str:
 
 def stated(finding: Finding) -> str:
     """Return the plain sentence of a finding."""
-    return closed(in_handy_units(finding.statement))
+    return closed(minus(in_handy_units(finding.statement)))
 
 
 def _value(text: str) -> float:
@@ -180,6 +187,11 @@ def shows_from(finding: Finding) -> str:
         return ""
     size = _limit(finding.visible_from, unit_of(finding))
     return f"{size} {finding.evidence}" if finding.answer == "not_seen" and finding.evidence else size
+
+
+def limit(finding: Finding) -> str:
+    """Return from which size, or of what kind, an effect would have shown: "8.3 ms", "wider than 3 mm"."""
+    return in_handy_units(shows_from(finding) or finding.evidence.removeprefix(FROM))
 
 
 def _limit(value: float, unit: str) -> str:

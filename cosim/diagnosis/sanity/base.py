@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from cosim.diagnosis.sanity.entry import Alternative, Sanity
+from cosim.plots.quantities import raised
 from pyfmi_models.model import Variable
 from pyfmi_models.mount import Mount
 
@@ -54,7 +55,7 @@ def _far(
 ) -> list[str]:
     """One sentence, or none."""
     side = {"positive": " forward", "negative": " backward"}.get(name.rsplit(".", 1)[-1], "")
-    numbers = f"{card.start:.3g} -> {value:.3g} {card.unit}"
+    numbers = f"{card.start:.3g} → {value:.3g} {raised(card.unit)}"
     if bounds and _at_bound(value, bounds, card.start):
         return [
             f"Refitted, the {words}{side} ends at a bound of the fit ({numbers}): it stands for something else, or "

@@ -1,0 +1,241 @@
+"""A formula as the file of an effect, for a person to review: the form of docs/adding_physics.md, loaded by nobody.
+
+    load = f,   level (1 + f) but not below zero,   applied = command - f
+
+f is the formula of a learned table (`formula.py`), each quantity held at the ends of the range that was seen.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cosim.diagnosis.learned.formula import Shape, interval
+from cosim.diagnosis.learned.spelled import LETTERS, Spelled
+from cosim.support.errors import OutputError
+from cosim.support.files import check_free, directory, replacing
+from cosim.support.version import __version__
+from pyfmi_models import effects
+from pyfmi_models.waves import INPUT, spoken
+
+PREFIX = "proposed_"
+"""Of the files' names: a folder that holds one holds a proposal already."""
+KNOWN = {
+    "position": "motion.q",
+    "speed": "motion.v",
+    "turn": "ca.atan2(ca.sin(motion.angle), ca.cos(motion.angle))",
+    "payload": "ca.fabs(motion.payload)",
+    "command": "command",
+}
+"""Quantities as an effect finds them; all others are inputs."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a formula acts: base class, what it needs of the contract, method with its arguments, what it returns."""
+
+    base: str
+    needed: tuple[str, ...]
+    method: str
+    returned: str
+
+
+PLACES = {
+    "torque": Place("LoadEffect", ("Main", "Motion"), "load(self, motion: Motion) -> Scalar", "f"),
+    "friction": Place(
+        "FrictionEffect",
+        ("Main", "Motion"),
+        "level(self, level: Scalar, motion: Motion) -> Scalar",
+        "level * ca.fmax(1.0 + f, 0.0)",
+    ),
+    "drive": Place("DriveEffect", ("Main",), "applied(self, state: object, command: Scalar) -> Scalar", "command - f"),
+}
+"""Of each kind of learned term that has a value."""
+
+FILE = '''"""Proposed by `cosim diagnose` {version} from recordings; nobody has reviewed it yet.
+
+{statement}
+
+To use it: say what it is and where it comes from, rename file, class and id, and put the file into
+pyfmi_models/effects/ (docs/adding_physics.md). A card then holds it with
+
+    [[effects]]
+    effect = "{id}"
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import casadi as ca
+
+from pyfmi_models.effects.base import {imports}
+from pyfmi_models.model import {model_imports}
+
+{ranges}
+
+
+@dataclass(frozen=True, kw_only=True)
+class {name}({base}):
+    """{equation}
+
+    Fitted to recordings; each quantity is held at the ends of the range that was seen.
+    """
+
+    id: ClassVar[str] = "{id}"
+    title: ClassVar[str] = "{title}"
+    equation: ClassVar[str] = "{equation}"
+    main: ClassVar[Main] = Main("{main}", unit="{main_unit}")
+    told_apart_by: ClassVar[str] = "it is fitted to recordings: say what else would look like it"
+    action: ClassVar[str] = "Say what makes it, and what to do about it."
+{parameters}
+{inputs}
+    def {method}:
+        """The equation above."""
+{body}
+        return {returned}
+
+    def statement(self, unit: str = "N·m") -> str:
+        """Say it to a mechanic."""
+        return f"{{self.title}}: {{self.equation}}."
+'''
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """One formula, and the file it would be."""
+
+    spelled: Spelled
+    statement: str
+    """What the diagnosis says of the learned term, with its errors."""
+
+    @property
+    def id(self) -> str:
+        """Id of the effect, and name of its file."""
+        quantities = "_and_".join(name.removeprefix(INPUT) for name in self.spelled.names)
+        return f"{PREFIX}{self.spelled.effect.kind}_over_{quantities}"
+
+    def text(self) -> str:
+        """Return the file."""
+        kind = self.spelled.effect.kind
+        place = PLACES[kind]
+        return FILE.format(
+            version=__version__,
+            statement=self.statement,
+            id=self.id,
+            imports=", ".join(sorted((place.base, *place.needed))),
+            model_imports=", ".join(["Scalar", *(["Variable"] if self._columns() else []), "parameter"]),
+            ranges="\n".join(self._ranges()),
+            name="".join(word.capitalize() for word in self.id.split("_")),
+            base=place.base,
+            equation=self.spelled.equation(),
+            title=f"Proposed: {kind} over {' and '.join(map(spoken, self.spelled.names))}",
+            main=self.spelled.outer_names[0],
+            main_unit=self._coefficients()[0][-1],
+            parameters="\n".join(self._parameters()),
+            inputs="\n".join(self._inputs()),
+            method=place.method,
+            body="\n".join(f"        {line}" for line in self._body()),
+            returned=place.returned,
+        )
+
+    def _seen(self) -> tuple[Sequence[float], ...]:
+        """The range of each quantity; () of the turn."""
+        effect = self.spelled.effect
+        found = (getattr(effect, key, ()) for key in ("command_seen", "seen", "by_seen"))
+        own = [seen for seen in found if seen]
+        return tuple(() if name == "turn" else own.pop(0) for name in self.spelled.names)
+
+    def _locals(self) -> tuple[str, ...]:
+        """What each quantity is called in the method."""
+        return tuple(LETTERS.get(name, "xy"[k]) for k, name in enumerate(self.spelled.names))
+
+    def _columns(self) -> list[str]:
+        return [name for name in self.spelled.names if name not in KNOWN]
+
+    def _ranges(self) -> Iterator[str]:
+        for k, (name, seen) in enumerate(zip(self.spelled.names, self._seen(), strict=True)):
+            if seen:
+                yield f"SEEN_{self._locals()[k].upper()} = ({float(seen[0])!r}, {float(seen[1])!r})"
+                yield f'"""Lowest and highest {spoken(name)} [{self.spelled.unit(k)}] in the recordings."""'
+
+    def _coefficients(self) -> list[tuple[str, float, float, str]]:
+        return self._numbers()[len(self.spelled.inner_names) :]
+
+    def _numbers(self) -> list[tuple[str, float, float, str]]:
+        """Name, value, error and unit, as of a rotary axis: a linear one gets m and N by itself."""
+        found, wide = Spelled(self.spelled.effect, self.spelled.formula, linear=False).numbers(), ("width", "period")
+        is_span = [unit == "degC" and name.startswith(wide) for name, _, _, unit in found]
+        return [(*one[:3], "K" if span else one[3]) for one, span in zip(found, is_span, strict=True)]
+
+    def _parameters(self) -> Iterator[str]:
+        limits = (*self._limits(), *[""] * len(self._coefficients()))
+        for (name, value, error, unit), bounds in zip(self._numbers(), limits, strict=True):
+            low, high = interval(value, error)
+            told = f"Fitted; 95 % {low:.4g} to {high:.4g}"
+            yield f'    {name}: Scalar = parameter(\n        "{unit}", "{told}", default={value!r}{bounds}\n    )'
+
+    def _limits(self) -> Iterator[str]:
+        """Bounds of the numbers inside the forms, as their fit had them."""
+        formula, seen = self.spelled.formula, self._seen()
+        for (which, form), place in formula.placed().items():
+            low, high = seen[which] or (-3.2, 3.2)
+            for k, (least, most) in zip(place, zip(*form.bounds(low, high), strict=True), strict=True):
+                value = formula.inner[k]
+                yield f", low={float(min(least, value)):.6g}, high={float(max(most, value)):.6g}"
+
+    def _inputs(self) -> Iterator[str]:
+        if not self._columns():
+            return
+        made = []
+        for name in self._columns():
+            (one,) = (one for one in self.spelled.effect.inputs() if one.name == name.removeprefix(INPUT))
+            described = f'unit="{one.unit}", description="{one.description}", start={float(one.start)!r}'
+            made.append(f'Variable(name="{one.name}", {described}),')
+        yield "\n    def inputs(self) -> tuple[Variable, ...]:"
+        yield '        """What is recorded beside the motion."""'
+        yield "        return ("
+        yield from (f"            {one}" for one in made)
+        yield "        )\n"
+
+    def _body(self) -> Iterator[str]:
+        for name, letter, seen in zip(self.spelled.names, self._locals(), self._seen(), strict=True):
+            value = KNOWN.get(name, f'motion.inputs["{name.removeprefix(INPUT)}"]')
+            edge = f"SEEN_{letter.upper()}"
+            yield f"{letter} = {f'ca.fmin(ca.fmax({value}, {edge}[0]), {edge}[1])' if seen else value}"
+        pairs = zip(self.spelled.outer_names, self.spelled.formula.shapes, strict=True)
+        first, *rest = (" * ".join([f"self.{name}", *self._factors(shape)]) for name, shape in pairs)
+        yield f"f = {first}"
+        yield from (f"f += {one}" for one in rest)
+
+    def _factors(self, shape: Shape) -> Iterator[str]:
+        formula = self.spelled.formula
+        placed = formula.placed()
+        for k, form in shape.parts:
+            own = [f"self.{self.spelled.inner_names[i]}" for i in placed.get((k, form), ())]
+            yield form.written(self._locals()[k], own, formula.tops[k])
+
+
+def check_folder(folder: Path, force: bool) -> None:
+    """Refuse a folder that holds a proposal, and the one that effects are loaded from (raises OutputError)."""
+    if folder.resolve() == Path(effects.__file__).parent.resolve():
+        text = f"{folder} is where effects are loaded from; propose into another folder and review the file there."
+        raise OutputError(text, culprit=str(folder))
+    for one in sorted(folder.glob(f"{PREFIX}*.py")):
+        check_free(one, force)
+
+
+def write_proposals(proposals: Sequence[Proposal], folder: Path, force: bool = False) -> tuple[Path, ...]:
+    """Write each proposal as a file of its own; nothing, not even the folder, where there is none.
+
+    Raises:
+        OutputError: the folder holds a proposal and `force` is not set, or is the one that effects are loaded from.
+    """
+    check_folder(folder, force)
+    paths = tuple(folder / f"{one.id}.py" for one in proposals)
+    for one, path in zip(proposals, paths, strict=True):
+        directory(folder)
+        with replacing(path, force=True) as partial:
+            partial.write_text(one.text(), "utf-8")
+    return paths
+
+
+__all__ = ["Proposal", "check_folder", "write_proposals"]

@@ -1,0 +1,82 @@
+"""Found means more likely than not: word, count and probability agree on page, terminal and in the data."""
+
+from dataclasses import replace
+
+import pytest
+from report_example import FOUND, REST, RIVALS, diagnosis
+
+from cosim.diagnosis.findings import answered
+from cosim.diagnosis.report import lead, words
+from cosim.diagnosis.report.quantities import Scales
+from cosim.diagnosis.result import Diagnosis, Finding
+from cosim.diagnosis.terminal import summary
+from cosim.serve.work import in_words
+from pyfmi_models.effects import Cogging
+
+MAYBE = replace(FOUND[1], effect="cable_wrap", title="Cable wrap", answer="ambiguous", probability=0.49)
+
+
+def of(*findings: Finding, unknown: bool = False) -> Diagnosis:
+    named = tuple(finding.effect for finding in findings if finding.answer in ("found", "ambiguous"))
+    verdict = (*named, "unknown") if unknown else named
+    return replace(diagnosis("two"), findings=(*findings, *REST), verdict=verdict)
+
+
+def said(whole: Diagnosis) -> str:
+    return " ".join(lead.lead(whole, Scales.of(whole)))
+
+
+@pytest.mark.parametrize(
+    ("probability", "members", "is_told", "answer"),
+    [
+        (0.50, (), True, "found"),
+        (0.49, (), True, "ambiguous"),
+        (0.97, ("backlash",), True, "ambiguous"),
+        (0.97, (), False, "ambiguous"),
+    ],
+)
+def test_found_is_what_is_alone_more_likely_than_not_and_of_a_size_that_is_told(
+    probability: float, members: tuple[str, ...], is_told: bool, answer: str
+) -> None:
+    assert answered(probability, members, is_told) == answer
+
+
+@pytest.mark.parametrize(
+    ("findings", "unknown", "heading"),
+    [
+        ((*FOUND, MAYBE), False, "Two effects are missing from the model, perhaps one more"),
+        ((*FOUND, *RIVALS), False, "Two effects are missing from the model"),
+        ((*FOUND, MAYBE), True, "Two effects are missing from the model, perhaps one more, and something unknown"),
+        ((MAYBE,), False, "One effect may be missing from the model"),
+        ((MAYBE,), True, "One effect may be missing from the model, and something unknown"),
+        ((MAYBE, *RIVALS), False, "Something is missing, with more than one possible cause"),
+    ],
+)
+def test_the_heading_counts_what_was_found_and_what_may_be_apart(
+    findings: tuple[Finding, ...], unknown: bool, heading: str
+) -> None:
+    assert lead.heading(of(*findings, unknown=unknown)) == heading
+
+
+def test_page_and_terminal_use_one_word_for_what_may_be() -> None:
+    whole = of(*FOUND, MAYBE)
+    (block,) = (one for one in words.blocks(whole) if one.first is MAYBE)
+    (row,) = (row for row in in_words(whole)["findings"] if row["what"] == "Cable wrap")
+    assert block.word == row["answer"] == "Maybe"
+    lines = summary(whole).splitlines()
+    assert lines[0] == "Two effects are missing from mount.toml, perhaps one more"
+    assert [line.split()[0] for line in lines if "cable wrap  " in line] == ["MAYBE"]
+    assert "A further error may come from cable wrap: its probability is 0.49." in said(whole)
+
+
+def test_the_lead_names_every_open_question() -> None:
+    pair = tuple(replace(one, effect=f"other_{one.effect}", title=f"Other {one.title.lower()}") for one in RIVALS)
+    sets = tuple(tuple(one.effect for one in rivals) for rivals in (RIVALS, pair))
+    told = said(replace(of(*FOUND, *RIVALS, *pair), ambiguous_with=sets))
+    assert "two possible causes: gravity unbalance or encoder eccentricity" in told
+    assert "two possible causes: other gravity unbalance or other encoder eccentricity" in told
+
+
+def test_a_ripple_is_told_with_the_digits_that_a_mechanic_reads() -> None:
+    assert "399.8 times per metre" in Cogging(cycles_per_rev=399.8213, amplitude=2.0).statement("N")
+    assert "24 times per turn" in Cogging(cycles_per_rev=24.0, amplitude=2.0).statement()
