@@ -220,6 +220,8 @@ def test_it_fits_a_phone_and_everything_can_be_touched(
 
 
 def check_phone(page: Page, scheme: str) -> None:
+    # A selector may be there before the style sheet of a new page is.
+    page.wait_for_load_state("load")
     assert page.evaluate("document.documentElement.scrollWidth") == PHONE["width"]
     low = page.evaluate(
         """([least, what]) => [...document.querySelectorAll(what)]
@@ -265,6 +267,7 @@ def test_axe_finds_nothing(browser: Any, files: list[Path], tmp_path: Path, sche
 
 
 def check_axe(page: Page, code: str) -> None:
+    page.wait_for_load_state("load")
     assert violations(page, code) == []
 
 
