@@ -12,6 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
 
 import mutants
 from mutations import mutated, sites
+from reach import Reached, read
 
 SOURCE = '''
 """A module."""
@@ -65,6 +66,35 @@ def test_the_tests_of_a_module_are_those_that_are_near() -> None:
     assert "test_master.py" in mutants.belonging(root / "cosim" / "master" / "planning.py")
 
 
+def test_the_tests_that_are_asked_call_the_function_in_question_the_cheapest_of_each_kind_first() -> None:
+    source = "LIMIT = 3\n\n\n@cached\ndef one():\n    return LIMIT\n\n\n"
+    source += "def other():\n    def inner():\n        return 2\n\n    return 1\n"
+    assert mutants.spanned(source, 1) == range(0)
+    assert mutants.spanned(source, 6) == range(4, 7), "from its decorator on, where Python says that it begins"
+    assert mutants.spanned(source, 11) == range(10, 12)
+    assert mutants.spanned(source, 13) == range(9, 14)
+    told = [("a[1]", 0.1, [4]), ("a[2]", 0.2, [4]), ("b", 0.3, [4, 9]), ("c", 0.4, [9]), ("d", 19.8, [4])]
+    reached = [Reached(f"tests/{test}", seconds, {"m.py": lines}) for test, seconds, lines in told]
+    assert mutants.calling("m.py", source, 6, reached) == ("a[1]", "b"), "all that fit into the time"
+    assert mutants.calling("m.py", source, 13, reached) == ("b", "c")
+    assert mutants.calling("m.py", source, 1, reached[:-1]) == ("a[1]", "b", "c", "a[2]"), "any of the module"
+    assert mutants.calling("other.py", source, 6, reached) == ()
+
+
+def test_who_calls_what_is_noted_for_each_test_that_passes(tmp_path: Path) -> None:
+    out = tmp_path / "reach"
+    here = Path(__file__).parent / "benchmarks" / "reach.py"
+    command = [sys.executable, here, "--files", "test_decision_proof.py", "--out", out]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600)
+    assert done.returncode == 0, done.stderr
+    found = read(out)
+    assert [one.seconds for one in found] == sorted(one.seconds for one in found)
+    source = (mutants.HOME / "cosim" / "diagnosis" / "proof.py").read_text("utf-8")
+    line = source[: source.index("def prove(")].count("\n") + 1
+    assert all(line in one.calls["cosim/diagnosis/proof.py"] for one in found)
+    assert len(mutants.calling("cosim/diagnosis/proof.py", source, line, found)) == len(found)
+
+
 def test_an_error_is_noticed_where_a_test_looks_and_survives_where_none_does(tmp_path: Path) -> None:
     alone("noticed", tmp_path)
 
@@ -92,7 +122,7 @@ def noticed(folder: Path) -> None:
         _, change, text = mutated(source, site)
         (folder / "held.py").write_text(text)
         assert mutants.noticed(folder, ["test_idle.py"]) == "", change
-        expected = "" if change == "min(x, 3) + 0 -> Sub" else "test_looks"
+        expected = "" if change == "min(x, 3) + 0 -> Sub" else "test_looks.py::test_looks"
         assert mutants.noticed(folder, ["test_idle.py", "test_looks.py"]) == expected, change
 
 

@@ -108,10 +108,13 @@ def trial(command: list[str], folder: Path, kill: signal.Signals | None, after: 
     files = [one for one in (folder / "out").rglob("*") if one.is_file()] if (folder / "out").exists() else []
     partial = [one for one in files if one.name.endswith((".partial", ".lock"))]
     text = (folder / "said").read_text("utf-8", "replace")
+    wrong = code != 0 if kill is None else code not in CODES[kill]
+    if wrong:
+        print(f"exit {code} after {after:.3f} s: ...{text[-1500:]}", flush=True)
     found = {
         "ended": int(code != 0),
         "half_written": sum(not whole(one) for one in files if one not in partial),
-        "wrong_exit_code": int(code != 0 if kill is None else code not in CODES[kill]),
+        "wrong_exit_code": int(wrong),
         "still_running": len(running(folder)),
         "temporary_left": len(list((folder / "tmp").iterdir())),
         "partial_left": len(partial),

@@ -1,10 +1,13 @@
 """Small errors planted in the code, one at a time: do the tests notice?
 
-    python tests/benchmarks/mutants.py --seed 1 --count 160 --out results/mutants [--journal FILE]
+    python tests/benchmarks/reach.py --out FILE
+    python tests/benchmarks/mutants.py --seed 1 --count 160 --reach FILE --out results/mutants [--journal FILE]
 
 A mutant is a module with one operator, number or truth value changed, or one call left out (`mutations.py`). It is
-written into a copy of the tree, and the tests that are nearest to its module, by imports and names, run there until one
-fails. Killed: a test failed or no longer ended. Survived: none did.
+written into a copy of the tree, and tests run there until one fails: those that call the function which was changed,
+the cheapest of each kind first, for `BUDGET` seconds; without `--reach`, or where none is known to call it, the files
+of tests nearest to the module, by imports and names. Killed: a test failed that passes without the error, or no longer
+ended. Survived: none did.
 """
 
 import argparse
@@ -32,6 +35,7 @@ import scipy.signal  # noqa: F401
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 
 from mutations import mutated, sites  # noqa: E402
+from reach import Reached, read  # noqa: E402
 
 from cosim.support.files import replacing  # noqa: E402
 from cosim.support.version import __version__  # noqa: E402
@@ -56,9 +60,11 @@ MOST, NEAREST = 4, 6
 """Imports between a test and a module at most, and test files that are asked at most."""
 SECONDS = 150
 """Of a processor that a test file may take: a mutant that never ends is noticed too."""
+BUDGET, MANY = 20.0, 120
+"""Seconds that the tests of a mutant take without it in all, and how many tests that are at most."""
 LOST = ("FAILED", "ERROR")
 """What pytest says of a test that noticed."""
-OURS = ("cosim", "cosim_studies", "pyfmi_models", "mutants", "mutations")
+OURS = ("cosim", "cosim_studies", "pyfmi_models", "mutants", "mutations", "reach")
 """What a fork loads anew, from the tree with the error."""
 SLOW = ("test_attack", "test_prove", "test_proof", "test_serve", "test_benchmarks", "test_same_bits", "test_platforms")
 """Test files that are not asked: a mutant that only they would notice counts as survived."""
@@ -132,23 +138,62 @@ def copied(folder: Path) -> Path:
 
 
 def noticed(tree: Path, tests: Sequence[str]) -> str:
-    """Run tests in a tree until one fails; its name, "time" where it did not end, empty where nobody noticed."""
-    for name in tests:
-        said = tree / "said"
-        pid = os.fork()
-        if not pid:
-            os._exit(_tested(tree, name, said))
-        code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-        if code == -signal.SIGXCPU:
-            return f"{name} (time)"
-        if code not in (0, 5):  # 5: no tests here
-            failed = [one for one in said.read_text("utf-8", "replace").splitlines() if one.startswith(LOST)]
-            return failed[-1].split(" - ")[0].split("::")[-1] if failed else name
-    return ""
+    """Run files of tests in a tree, one after the other, until one fails; what `failed` says of it."""
+    return next(filter(None, (failed(tree, [name]) for name in tests)), "")
 
 
-def _tested(tree: Path, name: str, said: Path) -> int:
-    """Run a file of tests here, in a fork that has all but the tree loaded already; what pytest ends with."""
+def failed(tree: Path, tests: Sequence[str]) -> str:
+    """Run tests until one fails; its name from the file on, "(time)" where they did not end, or nothing."""
+    said = tree / "said"
+    pid = os.fork()
+    if not pid:
+        os._exit(_tested(tree, tests, said))
+    code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+    if code == -signal.SIGXCPU:
+        return f"{tests[0]} (time)"
+    if code in (0, 5):  # 5: no tests here
+        return ""
+    lost = [one for one in said.read_text("utf-8", "replace").splitlines() if one.startswith(LOST)]
+    words = lost[-1].split(" - ")[0].split(" ", 1)[-1] if lost else ""
+    return words.removeprefix("tests/") if "::" in words else tests[0]
+
+
+def spanned(source: str, line: int) -> range:
+    """The lines of the innermost function around a line; none outside of functions."""
+    kinds = (ast.FunctionDef, ast.AsyncFunctionDef)
+    around = [
+        range(min([node.lineno, *(one.lineno for one in node.decorator_list)]), (node.end_lineno or 0) + 1)
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, kinds)
+    ]
+    return min((one for one in around if line in one), key=len, default=range(0))
+
+
+def calling(module: str, source: str, line: int, reached: Sequence[Reached]) -> tuple[str, ...]:
+    """Tests that call the function around a line (outside of functions: any of the module), for `BUDGET` seconds.
+
+    Of each test function the cheapest case comes first, then the second of each.
+    """
+    begin = spanned(source, line)
+    told: dict[str, int] = {}
+    ranked = []
+    for one in reached:  # the cheapest first
+        lines = one.calls.get(module, [])
+        if begin.start in lines if begin else lines:
+            name = one.test.split("[")[0]
+            ranked.append((told.get(name, 0), one.seconds, one.test))
+            told[name] = told.get(name, 0) + 1
+    spent, found = 0.0, []
+    for _, seconds, test in sorted(ranked)[:MANY]:
+        if found and spent + seconds > BUDGET:
+            break
+        spent += seconds
+        found.append(test.removeprefix("tests/"))
+    return tuple(found)
+
+
+def _tested(tree: Path, tests: Sequence[str], said: Path) -> int:
+    """Run tests here, in a fork that has all but the tree loaded already; what pytest ends with."""
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
     os.setsid()
     os.chdir(tree)
@@ -159,7 +204,8 @@ def _tested(tree: Path, name: str, said: Path) -> int:
     with said.open("w") as file:
         os.dup2(file.fileno(), 1)
         os.dup2(file.fileno(), 2)
-    return int(pytest.main(["-n0", "-x", "-q", "-p", "no:cacheprovider", f"tests/{name}"]))
+    names = [f"tests/{name}" for name in tests]
+    return int(pytest.main(["-n0", "-x", "-q", "-p", "no:cacheprovider", *names]))
 
 
 def _is_of_home(folder: str) -> bool:
@@ -167,15 +213,22 @@ def _is_of_home(folder: str) -> bool:
     return (folder == str(HOME) or folder.startswith(str(HOME) + os.sep)) and not folder.startswith(sys.prefix + os.sep)
 
 
-def attempt(tree: Path, group: str, path: Path, site: int) -> Tried:
+def attempt(tree: Path, group: str, path: Path, site: int, reached: Sequence[Reached] = ()) -> Tried:
     """Plant one error, run the tests, take it back."""
-    source, place = path.read_text("utf-8"), tree / path.relative_to(HOME)
+    source, place, module = path.read_text("utf-8"), tree / path.relative_to(HOME), str(path.relative_to(HOME))
     line, change, text = mutated(source, site)
-    try:
-        place.write_text(text, "utf-8")
-        return Tried(group, str(path.relative_to(HOME)), site, line, change, noticed(tree, belonging(path)))
-    finally:
-        place.write_text(source, "utf-8")
+    known = list(calling(module, source, line, reached))
+    while True:
+        try:
+            place.write_text(text, "utf-8")
+            witness = failed(tree, known) if known else noticed(tree, belonging(path))
+        finally:
+            place.write_text(source, "utf-8")
+        if not witness or witness.endswith("(time)") or not failed(tree, [witness]):
+            return Tried(group, module, site, line, change, witness)
+        if witness not in known:  # a file that fails without the error too
+            raise SystemExit(f"{witness} fails in the tree as it is")
+        known.remove(witness)
 
 
 def journalled(journal: Path) -> list[Tried]:
@@ -205,17 +258,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=160)
+    parser.add_argument("--reach", type=Path, help="file that reach.py wrote")
     parser.add_argument("--journal", type=Path, help="file of what is done: a run that ended early goes on from there")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
     folder = Path(tempfile.mkdtemp(prefix="mutants-"))
+    reached = read(given.reach) if given.reach else []
     journal = given.journal or folder / "journal"
     try:
         tree = copied(folder)
         for group, path, site in drawn(given.seed, given.count):
             done = {(one.module, one.site) for one in journalled(journal)}
             if (str(path.relative_to(HOME)), site) not in done:
-                tried = attempt(tree, group, path, site)
+                tried = attempt(tree, group, path, site, reached)
                 print(f"{tried.module}:{tried.line} {tried.change}: {tried.noticed or 'SURVIVED'}", flush=True)
                 with journal.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(vars(tried)) + "\n")

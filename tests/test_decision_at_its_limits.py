@@ -1,0 +1,169 @@
+"""The decision exactly at its limits, with round constants: on which side each limit itself lies."""
+
+from dataclasses import replace
+from math import exp
+
+import pytest
+
+from cosim.diagnosis.calibration import calibrated
+from cosim.diagnosis.decision import (
+    Decision,
+    EffectScores,
+    Gain,
+    ResidualScores,
+    TermScores,
+    decide,
+    doubted,
+    followed,
+    is_left,
+    open_rivals,
+    stands,
+)
+from cosim.diagnosis.policy import POLICY
+
+ROUND = replace(
+    POLICY,
+    set_margin=3.0,
+    least_predicted=4.0,
+    sure_predicted=32.0,
+    halved=0.5,
+    most_raised=0.25,
+    least_share=0.125,
+    floor=16.0,
+    floor_alone=32.0,
+    sure_floor=128.0,
+    supported=0.125,
+    contradicted=0.125,
+    denied=2.0,
+    least_followed=8.0,
+    follows=0.25,
+    beside=0.5,
+    imitation=0.5,
+    imitation_share=0.75,
+    large_residual=0.125,
+    large_residual_there=0.25,
+)
+"""Constants with which every product is exact, so that a limit can be met exactly."""
+LITTLE = 1e-6
+
+
+def effect(name: str, evidence: float, explains: float = 0.5, **margins: float) -> EffectScores:
+    return EffectScores(name, evidence, margins, dict.fromkeys((name, *margins), explains))
+
+
+def left(*terms: TermScores, share: float = 0.0, there: float = 0.0) -> ResidualScores:
+    return ResidualScores(share, there, terms)
+
+
+def unknown(evidence: float, share: float, predicted: float = 0.0) -> bool:
+    return is_left([], left(TermScores("position", evidence, predicted, share)), ROUND)
+
+
+def test_a_rival_at_the_margin_of_a_set_is_beaten() -> None:
+    assert open_rivals(effect("delay", 9.0, a=3.0 - LITTLE, b=3.0), ROUND) == ("a",)
+
+
+@pytest.mark.parametrize(
+    ("gain", "share", "expected"),
+    [
+        (Gain(4.0, 0.1, 0.1), 0.125, True),
+        (Gain(4.0 - LITTLE, 0.1, 0.1), 0.125, False),
+        (Gain(4.0, 0.1, 0.1), 0.125 - LITTLE, False),
+        (Gain(32.0, 0.1, 0.1), 0.0, True),
+        (Gain(32.0 - LITTLE, 0.1, 0.1), 0.0, False),
+        (Gain(-16.0 + LITTLE, 0.5, 0.5), 0.5, True),
+        (Gain(-16.0, 0.5, 0.5), 0.5, False),
+        (Gain(0.0, 0.5 - LITTLE, 0.5), 0.5, False),
+        (Gain(0.0, 0.5, 0.5 - LITTLE), 0.5, False),
+        (Gain(9.0, 0.0, 0.0), 0.5, True),
+        (Gain(9.0, 0.0, -LITTLE), 0.5, True),
+        (Gain(9.0, -LITTLE, -LITTLE), 0.5, False),
+        (Gain(9.0, 0.3, -0.25), 0.5, True),
+        (Gain(9.0, 0.3, -0.25 - LITTLE), 0.5, False),
+        (Gain(9.0, -0.25 - LITTLE, 0.3), 0.5, False),
+        (Gain(32.0, -0.9, 0.5), 0.5, True),
+        (Gain(32.0 - LITTLE, -0.9, 0.5), 0.5, False),
+        (Gain(32.0, -0.9, 0.5 - LITTLE), 0.5, False),
+    ],
+)
+def test_an_effect_stands_from_its_limits_on(gain: Gain, share: float, expected: bool) -> None:
+    assert stands(gain, share, ROUND) is expected
+
+
+@pytest.mark.parametrize(
+    ("evidence", "explains", "rest", "expected"),
+    [
+        (20.0, 0.5, 16.0, True),
+        (20.0, 0.5, 16.0 - LITTLE, False),
+        (20.0, 0.75, 16.0, False),
+        (20.0, 0.75 - LITTLE, 16.0, True),
+        (32.0, 0.5, 16.0, False),
+        (32.0 - LITTLE, 0.5, 16.0, True),
+    ],
+)
+def test_a_name_may_imitate_what_is_left_up_to_its_limits(
+    evidence: float, explains: float, rest: float, expected: bool
+) -> None:
+    found = doubted([effect("delay", evidence, explains)], left(TermScores("position", rest, 0.0, 0.0)), ROUND)
+    assert found == (("delay",) if expected else ())
+
+
+def test_a_residual_is_large_beyond_its_limit_in_training_or_held_out() -> None:
+    assert not is_left([], left(share=0.125, there=0.25), ROUND)
+    assert is_left([], left(share=0.125 + LITTLE), ROUND)
+    assert is_left([], left(there=0.25 + LITTLE), ROUND)
+
+
+def test_the_evidence_that_is_asked_goes_with_what_held_out_recordings_say() -> None:
+    assert unknown(16.0, 0.125)
+    assert not unknown(16.0 - LITTLE, 0.125)
+    assert not unknown(16.0, 0.125 - LITTLE), "not supported: the higher floor"
+    assert unknown(32.0, 0.125 - LITTLE)
+    assert not unknown(32.0 - LITTLE, 0.0)
+    assert unknown(32.0, -0.125)
+    assert not unknown(32.0, -0.125 - LITTLE), "contradicted: the highest floor"
+    assert unknown(128.0, -0.5)
+    assert not unknown(128.0 - LITTLE, -0.5)
+    assert unknown(32.0, 0.0, -64.0)
+    assert not unknown(32.0, 0.0, -64.0 - LITTLE), "denied by the likelihood: the highest floor"
+    assert unknown(8.0, 0.25)
+    assert not unknown(8.0 - LITTLE, 0.25)
+    assert not unknown(8.0, 0.25 - LITTLE)
+
+
+def test_what_is_left_beside_a_sure_name_must_reach_its_share_of_that_evidence() -> None:
+    sure = effect("delay", 80.0, 0.9)
+    assert is_left([sure], left(TermScores("position", 40.0, 0.0, 0.5)), ROUND)
+    assert not is_left([sure], left(TermScores("position", 40.0 - LITTLE, 0.0, 0.5)), ROUND)
+
+
+def test_a_doubtful_name_excuses_nothing_that_is_left() -> None:
+    weak = effect("delay", 20.0, 0.5)
+    residual = left(TermScores("position", 16.0, 0.0, 0.5))
+    found = decide([weak], residual, ROUND)
+    assert (found.is_unknown, found.doubtful) == (True, ("delay",))
+    assert decide([weak], left(), ROUND).doubtful == ()
+
+
+def test_what_the_rest_follows_is_beyond_a_share_of_its_own_and_of_the_best() -> None:
+    terms = [TermScores(name, 50.0, 0.0, share) for name, share in (("t", 0.26), ("q", 0.8), ("v", 0.4), ("a", 0.41))]
+    assert followed(left(*terms), ROUND) == ("q", "a"), "beyond half of the best, the best first"
+    assert followed(left(TermScores("q", 50.0, 0.0, 0.25)), ROUND) == ("time",)
+    assert followed(left(TermScores("q", 50.0, 0.0, 0.25 + LITTLE)), ROUND) == ("q",)
+    assert followed(ResidualScores(0.0, 0.0, (), "friction level over time"), ROUND) == ("friction level over time",)
+
+
+@pytest.mark.parametrize("margin", [2.0, -1.5])
+@pytest.mark.parametrize("evidence", [1.0, 2000.0])
+def test_probabilities_are_calibrated_posterior_shares_times_what_is_explained(margin: float, evidence: float) -> None:
+    one = EffectScores("delay", evidence, {"lag": margin, "far": 9.0}, {"delay": 0.75, "lag": 0.5, "far": 0.25})
+    found = decide([one], left(), ROUND).probabilities["delay"]
+    total = 1 + exp(-margin) + exp(-9.0) + exp(-min(evidence, 700.0))
+    told = {"delay": calibrated(0.75 / total), "lag": calibrated(0.5 * exp(-margin) / total)}
+    scale = max(1.0, sum(told.values()))
+    assert found == pytest.approx({name: value / scale for name, value in told.items()}, rel=1e-12)
+
+
+def test_what_is_decided_stays_when_something_more_is_left() -> None:
+    decided = Decision({}, {}, True, ("time",))
+    assert decided.with_rest(("position",)) is decided

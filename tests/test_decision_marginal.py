@@ -1,0 +1,108 @@
+"""The marginal likelihood of a structure, against the dense Gaussian density that it stands for."""
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from cosim.diagnosis.marginal import Group, Marginal, marginal
+
+Array = npt.NDArray[np.float64]
+DICE = np.random.default_rng(18)
+ROWS = (40, 70)
+"""Rows of two bands."""
+FREE = np.array([2.0, 0.5, 9.0, 9.0])
+"""Prior standard deviations; those of the last two columns are of a group, so that they do not count."""
+GROUPS = (Group([2, 3], 0.5),)
+NOISE = np.array([0.3, 2.0])
+SIZE = np.array([0.7])
+
+
+def bands(size: float = 0.4, noise: Array = NOISE, rows: tuple[int, ...] = ROWS) -> list[tuple[Array, Array]]:
+    """Targets and columns of each band, drawn from the model."""
+    beta = np.array([1.0, -0.4, *size * DICE.standard_normal(2)])
+    drawn = []
+    for many, variance in zip(rows, noise, strict=True):
+        x = DICE.standard_normal((many, 4))
+        drawn.append((x @ beta + np.sqrt(variance) * DICE.standard_normal(many), x))
+    return drawn
+
+
+def grams(drawn: list[tuple[Array, Array]]) -> Array:
+    return np.array([np.column_stack([y, x]).T @ np.column_stack([y, x]) for y, x in drawn])
+
+
+def found(drawn: list[tuple[Array, Array]], effective: Array | None = None, **more: object) -> Marginal:
+    count = np.array([float(len(y)) for y, _ in drawn])
+    told = {"floor": np.zeros(len(drawn)), "groups": GROUPS, "free": FREE, **more}
+    return marginal(grams(drawn), count=count, effective=count if effective is None else effective, **told)  # type: ignore[arg-type]
+
+
+def start(noise: Array = NOISE, sizes: Array = SIZE) -> Marginal:
+    return Marginal(0.0, noise, sizes, np.zeros(4))
+
+
+def test_where_every_row_counts_it_is_the_density_of_the_data_with_the_prior_of_the_sizes() -> None:
+    drawn = bands()
+    one = found(drawn, start=start(), rounds=0)
+    prior = np.diag(np.array([2.0, 0.5, 0.7, 0.7]) ** 2)
+    x = np.concatenate([x for _, x in drawn])
+    y = np.concatenate([y for y, _ in drawn])
+    covariance = np.diag(np.repeat(NOISE, ROWS)) + x @ prior @ x.T
+    density = -(y @ np.linalg.solve(covariance, y) + np.linalg.slogdet(covariance)[1]) / 2
+    assert one.log_likelihood == pytest.approx(density - (0.7 / 0.5) ** 2 / 2, rel=1e-9)
+    assert one.beta == pytest.approx(prior @ x.T @ np.linalg.solve(covariance, y), rel=1e-9)
+    assert (one.noise, one.sizes) == (NOISE, SIZE)
+
+
+def test_rows_that_say_nothing_new_count_less_in_the_likelihood_and_in_the_fit() -> None:
+    drawn = bands()
+    half = found(drawn, np.array(ROWS) / 2.0, start=start(), rounds=0)
+    scaled = [(y / np.sqrt(2), x / np.sqrt(2)) for y, x in drawn]
+    same = found(scaled, start=start(), rounds=0)
+    spared = sum(many / 2 * np.log(variance) for many, variance in zip(ROWS, NOISE, strict=True)) / 2
+    assert half.beta == pytest.approx(same.beta, rel=1e-12)
+    assert half.log_likelihood == pytest.approx(same.log_likelihood + spared, rel=1e-12)
+
+
+def test_noise_and_sizes_that_are_renewed_explain_the_data_better_and_come_near_the_truth() -> None:
+    true = np.array([0.25, 4.0])
+    drawn = bands(noise=true, rows=(4000, 4000))
+    likelihoods = [found(drawn, rounds=rounds).log_likelihood for rounds in (0, 1, 2, 6)]
+    assert likelihoods == sorted(likelihoods)
+    assert likelihoods[0] < likelihoods[1]
+    assert found(drawn).noise == pytest.approx(true, rel=0.1)
+
+
+def test_renewed_noise_is_the_mean_square_left_with_the_uncertainty_of_the_fit() -> None:
+    drawn = bands()
+    begun, renewed = (found(drawn, start=start(), rounds=rounds) for rounds in (0, 1))
+    prior = np.diag(1 / np.array([2.0, 0.5, 0.7, 0.7]) ** 2)
+    normal = sum((x.T @ x / variance for (_, x), variance in zip(drawn, NOISE, strict=True)), prior)
+    covariance = np.linalg.inv(normal)
+    expected = [
+        (float(np.sum((y - x @ begun.beta) ** 2)) + float(np.trace(covariance @ x.T @ x))) / len(y) for y, x in drawn
+    ]
+    assert renewed.noise == pytest.approx(expected, rel=1e-9)
+    mean = float(np.mean(begun.beta[2:] ** 2 + np.diag(covariance)[2:]))
+    size = renewed.sizes[0]
+    assert size**2 / mean + size**4 / (2 * mean * 0.5**2) == pytest.approx(1.0, rel=1e-9), "the slope is zero there"
+
+
+def test_noise_is_never_below_its_floor() -> None:
+    drawn = bands()
+    floor = np.array([5.0, 6.0])
+    assert (found(drawn, floor=floor).noise >= floor).all()
+    first = found(drawn, floor=floor, rounds=0)
+    energy = [max(float(y @ y) / len(y), least) for (y, _), least in zip(drawn, floor, strict=True)]
+    assert first.noise == pytest.approx(energy, rel=1e-12)
+
+
+def test_a_group_that_explains_nothing_becomes_small_and_one_that_does_becomes_large() -> None:
+    few, many = (found(bands(size=size, rows=(400, 400)), rounds=30).sizes[0] for size in (1e-3, 2.0))
+    assert few < 0.1 < many
+
+
+def test_priors_without_bound_are_numbers_all_the_same() -> None:
+    told = found(bands(), free=np.array([1e300, 1e-300, 1.0, 1.0]))
+    assert np.isfinite(told.log_likelihood)
+    assert abs(told.beta[1]) < 1e-12

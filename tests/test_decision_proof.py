@@ -1,0 +1,153 @@
+"""Which effects stand, where all but the choice is a table: likelihoods and errors by the effects that are in."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.proof import Proof, prove
+from cosim.diagnosis.rivals import AcceptedEffect, Examined
+
+RULES = replace(POLICY, least_predicted=3.0, sure_predicted=30.0, halved=0.5, most_raised=0.1, least_share=0.02)
+
+
+@dataclass(frozen=True)
+class Named:
+    """An effect that is only its name."""
+
+    id: str
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A mount that is only its effects."""
+
+    effects: tuple[Named, ...]
+
+    @property
+    def names(self) -> str:
+        return "".join(one.id for one in self.effects)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A fit that leaves so much in each of four rows."""
+
+    mount: Structure
+    left: float = 0.0
+
+    @property
+    def residual(self) -> Any:
+        return np.full(4, self.left)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    evidence: float
+    fit: Fitted
+
+
+class Tables:
+    """Comparison, problem and held-out recordings in one: the base has the effect "b" of its own."""
+
+    policy = RULES
+    mount = Structure((Named("b"),))
+    weight = np.ones(4)
+
+    def __init__(self, nats: Mapping[str, float], errors: Mapping[str, float] | None = None) -> None:
+        self.nats, self.errors = nats, errors or {}
+        self.fitted: list[str] = []
+
+    @property
+    def problem(self) -> "Tables":
+        return self
+
+    def fit(self, mount: Structure, iterations: int) -> Fitted:
+        assert 1 < iterations < 100
+        self.fitted.append(mount.names)
+        return Fitted(mount)
+
+    def residual(self, mount: Structure) -> str:
+        return mount.names
+
+    def log_likelihood(self, names: str) -> float:
+        return self.nats[names]
+
+    def plain_gains(self, before: Structure, after: Structure) -> tuple[float, float]:
+        """By default what is more has a little less error."""
+        old, new = (self.errors.get(one.names, 1.0 - 0.01 * len(one.effects)) for one in (before, after))
+        return (old - new) / old, (old - new) / old
+
+
+def structure(names: str, left: float = 0.0) -> Fitted:
+    return Fitted(Structure(tuple(Named(one) for one in names)), left)
+
+
+def proven(tables: Tables, names: str, removed: float = 0.5) -> Proof:
+    """Effects in the order of their evidence, each of which removes a share of what the base leaves."""
+    whole = structure("b" + names)
+    effects = []
+    for place, name in enumerate(names):
+        own = Candidate(100.0 - place, structure("b" + names, left=np.sqrt(1 - removed)))
+        without = structure("b" + names.replace(name, ""), left=1.0)
+        effects.append(AcceptedEffect((Named(name),), own, without, (), {}))  # type: ignore[arg-type]
+    examined = Examined(structure("b", left=1.0), whole, tuple(reversed(effects)), None)  # type: ignore[arg-type]
+    return prove(tables, examined, tables)  # type: ignore[arg-type]
+
+
+def standing(proof: Proof) -> str:
+    return "".join(one.effect.id for one in proof.standing)
+
+
+def test_effects_that_predict_stand_and_are_worth_what_is_lost_without_them() -> None:
+    tables = Tables({"b": 0.0, "bx": 10.0, "bxy": 17.0, "by": 5.0})
+    proof = proven(tables, "xy")
+    assert standing(proof) == "xy"
+    assert proof.predicted == {"x": 12.0, "y": 7.0}
+    assert proof.unproven == ()
+    assert proof.chosen.mount.names == "bxy"  # type: ignore[attr-defined]
+
+
+def test_where_nothing_predicts_the_base_stays() -> None:
+    proof = proven(Tables({"b": 0.0, "bx": -1.0, "bxy": -2.0, "by": -1.0}), "xy")
+    assert standing(proof) == ""
+    assert proof.chosen.mount.names == "b"  # type: ignore[attr-defined]
+    assert proof.predicted == {"x": 0.0, "y": 0.0}
+    assert [one.effect.id for one in proof.unproven] == ["x", "y"]
+
+
+def test_the_list_ends_where_prediction_is_best_and_one_that_does_not_help_loses_no_later_one() -> None:
+    tables = Tables({"b": 0.0, "bx": -1.0, "bxy": 20.0, "by": 22.0, "bxyz": 19.0})
+    proof = proven(tables, "xyz")
+    assert standing(proof) == "y", "x raises nothing and predicts nothing: it is taken out; z is beyond the best"
+    assert proof.predicted == {"x": -2.0, "y": 22.0, "z": 0.0}
+
+
+def test_one_effect_more_that_halves_the_error_is_tried_where_the_likelihood_cannot_tell() -> None:
+    nats = {"b": 0.0, "bx": 10.0, "bxy": 9.0, "by": -4.0}
+    assert standing(proven(Tables(nats), "xy")) == "x"
+    assert standing(proven(Tables(nats, {"b": 1.0, "bx": 0.8, "bxy": 0.3, "by": 0.8}), "xy")) == "xy"
+
+
+def test_of_two_ways_the_one_that_predicts_better_is_taken() -> None:
+    """The first falls only because the second is there; alone it predicts more than both."""
+    tables = Tables({"b": 0.0, "bx": 60.0, "by": 50.0, "bxy": 52.0})
+    proof = proven(tables, "xy")
+    assert standing(proof) == "x"
+    tables = Tables({"b": 0.0, "bx": 52.5, "by": 54.0, "bxy": 55.0})
+    assert standing(proven(tables, "xy")) == "y"
+
+
+@pytest.mark.parametrize(("nats", "expected"), [(10.0, ""), (30.0, "x")])
+def test_an_effect_that_removes_next_to_nothing_must_be_sure(nats: float, expected: str) -> None:
+    assert standing(proven(Tables({"b": 0.0, "bx": nats}), "x", removed=0.01)) == expected
+    assert standing(proven(Tables({"b": 0.0, "bx": nats}), "x", removed=0.03)) == "x"
+
+
+def test_what_stands_alone_is_not_fitted_again() -> None:
+    tables = Tables({"b": 0.0, "bx": 10.0})
+    assert standing(proven(tables, "x")) == "x"
+    assert tables.fitted == []

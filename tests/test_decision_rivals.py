@@ -1,0 +1,198 @@
+"""Effects that were found are taken out, challenged and swapped; what each structure is worth is a table here."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import pytest
+
+from cosim.diagnosis import rivals
+from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.rivals import AcceptedEffect, Examined, examine, explains, grouped, margins
+
+RULES = replace(POLICY, set_margin=3.0, keep_evidence=8.0)
+
+
+@dataclass(frozen=True)
+class Named:
+    id: str
+    amplitude: float = 0.0
+
+    @property
+    def title(self) -> str:
+        return self.id
+
+
+@dataclass(frozen=True)
+class Structure:
+    effects: tuple[Named, ...]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    mount: Structure
+    count: int = 0
+
+    @property
+    def names(self) -> str:
+        return "".join(one.id for one in self.mount.effects)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    effect: Named
+    fit: Fitted
+    evidence: float
+    plain_gain: float = 0.5
+
+
+@dataclass(frozen=True)
+class Tried:
+    current: Fitted
+    tried: tuple[Candidate, ...] = ()
+
+
+@dataclass(frozen=True)
+class Found:
+    base: Fitted
+    chosen: Fitted
+    stages: tuple[Tried, ...] = ()
+
+
+class Tables:
+    """Comparison and problem in one; the card has the effect "b" of its own."""
+
+    policy = RULES
+    mount = Structure((Named("b"),))
+    prepared = None
+
+    @property
+    def problem(self) -> "Tables":
+        return self
+
+    def fit(self, mount: Structure, iterations: int) -> Fitted:
+        return Fitted(mount)
+
+
+def fitted(names: str, count: int = 0) -> Fitted:
+    return Fitted(Structure(tuple(Named(one) for one in names)), count)
+
+
+Play = Callable[..., Examined]
+
+
+@pytest.fixture
+def play(monkeypatch: pytest.MonkeyPatch) -> Play:
+    """Examine a structure of which evidence and rivals are given by name."""
+
+    def examined(
+        names: str,
+        evidence: dict[str, float],
+        tried: dict[str, list[Candidate]] | None = None,
+        misfits: dict[str, float] | None = None,
+        counts: dict[str, int] | None = None,
+    ) -> Examined:
+        def stage(comparison: Any, current: Fitted, told: Any) -> Tried:
+            return Tried(current, tuple((tried or {}).get("".join(sorted(current.names)), [])))
+
+        def weighed(comparison: Any, chosen: Fitted, before: Fitted, effect: Named) -> Candidate:
+            return Candidate(effect, replace(chosen, count=(counts or {}).get(effect.id, 0)), evidence[effect.id])
+
+        monkeypatch.setattr(rivals, "stage", stage)
+        monkeypatch.setattr(rivals, "weighed", weighed)
+        monkeypatch.setattr(rivals, "margin", lambda _, own, other: own.evidence - other.evidence)
+        monkeypatch.setattr(rivals, "is_admissible", lambda _, one: not one.effect.id.isupper())
+        monkeypatch.setattr(rivals, "misfits_of", lambda *_: misfits or {})
+        return examine(Tables(), Found(fitted("b"), fitted("b" + names)))  # type: ignore[arg-type]
+
+    return examined
+
+
+def rival(name: str, evidence: float, count: int = 0, beside: str = "b") -> Candidate:
+    return Candidate(Named(name), fitted(beside + name, count), evidence)
+
+
+def chosen(found: Examined) -> str:
+    return found.chosen.names  # type: ignore[attr-defined, no-any-return]
+
+
+def test_what_nothing_challenges_stays_with_its_margins(play: Play) -> None:
+    found = play("x", {"x": 50.0}, {"b": [rival("r", 20.0), rival("s", 40.0), rival("r", 30.0), rival("x", 60.0)]})
+    (one,) = found.effects
+    assert chosen(found) == "bx"
+    assert [r.effect.id for r in one.rivals] == ["s", "r"], "the best of each kind, the closest first; not itself"
+    assert one.margins == {"s": 10.0, "r": 20.0}
+    assert one.margin(one.rivals[1]) == 20.0
+    assert one.without.mount.effects == (Named("b"),)  # type: ignore[comparison-overlap]
+    assert found.last.current is found.chosen
+
+
+def test_an_effect_without_evidence_beside_the_others_goes_and_the_last_one_stays(play: Play) -> None:
+    assert chosen(play("xy", {"x": 50.0, "y": 8.0})) == "bxy"
+    assert chosen(play("xy", {"x": 50.0, "y": 7.9})) == "bx"
+    assert chosen(play("x", {"x": 1.0})) == "bx"
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "counts", "expected"),
+    [
+        (20.0, 20.5, (2, 2), "br"),
+        (20.0, 20.0, (2, 2), "bx"),
+        (20.0, 17.5, (2, 1), "br"),
+        (20.0, 17.0, (2, 1), "bx"),
+        (20.0, 23.0, (1, 2), "bx"),
+        (20.0, 23.5, (1, 2), "br"),
+    ],
+)
+def test_a_rival_takes_the_place_where_it_is_better_or_near_and_simpler(
+    own: float, other: float, counts: tuple[int, int], expected: str, play: Play
+) -> None:
+    tried = {"b": [rival("r", other, counts[1]), rival("x", own, counts[0])]}
+    found = play("x", {"x": own, "r": other}, tried, counts={"x": counts[0], "r": counts[1]})
+    assert chosen(found) == expected
+
+
+def test_a_rival_that_cannot_be_takes_no_place(play: Play) -> None:
+    assert chosen(play("x", {"x": 20.0}, {"b": [rival("R", 90.0)]})) == "bx"
+
+
+def test_where_the_set_point_speaks_of_both_it_decides(play: Play) -> None:
+    tried = {"b": [rival("r", 10.0)]}
+    assert chosen(play("x", {"x": 20.0, "r": 99.0}, tried, {"x": 1000.0, "r": 1.0})) == "br"
+    assert chosen(play("x", {"x": 20.0}, {"b": [rival("r", 90.0)]}, {"x": 1.0, "r": 2.0})) == "bx", "not by evidence"
+
+
+def test_swaps_that_go_in_a_circle_end(play: Play) -> None:
+    tried = {"b": [rival("r", 30.0), rival("x", 30.0)]}
+    found = play("x", {"x": 20.0, "r": 20.0}, tried)
+    assert chosen(found) in ("bx", "br")
+    assert len(found.effects) == 1
+
+
+def accepted(**more: Any) -> AcceptedEffect:
+    told = {"effects": (Named("x"),), "own": Candidate(Named("x"), fitted("bx"), 50.0, 0.4), "without": fitted("b")}
+    told |= {
+        "rivals": (rival("r", 20.0), replace(rival("s", 10.0), plain_gain=-0.2)),
+        "margins": {"r": 30.0, "s": 40.0},
+    }
+    return AcceptedEffect(**(told | more))  # type: ignore[arg-type]
+
+
+def test_margins_are_those_of_the_set_point_where_it_tells_the_two_apart() -> None:
+    assert margins(accepted()) == {"r": 30.0, "s": 40.0}
+    assert margins(accepted(misfits={"x": 4.0, "r": 12.0})) == {"r": 4.0, "s": 40.0}, "half of chi-squared is nats"
+
+
+def test_what_raises_the_error_explains_nothing() -> None:
+    assert explains(accepted()) == {"x": 0.4, "r": 0.5, "s": 0.0}
+
+
+def test_of_a_ripple_the_strongest_wave_is_shown() -> None:
+    waves = tuple(Named("x", amplitude) for amplitude in (0.1, 0.7, 0.3))
+    assert accepted(effects=waves).effect == waves[1]  # type: ignore[comparison-overlap]
+
+
+def test_effects_of_one_kind_are_one_group_and_those_of_the_card_in_none() -> None:
+    one = Fitted(Structure((Named("b"), Named("x"), Named("y"), Named("x", 2.0))))
+    groups = grouped(Tables(), one)  # type: ignore[arg-type]
+    assert [[effect.id for effect in group] for group in groups] == [["x", "x"], ["y"]]

@@ -1,0 +1,127 @@
+"""What a mechanic reads of an effect: whole sentences, by hand from the numbers, for axes that turn and that slide."""
+
+from math import log
+
+import pytest
+from effect_examples import EXAMPLES
+
+from pyfmi_models.effects import FORMS, Effect
+
+BY_NAME = {form.__name__: form for form in FORMS}
+TURNING = {
+    "ActuatorLag": "The drive builds up its torque slowly, with a time constant of 4 ms.",
+    "AltitudeInertia": "The azimuth carries 3 kg·m² more with the tube level than at the zenith.",
+    "AzimuthCentrifugal": "Turning in azimuth swings the tube down; it weighs 3 kg·m² against it.",
+    "Backlash": "There is play of 0.01 rad in the drive.",
+    "CableWrap": "A cable or spring pulls towards 0.2 rad with 3 N·m per rad.",
+    "ClockSkew": "The clock of the encoder is 4 ms ahead of the torque and drifts by 100 ppm. Nothing mechanical.",
+    "Cogging": "The motor tugs 24 times per turn, 0.5 N·m each way.",
+    "Compliance": "36 % of the inertia hangs on a spring that rings at 25 Hz.",
+    "LoadSideCompliance": "The motor turns the axis through a spring: both ring against each other at 60 Hz.",
+    "ConcaveViscous": "Above 0.3 rad/s viscous friction falls: the grease thins.",
+    "DeadBand": "The drive gives next to nothing for commands below 0.5 N·m, and less by that above.",
+    "Delay": "The machine answers 4 ms later than the simulation. Nothing mechanical.",
+    "DwellBreakaway": "The longer the axis rests the harder it starts: "
+    f"{0.3 * log(10):.2g} N·m more for ten times the rest.",
+    "EncoderEccentricity": "The encoder errs by 0.001 rad either way, 8 times per turn.",
+    "GravityUnbalance": "The axis is out of balance by 1.5 N·m.",
+    "InertiaVariation": "The inertia rises and falls by 30 %, 2 times per turn.",
+    "KnownLoad": "The known load acts with 1 N·m of drive torque for each N·m.",
+    "LearnedAfterReversal": "After a reversal friction is +11 % off for a while; learned from data.",
+    "LearnedDrive": "The drive gives up to 0.25 N·m less or more than its command; a table learned from data.",
+    "LearnedHysteresis": "Something goes round a loop of 0.5 N·m either way; learned from data.",
+    "LoadDependentFriction": "Friction rises by 0.2 N·m for each N·m of load on the axis.",
+    "LoadScaledFriction": "Friction rises by 0.1 N·m for each N·m of load on the axis.",
+    "LocalFriction": "Around 1 rad friction is +30 % off, over about 0.2 rad.",
+    "PeriodicDisturbance": "Something shakes the axis 3 times a second with 0.6 N·m.",
+    "PeriodicFriction": "Friction rises and falls by 20 %, 3 times per turn.",
+    "Presliding": "Before it slides the axis bends like a spring of 2e+04 N·m per rad.",
+    "QuadraticDrag": "Drag grows with the square of the speed, 2 N·m at 1 rad/s.",
+    "StribeckEffect": "Below about 0.02 rad/s friction changes with speed, to 4 N·m near standstill.",
+    "ThermalViscosity": "Viscous friction falls by 4 % per degree and sliding friction falls by 2 % per degree.",
+    "TorqueOffset": "A constant 0.7 N·m pushes the axis backward, moving or not.",
+    "TorqueSaturation": "The drive saturates at 5 N·m: 40 % of what is asked for beyond it arrives.",
+}
+"""By the examples of tests/effect_examples.py; 36 % is 1 - (20 / 25)^2, the share that rings."""
+SLIDING = (
+    ("N·m", "N"),
+    ("per rad", "per m"),
+    (" rad ", " m "),
+    ("rad.", "m."),
+    ("rad/s", "m/s"),
+    ("per turn", "per metre"),
+)
+
+
+@pytest.mark.parametrize("effect", EXAMPLES, ids=lambda one: type(one).__name__)
+def test_a_sentence_says_the_numbers_of_an_axis_that_turns(effect: Effect) -> None:
+    if type(effect).__name__ in TURNING:
+        assert effect.statement() == TURNING[type(effect).__name__]
+
+
+@pytest.mark.parametrize("effect", EXAMPLES, ids=lambda one: type(one).__name__)
+def test_the_sentence_of_an_axis_that_slides_differs_in_its_units_alone(effect: Effect) -> None:
+    if type(effect).__name__ in TURNING:
+        expected = TURNING[type(effect).__name__]
+        for one, other in SLIDING:
+            expected = expected.replace(one, other)
+        for one, other in (("of the inertia", "of the moving mass"), ("The inertia rises", "The moving mass rises")):
+            expected = expected.replace(one, other)
+        assert effect.statement("N") == expected
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers", "expected"),
+    [
+        ("ClockSkew", {"offset_ms": -4.0}, "The clock of the encoder is 4 ms behind the torque. Nothing mechanical."),
+        ("ClockSkew", {"drift_ppm": -50.0}, "The clock of the encoder drifts by -50 ppm. Nothing mechanical."),
+        ("ClockSkew", {}, "The clock of the encoder is right. Nothing mechanical."),
+        ("TorqueOffset", {"torque": -0.7}, "A constant 0.7 N·m pushes the axis forward, moving or not."),
+        ("TorqueSaturation", {"knee_torque": 5.0}, "The drive saturates at 5 N·m: no more arrives."),
+        (
+            "ThermalViscosity",
+            {"viscous_per_degC": 0.04},
+            "Viscous friction grows by 4 % per degree.",
+        ),
+        (
+            "ConcaveViscous",
+            {"thinning_speed": 0.3, "exponent": 0.4},
+            "Above 0.3 rad/s viscous friction rises less than the speed: the grease thins.",
+        ),
+        (
+            "FrictionAsymmetry",
+            {"level_asymmetry": 0.1},
+            "Sliding friction is 20 % higher moving forward than backward.",
+        ),
+        (
+            "FrictionAsymmetry",
+            {"level_asymmetry": -0.1, "viscous_asymmetry": 0.009},
+            "Sliding friction is 20 % higher moving backward than forward.",
+        ),
+        (
+            "FrictionAsymmetry",
+            {"level_asymmetry": 0.1, "viscous_asymmetry": -0.2},
+            "Viscous friction is 40 % higher moving backward than forward, "
+            "sliding friction is 20 % higher moving forward than backward.",
+        ),
+        (
+            "FrictionWander",
+            {"std": 0.25, "correlation_time": 0.3, "jump_std": 0.1, "jump_period": 2.5},
+            "Friction wanders by 25 % (RMS) within 0.3 s, and jumps by 10 % every 2.5 s: "
+            "the same motion twice meets another friction.",
+        ),
+    ],
+)
+def test_a_sentence_says_signs_and_leaves_out_what_is_not_there(
+    name: str, numbers: dict[str, float], expected: str
+) -> None:
+    assert BY_NAME[name](**numbers).statement() == expected
+
+
+def test_what_was_learned_says_over_what_and_how_large_it_is() -> None:
+    """Half the range between the greatest and the least of a table is what it does either way."""
+    said = {type(one).__name__: one.statement() for one in EXAMPLES}
+    assert said["LearnedTorque"] == "Something that depends on position, 0.6 N·m; a table learned from data."
+    assert said["LearnedFriction"].startswith(
+        "Something that depends on position and temperature, 46 % of the friction;"
+    )
