@@ -3,6 +3,7 @@
     read        a file, data frame or dict of arrays  ->  Recording
     run         a scenario                            ->  RunResult, with its recording
     diagnose    recordings and a card                 ->  DiagnosisResult: what the card lacks, and a better card
+    investigate scenario, card, machine               ->  InvestigateResult: motions until one answer is left
     identify    recordings and a card                 ->  IdentifyResult: the card's numbers with standard errors
     export      a card                                ->  Exported: FMUs, SSP, Modelica
     show        any file of this project              ->  Shown: what it holds
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from cosim.api.diagnose import DiagnosisResult, diagnose
     from cosim.api.export import Exported, export
     from cosim.api.identify import IdentifyResult, identify
+    from cosim.api.investigate import InvestigateResult, investigate
     from cosim.api.recordings import read
     from cosim.api.run import run
     from cosim.api.show import Shown, show
@@ -34,6 +36,7 @@ _HOMES = {
     "cosim.api.diagnose": ("DiagnosisResult", "diagnose"),
     "cosim.api.export": ("Exported", "export"),
     "cosim.api.identify": ("IdentifyResult", "identify"),
+    "cosim.api.investigate": ("InvestigateResult", "investigate"),
     "cosim.api.recordings": ("read",),
     "cosim.api.run": ("run",),
     "cosim.master.result": ("RunResult",),
@@ -52,6 +55,7 @@ __all__ = [
     "Exported",
     "IdentifyResult",
     "InputError",
+    "InvestigateResult",
     "ModelError",
     "Recording",
     "RunResult",
@@ -61,6 +65,7 @@ __all__ = [
     "diagnose",
     "export",
     "identify",
+    "investigate",
     "read",
     "read_card",
     "run",

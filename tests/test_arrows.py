@@ -25,6 +25,7 @@ FLOORS = (
     {"cosim.master", "cosim.plots"},
     {"cosim.hardware", "cosim.observatory", "cosim.sweep", "cosim.models", "cosim.estimation"},
     {"cosim.diagnosis"},
+    {"cosim.investigation"},
     {"cosim.api", "cosim_studies"},
     {"cosim.serve"},
     {"cosim", "cosim.cli"},
@@ -33,7 +34,7 @@ FLOORS = (
 """The floors of the house, from the ground: what stands on one imports only from floors below."""
 FLOOR_OF = {folder: number for number, floor in enumerate(FLOORS) for folder in floor}
 HIGHEST = {"cosim", "cosim.api", "cosim.cli", "cosim.serve", "cosim_studies"}
-KNOW_PHYSICS = {"cosim.models", "cosim.estimation", "cosim.diagnosis"} | HIGHEST
+KNOW_PHYSICS = {"cosim.models", "cosim.estimation", "cosim.diagnosis", "cosim.investigation"} | HIGHEST
 NEED_HEAVY = KNOW_PHYSICS | {"cosim.plots"}
 """Folders that may import CasADi, the compiler or matplotlib: a run needs none of them."""
 STUDY_VERBS = {f"cosim.cli.{verb}" for verb in ("demo", "paper", "prove")}

@@ -25,13 +25,26 @@ from cosim.support.terminal import abandon_stdout, finish_stdout, keep_stdout, p
 from cosim.support.version import __version__
 from pyfmi_models.errors import ModelError
 
-SEVERAL = ("--columns", "--units", "--layout", "--variables")
+SEVERAL = ("--columns", "--units", "--layout", "--variables", "--limits")
 """Options that may be followed by several name=value pairs."""
 INTERRUPTED, TERMINATED = 130, 143
 """Exit codes."""
 LONGEST = 300
 """Characters of a name, or of a reason of the system, in a message."""
-VERBS = ("demo", "export", "run", "identify", "diagnose", "prove", "paper", "sweep", "hardware", "show", "serve")
+VERBS = (
+    "demo",
+    "export",
+    "run",
+    "identify",
+    "diagnose",
+    "investigate",
+    "prove",
+    "paper",
+    "sweep",
+    "hardware",
+    "show",
+    "serve",
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -1,0 +1,112 @@
+"""`cosim.investigate`: a scenario, a card and a machine to one answer, by motions that decide what is open."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from cosim.api.recordings import Source, read_all
+from cosim.data.recording import Recording
+from cosim.diagnosis.deliver import deliver_quickly
+from cosim.diagnosis.result import Diagnosis
+from cosim.investigation.log import DIAGNOSIS, PAGE, STORY, Log
+from cosim.investigation.loop import Investigation, Settings
+from cosim.investigation.page import write_page
+from cosim.investigation.prepare import given
+from cosim.investigation.story import Answered, Moved, Story
+from cosim.support.files import replacing
+from cosim.support.html import text as html_text
+from cosim.support.plain import JsonObject
+from pyfmi_models.card import Card
+
+
+@dataclass(frozen=True)
+class InvestigateResult:
+    """What an investigation did, its last diagnosis, and the better card."""
+
+    story: Story
+    diagnosis: Diagnosis
+    card: Card
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """As `DiagnosisResult.missing`: () nothing is missing; or ids of effects, or "unknown"."""
+        return self.diagnosis.verdict
+
+    def as_json(self) -> JsonObject:
+        """Return the story as plain data, as story.json holds it."""
+        return self.story.as_json()
+
+    def __str__(self) -> str:
+        return str(self.story)
+
+    def _repr_html_(self) -> str:
+        return html_text(str(self))
+
+
+def investigate(
+    scenario: str,
+    card: str,
+    out: str | Path,
+    *,
+    machine: str = "",
+    budget: float = 300.0,
+    seconds: float = 15.0,
+    limits: Mapping[str, str] | None = None,
+    train: Source | Sequence[Source] = (),
+    heldout: Source | Sequence[Source] = (),
+    seed: int = 1,
+    force: bool = False,
+    on_progress: Callable[[str], None] = lambda text: None,
+    on_step: Callable[[Moved | Answered], None] = lambda step: None,
+    command: str = "cosim.investigate",
+) -> InvestigateResult:
+    """Ask the machine until one answer is left: record, diagnose, and run the motion that tells most of what is open.
+
+    Args:
+        scenario: plant, controller, set point and columns: its path, or the name of a shipped one.
+        card: the model as believed: its path, or the name of a shipped one.
+        out: folder for recordings, journal, story and the last diagnosis; one begun there is gone on with.
+        machine: a card or plant FMU that stands in for the machine, in the place of the scenario's plant.
+        budget: seconds of motion that may be spent, the first recordings and those of earlier calls included.
+        seconds: length of one motion [s]; each is run twice, to be fitted and for the proof.
+        limits: {"position": "LOW:HIGH", "speed": ..., "acceleration": ..., "torque": ..., "frequency": ...} in SI;
+            what is not given is what the scenario's own set point asks for.
+        train: recordings to go on from, with `heldout` in the place of the first two.
+        heldout: recordings for the proof, to go on from.
+        seed: of the phases of motions with many tones.
+        force: start over, and remove what an investigation left there.
+        on_progress: told in a few words what is being done.
+        on_step: told each recording and each answer.
+        command: what the files shall name as what made them.
+
+    Returns:
+        `InvestigateResult`.
+
+    Raises:
+        ScenarioError, CardError, InputError: before anything moves.
+        OutputError: the folder holds another investigation.
+        StepError: the machine failed; what was recorded before is kept.
+    """
+    settings = Settings(budget, seconds, seed)
+    first = (_read(one, kind) for one, kind in ((train, "train"), (heldout, "heldout")))
+    ready = given(scenario, card, machine, limits or {}, settings, *first)
+    with Log(Path(out), ready.identity(), force) as log:
+        work = Investigation(ready.machine, ready.card, ready.limits, log, settings, on_progress, on_step)
+        work.begin(ready.machine.own(), ready.train, ready.heldout)
+        return _written(work, work.go_on(), Path(out), command)
+
+
+def _read(source: Source | Sequence[Source], kind: str) -> list[Recording]:
+    return read_all([] if isinstance(source, tuple) and not source else source, kind, None, None)
+
+
+def _written(work: Investigation, story: Story, out: Path, command: str) -> InvestigateResult:
+    """Write the last diagnosis, the story and its page."""
+    assert work.outcome is not None
+    train, heldout = work.recordings["train"], work.recordings["heldout"]
+    found = deliver_quickly(work.outcome, train, heldout, work.card, out / DIAGNOSIS, command)
+    with replacing(out / STORY, force=True) as partial:
+        partial.write_text(json.dumps(story.as_json(), indent=2) + "\n", "utf-8")
+    write_page(out / PAGE, story, out, command)
+    return InvestigateResult(story, found, work.outcome.card)

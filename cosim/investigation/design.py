@@ -1,0 +1,226 @@
+"""Which motion tells most: the expected log-odds between structures, after a refit to all recordings together.
+
+Each motion of the programme is put through both structures of a duel. If ours is right, the recording would be its
+torque and noise; the other is then refitted, to first order and with all of its parameters free, to the old
+recordings and the new one. What it cannot follow, d, decides:
+
+    expected log-odds = sum d^2 / (2 sigma^2 tau)        [nats]
+
+with sigma the RMS of the residual that our structure leaves now and tau its correlation in rows. The other way round it
+is computed too, and the smaller of both counts. Parameters that the old recordings tell badly are what a refit uses to
+follow, so their uncertainty is in it. What is not between two structures (something without a name, an effect that no
+recording could show) is sought where nothing was visited yet.
+"""
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from cosim.diagnosis.candidates import contact_level
+from cosim.diagnosis.hypotheses import candidates
+from cosim.estimation.fit import Fit, free_parameters
+from cosim.estimation.inverse import Inverse
+from cosim.estimation.least_squares import projected
+from cosim.estimation.prepare import Array, Piece, Prepared, lowpass
+from cosim.estimation.problem import Problem
+from cosim.investigation.families import FAMILIES
+from cosim.investigation.limits import Limits
+from cosim.investigation.motions import FADE, Motion, Room
+from cosim.investigation.questions import Duel
+from pyfmi_models.effects.base import TonalEffect
+
+ENOUGH = 10.0
+"""Nats at which a question counts as settled: more for one is not worth less for another (odds of 20 000)."""
+LEAST = 2.0
+"""Nats below which a motion is not worth running: odds of 7, less than the margin of a set."""
+CELLS = 12
+"""Classes of position and of speed (by its logarithm, and direction) in which is counted what was visited."""
+SLOWEST = 1e-3
+"""Share of the speed limit below which an axis stands."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A motion that may be run, the nats that it promises for each duel, and the share of it that is new ground."""
+
+    motion: Motion
+    nats: tuple[float, ...]
+    ground: float
+
+    @property
+    def worth(self) -> float:
+        """Nats for all duels together, each counted up to what settles it."""
+        return sum(min(one, ENOUGH) for one in self.nats)
+
+
+SLOWER = (1.0, 0.5, 0.25)
+"""Shares of speed and acceleration at which a motion is tried until it leaves no limit. Unit: 1."""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """A motion that is not run, and which limit it would have left."""
+
+    motion: Motion
+    limit: str
+
+
+class Rated(NamedTuple):
+    """Motions that may be run, and those that may not."""
+
+    plans: tuple[Plan, ...]
+    refused: tuple[Refusal, ...]
+
+
+def plans(room: Room, problem: Problem, ours: Fit, duels: Sequence[Duel], limits: Limits, home: float) -> Rated:
+    """Rate a motion of every family that keeps to the limits, by set point and by the torque that the model says.
+
+    One that would leave them is tried again slower; one that still would is refused.
+    """
+    weighed = [_Weighed(problem, duel) for duel in duels]
+    seen, cutoff = visited(problem.prepared, limits), problem.prepared.cutoff
+    good, refused = list[Plan](), list[Refusal]()
+    for family in FAMILIES:
+        motion, piece, limit = allowed(family, room, ours, cutoff, limits, home)
+        if limit:
+            refused.append(Refusal(motion, limit))
+            continue
+        good.append(Plan(motion, tuple(one.nats(piece) for one in weighed), new_ground(piece, seen, limits)))
+    return Rated(tuple(good), tuple(refused))
+
+
+def pieces_of(room: Room, ours: Fit, problem: Problem, limits: Limits, home: float) -> list[Piece]:
+    """What motions of every family would visit, those that leave no limit."""
+    found = (allowed(family, room, ours, problem.prepared.cutoff, limits, home) for family in FAMILIES)
+    return [replace(piece, recording=k) for k, (_, piece, limit) in enumerate(found) if not limit]
+
+
+def allowed(
+    family: Callable[[Room], Motion], room: Room, ours: Fit, cutoff: float, limits: Limits, home: float
+) -> tuple[Motion, Piece, str]:
+    """The fastest motion of a family that leaves no limit, as a piece; or the slowest and the limit that it leaves."""
+    for share in SLOWER:
+        motion = family(room.slower(share))
+        piece, limit = piece_of(motion, home, cutoff, limits)
+        limit = limit or limits.torque_left(torque_of(ours, piece))
+        if not limit:
+            break
+    return motion, piece, limit
+
+
+def best(found: Sequence[Plan], has_duels: bool, done: Sequence[str] = ()) -> Plan | None:
+    """The plan that tells most; of motions without a duel the one of most new ground, each family once."""
+    if has_duels:
+        top = max(found, key=lambda one: (one.worth, one.ground), default=None)
+        return top if top and top.worth >= LEAST else None
+    fresh = [one for one in found if one.motion.family not in done and one.ground > 0]
+    return max(fresh, key=lambda one: one.ground, default=None)
+
+
+def shown_by_motion(names: Collection[str], ours: Fit, pieces: Sequence[Piece], noise: float) -> set[str]:
+    """Of some effects those that a diagnosis would look for in recordings of these motions, with noise.
+
+    What needs another load, or a quantity that nothing records, is not among them.
+    """
+    planned = Prepared(("planned",), tuple(pieces), pieces[0].cutoff, True)
+    residual = noise * np.random.default_rng(0).standard_normal(len(planned.recording_of))
+    level = np.full(len(residual), contact_level(ours.mount))
+    return {one.effect for one in candidates(ours.mount, planned, residual, level, names)} if names else set()
+
+
+def piece_of(motion: Motion, home: float, cutoff: float, limits: Limits) -> tuple[Piece, str]:
+    """A motion as a piece of a recording, at the rate of the analysis; and the limit that it leaves, "" if none."""
+    dt = 1 / (8 * cutoff)
+    t: Array = dt * np.arange(max(int(motion.seconds / dt), 64), dtype=float)
+    asked = motion.sampled(t)
+    left = limits.left_by(asked[0] + home, *asked[1:])
+    q, v, a = (lowpass(row, dt, cutoff) for row in asked)
+    inside = np.asarray((t > FADE / 2) & (t < t[-1] - FADE / 2))
+    return Piece(0, t, q + home, v, a, np.zeros_like(t), inside, dt, cutoff, 3), left
+
+
+def torque_of(fit: Fit, piece: Piece) -> Array:
+    """Torque that a fitted structure needs for a motion; what shakes the axis in any phase."""
+    mount, tones = fit.mount, [one for one in fit.mount.effects if isinstance(one, TonalEffect)]
+    still = replace(mount, effects=tuple(one for one in mount.effects if not isinstance(one, TonalEffect)))
+    torque = Inverse(still, ()).torque(piece, np.zeros(0))[0]
+    for hertz, size in (one.wave() for one in tones):
+        torque = torque + float(size) * np.sin(2 * np.pi * float(hertz) * piece.t)
+    return torque
+
+
+class _Weighed:
+    """A duel with what the old recordings say: both ways, what is refitted and what it leaves there."""
+
+    def __init__(self, problem: Problem, duel: Duel) -> None:
+        ways = ((duel.ours, duel.other), (duel.other, duel.ours))
+        self._ways = [_Way(problem, true, refitted) for true, refitted in ways]
+
+    def nats(self, piece: Piece) -> float:
+        """The smaller of both expectations."""
+        return min(way.nats(piece) for way in self._ways)
+
+
+class _Way:
+    def __init__(self, problem: Problem, true: Fit, refitted: Fit) -> None:
+        self._true, self._mount = true, refitted.mount
+        self._inverse = Inverse(refitted.mount, free_parameters(refitted.mount))
+        self._weight = problem.weight
+        self._gap, self._slopes = true.torque - refitted.torque, refitted.slopes
+        self._noise = _noise(true.residual[problem.weight > 0])
+        self._before = _energy(*self._old())
+
+    def nats(self, piece: Piece) -> float:
+        torque = torque_of(self._true, piece)
+        other, slopes = self._inverse.torque(replace(piece, tau=torque), self._inverse.present)
+        gap, old = (torque - other)[piece.kept], self._old()
+        joint = np.concatenate([old[0], gap]), np.concatenate([old[1], slopes[piece.kept]])
+        return max(_energy(*joint) - self._before, 0.0) / (2 * self._noise)
+
+    def _old(self) -> tuple[Array, Array]:
+        return self._weight * self._gap, self._weight[:, None] * self._slopes
+
+
+def _energy(target: Array, columns: Array) -> float:
+    left = projected(target, columns)
+    return float(left @ left)
+
+
+def _noise(residual: Array) -> float:
+    """Variance of the residual times its correlation in rows: what a sum of squares over rows is divided by."""
+    x = residual - residual.mean()
+    power = float(x @ x) / max(len(x), 1)
+    correlation, shift = 1.0, 1
+    while shift < len(x) // 4:
+        now = float(x[shift:] @ x[:-shift]) / len(x) / max(power, 1e-300)
+        if now <= 0.05:
+            break
+        correlation, shift = correlation + 2 * now, shift + 1
+    return max(power * correlation, 1e-300)
+
+
+Cells = frozenset[tuple[int, int]]
+
+
+def visited(prepared: Prepared, limits: Limits) -> Cells:
+    """Classes of position and speed that recordings visited."""
+    return frozenset().union(*(_cells(piece, limits) for piece in prepared.pieces))
+
+
+def new_ground(piece: Piece, seen: Cells, limits: Limits) -> float:
+    """Share of the classes that a motion visits and no recording did, relative to all of the motion's."""
+    own = _cells(piece, limits)
+    return len(own - seen) / max(len(own), 1)
+
+
+def _cells(piece: Piece, limits: Limits) -> Cells:
+    place = np.floor(CELLS * (piece.q - limits.low) / (limits.high - limits.low)).astype(int)
+    speed = np.abs(piece.v) / (SLOWEST * limits.speed)
+    pace = np.floor(np.log2(np.maximum(speed, 1.0))).astype(int) * np.sign(piece.v).astype(int)
+    both = np.column_stack([place, pace])[piece.inside]
+    return frozenset(map(tuple, np.unique(both, axis=0).tolist()))
+
+
+__all__ = ["Plan", "Rated", "Refusal", "allowed", "best", "new_ground", "piece_of", "plans", "torque_of", "visited"]

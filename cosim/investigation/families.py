@@ -1,0 +1,149 @@
+"""The families of motion that are tried, each inside the room that an axis has: slow, with stops, with reversals, fast.
+
+Each is a function of the room; what it cannot do there in the time it leaves out.
+"""
+
+from collections.abc import Callable, Iterator
+from math import ceil, pi
+
+import numpy as np
+
+from cosim.investigation.motions import FADE, JERK, Motion, Move, Part, Rest, Room, Tones
+
+SPEEDS = (0.03, 0.1, 0.3, 1.0)
+"""Shares of the speed limit of a ladder of speeds: three a decade, down to a creep. Unit: 1."""
+RESTS = (0.3, 1.0, 3.0)
+"""Rests before the same move [s]."""
+TONES = 10
+"""Tones of a multisine: a decade has four or more of them."""
+STEPS, WAY = 8, 5.0
+"""Reversals of a ladder, and its way in units of the first half stroke: 1 + 3/2 + 3/4 + ..., and to its middle."""
+
+
+def _filled(room: Room, one_round: list[Part]) -> tuple[Part, ...]:
+    """A round again and again, as often as it fits, between two rests; cut where not even one fits."""
+    parts: list[Part] = [Rest(FADE)]
+    here, left = 0.0, room.seconds - 2 * FADE
+    for part in one_round * ceil(room.seconds / 0.1):
+        lasts = part.seconds(here)
+        if lasts > left or lasts <= 0:
+            break
+        parts.append(part)
+        here, left = part.end(here), left - lasts
+    return (*parts, Rest(FADE + left))
+
+
+def _stroke(room: Room, share: float) -> list[Part]:
+    """Both ways over a part of the room, at one speed."""
+    speed = share * room.speed
+    return [Move(to, speed, room.acceleration) for to in _ends(room, speed)]
+
+
+def _ends(room: Room, speed: float, takes: float | None = None) -> tuple[float, float]:
+    """Ends about the middle that are reached in time at a speed; the whole room where there is time for it."""
+    takes = takes if takes is not None else (room.seconds - 2 * FADE) / 2.5
+    half = min(room.reach, max(0.5 * speed * takes, 0.0)) / 2
+    sign = 1.0 if room.first >= room.second else -1.0
+    around = 0.0 if half < room.reach / 2 and _holds(room, half) else room.middle
+    return around + sign * half, around - sign * half
+
+
+def _holds(room: Room, half: float) -> bool:
+    return max(room.first, room.second) >= half and min(room.first, room.second) <= -half
+
+
+def slow_sweep(room: Room) -> Motion:
+    """Over the whole stroke as slowly as the time allows."""
+    lasts = room.seconds - 2 * FADE - 4 * (1 / JERK)
+    way = abs(room.first) + 2 * room.reach
+    speed = min(room.speed, 1.1 * way / lasts)
+    moves: list[Part] = [Move(to, speed, room.acceleration) for to in (room.first, room.second, room.first)]
+    return Motion("slow sweep", "a slow sweep over the whole stroke, both ways", _filled(room, moves))
+
+
+def fast_sweeps(room: Room) -> Motion:
+    """End to end at full speed, which also warms it up."""
+    moves: list[Part] = [Move(to, room.speed, room.acceleration) for to in (room.first, room.second)]
+    return Motion("warm-up", "sweeps at full speed, the same early and late", _filled(room, moves))
+
+
+def creep(room: Room) -> Motion:
+    """Slow reversals: a few percent of full speed."""
+    return Motion("creep", "creeping strokes, both ways", _filled(room, _stroke(room, SPEEDS[0])))
+
+
+def speed_ladder(room: Room) -> Motion:
+    """The same place at several speeds, both ways."""
+    parts: list[Part] = []
+    for share in SPEEDS:
+        speed, takes = share * room.speed, (room.seconds - 2 * FADE) / len(SPEEDS) / 2
+        parts += [Move(to, speed, room.acceleration) for to in _ends(room, speed, takes)]
+    return Motion("speed ladder", "strokes at 3, 10, 30 and 100 % of full speed, both ways", _filled(room, parts))
+
+
+def stop_and_go(room: Room) -> Motion:
+    """The same move after rests of different lengths."""
+    parts: list[Part] = []
+    way, here = 0.25 * room.reach, 0.0
+    step = way if room.first >= room.second else -way
+    for number, rest in enumerate(RESTS * 2):
+        here = step if number % 2 == 0 and _holds(room, way) else 0.0 if number % 2 else room.middle + step
+        parts += [Move(here, 0.5 * room.speed, room.acceleration), Rest(rest)]
+    return Motion("stop-and-go", "the same move after rests of 0.3, 1 and 3 s", _filled(room, parts))
+
+
+def reversal_ladder(room: Room) -> Motion:
+    """Reversals that get smaller and smaller."""
+    speed, left = 0.2 * room.speed, room.seconds - 2 * FADE
+    half = min(room.reach / 2, speed * max(left - STEPS / JERK, 0.0) / WAY)
+    around = 0.0 if _holds(room, half) else room.middle
+    sign = 1.0 if room.first >= room.second else -1.0
+    sizes = [sign * half * 0.5**k * (-1) ** k for k in range(STEPS)]
+    parts: list[Part] = [Move(around, room.speed, room.acceleration)] if around else []
+    parts += [Move(around + size, speed, room.acceleration) for size in sizes]
+    return Motion("reversal ladder", "slow reversals, each half as large as the one before", _filled(room, parts))
+
+
+def tone(room: Room) -> Motion:
+    """One sine that reaches full speed and full acceleration."""
+    hertz = min(room.acceleration / (2 * pi * room.speed), room.frequency)
+    return Motion("tone", f"a sine of {hertz:.2g} Hz", _tones(room, [hertz], [0.0]))
+
+
+def fast_tone(room: Room) -> Motion:
+    """One sine as fast as the loop follows."""
+    return Motion("fast tone", f"a sine of {room.frequency:.2g} Hz", _tones(room, [room.frequency], [0.0]))
+
+
+def multisine(room: Room) -> Motion:
+    """Many tones at once, from a stroke in the time there is to what the loop follows; phases from a seed."""
+    hertz = np.geomspace(2 / room.seconds, room.frequency, TONES).tolist()
+    phases = np.random.default_rng(room.seed).uniform(0, 2 * pi, TONES).tolist()
+    return Motion("multisine", "many tones at once", _tones(room, hertz, phases))
+
+
+def _tones(room: Room, hertz: list[float], phases: list[float]) -> tuple[Part, ...]:
+    """Tones with as much speed each, up to where the acceleration ends it, scaled so that all limits hold."""
+    sizes = [min(1.0, room.acceleration / (room.speed * 2 * pi * f)) / (2 * pi * f) for f in hertz]
+    half = min(abs(room.first), abs(room.second))
+    move: list[Part] = []
+    to_middle = Move(room.middle, 0.5 * room.speed, room.acceleration)
+    if half < room.reach / 4 and to_middle.seconds(0.0) < room.seconds / 3:
+        move, half = [to_middle], room.reach / 2
+    lasts = room.seconds - 2 * FADE - sum(one.seconds(0.0) for one in move)
+    whole = Tones(lasts, tuple(hertz), tuple(sizes), tuple(phases))
+    q, v, a = whole.sampled(np.arange(0.0, lasts, min(0.02 / max(hertz), 0.02 * FADE)), 0.0)
+    tops = zip((q, v, a), (half, room.speed, room.acceleration), strict=True)
+    scale = min(limit / max(float(np.abs(one).max()), 1e-300) for one, limit in tops)
+    return (Rest(FADE), *move, Tones(lasts, whole.hertz, tuple(scale * s for s in sizes), whole.phases), Rest(FADE))
+
+
+FAMILIES: tuple[Callable[[Room], Motion], ...] = (
+    *(slow_sweep, creep, speed_ladder, stop_and_go, reversal_ladder, fast_sweeps, tone, fast_tone, multisine),
+)
+
+
+def motions(room: Room) -> Iterator[Motion]:
+    """One motion of each family that has room; the slowest first."""
+    for family in FAMILIES:
+        yield family(room)

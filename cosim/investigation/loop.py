@@ -1,0 +1,217 @@
+"""The rounds: diagnose all recordings together, and while something is open, run the motion that tells most.
+
+Each motion is run twice, once to be fitted and once, from the other end, for the proof: an effect that no held-out
+recording shows cannot be proven. Steps that the journal holds are not done again.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from time import perf_counter
+from typing import Literal
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.diagnose import Outcome
+from cosim.diagnosis.diagnose import diagnose as find
+from cosim.estimation.fit import Fit
+from cosim.estimation.problem import Problem
+from cosim.investigation.design import Plan, Rated, allowed, best, pieces_of, plans, shown_by_motion
+from cosim.investigation.families import FAMILIES, multisine
+from cosim.investigation.limits import Limits
+from cosim.investigation.log import Log
+from cosim.investigation.machine import Machine
+from cosim.investigation.motions import Motion, Room, room_of
+from cosim.investigation.questions import Duel, Question, duels, problem_of, questions
+from cosim.investigation.story import Answered, End, Moved, Story
+from cosim.support.errors import InputError
+from pyfmi_models.card import Card
+from pyfmi_models.effects import CATALOGUE
+
+SHORTEST = 8.0
+"""Seconds that a motion must last, or it is not worth starting: the diagnosis leaves 3.5 s of a recording out."""
+GROUND = ("unknown", "not testable", "unconfirmed")
+"""Kinds of questions that are not between two structures: they are sought on new ground."""
+ROLES: tuple[Literal["train", "heldout"], ...] = ("train", "heldout")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Seconds of motion that may be spent, and of one motion; the seed of its phases; designed or at random."""
+
+    budget: float = 300.0
+    seconds: float = 15.0
+    seed: int = 1
+    design: Literal["log-odds", "random"] = "log-odds"
+
+
+@dataclass
+class Investigation:
+    """What is moved, what is believed, what may not be left, and where it is kept."""
+
+    machine: Machine
+    card: Card
+    limits: Limits
+    log: Log
+    settings: Settings = field(default_factory=Settings)
+    on_progress: Callable[[str], None] = lambda _: None
+    on_step: Callable[[Moved | Answered], None] = lambda _: None
+    recordings: dict[str, list[Recording]] = field(default_factory=lambda: {"train": [], "heldout": []})
+    steps: list[Moved | Answered] = field(default_factory=list)
+    refused: dict[str, str] = field(default_factory=dict)
+    unmoved: tuple[Question, ...] = ()
+    """Questions that no motion decides."""
+    outcome: Outcome | None = None
+    """The last diagnosis."""
+
+    def begin(self, own: Motion, train: Sequence[Recording] = (), heldout: Sequence[Recording] = ()) -> None:
+        """Take recordings that are there; else run the machine's own motion to fit, and many tones for the proof."""
+        if train:
+            self.recordings = {"train": [*train], "heldout": [*heldout]}
+            return
+        lasts = max(min(self.settings.seconds, own.seconds), SHORTEST)
+        for role, motion in zip(ROLES, (own, multisine(self._room(lasts, False))), strict=True):
+            number = len(self.steps)
+            known = self.log.moved(number)
+            left = self.add(known, self.log.read(known), False) if known else self.run(motion, number, role)
+            if left:
+                raise InputError(f"The first recording has left a limit: {left}; give other --limits.", culprit=left)
+
+    def go_on(self) -> Story:
+        """Round after round, until one answer is left or nothing more can be done."""
+        while True:
+            ended, open_ = self._round()
+            if ended:
+                break
+        refused = tuple(f"{family}: {limit}" for family, limit in self.refused.items())
+        return Story(
+            tuple(self.steps), ended, tuple(_otherwise((*open_, *self.unmoved))), refused, self.limits.as_json()
+        )
+
+    def add(self, step: Moved, recording: Recording, is_new: bool) -> str:
+        """Take in a recording; returns the limit that it left."""
+        if is_new:
+            step = replace(step, left=self.limits.left_in(recording))
+            self.log.append(step)
+        self.recordings[step.role].append(recording)
+        self._told(step)
+        return step.left
+
+    def _round(self) -> tuple[End | None, Sequence[Question]]:
+        """Diagnose, design, move; the end, if this was it, and the questions that are open then."""
+        if any(isinstance(one, Moved) and one.left for one in self.steps):
+            return "limit left", () if self.outcome else self._diagnosed(len(self.steps))
+        number = len(self.steps)
+        known = self.log.answered(number)
+        if known and all(self.log.moved(number + k) for k in (1, 2)):
+            self._told(known)
+            return self._moved([None, None]), ()
+        open_ = self._diagnosed(number)
+        if not open_:
+            return "answered", ()
+        lasts = min(self.settings.seconds, (self.settings.budget - self._spent()) / 2)
+        if lasts < SHORTEST:
+            return "budget spent", open_
+        chosen = self._designed(open_, lasts)
+        return (self._moved(chosen), ()) if chosen else ("no motion tells", open_)
+
+    def _diagnosed(self, number: int) -> Sequence[Question]:
+        """Diagnose all recordings together; what is left open."""
+        begun = perf_counter()
+        self.outcome = find(self.recordings["train"], self.recordings["heldout"], self.card, self.on_progress)
+        asked = self._movable(questions(self.outcome.diagnosis))
+        known = self.log.answered(number)
+        step = known or Answered.of(number, self.outcome.diagnosis, asked, perf_counter() - begun)
+        if not known:
+            self.log.append(step)
+        self._told(step)
+        return asked
+
+    def _movable(self, asked: Sequence[Question]) -> Sequence[Question]:
+        """Questions that some motion may decide; the others are kept to be told at the end."""
+        assert self.outcome is not None
+        before = next((one.verdict for one in reversed(self.steps) if isinstance(one, Answered)), None)
+        if before == self.outcome.diagnosis.verdict:
+            asked = [one for one in asked if one.kind != "unconfirmed"]
+        names = {name for one in asked if one.kind == "not testable" for name in one.effects}
+        if not names:
+            self.unmoved = ()
+            return asked
+        problem = problem_of(self.recordings["train"], self.card)
+        ours = problem.fit(self.outcome.card.plant(), 1)
+        pieces = pieces_of(self._room(self.settings.seconds, False), ours, problem, self.limits, self.machine.home)
+        shown = shown_by_motion(names, ours, pieces, ours.rms) if pieces else set()
+        self.unmoved = tuple(one for one in asked if one.kind == "not testable" and not set(one.effects) <= shown)
+        return [one for one in asked if one not in self.unmoved]
+
+    def _designed(self, asked: Sequence[Question], lasts: float) -> list[Plan | None] | None:
+        """The motion that tells most and the same from the other end; None where none tells anything."""
+        assert self.outcome is not None
+        self.on_progress("designing the next motion")
+        rooms = [self._room(lasts, turned) for turned in (False, True)]
+        problem = problem_of(self.recordings["train"], self.card)
+        if self.settings.design == "random":
+            return [Plan(multisine(room), (), 0.0) for room in rooms]
+        pairs = duels(self.outcome, problem, asked)
+        ours = pairs[0].ours if pairs else problem.fit(self.outcome.card.plant(), 1)
+        rated = plans(rooms[0], problem, ours, pairs, self.limits, self.machine.home)
+        self.refused |= {one.motion.family: one.limit for one in rated.refused}
+        plan = self._best(rated, pairs, asked)
+        return [plan, self._turned(plan, rooms[1], problem, ours)] if plan else None
+
+    def _best(self, rated: Rated, pairs: Sequence[Duel], asked: Sequence[Question]) -> Plan | None:
+        done = [one.family for one in self.steps if isinstance(one, Moved)]
+        plan = best(rated.plans, True) if pairs else None
+        more = any(one.kind in GROUND for one in asked)
+        return plan or (best(rated.plans, False, done) if more or not pairs else None)
+
+    def _turned(self, plan: Plan, room: Room, problem: Problem, ours: Fit) -> Plan:
+        """The same family from the other end; the same motion where that would leave a limit."""
+        family = next(one for one in FAMILIES if one(room).family == plan.motion.family)
+        cutoff = problem.prepared.cutoff
+        motion, _, limit = allowed(family, room, ours, cutoff, self.limits, self.machine.home)
+        return plan if limit else replace(plan, motion=motion)
+
+    def _moved(self, chosen: Sequence[Plan | None]) -> End | None:
+        for role, plan in zip(ROLES, chosen, strict=True):
+            number = len(self.steps)
+            known = self.log.moved(number)
+            if known:
+                left = self.add(known, self.log.read(known), False)
+            else:
+                assert plan is not None
+                left = self.run(plan.motion, number, role, plan.worth)
+            if left:
+                break
+        return None
+
+    def run(self, motion: Motion, number: int, role: Literal["train", "heldout"], nats: float = 0.0) -> str:
+        """Run a motion and keep its recording; the limit that it left."""
+        path = self.log.path(number, motion.family)
+        self.on_progress(f"moving: {motion.title}")
+        recording = self.machine.record(motion, number, path)
+        file = path.relative_to(self.log.folder).as_posix()
+        step = Moved(number, file, role, motion.family, motion.title, motion.seconds, nats)
+        return self.add(step, recording, True)
+
+    def _room(self, lasts: float, turned: bool) -> Room:
+        seed = self.settings.seed + 1000 * len(self.steps) + turned
+        return room_of(self.limits, self.machine.home, lasts, seed, turned)
+
+    def _spent(self) -> float:
+        return sum(one.seconds for one in self.steps if isinstance(one, Moved))
+
+    def _told(self, step: Moved | Answered) -> None:
+        self.steps.append(step)
+        self.on_step(step)
+
+
+def _otherwise(asked: Sequence[Question]) -> list[str]:
+    """What else than a motion would tell what is open, a sentence each."""
+    found = [f"{one.statement}: {one.otherwise}." for one in asked if one.otherwise]
+    for one in asked:
+        told = {CATALOGUE[name][0].told_apart_by for name in one.effects if one.kind == "set" and name in CATALOGUE}
+        ways = {CATALOGUE[name][0].to_record for name in one.effects if one.kind == "set" and name in CATALOGUE}
+        found += [f"{one.statement}: {' / '.join(sorted(ways))}; {' / '.join(sorted(told))}."] if told else []
+    return found
+
+
+__all__ = ["Investigation", "Settings"]

@@ -1,0 +1,101 @@
+"""The story of an investigation as one page: self-contained HTML, without script and without network.
+
+What was open, what was moved to decide it, what each answer was; above it all motions one after the other.
+"""
+
+from collections.abc import Iterator
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from cosim.data.recording import Recording
+from cosim.investigation.story import SENTENCES, Answered, Moved, Story
+from cosim.plots.chart import Chart
+from cosim.plots.style import AFTER, BEFORE, thin
+from cosim.support.files import replacing
+from cosim.support.version import __version__
+
+SIZE = (720, 260)
+"""px."""
+POINTS = 400
+"""Points of a line for each recording, at most twice as many."""
+ROLES = {"train": "to fit", "heldout": "for the proof"}
+
+
+def write_page(path: Path, story: Story, folder: Path, command: str, linear: bool = False) -> Path:
+    """Write the page of a story whose recordings lie in `folder`, in the place of an older one; returns its path."""
+    style = (files("cosim") / "plots" / "run_page.css").read_text("utf-8") + "svg { max-width: 760px; }"
+    head = '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
+    head += f"<style>{style}</style><title>Investigation: {escape(story.last.words)}</title>"
+    body = "".join([*_head(story, command), _picture(story, folder, linear), _steps(story), *_rest(story)])
+    with replacing(path, force=True) as partial:
+        partial.write_text(f'<!doctype html><html lang="en">{head}<body><main>{body}</main></body></html>\n', "utf-8")
+    return path
+
+
+def _head(story: Story, command: str) -> Iterator[str]:
+    first, last = story.first, story.last
+    facts = {
+        "s of motion": f"{story.seconds:.0f}",
+        "s after the first answer": f"{story.further:.0f}",
+        "answers": str(sum(isinstance(one, Answered) for one in story.steps)),
+        "held-out error, first": f"{first.after:.3g}",
+        "held-out error, last": f"{last.after:.3g}",
+    }
+    yield f"<h1>{escape(last.words[0].upper() + last.words[1:])}</h1><p>{escape(SENTENCES[story.ended])}</p>"
+    yield f'<p class="quiet">{escape(command)} · {escape(__version__)}</p>'
+    shown = "".join(f"<span><b>{value}</b>{name}</span>" for name, value in facts.items())
+    yield f'<div class="facts">{shown}</div>'
+
+
+def _picture(story: Story, folder: Path, linear: bool) -> str:
+    """All motions one after the other; those for the proof in another colour."""
+    lines, start = [], 0.0
+    for one in story.steps:
+        if isinstance(one, Moved):
+            recording = Recording.read(folder / one.file)
+            t, q = thin(recording.t - recording.t[0], recording["q"], POINTS)
+            lines.append((start + t, q, AFTER if one.role == "train" else BEFORE))
+            start += one.seconds
+    if not lines:
+        return ""
+    low, high = min(float(q.min()) for _, q, _ in lines), max(float(q.max()) for _, q, _ in lines)
+    unit = "m" if linear else "rad"
+    chart = Chart.over(f"Position [{unit}]", "seconds of motion", (0.0, start), (low, high), SIZE)
+    for t, q, colour in lines:
+        chart.line(np.asarray(t), np.asarray(q), colour)
+    said = "Blue: recorded to be fitted. Orange: recorded for the proof."
+    return f'<h2>What was moved</h2>{chart.svg()}<p class="quiet">{said}</p>'
+
+
+def _steps(story: Story) -> str:
+    rows = "".join(f"<tr><td>{one.number}</td>{_row(one)}</tr>" for one in story.steps)
+    names = ("step", "what", "", "s", "expected [nats]", "held-out error", "noise")
+    head = "".join(f"<th>{name}</th>" for name in names)
+    return f'<h2>Step by step</h2><div class="wide"><table><tr>{head}</tr>{rows}</table></div>'
+
+
+def _row(one: Moved | Answered) -> str:
+    if isinstance(one, Moved):
+        left = f" Left: {one.left}." if one.left else ""
+        link = f'<a href="{escape(one.file)}">{escape(one.title)}</a>, {ROLES[one.role]}.{escape(left)}'
+        nats = f"{one.nats:.1f}" if one.nats else ""
+        numbers = f'<td class="n">{one.seconds:.0f}</td><td class="n">{nats}</td>'
+        return f"<td>moved</td><td>{link}</td>{numbers}<td></td><td></td>"
+    open_ = f"<br>Open: {escape('; '.join(one.open))}." if one.open else ""
+    numbers = f'<td class="n">{one.after:.3g}</td><td class="n">{one.floor:.3g}</td>'
+    return f"<td><b>answer</b></td><td><b>{escape(one.words)}</b>{open_}</td><td></td><td></td>{numbers}"
+
+
+def _rest(story: Story) -> Iterator[str]:
+    if story.otherwise:
+        yield "<h2>What else would tell</h2>" + "".join(f"<p>{escape(one)}</p>" for one in story.otherwise)
+    if story.refused:
+        yield "<h2>Not moved, as a limit would have been left</h2>"
+        yield "".join(f"<p>{escape(one)}</p>" for one in story.refused)
+    rows = "".join(f'<tr><td>{name}</td><td class="n">{value:.4g}</td></tr>' for name, value in story.limits.items())
+    yield f"<h2>Limits</h2><table>{rows}</table><p class='quiet'>SI units; checked before and in what was recorded.</p>"
+    yield '<p><a href="diagnosis/diagnosis.json">The last diagnosis</a>, <a href="diagnosis/card.toml">the card</a>, '
+    yield '<a href="story.json">this story as data</a></p>'

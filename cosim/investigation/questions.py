@@ -1,0 +1,130 @@
+"""What a diagnosis leaves open: sets, effects that are not certain, effects that cannot be tested, what has no name.
+
+A duel is a question between two structures, each fitted to the same recordings: what the answer holds, and the same
+with the rival, or without the effect.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from typing import Any, Literal
+
+from cosim.data.recording import Recording
+from cosim.data.single_readings import cleaned
+from cosim.diagnosis.band import in_band
+from cosim.diagnosis.diagnose import Outcome
+from cosim.diagnosis.result import Diagnosis, Finding
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import Prepared
+from cosim.estimation.problem import Problem
+from cosim.estimation.row_weights import weights
+from pyfmi_models.card import Card
+from pyfmi_models.effects import CATALOGUE, Effect
+from pyfmi_models.model import Pair
+from pyfmi_models.mount import Mount
+
+Kind = Literal["set", "uncertain", "unknown", "not testable", "unconfirmed"]
+EVALUATIONS = 15
+"""Evaluations of the model that a refit of a rival may spend: it starts from the diagnosis' own numbers."""
+NEAR_FLOOR = 1.3
+"""Held-out error, in units of the noise there, up to which nothing that matters is left. Unit: 1."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """One open question: its kind, the effects it is about, and what stands in its way."""
+
+    kind: Kind
+    effects: tuple[str, ...]
+    statement: str
+    otherwise: str = ""
+    """What else than a motion would tell."""
+
+
+@dataclass(frozen=True)
+class Duel:
+    """Two fitted structures of which one is right, as far as a question is concerned."""
+
+    question: Question
+    ours: Fit
+    other: Fit
+
+
+def problem_of(train: Sequence[Recording], card: Card) -> Problem:
+    """What fits of the training recordings share, in the band of the diagnosis."""
+    good, mount = [*map(cleaned, train)], card.plant()
+    prepared = in_band(good, mount)
+    return Problem(mount, prepared, _weight(mount, prepared), max(one.sample_time for one in good))
+
+
+def _weight(mount: Mount, prepared: Prepared) -> Any:
+    import numpy as np
+
+    return np.ones(len(prepared.recording_of)) if mount.friction.key == "none" else weights(mount.friction, prepared)
+
+
+def questions(found: Diagnosis) -> tuple[Question, ...]:
+    """Everything that a diagnosis leaves open and that matters, the likeliest to be settled first."""
+    titles = {one.effect: one.title.lower() for one in found.findings}
+    sets = [Question("set", group, " or ".join(titles.get(n, n) for n in group)) for group in found.ambiguous_with]
+    paired = {name for group in found.ambiguous_with for name in group}
+    lone = [one for one in found.in_model if one.answer == "ambiguous" and one.effect not in paired]
+    unsure = [Question("uncertain", (one.effect,), f"whether it is {titles[one.effect]}") for one in lone]
+    unknown = [Question("unknown", (), "something that has no name")] if "unknown" in found.verdict else []
+    asked = (*sets, *unsure, *unknown, *_not_testable(found))
+    return (
+        asked if _is_near(found) or not found.verdict else (*asked, Question("unconfirmed", (), _confirmation(found)))
+    )
+
+
+def _is_near(found: Diagnosis) -> bool:
+    """Whether the held-out error is down to the noise."""
+    return found.heldout.after_rms <= NEAR_FLOOR * found.heldout.floor_rms
+
+
+def _confirmation(found: Diagnosis) -> str:
+    share = found.heldout.after_rms / max(found.heldout.floor_rms, 1e-300)
+    return f"whether the same is found once more (the held-out error is {share:.1f} times the noise)"
+
+
+def _not_testable(found: Diagnosis) -> Iterator[Question]:
+    """Effects that no recording so far could show, where the held-out error is above the noise or nothing was found."""
+    if found.verdict and _is_near(found):
+        return
+    for one in found.findings:
+        if one.answer == "not_testable" and one.action:
+            yield Question("not testable", (one.effect,), f"whether there is {one.title.lower()}", one.action)
+
+
+def duels(outcome: Outcome, problem: Problem, asked: Sequence[Question]) -> list[Duel]:
+    """The questions that are between two structures, each of them fitted to the training recordings."""
+    pairs = [(question, rival) for question in asked for rival in _rivals(question, outcome)]
+    if not pairs:
+        return []
+    ours = problem.fit(outcome.card.plant(), EVALUATIONS)
+    return [Duel(question, ours, problem.fit(rival, EVALUATIONS)) for question, rival in pairs]
+
+
+def _rivals(question: Question, outcome: Outcome) -> Iterator[Mount]:
+    """The delivered model with another effect in the place of the one that is in question, or without it."""
+    if question.kind not in ("set", "uncertain"):
+        return
+    mount, main = outcome.card.plant(), question.effects[0]
+    own = len(mount.effects) - len(outcome.card.effects)
+    rest = (*mount.effects[:own], *(one for one in outcome.card.effects if one.id != main))
+    if question.kind == "uncertain":
+        yield replace(mount, effects=rest)
+    findings = {one.effect: one for one in outcome.diagnosis.findings}
+    for name in question.effects[1:]:
+        yield replace(mount, effects=(*rest, effect_of(findings[name])))
+
+
+def effect_of(finding: Finding) -> Effect:
+    """The effect of a finding, with its fitted numbers."""
+    names = {name.partition(".")[0] for name in finding.parameters}
+    form = max(CATALOGUE[finding.effect], key=lambda one: len(names & {item.name for item in fields(one)}))
+    numbers: dict[str, float | Pair] = {}
+    for name in names:
+        sides = [finding.parameters.get(f"{name}.{side}") for side in Pair._fields]
+        numbers[name] = Pair(*sides) if None not in sides else finding.parameters[name]  # type: ignore[arg-type]
+    make: Any = form
+    return make(**numbers)  # type: ignore[no-any-return]

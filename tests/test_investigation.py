@@ -1,0 +1,101 @@
+"""The loop that asks the machine: it decides, it keeps to its limits, and a kill loses nothing."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cosim.api.investigate import investigate
+from cosim.cli import main
+from cosim.cli.investigate import seconds_of
+from cosim.investigation.machine import CoSimulated
+from cosim.support.errors import InputError, OutputError
+from tests.investigations import CABLE, DWELL, LIMITS, written
+
+
+def test_one_answer_needs_no_further_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scenario, card, machine = written(tmp_path, CABLE)
+    words = ["investigate", scenario, "--card", card, "--machine", machine, "--out", str(tmp_path / "out")]
+    with pytest.raises(SystemExit) as ended:
+        main([*words, "--seconds", "10", "--budget", "1min", "--json"])
+    assert not ended.value.code
+    told = json.loads(capsys.readouterr().out)
+    assert told["verdict"] == ["cable_wrap"]
+    assert told["ended"] == "answered"
+    assert told["further_motion_seconds"] == 0
+    page = (tmp_path / "out" / "story.html").read_text("utf-8")
+    assert "Cable wrap" in page
+    assert "<script" not in page
+
+
+def test_a_wrong_first_name_is_put_right_by_motion_and_a_kill_loses_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first recordings hardly rest: what settles at rest is taken for Stribeck friction until the axis stops."""
+    given, out = written(tmp_path, DWELL), tmp_path / "out"
+    asked = {"machine": given[2], "budget": 42.5, "seconds": 10.0, "limits": LIMITS}
+    record = CoSimulated.record
+
+    def killed(self: CoSimulated, motion: object, number: int, path: Path) -> object:
+        if number == 4:
+            raise KeyboardInterrupt
+        return record(self, motion, number, path)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(CoSimulated, "record", killed)
+    with pytest.raises(KeyboardInterrupt):
+        investigate(*given[:2], out, **asked)  # type: ignore[arg-type]
+    kept = {path.name: path.read_bytes() for path in (out / "recordings").iterdir()}
+    assert len(kept) == 3
+    monkeypatch.setattr(CoSimulated, "record", record)
+    done = investigate(*given[:2], out, **asked)  # type: ignore[arg-type]
+    assert {name: (out / "recordings" / name).read_bytes() for name in kept} == kept
+    assert done.story.first.verdict != ("dwell_breakaway",)
+    assert done.missing == ("dwell_breakaway",)
+    assert done.story.seconds <= 42.5
+    again = investigate(*given[:2], out, **asked)  # type: ignore[arg-type]
+    assert [one.number for one in again.story.steps] == [one.number for one in done.story.steps]
+
+
+def test_a_folder_of_another_investigation_is_refused(tmp_path: Path) -> None:
+    given, out = written(tmp_path, CABLE), tmp_path / "out"
+    out.mkdir()
+    (out / "investigation.json").write_text('{"card": "another"}', "utf-8")
+    with pytest.raises(OutputError, match="another investigation"):
+        investigate(*given[:2], out)
+
+
+@pytest.mark.parametrize(
+    ("limits", "message"),
+    [
+        ({"position": "1:2"}, "stands at 0"),
+        ({"position": "2:1"}, "a limit is position=LOW:HIGH"),
+        ({"jerk": "3"}, "a limit is position=LOW:HIGH"),
+        ({"speed": "-1"}, "above 0"),
+        ({"frequency": "250"}, "shows less than 250 Hz"),
+    ],
+)
+def test_limits_that_are_none_are_refused_before_anything_moves(
+    tmp_path: Path, limits: dict[str, str], message: str
+) -> None:
+    given = written(tmp_path)
+    with pytest.raises(InputError, match=message):
+        investigate(*given[:2], tmp_path / "out", limits=limits)
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_machine_that_leaves_a_limit_is_not_moved_again(tmp_path: Path) -> None:
+    given = written(tmp_path, CABLE)
+    with pytest.raises(InputError, match="left a limit: torque"):
+        investigate(*given[:2], tmp_path / "out", machine=given[2], limits={"torque": "1.5"})
+    assert len([*(tmp_path / "out" / "recordings").iterdir()]) == 1
+
+
+@pytest.mark.parametrize(("text", "seconds"), [("300", 300), ("300s", 300), ("1.5min", 90), ("1 h", 3600)])
+def test_a_budget_is_a_time(text: str, seconds: float) -> None:
+    assert seconds_of(text) == seconds
+
+
+@pytest.mark.parametrize("text", ["", "0", "-3s", "soon", "3 days"])
+def test_a_budget_that_is_no_time_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="it is a time above 0"):
+        seconds_of(text)

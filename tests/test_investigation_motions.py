@@ -1,0 +1,55 @@
+"""Motions of an investigation: inside their limits whatever these are, and smooth."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from cosim.data.recording import Recording
+from cosim.investigation.families import FAMILIES, motions
+from cosim.investigation.limits import Limits
+from cosim.investigation.motions import Room, room_of
+
+SIZES = st.floats(1e-3, 10.0)
+LIMITS = Limits(-1.0, 1.0, 0.5, 2.0, 50.0, 5.0)
+
+
+def rooms(limits: Limits) -> list[Room]:
+    return [room_of(limits, home, 12.0, 3, turned) for home in (0.0, 0.8) for turned in (False, True)]
+
+
+@given(low=SIZES, high=SIZES, speed=SIZES, acceleration=SIZES, frequency=st.floats(0.3, 30.0), turned=st.booleans())
+def test_no_motion_leaves_a_limit(
+    low: float, high: float, speed: float, acceleration: float, frequency: float, turned: bool
+) -> None:
+    limits = Limits(-low, high, speed, acceleration, 1.0, frequency)
+    for motion in motions(room_of(limits, 0.0, 10.0, 1, turned)):
+        asked = motion.sampled(np.arange(0.0, motion.seconds, 4e-3))
+        assert limits.left_by(*asked) == "", motion.family
+
+
+@pytest.mark.parametrize("number", range(len(FAMILIES)))
+def test_a_motion_lasts_as_long_as_asked_begins_and_ends_at_rest_and_is_smooth(number: int) -> None:
+    for room in rooms(LIMITS):
+        motion = FAMILIES[number](room)
+        t = np.arange(0.0, motion.seconds, 1e-3)
+        q, v, a = motion.sampled(t)
+        assert motion.seconds == pytest.approx(room.seconds)
+        assert [q[0], v[0], a[0], v[-1], a[-1]] == pytest.approx([0.0] * 5)
+        assert np.ptp(q) > 0, motion.family
+        assert np.abs(np.gradient(q, t) - v).max() < 1e-3 * 0.5  # half a step of the acceleration
+        assert np.abs(np.diff(a)).max() < 2 * 20 * 2.0 * 1e-3  # jerk: 20 accelerations a second, half of it to spare
+
+
+def test_a_recording_that_overshoots_is_named() -> None:
+    t = np.arange(0.0, 10.0, 1e-2)
+    recording = Recording.of({"t": t, "tau": np.sin(t), "q": 1.2 * np.sin(t)})
+    assert LIMITS.left_in(recording).startswith("position 1.2 beyond 1")
+    still = Recording.of({"t": t, "tau": 60 * np.sin(t), "q": 0.4 * np.sin(t)})
+    assert LIMITS.left_in(still).startswith("torque")
+
+
+def test_the_other_end_comes_first_in_a_turned_motion() -> None:
+    straight, turned = (room_of(LIMITS, 0.0, 12.0, 3, way) for way in (False, True))
+    ways = [FAMILIES[0](room).sampled(np.arange(0.0, 12.0, 1e-2))[0] for room in (straight, turned)]
+    assert np.allclose(ways[0], -ways[1])
