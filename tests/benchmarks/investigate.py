@@ -62,7 +62,8 @@ class Concealed:
     """A mount of the generator, which follows any motion; what is concealed in it is the same in each recording."""
 
     def __init__(self, case: Case) -> None:
-        self.case, bench = case, self._bench()
+        self.case = case
+        bench = self._bench()
         bench.mount["loop_inertia"] = 0.0
         self.card = parse_card(to_toml(perturbed(bench, stream(case.seed, "card"))), "card.toml")
         self.pace, self.home = bench.pace, bench.pace.home
