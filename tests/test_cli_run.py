@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from tiny_fmu import tiny
 import cosim.models.cache
 from cosim.cli import guarded, main
 from cosim.data.recording import Recording
+from cosim.support.interrupts import end_well
 
 __all__ = ["tiny"]
 
@@ -296,6 +298,28 @@ def test_a_signal_that_comes_before_a_verb_begins_is_told_by_the_exit_code(
         for one, handler in before.items():
             signal.signal(one, handler)
     assert "cosim: terminated" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (None, None)])
+def test_what_a_c_extension_makes_of_a_signal_is_an_interrupt(number: int | None, code: int | None) -> None:
+    """Some swallow the KeyboardInterrupt and raise an error of their own that does not even hold it."""
+
+    def verb() -> None:
+        with suppress(KeyboardInterrupt):
+            end_well()
+            if number is not None:
+                signal.raise_signal(number)
+        raise RuntimeError("error building a validator")
+
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        with pytest.raises(RuntimeError if code is None else SystemExit) as ended:
+            guarded(verb, False)()
+        assert getattr(ended.value, "code", None) == code
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+        end_well()
 
 
 @pytest.mark.parametrize(("cause", "code"), [(KeyboardInterrupt(), 130), (ValueError(), None)])

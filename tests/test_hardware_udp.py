@@ -250,3 +250,19 @@ def test_an_injection_that_is_none_is_refused(text: str) -> None:
 def test_a_fault_of_frames_is_refused_where_there_are_none(tmp_path: Path) -> None:
     with pytest.raises(HardwareError, match="a fault of frames, and the drive in this process has none"):
         Session(scenario(), faulty(kind="late"), tmp_path / "box", fast=True)
+
+
+def test_a_loop_without_a_clock_sleeps_as_it_waits_and_one_in_real_time_waits_as_its_machine_says(
+    tmp_path: Path,
+) -> None:
+    with drive() as there, session(tmp_path / "fast", there.url) as one:
+        assert one.transport.udp.spin == 0  # type: ignore[attr-defined]
+        assert one.transport.udp.patience >= 1e9, "a drive without a clock may be a slow computer"  # type: ignore[attr-defined]
+    machine = changed(
+        SIMULATED, "test", clock=SIMULATED.clock.model_dump() | {"answer_us": 300.0, "answer_spin_us": 20.0}
+    )
+    with drive(machine, lockstep=False) as there:
+        one = Session(scenario(), over(there.url, machine), tmp_path / "real")
+        assert (one.transport.udp.patience, one.transport.udp.spin) == (300_000, 20_000)  # type: ignore[attr-defined]
+        with one:
+            pass

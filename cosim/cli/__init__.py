@@ -20,7 +20,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 
 from cosim.support.errors import CosimError, InputError
-from cosim.support.interrupts import Terminated, end_well, is_terminated
+from cosim.support.interrupts import Terminated, end_well, is_interrupted, is_terminated
 from cosim.support.terminal import abandon_stdout, finish_stdout, keep_stdout, put, say
 from cosim.support.version import __version__
 from pyfmi_models.errors import ModelError
@@ -136,8 +136,8 @@ def guarded(verb: Callable[..., Any], debug: bool) -> Callable[..., Any]:
             if debug:
                 raise
             leave(error)
-        except ImportError as error:  # what a C extension makes of a signal while it is loaded
-            if debug or not isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+        except Exception as error:  # what a C extension makes of a signal that comes while it works
+            if debug or not (is_interrupted() or isinstance(error.__cause__ or error.__context__, KeyboardInterrupt)):
                 raise
             leave(Terminated() if is_terminated() else KeyboardInterrupt())
 

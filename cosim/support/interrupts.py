@@ -22,19 +22,24 @@ def end_well() -> None:
     """Let SIGTERM (and SIGHUP) end this process as Ctrl-C does, so that no file is left half written."""
     _HEARD.clear()
     if threading.current_thread() is threading.main_thread():
-        for number in ENDING:
-            if signal.getsignal(number) is signal.SIG_DFL:
+        for number in (signal.SIGINT, *ENDING):
+            if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
                 signal.signal(number, _end)
+
+
+def is_interrupted() -> bool:
+    """Whether this process was asked to end, by Ctrl-C or otherwise: an error that comes then may be only that."""
+    return bool(_HEARD)
 
 
 def is_terminated() -> bool:
     """Whether this process was asked to end by a signal that is not Ctrl-C."""
-    return bool(_HEARD)
+    return any(number != signal.SIGINT for number in _HEARD)
 
 
 def _end(number: int, frame: FrameType | None) -> None:
     _HEARD.append(number)
-    raise Terminated
+    raise KeyboardInterrupt if number == signal.SIGINT else Terminated
 
 
 @contextmanager
