@@ -1,5 +1,6 @@
 """A small axis in its loop, a card that believes in it, and one with an effect that nobody told."""
 
+import re
 from pathlib import Path
 
 BELIEVED = """
@@ -95,3 +96,13 @@ def written(folder: Path, effect: str = "") -> tuple[str, str, str]:
     machine.write_text(BELIEVED + effect, "utf-8")
     scenario.write_text(SCENARIO.replace("CARD", str(card)), "utf-8")
     return str(scenario), str(card), str(machine)
+
+
+def on_a_drive(folder: Path, effect: str) -> tuple[str, str]:
+    """Scenario and card; the plant that a drive moves is the machine, and its encoder has steps in place of noise."""
+    scenario, card, machine = written(folder, effect)
+    text = re.sub(r'\[signals\.(ripple|grain)\]\nkind = "noise"\nrms = \S+\nseed = \d\n\n', "", SCENARIO)
+    text = re.sub(r'noise = "\w+"\n', "", text).replace('from = "mount.q"\n', 'from = "mount.q"\nquantum = 1e-6\n')
+    text = text.replace('[components.mount]\ncard = "CARD"', f'[components.mount]\ncard = "{machine}"')
+    Path(scenario).write_text(text.replace("CARD", card), "utf-8")
+    return scenario, card

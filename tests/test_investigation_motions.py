@@ -37,6 +37,7 @@ def test_a_motion_lasts_as_long_as_asked_begins_and_ends_at_rest_and_is_smooth(n
         assert motion.seconds == pytest.approx(room.seconds)
         assert [q[0], v[0], a[0], v[-1], a[-1]] == pytest.approx([0.0] * 5)
         assert np.ptp(q) > 0, motion.family
+        assert q[-1] == pytest.approx(0.0), motion.family  # back where it began: a drive is there before the next one
         assert np.abs(np.gradient(q, t) - v).max() < 1e-3 * 0.5  # half a step of the acceleration
         assert np.abs(np.diff(a)).max() < 2 * 20 * 2.0 * 1e-3  # jerk: 20 accelerations a second, half of it to spare
 

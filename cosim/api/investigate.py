@@ -9,6 +9,7 @@ from cosim.api.recordings import Source, read_all
 from cosim.data.recording import Recording
 from cosim.diagnosis.deliver import deliver_quickly
 from cosim.diagnosis.result import Diagnosis
+from cosim.hardware.machine import Machine as Hardware
 from cosim.investigation.log import DIAGNOSIS, PAGE, STORY, Log
 from cosim.investigation.loop import Investigation, Settings
 from cosim.investigation.page import write_page
@@ -49,13 +50,14 @@ def investigate(
     card: str,
     out: str | Path,
     *,
-    machine: str = "",
+    machine: str | Hardware = "",
     budget: float = 300.0,
     seconds: float = 15.0,
     limits: Mapping[str, str] | None = None,
     train: Source | Sequence[Source] = (),
     heldout: Source | Sequence[Source] = (),
     seed: int = 1,
+    fast: bool = False,
     force: bool = False,
     on_progress: Callable[[str], None] = lambda text: None,
     on_step: Callable[[Moved | Answered], None] = lambda step: None,
@@ -67,7 +69,8 @@ def investigate(
         scenario: plant, controller, set point and columns: its path, or the name of a shipped one.
         card: the model as believed: its path, or the name of a shipped one.
         out: folder for recordings, journal, story and the last diagnosis; one begun there is gone on with.
-        machine: a card or plant FMU that stands in for the machine, in the place of the scenario's plant.
+        machine: a card or plant FMU that stands in for the machine, in the place of the scenario's plant; or a drive,
+            from `cosim.hardware.machine.read_machine`, which is moved inside its own limits too.
         budget: seconds of motion that may be spent, the first recordings and those of earlier calls included.
         seconds: length of one motion [s]; each is run twice, to be fitted and for the proof.
         limits: {"position": "LOW:HIGH", "speed": ..., "acceleration": ..., "torque": ..., "frequency": ...} in SI;
@@ -75,6 +78,7 @@ def investigate(
         train: recordings to go on from, with `heldout` in the place of the first two.
         heldout: recordings for the proof, to go on from.
         seed: of the phases of motions with many tones.
+        fast: run a drive without a clock.
         force: start over, and remove what an investigation left there.
         on_progress: told in a few words what is being done.
         on_step: told each recording and each answer.
@@ -86,14 +90,15 @@ def investigate(
     Raises:
         ScenarioError, CardError, InputError: before anything moves.
         OutputError: the folder holds another investigation.
+        HardwareError: the drive is not there, or a session ended in a fault.
         StepError: the machine failed; what was recorded before is kept.
     """
     settings = Settings(budget, seconds, seed)
-    first = (_read(one, kind) for one, kind in ((train, "train"), (heldout, "heldout")))
-    ready = given(scenario, card, machine, limits or {}, settings, *first)
+    first, second = _read(train, "train"), _read(heldout, "heldout")
+    ready = given(scenario, card, machine, limits or {}, settings, first, second, fast)
     with Log(Path(out), ready.identity(), force) as log:
         work = Investigation(ready.machine, ready.card, ready.limits, log, settings, on_progress, on_step)
-        work.begin(ready.machine.own(), ready.train, ready.heldout)
+        work.begin(ready.own, ready.train, ready.heldout)
         return _written(work, work.go_on(), Path(out), command)
 
 

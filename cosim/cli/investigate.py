@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from cosim.cli.complete import cards, scenarios
+from cosim.cli.drive import KeyOption, machine_of
 from cosim.cli.options import Force
 from cosim.reading import pairs_of
 from cosim.support.errors import InputError
@@ -21,8 +22,12 @@ def investigate(
     card: Annotated[str, typer.Option("--card", help="The model as believed.", autocompletion=cards)],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder; an investigation begun there is gone on with.")],
     machine: Annotated[
-        str, typer.Option("--machine", help="A card or plant FMU in the place of the scenario's plant.")
+        str,
+        typer.Option("--machine", help="A card or plant FMU in the plant's place; of a --drive its file."),
     ] = "",
+    drive: Annotated[str, typer.Option("--drive", help="udp://HOST:PORT: move a drive; needs --move.")] = "",
+    key: KeyOption = "",
+    move: Annotated[bool, typer.Option("--move", help="A drive may be moved.")] = False,
     budget: Annotated[str, typer.Option("--budget", help="Motion that may be spent: 300s, 5min.")] = "300s",
     seconds: Annotated[float, typer.Option("--seconds", help="Length of one motion [s].", min=8.0)] = 15.0,
     limits: Annotated[
@@ -39,12 +44,16 @@ def investigate(
     from cosim.api.investigate import investigate as ask
     from cosim.investigation.log import PAGE
 
-    words = {"--card": card, "--machine": machine, "--budget": budget, "--seconds": f"{seconds:g}", "--out": str(out)}
+    words = {"--card": card, "--machine": machine, "--drive": drive, "--budget": budget, "--seconds": f"{seconds:g}"}
+    words |= {"--limits": " ".join(limits or ()), "--out": str(out)}
     command = join(["cosim", "investigate", scenario, *(w for name, v in words.items() if v for w in (name, v))])
+    if drive and not move:
+        raise InputError(f"--drive {drive} would move an axis; give --move to allow it.", culprit="--drive")
+    moved = machine_of(machine or "virtual", drive, key) if drive else machine
     with stage("asking the machine") as progress:
         done = ask(
             *(scenario, card, out),
-            machine=machine,
+            machine=moved,
             budget=seconds_of(budget),
             seconds=seconds,
             limits=pairs_of("--limits", limits),

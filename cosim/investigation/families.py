@@ -4,6 +4,7 @@ Each is a function of the room; what it cannot do there in the time it leaves ou
 """
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from math import ceil, pi
 
 import numpy as np
@@ -21,16 +22,17 @@ STEPS, WAY = 8, 5.0
 
 
 def _filled(room: Room, one_round: list[Part]) -> tuple[Part, ...]:
-    """A round again and again, as often as it fits, between two rests; cut where not even one fits."""
+    """A round again and again, as often as it fits, between two rests; then back to where it began."""
     parts: list[Part] = [Rest(FADE)]
+    back = Move(0.0, room.speed, room.acceleration)
     here, left = 0.0, room.seconds - 2 * FADE
     for part in one_round * ceil(room.seconds / 0.1):
         lasts = part.seconds(here)
-        if lasts > left or lasts <= 0:
+        if lasts + back.seconds(part.end(here)) > left or lasts <= 0:
             break
         parts.append(part)
         here, left = part.end(here), left - lasts
-    return (*parts, Rest(FADE + left))
+    return (*parts, back, Rest(FADE + left - back.seconds(here)))
 
 
 def _stroke(room: Room, share: float) -> list[Part]:
@@ -127,15 +129,17 @@ def _tones(room: Room, hertz: list[float], phases: list[float]) -> tuple[Part, .
     sizes = [min(1.0, room.acceleration / (room.speed * 2 * pi * f)) / (2 * pi * f) for f in hertz]
     half = min(abs(room.first), abs(room.second))
     move: list[Part] = []
+    back: list[Part] = []
     to_middle = Move(room.middle, 0.5 * room.speed, room.acceleration)
     if half < room.reach / 4 and to_middle.seconds(0.0) < room.seconds / 3:
-        move, half = [to_middle], room.reach / 2
-    lasts = room.seconds - 2 * FADE - sum(one.seconds(0.0) for one in move)
+        move, back, half = [to_middle], [replace(to_middle, to=0.0)], room.reach / 2
+    lasts = room.seconds - 2 * FADE - 2 * sum(one.seconds(0.0) for one in move)
     whole = Tones(lasts, tuple(hertz), tuple(sizes), tuple(phases))
     q, v, a = whole.sampled(np.arange(0.0, lasts, min(0.02 / max(hertz), 0.02 * FADE)), 0.0)
     tops = zip((q, v, a), (half, room.speed, room.acceleration), strict=True)
     scale = min(limit / max(float(np.abs(one).max()), 1e-300) for one, limit in tops)
-    return (Rest(FADE), *move, Tones(lasts, whole.hertz, tuple(scale * s for s in sizes), whole.phases), Rest(FADE))
+    scaled = replace(whole, sizes=tuple(scale * size for size in sizes))
+    return (Rest(FADE), *move, scaled, *back, Rest(FADE))
 
 
 FAMILIES: tuple[Callable[[Room], Motion], ...] = (

@@ -53,6 +53,10 @@ class Limits:
             found = replace(found, **_numbers(name, text))
         return found
 
+    def tightened(self, speed: float, torque: float) -> "Limits":
+        """The same with a speed and a torque that are no larger than these."""
+        return replace(self, speed=min(self.speed, speed), torque=min(self.torque, torque))
+
     def left_by(self, q: Array, v: Array, a: Array) -> str:
         """The first limit that a planned motion would leave, in words; "" where it leaves none."""
         within = (_high("position", self.high, q), _high("position", -self.low, -q))

@@ -15,7 +15,7 @@ from cosim.diagnosis.diagnose import diagnose as find
 from cosim.estimation.fit import Fit
 from cosim.estimation.problem import Problem
 from cosim.investigation.design import Plan, Rated, allowed, best, pieces_of, plans, shown_by_motion
-from cosim.investigation.families import FAMILIES, multisine
+from cosim.investigation.families import FAMILIES, multisine, tone
 from cosim.investigation.limits import Limits
 from cosim.investigation.log import Log
 from cosim.investigation.machine import Machine
@@ -28,6 +28,8 @@ from pyfmi_models.effects import CATALOGUE
 
 SHORTEST = 8.0
 """Seconds that a motion must last, or it is not worth starting: the diagnosis leaves 3.5 s of a recording out."""
+AGAIN, AGAIN_NOTHING = 1, 2
+"""Rounds over new ground that an answer must survive where it leaves more than the noise, or where it is "nothing"."""
 GROUND = ("unknown", "not testable", "unconfirmed")
 """Kinds of questions that are not between two structures: they are sought on new ground."""
 ROLES: tuple[Literal["train", "heldout"], ...] = ("train", "heldout")
@@ -62,13 +64,14 @@ class Investigation:
     outcome: Outcome | None = None
     """The last diagnosis."""
 
-    def begin(self, own: Motion, train: Sequence[Recording] = (), heldout: Sequence[Recording] = ()) -> None:
-        """Take recordings that are there; else run the machine's own motion to fit, and many tones for the proof."""
+    def begin(self, own: Motion | None, train: Sequence[Recording] = (), heldout: Sequence[Recording] = ()) -> None:
+        """Take recordings that are there; else run the scenario's own motion (or a tone) to fit, others for proof."""
         if train:
             self.recordings = {"train": [*train], "heldout": [*heldout]}
             return
-        lasts = max(min(self.settings.seconds, own.seconds), SHORTEST)
-        for role, motion in zip(ROLES, (own, multisine(self._room(lasts, False))), strict=True):
+        lasts = max(min(self.settings.seconds, own.seconds if own else self.settings.seconds), SHORTEST)
+        room = self._room(lasts, False)
+        for role, motion in zip(ROLES, (own or tone(room), multisine(room)), strict=True):
             number = len(self.steps)
             known = self.log.moved(number)
             left = self.add(known, self.log.read(known), False) if known else self.run(motion, number, role)
@@ -128,8 +131,7 @@ class Investigation:
     def _movable(self, asked: Sequence[Question]) -> Sequence[Question]:
         """Questions that some motion may decide; the others are kept to be told at the end."""
         assert self.outcome is not None
-        before = next((one.verdict for one in reversed(self.steps) if isinstance(one, Answered)), None)
-        if before == self.outcome.diagnosis.verdict:
+        if self._is_confirmed(self.outcome.diagnosis.verdict):
             asked = [one for one in asked if one.kind != "unconfirmed"]
         names = {name for one in asked if one.kind == "not testable" for name in one.effects}
         if not names:
@@ -141,6 +143,12 @@ class Investigation:
         shown = shown_by_motion(names, ours, pieces, ours.rms) if pieces else set()
         self.unmoved = tuple(one for one in asked if one.kind == "not testable" and not set(one.effects) <= shown)
         return [one for one in asked if one not in self.unmoved]
+
+    def _is_confirmed(self, verdict: tuple[str, ...]) -> bool:
+        """Whether the last answers before this one, as many as it takes, were the same."""
+        needed = AGAIN if verdict else AGAIN_NOTHING
+        before = [one.verdict for one in self.steps if isinstance(one, Answered)][-needed:]
+        return before == [verdict] * needed
 
     def _designed(self, asked: Sequence[Question], lasts: float) -> list[Plan | None] | None:
         """The motion that tells most and the same from the other end; None where none tells anything."""

@@ -119,12 +119,14 @@ class CoSimulated:
 
     def record(self, motion: Motion, number: int, path: Path) -> Recording:
         """Run the scenario with a motion in the place of its set point."""
-        signal = self.scenario.signals[self.reference]
-        planned: dict[str, Signal] = {self.reference: Planned(motion, self._start, dict(signal.outputs))}
+        return self._run(self.follows(motion), path, number)
+
+    def follows(self, motion: Motion, home: float | None = None) -> Scenario:
+        """The scenario with a motion in the place of its set point, from its own start or from another place."""
+        signal, start = self.scenario.signals[self.reference], self._start if home is None else home - self._offset
+        planned: dict[str, Signal] = {self.reference: Planned(motion, start, dict(signal.outputs))}
         ticks = round(motion.seconds / self.scenario.step)
-        return self._run(
-            replace(self.scenario, signals={**self.scenario.signals, **planned}, ticks=ticks), path, number
-        )
+        return replace(self.scenario, signals={**self.scenario.signals, **planned}, ticks=ticks)
 
     def _run(self, scenario: Scenario, path: Path, number: int) -> Recording:
         fresh = {name: _again(signal, number) for name, signal in scenario.signals.items()}

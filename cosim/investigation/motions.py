@@ -1,7 +1,7 @@
 """Motions that a mechanic understands, as programmes of moves, rests and tones, and the families that are tried.
 
-A programme starts and ends at rest; positions count from where the axis stands. Moves have limited speed, acceleration
-and jerk; tones swell and fade with a quintic. So position, speed and acceleration belong together exactly.
+A programme starts and ends at rest in the same place; positions count from there. Moves have limited speed,
+acceleration and jerk; tones swell and fade with a quintic. So position, speed and acceleration belong together exactly.
 """
 
 from collections.abc import Iterator

@@ -71,9 +71,8 @@ def questions(found: Diagnosis) -> tuple[Question, ...]:
     unsure = [Question("uncertain", (one.effect,), f"whether it is {titles[one.effect]}") for one in lone]
     unknown = [Question("unknown", (), "something that has no name")] if "unknown" in found.verdict else []
     asked = (*sets, *unsure, *unknown, *_not_testable(found))
-    return (
-        asked if _is_near(found) or not found.verdict else (*asked, Question("unconfirmed", (), _confirmation(found)))
-    )
+    settled = found.verdict and _is_near(found)
+    return asked if settled else (*asked, Question("unconfirmed", (), _confirmation(found)))
 
 
 def _is_near(found: Diagnosis) -> bool:
@@ -82,6 +81,8 @@ def _is_near(found: Diagnosis) -> bool:
 
 
 def _confirmation(found: Diagnosis) -> str:
+    if not found.verdict:
+        return "whether nothing is missing where nothing was visited yet, too"
     share = found.heldout.after_rms / max(found.heldout.floor_rms, 1e-300)
     return f"whether the same is found once more (the held-out error is {share:.1f} times the noise)"
 
