@@ -50,6 +50,13 @@ def test_a_recording_that_overshoots_is_named() -> None:
     assert LIMITS.left_in(still).startswith("torque")
 
 
+def test_a_gap_of_late_cycles_is_no_speed() -> None:
+    t = np.delete(np.arange(0.0, 10.0, 2e-3), np.arange(2000, 2040))
+    assert LIMITS.left_in(Recording.of({"t": t, "tau": np.sin(t), "q": 0.45 * np.sin(t)})) == ""
+    fast = Recording.of({"t": t, "tau": np.sin(t), "q": 0.2 * np.sin(3 * t)})
+    assert LIMITS.left_in(fast).startswith("speed 0.6")
+
+
 def test_the_other_end_comes_first_in_a_turned_motion() -> None:
     straight, turned = (room_of(LIMITS, 0.0, 12.0, 3, way) for way in (False, True))
     ways = [FAMILIES[0](room).sampled(np.arange(0.0, 12.0, 1e-2))[0] for room in (straight, turned)]

@@ -26,7 +26,7 @@ from cosim.estimation.least_squares import projected
 from cosim.estimation.prepare import Array, Piece, Prepared, lowpass
 from cosim.estimation.problem import Problem
 from cosim.investigation.families import FAMILIES
-from cosim.investigation.limits import Limits
+from cosim.investigation.limits import KEPT, Limits
 from cosim.investigation.motions import FADE, Motion, Room
 from cosim.investigation.questions import Duel
 from pyfmi_models.effects.base import TonalEffect
@@ -55,6 +55,8 @@ class Plan:
         return sum(min(one, ENOUGH) for one in self.nats)
 
 
+SPARE = 4.0
+"""Torque that must be left over, in units of the RMS that the model leaves: for noise, and for what it lacks."""
 SLOWER = (1.0, 0.5, 0.25)
 """Shares of speed and acceleration at which a motion is tried until it leaves no limit. Unit: 1."""
 
@@ -104,7 +106,7 @@ def allowed(
     for share in SLOWER:
         motion = family(room.slower(share))
         piece, limit = piece_of(motion, home, cutoff, limits)
-        limit = limit or limits.torque_left(torque_of(ours, piece))
+        limit = limit or limits.torque_left((np.abs(torque_of(ours, piece)) + SPARE * ours.rms) / KEPT)
         if not limit:
             break
     return motion, piece, limit

@@ -38,6 +38,8 @@ class Driven:
     hardware: Hardware
     fast: bool = False
     """Without a clock."""
+    limits: Limits | None = None
+    """Limits by which the loop's own are tightened."""
 
     @cached_property
     def home(self) -> float:
@@ -63,6 +65,7 @@ class Driven:
         box = path.with_suffix(".box")
         scenario = with_fmus(self.loop.follows(motion, self.home))
         with Session(scenario, self.hardware, box, fast=self.fast) as session:
+            self._tighten(session)
             done = run_session(session)
         thinned(recording_of(read_black_box(box), motion.family), RATE).write(path)
         ended = ", ".join(done["faults"]) or ("" if done["completed"] else str(done["state"]))
@@ -70,6 +73,12 @@ class Driven:
             message = f"{self.hardware.name} ended in {ended} on {motion.title}; nothing more was moved."
             raise HardwareError(message, culprit=self.hardware.name, value=ended)
         return Recording.read(path)
+
+    def _tighten(self, session: Session) -> None:
+        """Let the loop itself hold the torque, and stop at the speed, that the investigation may use."""
+        for name in ("torque", "speed") if self.limits else ():
+            session.tighten(name, min(getattr(self.limits, name), getattr(self.hardware.limits, name)))
+            session.advance(2)
 
 
 def thinned(found: Recording, rate: float) -> Recording:

@@ -67,7 +67,8 @@ class Limits:
         """The first limit that a recorded motion has left, in words; "" where it has left none."""
         tau, q = recording["tau"], recording["q"]
         dt = recording.sample_time
-        speed = np.abs(derivative(lowpass(q, dt, SMOOTH_HZ), dt))
+        even = np.interp(np.arange(recording.t[0], recording.t[-1], dt), recording.t, q)  # late cycles leave gaps
+        speed = np.abs(derivative(lowpass(even, dt, SMOOTH_HZ), dt))
         within = (_high("position", self.high, q), _high("position", -self.low, -q))
         return next(filter(None, (*within, _high("speed", self.speed, speed), self.torque_left(tau))), "")
 

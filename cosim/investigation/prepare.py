@@ -1,7 +1,7 @@
 """From names to an investigation: scenario, card, machine and limits read and checked, its folder opened."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256 as sha256_of
 from math import pi, sqrt
 from pathlib import Path
@@ -75,6 +75,7 @@ def given(
     loop, believed = CoSimulated(read_scenario(scenario), machine if isinstance(machine, str) else ""), read_card(card)
     drive = None if isinstance(machine, str) else Driven(loop, machine, fast)
     kept = _limits(loop, drive, believed, limits)
+    drive = drive and replace(drive, limits=kept)
     return Given(loop, drive, believed, kept, settings, tuple(train), tuple(heldout))
 
 
