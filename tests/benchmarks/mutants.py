@@ -14,6 +14,7 @@ import argparse
 import ast
 import json
 import os
+import re
 import resource
 import signal
 import sys
@@ -153,9 +154,9 @@ def failed(tree: Path, tests: Sequence[str]) -> str:
         return f"{tests[0]} (time)"
     if code in (0, 5):  # 5: no tests here
         return ""
-    lost = [one for one in said.read_text("utf-8", "replace").splitlines() if one.startswith(LOST)]
-    words = lost[-1].split(" - ")[0].split(" ", 1)[-1] if lost else ""
-    return words.removeprefix("tests/") if "::" in words else tests[0]
+    lost = [one.split(" - ")[0] for one in said.read_text("utf-8", "replace").splitlines() if one.startswith(LOST)]
+    named = re.search(r"tests/(test_\w+\.py::.*)", lost[-1]) if lost else None
+    return named[1] if named else tests[0]
 
 
 def spanned(source: str, line: int) -> range:
