@@ -7,9 +7,10 @@ recordings and the new one. What it cannot follow, d, decides:
     expected log-odds = sum d^2 / (2 sigma^2 tau)        [nats]
 
 with sigma the RMS of the residual that our structure leaves now and tau its correlation in rows. The other way round it
-is computed too, and the smaller of both counts. Parameters that the old recordings tell badly are what a refit uses to
-follow, so their uncertainty is in it. What is not between two structures (something without a name, an effect that no
-recording could show) is sought where nothing was visited yet.
+is computed too, and the smaller of both counts; but a structure follows its own special case perfectly, so between such
+two it is asked what would show if the general one were right. Parameters that the old recordings tell badly are what a
+refit uses to follow, so their uncertainty is in it. What is not between two structures (something without a name, an
+effect that no recording could show) is sought where nothing was visited yet.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -158,10 +159,11 @@ class _Weighed:
 
     def __init__(self, problem: Problem, duel: Duel) -> None:
         ways = ((duel.ours, duel.other), (duel.other, duel.ours))
-        self._ways = [_Way(problem, true, refitted) for true, refitted in ways]
+        used = {"ours": ways[:1], "other": ways[1:]}.get(duel.general, ways)
+        self._ways = [_Way(problem, true, refitted) for true, refitted in used]
 
     def nats(self, piece: Piece) -> float:
-        """The smaller of both expectations."""
+        """The smaller of both expectations; that of the general structure where the other is a special case of it."""
         return min(way.nats(piece) for way in self._ways)
 
 

@@ -48,6 +48,17 @@ class Duel:
     ours: Fit
     other: Fit
 
+    @property
+    def general(self) -> Literal["ours", "other", ""]:
+        """Which of both holds the other as a special case; "" where neither does."""
+        if self.question.kind == "uncertain":
+            return "ours"
+        ours, other = ({one.id: one.special_case_of for one in fit.mount.effects} for fit in (self.ours, self.other))
+        only, others = set(ours) - set(other), set(other) - set(ours)
+        if any(others & set(ours[name]) for name in only):
+            return "other"
+        return "ours" if any(only & set(other[name]) for name in others) else ""
+
 
 def problem_of(train: Sequence[Recording], card: Card) -> Problem:
     """What fits of the training recordings share, in the band of the diagnosis."""

@@ -1,0 +1,78 @@
+"""Which motion tells two structures apart: the one on which they differ after a refit, whichever of them is right."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.estimation.problem import Problem
+from cosim.investigation.design import Plan, Rated, best, piece_of, plans, shown_by_motion
+from cosim.investigation.families import fast_tone
+from cosim.investigation.limits import Limits
+from cosim.investigation.machine import CoSimulated
+from cosim.investigation.motions import Rest, room_of
+from cosim.investigation.questions import Duel, Question, problem_of
+from cosim.system.scenario import read_scenario
+from pyfmi_models.card import read_card
+from pyfmi_models.effects import CATALOGUE, Effect, GravityUnbalance
+from tests.investigations import CABLE, written
+
+LIMITS = Limits(-1.5, 1.5, 1.0, 3.0, 60.0, 2.4)
+SET, DOUBT = Question("set", ("cable_wrap", "torque_offset"), "set"), Question("uncertain", ("cable_wrap",), "doubt")
+(CABLE_WRAP, OFFSET) = (CATALOGUE[name][0] for name in ("cable_wrap", "torque_offset"))
+
+
+@pytest.fixture(scope="module")
+def problem(tmp_path_factory: pytest.TempPathFactory) -> Problem:
+    folder: Path = tmp_path_factory.mktemp("axis")
+    scenario, card, machine = written(folder, CABLE)
+    loop = CoSimulated(read_scenario(scenario), machine)
+    return problem_of([loop.record(loop.own(), 0, folder / "first.parquet")], read_card(card))
+
+
+def duel(problem: Problem, question: Question, other: Effect | None) -> Duel:
+    ours = replace(problem.mount, effects=(CABLE_WRAP(stiffness=2.0, home=0.05),))  # type: ignore[call-arg]
+    rival = replace(problem.mount, effects=(other,) if other else ())
+    return Duel(question, problem.fit(ours, 15), problem.fit(rival, 15))
+
+
+def rated(problem: Problem, one: Duel) -> Rated:
+    return plans(room_of(LIMITS, 0.0, 12.0, 1, False), problem, one.ours, [one], LIMITS, 0.0)
+
+
+def nats(found: Rated) -> dict[str, float]:
+    return {plan.motion.family: plan.nats[0] for plan in found.plans}
+
+
+def test_a_long_stroke_tells_a_cable_from_a_weight_and_a_fast_tone_does_not(problem: Problem) -> None:
+    found = rated(problem, duel(problem, SET, GravityUnbalance(mgl=2.0, phase=0.0)))
+    told = nats(found)
+    assert told["slow sweep"] > 10 * told["fast tone"]
+    chosen = best(found.plans, True)
+    assert chosen is not None
+    assert chosen.worth == 10.0  # what settles it; of those, the one of most new ground
+
+
+def test_a_doubtful_name_and_a_special_case_are_asked_from_the_general_side(problem: Problem) -> None:
+    """With the cable a model follows one without it, so the other side alone would never promise anything."""
+    for question, other in ((DOUBT, None), (SET, OFFSET(torque=0.1))):  # type: ignore[call-arg]
+        one = duel(problem, question, other)
+        assert one.general == "ours"
+        assert nats(rated(problem, one))["slow sweep"] > 10.0
+
+
+def test_what_needs_another_load_is_shown_by_no_motion(problem: Problem) -> None:
+    ours = problem.fit(problem.mount, 5)
+    motion = fast_tone(room_of(LIMITS, 0.0, 12.0, 1, False))
+    piece, _ = piece_of(motion, 0.0, problem.prepared.cutoff, LIMITS)
+    names = ("load_dependent_friction", "compliance")
+    assert shown_by_motion(names, ours, [piece], 0.1) == {"compliance"}
+
+
+def test_a_motion_that_tells_less_than_a_set_asks_for_is_not_run() -> None:
+    still = replace(fast_tone(room_of(LIMITS, 0.0, 12.0, 1, False)), parts=(Rest(12.0),))
+    assert best([Plan(still, (1.9,), 1.0)], True) is None
+    assert best([Plan(still, (), 0.5)], False, ("fast tone",)) is None
+    assert best([Plan(still, (), 0.5)], False) is not None
+    assert np.isclose(Plan(still, (30.0, 4.0), 0.0).worth, 14.0)
