@@ -228,3 +228,23 @@ def test_without_the_compiled_loop_there_is_no_solver(
     monkeypatch.setattr("cosim.master.exchange.library", lambda: None)
     with pytest.raises(FmuError, match="its solver needs the compiled loop, which is missing here"):
         ExchangeComponent(fmus["lugre", 3])
+
+
+@VERSIONS
+def test_nominals_are_those_of_the_fmu_and_1_where_it_says_none(
+    fmus: dict[tuple[str, int], Path], fmi: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The solver's tolerance of a state goes by them; FMI wants them above 0 and finite."""
+
+    def nominals(component: ExchangeComponent) -> list[float]:
+        component.start({})
+        return list(component._arrays_kept["nominals"][:3])
+
+    def said(target: Any, count: int) -> None:
+        assert count == 3
+        target[0], target[1], target[2] = 0.0, -2.0, float("nan")
+
+    with ExchangeComponent(fmus["lugre", fmi]) as component:
+        assert nominals(component) == [1.0, 0.01, 1e-5]
+        monkeypatch.setattr(component._fmu, "getNominalsOfContinuousStates", said)
+        assert nominals(component) == [1.0, 1.0, 1.0]

@@ -9,7 +9,7 @@ import pytest
 from test_cli_run import scenario
 from tiny_fmu import tiny
 
-from cosim.master.isolated import Call, Watch, run_isolated
+from cosim.master.isolated import CALL_TIMEOUT, GRACE, Call, Watch, run_isolated
 from cosim.master.loop.structures import CLoop
 from cosim.master.simulate import Options
 from cosim.support.activity import Board
@@ -125,6 +125,12 @@ def test_a_time_is_said_only_of_a_step_and_a_process_may_end_outside_of_all_call
     board.write("odd", "loaded")
     error = Watch(board, 0.001, 2.0).error(LostError("crashed", "reason", 1), given)
     assert str(error).startswith("odd ended its process with exit code 1 while it was loaded; a component must return")
+
+
+def test_the_times_are_those_that_the_documentation_promises() -> None:
+    text = (Path(__file__).parents[1] / "docs" / "other_tools.md").read_text("utf-8")
+    assert f"`... did not return within {CALL_TIMEOUT:g} s while it was loaded;" in text
+    assert f"ends it if a call does not return within {GRACE:g} s" in text
 
 
 SPEAKING = """

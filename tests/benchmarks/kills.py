@@ -1,6 +1,6 @@
 """Commands that are ended at any moment: is a file half written, does anything still run, is anything left behind?
 
-    python tests/benchmarks/kills.py --trials 50 --out results/kills [--only run sweep] [--journal FILE]
+    python tests/benchmarks/kills.py --trials 50 --out results/kills [--only run sweep] [--journal FILE [--so-far]]
 
 Each command is run once to its end, and then again and again, ended by SIGKILL, SIGINT or SIGTERM at a moment drawn
 from that time. Afterwards every file under its own name must be whole. After SIGINT and SIGTERM there must be no
@@ -71,6 +71,7 @@ class Counts:
     """What was found in the trials of a command with a signal, and how many there were."""
 
     trials: int = 0
+    seed: int = 1
     found: dict[str, int] = field(default_factory=lambda: dict.fromkeys(COUNTED, 0))
 
     def add(self, **found: int) -> None:
@@ -172,14 +173,17 @@ def page(found: dict[tuple[str, str], Counts], undone: dict[str, int], command: 
         "",
         f"mount-cosim {__version__}. What the columns mean stands at the top of `tests/benchmarks/kills.py`.",
         "",
-        "| command | signal | trials | " + " | ".join(COUNTED) + " |",
-        "|---|---|" + "--:|" * (1 + len(COUNTED)),
+        "| command | signal | seed | trials | " + " | ".join(COUNTED) + " |",
+        "|---|---|" + "--:|" * (2 + len(COUNTED)),
         *(
-            f"| {name} | {how} | {one.trials} | " + " | ".join(str(one.found[key]) for key in COUNTED) + " |"
+            f"| {name} | {how} | {one.seed} | {one.trials} | "
+            + " | ".join(str(one.found[key]) for key in COUNTED)
+            + " |"
             for (name, how), one in found.items()
         ),
         "",
-        "Where there are fewer trials than asked for, that part was run with fewer.",
+        "Where there are fewer trials than asked for, that part was run with fewer; "
+        "a part of another seed was run apart.",
         "",
         "Run again after the last SIGKILL, what was wrong: "
         + ", ".join(f"{name} {count}" for name, count in undone.items())
@@ -194,7 +198,7 @@ def journalled(journal: Path | None) -> tuple[dict[tuple[str, str], Counts], dic
     undone: dict[str, int] = {}
     for line in journal.read_text("utf-8").splitlines() if journal and journal.exists() else []:
         one = json.loads(line)
-        found[one["command"], one["signal"]] = Counts(one["trials"], one["found"])
+        found[one["command"], one["signal"]] = Counts(one["trials"], one["seed"], one["found"])
         undone |= one["undone"]
     return found, undone
 
@@ -205,7 +209,7 @@ def ended(name: str, command: list[str], kill: signal.Signals, given: argparse.N
     if any(good.values()):
         raise SystemExit(f"{name} does not end well by itself: {good}: {(folder / 'good/said').read_text()}")
     rmtree(folder / "good")
-    dice, counts, undone = Random(f"{given.seed}.{name}.{kill.name}"), Counts(), {}
+    dice, counts, undone = Random(f"{given.seed}.{name}.{kill.name}"), Counts(seed=given.seed), {}
     for number in range(given.trials):
         here = folder / f"{name}{kill.name}{number}"
         counts.add(**trial(command, here, kill, dice.uniform(0, seconds))[0])
@@ -222,8 +226,12 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--only", nargs="*", default=["run", "sweep", "export", "diagnose", "hardware"])
     parser.add_argument("--journal", type=Path, help="file of what is done: a run that ended early goes on from there")
+    parser.add_argument("--so-far", action="store_true", help="only write the table of what the journal has")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
+    if given.so_far:
+        written(given)
+        return
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell lets what runs in its background ignore it
     folder = Path(tempfile.mkdtemp(prefix="kills-"))
     journal = given.journal or folder / "journal"
@@ -235,9 +243,14 @@ def main() -> None:
                 print(line, flush=True)
                 with journal.open("a", encoding="utf-8") as file:
                     file.write(line + "\n")
-        found, undone = journalled(journal)
+        written(argparse.Namespace(**{**vars(given), "journal": journal}))
     finally:
         rmtree(folder, ignore_errors=True)
+
+
+def written(given: argparse.Namespace) -> None:
+    """Write the table of what the journal has; rows may be of runs with other seeds."""
+    found, undone = journalled(given.journal)
     given.out.mkdir(parents=True, exist_ok=True)
     line = f"python tests/benchmarks/kills.py --trials {given.trials} --seed {given.seed} --out results/kills"
     with replacing(given.out / "README.md", force=True) as partial:

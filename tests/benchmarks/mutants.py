@@ -20,7 +20,6 @@ import signal
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -35,11 +34,9 @@ import scipy.signal  # noqa: F401
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 
+from mutants_page import Tried, journalled, written  # noqa: E402
 from mutations import mutated, sites  # noqa: E402
 from reach import Reached, read  # noqa: E402
-
-from cosim.support.files import replacing  # noqa: E402
-from cosim.support.version import __version__  # noqa: E402
 
 HOME = Path(__file__).parents[2]
 GROUPS = {
@@ -65,22 +62,10 @@ BUDGET, MANY = 20.0, 120
 """Seconds that the tests of a mutant take without it in all, and how many tests that are at most."""
 LOST = ("FAILED", "ERROR")
 """What pytest says of a test that noticed."""
-OURS = ("cosim", "cosim_studies", "pyfmi_models", "mutants", "mutations", "reach")
+OURS = ("cosim", "cosim_studies", "pyfmi_models", "mutants", "mutants_page", "mutations", "reach")
 """What a fork loads anew, from the tree with the error."""
 SLOW = ("test_attack", "test_prove", "test_proof", "test_serve", "test_benchmarks", "test_same_bits", "test_platforms")
 """Test files that are not asked: a mutant that only they would notice counts as survived."""
-
-
-@dataclass(frozen=True)
-class Tried:
-    """A mutant: its group, module, place in the list of its sites, line, what was changed, and who noticed."""
-
-    group: str
-    module: str
-    site: int
-    line: int
-    change: str
-    noticed: str
 
 
 @cache
@@ -185,12 +170,11 @@ def calling(module: str, source: str, line: int, reached: Sequence[Reached]) -> 
             ranked.append((told.get(name, 0), one.seconds, one.test))
             told[name] = told.get(name, 0) + 1
     spent, found = 0.0, []
-    for _, seconds, test in sorted(ranked)[:MANY]:
-        if found and spent + seconds > BUDGET:
-            break
-        spent += seconds
-        found.append(test.removeprefix("tests/"))
-    return tuple(found)
+    for _, seconds, test in sorted(ranked):
+        if not found or spent + seconds <= BUDGET:  # a cheap one may stand behind one that takes too long
+            spent += seconds
+            found.append(test.removeprefix("tests/"))
+    return tuple(found[:MANY])
 
 
 def _tested(tree: Path, tests: Sequence[str], said: Path) -> int:
@@ -232,28 +216,6 @@ def attempt(tree: Path, group: str, path: Path, site: int, reached: Sequence[Rea
         known.remove(witness)
 
 
-def journalled(journal: Path) -> list[Tried]:
-    """What a journal has; nothing where there is none."""
-    return [Tried(**json.loads(one)) for one in journal.read_text("utf-8").splitlines()] if journal.exists() else []
-
-
-def page(tried: Sequence[Tried], command: str) -> str:
-    """The table for people, and the survivors."""
-    rows = []
-    for name in [*GROUPS, "all"]:
-        here = [one for one in tried if name in (one.group, "all")]
-        killed = sum(bool(one.noticed) for one in here)
-        rows.append(f"| {name} | {len(here)} | {killed} | {len(here) - killed} | {killed / max(1, len(here)):.0%} |")
-    late = sum(one.noticed.endswith("(time)") for one in tried)
-    head = "What a mutant is and which tests are asked stands at the top of `tests/benchmarks/mutants.py`"
-    lines = ["# Small errors planted in the code", "", f"    {command}", "", f"mount-cosim {__version__}. {head}."]
-    lines += [f"{late} of the killed were noticed because a test no longer ended.", ""]
-    lines += ["| modules | mutants | killed | survived | rate |", "|---|--:|--:|--:|--:|", *rows, ""]
-    lines += ["## Survivors", "", "| module | line | change |", "|---|--:|---|"]
-    lines += [f"| {one.module} | {one.line} | `{one.change}` |" for one in tried if not one.noticed]
-    return "\n".join(lines) + "\n"
-
-
 def main() -> None:
     """Plant, count, and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -261,8 +223,12 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=160)
     parser.add_argument("--reach", type=Path, help="file that reach.py wrote")
     parser.add_argument("--journal", type=Path, help="file of what is done: a run that ended early goes on from there")
+    parser.add_argument("--so-far", action="store_true", help="only write the table of what the journal has")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
+    if given.so_far:
+        written(journalled(given.journal), given.seed, given.count, given.out)
+        return
     folder = Path(tempfile.mkdtemp(prefix="mutants-"))
     reached = read(given.reach) if given.reach else []
     journal = given.journal or folder / "journal"
@@ -278,10 +244,7 @@ def main() -> None:
         tried_all = journalled(journal)
     finally:
         rmtree(folder, ignore_errors=True)
-    command = f"python tests/benchmarks/mutants.py --seed {given.seed} --count {given.count} --out results/mutants"
-    given.out.mkdir(parents=True, exist_ok=True)
-    with replacing(given.out / "README.md", force=True) as partial:
-        partial.write_text(page(tried_all, command), "utf-8")
+    written(tried_all, given.seed, given.count, given.out)
 
 
 if __name__ == "__main__":
