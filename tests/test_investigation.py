@@ -4,13 +4,13 @@ import json
 from pathlib import Path
 
 import pytest
+from investigations import CABLE, DWELL, LIMITS, written
 
 from cosim.api.investigate import investigate
 from cosim.cli import main
 from cosim.cli.investigate import seconds_of
 from cosim.investigation.machine import CoSimulated
 from cosim.support.errors import InputError, OutputError
-from tests.investigations import CABLE, DWELL, LIMITS, written
 
 
 def test_one_answer_needs_no_further_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

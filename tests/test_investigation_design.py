@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from investigations import CABLE, written
 
 from cosim.estimation.problem import Problem
 from cosim.investigation.design import Plan, Rated, best, piece_of, plans, shown_by_motion
@@ -16,7 +17,6 @@ from cosim.investigation.questions import Duel, Question, problem_of
 from cosim.system.scenario import read_scenario
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import CATALOGUE, Effect, GravityUnbalance
-from tests.investigations import CABLE, written
 
 LIMITS = Limits(-1.5, 1.5, 1.0, 3.0, 60.0, 2.4)
 SET, DOUBT = Question("set", ("cable_wrap", "torque_offset"), "set"), Question("uncertain", ("cable_wrap",), "doubt")

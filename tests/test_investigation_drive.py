@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from investigations import CABLE, on_a_drive
 
 from cosim.api.investigate import investigate
 from cosim.cli import main
@@ -12,7 +13,6 @@ from cosim.hardware.machine import Machine, changed, read_machine
 from cosim.hardware.words import ENTERED
 from cosim.investigation.drive import thinned
 from cosim.support.errors import HardwareError
-from tests.investigations import CABLE, on_a_drive
 
 RANGE = {"position": "-0.35:0.35"}
 

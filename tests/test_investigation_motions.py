@@ -1,14 +1,16 @@
 """Motions of an investigation: inside their limits whatever these are, and smooth."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.data.recording import Recording
-from cosim.investigation.families import FAMILIES, motions
+from cosim.investigation.families import FAMILIES, fast_sweeps, motions, slow_sweep, stop_and_go
 from cosim.investigation.limits import Limits
-from cosim.investigation.motions import Room, room_of
+from cosim.investigation.motions import Motion, Room, room_of
 
 SIZES = st.floats(1e-3, 10.0)
 LIMITS = Limits(-1.0, 1.0, 0.5, 2.0, 50.0, 5.0)
@@ -40,6 +42,28 @@ def test_a_motion_lasts_as_long_as_asked_begins_and_ends_at_rest_and_is_smooth(n
         assert q[-1] == pytest.approx(0.0), motion.family  # back where it began: a drive is there before the next one
         assert np.abs(np.gradient(q, t) - v).max() < 1e-3 * 0.5  # half a step of the acceleration
         assert np.abs(np.diff(a)).max() < 2 * 20 * 2.0 * 1e-3  # jerk: 20 accelerations a second, half of it to spare
+
+
+@pytest.mark.parametrize("family", [slow_sweep, fast_sweeps])
+@pytest.mark.parametrize("home", [0.0, 0.8])
+def test_a_sweep_goes_both_ways_as_far_as_the_time_allows(family: Callable[[Room], Motion], home: float) -> None:
+    reach = []
+    for seconds in (8.0, 20.0):
+        q, _, _ = family(room_of(LIMITS, home, seconds, 3, False)).sampled(np.arange(0.0, seconds, 1e-2))
+        assert q.min() < 0 < q.max()
+        reach.append(np.ptp(q))
+    assert reach[1] == pytest.approx(1.8, rel=1e-3)
+    assert reach[0] < 1.2
+
+
+def test_a_stop_and_go_rests_for_different_times_whatever_the_time() -> None:
+    for seconds in (8.0, 20.0):
+        t = np.arange(0.0, seconds, 1e-3)
+        moving = np.abs(stop_and_go(room_of(LIMITS, 0.0, seconds, 3, False)).sampled(t)[1]) > 1e-6
+        starts, stops = (np.flatnonzero(np.diff(moving.astype(int)) == way) for way in (1, -1))
+        rests = t[starts[1:6]] - t[stops[:5]]
+        assert len(starts) >= 6
+        assert rests[2] / rests[0] == pytest.approx(10.0, rel=0.25)  # 3 s after 0.3 s, or a share of both
 
 
 def test_a_recording_that_overshoots_is_named() -> None:

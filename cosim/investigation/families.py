@@ -5,7 +5,7 @@ Each is a function of the room; what it cannot do there in the time it leaves ou
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from math import ceil, pi
+from math import ceil, pi, sqrt
 
 import numpy as np
 
@@ -17,6 +17,10 @@ RESTS = (0.3, 1.0, 3.0)
 """Rests before the same move [s]."""
 TONES = 10
 """Tones of a multisine: a decade has four or more of them."""
+RESTING = 0.6
+"""Most of the time that a stop-and-go rests. Unit: 1."""
+LEAST_ROOM = 0.95
+"""Share of the time that a sweep at full speed may take: what is left covers rounding. Unit: 1."""
 STEPS, WAY = 8, 5.0
 """Reversals of a ladder, and its way in units of the first half stroke: 1 + 3/2 + 3/4 + ..., and to its middle."""
 
@@ -55,17 +59,37 @@ def _holds(room: Room, half: float) -> bool:
 
 
 def slow_sweep(room: Room) -> Motion:
-    """Over the whole stroke as slowly as the time allows."""
-    lasts = room.seconds - 2 * FADE - 4 * (1 / JERK)
-    way = abs(room.first) + 2 * room.reach
-    speed = min(room.speed, 1.1 * way / lasts)
-    moves: list[Part] = [Move(to, speed, room.acceleration) for to in (room.first, room.second, room.first)]
-    return Motion("slow sweep", "a slow sweep over the whole stroke, both ways", _filled(room, moves))
+    """From end to end as slowly as the time allows; shorter where even full speed would not do."""
+    left, way = _left(room), _way(room)
+    ramps = 3 / room.acceleration
+    speed = min(room.speed, 2 * way / (left + sqrt(max(left**2 - 4 * ramps * way, 0.0))))
+    share = way / (2 * room.reach)
+    moves: list[Part] = [Move(share * to, speed, room.acceleration) for to in (room.first, room.second)]
+    back = Move(0.0, speed, room.acceleration)
+    rest = room.seconds - FADE - _lasts([*moves, back])
+    return Motion("slow sweep", "a slow sweep from end to end and back", (Rest(FADE), *moves, back, Rest(rest)))
+
+
+def _left(room: Room) -> float:
+    """Seconds for three moves: there, over, back."""
+    return room.seconds - 2 * FADE - 3 / JERK
+
+
+def _way(room: Room) -> float:
+    """From here to one end, to the other and back here; as much of it as full speed does in the time."""
+    fastest = min(room.speed, _left(room) * room.acceleration / 6)
+    return min(2 * room.reach, LEAST_ROOM * fastest * (_left(room) - 3 * fastest / room.acceleration))
+
+
+def _lasts(parts: list[Part]) -> float:
+    """Seconds of parts one after the other, from where the axis stands."""
+    return Motion("", "", tuple(parts)).seconds
 
 
 def fast_sweeps(room: Room) -> Motion:
     """End to end at full speed, which also warms it up."""
-    moves: list[Part] = [Move(to, room.speed, room.acceleration) for to in (room.first, room.second)]
+    share = _way(room) / (2 * room.reach)
+    moves: list[Part] = [Move(share * to, room.speed, room.acceleration) for to in (room.first, room.second)]
     return Motion("warm-up", "sweeps at full speed, the same early and late", _filled(room, moves))
 
 
@@ -84,14 +108,18 @@ def speed_ladder(room: Room) -> Motion:
 
 
 def stop_and_go(room: Room) -> Motion:
-    """The same move after rests of different lengths."""
+    """The same move after rests of different lengths, which are shorter where the time is."""
+    left, many = room.seconds - 2 * FADE, 2 * len(RESTS)
+    shorter = min(1.0, RESTING * left / (2 * sum(RESTS)))
+    takes = (left - 2 * shorter * sum(RESTS)) / (many + 1)
+    speed = min(room.speed / 2, room.acceleration * max(takes - 1 / JERK, 0.0) / 3)
+    way = min(speed * max(takes - speed / room.acceleration - 1 / JERK, 0.0), room.reach / 4)
+    far = room.first if abs(room.first) >= way else room.second
     parts: list[Part] = []
-    way, here = 0.25 * room.reach, 0.0
-    step = way if room.first >= room.second else -way
     for number, rest in enumerate(RESTS * 2):
-        here = step if number % 2 == 0 and _holds(room, way) else 0.0 if number % 2 else room.middle + step
-        parts += [Move(here, 0.5 * room.speed, room.acceleration), Rest(rest)]
-    return Motion("stop-and-go", "the same move after rests of 0.3, 1 and 3 s", _filled(room, parts))
+        to = 0.0 if number % 2 else way * (1.0 if far > 0 else -1.0)
+        parts += [Move(to, speed, room.acceleration), Rest(shorter * rest)]
+    return Motion("stop-and-go", "the same move after rests of different lengths", _filled(room, parts))
 
 
 def reversal_ladder(room: Room) -> Motion:

@@ -8,6 +8,7 @@ a plant with a concealed cable, in its loop. Counted: recordings beyond a limit,
 """
 
 import argparse
+import sys
 from collections import Counter
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,7 +24,9 @@ from cosim.investigation.questions import problem_of
 from cosim.support.version import __version__
 from cosim.system.scenario import read_scenario
 from pyfmi_models.card import read_card
-from tests.investigations import CABLE, written
+
+sys.path.append(str(Path(__file__).parents[1]))
+from investigations import CABLE, written
 
 SECONDS, CUTOFF = 8.0, 30.0
 """Length of each motion [s]; band of the predicted torque [Hz]."""
