@@ -1,6 +1,7 @@
 """The loop that asks the machine: it decides, it keeps to its limits, and a kill loses nothing."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -9,7 +10,10 @@ from investigations import CABLE, DWELL, LIMITS, written
 from cosim.api.investigate import investigate
 from cosim.cli import main
 from cosim.cli.investigate import seconds_of
+from cosim.data.recording import Recording
 from cosim.investigation.machine import CoSimulated
+from cosim.investigation.motions import Motion
+from cosim.investigation.story import Moved
 from cosim.support.errors import InputError, OutputError
 
 
@@ -88,6 +92,32 @@ def test_a_machine_that_leaves_a_limit_is_not_moved_again(tmp_path: Path) -> Non
     with pytest.raises(InputError, match="left a limit: torque"):
         investigate(*given[:2], tmp_path / "out", machine=given[2], limits={"torque": "1.5"})
     assert len([*(tmp_path / "out" / "recordings").iterdir()]) == 1
+
+
+def test_a_limit_left_on_the_way_is_the_end_is_said_and_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    given, out = written(tmp_path, DWELL), tmp_path / "out"
+    record = CoSimulated.record
+
+    def overshot(self: CoSimulated, motion: Motion, number: int, path: Path) -> Recording:
+        found = record(self, motion, number, path)
+        if number < 3:
+            return found
+        path.unlink()
+        replace(found, table=found.table | {"q": 3 * found["q"]}).write(path)
+        return Recording.read(path)
+
+    monkeypatch.setattr(CoSimulated, "record", overshot)
+    done = investigate(*given[:2], out, machine=given[2], budget=100, seconds=10, limits=LIMITS)
+    assert done.story.ended == "limit left"
+    last = done.story.steps[-1]
+    assert isinstance(last, Moved)
+    assert (last.number, last.left.partition(" ")[0]) == (3, "position")
+    assert (out / last.file).exists()
+    assert "LEFT position" in str(done)
+    again = investigate(*given[:2], out, machine=given[2], budget=100, seconds=10, limits=LIMITS)
+    assert [one.number for one in again.story.steps if isinstance(one, Moved)] == [0, 1, 3]
 
 
 @pytest.mark.parametrize(("text", "seconds"), [("300", 300), ("300s", 300), ("1.5min", 90), ("1 h", 3600)])
