@@ -15,7 +15,7 @@ from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from cosim_studies.proof.generator import make_case, write_case
 from cosim_studies.proof.tool import given
-from pyfmi_models.effects import TorqueOffset
+from pyfmi_models.effects import FrictionAsymmetry, TorqueOffset
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
@@ -73,6 +73,20 @@ def test_what_acts_in_one_second_of_a_minute_predicts() -> None:
     v = 1 + 2 * np.exp(-(((t - 30.5) / 0.15) ** 2)) + 0.1 * np.sin(t)
     recording = held_out(white(2) + 0.3 * v**2, v)
     assert predicted(recording, QuadraticDrag(coefficient=0.3)) > POLICY.least_predicted
+
+
+def test_what_training_leaves_open_of_an_effect_is_not_held_against_it() -> None:
+    """Near one speed each way an asymmetry of the level and one of the viscous friction are much the same."""
+    t = np.arange(SECONDS * RATE) / RATE
+    steady, swinging = np.tanh(20 * np.sin(t)) * (1 + 0.2 * np.sin(0.37 * t)), np.sin(t) * (1.5 + np.sin(0.3 * t))
+    trained = held_out(white(1) + 0.1 * np.abs(steady), steady)
+    prepared, there = (prepare([one], 30.0) for one in (trained, held_out(white(2) + 0.1 * np.abs(swinging), swinging)))
+    problem = Problem(axis(), prepared, np.ones(len(prepared.recording_of)), 1 / RATE)
+    base, found = (problem.fit(axis(*effects), 15) for effects in ((), (FrictionAsymmetry(level_asymmetry=0.03),)))
+    held = Predictive.of(Comparison.of(problem, base, POLICY), there, base, there)
+    assert held.log_likelihood(held.residual(found.mount)) < held.predicted(base)
+    assert held.predicted(found) > held.predicted(base) + POLICY.least_predicted
+    assert held.predicted(base) == held.log_likelihood(held.residual(base.mount))
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.2])

@@ -146,6 +146,7 @@ def test_what_is_sure_but_a_small_share_of_the_rest_or_of_a_name_does_not_say_un
     assert found.says_unknown(POLICY, 0.0)
     assert not replace(found, after=0.95 * found.before).says_unknown(POLICY, 0.0)
     assert not found.says_unknown(POLICY, min(found.evidence) + 1)
+    assert not replace(found, quantities=("speed",)).says_unknown(POLICY, 0.0)  # another friction law, no more
 
 
 def test_the_size_of_a_term_is_that_of_what_was_missing() -> None:

@@ -104,14 +104,22 @@ def test_a_large_rest_is_unknown_and_goes_with_what_makes_it(extra: Extra, goes_
     assert goes_with in decision.depends_on
 
 
+def stuck(now: dict[str, Array]) -> Array:
+    """Friction that has the old sign for .06 s after a turn, as where an axis sticks within a step of its encoder."""
+    turned = last_reversal(now["q"], 1e-6)[0]
+    after = now["t"] - now["t"][turned]
+    return np.where((after < 0.06) & (turned > 0), -2 * FC * np.sign(now["v"]), 0.0)
+
+
 @pytest.mark.parametrize(
     "extra",
     [
+        stuck,
         lambda now: 0 * now["t"],
         lambda now: 0.04 * FC * np.sign(now["v"]) * np.sin(0.9 * now["t"] + now["run"]),
         lambda now: 0.3 * FC * np.random.default_rng(0).standard_normal(len(now["t"])),
     ],
-    ids=["nothing", "wandering level", "noise"],
+    ids=["sticks at turns", "nothing", "wandering level", "noise"],
 )
 def test_a_small_rest_and_noise_are_nothing_to_explain(extra: Extra) -> None:
     residual, decision = left(extra)

@@ -6,12 +6,13 @@ recording, as a warm-up can, is missing as well.
 """
 
 import numpy as np
+from scipy.ndimage import minimum_filter1d
 
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.predictive import Predictive
 from cosim.estimation.fit import Fit
 from cosim.estimation.least_squares import projected
-from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.row_weights import least_speed
 
 CELL = 0.25
@@ -49,8 +50,21 @@ def over_time(comparison: Comparison, found: Fit) -> str:
 
 
 def _clear(prepared: Prepared) -> Array:
-    v = prepared.stacked("v")
-    return np.asarray(np.abs(v) > least_speed(v), float)
+    """1 in clear motion that no turn is near, else 0.
+
+    Friction steps at a turn, and the filter smears what a law lacks there over the period of its cutoff: an axis that
+    sticks within a step of its encoder leaves there more than most effects.
+    """
+    least = least_speed(prepared.stacked("v"))
+    return np.concatenate([_far_from_turns(piece, least)[piece.kept] for piece in prepared.pieces])
+
+
+def _far_from_turns(piece: Piece, least: float) -> Array:
+    """1 where the motion is clear for a period of the cutoff before and after a row, else 0."""
+    clear = np.abs(piece.v) > least
+    clear &= np.diff(np.sign(piece.v), prepend=np.sign(piece.v[:1])) == 0
+    width = 2 * max(1, round(1 / (piece.cutoff * piece.dt))) + 1
+    return np.asarray(minimum_filter1d(clear.astype(np.uint8), width), float)
 
 
 def _friction(comparison: Comparison, clear: Array) -> float:

@@ -12,7 +12,7 @@ from cosim.diagnosis.locate import where
 from cosim.diagnosis.result import Answer, Finding, Trace
 from cosim.diagnosis.rivals import AcceptedEffect
 from cosim.diagnosis.search import CandidateFit
-from cosim.estimation.blocks import Blocks, sandwich
+from cosim.estimation.blocks import Blocks, covariance
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
 from pyfmi_models.effects import Effect
@@ -36,10 +36,8 @@ class Numbers:
 
 def standard_errors(chosen: Fit, blocks: Blocks, weight: Array) -> dict[str, float]:
     """Block-robust standard errors of all fitted parameters (sandwich with blocks as clusters)."""
-    slopes = chosen.slopes * weight[:, None]
-    scale = np.sqrt((slopes**2).sum(0)) + 1e-300
-    covariance = sandwich(slopes / scale, chosen.residual * weight, blocks, rcond=1e-10)
-    return dict(zip(chosen.free, (np.sqrt(np.maximum(np.diag(covariance), 0)) / scale).tolist(), strict=True))
+    spread = covariance(chosen.slopes * weight[:, None], chosen.residual * weight, blocks)
+    return dict(zip(chosen.free, np.sqrt(np.maximum(np.diag(spread), 0)).tolist(), strict=True))
 
 
 def numbers_of(effect: Effect, mount: Mount, errors: Mapping[str, float]) -> Numbers:

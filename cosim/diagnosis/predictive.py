@@ -19,9 +19,11 @@ from cosim.diagnosis.discrepancy import Discrepancy, Shapes, discrepancy
 from cosim.diagnosis.marginal import Group, marginal
 from cosim.diagnosis.policy import Policy
 from cosim.diagnosis.protocol import is_noise, residuals
+from cosim.estimation.blocks import Blocks, covariance
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import weights
 from pyfmi_models.mount import Mount
 
@@ -48,6 +50,9 @@ class Predictive:
     halved: float
     protocol: Prepared
     """The same recordings in the band of the protocol, whose error is what is printed."""
+    training: Problem
+    base: tuple[str, ...]
+    """Names of the base's fitted numbers."""
 
     @classmethod
     def of(cls, comparison: Comparison, prepared: Prepared, base: Fit, protocol: Prepared) -> "Predictive":
@@ -65,6 +70,8 @@ class Predictive:
             floor,
             comparison.policy.halved,
             protocol,
+            comparison.problem,
+            base.free,
         )
 
     def as_delivered(self) -> "Predictive":
@@ -82,9 +89,23 @@ class Predictive:
         """Derivatives of the needed torque by the fitted numbers of a structure, at the kept rows."""
         return stacked(Inverse(found.mount, found.free), self.prepared.pieces, found.values)[1]
 
-    def log_likelihood(self, residual: Array) -> float:
-        """Log-likelihood of a residual at the kept rows, nuisances integrated out."""
-        target = self.bands.transform(residual[:, None])
+    def predicted(self, found: Fit) -> float:
+        """Log-likelihood of a structure fitted to training, what that leaves open of its effects integrated out."""
+        own = [k for k, name in enumerate(found.free) if name not in self.base]
+        weight = self.training.weight
+        slopes, blocks = found.slopes * weight[:, None], Blocks.of(self.training.prepared)
+        spread = covariance(slopes, found.residual * weight, blocks)[np.ix_(own, own)]
+        size, axes = np.linalg.eigh(spread / np.outer(scale := _sizes(spread), scale))
+        open_ = self.slopes(found)[:, own] @ (scale[:, None] * axes * np.sqrt(np.maximum(size, 0)))
+        return self.log_likelihood(self.residual(found.mount), open_)
+
+    def log_likelihood(self, residual: Array, open_: Array | None = None) -> float:
+        """Log-likelihood of a residual at the kept rows, nuisances integrated out.
+
+        `open_` are columns (rows, n) of which a standard normal amount may be in it.
+        """
+        columns = residual[:, None] if open_ is None else np.column_stack([residual, open_])
+        target = self.bands.transform(columns)
         cross = self.bands.crossed(target, self._nuisances)
         grams = np.concatenate(
             [
@@ -93,7 +114,8 @@ class Predictive:
             ],
             axis=1,
         )
-        groups = [Group(np.array(group.columns), group.prior) for group in self.nuisances.groups]
+        first = columns.shape[1] - 1
+        groups = [Group(first + np.array(group.columns), group.prior) for group in self.nuisances.groups]
         free = np.ones(grams.shape[1] - 1)
         return marginal(grams, free, groups, self.bands.count, self.bands.effective, self.floor).log_likelihood
 
@@ -128,6 +150,11 @@ class Predictive:
     @cached_property
     def _nuisance_grams(self) -> Array:
         return self.bands.grams(self._nuisances)
+
+
+def _sizes(spread: Array) -> Array:
+    """Standard deviations of a covariance."""
+    return np.asarray(np.sqrt(np.maximum(np.diag(spread), 1e-300)))
 
 
 def _moved(others: Discrepancy, base: Fit, prepared: Prepared, policy: Policy) -> Discrepancy:

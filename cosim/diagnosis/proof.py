@@ -55,7 +55,7 @@ def _standing(
     for name in sorted(out):
         rest = [one for one in some if one.effect.id != name]
         ways.append(_standing(comparison, examined, _with(problem, examined, rest), rest, held))
-    best, kept, known = max(ways, key=lambda way: held.log_likelihood(held.residual(way[0].mount)))
+    best, kept, known = max(ways, key=lambda way: held.predicted(way[0]))
     return best, kept, gains | known
 
 
@@ -63,7 +63,7 @@ def _longest(
     comparison: Comparison, examined: Examined, order: Sequence[AcceptedEffect], held: Predictive
 ) -> tuple[Fit, list[AcceptedEffect]]:
     fits = [_with(comparison.problem, examined, order[:count]) for count in range(len(order) + 1)]
-    likelihoods = [held.log_likelihood(held.residual(one.mount)) for one in fits]
+    likelihoods = [held.predicted(one) for one in fits]
     best = max(range(len(fits)), key=lambda count: likelihoods[count])
     while best < len(order) and _between(fits, likelihoods, best, held).halves(comparison.policy):
         best += 1
@@ -96,7 +96,7 @@ def _gain(
         own = len(problem.mount.effects)
         rest = [e for k, e in enumerate(chosen.mount.effects) if e.id != one.effect.id or k < own]
         without = problem.fit(replace(chosen.mount, effects=tuple(rest)), 10)
-    after, before = (held.log_likelihood(held.residual(fit.mount)) for fit in (chosen, without))
+    after, before = (held.predicted(fit) for fit in (chosen, without))
     return Gain(after - before, *held.plain_gains(without.mount, chosen.mount))
 
 

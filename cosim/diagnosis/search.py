@@ -13,6 +13,7 @@ import numpy as np
 
 from cosim.diagnosis.admissibility import in_time
 from cosim.diagnosis.admissibility import is_admissible as is_what_it_says
+from cosim.diagnosis.asked import is_asked_for
 from cosim.diagnosis.comparison import Comparison, Screened, aside_for
 from cosim.diagnosis.harmonics import with_harmonics
 from cosim.diagnosis.hypotheses import hypothesis_of
@@ -104,7 +105,8 @@ def refitted(
     problem = comparison.problem
     grown = replace(current.mount, effects=(*current.mount.effects, effect))
     found, aside = problem.fit(grown, 12), aside_for(effect.id)
-    found = hypothesis_of(effect).tuned(problem, found, effect, lambda fit: comparison.evidence(fit, aside))
+    before = comparison.evidence(current, aside)
+    found = hypothesis_of(effect).tuned(problem, found, effect, lambda fit: comparison.evidence(fit, aside) - before)
     return weighed(comparison, found, current, many)
 
 
@@ -197,7 +199,9 @@ def is_admissible(comparison: Comparison, one: CandidateFit) -> bool:
     """Whether an effect is large enough to matter, means what its name says, and can be told from this motion."""
     policy, problem = comparison.policy, comparison.problem
     loud = one.plain_gain >= policy.least_plain_gain and one.above_noise >= policy.least_above_noise
-    return loud and is_what_it_says(problem, one) and in_time(problem, one)
+    if not loud or not is_what_it_says(problem, one) or not in_time(problem, one):
+        return False
+    return not hypothesis_of(one.effect).must_stand_out or is_asked_for(comparison, one.fit, one.effect)
 
 
 def _is_full(best: CandidateFit, comparison: Comparison) -> bool:

@@ -47,3 +47,13 @@ def sandwich(columns: Array, left: Array, blocks: Blocks, rcond: float) -> Array
     bread = np.linalg.pinv(columns.T @ columns, rcond=rcond)
     scores = np.array([columns[rows].T @ left[rows] for rows in blocks.rows])
     return np.asarray(bread @ (scores.T @ scores) @ bread * len(scores) / max(len(scores) - 1, 1))
+
+
+def covariance(slopes: Array, left: Array, blocks: Blocks) -> Array:
+    """Covariance of parameters that least squares fitted, from weighted derivatives (rows, parameters); see `sandwich`.
+
+    Parameters have units of their own, so directions are told apart in units of their derivatives' sizes.
+    """
+    size = np.sqrt((slopes**2).sum(0))
+    scale = np.where(size > 0, size, 1.0)
+    return np.asarray(sandwich(slopes / scale, left, blocks, rcond=1e-10) / np.outer(scale, scale))

@@ -81,6 +81,8 @@ class Play(Hypothesis[Backlash]):
     def tuned(self, problem: Problem, found: Fit, start: Backlash, evidence: Evidence) -> Fit:
         """Go on from gaps around the one that was found: whether a flank is met jumps with the gap."""
         found = max((found, _shared(problem, found, evidence)), key=evidence)
+        if evidence(found) <= 0:
+            return found
         play: Any = found.mount.effects[-1]
         return refound(problem, found, evidence, [replace(play, gap_rad=times * play.gap_rad) for times in AROUND], 25)
 

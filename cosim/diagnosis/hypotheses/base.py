@@ -86,7 +86,7 @@ class Hypothesis(Generic[Form]):
     finds_its_way: ClassVar[bool] = False
     """Whether a refit gets from any member of the grid to the best one; then only one is refitted."""
     must_stand_out: ClassVar[bool] = False
-    """Whether it must remove more energy than the noise of the reading holds."""
+    """Whether it must remove more energy than the noise of the reading holds, and be asked for by the set point."""
     is_timing: ClassVar[bool] = False
     """Whether it is told by changes of the torque alone."""
     has_own_phase: ClassVar[bool] = False
@@ -115,6 +115,7 @@ class Hypothesis(Generic[Form]):
         """Fit what the grid knows only roughly of the effect that was added last, from `start`.
 
         Of fits from several starts the one with most evidence is taken: the least residual may be about very few rows.
+        `evidence` of a fit is in nats above the structure without the effect.
         """
         found = revived(problem, found, start) if start.place == "Friction" else found
         return in_cycles(problem, found) if getattr(found.mount.effects[-1], "cycles_per_rev", 0.0) > 0 else found

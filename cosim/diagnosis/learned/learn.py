@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.dictionary import OF_LAW
 from cosim.diagnosis.entries import BinsEntry, LearnedEntry, NotLearnedEntry
 from cosim.diagnosis.learned.agreement import formula_of
 from cosim.diagnosis.learned.candidate_terms import CandidateTerm, candidate_terms
@@ -74,9 +75,13 @@ class Learned:
         return self.helps and min(*self.evidence, *self.predicted, self.gain) >= SURE
 
     def says_unknown(self, policy: Policy, least: float) -> bool:
-        """Whether it says alone that something has no name: sure, a large share of the rest, `least` nats or more."""
+        """Whether it says alone that something has no name: sure, a large share of the rest, `least` nats or more.
+
+        Another friction law over speed is no missing effect.
+        """
         follows = 1 - (self.after / self.before) ** 2 >= policy.follows
-        return self.is_sure and follows and min(self.evidence) >= least
+        of_law = set(self.quantities) <= set(OF_LAW)
+        return self.is_sure and follows and min(self.evidence) >= least and not of_law
 
     @property
     def unit(self) -> str:
