@@ -6,14 +6,13 @@ recording, as a warm-up can, is missing as well.
 """
 
 import numpy as np
-from scipy.ndimage import minimum_filter1d
 
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.predictive import Predictive
 from cosim.estimation.fit import Fit
 from cosim.estimation.least_squares import projected
-from cosim.estimation.prepare import Array, Piece, Prepared
-from cosim.estimation.row_weights import least_speed
+from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.row_weights import far_from_turns
 
 CELL = 0.25
 """Seconds over which the rest is averaged: noise and presliding go, what lasts stays."""
@@ -26,20 +25,20 @@ KNOT = 1.0
 def share_left(comparison: Comparison, found: Fit) -> float:
     """Slow part of what a structure leaves of the training recordings."""
     prepared = comparison.problem.prepared
-    clear = comparison.problem.weight * _clear(prepared)
+    clear = comparison.problem.weight * far_from_turns(prepared)
     return _slow(found.residual, clear, prepared) / _friction(comparison, clear)
 
 
 def share_there(comparison: Comparison, residual: Array, held: Predictive) -> float:
     """Slow part of what a structure leaves of recordings that it was not fitted to, by the friction of those it was."""
-    clear = comparison.problem.weight * _clear(comparison.problem.prepared)
-    return _slow(residual, _clear(held.prepared), held.prepared) / _friction(comparison, clear)
+    clear = comparison.problem.weight * far_from_turns(comparison.problem.prepared)
+    return _slow(residual, far_from_turns(held.prepared), held.prepared) / _friction(comparison, clear)
 
 
 def over_time(comparison: Comparison, found: Fit) -> str:
     """Which explains more: a torque that is free over time, or a friction level that is."""
     prepared, level = comparison.problem.prepared, comparison.nuisances.level
-    clear = comparison.problem.weight * _clear(prepared)
+    clear = comparison.problem.weight * far_from_turns(prepared)
     rest, left, first = found.residual * clear, {"time": 0.0, "friction level over time": 0.0}, 0
     for piece in prepared.pieces:
         rows = slice(first, first + len(piece.kept))
@@ -47,24 +46,6 @@ def over_time(comparison: Comparison, found: Fit) -> str:
         for name, factor in zip(left, (np.abs(level), level), strict=True):
             left[name] += float(np.sum(projected(rest[rows], hats * (clear * factor)[rows, None]) ** 2))
     return min(left, key=lambda name: left[name])
-
-
-def _clear(prepared: Prepared) -> Array:
-    """1 in clear motion that no turn is near, else 0.
-
-    Friction steps at a turn, and the filter smears what a law lacks there over the period of its cutoff: an axis that
-    sticks within a step of its encoder leaves there more than most effects.
-    """
-    least = least_speed(prepared.stacked("v"))
-    return np.concatenate([_far_from_turns(piece, least)[piece.kept] for piece in prepared.pieces])
-
-
-def _far_from_turns(piece: Piece, least: float) -> Array:
-    """1 where the motion is clear for a period of the cutoff before and after a row, else 0."""
-    clear = np.abs(piece.v) > least
-    clear &= np.diff(np.sign(piece.v), prepend=np.sign(piece.v[:1])) == 0
-    width = 2 * max(1, round(1 / (piece.cutoff * piece.dt))) + 1
-    return np.asarray(minimum_filter1d(clear.astype(np.uint8), width), float)
 
 
 def _friction(comparison: Comparison, clear: Array) -> float:

@@ -9,12 +9,16 @@ from cosim.diagnosis.tuning import at_bound
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
+from cosim.estimation.row_weights import far_from_turns
 from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount
 
 LEAST_CHANGES = 0.5
 """Share of the torque's changes from row to row that a model with a delay or a lag must explain: in noise that the
 controller answers, time runs otherwise than in the machine."""
+
+LEAST_REMOVED = 0.02
+"""Share of the energy below which it says nothing where it is removed: what is slow and small removes as little."""
 
 
 class Fitted(Protocol):
@@ -74,3 +78,18 @@ def in_time(problem: Problem, one: Fitted) -> bool:
     rows = np.flatnonzero(counted[1:] & counted[:-1] & (owner[1:] == owner[:-1]))
     left, all_of_it = (np.diff(x)[rows] for x in (one.fit.residual, problem.prepared.stacked("tau")))
     return float(left @ left) < (1 - LEAST_CHANGES) * float(all_of_it @ all_of_it)
+
+
+def away_from_turns(problem: Problem, left: Array, without: Array) -> float:
+    """Share of the energy that something removes which it removes away from turns; 1 where it hardly removes any.
+
+    Args:
+        problem: whose rows these are.
+        left: weighted residual of training with it (rows,) [N m].
+        without: the same without it.
+    """
+    removed = without**2 - left**2
+    whole = float(removed.sum())
+    if whole <= LEAST_REMOVED * float(without @ without):
+        return 1.0
+    return float(far_from_turns(problem.prepared) @ removed) / whole

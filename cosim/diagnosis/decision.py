@@ -32,6 +32,8 @@ class TermScores:
     predicted: float
     share: float
     """Share of the held-out residual energy that it predicts."""
+    away: float = 1.0
+    """Share of the training residual energy that it removes which it removes away from turns."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,12 @@ def least_left(named: Sequence[EffectScores], policy: Policy) -> float:
 
 
 def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:
-    """Whether what the residual follows is more than a friction law's misfit: sure, or held out as well as trained."""
+    """Whether what the residual follows is more than a friction law's misfit: sure, or held out as well as trained.
+
+    What it removes about turns alone is what laws lack there.
+    """
+    if term.away < policy.least_away_unnamed:
+        return False
     there = term.evidence >= policy.least_followed and term.share >= policy.follows
     return term.evidence >= least and (there or term.evidence >= _floor_of(term, policy))
 

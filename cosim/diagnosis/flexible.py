@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from cosim.diagnosis.admissibility import away_from_turns
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.decision import TermScores
 from cosim.diagnosis.dictionary import OF_LAW, Term, dictionary
@@ -26,10 +27,15 @@ def flexible_terms(comparison: Comparison, found: Fit, held: Predictive) -> list
 def _scored(
     comparison: Comparison, found: Fit, name: str, term: Term, held: Predictive, residual: Array, slopes: Array
 ) -> TermScores:
-    evidence, beta = comparison.group(found, term.columns(comparison.problem.prepared))
+    problem = comparison.problem
+    columns = term.columns(problem.prepared)
+    evidence, beta = comparison.group(found, columns)
+    pair = np.column_stack([found.residual, found.residual - columns @ beta])
+    without, with_it = projected(pair * problem.weight[:, None], found.slopes * problem.weight[:, None]).T
+    away = away_from_turns(problem, with_it, without)
     after = residual - term.columns(held.prepared) @ beta
     gain = held.log_likelihood(after) - held.log_likelihood(residual)
     # The base was bent to what is missing in training, so its own parameters are free beside what is predicted.
     left = projected(np.column_stack([residual, after]) * held.weight[:, None], slopes * held.weight[:, None])
-    before, with_it = (left**2).sum(0)
-    return TermScores(name, evidence, gain, 1 - float(with_it) / max(float(before), 1e-300))
+    before, now = (left**2).sum(0)
+    return TermScores(name, evidence, gain, 1 - float(now) / max(float(before), 1e-300), away)

@@ -49,6 +49,9 @@ class Policy:
     least_above_noise: float = 5.0
     """Energy that a spring must remove, in those of the reading's noise, differentiated twice. Unit: 1. In nulls of
     two generators false springs removed 1.2 at most, beside other effects 4.1; true ones 6.8 and more."""
+    least_away: float = 0.05
+    """Share of what an effect of timing removes that it must remove away from turns: an axis that sticks within a step
+    of its encoder turns late. Unit: 1. In three such nulls .007 at most, true ones have .19 and more."""
     keep_evidence: float = 8.0
     """Evidence below which an accepted effect goes when others came after it. Unit: nats."""
     further_share: float = 0.4
@@ -92,6 +95,9 @@ class Policy:
     nats ..."""
     least_followed: float = 10.0
     """... or if it has this and predicts the share `follows` there. Unit: nats."""
+    least_away_unnamed: float = 0.33
+    """Share of what a term removes that it must remove away from turns, where laws lack most. Unit: 1. In nulls of two
+    generators .06 to .32, where something is missing .46 and more."""
     imitation: float = 0.3
     """Evidence of what is left, relative to a name's, from which the name may imitate what is missing. Unit: 1."""
     follows: float = 0.3

@@ -9,9 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import inf, log
 
-import numpy as np
-
-from cosim.diagnosis.admissibility import in_time
+from cosim.diagnosis.admissibility import away_from_turns, in_time
 from cosim.diagnosis.admissibility import is_admissible as is_what_it_says
 from cosim.diagnosis.asked import is_asked_for
 from cosim.diagnosis.comparison import Comparison, Screened, aside_for
@@ -41,6 +39,8 @@ class CandidateFit:
     """Share of the plain residual energy removed."""
     above_noise: float = inf
     """Energy that a spring removes, in those of the reading's noise."""
+    away: float = 1.0
+    """Share of the energy that a timing effect removes which it removes away from turns."""
 
 
 @dataclass(frozen=True)
@@ -118,9 +118,12 @@ def weighed(
     price = log(max(many, 1))
     aside = aside_for(effect.id)
     gain = comparison.evidence(found, aside) - comparison.evidence(current, aside) - price
-    plain = [float(np.sum((comparison.problem.weight * one.residual) ** 2)) for one in (found, current)]
-    loud = comparison.above_noise(found, current) if hypothesis_of(effect).must_stand_out else inf
-    return CandidateFit(effect, found, gain, price, 1 - plain[0] / max(plain[1], 1e-300), loud)
+    own, problem = hypothesis_of(effect), comparison.problem
+    loud = comparison.above_noise(found, current) if own.must_stand_out else inf
+    left, without = (problem.weight * one.residual for one in (found, current))
+    away = away_from_turns(problem, left, without) if own.is_timing else 1.0
+    share = 1 - float(left @ left) / max(float(without @ without), 1e-300)
+    return CandidateFit(effect, found, gain, price, share, loud, away)
 
 
 @dataclass(frozen=True)
@@ -199,7 +202,7 @@ def is_admissible(comparison: Comparison, one: CandidateFit) -> bool:
     """Whether an effect is large enough to matter, means what its name says, and can be told from this motion."""
     policy, problem = comparison.policy, comparison.problem
     loud = one.plain_gain >= policy.least_plain_gain and one.above_noise >= policy.least_above_noise
-    if not loud or not is_what_it_says(problem, one) or not in_time(problem, one):
+    if not loud or one.away < policy.least_away or not is_what_it_says(problem, one) or not in_time(problem, one):
         return False
     return not hypothesis_of(one.effect).must_stand_out or is_asked_for(comparison, one.fit, one.effect)
 

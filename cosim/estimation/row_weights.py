@@ -6,8 +6,9 @@ what a law misses there, they all miss alike.
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import minimum_filter1d
 
-from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.prepare import Array, Piece, Prepared
 from pyfmi_models.friction import FrictionLaw, MemorylessLaw
 
 CLEAR_MOTION = 0.02
@@ -39,6 +40,24 @@ def weights(law: FrictionLaw, prepared: Prepared) -> Array:
     says = np.concatenate([_says(law, piece.v[piece.kept], least_speed(v)) for piece in prepared.pieces])
     new = says / _repeated(v, says, prepared.recording_of)
     return np.asarray(np.sqrt(new * says.sum() / max(new.sum(), 1e-300)))
+
+
+def far_from_turns(prepared: Prepared) -> Array:
+    """1 at kept rows in clear motion that no turn is near, else 0.
+
+    Friction steps at a turn, and the filter smears what a law lacks there over the period of its cutoff: an axis that
+    sticks within a step of its encoder leaves there more than most effects.
+    """
+    least = least_speed(prepared.stacked("v"))
+    return np.concatenate([_far(piece, least)[piece.kept] for piece in prepared.pieces])
+
+
+def _far(piece: Piece, least: float) -> Array:
+    """1 where the motion is clear for a period of the cutoff before and after a row, else 0."""
+    clear = np.abs(piece.v) > least
+    clear &= np.diff(np.sign(piece.v), prepend=np.sign(piece.v[:1])) == 0
+    width = 2 * max(1, round(1 / (piece.cutoff * piece.dt))) + 1
+    return np.asarray(minimum_filter1d(clear.astype(np.uint8), width), float)
 
 
 def _says(law: FrictionLaw, v: Array, least: float) -> Array:

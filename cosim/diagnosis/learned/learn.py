@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from cosim.diagnosis.admissibility import away_from_turns
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.dictionary import OF_LAW
 from cosim.diagnosis.entries import BinsEntry, LearnedEntry, NotLearnedEntry
@@ -25,7 +26,7 @@ from cosim.diagnosis.policy import Policy
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.protocol import interval_of, residuals
 from cosim.estimation.fit import Fit
-from cosim.estimation.inverse import Inverse
+from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
 from cosim.support.statistics import rms
 from pyfmi_models.effects.learned import LearnedEffect
@@ -64,6 +65,8 @@ class Learned:
     predicted: tuple[float, ...] = field(default=())
     gain: float = 0.0
     """What the held-out recordings gain by the terms. Unit: nats."""
+    away: float = 1.0
+    """Share of the energy that the terms remove in training which they remove away from turns."""
     data: tuple[BinsEntry, ...] = field(default=())
     """What the training recordings leave without each term, over what it goes over."""
     formulas: tuple[Formula | None, ...] = field(default=())
@@ -77,11 +80,12 @@ class Learned:
     def says_unknown(self, policy: Policy, least: float) -> bool:
         """Whether it says alone that something has no name: sure, a large share of the rest, `least` nats or more.
 
-        Another friction law over speed is no missing effect.
+        Another friction law over speed is no missing effect, nor is what laws lack about turns.
         """
         follows = 1 - (self.after / self.before) ** 2 >= policy.follows
         of_law = set(self.quantities) <= set(OF_LAW)
-        return self.is_sure and follows and min(self.evidence) >= least and not of_law
+        elsewhere = self.away >= policy.least_away_unnamed
+        return self.is_sure and follows and min(self.evidence) >= least and elsewhere and not of_law
 
     @property
     def unit(self) -> str:
@@ -175,7 +179,9 @@ def _measured(comparison: Comparison, found: Fit, learned: Learned, held: Predic
     rows = [partial(whole, one, problem.prepared, problem.weight) for one in learned.effects]
     formulas = (formula_of(whole, one, found, comparison, held) for one in learned.effects)
     data = tuple(one.data() for one in rows)
-    return replace(learned, size=_size(comparison, learned), data=data, formulas=tuple(formulas))
+    left = problem.prepared.stacked("tau") - stacked(Inverse(whole, ()), problem.prepared.pieces, np.zeros(0))[0]
+    away = away_from_turns(problem, problem.weight * left, problem.weight * found.residual)
+    return replace(learned, size=_size(comparison, learned), data=data, formulas=tuple(formulas), away=away)
 
 
 def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], held: Predictive) -> Learned | None:
