@@ -97,9 +97,10 @@ def test_what_is_left_elsewhere_is_told_by_the_friction_of_training() -> None:
     assert share_there(comparing(steady(2), 4.0), rest, there) == pytest.approx(0.25, rel=1e-12)
 
 
-def test_a_torque_or_a_friction_level_over_time_whichever_explains_more() -> None:
+@pytest.mark.parametrize("size", [1.0, 1e-6])
+def test_a_torque_or_a_friction_level_over_time_whichever_explains_more(size: float) -> None:
     seconds = np.arange(8 * RATE) / RATE
-    drift = np.sin(2 * np.pi * seconds / 8)
+    drift = size * np.sin(2 * np.pi * seconds / 8)
     turning = np.sign(np.sin(2 * np.pi * seconds) + 1e-9)
     motion = Motion({"v": [turning, turning], "tau": [turning, turning]})
     comparison = comparing(motion, np.tile(turning, 2))

@@ -95,6 +95,18 @@ def test_who_calls_what_is_noted_for_each_test_that_passes(tmp_path: Path) -> No
     assert len(mutants.calling("cosim/diagnosis/proof.py", source, line, found)) == len(found)
 
 
+def test_a_function_is_named_where_its_body_holds_a_line() -> None:
+    source = (
+        "class A:\n    def one(self, x=1):\n        def inner():\n            return x\n        return inner\n\ny = 2\n"
+    )
+    assert [mutants.function_of(source, line) for line in range(1, 8)] == ["", "", "A.one", "A.one", "A.one", "", ""]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="forks")
+def test_a_server_of_tests_changes_one_function_in_place(tmp_path: Path) -> None:
+    alone("served", tmp_path)
+
+
 def test_an_error_is_noticed_where_a_test_looks_and_survives_where_none_does(tmp_path: Path) -> None:
     alone("noticed", tmp_path)
 
@@ -126,12 +138,42 @@ def noticed(folder: Path) -> None:
         assert mutants.noticed(folder, ["test_idle.py", "test_looks.py"]) == expected, change
 
 
+def served(folder: Path) -> None:
+    (folder / "tests").mkdir()
+    good = "def held(x, most=3):\n    return min(x, most)\n\n\n"
+    good += "class A:\n    def one(self):\n        return [k + 1 for k in (1, 2)]\n"
+    (folder / "held.py").write_text(good)
+    body = "from held import A, held\n\ndef test_held():\n    assert held(9) == 3\n\n"
+    body += "def test_one():\n    assert A().one() == [2, 3]\n"
+    (folder / "tests" / "test_both.py").write_text(body)
+    server = mutants.Server(folder, ["test_both.py"])
+    both = ["test_both.py::test_one", "test_both.py::test_held"]
+
+    def found(old: str, new: str, function: str) -> str | None:
+        (folder / "held.py").write_text(good.replace(old, new))
+        try:
+            return server.failed(both, "held.py", function)
+        finally:
+            (folder / "held.py").write_text(good)
+
+    assert server.failed(both) == ""
+    assert found("min(x, most)", "max(x, most)", "held") == "test_both.py::test_held"
+    assert found("k + 1", "k - 1", "A.one") == "test_both.py::test_one"
+    assert found("k + 1", "1 + k", "A.one") == ""
+    assert found("x, most)", "x, 3)", "held") == "", "each fork begins without the error before it"
+    assert found("(x, most=3)", "(x)", "held") is None, "another shape cannot be put in"
+    assert found("k + 1", "k - 1", "A.two") is None
+    assert server.failed(["test_both.py::test_none"]) is None
+    server.close()
+
+
 def planted(module: str, changes: tuple[str, ...]) -> Callable[[Path], None]:
     def run(folder: Path) -> None:
         tree, path = mutants.copied(folder), mutants.HOME / module
         source = path.read_text("utf-8")
         found = {mutated(source, site)[1]: site for site in range(len(sites(source)))}
-        tried = [mutants.attempt(tree, "sample", path, found[one]) for one in changes]
+        asking = mutants.Asking(tree)
+        tried = [asking.attempt("sample", path, found[one]) for one in changes]
         assert [one for one in tried if not one.noticed] == []
         assert (tree / module).read_text("utf-8") == source
 
@@ -140,6 +182,7 @@ def planted(module: str, changes: tuple[str, ...]) -> Callable[[Path], None]:
 
 PARTS = {
     "noticed": noticed,
+    "served": served,
     "story": planted(
         "cosim/hardware/story.py", ("now['sha256'] != seal.sha256 -> Eq", "now['story'] == seal.story -> NotEq")
     ),

@@ -15,7 +15,6 @@ import ast
 import json
 import os
 import re
-import resource
 import signal
 import sys
 import tempfile
@@ -34,11 +33,11 @@ import scipy.signal  # noqa: F401
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 
+from mutants_fork import HOME, QUIET, Server, function_of, limited, prepared  # noqa: E402
 from mutants_page import Tried, journalled, written  # noqa: E402
 from mutations import mutated, sites  # noqa: E402
 from reach import Reached, read  # noqa: E402
 
-HOME = Path(__file__).parents[2]
 GROUPS = {
     "models": (
         "pyfmi_models/*.py",
@@ -56,14 +55,10 @@ GROUPS = {
 """Modules whose tests are tested; from each group as many mutants."""
 MOST, NEAREST = 4, 6
 """Imports between a test and a module at most, and test files that are asked at most."""
-SECONDS = 150
-"""Of a processor that a test file may take: a mutant that never ends is noticed too."""
 BUDGET, MANY = 20.0, 120
 """Seconds that the tests of a mutant take without it in all, and how many tests that are at most."""
 LOST = ("FAILED", "ERROR")
 """What pytest says of a test that noticed."""
-OURS = ("cosim", "cosim_studies", "pyfmi_models", "mutants", "mutants_page", "mutations", "reach")
-"""What a fork loads anew, from the tree with the error."""
 SLOW = ("test_attack", "test_prove", "test_proof", "test_serve", "test_benchmarks", "test_same_bits", "test_platforms")
 """Test files that are not asked: a mutant that only they would notice counts as survived."""
 
@@ -179,41 +174,50 @@ def calling(module: str, source: str, line: int, reached: Sequence[Reached]) -> 
 
 def _tested(tree: Path, tests: Sequence[str], said: Path) -> int:
     """Run tests here, in a fork that has all but the tree loaded already; what pytest ends with."""
-    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-    os.setsid()
-    os.chdir(tree)
-    os.environ |= {"PYTHONPATH": str(tree), "OMP_NUM_THREADS": "1"}
-    sys.path[:] = [str(tree), *(one for one in sys.path if not _is_of_home(one))]
-    for module in [one for one in sys.modules if one.split(".")[0] in OURS]:
-        del sys.modules[module]
-    with said.open("w") as file:
-        os.dup2(file.fileno(), 1)
-        os.dup2(file.fileno(), 2)
-    names = [f"tests/{name}" for name in tests]
-    return int(pytest.main(["-n0", "-x", "-q", "-p", "no:cacheprovider", *names]))
+    limited()
+    prepared(tree, said)
+    return int(pytest.main([*QUIET, "-x", *(f"tests/{name}" for name in tests)]))
 
 
-def _is_of_home(folder: str) -> bool:
-    """Whether modules there are those of which a copy is changed; a virtual environment may lie in their tree."""
-    return (folder == str(HOME) or folder.startswith(str(HOME) + os.sep)) and not folder.startswith(sys.prefix + os.sep)
+class Asking:
+    """Who asks tests: those that call a function, in the server, else in a fork that loads all anew.
 
+    Args:
+        tree: a copy, in which errors are planted.
+        reached: which test calls what; without it the nearest files are asked.
+    """
 
-def attempt(tree: Path, group: str, path: Path, site: int, reached: Sequence[Reached] = ()) -> Tried:
-    """Plant one error, run the tests, take it back."""
-    source, place, module = path.read_text("utf-8"), tree / path.relative_to(HOME), str(path.relative_to(HOME))
-    line, change, text = mutated(source, site)
-    known = list(calling(module, source, line, reached))
-    while True:
-        try:
-            place.write_text(text, "utf-8")
-            witness = failed(tree, known) if known else noticed(tree, belonging(path))
-        finally:
-            place.write_text(source, "utf-8")
-        if not witness or witness.endswith("(time)") or not failed(tree, [witness]):
-            return Tried(group, module, site, line, change, witness)
-        if witness not in known:  # a file that fails without the error too
-            raise SystemExit(f"{witness} fails in the tree as it is")
-        known.remove(witness)
+    def __init__(self, tree: Path, reached: Sequence[Reached] = ()) -> None:
+        self.tree, self._reached = tree, reached
+        files = sorted({one.test.split("::")[0].removeprefix("tests/") for one in reached})
+        self._server = Server(tree, files) if files else None
+
+    def attempt(self, group: str, path: Path, site: int) -> Tried:
+        """Plant one error, run the tests, take it back."""
+        source, place, module = path.read_text("utf-8"), self.tree / path.relative_to(HOME), str(path.relative_to(HOME))
+        line, change, text = mutated(source, site)
+        known = list(calling(module, source, line, self._reached))
+        while True:
+            try:
+                place.write_text(text, "utf-8")
+                witness = self._failed(known, module, source, line) if known else noticed(self.tree, belonging(path))
+            finally:
+                place.write_text(source, "utf-8")
+            if not witness or witness.endswith("(time)") or not self._failed([witness]):
+                return Tried(group, module, site, line, change, witness)
+            if witness not in known:  # a file that fails without the error too
+                raise SystemExit(f"{witness} fails in the tree as it is")
+            known.remove(witness)
+
+    def _failed(self, tests: Sequence[str], module: str = "", source: str = "", line: int = 0) -> str:
+        function = function_of(source, line) if module else ""
+        found = self._server.failed(tests, module, function) if self._server and (function or not module) else None
+        return failed(self.tree, tests) if found is None else found
+
+    def close(self) -> None:
+        """End the server, if there is one."""
+        if self._server:
+            self._server.close()
 
 
 def main() -> None:
@@ -233,14 +237,15 @@ def main() -> None:
     reached = read(given.reach) if given.reach else []
     journal = given.journal or folder / "journal"
     try:
-        tree = copied(folder)
+        asking = Asking(copied(folder), reached)
         for group, path, site in drawn(given.seed, given.count):
             done = {(one.module, one.site) for one in journalled(journal)}
             if (str(path.relative_to(HOME)), site) not in done:
-                tried = attempt(tree, group, path, site, reached)
+                tried = asking.attempt(group, path, site)
                 print(f"{tried.module}:{tried.line} {tried.change}: {tried.noticed or 'SURVIVED'}", flush=True)
                 with journal.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(vars(tried)) + "\n")
+        asking.close()
         tried_all = journalled(journal)
     finally:
         rmtree(folder, ignore_errors=True)
