@@ -26,14 +26,22 @@ class Motion:
 
     @property
     def pieces(self) -> list[Any]:
-        many = [len(one) for one in self.columns["v"]]
+        speeds = self.columns["v"]
+        many = [len(one) for one in speeds]
         q = self.columns.get("q", [np.zeros(count) for count in many])
         asked = self.asked or [True] * len(many)
+        rows = {"dt": 1 / RATE, "cutoff": RATE}
         return [
             SimpleNamespace(
-                kept=np.arange(count), t=np.arange(count) / RATE, q=place, inside=slice(1, count - 1), asked=wanted
+                kept=np.arange(len(v)),
+                t=np.arange(len(v)) / RATE,
+                q=place,
+                v=v,
+                inside=slice(1, -1),
+                asked=wanted,
+                **rows,
             )
-            for count, place, wanted in zip(many, q, asked, strict=True)
+            for v, place, wanted in zip(speeds, q, asked, strict=True)
         ]
 
     @property

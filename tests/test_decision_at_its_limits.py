@@ -131,6 +131,12 @@ def test_the_evidence_that_is_asked_goes_with_what_held_out_recordings_say() -> 
     assert not unknown(8.0, 0.25 - LITTLE)
 
 
+def test_what_a_term_removes_about_turns_alone_is_nothing_unknown() -> None:
+    least = POLICY.least_away_unnamed
+    for away, expected in ((least, True), (least - LITTLE, False)):
+        assert is_left([], left(TermScores("position", 500.0, 0.0, 0.9, away)), ROUND) is expected
+
+
 def test_what_is_left_beside_a_sure_name_must_reach_its_share_of_that_evidence() -> None:
     sure = effect("delay", 80.0, 0.9)
     assert is_left([sure], left(TermScores("position", 40.0, 0.0, 0.5)), ROUND)

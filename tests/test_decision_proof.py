@@ -70,11 +70,8 @@ class Tables:
         self.fitted.append(mount.names)
         return Fitted(mount)
 
-    def residual(self, mount: Structure) -> str:
-        return mount.names
-
-    def log_likelihood(self, names: str) -> float:
-        return self.nats[names]
+    def predicted(self, found: Fitted) -> float:
+        return self.nats[found.mount.names]
 
     def plain_gains(self, before: Structure, after: Structure) -> tuple[float, float]:
         """By default what is more has a little less error."""
