@@ -1,4 +1,4 @@
-"""A spring must be asked for by the set point: a loop that answers noise makes one that is not there."""
+"""A spring must be asked for by the set point, and what is late must be late away from turns too."""
 
 from dataclasses import replace
 from typing import Any
@@ -8,11 +8,14 @@ import pytest
 from scipy.signal import lfilter
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.admissibility import away_from_turns
 from cosim.diagnosis.asked import is_asked_for
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.search import is_admissible, weighed
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
+from pyfmi_models.effects import Delay
 from pyfmi_models.effects.compliance import LoadSideCompliance
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
@@ -70,3 +73,50 @@ def test_a_loop_that_answers_noise_is_no_spring() -> None:
 
 def test_without_a_set_point_nobody_can_be_asked() -> None:
     assert asked_for(5.0, 0.0, False, with_set_point=False)
+
+
+def swung(left: Any) -> tuple[Problem, Any, Any]:
+    """Rows of a motion that turns every 5 s, what is left of them with an effect (`left` of the time), and without."""
+    t = np.arange(0, SECONDS, DT)
+    recording = Recording("run", {"t": t, "q": np.sin(2 * np.pi * 0.1 * t), "tau": np.zeros_like(t)})
+    prepared = prepare([recording], 8.0)
+    when = prepared.stacked("t")
+    problem = Problem(MOUNT, prepared, np.ones(len(when)), DT)
+    return problem, left(when), np.ones(len(when))
+
+
+def turning(t: Any) -> Any:
+    """0 for 60 ms after each turn, 1 elsewhere: all that is removed is removed there."""
+    return np.where((t - 2.5) % 5.0 < 0.06, 0.0, 1.0)
+
+
+def test_where_something_removes_energy() -> None:
+    problem, left, without = swung(turning)
+    assert away_from_turns(problem, left, without) == 1.0  # a hundredth of the energy says nothing
+    loud = np.where(turning(problem.prepared.stacked("t")) == 0.0, 5.0, 1.0)
+    assert away_from_turns(problem, left, loud) == pytest.approx(0.0, abs=1e-12)
+    assert away_from_turns(problem, 0 * left, without) == pytest.approx(0.94, abs=0.03)
+
+
+def test_what_is_late_about_turns_alone_is_not_named() -> None:
+    """An axis that sticks within a step of its encoder is read late as it turns: the friction is 20 ms ahead, alone."""
+    made = []
+    for seed in (1, 2):
+        t = np.arange(0, SECONDS, DT)
+        v = np.cos(2 * np.pi * 0.3 * t + seed) + 0.3 * np.cos(2 * np.pi * 0.11 * t)
+        ahead = np.sign(np.interp(t + 0.02, t, v))
+        a = np.gradient(v, DT)
+        noise = 0.02 * np.random.default_rng(seed).standard_normal(len(t))
+        tau = 0.01 * a + 0.5 * v + 2 * ahead + noise
+        made.append(Recording(f"run_{seed}", {"t": t, "q": np.cumsum(v) * DT, "tau": tau}))
+    mount = replace(MOUNT, axis=Axis(inertia=0.01), friction=Coulomb(Fc=2.0, sigma2=0.5))
+    prepared = prepare(made, 8.0)
+    problem = Problem(mount, prepared, np.ones(len(prepared.recording_of)), DT)
+    base = problem.fit(problem.mount, 25)
+    comparison = Comparison.of(problem, base, POLICY)
+    found = problem.fit(replace(base.mount, effects=(Delay(delay_ms=5.0),)), 15)
+    one = weighed(comparison, found, base)
+    assert one.evidence > POLICY.least_evidence
+    assert one.away < POLICY.least_away
+    assert not is_admissible(comparison, one)
+    assert is_admissible(comparison, replace(one, away=1.0))

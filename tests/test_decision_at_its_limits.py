@@ -151,6 +151,12 @@ def test_a_doubtful_name_excuses_nothing_that_is_left() -> None:
     assert decide([weak], left(), ROUND).doubtful == ()
 
 
+def test_what_a_term_removes_about_turns_alone_is_what_laws_lack_there() -> None:
+    least = ROUND.least_away_unnamed
+    assert is_left([], left(TermScores("torque", 500.0, 50.0, 0.9, away=least)), ROUND)
+    assert not is_left([], left(TermScores("torque", 500.0, 50.0, 0.9, away=least - LITTLE)), ROUND)
+
+
 def test_what_the_rest_follows_is_beyond_a_share_of_its_own_and_of_the_best() -> None:
     terms = [TermScores(name, 50.0, 0.0, share) for name, share in (("t", 0.26), ("q", 0.8), ("v", 0.4), ("a", 0.41))]
     assert followed(left(*terms), ROUND) == ("q", "a"), "beyond half of the best, the best first"
