@@ -25,8 +25,12 @@ import pyarrow.parquet  # noqa: F401
 import pytest
 import scipy.signal  # noqa: F401
 
+import cosim
+
 HOME = Path(__file__).parents[2]
-TRACED = tuple(f"{HOME / name}{os.sep}" for name in ("cosim", "pyfmi_models"))
+PRODUCT = Path(cosim.__file__).parents[1]
+"""Where the product is that the tests call: this checkout, or where it was installed."""
+TRACED = tuple(f"{PRODUCT / name}{os.sep}" for name in ("cosim", "pyfmi_models"))
 SECONDS = 240
 """Of a processor that a file of tests may take here; those of its tests that come later are not known."""
 
@@ -70,7 +74,7 @@ class Noting:
     def _by_module(self) -> dict[str, list[int]]:
         found: dict[str, list[int]] = {}
         for path, line in sorted(self._calls):
-            found.setdefault(str(Path(path).relative_to(HOME)), []).append(line)
+            found.setdefault(str(Path(path).relative_to(PRODUCT)), []).append(line)
         return found
 
 
