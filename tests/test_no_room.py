@@ -17,6 +17,7 @@ from tiny_fmu import tiny
 
 import cosim.support.cell
 from cosim.cli import surroundings
+from cosim.data.recording import Recording
 
 __all__ = ["cache", "scenario", "tiny"]
 
@@ -150,6 +151,34 @@ def test_what_cannot_be_printed_is_no_success() -> None:
     assert done.stderr.startswith(b"cosim: ")
     assert b"no space left on device" in done.stderr
     assert done.stderr.count(b"\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("closed", "command", "code", "said"),
+    [
+        (">&-", ("show", "paper_mount"), 2, b"cosim: bad file descriptor.\n"),
+        ("<&-", ("show", "paper_mount"), 0, b""),
+        ("2>&-", ("show", "paper_mount"), 0, b""),
+        ("2>&-", ("show", "nothing"), 2, b""),
+        ("<&- >&- 2>&-", ("show", "nothing"), 2, b""),
+    ],
+)
+def test_a_standard_file_that_is_closed_is_no_traceback(
+    closed: str, command: tuple[str, ...], code: int, said: bytes
+) -> None:
+    shell = ["sh", "-c", f'exec "$@" {closed}', "sh", sys.executable, "-m", "cosim", *command]
+    done = subprocess.run(shell, env=ENVIRONMENT, capture_output=True, check=False)
+    assert (done.returncode, done.stderr) == (code, said)
+    assert bool(done.stdout) == (code == 0)
+
+
+def test_a_run_whose_standard_files_are_closed_records_whole(scenario: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out")]
+    done = subprocess.run(
+        ["sh", "-c", 'exec "$@" <&- 2>&-', "sh", *command], env=ENVIRONMENT, check=False, capture_output=True
+    )
+    assert done.returncode == 0
+    assert len(Recording.read(tmp_path / "out" / "recording.parquet")) == 250
 
 
 def test_what_the_system_refuses_is_a_sentence_with_its_culprit() -> None:

@@ -36,6 +36,7 @@ CARD = (Path(__file__).parents[1] / "pyfmi_models" / "cards" / "paper_mount.toml
         ("step = 1e-3", "step = 1e-308", r"step = 1e-308 breaks a rule: input should be greater than or equal"),
         ("stop = 0.5", "stop = 1e308", r"stop = 1e\+308 breaks a rule: input should be less than or equal"),
         ("step = 1e-3\nstop = 0.5", "step = 1e-9\nstop = 1e8", r"stop = 1e\+08 s is 1e\+17 steps of 1e-09 s; 9,007,1"),
+        ("smooth_start = 0.1", "smooth_start = 1e308", r"smooth_start = 1e\+308 breaks a rule: input should be less"),
         ("decimation = 2", f"decimation = {DIGITS}", r"is not valid TOML: a number in it has too many digits"),
         ("decimation = 2", f"decimation = {NESTED}", r"is not valid TOML: its brackets are nested too deeply"),
         ("[record]", f"{FAULT}from = 1e308\n[record]", r"from = 1e\+308 breaks a rule: input should be less"),
@@ -82,6 +83,32 @@ def test_a_frequency_just_below_half_of_the_ticks_is_run(tiny: dict[int, Path]) 
     from cosim.master.simulate import run
 
     assert run(parse_scenario(text, "loop.toml", Path())).statistics["steps"] == 500
+
+
+@pytest.mark.parametrize("isolate", ["--isolate", "--no-isolate"])
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("k = 5.0", f"k = {10**400}", f'"controller.k" is 1{"0" * 59}... (401 characters); that is beyond a Float64.'),
+        ("amplitude = 0.1", "amplitude = 1e308", 'The signal "r.velocity" is nan at tick 0 (0 s); it must be a finite'),
+        (
+            'kind = "sine"\nfrequency = 2.0\namplitude = 0.1',
+            'kind = "slews"\npositions = [0.0, 1.0]\nmax_velocity = 1.0\nmax_acceleration = 1e200\nmax_jerk = 1e200',
+            'The signal "r" cannot be computed: its numbers lead beyond what arithmetic has.',
+        ),
+    ],
+    ids=["parameter", "amplitude", "slews"],
+)
+def test_a_number_that_arithmetic_cannot_take_costs_a_sentence_and_no_warning(
+    scenario: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], old: str, new: str, sentence: str, isolate: str
+) -> None:
+    assert old in scenario.read_text()
+    scenario.write_text(scenario.read_text().replace(old, new))
+    assert call("run", scenario, "--out", tmp_path / "out", isolate) == 2
+    said = capfd.readouterr().err.splitlines()
+    assert said[0] == "loop: 500 steps of 0.001 s"
+    assert said[-1].startswith(f"cosim: {sentence}")
+    assert [one for one in said[1:-1] if not one.startswith("what was recorded until then is in ")] == []
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])

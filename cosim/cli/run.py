@@ -75,7 +75,7 @@ def run(
 def _run(scenario: "Scenario", delivery: "Delivery") -> "RunResult":
     """Run, and show how it goes."""
     from cosim.api.run import RECORDING
-    from cosim.support.errors import StepError
+    from cosim.support.errors import SignalError, StepError
 
     title = f"{scenario.name}: {scenario.ticks:,} steps of {scenario.step:g} s"
     size = 8 * (scenario.ticks // scenario.decimation) * (len(scenario.records) + 1)
@@ -84,7 +84,7 @@ def _run(scenario: "Scenario", delivery: "Delivery") -> "RunResult":
         with stage(title) as shown:
             options = replace(delivery.options, on_progress=with_forecast(shown, size, say))
             return replace(delivery, options=options).of(scenario)
-    except (StepError, KeyboardInterrupt):
+    except (StepError, SignalError, KeyboardInterrupt):
         if recording.exists():
             say(f"what was recorded until then is in {recording}")
         raise

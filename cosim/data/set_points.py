@@ -36,7 +36,7 @@ class SetPoint(SignalSection):
     """A motion with an optional smooth start: the motion times a quintic rise over `smooth_start` seconds."""
 
     unit: str = "rad"
-    smooth_start: float = Field(default=0.0, ge=0)
+    smooth_start: float = Field(default=0.0, ge=0, le=LONGEST)
 
     @property
     def outputs(self) -> Mapping[str, str]:

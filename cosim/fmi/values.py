@@ -13,8 +13,9 @@ import numpy as np
 from cosim.fmi.component import Port
 from cosim.fmi.types import FLOATS, INTEGERS, article, limits
 from cosim.support.errors import FmuError
+from cosim.support.numbers import shown
 
-LARGEST_FLOAT32 = float(np.finfo(np.float32).max)
+LARGEST_FLOAT32, LARGEST_FLOAT64 = float(np.finfo(np.float32).max), float(np.finfo(np.float64).max)
 _BOOLEANS: Mapping[Any, bool] = {True: True, False: False, "true": True, "false": False}
 
 
@@ -54,6 +55,8 @@ def _element(port: Port, value: Any, who: str) -> Any:
     number = _item(port, value, who) if port.type == "Enumeration" else value
     if isinstance(number, bool) or not isinstance(number, int | float | np.number):
         raise _error(who, value, "it must be a number, or an output of a signal")
+    if isinstance(number, int) and abs(number) > LARGEST_FLOAT64:
+        raise _error(who, value, "that is beyond a Float64")
     if not port.low <= number <= port.high:
         unit = f" {port.unit}" if port.unit else ""
         raise _error(who, value, f"it must lie in {port.low:g} .. {port.high:g}{unit}")
@@ -108,5 +111,5 @@ def _text(kind: str, value: Any, who: str) -> Any:
 
 
 def _error(who: str, value: Any, rule: str, *choices: str) -> FmuError:
-    shown = f'"{value}"' if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else f"{value}"
-    return FmuError(f'"{who}" is {shown}; {rule}.', culprit=who, value=value, choices=choices)
+    told = f'"{value}"' if isinstance(value, str) else f"{value:g}" if isinstance(value, float) else shown(value)
+    return FmuError(f'"{who}" is {told}; {rule}.', culprit=who, value=value, choices=choices)

@@ -95,7 +95,8 @@ class Execution:
         self.writer.origin |= {"complete": True} | ({"ended": self.ended} if self.ended else {})
 
     def _run_chunks(self) -> None:
-        streams = make_streams(self.wiring, self.plan.step)
+        with np.errstate(all="ignore"):  # as in `_given`
+            streams = make_streams(self.wiring, self.plan.step)
         self.loop.start()
         self._check()
         for chunk in chunks(self.ticks):
@@ -112,10 +113,20 @@ class Execution:
 
     def _given(self, streams: Sequence[Stream], chunk: np.ndarray) -> np.ndarray:
         """Return what the signals give in these ticks, shape (signals, ticks)."""
-        columns = [stream(chunk) for stream in streams]
+        with np.errstate(all="ignore"):  # what is no number any more is told below, with its name and its time
+            columns = [self._computed(number, stream, chunk) for number, stream in enumerate(streams)]
         given = np.concatenate(columns) if columns else np.empty((0, len(chunk)))
         self._check_given(given, int(chunk[0]))
         return given
+
+    def _computed(self, number: int, stream: Stream, chunk: np.ndarray) -> np.ndarray:
+        """Return what a signal gives in these ticks."""
+        try:
+            return stream(chunk)
+        except ArithmeticError as error:
+            name = list(self.wiring.sources())[number]
+            message = f'The signal "{name}" cannot be computed: its numbers lead beyond what arithmetic has.'
+            raise SignalError(message, culprit=name) from error
 
     def _check_given(self, given: np.ndarray, first: int) -> None:
         """Refuse signals that are no numbers before a component meets them."""

@@ -46,12 +46,28 @@ def keep_stdout() -> None:
     What a terminal or pipe has no letters for is written as an escape, whatever the language of the system.
     """
     codecs.register_error(WRITABLE, _writable)
+    _open_what_is_closed()
     given = sys.__stdout__
     if given and sys.stdout is given and given.fileno() == 1:
         sys.stdout = os.fdopen(os.dup(1), "w", encoding=given.encoding, errors=WRITABLE)
         os.dup2(2, 1)
     if isinstance(sys.stderr, io.TextIOWrapper):
         sys.stderr.reconfigure(errors=WRITABLE)
+
+
+def _open_what_is_closed() -> None:
+    """Put something in the place of standard files that are closed, which the next file that is opened would take.
+
+    To write to such a stdout is an error, as to one that is full.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDONLY if number == 1 else os.O_RDWR)  # takes the lowest number that is free
+            os.set_inheritable(number, True)
+    if sys.stdout is None:
+        sys.stdout = os.fdopen(1, "w", encoding="utf-8", errors=WRITABLE, closefd=False)
 
 
 def _writable(error: UnicodeError) -> tuple[str | bytes, int]:
