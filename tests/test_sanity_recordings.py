@@ -150,14 +150,15 @@ class TestGenerated:
             (11, True, False),
             (30, True, True),
             (-8, False, False),
-            (-23, True, False),
+            (-14, True, False),
+            (-23, True, True),
             (-40, True, True),
         ],
     )
     def test_a_drives_delay_is_let_pass_a_large_one_said_and_a_larger_one_blocks(
         self, ms: int, late: bool, blocks: bool
     ) -> None:
-        """The machine's own lag is 6 ms; where it is negative the torque was shifted instead of the position."""
+        """Where it is negative the torque was shifted instead of the position."""
         _, (*train, _) = generated()
         change = delayed(ms / 1e3) if ms > 0 else late_torque(-ms / 1e3)
         found = clocks([Balance([change(one) if ms else one]) for one in train], "both")

@@ -7,7 +7,8 @@ viscosity are one thing. Recordings are fitted each with numbers of its own; the
 
 Friction that turns round over a distance is late as well. So a lag counts only if it is there both with the plain
 balance and beside the shapes that friction laws cannot agree on (`discrepancy_basis`), and what neither excludes is
-its range.
+its range. Nor may turns alone tell it: an axis that sticks within a step of its encoder, or a law that is another than
+dir(v), is late there and nowhere else. Where the rows away from turns exclude no lag, none is certain.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,21 +21,25 @@ from scipy.optimize import lsq_linear
 from cosim.diagnosis.sanity.balance import Balance
 from cosim.diagnosis.sanity.entry import Alternative, Sanity
 from cosim.estimation.discrepancy_basis import discrepancy_basis
-from cosim.estimation.prepare import Array
+from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.row_weights import far_from_turns
 
 Columns = Callable[[Balance], Array]
+Rows = Callable[[Prepared], Array]
 REACH, STEP = 0.060, 0.002
 """Lags that are tried [s]."""
 LAGS = np.arange(-REACH, REACH + STEP / 2, STEP)
 ALIKE = 3.0
 """Lags less likely than the best by no more than so many nats are not excluded (95 % of normal errors: 1.9)."""
-LATE, CERTAINLY = 0.014, 0.010
+LATE, CERTAINLY = 0.010, 0.008
 """A lag of so many seconds, certainly more than the latter, is more than delays and lags of most servo drives."""
-TOO_LATE, CERTAINLY_TOO_LATE = 0.024, 0.020
+TOO_LATE, CERTAINLY_TOO_LATE = 0.018, 0.016
 """One of so many, certainly more than the latter, is no drive's: no effect may be named beside it. Field buses and slow
 loops have 20 ms."""
 EXPLAINED = 0.8
 """Share of the torque's energy that a balance must explain to say anything of milliseconds."""
+LEAST_ROWS = 10
+"""Rows for each column below which a lag is not looked for."""
 CLOCKS, CLOCKS_TOO_LATE = 0.6, 0.85
 """Share of either kind that comes from clocks and late read-outs; the others are dead times of drives."""
 
@@ -71,17 +76,15 @@ NO_OFFSET = ClockOffset(0.0, 0.0, 0.0)
 
 def clock_offset(balances: Sequence[Balance]) -> ClockOffset:
     """Find the lag of the position behind the torque that balances recordings best, with any friction."""
-    plain = _clock_offset(balances, lambda one: one.columns(one.own_order))
-    if not plain.is_late:
-        return plain
-    rich = _clock_offset(
-        balances, lambda one: np.column_stack([one.columns(one.own_order), *discrepancy_basis(one.prepared)])
-    )
-    return ClockOffset(plain.lag, min(plain.low, rich.low), max(plain.high, rich.high))
+    return _clock_offset(balances, lambda one: one.columns(one.own_order), far_from_turns)
 
 
-def _clock_offset(balances: Sequence[Balance], columns: Columns) -> ClockOffset:
-    likelihood = np.sum([_likelihood(one, columns(one)) for one in balances], axis=0)
+def _every_row(prepared: Prepared) -> Array:
+    return np.ones(len(prepared.recording_of))
+
+
+def _clock_offset(balances: Sequence[Balance], columns: Columns, rows: Rows = _every_row) -> ClockOffset:
+    likelihood = np.sum([_likelihood(one, columns(one), rows(one.prepared)) for one in balances], axis=0)
     near = LAGS[likelihood >= likelihood.max() - ALIKE]
     return ClockOffset(float(LAGS[int(likelihood.argmax())]), float(near.min()), float(near.max()))
 
@@ -109,10 +112,13 @@ def clocks(balances: Sequence[Balance], names: str) -> tuple[Sanity, ...]:
     return (Sanity(finding="clocks", statement=text, alternatives=causes, blocks_naming=found.is_too_late),)
 
 
-def _likelihood(balance: Balance, columns: Array) -> Array:
+def _likelihood(balance: Balance, columns: Array, counts: Array) -> Array:
     """Log-likelihood of each lag beside columns, the first of which are inertia, friction and viscosity."""
     torque = _shifted(balance)
-    inside = np.all(np.isfinite(torque), axis=1)
+    inside = (counts > 0) & np.all(np.isfinite(torque), axis=1)
+    if inside.sum() < LEAST_ROWS * columns.shape[1]:
+        return np.zeros(len(LAGS))
+    share = float(np.mean(inside))
     columns, torque = columns[inside], torque[inside]
     basis, triangle = np.linalg.qr(columns)
     seen, energy = basis.T @ torque, (torque**2).sum(0)
@@ -121,8 +127,8 @@ def _likelihood(balance: Balance, columns: Array) -> Array:
     unseen = energy - (seen**2).sum(0)
     left = np.array([2 * lsq_linear(triangle, one, (least, np.inf), "bvls").cost for one in seen.T]) + unseen
     solution = balance.solution(balance.own_order)
-    rows = solution.independent * max(0.0, 1 - float((left / energy).min()))
-    return np.asarray(-0.5 * rows * np.log(left + balance.overlooked))
+    rows = share * solution.independent * max(0.0, 1 - float((left / energy).min()))
+    return np.asarray(-0.5 * rows * np.log(left + share * balance.overlooked))
 
 
 def _shifted(balance: Balance) -> Array:
