@@ -42,6 +42,8 @@ ROUND = replace(
     imitation_share=0.75,
     large_residual=0.125,
     large_residual_there=0.25,
+    large_residual_beside=0.0625,
+    most_raised_beside_rest=0.5,
 )
 """Constants with which every product is exact, so that a limit can be met exactly."""
 LITTLE = 1e-6
@@ -84,6 +86,10 @@ def test_a_rival_at_the_margin_of_a_set_is_beaten() -> None:
         (Gain(32.0, -0.9, 0.5), 0.5, True),
         (Gain(32.0 - LITTLE, -0.9, 0.5), 0.5, False),
         (Gain(32.0, -0.9, 0.5 - LITTLE), 0.5, False),
+        (Gain(4.0, -0.5, -0.5, at_rest=0.5), 0.5, True),
+        (Gain(4.0, -0.5, -0.5, at_rest=0.5 - LITTLE), 0.5, False),
+        (Gain(4.0 - LITTLE, -0.5, -0.5, at_rest=0.5), 0.5, False),
+        (Gain(4.0, -0.5 - LITTLE, 0.5, at_rest=0.9), 0.5, False),
     ],
 )
 def test_an_effect_stands_from_its_limits_on(gain: Gain, share: float, expected: bool) -> None:
@@ -112,6 +118,8 @@ def test_a_residual_is_large_beyond_its_limit_in_training_or_held_out() -> None:
     assert not is_left([], left(share=0.125, there=0.25), ROUND)
     assert is_left([], left(share=0.125 + LITTLE), ROUND)
     assert is_left([], left(there=0.25 + LITTLE), ROUND)
+    assert not is_left([], ResidualScores(0.0, 0.0, share_beside=0.0625), ROUND)
+    assert is_left([], ResidualScores(0.0, 0.0, share_beside=0.0625 + LITTLE), ROUND)
 
 
 def test_the_evidence_that_is_asked_goes_with_what_held_out_recordings_say() -> None:

@@ -214,9 +214,10 @@ def test_the_second_of_two_runs_into_one_folder_is_refused_while_the_first_lives
     long.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e6"))
     command = [sys.executable, "-m", "cosim", "run", str(long), "--out", str(tmp_path / "out")]
     first = subprocess.Popen(command, env=ENVIRONMENT, stderr=subprocess.DEVNULL)
-    until = time.monotonic() + 30
-    while time.monotonic() < until and not list((tmp_path / "out").glob(".*.partial")):
+    until = time.monotonic() + 120
+    while time.monotonic() < until and first.poll() is None and not list((tmp_path / "out").glob(".*.partial")):
         time.sleep(0.02)
+    assert first.poll() is None, "the first run ended before the second began"
     for force in ((), ("--force",)):
         assert call("run", scenario, "--out", tmp_path / "out", *force) == 2
         sentence = f"Another run is writing to {tmp_path / 'out'}; wait for it, end it, or give another --out."

@@ -211,6 +211,22 @@ def test_a_unit_that_was_stated_is_not_doubted() -> None:
     assert not any("in deg" in one[1] for one in found)
 
 
+@pytest.mark.parametrize("ms", [0, 20])
+def test_what_is_late_about_turns_alone_is_no_lag(ms: int) -> None:
+    """Friction that turns round smoothly, or sticks: of two clocks only what the rest of the motion shows."""
+    t = np.arange(30_000) / 500
+    v = 0.3 * np.sin(1.7 * t) + 0.2 * np.sin(4.1 * t) + 0.1 * np.sin(9.3 * t)
+    a = np.gradient(v, t)
+    turned = np.maximum.accumulate(np.where(np.diff(np.sign(v), prepend=np.sign(v[0])) != 0, np.arange(len(t)), 0))
+    sticks = (np.arange(len(t)) - turned < 25) & (turned > 0)
+    run = Recording(
+        "run", {"t": t, "tau": 2 * a + 2 * np.sign(v) * np.where(sticks, -1, 1) + 0.1 * v, "q": np.cumsum(v) / 500}
+    )
+    found = clocks([Balance([delayed(ms / 1e3)(run) if ms else run])], "run")
+    assert [one.blocks_naming for one in found] == ([True] if ms else [])
+    assert all("18 ms" in one.statement for one in found)
+
+
 DATA = Path(__file__).resolve().parents[2] / "shared" / "recordings"
 MEASURED = {
     "quasi_direct_pendulum": ("ddp", "direct_collocation", "energy_shaping", 0.15, 0.15),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.adequacy import over_time, share_left, share_there
+from cosim.diagnosis.adequacy import over_time, share_beside, share_left, share_there
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.decision import Decision, ResidualScores, decide
 from cosim.diagnosis.flagged import Residual, flagged, loud_states, noise_at
@@ -57,8 +57,10 @@ def left(extra: Extra) -> tuple[ResidualScores, Decision]:
     base = problem.fit(mount, 25)
     comparison = Comparison.of(problem, base, POLICY)
     held = Predictive.of(comparison, there, base, there)
-    sizes = share_left(comparison, base), share_there(comparison, held.residual(base.mount), held)
-    residual = ResidualScores(*sizes, flexible_terms(comparison, base, held), over_time(comparison, base))
+    rest = held.residual(base.mount)
+    sizes = share_left(comparison, base), share_there(comparison, rest, held)
+    shown, beside = over_time(comparison, base), share_beside(comparison, base, rest, held)
+    residual = ResidualScores(*sizes, flexible_terms(comparison, base, held), shown, beside)
     return residual, decide([], residual, POLICY)
 
 
@@ -126,6 +128,34 @@ def test_a_small_rest_and_noise_are_nothing_to_explain(extra: Extra) -> None:
     assert residual.share < POLICY.large_residual
     assert not decision.is_unknown
     assert decision.depends_on == ()
+
+
+def another_law(now: dict[str, Array]) -> Array:
+    """Friction that rises smoothly through standstill, over a tenth of the top speed."""
+    return 0.6 * FC * np.tanh(now["v"] / 0.1)
+
+
+def pushed(now: dict[str, Array]) -> Array:
+    """A push of a twelfth of the friction that comes and goes, at times of its own."""
+    return FC / 12 * np.sign(np.sin(2 * np.pi * now["t"] / 3.3 + now["run"]))
+
+
+def test_what_no_law_can_have_left_may_be_smaller_than_what_one_has() -> None:
+    (law, by_law), (push, by_push) = left(another_law), left(pushed)
+    assert law.share_beside < 0.7 * law.share
+    assert not by_law.is_unknown
+    assert max(push.share, push.share_there) < POLICY.large_residual
+    assert push.share_beside > POLICY.large_residual_beside
+    assert by_push.is_unknown
+
+
+def test_noise_adds_nothing_to_what_lasts() -> None:
+    def noisy(size: float) -> Extra:
+        return lambda now: size * FC * np.random.default_rng(int(now["run"][0])).standard_normal(len(now["t"]))
+
+    (quiet, _), (loud, _) = left(noisy(0.1)), left(noisy(1.0))
+    assert loud.share > 5 * quiet.share
+    assert loud.share_beside < 0.5 * loud.share
 
 
 def test_a_turn_counts_once_the_motion_came_back_far_enough() -> None:

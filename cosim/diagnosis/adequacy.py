@@ -6,6 +6,7 @@ recording, as a warm-up can, is missing as well.
 """
 
 import numpy as np
+import numpy.typing as npt
 
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.predictive import Predictive
@@ -35,6 +36,20 @@ def share_there(comparison: Comparison, residual: Array, held: Predictive) -> fl
     return _slow(residual, far_from_turns(held.prepared), held.prepared) / _friction(comparison, clear)
 
 
+def share_beside(comparison: Comparison, found: Fit, residual_there: Array, held: Predictive) -> float:
+    """Slow part beside what friction laws cannot agree on and a level that wanders; in training or held out, the more.
+
+    What is left of either cannot be friction of another law, so that little of it is no misfit.
+    """
+    prepared, nuisances = comparison.problem.prepared, comparison.nuisances.columns
+    clear, clear_there = (far_from_turns(one) for one in (prepared, held.prepared))
+    trained = comparison.problem.weight * clear
+    left = _beside(found.residual, trained, nuisances)
+    there = _beside(residual_there, clear_there, held.nuisances.columns)
+    sizes = (_lasting(left, trained, prepared), _lasting(there, clear_there, held.prepared))
+    return max(sizes) / _friction(comparison, trained)
+
+
 def over_time(comparison: Comparison, found: Fit) -> str:
     """Which explains more: a torque that is free over time, or a friction level that is."""
     prepared, level = comparison.problem.prepared, comparison.nuisances.level
@@ -55,17 +70,44 @@ def _friction(comparison: Comparison, clear: Array) -> float:
     return max(level, LEAST_FRICTION * torque, 1e-300)
 
 
+def _beside(residual: Array, weight: Array, columns: Array) -> Array:
+    """What no combination of columns explains of a residual, at the rows that count."""
+    root = np.sqrt(weight)
+    left = projected(root * residual, root[:, None] * columns)
+    return np.asarray(np.divide(left, root, out=np.zeros_like(left), where=root > 0))
+
+
 def _rms(values: Array, weight: Array) -> float:
     return float(np.sqrt((weight @ values**2) / max(weight.sum(), 1e-300)))
 
 
 def _slow(values: Array, weight: Array, prepared: Prepared) -> float:
     """RMS of the means over cells of `CELL` seconds."""
-    number = np.concatenate([np.full(len(piece.kept), k) for k, piece in enumerate(prepared.pieces)])
-    time = np.floor(prepared.stacked("t") / CELL)
-    _, cell = np.unique(np.column_stack([number, time]), axis=0, return_inverse=True)
-    count, total = (np.bincount(cell.ravel(), one) for one in (weight, weight * values))
+    cell, _ = _cells(prepared)
+    count, total = (np.bincount(cell, one) for one in (weight, weight * values))
     return _rms(total / np.maximum(count, 1e-300), np.asarray(count, float))
+
+
+def _lasting(values: Array, weight: Array, prepared: Prepared) -> float:
+    """RMS of what the halves of cells have in common: noise, which they have not, adds nothing."""
+    cell, half = _cells(prepared)
+    many = int(cell.max()) + 1
+    counts, totals = (
+        [np.bincount(cell[half == k], one[half == k], many) for k in (0, 1)] for one in (weight, weight * values)
+    )
+    both = (counts[0] > 0) & (counts[1] > 0)
+    means = [total[both] / count[both] for total, count in zip(totals, counts, strict=True)]
+    share = (counts[0] + counts[1])[both]
+    common = float(share @ (means[0] * means[1])) / max(float(share.sum()), 1e-300)
+    return float(np.sqrt(max(0.0, common)))
+
+
+def _cells(prepared: Prepared) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
+    """The cell of `CELL` seconds that each kept row lies in, and in which half of it."""
+    number = np.concatenate([np.full(len(piece.kept), k) for k, piece in enumerate(prepared.pieces)])
+    halves = np.floor(2 * prepared.stacked("t") / CELL).astype(np.int64)
+    _, cell = np.unique(np.column_stack([number, halves // 2]), axis=0, return_inverse=True)
+    return cell.ravel(), halves % 2
 
 
 def _hats(t: Array) -> Array:

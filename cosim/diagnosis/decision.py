@@ -44,6 +44,8 @@ class ResidualScores:
     share_there: float
     terms: Sequence[TermScores] = ()
     over_time: str = "time"
+    share_beside: float = 0.0
+    """The same beside what friction laws cannot agree on."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,8 @@ class Gain:
     nats: float
     narrow: float
     wide: float
+    at_rest: float = 0.0
+    """Share at rest, where it says something and the model without it nothing; else 0."""
 
     def halves(self, policy: Policy) -> bool:
         """Whether the plain error energy is halved in both bands, and the likelihood does not clearly speak against it.
@@ -105,10 +109,14 @@ class Gain:
         """Whether the plain error is raised, in both bands or by much in one.
 
         What surely predicts and halves the error in the wider band may raise it in the narrower one: a bristle at rest
-        creeps with each vibration that a filter leaves, the less of them the more a model keeps of a wrong torque.
+        creeps with each vibration that a filter leaves, the less of them the more a model keeps of a wrong torque. So
+        may what halves the error at rest, of which the model without it says nothing: what it costs elsewhere is
+        judged by the likelihood.
         """
         if self.wide >= policy.halved and self.nats >= policy.sure_predicted:
             return False
+        if self.at_rest >= policy.halved and self.nats >= policy.least_predicted:
+            return min(self.narrow, self.wide) < -policy.most_raised_beside_rest
         return max(self.narrow, self.wide) < 0 or min(self.narrow, self.wide) < -policy.most_raised
 
 
@@ -132,6 +140,7 @@ def open_rivals(one: EffectScores, policy: Policy) -> tuple[str, ...]:
 def is_left(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> bool:
     """Whether something is left that is no misfit of a friction law, nor of the equations of what is named."""
     large = residual.share > policy.large_residual or residual.share_there > policy.large_residual_there
+    large = large or residual.share_beside > policy.large_residual_beside
     doubtful = doubted(effects, residual, policy)
     least = least_left([one for one in effects if one.effect not in doubtful], policy)
     return large or any(_is_no_misfit(one, least, policy) for one in residual.terms)

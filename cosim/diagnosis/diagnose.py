@@ -9,7 +9,7 @@ import numpy as np
 from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
 from cosim.diagnosis.absent import not_found
-from cosim.diagnosis.adequacy import over_time, share_left, share_there
+from cosim.diagnosis.adequacy import over_time, share_beside, share_left, share_there
 from cosim.diagnosis.band import in_band
 from cosim.diagnosis.breakdown import parts
 from cosim.diagnosis.comparison import Comparison
@@ -168,7 +168,8 @@ def _residual_scores(comparison: Comparison, proof: Proof, held: Predictive) -> 
     left, there = share_left(comparison, proof.chosen), held.residual(proof.chosen.mount)
     terms = flexible_terms(comparison, proof.chosen, held)
     shown = over_time(comparison, proof.chosen)
-    return ResidualScores(left, share_there(comparison, there, held), terms, shown)
+    beside = share_beside(comparison, proof.chosen, there, held)
+    return ResidualScores(left, share_there(comparison, there, held), terms, shown, beside)
 
 
 def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Recording], name: str) -> Diagnosis:

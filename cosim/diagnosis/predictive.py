@@ -13,6 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
+from cosim.diagnosis.admissibility import gets_memory, removed_at_rest
 from cosim.diagnosis.bands import Bands
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.discrepancy import Discrepancy, Shapes, discrepancy
@@ -138,6 +139,12 @@ class Predictive:
         pairs = (narrow, narrow if is_noise(narrow, wide) and not amplified else wide)
         first, second = (1 - after / max(before, 1e-300) for before, after in pairs)
         return (first, second) if self.prepared.cutoff <= self.protocol.cutoff else (second, first)
+
+    def at_rest(self, without: Mount, mount: Mount) -> float:
+        """Share of the plain residual energy that a model with memory removes where one without is silent, else 0."""
+        if not gets_memory(mount, without) or self.weight.all():
+            return 0.0
+        return removed_at_rest(self.weight, self.residual(mount), self.residual(without))
 
     def _protocol_energy(self, mount: Mount) -> float:
         left = zip(residuals(self.protocol, mount), self.protocol.pieces, strict=True)

@@ -9,6 +9,7 @@ from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.rivals import AcceptedEffect, Examined
 from cosim.estimation.fit import Fit
 from cosim.estimation.problem import Problem
+from pyfmi_models.mount import Mount
 
 
 @dataclass(frozen=True)
@@ -73,7 +74,7 @@ def _longest(
 def _between(fits: Sequence[Fit], likelihoods: Sequence[float], count: int, held: Predictive) -> Gain:
     """What one effect more gains."""
     without, grown = fits[count], fits[count + 1]
-    return Gain(likelihoods[count + 1] - likelihoods[count], *held.plain_gains(without.mount, grown.mount))
+    return _gained(likelihoods[count + 1] - likelihoods[count], without.mount, grown.mount, held)
 
 
 def _with(problem: Problem, examined: Examined, some: Sequence[AcceptedEffect]) -> Fit:
@@ -97,7 +98,11 @@ def _gain(
         rest = [e for k, e in enumerate(chosen.mount.effects) if e.id != one.effect.id or k < own]
         without = problem.fit(replace(chosen.mount, effects=tuple(rest)), 10)
     after, before = (held.predicted(fit) for fit in (chosen, without))
-    return Gain(after - before, *held.plain_gains(without.mount, chosen.mount))
+    return _gained(after - before, without.mount, chosen.mount, held)
+
+
+def _gained(nats: float, without: Mount, mount: Mount, held: Predictive) -> Gain:
+    return Gain(nats, *held.plain_gains(without, mount), held.at_rest(without, mount))
 
 
 def _share(problem: Problem, base: Fit, one: AcceptedEffect) -> float:

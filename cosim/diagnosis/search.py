@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import inf, log
 
-from cosim.diagnosis.admissibility import away_from_turns, in_time
+from cosim.diagnosis.admissibility import away_from_turns, gets_memory, in_time, removed_at_rest
 from cosim.diagnosis.admissibility import is_admissible as is_what_it_says
 from cosim.diagnosis.asked import is_asked_for
 from cosim.diagnosis.comparison import Comparison, Screened, aside_for
@@ -41,6 +41,8 @@ class CandidateFit:
     """Energy that a spring removes, in those of the reading's noise."""
     away: float = 1.0
     """Share of the energy that a timing effect removes which it removes away from turns."""
+    at_rest: float = 1.0
+    """Share of the energy at rest that a contact that bends removes."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,9 @@ def weighed(
     left, without = (problem.weight * one.residual for one in (found, current))
     away = away_from_turns(problem, left, without) if own.is_timing else 1.0
     share = 1 - float(left @ left) / max(float(without @ without), 1e-300)
-    return CandidateFit(effect, found, gain, price, share, loud, away)
+    remembers = gets_memory(found.mount, current.mount)
+    rest = removed_at_rest(problem.weight, found.residual, current.residual) if remembers else 1.0
+    return CandidateFit(effect, found, gain, price, share, loud, away, rest)
 
 
 @dataclass(frozen=True)
@@ -202,7 +206,9 @@ def is_admissible(comparison: Comparison, one: CandidateFit) -> bool:
     """Whether an effect is large enough to matter, means what its name says, and can be told from this motion."""
     policy, problem = comparison.policy, comparison.problem
     loud = one.plain_gain >= policy.least_plain_gain and one.above_noise >= policy.least_above_noise
-    if not loud or one.away < policy.least_away or not is_what_it_says(problem, one) or not in_time(problem, one):
+    if not loud or one.away < policy.least_away or one.at_rest < policy.halved:
+        return False
+    if not is_what_it_says(problem, one) or not in_time(problem, one):
         return False
     return not hypothesis_of(one.effect).must_stand_out or is_asked_for(comparison, one.fit, one.effect)
 

@@ -20,6 +20,10 @@ ONSETS = (0.3, 1.0, 3.0)
 """Rests [s] at which the rise may begin, beside the .1 s of a start: rock and metal settle from .1 to a few seconds on
 (Dieterich, J. Geophys. Res. 77 (1972) 3690). Where it begins too early, level and rise stand in for each other."""
 
+MOST_RISE = 1.0
+"""Rise per e-fold of rest relative to the friction level. Contacts rise by hundredths of it (Dieterich), wet ones by
+some tenths; one that doubles has another cause, such as numbers of a base that its own law cannot tell."""
+
 
 class Settling(Hypothesis[DwellBreakaway]):
     """A break-away torque that grows with the rest before it."""
@@ -39,11 +43,12 @@ class Settling(Hypothesis[DwellBreakaway]):
     def is_degenerate(self, problem: Problem, effect: DwellBreakaway) -> bool:
         """What a friction level wanders by, whatever rest was before, is no settling; nor is what no slip renews.
 
-        A contact that bends before it slides is not renewed while it bends.
+        Nor is a rise beyond the friction level. A contact that bends before it slides is not renewed while it bends.
         """
         level = contact_level(problem.mount)
         bent = level / float(getattr(problem.mount.friction, "sigma0", inf))
-        return bool(effect.torque_per_efold < POLICY.wander_prior * level or effect.memory_rad < bent)
+        settles = POLICY.wander_prior * level <= effect.torque_per_efold <= MOST_RISE * level
+        return not settles or effect.memory_rad < bent
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Ages of the contact that a small or a larger slip renews."""

@@ -5,10 +5,9 @@
 is solved for each lag. Without the bounds a late position would only look like a negative viscosity: on a sine, lag and
 viscosity are one thing. Recordings are fitted each with numbers of its own; their log-likelihoods are added.
 
-Friction that turns round over a distance is late as well. So a lag counts only if it is there both with the plain
-balance and beside the shapes that friction laws cannot agree on (`discrepancy_basis`), and what neither excludes is
-its range. Nor may turns alone tell it: an axis that sticks within a step of its encoder, or a law that is another than
-dir(v), is late there and nowhere else. Where the rows away from turns exclude no lag, none is certain.
+Turns tell nothing of it: friction that turns round over a distance is late there, and so is an axis that sticks within
+a step of its encoder. So only rows away from turns count. Read there, recordings of one clock of 211 machines have no
+lag but a few milliseconds of their drives; before, 38 of them had 14 ms and more.
 """
 
 from collections.abc import Callable, Sequence
@@ -20,7 +19,6 @@ from scipy.optimize import lsq_linear
 
 from cosim.diagnosis.sanity.balance import Balance
 from cosim.diagnosis.sanity.entry import Alternative, Sanity
-from cosim.estimation.discrepancy_basis import discrepancy_basis
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.row_weights import far_from_turns
 
