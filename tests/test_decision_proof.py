@@ -78,6 +78,10 @@ class Tables:
         old, new = (self.errors.get(one.names, 1.0 - 0.01 * len(one.effects)) for one in (before, after))
         return (old - new) / old, (old - new) / old
 
+    def at_rest(self, *_: Structure) -> float:
+        """None of the effects remembers."""
+        return 0.0
+
 
 def structure(names: str, left: float = 0.0) -> Fitted:
     return Fitted(Structure(tuple(Named(one) for one in names)), left)
