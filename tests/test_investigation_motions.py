@@ -1,6 +1,7 @@
 """Motions of an investigation: inside their limits whatever these are, and smooth."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.data.recording import Recording
-from cosim.investigation.families import FAMILIES, fast_sweeps, motions, slow_sweep, stop_and_go
+from cosim.investigation.families import FAMILIES, fast_sweeps, fast_tone, motions, slow_sweep, stop_and_go
 from cosim.investigation.limits import Limits
-from cosim.investigation.motions import Motion, Room, room_of
+from cosim.investigation.motions import Motion, Room, Tones, room_of
+from cosim.support.errors import InputError
 
 SIZES = st.floats(1e-3, 10.0)
 LIMITS = Limits(-1.0, 1.0, 0.5, 2.0, 50.0, 5.0)
@@ -28,6 +30,26 @@ def test_no_motion_leaves_a_limit(
     for motion in motions(room_of(limits, 0.0, 10.0, 1, turned)):
         asked = motion.sampled(np.arange(0.0, motion.seconds, 4e-3))
         assert limits.left_by(*asked) == "", motion.family
+
+
+@given(low=st.floats(0.05, 20.0), wide=st.floats(1.01, 10.0), frequency=st.floats(0.3, 30.0), turned=st.booleans())
+def test_no_tone_lies_in_the_forbidden_band(low: float, wide: float, frequency: float, turned: bool) -> None:
+    limits = replace(LIMITS, frequency=frequency).with_given({"forbidden": f"{low}:{low * wide}"})
+    for motion in motions(room_of(limits, 0.0, 10.0, 1, turned)):
+        tones = [part for part in motion.parts if isinstance(part, Tones)]
+        assert all(not low <= hertz <= low * wide for one in tones for hertz in one.hertz), motion.family
+        assert limits.left_by(*motion.sampled(np.arange(0.0, motion.seconds, 4e-3))) == "", motion.family
+
+
+def test_without_a_forbidden_band_tones_lie_where_the_room_asks() -> None:
+    (tones,) = [part for part in fast_tone(room_of(LIMITS, 0.0, 12.0, 3, False)).parts if isinstance(part, Tones)]
+    assert tones.hertz == (0.9 * 5.0,)
+
+
+@pytest.mark.parametrize("text", ["5", "5:5", "9:7", "0:3", "-1:3", "a:b", "1:2:3"])
+def test_a_forbidden_band_that_is_none_is_refused(text: str) -> None:
+    with pytest.raises(InputError, match="forbidden=FROM:TO"):
+        LIMITS.with_given({"forbidden": text})
 
 
 @pytest.mark.parametrize("number", range(len(FAMILIES)))

@@ -73,7 +73,8 @@ def investigate(
             from `cosim.hardware.machine.read_machine`, which is moved inside its own limits too.
         budget: seconds of motion that may be spent, the first recordings and those of earlier calls included.
         seconds: length of one motion [s]; each is run twice, to be fitted and for the proof.
-        limits: {"position": "LOW:HIGH", "speed": ..., "acceleration": ..., "torque": ..., "frequency": ...} in SI;
+        limits: {"position": "LOW:HIGH", "speed": ..., "acceleration": ..., "torque": ..., "frequency": ...,
+            "forbidden": "FROM:TO"} in SI, the last a band [Hz] in which no tone lies;
             what is not given is what the scenario's own set point asks for.
         train: recordings to go on from, with `heldout` in the place of the first two.
         heldout: recordings for the proof, to go on from.

@@ -136,19 +136,21 @@ def reversal_ladder(room: Room) -> Motion:
 
 def tone(room: Room) -> Motion:
     """One sine that reaches full speed and full acceleration."""
-    hertz = min(room.acceleration / (2 * pi * room.speed), room.frequency)
+    hertz = room.outside(min(room.acceleration / (2 * pi * room.speed), room.frequency))
     return Motion("tone", f"a sine of {hertz:.2g} Hz", _tones(room, [hertz], [0.0]))
 
 
 def fast_tone(room: Room) -> Motion:
     """One sine as fast as the loop follows."""
-    return Motion("fast tone", f"a sine of {room.frequency:.2g} Hz", _tones(room, [room.frequency], [0.0]))
+    hertz = room.outside(room.frequency)
+    return Motion("fast tone", f"a sine of {hertz:.2g} Hz", _tones(room, [hertz], [0.0]))
 
 
 def multisine(room: Room) -> Motion:
     """Many tones at once, from a stroke in the time there is to what the loop follows; phases from a seed."""
-    hertz = np.geomspace(2 / room.seconds, room.frequency, TONES).tolist()
-    phases = np.random.default_rng(room.seed).uniform(0, 2 * pi, TONES).tolist()
+    every = np.geomspace(2 / room.seconds, room.frequency, TONES).tolist()
+    hertz = sorted({room.outside(one) for one in every})
+    phases = np.random.default_rng(room.seed).uniform(0, 2 * pi, TONES).tolist()[: len(hertz)]
     return Motion("multisine", "many tones at once", _tones(room, hertz, phases))
 
 

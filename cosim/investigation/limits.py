@@ -19,12 +19,12 @@ SLACK = 1e-9
 """Relative excess that is rounding. Unit: 1."""
 SMOOTH_HZ = 30.0
 """Cutoff in front of the speed that is judged in a recording [Hz], as in the proof's protocol."""
-NAMES = ("position", "speed", "acceleration", "torque", "frequency")
+NAMES = ("position", "speed", "acceleration", "torque", "frequency", "forbidden")
 
 
 @dataclass(frozen=True)
 class Limits:
-    """Lowest and highest position, most speed, acceleration, torque, and the highest frequency of a tone."""
+    """Lowest and highest position, most speed, acceleration, torque, highest frequency of a tone, band without any."""
 
     low: float
     high: float
@@ -32,6 +32,9 @@ class Limits:
     acceleration: float
     torque: float
     frequency: float
+    forbidden_from: float = 0.0
+    forbidden_to: float = 0.0
+    """Band [Hz] in which no tone may lie, such as about a resonance; from 0 to 0 there is none."""
 
     @classmethod
     def visited(cls, motion: tuple[Array, Array, Array], torque: float, bandwidth: float | None) -> "Limits":
@@ -43,7 +46,7 @@ class Limits:
         return cls(float(middle - half), float(middle + half), speed, acceleration, torque, bandwidth or 10 * own)
 
     def with_given(self, given: Mapping[str, str]) -> "Limits":
-        """The same with numbers in the place of some: {"position": "-0.5:0.5", "speed": "0.2"}.
+        """The same with numbers in the place of some: {"position": "-0.5:0.5", "speed": "0.2", "forbidden": "12:15"}.
 
         Raises:
             InputError: a name is unknown, or what is given for it is no limit.
@@ -87,12 +90,14 @@ def _high(name: str, limit: float, values: Array) -> str:
 
 
 def _numbers(name: str, text: str) -> dict[str, float]:
-    rule = "a limit is position=LOW:HIGH, or a number above 0 for " + ", ".join(NAMES[1:])
+    rule = "a limit is position=LOW:HIGH, forbidden=FROM:TO (Hz), or a number above 0 for " + ", ".join(NAMES[1:-1])
     try:
-        if name == "position":
+        if name in ("position", "forbidden"):
             low, high = (float(one) for one in text.split(":"))
-            if low < high:
+            if name == "position" and low < high:
                 return {"low": low, "high": high}
+            if name == "forbidden" and 0 < low < high:
+                return {"forbidden_from": low, "forbidden_to": high}
         elif name in NAMES and float(text) > 0:
             return {name: float(text)}
     except ValueError:

@@ -19,6 +19,8 @@ Sampled = tuple[Array, Array, Array]
 """Position, speed and acceleration, one value a row."""
 JERK = 20.0
 """Jerk, as accelerations a second [1/s]: a move reaches its acceleration in 50 ms."""
+BELOW = 0.95
+"""A tone that would lie in the forbidden band lies at this share of its lower end: one that swells is a little wide."""
 FADE = 1.5
 """Seconds in which tones swell and fade, and rests at both ends of a programme [s]."""
 
@@ -158,6 +160,8 @@ class Room(NamedTuple):
     frequency: float
     seconds: float
     seed: int
+    forbidden: tuple[float, float] = (0.0, 0.0)
+    """Band [Hz] in which no tone lies."""
 
     @property
     def reach(self) -> float:
@@ -168,6 +172,11 @@ class Room(NamedTuple):
     def middle(self) -> float:
         """Half-way between both ends."""
         return (self.first + self.second) / 2
+
+    def outside(self, hertz: float) -> float:
+        """The frequency itself, or one below the forbidden band where it lies in it."""
+        low, high = self.forbidden
+        return BELOW * low if BELOW * low < hertz < high / BELOW else hertz
 
     def slower(self, share: float) -> "Room":
         """The same with a share of speed and acceleration."""
@@ -180,4 +189,5 @@ def room_of(limits: Limits, home: float, seconds: float, seed: int, turned: bool
     ends = (min(middle - half, home) - home, max(middle + half, home) - home)
     first, second = ends if turned else ends[::-1]
     usable = KEPT * limits.frequency
-    return Room(first, second, KEPT * limits.speed, KEPT * limits.acceleration, usable, seconds, seed)
+    band = limits.forbidden_from, limits.forbidden_to
+    return Room(first, second, KEPT * limits.speed, KEPT * limits.acceleration, usable, seconds, seed, band)
