@@ -34,11 +34,14 @@ def amplifiers(fmu: Path, algorithm: Any, **options: Any) -> RunResult:
 
 
 @pytest.mark.parametrize("algorithm", [Jacobi(), GaussSeidel(kind="gauss-seidel")])
-def test_an_algebraic_loop_is_named_before_the_first_step(direct: Path, algorithm: Any) -> None:
+def test_an_algebraic_loop_is_named_before_the_first_step(direct: Path, algorithm: Any, tmp_path: Path) -> None:
     sentence = f"each follows the one before at once, and {algorithm.kind} cannot solve that. Choose the algorithm"
     with pytest.raises(WiringError, match=sentence) as caught:
         amplifiers(direct, algorithm)
     assert set(caught.value.value) == {"one.y", "two.a", "two.y", "one.b"}
+    with pytest.raises(WiringError, match=sentence):
+        amplifiers(direct, algorithm, path=tmp_path / "r.parquet")
+    assert not list(tmp_path.iterdir())
 
 
 @BOTH

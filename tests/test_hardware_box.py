@@ -30,6 +30,7 @@ def test_the_recording_is_one_that_a_diagnosis_reads(tmp_path: Path) -> None:
     path = recorded(tmp_path).write(tmp_path / "r.parquet")
     read = Recording.read(path)
     assert {"tau", "q", "q_d"} <= set(read)
+    assert [read.units[one] for one in ("t", "tau", "q", "q_d", "v_d")] == ["s", "N.m", "rad", "rad", "rad/s"]
     what = scenario()
     twin = run(replace(what, records={"tau": Record("mount.tau", "mean")})).recording
     first = int(np.flatnonzero(read["machine.notes"].astype(int) & 1)[0])

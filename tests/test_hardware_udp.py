@@ -247,6 +247,18 @@ def test_an_injection_that_is_none_is_refused(text: str) -> None:
         changed(SIMULATED, "--inject", inject=[parse_injection(text)])
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("silence", {"kind": "silence", "at": 0.0}),
+        ("silence:1.5", {"kind": "silence", "at": 1.5}),
+        ("late:1.5:0.2:3", {"kind": "late", "at": 1.5, "lasts": 0.2, "size": 3.0}),
+    ],
+)
+def test_an_injection_begins_at_once_unless_it_says_when(text: str, said: dict[str, object]) -> None:
+    assert parse_injection(text) == said
+
+
 def test_a_fault_of_frames_is_refused_where_there_are_none(tmp_path: Path) -> None:
     with pytest.raises(HardwareError, match="a fault of frames, and the drive in this process has none"):
         Session(scenario(), faulty(kind="late"), tmp_path / "box", fast=True)

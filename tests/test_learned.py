@@ -124,6 +124,15 @@ def test_after_a_reversal_friction_comes_back_to_its_level() -> None:
     assert turned == pytest.approx(np.exp(0.5))
 
 
+def test_an_element_forgets_a_reversal_over_its_way_or_its_time() -> None:
+    effect = LearnedAfterReversal(ways=(0.1,), times=(0.25,), level_change=(0.5, 0.5))
+    here, speed, dt = mount(effect).at(0.0, 0.0, 0.2), 0.2, 1e-4
+    state = -np.ones(2)
+    for _ in range(2500):  # 0.25 s, 0.05 rad
+        state = state + dt * np.array(ca.DM(effect.rate(here._replace(state=state)))).ravel()
+    np.testing.assert_allclose(state, 1 - 2 * np.exp([-speed * 0.25 / 0.1, -1.0]), atol=2e-4)
+
+
 @NAMED
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_an_fmu_steps_as_the_equations_of_a_learned_term_say(effect, fmi: int) -> None:

@@ -100,6 +100,8 @@ def test_values_that_cannot_be_typed_leave_numbers(tmp_path: Path, table: pd.Dat
     [
         ("#4", "no #4; the file holds 3 recordings, #1 to #3 (another begins where time runs backwards)."),
         ("#0", "there is no #0; the file holds 3 recordings"),
+        ("#٣", "there is no #٣; the file holds 3 recordings"),
+        (f"#{'9' * 5000}", "9...; the file holds 3 recordings, #1 to #3"),
         ("drive=worn", '"drive" is nowhere worn; it holds: lead, worm. Did you mean "worm"?'),
         ("speed=fast", '"speed" is nowhere fast; it holds: 10, 0.1.'),
         (

@@ -179,6 +179,15 @@ TorqueSaturation
     knee_torque 1e-06..inf ~1
     slope 0..1 ~1 = 0
 """
+LISTS = {
+    "Cogging": ["harmonics -100..100"],
+    "LearnedTorque": ["seen -1e+09..1e+09", "by_seen -1e+09..1e+09", "waves 0..40", "torque -1e+09..1e+09"],
+    "LearnedFriction": ["seen -1e+09..1e+09", "by_seen -1e+09..1e+09", "waves 0..40", "level_change -5..5"],
+    "LearnedDrive": ["command_seen -1e+09..1e+09", "missing -1e+09..1e+09"],
+    "LearnedHysteresis": ["strokes 1e-09..1e+09", "torque 0..1e+09"],
+    "LearnedAfterReversal": ["ways 1e-09..1e+09", "times 1e-09..1e+09", "level_change -5..5"],
+}
+"""Lists of numbers that shape the equations: what each of a list may be."""
 
 
 def told(item: Any) -> str:
@@ -206,5 +215,11 @@ def test_a_form_takes_the_numbers_that_its_cards_were_promised(form: type) -> No
     assert here == promised().get(form.__name__, [])
 
 
+@pytest.mark.parametrize("form", FORMS, ids=lambda one: one.__name__)
+def test_a_form_takes_the_lists_that_its_cards_were_promised(form: type) -> None:
+    lists = {item.name: item.metadata["structure"] for item in fields(form) if "structure" in item.metadata}
+    assert [f"{name} {one.low:g}..{one.high:g}" for name, one in lists.items()] == LISTS.get(form.__name__, [])
+
+
 def test_the_table_names_only_forms_that_there_are() -> None:
-    assert set(promised()) <= {one.__name__ for one in [*LAWS, *FORMS]}
+    assert set(promised()) | set(LISTS) <= {one.__name__ for one in [*LAWS, *FORMS]}

@@ -183,9 +183,23 @@ def test_seconds_stay_seconds_where_they_are_stated(tmp_path: Path) -> None:
     assert Recording.read(written(tmp_path / "run.csv", text)).sample_time == 1.0
 
 
+@pytest.mark.parametrize("column", ["#0", "#4", "#²", "#" + "9" * 5000])
+def test_a_number_that_no_column_has_is_named(tmp_path: Path, column: str) -> None:
+    path = written(tmp_path / "run.csv", "t,tau,q\n" + rows(","))
+    with pytest.raises(RecordingError, match=r'no column "#'):
+        Recording.read(path, columns={"q": column})
+
+
 def test_the_names_of_a_text_may_be_stated_by_their_line(tmp_path: Path) -> None:
     path = written(tmp_path / "run.csv", "a,b,c\nt,tau,q\nx,y,z\n" + rows(","))
     assert Recording.read(path, layout={"header": "2"}).columns == ("t", "tau", "q")
+
+
+@pytest.mark.parametrize("header", ["-1", "9999", "²", "9" * 5000, "1e400", "two"])
+def test_what_is_no_line_of_the_text_is_refused(tmp_path: Path, header: str) -> None:
+    path = written(tmp_path / "run.csv", "t,tau,q\n" + rows(","))
+    with pytest.raises(RecordingError, match=r"^--layout header=.{1,100}: it is the line of the names, from 1 to"):
+        Recording.read(path, layout={"header": header})
 
 
 def test_a_separator_and_a_decimal_sign_can_be_stated(tmp_path: Path) -> None:

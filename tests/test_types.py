@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mirror_fmu import KINDS, mirror, named
+from mirror_fmu import KINDS, description, mirror, named
 from simulating import simulate
-from tiny_fmu import tiny
+from tiny_fmu import described, tiny
 
 from cosim.data.recording import Recording
 from cosim.fmi.fmu import FmuComponent
@@ -387,6 +387,15 @@ def test_an_element_of_an_array_is_set_beside_the_start_values_of_the_others(mir
         {"m": mirror[3]}, [], record={"y": "m.y"}, step=0.1, ticks=2, parameters={"m": {"u[2]": 9.0}}
     ).recording
     assert [recording[f"y[{n}]"][-1] for n in (1, 2, 3)] == [1, 9, 3]
+
+
+@pytest.mark.parametrize("start", ["1 x 3", f"1 {'9' * 5000} 3", "1 ² 3"])
+def test_start_values_of_an_array_that_are_no_numbers_are_refused(
+    mirror: dict[int, Path], tmp_path: Path, start: str
+) -> None:
+    bad = described(mirror[3], tmp_path / "bad.fmu", description(3).replace('start="1 2 3"', f'start="{start}"'))
+    with pytest.raises(FmuError, match="must be a number"):
+        simulate({"m": bad}, [], record={"y": "m.y"}, step=0.1, ticks=2, parameters={"m": {"u[3]": 9.0}})
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,7 @@ from cosim.data.limits import short
 from cosim.data.roles import counts, guess
 from cosim.data.text.names import spelled, suffixed_unit
 from cosim.support.errors import RecordingError
+from cosim.support.numbers import whole
 
 OPTIONAL = ("q_d", "temperature")
 """Columns that are looked for where names have to be read anyway."""
@@ -67,10 +68,10 @@ def assign(
 
 def numbered(name: str, found: Columns) -> str:
     """Return the name of a column that is given by its number, `#3`; any other as it is."""
-    number = name.removeprefix("#")
-    if name in found.values or not (name.startswith("#") and number.isdigit() and 0 < int(number) <= len(found.values)):
+    place = whole(name[1:]) or 0
+    if name in found.values or not (name.startswith("#") and 0 < place <= len(found.values)):
         return name
-    return [*found.values][int(number) - 1]
+    return [*found.values][place - 1]
 
 
 def _missing(

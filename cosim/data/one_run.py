@@ -12,6 +12,7 @@ from cosim.data.limits import listed, short
 from cosim.data.runs import equal, split, starts, text_of
 from cosim.data.times import read_clock
 from cosim.support.errors import RecordingError
+from cosim.support.numbers import whole
 
 MANY = 1000
 """Values of a column beyond which it is a measurement, and no name of a recording."""
@@ -70,7 +71,7 @@ def _numbered(
 ) -> np.ndarray:
     """Return the rows of a recording by its number, `#3`; a new one begins where time runs backwards."""
     begins = np.append(_begins(path, found, columns, units), len(next(iter(found.values.values()))))
-    count, wanted = len(begins) - 1, int(number[1:]) if number[1:].isdecimal() else 0
+    count, wanted = len(begins) - 1, whole(number[1:]) or 0
     if not 0 < wanted <= count:
         have = f"{count:,} recordings, #1 to #{count}" if count > 1 else "one recording"
         rule = "another begins where time runs backwards"

@@ -86,5 +86,9 @@ def _start_values(whole: Port, name: str) -> list[Any]:
     return prepared(whole, [named.get(text, _number(text)) for text in texts], f"{name}.{whole.name}")
 
 
-def _number(text: str) -> float:
-    return int(text) if text.lstrip("+-").isdigit() else float(text)
+def _number(text: str) -> float | str:
+    """Read a number; what is none stays text, which no number takes."""
+    try:
+        return int(text) if text.lstrip("+-").isdigit() else float(text)
+    except ValueError:
+        return text

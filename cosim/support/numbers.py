@@ -16,6 +16,12 @@ Seconds = Annotated[float, Field(gt=0, le=LONGEST)]
 Step = Annotated[float, Field(ge=SHORTEST, le=LONGEST)]
 
 
+def whole(text: str) -> int | None:
+    """Return the number that a text of digits says; nothing where it says none, or one beyond `COUNT`."""
+    said = text.isascii() and text.isdigit() and len(text) < len(str(COUNT))
+    return int(text) if said else None
+
+
 def shown(value: object) -> str:
     """Write a value as it stands in a file, cut short where it is long."""
     try:

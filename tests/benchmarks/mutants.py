@@ -18,7 +18,7 @@ import re
 import signal
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -118,17 +118,17 @@ def copied(folder: Path) -> Path:
     return Path(copytree(HOME, folder / "tree", ignore=ignored))
 
 
-def noticed(tree: Path, tests: Sequence[str]) -> str:
+def noticed(tree: Path, tests: Sequence[str], without: Iterable[str] = ()) -> str:
     """Run files of tests in a tree, one after the other, until one fails; what `failed` says of it."""
-    return next(filter(None, (failed(tree, [name]) for name in tests)), "")
+    return next(filter(None, (failed(tree, [name], without) for name in tests)), "")
 
 
-def failed(tree: Path, tests: Sequence[str]) -> str:
-    """Run tests until one fails; its name from the file on, "(time)" where they did not end, or nothing."""
+def failed(tree: Path, tests: Sequence[str], without: Iterable[str] = ()) -> str:
+    """Run tests, some left out, until one fails; its name "(time)" where they did not end, or nothing."""
     said = tree / "said"
     pid = os.fork()
     if not pid:
-        os._exit(_tested(tree, tests, said))
+        os._exit(_tested(tree, tests, said, without))
     code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
     if code == -signal.SIGXCPU:
         return f"{tests[0]} (time)"
@@ -172,11 +172,12 @@ def calling(module: str, source: str, line: int, reached: Sequence[Reached]) -> 
     return tuple(found[:MANY])
 
 
-def _tested(tree: Path, tests: Sequence[str], said: Path) -> int:
+def _tested(tree: Path, tests: Sequence[str], said: Path, without: Iterable[str]) -> int:
     """Run tests here, in a fork that has all but the tree loaded already; what pytest ends with."""
     limited()
     prepared(tree, said)
-    return int(pytest.main([*QUIET, "-x", *(f"tests/{name}" for name in tests)]))
+    left_out = [f"--deselect=tests/{one}" for one in without]
+    return int(pytest.main([*QUIET, "-x", *left_out, *(f"tests/{name}" for name in tests)]))
 
 
 class Asking:
@@ -189,6 +190,7 @@ class Asking:
 
     def __init__(self, tree: Path, reached: Sequence[Reached] = ()) -> None:
         self.tree, self._reached = tree, reached
+        self._broken: set[str] = set()  # tests that fail in the copy without an error too
         files = sorted({one.test.split("::")[0].removeprefix("tests/") for one in reached})
         self._server = Server(tree, files) if files else None
 
@@ -196,18 +198,22 @@ class Asking:
         """Plant one error, run the tests, take it back."""
         source, place, module = path.read_text("utf-8"), self.tree / path.relative_to(HOME), str(path.relative_to(HOME))
         line, change, text = mutated(source, site)
-        known = list(calling(module, source, line, self._reached))
         while True:
+            known = [one for one in calling(module, source, line, self._reached) if one not in self._broken]
             try:
                 place.write_text(text, "utf-8")
-                witness = self._failed(known, module, source, line) if known else noticed(self.tree, belonging(path))
+                witness = (
+                    self._failed(known, module, source, line)
+                    if known
+                    else noticed(self.tree, belonging(path), self._broken)
+                )
             finally:
                 place.write_text(source, "utf-8")
             if not witness or witness.endswith("(time)") or not self._failed([witness]):
                 return Tried(group, module, site, line, change, witness)
-            if witness not in known:  # a file that fails without the error too
+            if witness in self._broken:
                 raise SystemExit(f"{witness} fails in the tree as it is")
-            known.remove(witness)
+            self._broken.add(witness)
 
     def _failed(self, tests: Sequence[str], module: str = "", source: str = "", line: int = 0) -> str:
         function = function_of(source, line) if module else ""

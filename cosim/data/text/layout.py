@@ -11,9 +11,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from cosim.data.limits import short
 from cosim.data.text.fields import is_value, split
 from cosim.data.text.names import is_unit
 from cosim.support.errors import RecordingError
+from cosim.support.numbers import whole
 
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "blank": " ", "bar": "|"}
 DECIMALS = {"point": ".", "comma": ","}
@@ -163,10 +165,10 @@ def is_row_of_units(fields: Sequence[str]) -> bool:
 
 def _stated(rows: Sequence[list[str]], found: Layout, header: str) -> Layout:
     """Lay out with the line of names as stated, counted from 1."""
-    if not header.isdigit() or int(header) > len(rows):
-        text = f"--layout header={header}: it is the line of the names, from 1 to {len(rows)}, or 0 for none."
+    line = whole(header)
+    if line is None or line > len(rows):
+        text = f"--layout header={short(header)}: it is the line of the names, from 1 to {len(rows)}, or 0 for none."
         raise RecordingError(text, culprit="header", value=header)
-    line = int(header)
     names = tuple((rows[line - 1] + [""] * found.count)[: found.count])
     has_units = line < len(rows) and len(rows[line]) == found.count and is_row_of_units(rows[line])
     first = max(found.first, line + has_units)
