@@ -221,6 +221,8 @@ def test_a_recording_for_which_there_is_no_room_is_refused(tiny: Tiny, tmp_path:
         simulate({"one": tiny[3]}, [], path=tmp_path / "run.parquet", **endless)
     with pytest.raises(OutputError, match="16 PB are needed and memory has"):
         simulate({"one": tiny[3]}, [], **endless)
+    with pytest.raises(OutputError, match=r"2\.29 PB are needed .* the recording has 142,857,142,857,143 rows;"):
+        simulate({"one": tiny[3]}, [], decimation=7, **endless)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -6,8 +6,8 @@
 A mutant is a module with one operator, number or truth value changed, or one call left out (`mutations.py`). It is
 written into a copy of the tree, and tests run there until one fails: those that call the function which was changed,
 the cheapest of each kind first, for `BUDGET` seconds; without `--reach`, or where none is known to call it, the files
-of tests nearest to the module, by imports and names. Killed: a test failed that passes without the error, or no longer
-ended. Survived: none did.
+of tests nearest to the module, by imports and names; outside of functions `DECLARING` too. Killed: a test failed that
+passes without the error, or no longer ended. Survived: none did.
 """
 
 import argparse
@@ -59,6 +59,8 @@ BUDGET, MANY = 20.0, 120
 """Seconds that the tests of a mutant take without it in all, and how many tests that are at most."""
 LOST = ("FAILED", "ERROR")
 """What pytest says of a test that noticed."""
+DECLARING = ("test_parameter_ranges.py", "test_machine_ranges.py")
+"""Tests of what a module only declares, which calls none of its functions: asked of lines outside of functions."""
 SLOW = ("test_attack", "test_prove", "test_proof", "test_serve", "test_benchmarks", "test_same_bits", "test_platforms")
 """Test files that are not asked: a mutant that only they would notice counts as survived."""
 
@@ -207,6 +209,8 @@ class Asking:
                     if known
                     else noticed(self.tree, belonging(path), self._broken)
                 )
+                if not witness and not spanned(source, line):
+                    witness = noticed(self.tree, DECLARING, self._broken)
             finally:
                 place.write_text(source, "utf-8")
             if not witness or witness.endswith("(time)") or not self._failed([witness]):
