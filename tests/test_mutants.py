@@ -136,6 +136,7 @@ def noticed(folder: Path) -> None:
         assert mutants.noticed(folder, ["test_idle.py"]) == "", change
         expected = "" if change == "min(x, 3) + 0 -> Sub" else "test_looks.py::test_looks"
         assert mutants.noticed(folder, ["test_idle.py", "test_looks.py"]) == expected, change
+        assert mutants.noticed(folder, ["test_looks.py"], without=["test_looks.py::test_looks"]) == ""
 
 
 def served(folder: Path) -> None:
