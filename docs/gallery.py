@@ -44,7 +44,7 @@ def write_gallery(folder: Path) -> None:
     piece = prepare([motion()], CUTOFF).pieces[0]
     with mpl.rc_context(STYLE):
         parts = [section(name, one, folder, piece) for name, one in sorted(shown.items(), key=lambda p: p[1].title)]
-    (folder / "effects.md").write_text("\n".join([INTRODUCTION, *parts]), "utf-8")
+    (folder / "effects.md").write_text("\n".join([INTRODUCTION, *parts, *of_cards_alone()]), "utf-8")
 
 
 INTRODUCTION = f"""# Gallery of effects
@@ -54,6 +54,31 @@ are those of the [report](../report.md): an axis of 2 kg m² with friction of 1 
 {SECONDS} s, with rests. Orange is the model without the effect, blue with it. An effect torque *resists*: it stands
 on the right of J q'' = τ − friction − loads − effects with a minus.
 """
+
+
+OF_CARDS = """## Effects of cards alone
+
+Cards may hold these too, and FMUs, C, Modelica and firmware compute them. A diagnosis does not look for them yet: a
+recording with one that its card does not hold is at best called "unknown".
+"""
+
+
+def of_cards_alone() -> Iterator[str]:
+    """Yield what is said of the effects that a diagnosis does not look for, without pictures."""
+    yield OF_CARDS
+    shown = {form.id: form for form in reversed(EXAMPLES) if form.id not in TRIED}
+    for name, one in sorted(shown.items(), key=lambda p: p[1].title):
+        told, literature = described(type(one))
+        yield f"### {one.title}\n\n`{name}`, {one.place.lower()}. {told}\n\n*In words:* {one.statement()}\n"
+        yield from (f"*{title}:* {text}\n" for title, text in _said(one, literature) if text)
+        yield _table(one) + "\n"
+
+
+def _said(one: Effect, literature: str) -> Iterator[tuple[str, str]]:
+    yield "Equation", f"`{one.equation}`" if one.equation else ""
+    yield "Told apart by", f"{one.told_apart_by}."
+    yield "What to do", one.action
+    yield "Literature", literature
 
 
 def section(name: str, one: Effect, folder: Path, piece: Piece) -> str:

@@ -42,6 +42,7 @@ NUMBERS: dict[str, dict[str, Any]] = {
     "AltitudeInertia": {"tube_inertia": 3.0},
     "AzimuthCentrifugal": {"tube_inertia": 3.0},
     "LoadDependentFriction": {"coulomb_per_Nm": 0.2},
+    "GearFriction": {"driving": 0.3, "driven": 0.1},
     "TorqueSaturation": {"knee_torque": 5.0, "slope": 0.4},
     "DeadBand": {"band": 0.5},
     "ConcaveViscous": {"thinning_speed": 0.3, "exponent": -0.4},

@@ -53,6 +53,13 @@ def test_no_literature_is_told_twice(gallery: Any) -> None:
     assert [name for name in gallery.LITERATURE if gallery.described(last[name])[1]] == []
 
 
+def test_the_gallery_lists_the_effects_that_a_diagnosis_does_not_look_for(gallery: Any) -> None:
+    text = "\n".join(gallery.of_cards_alone())
+    assert "A diagnosis does not look for them yet" in text
+    assert set(re.findall(r"^`(\w+)`, ", text, re.M)) == set(CATALOGUE) - set(TRIED)
+    assert text.count("*Literature:* Carreau") == 1
+
+
 def test_the_index_leads_to_every_page_that_is_there() -> None:
     index = (DOCS / "index.md").read_text("utf-8")
     listed = set(re.findall(r"^([a-z_/]+)$", index, re.M))

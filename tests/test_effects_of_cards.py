@@ -1,11 +1,37 @@
-"""Effects that a card may hold and a diagnosis does not ask for yet: a dead band, viscous friction that rises less."""
+"""Effects that a card may hold and a diagnosis does not ask for yet, each beside its equation in numpy."""
+
+from typing import Any
 
 import numpy as np
 import pytest
-from effect_examples import mount
+from effect_examples import evaluate, mount, simulate
 
+from cosim.diagnosis.hypotheses import TRIED
+from pyfmi_models.effects import CATALOGUE, GravityUnbalance
 from pyfmi_models.effects.concave_viscous import ConcaveViscous
 from pyfmi_models.effects.dead_band import DeadBand
+from pyfmi_models.effects.gear_friction import GearFriction
+from pyfmi_models.effects.known_load import KnownLoad
+from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction
+
+ASKED = """
+    friction_asymmetry stribeck presliding position_friction load_dependent_friction dwell_breakaway thermal_viscosity
+    torque_offset cogging gravity_unbalance cable_wrap quadratic_drag periodic_disturbance torque_saturation delay
+    actuator_lag clock_skew inertia_variation compliance encoder_eccentricity backlash
+"""
+"""What a diagnosis looks for: an effect in the catalogue is not asked for before it has a hypothesis."""
+OF_CARDS = ("concave_viscous", "dead_band", "gear_friction")
+
+
+def friction(*effects: Any, motion: str = "rotary", **values: float) -> float:
+    """Friction torque of an axis with 1 N m of Coulomb friction, 3 N m s/rad and these effects."""
+    return evaluate(mount(*effects, motion=motion).model(), **values)["friction"]
+
+
+def test_a_diagnosis_asks_for_what_it_did_and_for_none_of_these() -> None:
+    assert set(TRIED) == set(ASKED.split())
+    assert not set(OF_CARDS) & set(TRIED)
+    assert set(OF_CARDS) <= set(CATALOGUE)
 
 
 def test_a_dead_band_takes_its_width_of_large_commands_and_most_of_small_ones() -> None:
@@ -36,3 +62,52 @@ def test_far_above_its_speed_viscous_friction_is_a_power_and_far_below_a_line(ex
     assert torque(200.0) / torque(100.0) == pytest.approx(2.0**exponent, rel=1e-5)
     assert torque(100.0) == pytest.approx(line * 100.0 * 1000.0 ** (exponent - 1), rel=1e-5)
     assert torque(-0.3) == -torque(0.3) < 0.0
+
+
+# Gears
+
+WEIGHT = GravityUnbalance(mgl=2.0, phase=0.3)
+GEAR = GearFriction(driving=0.6, driven=0.2)
+
+
+@pytest.mark.parametrize("v", [-0.5, -0.01, 0.02, 0.7])
+@pytest.mark.parametrize("q", [-2.0, -0.3, 0.4, 1.2, 5.0])
+def test_a_gear_rubs_by_its_load_and_otherwise_lifting_than_lowering(q: float, v: float) -> None:
+    load = 2.0 * np.sin(q + 0.3)
+    level = 1.0 + (0.6 if load * v > 0 else 0.2) * abs(load)
+    assert friction(WEIGHT, GEAR, position=q, speed=v) == pytest.approx(level * np.sign(v) + 3 * v, rel=1e-12)
+
+
+def test_at_rest_a_gear_has_the_mean_of_both() -> None:
+    motion = mount(WEIGHT, GEAR).at(0.0, 0.4, 0.0)
+    assert float(mount(WEIGHT, GEAR).level(motion)) == pytest.approx(1.0 + 0.4 * 2.0 * np.sin(0.7), rel=1e-12)
+    assert friction(WEIGHT, GEAR, position=0.4, speed=0.0) == 0.0
+
+
+@pytest.mark.parametrize("v", [-0.3, 0.3])
+def test_a_gear_alike_both_ways_is_friction_that_depends_on_the_load(v: float) -> None:
+    alike, same = GearFriction(driving=0.3, driven=0.3), LoadDependentFriction(coulomb_per_Nm=0.3)
+    for q in (-2.0, 0.1, 1.3):
+        expected = friction(WEIGHT, same, position=q, speed=v)
+        assert friction(WEIGHT, alike, position=q, speed=v) == pytest.approx(expected, rel=1e-14)
+
+
+@pytest.mark.parametrize("load", [-4.0, 4.0])
+def test_a_gear_of_a_linear_axis_feels_a_known_load(load: float) -> None:
+    for v in (-0.2, 0.2):
+        level = 1.0 + (0.6 if load * v > 0 else 0.2) * 4.0
+        found = friction(KnownLoad(), GEAR, motion="linear", position=0.7, speed=v, load_torque=load)
+        assert found == pytest.approx(level * np.sign(v) + 3 * v, rel=1e-12)
+    units = {one.name: one.unit for one in mount(WEIGHT, GEAR, motion="linear").parameters()}
+    assert units["gear_friction.driving"] == units["gear_friction.driven"] == "1"
+
+
+def test_a_gear_that_takes_more_than_it_lowers_holds_its_load() -> None:
+    """The weight hangs out at a right angle; friction of the axis itself is small, and nothing drives."""
+    far = {}
+    for driven in (0.2, 1.2):
+        gear = GearFriction(driving=1.5, driven=driven)
+        run = simulate(mount(GravityUnbalance(mgl=20.0), gear).model(), np.array([0.0, 1.0]), start={"position": 1.5})
+        far[driven] = abs(run["position"][-1] - 1.5)
+    assert far[1.2] < 1e-4
+    assert far[0.2] > 0.5

@@ -24,6 +24,7 @@ TURNING = {
     "DwellBreakaway": "The longer the axis rests the harder it starts: "
     f"{0.3 * log(10):.2g} N·m more for ten times the rest.",
     "EncoderEccentricity": "The encoder errs by 0.001 rad either way, 8 times per turn.",
+    "GearFriction": "The gear's friction rises by 0.3 N·m for each N·m that it lifts and 0.1 that it lowers.",
     "GravityUnbalance": "The axis is out of balance by 1.5 N·m.",
     "InertiaVariation": "The inertia rises and falls by 30 %, 2 times per turn.",
     "KnownLoad": "The known load acts with 1 N·m of drive torque for each N·m.",
@@ -103,6 +104,12 @@ def test_the_sentence_of_an_axis_that_slides_differs_in_its_units_alone(effect: 
             {"level_asymmetry": 0.1, "viscous_asymmetry": -0.2},
             "Viscous friction is 40 % higher moving backward than forward, "
             "sliding friction is 20 % higher moving forward than backward.",
+        ),
+        (
+            "GearFriction",
+            {"driving": 0.6, "driven": 1.2},
+            "The gear's friction rises by 0.6 N·m for each N·m that it lifts and 1.2 that it lowers; "
+            "it holds its load by itself.",
         ),
         (
             "FrictionWander",

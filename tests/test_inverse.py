@@ -31,7 +31,8 @@ def fitting(effect: Effect) -> tuple[Effect, ...]:
         return (replace(effect, q_center=0.3),)
     if isinstance(effect, TorqueSaturation):
         return (replace(effect, knee_torque=5.0),)
-    known = (GravityUnbalance(mgl=3.0, phase=0.3),) if effect.id == "load_dependent_friction" else ()
+    loaded = effect.id in ("load_dependent_friction", "gear_friction")
+    known = (GravityUnbalance(mgl=3.0, phase=0.3),) if loaded else ()
     return (*known, effect)
 
 

@@ -114,6 +114,9 @@ FrictionWander
     jump_std 0..0.5 ~1 = 0
     jump_period 0.01..inf ~1 = 2.5
     seed 0..1e+06 ~1 = 0
+GearFriction
+    driving 0..10 ~1
+    driven 0..10 ~1
 GravityUnbalance
     mgl 0..inf ~1
     phase -inf..inf ~1 = 0
