@@ -7,12 +7,13 @@ import pytest
 from effect_examples import evaluate, mount, simulate
 
 from cosim.diagnosis.hypotheses import TRIED
-from pyfmi_models.effects import CATALOGUE, GravityUnbalance
+from pyfmi_models.effects import CATALOGUE, GravityUnbalance, LocalFriction
 from pyfmi_models.effects.concave_viscous import ConcaveViscous
 from pyfmi_models.effects.dead_band import DeadBand
 from pyfmi_models.effects.gear_friction import GearFriction
 from pyfmi_models.effects.known_load import KnownLoad
 from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction
+from pyfmi_models.effects.rough_spot import RoughSpot
 
 ASKED = """
     friction_asymmetry stribeck presliding position_friction load_dependent_friction dwell_breakaway thermal_viscosity
@@ -20,7 +21,7 @@ ASKED = """
     actuator_lag clock_skew inertia_variation compliance encoder_eccentricity backlash
 """
 """What a diagnosis looks for: an effect in the catalogue is not asked for before it has a hypothesis."""
-OF_CARDS = ("concave_viscous", "dead_band", "gear_friction")
+OF_CARDS = ("concave_viscous", "dead_band", "gear_friction", "rough_spot")
 
 
 def friction(*effects: Any, motion: str = "rotary", **values: float) -> float:
@@ -111,3 +112,28 @@ def test_a_gear_that_takes_more_than_it_lowers_holds_its_load() -> None:
         far[driven] = abs(run["position"][-1] - 1.5)
     assert far[1.2] < 1e-4
     assert far[0.2] > 0.5
+
+
+# Rough spots
+
+SPOT = RoughSpot(q_center=0.3, width=0.1, forward=0.8, backward=-0.3)
+
+
+@pytest.mark.parametrize("motion", ["rotary", "linear"])
+@pytest.mark.parametrize("v", [-0.4, -0.01, 0.01, 0.4])
+def test_a_rough_spot_is_another_forward_than_backward(v: float, motion: str) -> None:
+    for q in (-9.0, 0.1, 0.25, 0.3, 0.5, 0.3 + 2 * np.pi):
+        rise = (0.8 if v > 0 else -0.3) * np.exp(-0.5 * ((q - 0.3) / 0.1) ** 2)
+        expected = (1 + rise) * np.sign(v) + 3 * v
+        assert friction(SPOT, motion=motion, position=q, speed=v) == pytest.approx(expected, rel=1e-12)
+    units = {one.name: one.unit for one in mount(SPOT, motion="linear").parameters()}
+    assert [units[f"rough_spot.{name}"] for name in ("q_center", "width", "forward")] == ["m", "m", "1"]
+
+
+def test_a_spot_alike_both_ways_is_the_local_form_of_friction_over_position() -> None:
+    alike = RoughSpot(q_center=0.3, width=0.1, forward=0.8, backward=0.8)
+    same = LocalFriction(q_center=0.3, width=0.1, relative_amplitude=0.8)
+    for q in (0.1, 0.3, 0.44):
+        for v in (-0.2, 0.0, 0.2):
+            expected = friction(same, position=q, speed=v)
+            assert friction(alike, position=q, speed=v) == pytest.approx(expected, rel=1e-14)

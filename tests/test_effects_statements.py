@@ -38,6 +38,7 @@ TURNING = {
     "PeriodicFriction": "Friction rises and falls by 20 %, 3 times per turn.",
     "Presliding": "Before it slides the axis bends like a spring of 2e+04 N·m per rad.",
     "QuadraticDrag": "Drag grows with the square of the speed, 2 N·m at 1 rad/s.",
+    "RoughSpot": "Around 0.3 rad friction is +80 % off moving forward and -30 % backward, over about 0.4 rad.",
     "StribeckEffect": "Below about 0.02 rad/s friction changes with speed, to 4 N·m near standstill.",
     "ThermalViscosity": "Viscous friction falls by 4 % per degree and sliding friction falls by 2 % per degree.",
     "TorqueOffset": "A constant 0.7 N·m pushes the axis backward, moving or not.",

@@ -159,6 +159,11 @@ Presliding
     sigma1 0..inf ~100 = 0
 QuadraticDrag
     coefficient 0..inf ~1
+RoughSpot
+    q_center -inf..inf ~1
+    width 1e-06..inf ~1
+    forward -0.95..20 ~1
+    backward -0.95..20 ~1
 StribeckEffect
     Fs 1e-09..inf ~1
     Vs 1e-07..inf ~0.01

@@ -51,8 +51,7 @@ class LocalFriction(_PositionFriction):
 
     def level(self, level: Scalar, motion: Motion) -> Scalar:
         """`level (1 + r exp(-((q - q_center)/width)^2 / 2))`."""
-        distance = (motion.q - self.q_center) / self.width
-        return level * (1 + self.relative_amplitude * ca.exp(-ca.fmin(distance * distance, 1e3) / 2))
+        return level * (1 + self.relative_amplitude * bump(motion.q, self.q_center, self.width))
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
@@ -60,3 +59,9 @@ class LocalFriction(_PositionFriction):
         size = 100 * self.relative_amplitude
         span = f"over about {4 * self.width:.2g} {where}"
         return f"Around {self.q_center:.4g} {where} friction is {size:+.0f} % off, {span}."
+
+
+def bump(q: Scalar, center: Scalar, width: Scalar) -> Scalar:
+    """`exp(-((q - center)/width)^2 / 2)`, without underflow far away."""
+    distance = (q - center) / width
+    return ca.exp(-ca.fmin(distance * distance, 1e3) / 2)
