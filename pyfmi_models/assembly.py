@@ -137,12 +137,15 @@ class Assembly:
             start = [variable.start for variable in effect.states()]
             yield effect, motion._replace(state=states.get(name, start))
 
-    def applied(self, command: Scalar, states: Mapping[str, Any]) -> tuple[Scalar, dict[str, Scalar]]:
+    def applied(
+        self, command: Scalar, states: Mapping[str, Any], inputs: Mapping[str, Scalar]
+    ) -> tuple[Scalar, dict[str, Scalar]]:
         """Torque path: limit, then the drive effects in series. Return the applied torque and the rates of states."""
         rates, torque = {}, ca.fmax(-self.axis.torque_limit, ca.fmin(self.axis.torque_limit, command))
         for name, effect in self.of_kind(DriveEffect):
-            rates[name] = effect.rate(states[name], torque)
-            torque = effect.applied(states[name], torque)
+            drive = effect.given(inputs)
+            rates[name] = drive.rate(states[name], torque)
+            torque = drive.applied(states[name], torque)
         return torque, rates
 
     @property

@@ -45,6 +45,8 @@ NUMBERS: dict[str, dict[str, Any]] = {
     "GearFriction": {"driving": 0.3, "driven": 0.1},
     "TorqueSaturation": {"knee_torque": 5.0, "slope": 0.4},
     "DeadBand": {"band": 0.5},
+    "TorqueDroop": {"droop": 0.2, "rated_torque": 8.0},
+    "WarmTorqueDroop": {"droop": 0.2, "rated_torque": 8.0, "per_degC": -0.002},
     "RoughSpot": {"q_center": 0.3, "width": 0.1, "forward": 0.8, "backward": -0.3},
     "ConcaveViscous": {"thinning_speed": 0.3, "exponent": -0.4},
     "PeriodicDisturbance": {"frequency_hz": 3.0, "amplitude": 0.6, "phase": 0.2},

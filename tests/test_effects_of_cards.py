@@ -4,9 +4,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from effect_examples import evaluate, mount, simulate
+from effect_examples import EXAMPLES, evaluate, mount, simulate
 
 from cosim.diagnosis.hypotheses import TRIED
+from cosim.diagnosis.sanity.admission import check_effects
+from cosim.support.errors import InputError
+from pyfmi_models.card import parse_card
 from pyfmi_models.effects import CATALOGUE, GravityUnbalance, LocalFriction
 from pyfmi_models.effects.concave_viscous import ConcaveViscous
 from pyfmi_models.effects.dead_band import DeadBand
@@ -14,6 +17,9 @@ from pyfmi_models.effects.gear_friction import GearFriction
 from pyfmi_models.effects.known_load import KnownLoad
 from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction
 from pyfmi_models.effects.rough_spot import RoughSpot
+from pyfmi_models.effects.torque_droop import TorqueDroop, WarmTorqueDroop
+from pyfmi_models.effects.torque_saturation import TorqueSaturation
+from pyfmi_models.errors import CardError
 
 ASKED = """
     friction_asymmetry stribeck presliding position_friction load_dependent_friction dwell_breakaway thermal_viscosity
@@ -21,7 +27,7 @@ ASKED = """
     actuator_lag clock_skew inertia_variation compliance encoder_eccentricity backlash
 """
 """What a diagnosis looks for: an effect in the catalogue is not asked for before it has a hypothesis."""
-OF_CARDS = ("concave_viscous", "dead_band", "gear_friction", "rough_spot")
+OF_CARDS = ("concave_viscous", "dead_band", "gear_friction", "rough_spot", "torque_droop")
 
 
 def friction(*effects: Any, motion: str = "rotary", **values: float) -> float:
@@ -137,3 +143,64 @@ def test_a_spot_alike_both_ways_is_the_local_form_of_friction_over_position() ->
         for v in (-0.2, 0.0, 0.2):
             expected = friction(same, position=q, speed=v)
             assert friction(alike, position=q, speed=v) == pytest.approx(expected, rel=1e-14)
+
+
+# Droop
+
+
+def drooped(command: float, droop: float, rated: float) -> float:
+    """The docstring's equation, in numpy."""
+    s = np.hypot(np.array([command / rated, 1.0]), 0.05) - 0.05
+    return command / (1 + (1 / (1 - droop) - 1) * s[0] / s[1])
+
+
+@pytest.mark.parametrize("droop", [0.0, 0.05, 0.3, 0.9])
+def test_a_drive_that_droops_loses_its_share_at_the_rated_torque_and_more_always_gives_more(droop: float) -> None:
+    drive = TorqueDroop(droop=droop, rated_torque=8.0)
+    command = np.concatenate([-np.geomspace(1e-6, 800.0, 400)[::-1], np.geomspace(1e-6, 800.0, 400)])
+    given = np.array([float(drive.applied((), u)) for u in command])
+    np.testing.assert_allclose(given, [drooped(u, droop, 8.0) for u in command], rtol=1e-12)
+    np.testing.assert_allclose(given, -given[::-1], rtol=1e-15)
+    assert np.all(np.diff(given) > 0)
+    assert float(drive.applied((), 8.0)) == pytest.approx((1 - droop) * 8.0, rel=1e-12)
+
+
+def test_a_small_droop_is_a_line_over_the_torque_where_a_saturation_has_a_knee() -> None:
+    """At half the knee, or half the rated torque: the one has lost half its share, the other nothing."""
+    for command in (2.0, 4.0, 8.0):
+        lost = 1 - float(TorqueDroop(droop=0.02, rated_torque=8.0).applied((), command)) / command
+        assert lost == pytest.approx(0.02 * command / 8.0, abs=0.02 * 0.05)
+    assert float(TorqueSaturation(knee_torque=8.0, slope=0.3).applied((), 4.0)) == pytest.approx(4.0, rel=1e-9)
+    assert float(TorqueDroop(droop=0.3, rated_torque=8.0).applied((), 4.0)) < 0.85 * 4.0
+
+
+@pytest.mark.parametrize("degrees", [-30.0, 20.0, 80.0])
+def test_warm_magnets_give_less(degrees: float) -> None:
+    drive = WarmTorqueDroop(droop=0.1, rated_torque=8.0, per_degC=-0.002)
+    model = mount(drive).model()
+    assert [(one.name, one.unit, one.start) for one in model.inputs[2:]] == [("temperature", "degC", 20.0)]
+    found = evaluate(model, tau=5.0, temperature=degrees)["applied"]
+    units = {one.name: one.unit for one in mount(drive, motion="linear").parameters()}
+    assert [units[f"torque_droop.{name}"] for name in ("rated_torque", "droop", "per_degC")] == ["N", "1", "1/K"]
+    assert found == pytest.approx(drooped(5.0, 0.1, 8.0) * (1 - 0.002 * (degrees - 20)), rel=1e-12)
+
+
+def test_however_hot_a_drive_keeps_a_tenth_of_its_torque_constant() -> None:
+    model = mount(WarmTorqueDroop(droop=0.0, rated_torque=8.0, per_degC=-0.05)).model()
+    assert evaluate(model, tau=5.0, temperature=500.0)["applied"] == pytest.approx(0.5)
+
+
+def test_a_card_takes_the_form_with_a_temperature_by_its_key() -> None:
+    text = '[mount]\ninertia = 2.0\n[friction]\nmodel = "none"\n[[effects]]\neffect = "torque_droop"\n'
+    numbers = "droop = 0.1\nrated_torque = 8.0\n"
+    assert parse_card(text + numbers, "c").effects == (TorqueDroop(droop=0.1, rated_torque=8.0),)
+    warm = WarmTorqueDroop(droop=0.1, rated_torque=8.0, per_degC=-0.001)
+    assert parse_card(text + numbers + "per_degC = -0.001\n", "c").effects == (warm,)
+    with pytest.raises(CardError, match='"warmth" is not a key'):
+        parse_card(text + numbers + "warmth = 3.0\n", "c")
+
+
+@pytest.mark.parametrize("effect", [one for one in EXAMPLES if type(one).__name__ in ("BoucWen", "WarmTorqueDroop")])
+def test_a_card_with_what_an_inverse_cannot_follow_is_refused_by_a_diagnosis(effect: Any) -> None:
+    with pytest.raises(InputError, match=f"The card holds {effect.id}, which a diagnosis cannot take into account yet"):
+        check_effects(mount(effect))

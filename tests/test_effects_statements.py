@@ -41,6 +41,8 @@ TURNING = {
     "RoughSpot": "Around 0.3 rad friction is +80 % off moving forward and -30 % backward, over about 0.4 rad.",
     "StribeckEffect": "Below about 0.02 rad/s friction changes with speed, to 4 N·m near standstill.",
     "ThermalViscosity": "Viscous friction falls by 4 % per degree and sliding friction falls by 2 % per degree.",
+    "TorqueDroop": "Of a command of 8 N·m the drive loses 20 %, of less less.",
+    "WarmTorqueDroop": "Of a command of 8 N·m the drive loses 20 %, of less less, and gives 0.2 % less per degree.",
     "TorqueOffset": "A constant 0.7 N·m pushes the axis backward, moving or not.",
     "TorqueSaturation": "The drive saturates at 5 N·m: 40 % of what is asked for beyond it arrives.",
 }

@@ -15,6 +15,7 @@ from cosim.estimation.set_point import set_point
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import ClockEffect, Effect, GravityUnbalance, LocalFriction, PeriodicFriction
 from pyfmi_models.effects.backlash import Backlash
+from pyfmi_models.effects.torque_droop import TorqueDroop
 from pyfmi_models.effects.torque_saturation import TorqueSaturation
 from pyfmi_models.friction import LuGre, Stribeck
 from pyfmi_models.friction.lugre_passive import PassiveLuGre
@@ -31,6 +32,8 @@ def fitting(effect: Effect) -> tuple[Effect, ...]:
         return (replace(effect, q_center=0.3),)
     if isinstance(effect, TorqueSaturation):
         return (replace(effect, knee_torque=5.0),)
+    if isinstance(effect, TorqueDroop):
+        return (replace(effect, rated_torque=60.0),)
     loaded = effect.id in ("load_dependent_friction", "gear_friction")
     known = (GravityUnbalance(mgl=3.0, phase=0.3),) if loaded else ()
     return (*known, effect)

@@ -181,6 +181,13 @@ RubbedViscosity
     coulomb_per_degC -1..1 ~1 = 0
     heat_degC_per_rad 0..1e+06 ~1 fixed
     cooling_s 0.001..inf ~1 = 600
+TorqueDroop
+    droop 0..0.9 ~1
+    rated_torque 1e-06..inf ~1 fixed
+WarmTorqueDroop
+    droop 0..0.9 ~1
+    rated_torque 1e-06..inf ~1 fixed
+    per_degC -0.05..0.05 ~1
 TorqueOffset
     torque -inf..inf ~1
 TorqueSaturation

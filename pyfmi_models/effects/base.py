@@ -20,7 +20,7 @@ Signs: an effect torque resists, J q'' = tau - tau_f - loads - effects. Effects 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
@@ -89,7 +89,8 @@ class Effect(Part):
     special_case_of: ClassVar[tuple[str, ...]] = ()
     """Effects that include this one: what both explain, the special one predicts alike."""
     is_determined: ClassVar[bool] = True
-    """Whether motion and inputs determine it; not what is drawn by chance."""
+    """Whether the torque of a recorded motion can be told with it: not of what is drawn by chance, and not yet of what
+    reads an input in the torque path or has a memory that is not linear in its states."""
     ordered: ClassVar[tuple[tuple[str, str, float], ...]] = ()
     """Parameters of which the second is above the first, and the least factor between them that a fit keeps."""
 
@@ -123,6 +124,10 @@ class DriveEffect(Effect):
     """Dynamics or limits between the commanded and the applied torque."""
 
     place: ClassVar[str] = "Torque path"
+
+    def given(self, inputs: Mapping[str, Scalar]) -> Self:
+        """Return the effect at the values of the inputs that it names; `rate` and `applied` are then of that moment."""
+        return self
 
     def rate(self, state: Any, command: Scalar) -> Any:
         """Time derivative of the states under a command [N m], a column."""
