@@ -47,6 +47,7 @@ NUMBERS: dict[str, dict[str, Any]] = {
     "DeadBand": {"band": 0.5},
     "TorqueDroop": {"droop": 0.2, "rated_torque": 8.0},
     "WarmTorqueDroop": {"droop": 0.2, "rated_torque": 8.0, "per_degC": -0.002},
+    "BoucWen": {"torque": 0.8, "stroke": 0.05, "beta": 0.6, "gamma": -0.3, "n": 1.5},
     "RoughSpot": {"q_center": 0.3, "width": 0.1, "forward": 0.8, "backward": -0.3},
     "ConcaveViscous": {"thinning_speed": 0.3, "exponent": -0.4},
     "PeriodicDisturbance": {"frequency_hz": 3.0, "amplitude": 0.6, "phase": 0.2},

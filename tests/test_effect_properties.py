@@ -46,6 +46,7 @@ NEUTRAL = {
     "InertiaVariation": {"relative_amplitude": 0.0},
     "LoadDependentFriction": {"coulomb_per_Nm": 0.0},
     "GearFriction": {"driving": 0.0, "driven": 0.0},
+    "BoucWen": {"torque": 0.0},
     "TorqueDroop": {"droop": 0.0},
     "WarmTorqueDroop": {"droop": 0.0},
     "RoughSpot": {"forward": 0.0, "backward": 0.0},

@@ -27,7 +27,7 @@ ASKED = """
     actuator_lag clock_skew inertia_variation compliance encoder_eccentricity backlash
 """
 """What a diagnosis looks for: an effect in the catalogue is not asked for before it has a hypothesis."""
-OF_CARDS = ("concave_viscous", "dead_band", "gear_friction", "rough_spot", "torque_droop")
+OF_CARDS = ("concave_viscous", "dead_band", "gear_friction", "rough_spot", "torque_droop", "bouc_wen")
 
 
 def friction(*effects: Any, motion: str = "rotary", **values: float) -> float:

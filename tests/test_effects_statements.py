@@ -13,6 +13,7 @@ TURNING = {
     "AltitudeInertia": "The azimuth carries 3 kg·m² more with the tube level than at the zenith.",
     "AzimuthCentrifugal": "Turning in azimuth swings the tube down; it weighs 3 kg·m² against it.",
     "Backlash": "There is play of 0.01 rad in the drive.",
+    "BoucWen": "A belt or gear goes round a loop of 1.79 N·m either way, within 0.05 rad.",
     "CableWrap": "A cable or spring pulls towards 0.2 rad with 3 N·m per rad.",
     "ClockSkew": "The clock of the encoder is 4 ms ahead of the torque and drifts by 100 ppm. Nothing mechanical.",
     "Cogging": "The motor tugs 24 times per turn, 0.5 N·m each way.",

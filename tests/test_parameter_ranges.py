@@ -69,6 +69,13 @@ Backlash
     load_friction 0..inf ~1 = 0
     load_viscous 0..inf ~1 = 0
     load_deflection 1e-09..0.1 ~1 = 1e-05
+BoucWen
+    torque 0..inf ~1
+    stroke 1e-09..inf ~0.1
+    A 0.001..1000 ~1 = 1 fixed
+    beta 0..inf ~1 = 0.5 fixed
+    gamma -inf..inf ~1 = 0.5
+    n 1..10 ~1 = 1 fixed
 CableWrap
     stiffness 0..inf ~1
     home -inf..inf ~1 = 0
