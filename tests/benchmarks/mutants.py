@@ -2,12 +2,14 @@
 
     python tests/benchmarks/reach.py --out FILE
     python tests/benchmarks/mutants.py --seed 1 --count 160 --reach FILE --out results/mutants [--journal FILE]
+    python tests/benchmarks/mutants.py --journal FILE --ask MODULE=FILE_OF_TESTS ... --out results/mutants
 
 A mutant is a module with one operator, number or truth value changed, or one call left out (`mutations.py`). It is
 written into a copy of the tree, and tests run there until one fails: those that call the function which was changed,
 the cheapest of each kind first, for `BUDGET` seconds; without `--reach`, or where none is known to call it, the files
 of tests nearest to the module, by imports and names; outside of functions `DECLARING` too. Killed: a test failed that
-passes without the error, or no longer ended. Survived: none did.
+passes without the error, or no longer ended. Survived: none did. Which test calls what is not always seen (a test
+that finds made what one before it made calls less), so a survivor may be asked whole files more, by `--ask`.
 """
 
 import argparse
@@ -18,6 +20,7 @@ import re
 import signal
 import sys
 import tempfile
+import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
@@ -34,7 +37,7 @@ import scipy.signal  # noqa: F401
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 
 from mutants_fork import HOME, QUIET, Server, function_of, limited, prepared  # noqa: E402
-from mutants_page import Tried, journalled, written  # noqa: E402
+from mutants_page import Sample, Tried, journalled, written  # noqa: E402
 from mutations import mutated, sites  # noqa: E402
 from reach import Reached, read  # noqa: E402
 
@@ -196,20 +199,21 @@ class Asking:
         files = sorted({one.test.split("::")[0].removeprefix("tests/") for one in reached})
         self._server = Server(tree, files) if files else None
 
-    def attempt(self, group: str, path: Path, site: int) -> Tried:
-        """Plant one error, run the tests, take it back."""
+    def attempt(self, group: str, path: Path, site: int, files: Sequence[str] = ()) -> Tried:
+        """Plant one error, run the tests (or whole files of them), take it back."""
         source, place, module = path.read_text("utf-8"), self.tree / path.relative_to(HOME), str(path.relative_to(HOME))
         line, change, text = mutated(source, site)
         while True:
-            known = [one for one in calling(module, source, line, self._reached) if one not in self._broken]
+            known = calling(module, source, line, () if files else self._reached)
+            known = tuple(one for one in known if one not in self._broken)
             try:
                 place.write_text(text, "utf-8")
                 witness = (
                     self._failed(known, module, source, line)
                     if known
-                    else noticed(self.tree, belonging(path), self._broken)
+                    else noticed(self.tree, files or belonging(path), self._broken)
                 )
-                if not witness and not spanned(source, line):
+                if not witness and not files and not spanned(source, line):
                     witness = noticed(self.tree, DECLARING, self._broken)
             finally:
                 place.write_text(source, "utf-8")
@@ -237,29 +241,52 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=160)
     parser.add_argument("--reach", type=Path, help="file that reach.py wrote")
     parser.add_argument("--journal", type=Path, help="file of what is done: a run that ended early goes on from there")
+    parser.add_argument("--ask", nargs="*", default=[], help="MODULE=FILE: tests that survivors there are asked too")
+    parser.add_argument("--remarks", type=Path, help="what is known of survivors (.toml): why, by MODULE:LINE")
+    parser.add_argument("--page", default="README.md", help="name of the page")
     parser.add_argument("--so-far", action="store_true", help="only write the table of what the journal has")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
     if given.so_far:
-        written(journalled(given.journal), given.seed, given.count, given.out)
+        told(given, journalled(given.journal))
         return
     folder = Path(tempfile.mkdtemp(prefix="mutants-"))
     reached = read(given.reach) if given.reach else []
     journal = given.journal or folder / "journal"
     try:
         asking = Asking(copied(folder), reached)
-        for group, path, site in drawn(given.seed, given.count):
-            done = {(one.module, one.site) for one in journalled(journal)}
-            if (str(path.relative_to(HOME)), site) not in done:
-                tried = asking.attempt(group, path, site)
-                print(f"{tried.module}:{tried.line} {tried.change}: {tried.noticed or 'SURVIVED'}", flush=True)
-                with journal.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps(vars(tried)) + "\n")
+        again = todo_again(given.ask, journalled(journal))
+        for group, path, site, files in again if given.ask else todo(given.seed, given.count, journal):
+            tried = asking.attempt(group, path, site, files)
+            print(f"{tried.module}:{tried.line} {tried.change}: {tried.noticed or 'SURVIVED'}", flush=True)
+            with journal.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(vars(tried)) + "\n")
         asking.close()
         tried_all = journalled(journal)
     finally:
         rmtree(folder, ignore_errors=True)
-    written(tried_all, given.seed, given.count, given.out)
+    told(given, tried_all)
+
+
+def todo(seed: int, count: int, journal: Path) -> Iterator[tuple[str, Path, int, tuple[str, ...]]]:
+    """The mutants of a sample that the journal does not have."""
+    for group, path, site in drawn(seed, count):
+        if (str(path.relative_to(HOME)), site) not in {(one.module, one.site) for one in journalled(journal)}:
+            yield group, path, site, ()
+
+
+def todo_again(asked: Sequence[str], tried: Sequence[Tried]) -> list[tuple[str, Path, int, tuple[str, ...]]]:
+    """The survivors in modules for which files of tests are named, with these."""
+    named = [one.split("=") for one in asked]
+    files = {one.module: tuple(file for module, file in named if module == one.module) for one in tried}
+    left = [one for one in tried if not one.noticed and files[one.module]]
+    return [(one.group, HOME / one.module, one.site, files[one.module]) for one in left]
+
+
+def told(given: argparse.Namespace, tried: Sequence[Tried]) -> None:
+    """Write the page."""
+    remarks = tomllib.loads(given.remarks.read_text("utf-8")) if given.remarks else {}
+    written(tried, Sample(given.seed, given.count), given.out / given.page, remarks)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """What mutants.py leaves behind: a journal of what was tried, and the page with rates and survivors."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,9 +22,19 @@ class Tried:
     noticed: str
 
 
+@dataclass(frozen=True)
+class Sample:
+    """What was drawn: by which seed, and how many mutants."""
+
+    seed: int
+    count: int
+
+
 def journalled(journal: Path) -> list[Tried]:
-    """What a journal has; nothing where there is none."""
-    return [Tried(**json.loads(one)) for one in journal.read_text("utf-8").splitlines()] if journal.exists() else []
+    """What a journal has, of each mutant what was found last; nothing where there is none."""
+    lines = journal.read_text("utf-8").splitlines() if journal.exists() else []
+    found = [Tried(**json.loads(one)) for one in lines]
+    return list({(one.module, one.site): one for one in found}.values())
 
 
 def _rate(tried: Sequence[Tried]) -> str:
@@ -35,7 +45,7 @@ def _rate(tried: Sequence[Tried]) -> str:
     return f"{found.value:.0%} ({found.low:.0%} to {found.high:.0%})"
 
 
-def page(tried: Sequence[Tried], planned: int, command: str) -> str:
+def page(tried: Sequence[Tried], planned: int, command: str, remarks: Mapping[str, str]) -> str:
     """The table for people, and the survivors."""
     rows = []
     for name in [*dict.fromkeys(one.group for one in tried), "all"]:
@@ -50,15 +60,18 @@ def page(tried: Sequence[Tried], planned: int, command: str) -> str:
     ]
     lines += ["because a test no longer ended. In brackets: 95 % intervals (Wilson).", ""]
     lines += ["| modules | mutants | killed | survived | rate |", "|---|--:|--:|--:|--:|", *rows, ""]
-    lines += ["## Survivors", "", "| module | line | change |", "|---|--:|---|"]
-    lines += [f"| {one.module} | {one.line} | `{one.change}` |" for one in tried if not one.noticed]
+    lines += ["## Survivors", "", "| module | line | change | what is known of it |", "|---|--:|---|---|"]
+    for one in tried:
+        if not one.noticed:
+            remark = remarks.get(f"{one.module}:{one.line}", "")
+            lines.append(f"| {one.module} | {one.line} | `{one.change}` | {remark} |")
     return "\n".join(lines) + "\n"
 
 
-def written(tried: Sequence[Tried], seed: int, count: int, out: Path) -> None:
-    """Write the page."""
-    asked = f"--seed {seed} --count {count} --reach FILE"
-    out.mkdir(parents=True, exist_ok=True)
-    with replacing(out / "README.md", force=True) as partial:
-        text = page(tried, count, f"python tests/benchmarks/mutants.py {asked} --out results/mutants")
-        partial.write_text(text, "utf-8")
+def written(tried: Sequence[Tried], sample: Sample, out: Path, remarks: Mapping[str, str]) -> None:
+    """Write the page; `remarks` say what is known of a survivor, by module and line."""
+    asked = f"--seed {sample.seed} --count {sample.count} --reach FILE"
+    out.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(out, force=True) as partial:
+        command = f"python tests/benchmarks/mutants.py {asked} --out results/mutants"
+        partial.write_text(page(tried, sample.count, command, remarks), "utf-8")
