@@ -27,8 +27,7 @@ from cosim.support.files import replacing
 from cosim.support.version import __version__
 
 HOME = Path(__file__).parents[2]
-RUNNERS = {"cosim": "cosim, 6 signals to Parquet", "gauss_seidel": "cosim, Gauss-Seidel, 6 signals to Parquet"}
-RUNNERS |= {"c": "plain C loop"}
+RUNNERS = {"cosim": "cosim, 6 signals to Parquet", "c": "plain C loop"}
 TIMED = """
 import gc, sys
 from pathlib import Path
