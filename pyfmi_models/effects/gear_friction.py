@@ -21,8 +21,8 @@ class GearFriction(FrictionEffect):
     `LoadDependentFriction`. The load is the torque of the weights on the axis and of a known load; what accelerates
     the axis passes the teeth too and is left out, as in experiments at steady speed.
     References: Dohring, Lee, Newman, "A load-dependent transmission friction model: theory and experiments", ICRA
-    1993; by direction of power: Hamon, Gautier, Garrec, "Dynamic identification of robots with a dry friction model
-    depending on load and velocity", IROS 2010.
+    1993; by direction: Duclusaud, Passault, Padois, Ly, "Extended friction models for the physics simulation of servo
+    actuators", arXiv 2410.08650 (2024).
     """
 
     id: ClassVar[str] = "gear_friction"
