@@ -117,6 +117,17 @@ def test_a_torque_or_a_friction_level_over_time_whichever_explains_more(size: fl
     assert over_time(comparison, left(np.concatenate([turning * drift, 0.5 * drift]))) == "friction level over time"
 
 
+def test_what_begins_late_in_a_recording_counts_as_what_is_there_from_its_start() -> None:
+    seconds = np.arange(8 * RATE) / RATE
+    turning = np.sign(np.sin(2 * np.pi * seconds) + 1e-9)
+    motion = Motion({"v": [turning], "tau": [turning]})
+    late = np.clip(seconds - 4, 0, 1)
+    early = 0.2 * np.clip(2 - seconds, 0, 1)
+    comparison = comparing(motion, turning)
+    assert over_time(comparison, left(late + turning * early)) == "time"
+    assert over_time(comparison, left(turning * late + early)) == "friction level over time"
+
+
 # Admissibility
 
 

@@ -87,6 +87,32 @@ def test_fmi_2_has_value_references_for_each_type_apart(kind: str, compiled: boo
     assert column[kind.lower()][-1] == values[kind]
 
 
+@LOOPS
+@pytest.mark.parametrize(("fmi", "angry"), [(3, 2**40 + 1), (3, -(2**40)), (2, -30), (2, 2**31 - 1)])
+def test_an_item_may_have_any_value_of_its_version(
+    mirror: dict[int, Path], tmp_path: Path, fmi: int, angry: int, compiled: bool
+) -> None:
+    items = f'<Item name="calm" value="0"/><Item name="angry" value="{angry}"/>'
+    xml = description(3).replace('name="angry" value="30"', f'name="angry" value="{angry}"')
+    if fmi == 2:
+        moods = f'<TypeDefinitions><SimpleType name="Mood"><Enumeration>{items}</Enumeration></SimpleType>'
+        xml = description(2).replace("<ModelVariables>", f"{moods}</TypeDefinitions><ModelVariables>")
+        xml = xml.replace('<Integer start="0"/>', '<Enumeration declaredType="Mood" start="0"/>')
+        xml = xml.replace("<Integer/>", '<Enumeration declaredType="Mood"/>')
+    name = {2: "integer", 3: "enumeration"}[fmi]
+    moody = described(mirror[fmi], tmp_path / "moody.fmu", xml)
+    recording = simulate(
+        {"one": moody, "two": moody},
+        [Wire(f"one.{name}_out", f"two.{name}_in")],
+        record={"mood": f"two.{name}_out"},
+        step=0.1,
+        ticks=4,
+        parameters={"one": {f"{name}_in": "angry"}},
+        compiled=compiled,
+    ).recording
+    assert recording["mood"][-1] == angry
+
+
 def test_text_is_recorded_with_its_changes_and_read_again(mirror: dict[int, Path], tmp_path: Path) -> None:
     path = tmp_path / "r.parquet"
     done = simulate(
