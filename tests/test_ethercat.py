@@ -71,6 +71,7 @@ def test_the_mapping_written_into_the_drive_is_that_of_the_machine_file(
         one.advance(10)
         slave = bus.last.slaves[0]
         assert slave.mapped(0x1C12) == [(0x6071, 2), (0x6072, 2), (0x6040, 2)]
+        assert slave.objects[0x1C12, 0] == b"\x01"
         assert slave.objects[0x1C12, 1] == struct.pack("<H", 0x1602)
         assert slave.objects[0x6060, 0] == b"\x0a", "cyclic synchronous torque, also where it is not in the PDO"
         assert slave.watchdog == ("processdata", SIMULATED.watchdog_ms)

@@ -52,6 +52,17 @@ def test_a_replay_notices_a_single_changed_bit(tmp_path: Path) -> None:
     assert (done.identical, done.first) == (False, 2000)
 
 
+def test_a_black_box_is_let_go_of_when_its_session_ends(tmp_path: Path) -> None:
+    def mapped() -> bool:
+        return str(tmp_path / "box") in Path("/proc/self/maps").read_text()
+
+    with session(tmp_path) as one:
+        one.advance(10)
+        assert mapped()
+    assert not mapped(), "though the session is still there"
+    assert one is not None
+
+
 def test_a_torn_record_is_known(tmp_path: Path) -> None:
     with session(tmp_path) as one:
         one.advance(100)
