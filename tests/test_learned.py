@@ -42,6 +42,14 @@ def test_a_table_over_position_is_its_sum_of_waves() -> None:
     np.testing.assert_allclose(found, table((q + 1) / 2.2, effect.torque), atol=1e-13)
 
 
+def test_a_table_is_drawn_over_the_range_that_was_seen_and_one_of_the_turn_over_all_of_it() -> None:
+    at, torque = LearnedTorque(**OVER_POSITION).values(5)
+    np.testing.assert_allclose(at, np.linspace(-1.0, 1.2, 5))
+    np.testing.assert_allclose(torque, table((at + 1.0) / 2.2, OVER_POSITION["torque"]), atol=1e-12)
+    turned, _ = LearnedTorque(over="turn", torque=(0.1, 0.2, 0.3)).values(3)
+    np.testing.assert_allclose(turned, [-np.pi, 0.0, np.pi])
+
+
 def test_a_table_over_speed_is_its_sum_of_waves_dense_near_rest() -> None:
     effect = LearnedTorque(over="speed", seen=(-0.5, 1.0), torque=(0.1, 0.5, -0.2, 0.1, 0.3))
     v = np.linspace(-2, 2, 101)
