@@ -43,7 +43,14 @@ def test_generator_imports_nothing_of_the_project():
 
 
 def test_every_effect_of_the_catalogue_can_be_concealed():
-    of_cards = {"altitude_inertia", "azimuth_centrifugal", "bouc_wen", "concave_viscous", "dead_band", "friction_wander"}
+    of_cards = {
+        "altitude_inertia",
+        "azimuth_centrifugal",
+        "bouc_wen",
+        "concave_viscous",
+        "dead_band",
+        "friction_wander",
+    }
     of_drives = {"gear_friction", "rough_spot", "torque_droop"}
     without_a_diagnosis = of_cards | of_drives | {"known_load", "learned"}
     assert set(EFFECTS) == set(CATALOGUE) - without_a_diagnosis
