@@ -123,6 +123,32 @@ def test_a_name_that_is_too_long_is_one_sentence(
     assert left(tmp_path) == []
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("demo", "--out", ""),
+        ("export", "paper_mount", "-o", ""),
+        ("run", "sidereal", "--out="),
+        ("run", "sidereal", "--force", "--out", " \t"),
+        ("sweep", "", "--out", "out"),
+        ("show", ""),
+        ("prove", "--out", "out", "--decks", ""),
+        ("diagnose", "a.csv", "--heldout", "b.csv", "--card", "paper_mount", "--out", "out", "--propose", ""),
+        ("hardware", "run", "two_axis", "--out", ""),
+    ],
+    ids=" ".join,
+)
+def test_an_empty_name_is_not_the_folder_that_one_stands_in(
+    command: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert call(*command) == 2
+    place = next(k for k, one in enumerate(command) if not one.rpartition("=")[2].strip())
+    name = "--out" if command[place] == "--out=" else command[place - 1]
+    assert sentence(capsys).startswith(f'cosim: {name} "')
+    assert list(tmp_path.iterdir()) == []
+
+
 def in_c(*arguments: object, out: int = subprocess.PIPE) -> "subprocess.CompletedProcess[bytes]":
     """Call the command where the system's language has ASCII alone."""
     environment = ENVIRONMENT | {"LC_ALL": "C", "PYTHONUTF8": "0"}

@@ -54,6 +54,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         end_well()
         keep_stdout()
+        check_given(given)
         rest = repeated([argument for argument in given if argument != "--debug"])
         application(rest, debug)(rest, prog_name="cosim")
     except KeyboardInterrupt as error:  # while a verb was loaded, or after it had ended
@@ -64,6 +65,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if ended.code == INTERRUPTED and is_terminated():
             leave(Terminated())
         raise
+
+
+def check_given(arguments: Sequence[str]) -> None:
+    """Refuse an empty argument: as a path it would be the folder that one stands in. Its sentence ends the command."""
+    for before, argument in zip(("cosim", *arguments), arguments, strict=False):
+        option, assigned, value = argument.partition("=")
+        name, text = (option, value) if assigned and option.startswith("--") else (before, argument)
+        if not text.strip():
+            say(f'cosim: {name} "{text}": it must not be empty; write "." for the folder that you are in.')
+            sys.exit(2)
 
 
 def leave(error: KeyboardInterrupt) -> NoReturn:
