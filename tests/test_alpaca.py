@@ -18,6 +18,7 @@ from urllib.request import Request, urlopen
 
 import numpy as np
 import pytest
+from mortal import mortal
 
 from cosim.data.recording import Recording
 from cosim.models.cache import with_fmus
@@ -339,7 +340,7 @@ def asked(address: str, member: str) -> float:
 
 def test_the_command_serves_until_it_is_interrupted_and_completes_its_recording(tmp_path: Path) -> None:
     words = ("hardware", "alpaca", "--port", "0", "--speed", "4", "--out", str(tmp_path))
-    with subprocess.Popen([sys.executable, "-m", "cosim", *words], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen(mortal(sys.executable, "-m", "cosim", *words), stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         address = process.stdout.readline().strip()
         with urlopen(Request(f"{address}/connected", b"Connected=True", method="PUT"), timeout=PATIENCE) as answer:

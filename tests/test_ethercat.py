@@ -12,6 +12,7 @@ from typing import Any
 import fake_soem
 import numpy as np
 import pytest
+from mortal import mortal
 from on_hardware import SIMULATED, assert_safe, recorded, scenario
 
 from cosim.hardware.ethercat import CHECKED_EVERY
@@ -233,7 +234,7 @@ def veth(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
         for end in (near, far):
             subprocess.run(["ip", "link", "set", end, "up"], check=True)
         program = Path(__file__).with_name("ethercat_slave.py")
-        with subprocess.Popen([sys.executable, str(program), far], stdout=subprocess.PIPE) as slave:
+        with subprocess.Popen(mortal(sys.executable, str(program), far), stdout=subprocess.PIPE) as slave:
             assert slave.stdout is not None
             assert slave.stdout.readline() == b"listening\n"
             yield near

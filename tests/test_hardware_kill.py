@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
+from mortal import mortal
 from on_hardware import SCENARIO, recorded
 from over_udp import PATIENT, drive, session
 
@@ -97,8 +98,8 @@ with Session(scenario(("stop = 0.4", "stop = 30.0")), over({url!r}, PATIENT), Pa
 
 @contextmanager
 def spawned(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
-    """A process of Python that is gone afterwards."""
-    process = subprocess.Popen([sys.executable, *arguments], stdout=subprocess.PIPE)
+    """A process of Python that is gone afterwards, and with this one."""
+    process = subprocess.Popen(mortal(sys.executable, *arguments), stdout=subprocess.PIPE)
     try:
         yield process
     finally:

@@ -10,6 +10,7 @@ from math import radians
 from time import monotonic, sleep
 
 import pytest
+from mortal import mortal
 
 from cosim.models.cache import with_fmus
 from cosim.observatory.indi import CLIENTS, IndiServer
@@ -117,7 +118,7 @@ def test_through_an_indiserver_it_is_the_same_telescope(server: IndiServer, port
     with closing(socket.socket()) as free:
         free.bind(("127.0.0.1", 0))
         between = free.getsockname()[1]
-    command = [tool("indiserver"), "-p", str(between), f"{DEVICE}@127.0.0.1:{port}"]
+    command = mortal(tool("indiserver"), "-p", str(between), f"{DEVICE}@127.0.0.1:{port}")
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         try:
             until(lambda: "GEOGRAPHIC_COORD.LAT" in get(between, "GEOGRAPHIC_COORD.LAT", "1"))

@@ -8,6 +8,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 import pytest
+from mortal import mortal
 from serving import (
     CARD,
     HERE,
@@ -93,7 +94,7 @@ def test_every_answer_carries_the_policy_and_no_page_needs_an_exception_from_it(
 
 
 def begun(home: Path) -> tuple["subprocess.Popen[str]", str]:
-    command = [sys.executable, "-m", "cosim", "serve", "--no-browser", "--data", str(home)]
+    command = mortal(sys.executable, "-m", "cosim", "serve", "--no-browser", "--data", str(home))
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=HERE.parent)
     assert process.stdout is not None
     return process, process.stdout.readline().strip()

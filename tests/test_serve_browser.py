@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 import serve_work
 from browsing import DESK, PATIENCE, PHONE, axe_script, browser, dropped, opened, processor, violations
+from mortal import mortal
 from serving import CARD, HERE, READER, TOKEN, _path, recording, until  # skips without the extra [serve]
 
 from cosim.serve.app import make_app
@@ -86,7 +87,7 @@ def night(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_demo_is_diagnosed_from_the_drop_to_the_report_through_reload_and_a_killed_browser(
     browser: Any, night: Path, tmp_path: Path
 ) -> None:
-    command = [sys.executable, "-m", "cosim", "serve", "--no-browser", "--data", str(tmp_path / "data")]
+    command = mortal(sys.executable, "-m", "cosim", "serve", "--no-browser", "--data", str(tmp_path / "data"))
     server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, cwd=HERE.parent)
     assert server.stdout is not None
     try:
