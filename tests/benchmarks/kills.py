@@ -110,7 +110,8 @@ def trial(command: list[str], folder: Path, kill: signal.Signals | None, after: 
     partial = [one for one in files if one.name.endswith((".partial", ".lock"))]
     text = (folder / "said").read_text("utf-8", "replace")
     wrong = code != 0 if kill is None else code not in CODES[kill]
-    if wrong:
+    traced = "Traceback (most recent call last)" in text and str(HOME) in text
+    if wrong or traced:
         print(f"exit {code} after {after:.3f} s: ...{text[-1500:]}", flush=True)
     found = {
         "ended": int(code != 0),
@@ -119,7 +120,7 @@ def trial(command: list[str], folder: Path, kill: signal.Signals | None, after: 
         "still_running": len(running(folder)),
         "temporary_left": len(list((folder / "tmp").iterdir())),
         "partial_left": len(partial),
-        "traceback": int("Traceback (most recent call last)" in text and str(HOME) in text),
+        "traceback": int(traced),
     }
     return found, seconds
 
