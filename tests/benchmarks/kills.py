@@ -44,6 +44,8 @@ HOME = Path(__file__).parents[2]
 """Of this project: a traceback of an interpreter that had not begun with it yet is not its own."""
 LEAVE = 30.0
 """Seconds that a command and what it started have to end."""
+PATIENCE = 600.0
+"""Seconds after which a process that was ended and still runs is killed: a busy computer may need most of them."""
 COUNTED = ("ended", "half written", "wrong exit code", "still running", "temporary left", "partial left", "traceback")
 
 
@@ -90,6 +92,16 @@ def running(folder: Path) -> list[int]:
     return found
 
 
+def _left(process: "subprocess.Popen[bytes]") -> tuple[int, int]:
+    """Wait until a process ends, on a computer that may be busy; its exit code, and 1 where it had to be killed."""
+    try:
+        return process.wait(PATIENCE), 0
+    except subprocess.TimeoutExpired:
+        print(f"still running: {Path(f'/proc/{process.pid}/status').read_text()}", flush=True)
+        process.kill()
+        return process.wait(), 1
+
+
 def trial(command: list[str], folder: Path, kill: signal.Signals | None, after: float) -> tuple[dict[str, int], float]:
     """Run a command in a folder of its own and end it; what was found, and its seconds."""
     (folder / "tmp").mkdir(parents=True)
@@ -101,7 +113,7 @@ def trial(command: list[str], folder: Path, kill: signal.Signals | None, after: 
         with suppress(subprocess.TimeoutExpired):
             process.wait(after)
         process.send_signal(kill)
-    code = process.wait(600 if kill is None else LEAVE * 4)
+    code, stuck = _left(process)
     seconds = time.monotonic() - began
     last = time.monotonic() + LEAVE
     while running(folder) and time.monotonic() < last:
@@ -117,7 +129,7 @@ def trial(command: list[str], folder: Path, kill: signal.Signals | None, after: 
         "ended": int(code != 0),
         "half_written": sum(not whole(one) for one in files if one not in partial),
         "wrong_exit_code": int(wrong),
-        "still_running": len(running(folder)),
+        "still_running": stuck + len(running(folder)),
         "temporary_left": len(list((folder / "tmp").iterdir())),
         "partial_left": len(partial),
         "traceback": int(traced),
