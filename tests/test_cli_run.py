@@ -6,8 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import suppress
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,9 +14,8 @@ from test_scenario import TEXT
 from tiny_fmu import tiny
 
 import cosim.models.cache
-from cosim.cli import guarded, main
+from cosim.cli import main
 from cosim.data.recording import Recording
-from cosim.support.interrupts import end_well
 
 __all__ = ["tiny"]
 
@@ -280,53 +277,3 @@ def test_importing_the_package_is_quick_and_a_warm_run_needs_no_casadi(tmp_path:
     for name in ("cold", "warm"):
         said = subprocess.check_output([*command, str(tmp_path / name)], env=environment, cwd=tmp_path, text=True)
     assert not {"casadi", "ziglang", "matplotlib", "pandas"} & set(said.split())
-
-
-def test_a_signal_that_comes_before_a_verb_begins_is_told_by_the_exit_code(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Typer takes each KeyboardInterrupt for Ctrl-C."""
-    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
-            come = partial(signal.raise_signal, number)
-            monkeypatch.setattr("typer.core.TyperGroup.parse_args", lambda *_, come=come, **__: come())
-            signal.signal(signal.SIGINT, signal.default_int_handler)
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
-            assert call("show", "paper_mount") == code
-    finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
-    assert "cosim: terminated" in capsys.readouterr().err
-
-
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (None, None)])
-def test_what_a_c_extension_makes_of_a_signal_is_an_interrupt(number: int | None, code: int | None) -> None:
-    """Some swallow the KeyboardInterrupt and raise an error of their own that does not even hold it."""
-
-    def verb() -> None:
-        with suppress(KeyboardInterrupt):
-            end_well()
-            if number is not None:
-                signal.raise_signal(number)
-        raise RuntimeError("error building a validator")
-
-    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        with pytest.raises(RuntimeError if code is None else SystemExit) as ended:
-            guarded(verb, False)()
-        assert getattr(ended.value, "code", None) == code
-    finally:
-        for one, handler in before.items():
-            signal.signal(one, handler)
-        end_well()
-
-
-@pytest.mark.parametrize(("cause", "code"), [(KeyboardInterrupt(), 130), (ValueError(), None)])
-def test_a_signal_while_a_c_extension_is_loaded_is_an_interrupt(cause: BaseException, code: int | None) -> None:
-    def verb() -> None:
-        raise ImportError("initialization failed") from cause
-
-    with pytest.raises(ImportError if code is None else SystemExit) as ended:
-        guarded(verb, False)()
-    assert getattr(ended.value, "code", None) == code

@@ -1,13 +1,21 @@
 """Ctrl-C and termination between pieces of work, never inside one: rows that are being written are written once."""
 
+import os
 import signal
+import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from _thread import interrupt_main
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from types import FrameType
+from typing import Any
 
 ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
 """Signals that ask a process to end, beside Ctrl-C."""
+
+AGAIN = 0.01
+"""Seconds until a signal is raised again that came where Python ignores exceptions; by then it has left that place."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -25,6 +33,8 @@ def end_well() -> None:
         for number in (signal.SIGINT, *ENDING):
             if signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
                 signal.signal(number, _end)
+        if not isinstance(sys.unraisablehook, _Heard):
+            sys.unraisablehook = _Heard(sys.unraisablehook)
 
 
 def is_interrupted() -> bool:
@@ -40,6 +50,32 @@ def is_terminated() -> bool:
 def _end(number: int, frame: FrameType | None) -> None:
     _HEARD.append(number)
     raise KeyboardInterrupt if number == signal.SIGINT else Terminated
+
+
+@dataclass(frozen=True)
+class _Heard:
+    """Hook of exceptions that Python ignores, as of finalizers and of weak references: a signal is no such exception.
+
+    Printed and forgotten, as the hook `before` would do it, the command went on to its end.
+    """
+
+    before: Callable[[Any], object]
+
+    def __call__(self, ignored: Any) -> None:
+        if not (_HEARD and issubclass(ignored.exc_type, KeyboardInterrupt)):
+            self.before(ignored)
+            return
+        again = threading.Timer(AGAIN, _raise_again, [_HEARD[-1]])
+        again.daemon = True
+        with suppress(RuntimeError):  # no thread begins while Python ends, and it does end
+            again.start()
+
+
+def _raise_again(number: int) -> None:
+    if os.name == "posix":
+        os.kill(os.getpid(), number)  # wakes what the main thread waits in
+    else:
+        interrupt_main(number)
 
 
 @contextmanager

@@ -98,14 +98,14 @@ def _left(process: "subprocess.Popen[bytes]") -> tuple[int, int]:
         return process.wait(PATIENCE), 0
     except subprocess.TimeoutExpired:
         print(f"still running: {Path(f'/proc/{process.pid}/status').read_text()}", flush=True)
-        process.kill()
+        process.send_signal(signal.SIGABRT)  # for which it shows what it is doing
         return process.wait(), 1
 
 
 def trial(command: list[str], folder: Path, kill: signal.Signals | None, after: float) -> tuple[dict[str, int], float]:
     """Run a command in a folder of its own and end it; what was found, and its seconds."""
     (folder / "tmp").mkdir(parents=True)
-    environment = os.environ | {"TMPDIR": str(folder / "tmp")}
+    environment = os.environ | {"TMPDIR": str(folder / "tmp"), "PYTHONFAULTHANDLER": "1"}
     began = time.monotonic()
     with (folder / "said").open("wb") as said:
         process = subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=said)

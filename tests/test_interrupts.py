@@ -1,0 +1,103 @@
+"""A signal ends a command wherever it comes, with its exit code and a word."""
+
+import signal
+import subprocess
+import sys
+from contextlib import suppress
+from functools import partial
+
+import pytest
+from test_cli_run import ENVIRONMENT, call
+
+from cosim.cli import guarded
+from cosim.support.interrupts import end_well
+
+
+def test_a_signal_that_comes_before_a_verb_begins_is_told_by_the_exit_code(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Typer takes each KeyboardInterrupt for Ctrl-C."""
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+            come = partial(signal.raise_signal, number)
+            monkeypatch.setattr("typer.core.TyperGroup.parse_args", lambda *_, come=come, **__: come())
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            assert call("show", "paper_mount") == code
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+    assert "cosim: terminated" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (None, None)])
+def test_what_a_c_extension_makes_of_a_signal_is_an_interrupt(number: int | None, code: int | None) -> None:
+    """Some swallow the KeyboardInterrupt and raise an error of their own that does not even hold it."""
+
+    def verb() -> None:
+        with suppress(KeyboardInterrupt):
+            end_well()
+            if number is not None:
+                signal.raise_signal(number)
+        raise RuntimeError("error building a validator")
+
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        with pytest.raises(RuntimeError if code is None else SystemExit) as ended:
+            guarded(verb, False)()
+        assert getattr(ended.value, "code", None) == code
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+        end_well()
+
+
+@pytest.mark.parametrize(("cause", "code"), [(KeyboardInterrupt(), 130), (ValueError(), None)])
+def test_a_signal_while_a_c_extension_is_loaded_is_an_interrupt(cause: BaseException, code: int | None) -> None:
+    def verb() -> None:
+        raise ImportError("initialization failed") from cause
+
+    with pytest.raises(ImportError if code is None else SystemExit) as ended:
+        guarded(verb, False)()
+    assert getattr(ended.value, "code", None) == code
+
+
+FINALIZED = """
+import signal, time
+from cosim.cli import guarded
+from cosim.support.interrupts import end_well
+
+class Last:
+    def __del__(self):
+        {comes}
+
+def verb():
+    Last()
+    time.sleep({seconds})
+
+end_well()
+guarded(verb, False)()
+"""
+
+
+def ended(comes: str, seconds: float) -> tuple[int, str]:
+    """Run a verb in which something comes while an object is finalized."""
+    command = [sys.executable, "-c", FINALIZED.format(comes=comes, seconds=seconds)]
+    done = subprocess.run(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "said"), [("SIGINT", 130, "cosim: interrupted\n"), ("SIGTERM", 143, "cosim: terminated\n")]
+)
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_a_signal_that_comes_where_python_ignores_exceptions_is_not_lost(name: str, code: int, said: str) -> None:
+    assert ended(f"signal.raise_signal(signal.{name})", 600) == (code, said)
+
+
+def test_other_exceptions_that_python_ignores_are_told_as_ever() -> None:
+    code, said = ended("raise ValueError('of a finalizer')", 0)
+    assert code == 0
+    assert said.startswith("Exception ignored in: ")
+    assert said.endswith("ValueError: of a finalizer\n")
