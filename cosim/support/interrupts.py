@@ -75,7 +75,7 @@ def _raise_again(number: int) -> None:
     if os.name == "posix":
         os.kill(os.getpid(), number)  # wakes what the main thread waits in
     else:
-        interrupt_main(number)
+        interrupt_main(signal.Signals(number))
 
 
 @contextmanager
