@@ -24,11 +24,13 @@ class Slave:
         self.config_func: Callable[[int], None] | None = None
         self.before, self.mode, self.seen = 0, 0, {}
         self.refused: tuple[int, int] | None = None
+        self.written: list[tuple[int, int, bytes]] = []
 
     def sdo_write(self, index: int, subindex: int, data: bytes) -> None:
         if self.refused == (index, subindex):
             raise RuntimeError("abort 0x06090030")
         self.objects[index, subindex] = data
+        self.written.append((index, subindex, data))
 
     def set_watchdog(self, kind: str, milliseconds: float) -> None:
         self.watchdog = (kind, milliseconds)
@@ -82,6 +84,7 @@ class Master:
         self.slaves = [Slave() for _ in range(self.count)]
         self.expected_wkc, self.wkc, self.cycles, self.closed, self.state = 3, 3, 0, False, INIT_STATE
         self.states: list[int] = []
+        self.told: list[tuple[object, ...]] = []
 
     def open(self, interface: str) -> None:
         if interface != "fake0":
@@ -100,12 +103,15 @@ class Master:
         return sum(sizes.values())
 
     def config_dc(self) -> bool:
+        self.told.append(("config_dc",))
         return True
 
     def state_check(self, expected: int, timeout: int) -> int:
+        self.told.append(("state_check", expected, timeout))
         return self.slaves[0].state
 
     def read_state(self) -> int:
+        self.told.append(("read_state",))
         return self.slaves[0].state
 
     def write_state(self) -> int:
@@ -116,11 +122,13 @@ class Master:
 
     def send_processdata(self) -> int:
         self.cycles += 1
+        self.told.append(("send",))
         if self.change:
             self.change(self.cycles)
         return 1
 
     def receive_processdata(self, timeout: int) -> int:
+        self.told.append(("receive", timeout))
         self.slaves[0].exchange()
         return self.wkc
 

@@ -1,0 +1,129 @@
+"""Parts of the controller that remember, tick by tick: their equations, written again in numpy."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import casadi as ca
+import numpy as np
+import numpy.typing as npt
+import pytest
+from test_adrc_memory import LUGRE, H
+
+from pyfmi_models.adrc import Adaptation, Estimate, Learning, Seen
+
+Array = npt.NDArray[np.float64]
+BANDWIDTH = 220.0
+STEP = 1e-5
+"""Relative step of a central difference: its error is of its square, 1e-10."""
+TICKS = 400
+
+
+def ticks(part: Estimate, seen: Array) -> tuple[Array, Array]:
+    """States after each tick and the torque expected in it; `seen` has observed speed, reference and residual."""
+    states, numbers = part.states(), {one.name: ca.SX(one.start) for one in part.parameters()}
+    numbers["observer_bandwidth"] = ca.SX(BANDWIDTH)
+    x, u = ca.SX.sym("x", len(states)), ca.SX.sym("u", 3)
+    state, torque = part.advance(numbers, ca.vertsplit(x), Seen(*ca.vertsplit(u)), H)
+    step = ca.Function("step", [x, u], [ca.vertcat(*state), torque])
+    found, torques = step.mapaccum(len(seen))([one.start for one in states], ca.DM(seen).T)
+    return found.full().T, torques.full().ravel()
+
+
+def slope(formula: Callable[[float], float], place: float, size: float) -> float:
+    """Central difference."""
+    return (formula(place + STEP * size) - formula(place - STEP * size)) / (2 * STEP * size)
+
+
+class Expected:
+    """The recursion of `Adaptation` in numpy; derivatives are differences of LuGre's own equations."""
+
+    def __init__(self, widest: float, memory: float, slowest: float, noise: float, doubt: float) -> None:
+        self.theta, self.bristle, self.before = np.array([1.0, 1.0, 0.0]), 0.0, 0.0
+        self.slopes, self.chain = np.zeros(2), np.zeros((2, 3))
+        self.first = np.array([doubt, doubt, doubt * 3.322]) ** 2
+        self.P, self.R = np.diag(self.first), noise**2 * 2 * 0.3 / H
+        self.widest, self.memory, self.slowest = widest, memory, slowest
+
+    def walked(self, v: float, z: float, level: float, stiffness: float) -> float:
+        law = replace(LUGRE, Fc=level * 2.322, Fs=level * 3.322, sigma0=stiffness * 9.23e4)
+        return float(law.advance(z, v, law.level(v), H))
+
+    def felt(self, v: float, z: float, level: float, stiffness: float) -> float:
+        law = replace(LUGRE, Fc=level * 2.322, Fs=level * 3.322, sigma0=stiffness * 9.23e4)
+        return float(law.contact(z, v, law.level(v)) + law.viscous(v))
+
+    def along(self, formula: Callable[[float, float, float, float], float], v: float) -> tuple[float, Array]:
+        """Value of a formula, and how it goes with level and stiffness, also by way of the bristle."""
+        z, level, stiffness = self.bristle, self.theta[0], self.theta[1]
+        by_z = slope(lambda one: formula(v, one, level, stiffness), z, 1.0)
+        by_level = slope(lambda one: formula(v, z, one, stiffness), level, 1.0)
+        by_stiffness = slope(lambda one: formula(v, z, level, one), stiffness, 1.0)
+        return formula(v, z, level, stiffness), by_z * self.slopes + [by_level, by_stiffness]
+
+    def tick(self, v: float, residual: float) -> float:
+        self.bristle, self.slopes = self.along(self.walked, (self.before + v) / 2)
+        torque, regressors = self.along(self.felt, v)
+        self.before = v
+        for filters, value in zip(self.chain, regressors, strict=True):
+            for k in range(3):
+                filters[k] = value = filters[k] + (1 - np.exp(-BANDWIDTH * H)) * (value - filters[k])
+        if abs(v) > self.slowest:
+            self.learn(np.array([*self.chain[:, 2], 1.0]), residual)
+        return torque + float(self.theta[2])
+
+    def learn(self, phi: Array, residual: float) -> None:
+        push = self.P @ phi
+        spread = self.R + phi @ push
+        self.theta += push / spread * residual
+        self.P = self.P - np.outer(push, push) / spread
+        if np.all(np.diag(self.P) < self.first):
+            self.P = self.P * (1 + H / self.memory)
+        self.theta[:2] = np.clip(self.theta[:2], 1 / self.widest, self.widest)
+        self.theta[2] = np.clip(self.theta[2], -3.322, 3.322)  # the break-away torque of the model, not of the estimate
+
+
+def motion(seed: int) -> Array:
+    """Speeds through zero and rest, and a residual that pushes estimates to their bounds."""
+    rng, t = np.random.default_rng(seed), H * np.arange(TICKS)
+    v = 4e-3 * np.sin(40 * t + seed) * (np.abs(np.sin(9 * t)) > 0.3)
+    return np.column_stack([v + 1e-4, v, 40 * np.sin(25 * t) + rng.normal(0, 1, TICKS)])
+
+
+@pytest.mark.parametrize("source", ["reference", "observed"])
+@pytest.mark.parametrize("numbers", [{}, {"widest": 1.2, "memory": 0.2, "slowest": 2e-3, "noise": 0.05, "doubt": 0.4}])
+def test_identification_is_recursive_least_squares_with_forgetting(numbers: dict[str, float], source: str) -> None:
+    all_numbers = {"widest": 3.0, "memory": 20.0, "slowest": 2e-5, "noise": 0.5, "doubt": 0.3} | numbers
+    seen = motion(len(numbers))
+    found, torques = ticks(Adaptation(law=LUGRE, source=source, **numbers), seen)  # type: ignore[arg-type]
+    expected, speeds = Expected(**all_numbers), seen[:, 1 if source == "reference" else 0]
+    for state, torque, v, residual in zip(found, torques, speeds, seen[:, 2], strict=True):
+        assert torque == pytest.approx(expected.tick(v, residual), rel=1e-6, abs=1e-6)
+        np.testing.assert_allclose(state[:3], expected.theta, rtol=1e-6, atol=1e-7)
+        np.testing.assert_allclose(state[3:7], [expected.bristle, v, *expected.slopes], rtol=1e-6, atol=1e-6)
+        np.testing.assert_allclose(state[7:13], expected.chain.ravel(), rtol=1e-5, atol=1e-6)
+        np.testing.assert_allclose(state[13:], expected.P[np.triu_indices(3)], rtol=1e-5, atol=1e-7)
+    assert np.ptp(found[:, :3], axis=0).min() > 1e-3
+    if numbers:  # every bound was met
+        assert (found[:, :2].max(), np.abs(found[:, 2]).max()) == (1.2, 3.322)
+        assert found[:, :2].min() == pytest.approx(1 / 1.2)
+
+
+def hats(clock: float, knots: int, of: int) -> Array:
+    """1 at a knot, 0 at its neighbours, round the circle."""
+    distance = np.abs(clock * knots / of - np.arange(knots)) % knots
+    return np.maximum(0, 1 - np.minimum(distance, knots - distance))
+
+
+@pytest.mark.parametrize(("lead", "limit"), [(0.0, 1e6), (0.0136, 1e6), (0.03, 0.05)])
+def test_a_pass_learns_its_share_of_the_residual_where_it_belongs(lead: float, limit: float) -> None:
+    of, knots, gain = 150, 7, 0.4
+    seen = motion(3)
+    found, torques = ticks(Learning(ticks=of, knots=knots, gain=gain, lead=lead, limit=limit), seen)
+    learned = np.zeros(knots)
+    for k, (state, torque, residual) in enumerate(zip(found, torques, seen[:, 2], strict=True)):
+        clock = k % of
+        assert torque == pytest.approx(float(learned @ hats(clock, knots, of)), abs=1e-9)
+        learned = learned + gain * knots / of * residual * hats(clock - lead / H, knots, of)
+        learned = np.clip(learned, -limit, limit)
+        np.testing.assert_allclose(state, [(k + 1) % of, *learned], atol=1e-9)
+    assert np.abs(learned).max() > 0.04
