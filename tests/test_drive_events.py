@@ -17,6 +17,7 @@ def test_a_drive_tells_each_change_once_and_what_its_watchdog_took(monkeypatch: 
     def later(seconds: float) -> None:
         """What happens between two looks: nothing, operation, a trip, nothing, another one in the same state."""
         waits.append(seconds)
+        assert len(waits) < 9, "nothing more is told"
         if len(waits) == 2:
             there.drive.state, there.drive.held = 4, 1.5
         elif len(waits) in (3, 5):
