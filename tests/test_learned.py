@@ -11,6 +11,7 @@ from export_models import Driver
 
 from pyfmi_models.card import parse_card
 from pyfmi_models.card_writer import card_text
+from pyfmi_models.effects.base import Effect
 from pyfmi_models.effects.learned import LearnedDrive, LearnedFriction, LearnedTorque
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHysteresis
 from pyfmi_models.errors import CardError
@@ -130,6 +131,15 @@ def test_after_a_reversal_friction_comes_back_to_its_level() -> None:
     settled, turned = (float(here.level(here.at(0.0, 0.0, 0.2), {"learned": [memory]})) for memory in (1.0, -1.0))
     assert settled == pytest.approx(1.0)
     assert turned == pytest.approx(np.exp(0.5))
+
+
+@pytest.mark.parametrize("kind", [LearnedAfterReversal, LearnedHysteresis])
+def test_elements_are_named_from_one_on_and_remember_a_direction(kind: type[Effect]) -> None:
+    """Names of states are promises: recordings and FMUs hold them."""
+    (effect,) = [one for one in LEARNED if type(one) is kind]
+    states = effect.states()
+    assert [one.name for one in states] == [f"memory{k + 1}" for k in range(len(states))]
+    assert {(one.low, one.high, one.start, one.unit) for one in states} == {(-1, 1, 0, "1")}
 
 
 def test_an_element_forgets_a_reversal_over_its_way_or_its_time() -> None:
