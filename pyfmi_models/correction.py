@@ -25,14 +25,15 @@ def left_out(better: Mount) -> tuple[str, ...]:
 def correction(plant: Mount, better: Mount) -> Model:
     """Write the correction from one mount to a better one as a continuous model.
 
-    Inputs: the command tau, q and v of the plant, and what effects of the better mount read. Output: `corrected`, the
+    Inputs: the command tau, q and v of the plant, and what effects of either mount read. Output: `corrected`, the
     torque for the plant. Parameters and states are called `before.*` and `after.*`.
     """
     kept = replace(better, effects=tuple(one for one in better.effects if one.is_torque))
     before, after = _Side("before", plant), _Side("after", kept)
-    inputs = tuple(kept.in_axis_units(one) for one in (*_INPUTS, *kept.inputs()))
+    read = replace(better, effects=(*plant.effects, *kept.effects)).inputs()
+    inputs = tuple(kept.in_axis_units(one) for one in (*_INPUTS, *read))
     t, u = ca.SX.sym("t"), ca.SX.sym("u", len(inputs))
-    motion = kept.at(t, u[1], u[2], {one.name: u[len(_INPUTS) + k] for k, one in enumerate(kept.inputs())})
+    motion = kept.at(t, u[1], u[2], {one.name: u[len(_INPUTS) + k] for k, one in enumerate(read)})
     inertia, resisting, _, rates = before.needed(motion, u[0])
     better_inertia, better_resisting, applied, better_rates = after.needed(motion, u[0])
     torque = (applied - better_resisting) * inertia / better_inertia + resisting

@@ -23,6 +23,7 @@ from pyfmi_models.card import Card, read_card
 from pyfmi_models.correction import correction, left_out
 from pyfmi_models.effects import ActuatorLag, Cogging, FrictionAsymmetry
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
+from pyfmi_models.effects.known_load import KnownLoad
 from pyfmi_models.export import export_fmu
 
 CARD = read_card("paper_mount")
@@ -130,6 +131,18 @@ def test_a_plant_behind_a_correction_does_what_the_better_mount_does(tmp_path: P
     for column, share in (("tau", 0.02), ("q", 0.05)):
         off, before = (np.std((one[column] - wanted[column])[1000:]) for one in (found, plain))
         assert off < share * before, column
+
+
+@pytest.mark.parametrize("is_known", [(True, False), (False, True), (True, True)])
+def test_a_correction_reads_what_either_mount_reads(is_known: tuple[bool, bool]) -> None:
+    """A load of 2 N m that only one of both knows is what they differ by; one that both know is none."""
+    load = KnownLoad(gain=1.0)
+    mounts = [replace(CARD.plant(), effects=(load,) if own else ()) for own in is_known]
+    found = correction(mounts[0], mounts[1])
+    assert [one.name for one in found.inputs] == ["tau", "q", "v", "load_torque"]
+    states, parameters = ([one.start for one in group] for group in (found.states, found.parameters))
+    out = float(found.equations(0.0, states, [5.0, 0.0, 0.0, 2.0], parameters)[1])
+    assert out == pytest.approx(5.0 + 2.0 * (is_known[0] - is_known[1]))
 
 
 def test_what_a_torque_cannot_give_is_left_out_by_name() -> None:
