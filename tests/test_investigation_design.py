@@ -8,8 +8,8 @@ import pytest
 from investigations import CABLE, written
 
 from cosim.estimation.problem import Problem
-from cosim.investigation.design import Plan, Rated, best, piece_of, plans, shown_by_motion
-from cosim.investigation.families import fast_tone
+from cosim.investigation.design import Plan, Rated, allowed, best, piece_of, plans, shown_by_motion, spare
+from cosim.investigation.families import fast_sweeps, fast_tone
 from cosim.investigation.limits import Limits
 from cosim.investigation.machine import CoSimulated
 from cosim.investigation.motions import Rest, room_of
@@ -76,3 +76,38 @@ def test_a_motion_that_tells_less_than_a_set_asks_for_is_not_run() -> None:
     assert best([Plan(still, (), 0.5)], False, ("fast tone",)) is None
     assert best([Plan(still, (), 0.5)], False) is not None
     assert np.isclose(Plan(still, (30.0, 4.0), 0.0).worth, 14.0)
+
+
+def test_what_a_model_may_lack_grows_beyond_what_was_recorded(problem: Problem) -> None:
+    """Twice as fast, or twice as far from the middle, a drag or a cable that hardens may be eight times as large."""
+    known = problem.prepared
+    (low, high), top = known.ranges["q"], max(map(abs, known.ranges["v"]))
+    middle, half = (low + high) / 2, (high - low) / 2
+    rows = {"q": middle + np.array([0.0, 0.9, 2.0, 0.0]) * half, "v": np.array([0.9, 0.0, 0.0, -2.0]) * top}
+    assert spare(known, replace(known.pieces[0], **rows), 0.5) == pytest.approx([2.0, 2.0, 16.0, 16.0])
+
+
+def test_spare_torque_covers_a_drag_beside_the_best_line_through_what_was_recorded(problem: Problem) -> None:
+    known = problem.prepared
+    v, piece = known.stacked("v"), known.pieces[0]
+    line = np.column_stack([np.sign(v), v])
+    found = np.linalg.lstsq(line, v * np.abs(v), rcond=None)[0]
+    left = v * np.abs(v) - line @ found
+    for s in (1.0, 1.5, 2.0, 4.0):
+        fast = np.array([s * np.abs(v).max()])
+        off = abs(fast**2 - found[0] - found[1] * fast)
+        there = replace(piece, q=np.full(1, np.mean(known.ranges["q"])), v=fast)
+        assert off < spare(known, there, float(np.sqrt(np.mean(left**2))))
+
+
+def test_a_motion_far_beyond_any_recording_is_slowed_and_shortened_where_torque_is_scarce(problem: Problem) -> None:
+    ours, tops = problem.fit(problem.mount, 5), []
+    for torque in (1e6, 60.0, 25.0):
+        limits = replace(LIMITS, speed=2.0, acceleration=6.0, torque=torque)
+        room = room_of(limits, 0.0, 12.0, 1, False)
+        _, piece, refused = allowed(fast_sweeps, room, ours, problem.prepared, limits, 0.0)
+        assert refused == ""
+        tops.append((np.abs(piece.v).max(), np.abs(piece.q).max()))
+    wide, slower, nearer = tops
+    assert slower[0] < 0.7 * wide[0]
+    assert nearer[1] < 0.7 * wide[1]

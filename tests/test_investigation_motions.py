@@ -32,6 +32,15 @@ def test_no_motion_leaves_a_limit(
         assert limits.left_by(*asked) == "", motion.family
 
 
+@pytest.mark.parametrize("acceleration", np.geomspace(0.4, 2.0, 12))
+def test_a_short_motion_that_first_moves_to_the_middle_has_time_for_its_tones(acceleration: float) -> None:
+    """The way to the middle and back once took all of the 8 s, and nothing was left to tone in."""
+    limits = replace(LIMITS, speed=2.0, acceleration=float(acceleration))
+    for motion in motions(room_of(limits, 0.9, 8.0, 1, False)):
+        assert motion.seconds == pytest.approx(8.0)
+        assert all(part.lasts >= 2.0 for part in motion.parts if isinstance(part, Tones)), motion.family
+
+
 @given(low=st.floats(0.05, 20.0), wide=st.floats(1.01, 10.0), frequency=st.floats(0.3, 30.0), turned=st.booleans())
 def test_no_tone_lies_in_the_forbidden_band(low: float, wide: float, frequency: float, turned: bool) -> None:
     limits = replace(LIMITS, frequency=frequency).with_given({"forbidden": f"{low}:{low * wide}"})

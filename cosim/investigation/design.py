@@ -56,10 +56,12 @@ class Plan:
         return sum(min(one, ENOUGH) for one in self.nats)
 
 
-SPARE = 4.0
-"""Torque that must be left over, in units of the RMS that the model leaves: for noise, and for what it lacks."""
-SLOWER = (1.0, 0.5, 0.25)
-"""Shares of speed and acceleration at which a motion is tried until it leaves no limit. Unit: 1."""
+SPARE, GROWTH = 4.0, 3
+"""Torque that must be left over, in units of the RMS that the model leaves: for noise, and for what it lacks. Beyond
+the positions and speeds of the recordings it grows by this power of how far beyond: so steeply grows a cable that
+hardens (q^3), and 4 s^3 RMS covers what a drag of v^2 is off the best line through speeds up to v/s. Unit: 1."""
+SMALLER = ((1.0, 1.0), (0.5, 1.0), (0.25, 1.0), (0.5, 0.5), (0.25, 0.25))
+"""Shares of speed and acceleration, and of the way, at which a motion is tried until it leaves no limit. Unit: 1."""
 
 
 @dataclass(frozen=True)
@@ -80,13 +82,13 @@ class Rated(NamedTuple):
 def plans(room: Room, problem: Problem, ours: Fit, duels: Sequence[Duel], limits: Limits, home: float) -> Rated:
     """Rate a motion of every family that keeps to the limits, by set point and by the torque that the model says.
 
-    One that would leave them is tried again slower; one that still would is refused.
+    One that would leave them is tried again slower, then nearer to where the axis stands, and refused at last.
     """
     weighed = [_Weighed(problem, duel) for duel in duels]
-    seen, cutoff = visited(problem.prepared, limits), problem.prepared.cutoff
+    seen = visited(problem.prepared, limits)
     good, refused = list[Plan](), list[Refusal]()
     for family in FAMILIES:
-        motion, piece, limit = allowed(family, room, ours, cutoff, limits, home)
+        motion, piece, limit = allowed(family, room, ours, problem.prepared, limits, home)
         if limit:
             refused.append(Refusal(motion, limit))
             continue
@@ -96,21 +98,33 @@ def plans(room: Room, problem: Problem, ours: Fit, duels: Sequence[Duel], limits
 
 def pieces_of(room: Room, ours: Fit, problem: Problem, limits: Limits, home: float) -> list[Piece]:
     """What motions of every family would visit, those that leave no limit."""
-    found = (allowed(family, room, ours, problem.prepared.cutoff, limits, home) for family in FAMILIES)
+    found = (allowed(family, room, ours, problem.prepared, limits, home) for family in FAMILIES)
     return [replace(piece, recording=k) for k, (_, piece, limit) in enumerate(found) if not limit]
 
 
 def allowed(
-    family: Callable[[Room], Motion], room: Room, ours: Fit, cutoff: float, limits: Limits, home: float
+    family: Callable[[Room], Motion], room: Room, ours: Fit, known: Prepared, limits: Limits, home: float
 ) -> tuple[Motion, Piece, str]:
-    """The fastest motion of a family that leaves no limit, as a piece; or the slowest and the limit that it leaves."""
-    for share in SLOWER:
-        motion = family(room.slower(share))
-        piece, limit = piece_of(motion, home, cutoff, limits)
-        limit = limit or limits.torque_left((np.abs(torque_of(ours, piece)) + SPARE * ours.rms) / KEPT)
+    """The largest motion of a family that leaves no limit, as a piece; or the smallest and the limit that it leaves.
+
+    `known`: the recordings that our structure was fitted to.
+    """
+    for share, way in SMALLER:
+        motion = family(room.slower(share).nearer(way))
+        piece, limit = piece_of(motion, home, known.cutoff, limits)
+        limit = limit or limits.torque_left((np.abs(torque_of(ours, piece)) + spare(known, piece, ours.rms)) / KEPT)
         if not limit:
             break
     return motion, piece, limit
+
+
+def spare(known: Prepared, piece: Piece, rms: float) -> Array:
+    """Torque to leave over at each row of a motion, for what a model lacks that leaves an RMS on known recordings."""
+    low, high = known.ranges["q"]
+    top = max(abs(edge) for edge in known.ranges["v"])
+    far = np.abs(piece.q - (low + high) / 2) / max((high - low) / 2, 1e-300)
+    beyond = np.maximum(np.maximum(far, np.abs(piece.v) / max(top, 1e-300)), 1.0)
+    return np.asarray(SPARE * rms * beyond**GROWTH)
 
 
 def best(found: Sequence[Plan], has_duels: bool, done: Sequence[str] = ()) -> Plan | None:

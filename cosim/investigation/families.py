@@ -161,7 +161,7 @@ def _tones(room: Room, hertz: list[float], phases: list[float]) -> tuple[Part, .
     move: list[Part] = []
     back: list[Part] = []
     to_middle = Move(room.middle, 0.5 * room.speed, room.acceleration)
-    if half < room.reach / 4 and to_middle.seconds(0.0) < room.seconds / 3:
+    if half < room.reach / 4 and to_middle.seconds(0.0) < (room.seconds - 2 * FADE) / 4:  # half of the time for tones
         move, back, half = [to_middle], [replace(to_middle, to=0.0)], room.reach / 2
     lasts = room.seconds - 2 * FADE - 2 * sum(one.seconds(0.0) for one in move)
     whole = Tones(lasts, tuple(hertz), tuple(sizes), tuple(phases))

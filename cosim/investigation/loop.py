@@ -174,8 +174,7 @@ class Investigation:
     def _turned(self, plan: Plan, room: Room, problem: Problem, ours: Fit) -> Plan:
         """The same family from the other end; the same motion where that would leave a limit."""
         family = next(one for one in FAMILIES if one(room).family == plan.motion.family)
-        cutoff = problem.prepared.cutoff
-        motion, _, limit = allowed(family, room, ours, cutoff, self.limits, self.machine.home)
+        motion, _, limit = allowed(family, room, ours, problem.prepared, self.limits, self.machine.home)
         return plan if limit else replace(plan, motion=motion)
 
     def _moved(self, chosen: Sequence[Plan | None]) -> End | None:

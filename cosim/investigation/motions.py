@@ -182,6 +182,10 @@ class Room(NamedTuple):
         """The same with a share of speed and acceleration."""
         return self._replace(speed=share * self.speed, acceleration=share * self.acceleration)
 
+    def nearer(self, share: float) -> "Room":
+        """The same with a share of the way to both ends."""
+        return self._replace(first=share * self.first, second=share * self.second)
+
 
 def room_of(limits: Limits, home: float, seconds: float, seed: int, turned: bool) -> Room:
     """The room inside limits for an axis that stands at `home`; `turned` begins with the other end."""
