@@ -83,8 +83,10 @@ def test_what_a_model_may_lack_grows_beyond_what_was_recorded(problem: Problem) 
     known = problem.prepared
     (low, high), top = known.ranges["q"], max(map(abs, known.ranges["v"]))
     middle, half = (low + high) / 2, (high - low) / 2
-    rows = {"q": middle + np.array([0.0, 0.9, 2.0, 0.0]) * half, "v": np.array([0.9, 0.0, 0.0, -2.0]) * top}
-    assert spare(known, replace(known.pieces[0], **rows), 0.5) == pytest.approx([2.0, 2.0, 16.0, 16.0])
+    hard = np.abs(known.stacked("a")).max()
+    rows = {"q": middle + np.array([0.0, 0.9, 2.0, 0.0, 0.0]) * half, "v": np.array([0.9, 0.0, 0.0, -2.0, 0.0]) * top}
+    rows["a"] = np.array([0.9, 0.0, 0.0, 0.0, 3.0]) * hard
+    assert spare(known, replace(known.pieces[0], **rows), 0.5) == pytest.approx([2.0, 2.0, 16.0, 16.0, 54.0])
 
 
 def test_spare_torque_covers_a_drag_beside_the_best_line_through_what_was_recorded(problem: Problem) -> None:
@@ -96,7 +98,7 @@ def test_spare_torque_covers_a_drag_beside_the_best_line_through_what_was_record
     for s in (1.0, 1.5, 2.0, 4.0):
         fast = np.array([s * np.abs(v).max()])
         off = abs(fast**2 - found[0] - found[1] * fast)
-        there = replace(piece, q=np.full(1, np.mean(known.ranges["q"])), v=fast)
+        there = replace(piece, q=np.full(1, np.mean(known.ranges["q"])), v=fast, a=np.zeros(1))
         assert off < spare(known, there, float(np.sqrt(np.mean(left**2))))
 
 

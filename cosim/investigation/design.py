@@ -58,8 +58,9 @@ class Plan:
 
 SPARE, GROWTH = 4.0, 3
 """Torque that must be left over, in units of the RMS that the model leaves: for noise, and for what it lacks. Beyond
-the positions and speeds of the recordings it grows by this power of how far beyond: so steeply grows a cable that
-hardens (q^3), and 4 s^3 RMS covers what a drag of v^2 is off the best line through speeds up to v/s. Unit: 1."""
+the positions, speeds and accelerations of the recordings it grows by this power of how far beyond: so steeply grows a
+cable that hardens (q^3), and 4 s^3 RMS covers what a drag of v^2 is off the best line through speeds up to v/s. At
+faster reversals it is for an inertia that slow ones told badly, and for what the loop adds there. Unit: 1."""
 SMALLER = ((1.0, 1.0), (0.5, 1.0), (0.25, 1.0), (0.5, 0.5), (0.25, 0.25))
 """Shares of speed and acceleration, and of the way, at which a motion is tried until it leaves no limit. Unit: 1."""
 
@@ -121,10 +122,13 @@ def allowed(
 def spare(known: Prepared, piece: Piece, rms: float) -> Array:
     """Torque to leave over at each row of a motion, for what a model lacks that leaves an RMS on known recordings."""
     low, high = known.ranges["q"]
-    top = max(abs(edge) for edge in known.ranges["v"])
-    far = np.abs(piece.q - (low + high) / 2) / max((high - low) / 2, 1e-300)
-    beyond = np.maximum(np.maximum(far, np.abs(piece.v) / max(top, 1e-300)), 1.0)
+    pairs = ((piece.q - (low + high) / 2, (high - low) / 2), *((getattr(piece, k), _top(known, k)) for k in "va"))
+    beyond = np.maximum(1.0, np.max([np.abs(one) / max(most, 1e-300) for one, most in pairs], axis=0))
     return np.asarray(SPARE * rms * beyond**GROWTH)
+
+
+def _top(known: Prepared, name: str) -> float:
+    return float(np.abs(known.stacked(name)).max())
 
 
 def best(found: Sequence[Plan], has_duels: bool, done: Sequence[str] = ()) -> Plan | None:
