@@ -8,7 +8,7 @@ import pytest
 from investigations import CABLE, written
 
 from cosim.estimation.problem import Problem
-from cosim.investigation.design import Plan, Rated, allowed, best, piece_of, plans, shown_by_motion, spare
+from cosim.investigation.design import Plan, Rated, allowed, best, piece_of, plans, shown_by_motion, spare, strayed
 from cosim.investigation.families import fast_sweeps, fast_tone
 from cosim.investigation.limits import Limits
 from cosim.investigation.machine import CoSimulated
@@ -113,3 +113,18 @@ def test_a_motion_far_beyond_any_recording_is_slowed_and_shortened_where_torque_
     wide, slower, nearer = tops
     assert slower[0] < 0.7 * wide[0]
     assert nearer[1] < 0.7 * wide[1]
+
+
+def test_a_motion_leaves_room_for_what_the_axis_strayed_from_its_set_point(problem: Problem) -> None:
+    """A tenth of the way and of the speed is kept anyway; a loop that overshoots by more is asked for less."""
+    known = problem.prepared
+    far, fast = strayed(known)
+    assert 0 < far < 0.01
+    (piece,) = known.pieces
+    shaken = piece.extras["q_d"] + 0.02 * np.sin(2 * np.pi * 2.0 * piece.t)
+    loose = replace(known, pieces=(replace(piece, extras=piece.extras | {"q_d": shaken}),))
+    assert strayed(loose)[0] == pytest.approx(0.02, abs=far + 1e-3)
+    assert strayed(loose)[1] == pytest.approx(0.25, abs=fast + 0.01)
+    ours, room = problem.fit(problem.mount, 5), room_of(LIMITS, 0.0, 12.0, 1, False)
+    tops = [np.abs(allowed(fast_sweeps, room, ours, one, LIMITS, 0.0)[1].v).max() for one in (known, loose)]
+    assert tops[1] == pytest.approx(0.5 * tops[0], rel=0.1)

@@ -33,7 +33,7 @@ def test_a_motion_beyond_a_limit_is_seen_on_the_plant_and_by_the_drive(tmp_path:
 
 def test_the_page_counts_what_was_refused_and_what_left_a_limit() -> None:
     counts = Counter({"run": 50, "machines": 2, "refused: torque": 3, "beyond": 1})
-    text = page("command", counts, ["cogging, tone: drive: overspeeds 1 times"])
+    text = page("command", counts, ["cogging, tone: drive: 1 overspeeds"])
     assert "50 motions on 2 machines" in text
     assert "refused before they moved: 3 (3 for torque). 1 left a limit." in text
-    assert text.endswith("- cogging, tone: drive: overspeeds 1 times\n")
+    assert text.endswith("- cogging, tone: drive: 1 overspeeds\n")

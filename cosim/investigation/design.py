@@ -110,13 +110,28 @@ def allowed(
 
     `known`: the recordings that our structure was fitted to.
     """
+    within = limits.less(*strayed(known))
     for share, way in SMALLER:
         motion = family(room.slower(share).nearer(way))
-        piece, limit = piece_of(motion, home, known.cutoff, limits)
+        piece, limit = piece_of(motion, home, known.cutoff, within)
         limit = limit or limits.torque_left((np.abs(torque_of(ours, piece)) + spare(known, piece, ours.rms)) / KEPT)
         if not limit:
             break
     return motion, piece, limit
+
+
+def strayed(known: Prepared) -> tuple[float, float]:
+    """How far, and how much faster, the axis was at most than its set point in recordings; 0 where they have none.
+
+    A loop that friction lets go at a reversal overshoots by a speed of its own, however slow the motion is.
+    """
+    far, fast = 0.0, 0.0
+    for piece in (one for one in known.pieces if "q_d" in one.extras):
+        gap = piece.q - piece.lowpass(piece.extras["q_d"])
+        gap = gap - np.median(gap)  # the set point may count from elsewhere
+        far = max(far, float(np.abs(gap[piece.inside]).max()))
+        fast = max(fast, float(np.abs(np.gradient(gap, piece.dt)[piece.inside]).max()))
+    return far, fast
 
 
 def spare(known: Prepared, piece: Piece, rms: float) -> Array:

@@ -60,6 +60,10 @@ class Limits:
         """The same with a speed and a torque that are no larger than these."""
         return replace(self, speed=min(self.speed, speed), torque=min(self.torque, torque))
 
+    def less(self, way: float, speed: float) -> "Limits":
+        """The same, narrower by a way at both ends and by a speed."""
+        return replace(self, low=self.low + way, high=self.high - way, speed=self.speed - speed)
+
     def left_by(self, q: Array, v: Array, a: Array) -> str:
         """The first limit that a planned motion would leave, in words; "" where it leaves none."""
         within = (_high("position", self.high, q), _high("position", -self.low, -q))

@@ -6,13 +6,15 @@ Machines are drawn (inertia, friction, loop, something concealed, a card up to 1
 limits, evenly in their logarithm: position, speed, acceleration, torque, frequency, in every other one a forbidden
 band, and the seconds. A motion that no share of speed makes fit is refused, as in an investigation. Every other one is
 run on the co-simulated plant, and on the drive of `virtual-drive` (in this process; `--udp`: at the other end of UDP)
-with torque and speed as limits of its own and a loop that has none. Counted: set points, the plant's own position and
-speed, torques beyond a limit; orders and speeds that the drive itself found beyond its limits.
+with torque and speed as limits of its own and a loop that has none. Counted as beyond a limit: set points, torques, the
+plant's own position and speed, a speed that the drive itself finds, a torque that it has to hold, a session that ends
+in a fault.
 """
 
 import argparse
 import itertools
 import sys
+import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -95,7 +97,7 @@ def run(one: Axis, motion: Motion, given: Asked, folder: Path, udp: bool) -> lis
         done, counted = (over_udp if udp else on_a_drive)(one, motion, given.limits, folder / "run.drive.parquet")
     except HardwareError as error:
         return [*beyond, f"drive: {error}"]
-    beyond += [f"drive: {name} {many} times" for name, many in counted.items() if many]
+    beyond += [f"drive: {many} {name}" for name, many in counted.items() if many]
     if done["q"].max() > given.limits.high or done["q"].min() < given.limits.low:
         beyond.append(f"drive: position {done['q'].min():.5g} to {done['q'].max():.5g}")
     return beyond
@@ -141,13 +143,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--runs", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=5100)
+    parser.add_argument("--until", type=float, default=1e9, help="seconds after which no machine is begun")
     parser.add_argument("--udp", action="store_true", help="the drive at the other end of UDP")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
-    counts, beyond = Counter[str](), list[str]()
+    counts, beyond, begun = Counter[str](), list[str](), time.monotonic()
     for number in itertools.count():
         left = min(RUNS, given.runs - counts["run"])
-        if left <= 0:
+        if left <= 0 or time.monotonic() - begun > given.until:
             break
         with TemporaryDirectory() as name:
             beyond += machine(np.random.default_rng([given.seed, number]), Path(name), counts, left, given.udp)
