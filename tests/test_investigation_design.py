@@ -125,6 +125,7 @@ def test_a_motion_leaves_room_for_what_the_axis_strayed_from_its_set_point(probl
     loose = replace(known, pieces=(replace(piece, extras=piece.extras | {"q_d": shaken}),))
     assert strayed(loose)[0] == pytest.approx(0.02, abs=far + 1e-3)
     assert strayed(loose)[1] == pytest.approx(0.25, abs=fast + 0.01)
-    ours, room = problem.fit(problem.mount, 5), room_of(LIMITS, 0.0, 12.0, 1, False)
-    tops = [np.abs(allowed(fast_sweeps, room, ours, one, LIMITS, 0.0)[1].v).max() for one in (known, loose)]
+    limits, ours = replace(LIMITS, speed=0.5), problem.fit(problem.mount, 5)
+    room = room_of(limits, 0.0, 12.0, 1, False)
+    tops = [np.abs(allowed(fast_sweeps, room, ours, one, limits, 0.0)[1].v).max() for one in (known, loose)]
     assert tops[1] == pytest.approx(0.5 * tops[0], rel=0.1)
