@@ -105,6 +105,18 @@ def test_what_is_left_elsewhere_is_told_by_the_friction_of_training() -> None:
     assert share_there(comparing(steady(2), 4.0), rest, there) == pytest.approx(0.25, rel=1e-12)
 
 
+def test_friction_of_training_is_that_of_clear_motion_by_its_weight() -> None:
+    there: Any = SimpleNamespace(prepared=Motion({"v": [np.ones(RATE)]}))
+    motion = Motion({"v": [np.repeat([1.0, 0.0], 2 * RATE)], "tau": [np.full(4 * RATE, 2.0)]})
+    level, weight = (
+        np.repeat([2.0, 6.0, 70.0], [RATE, RATE, 2 * RATE]),
+        np.repeat([3.0, 1.0, 5.0], [RATE, RATE, 2 * RATE]),
+    )
+    clear = np.r_[np.full(RATE, 3.0), np.full(RATE - 1, 1.0)]  # the last row before the rest is near a turn
+    expected = 1.0 / np.sqrt(clear @ level[: 2 * RATE - 1] ** 2 / clear.sum())
+    assert share_there(comparing(motion, level, weight), np.ones(RATE), there) == pytest.approx(expected, rel=1e-3)
+
+
 @pytest.mark.parametrize("size", [1.0, 1e-6])
 def test_a_torque_or_a_friction_level_over_time_whichever_explains_more(size: float) -> None:
     seconds = np.arange(8 * RATE) / RATE

@@ -3,7 +3,10 @@
 from types import SimpleNamespace
 
 import pytest
+from on_hardware import SIMULATED
+from over_udp import drive
 
+from cosim.hardware.machine import changed
 from cosim.hardware.virtual import Event, VirtualDrive
 from cosim.hardware.words import STATES
 
@@ -37,3 +40,15 @@ def test_a_drive_tells_each_change_once_and_what_its_watchdog_took(monkeypatch: 
     ]
     assert len(waits) == 5
     assert 0 < max(waits) <= 0.1
+
+
+@pytest.mark.parametrize("lockstep", [True, False])
+def test_a_drive_counts_in_the_units_of_its_clock(lockstep: bool) -> None:
+    """Nanoseconds; a session is free after a second without an order, or the watchdog's time where that is longer."""
+    patient = changed(SIMULATED, "test", watchdog_ms=1500.0)
+    for machine, lease in ((SIMULATED, 1_000_000_000), (patient, 1_500_000_000)):
+        with drive(machine, lockstep=lockstep) as there:
+            assert there.virtual.period == (0 if lockstep else 100_000)
+            assert there.virtual.watchdog == machine.watchdog_ms * 1_000_000
+            assert there.virtual.lease == lease
+            assert there.virtual.ahead == max(1000, there.drive.watchdog)
