@@ -57,7 +57,7 @@ def test_the_gallery_lists_the_effects_that_a_diagnosis_does_not_look_for(galler
     text = "\n".join(gallery.of_cards_alone())
     assert "A diagnosis does not look for them yet" in text
     assert set(re.findall(r"^`(\w+)`, ", text, re.M)) == set(CATALOGUE) - set(TRIED)
-    assert text.count("*Literature:* Carreau") == 1
+    assert text.count("*Literature:* Wen") == 1
 
 
 def test_the_index_leads_to_every_page_that_is_there() -> None:
