@@ -23,6 +23,7 @@ from cosim.diagnosis.policy import POLICY
 
 ROUND = replace(
     POLICY,
+    sure_beside_unknown=0.875,
     set_margin=3.0,
     least_predicted=4.0,
     sure_predicted=32.0,
@@ -157,6 +158,16 @@ def test_a_doubtful_name_excuses_nothing_that_is_left() -> None:
     found = decide([weak], residual, ROUND)
     assert (found.is_unknown, found.doubtful) == (True, ("delay",))
     assert decide([weak], left(), ROUND).doubtful == ()
+
+
+def test_a_name_beside_something_unknown_is_as_likely_as_not_unless_it_removes_nearly_all() -> None:
+    residual = left(share=1.0)
+    sure, doubtful = effect("cogging", 80.0, 0.875), effect("delay", 80.0, 0.875 - LITTLE)
+    found = decide([sure, doubtful], residual, ROUND)
+    assert (found.is_unknown, found.doubtful) == (True, ("delay",))
+    alone = decide([sure, doubtful], left(), ROUND)
+    assert found.probabilities["cogging"] == alone.probabilities["cogging"]
+    assert found.probabilities["delay"]["delay"] == pytest.approx(alone.probabilities["delay"]["delay"] / 2)
 
 
 def test_what_a_term_removes_about_turns_alone_is_what_laws_lack_there() -> None:
