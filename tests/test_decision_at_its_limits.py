@@ -197,4 +197,4 @@ def test_probabilities_are_calibrated_posterior_shares_times_what_is_explained(m
 
 def test_what_is_decided_stays_when_something_more_is_left() -> None:
     decided = Decision({}, {}, True, ("time",))
-    assert decided.with_rest(("position",)) is decided
+    assert decided.with_rest(("position",), ()) is decided

@@ -1,7 +1,7 @@
 """The decision, from scores alone: what is named, what stays open, whether something unknown is left. No data here."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import exp
 
 from cosim.diagnosis.calibration import calibrated
@@ -61,24 +61,28 @@ class Decision:
     doubtful: tuple[str, ...] = ()
     """Names that help, and may yet imitate what is unknown: they are as likely as not."""
 
-    def with_rest(self, follows: tuple[str, ...]) -> "Decision":
-        """The same where something without a name is left, that follows some quantities; what is decided stays."""
-        return self if self.is_unknown else replace(self, is_unknown=True, depends_on=follows)
+    def with_rest(self, follows: tuple[str, ...], doubtful: tuple[str, ...]) -> "Decision":
+        """The same where something is left without a name, that follows quantities and may be what some names imitate."""
+        if self.is_unknown:
+            return self
+        told = {
+            name: {one: value / 2 for one, value in members.items()} if name in doubtful else members
+            for name, members in self.probabilities.items()
+        }
+        return Decision(self.sets, told, True, follows, doubtful)
 
 
 def decide(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Decision:
     """Decide what is named, what stays open and whether something without a name is left."""
     sets = {one.effect: open_rivals(one, policy) for one in effects}
-    unknown = is_left(effects, residual, policy)
-    doubtful = beside_unknown(effects, policy) if unknown else ()
-    probabilities = {
-        one.effect: _probabilities(one, sets[one.effect], 0.5 if one.effect in doubtful else 1.0) for one in effects
-    }
-    return Decision(sets, probabilities, unknown, followed(residual, policy) if unknown else (), doubtful)
+    named = Decision(sets, {one.effect: _probabilities(one, sets[one.effect]) for one in effects}, False, ())
+    if not is_left(effects, residual, policy):
+        return named
+    return named.with_rest(followed(residual, policy), beside_unknown(effects, policy))
 
 
 def beside_unknown(effects: Sequence[EffectScores], policy: Policy) -> tuple[str, ...]:
-    """Names that leave too much to be sure where what they leave has no name: the part of one cause may look like them."""
+    """Names that leave too much to be sure where that has no name: a part of one cause may look like them."""
     return tuple(one.effect for one in effects if one.explains[one.effect] < policy.sure_beside_unknown)
 
 
@@ -184,14 +188,11 @@ def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
     return tuple(one.name for one in ranked if one.share > least) or (residual.over_time,)
 
 
-def _probabilities(one: EffectScores, members: Sequence[str], sure: float) -> dict[str, float]:
-    """Posterior shares of an effect, its rivals and "none" (equal priors), times what each explains, calibrated.
-
-    `sure` is the probability that it is an effect at all, and no part of something unknown.
-    """
+def _probabilities(one: EffectScores, members: Sequence[str]) -> dict[str, float]:
+    """Posterior shares of an effect, its rivals and "none" (equal priors), times what each explains, calibrated."""
     odds = {one.effect: 0.0, **{name: -margin for name, margin in one.margins.items()}}
     top = max(odds.values())
     weights = {name: exp(value - top) for name, value in odds.items()}
     total = sum(weights.values()) + exp(-min(one.evidence, 700.0) - top)
-    told = {name: sure * calibrated(weights[name] / total * one.explains[name]) for name in (one.effect, *members)}
+    told = {name: calibrated(weights[name] / total * one.explains[name]) for name in (one.effect, *members)}
     return {name: value / max(1.0, sum(told.values())) for name, value in told.items()}

@@ -13,7 +13,7 @@ from cosim.diagnosis.adequacy import over_time, share_beside, share_left, share_
 from cosim.diagnosis.band import in_band
 from cosim.diagnosis.breakdown import parts
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import Decision, EffectScores, ResidualScores, decide, least_left
+from cosim.diagnosis.decision import Decision, EffectScores, ResidualScores, beside_unknown, decide, least_left
 from cosim.diagnosis.delivered import standing
 from cosim.diagnosis.entries import NotLearnedEntry
 from cosim.diagnosis.experiment import Experiment, best, told
@@ -227,9 +227,10 @@ def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Lear
     after = tried.mount if tried.helps else answer.chosen.mount
     models = Structures(problem.mount, answer.base.mount, after)
     told = tried.judged_in(judged_band(heldout, models, problem.prepared.cutoff), answer.chosen.mount)
-    policy = answer.comparison.policy
-    if told.says_unknown(policy, least_left(_scores(answer.proof), policy)):
-        answer = replace(answer, decision=answer.decision.with_rest(told.quantities))
+    policy, scores = answer.comparison.policy, _scores(answer.proof)
+    if told.says_unknown(policy, least_left(scores, policy)):
+        decision = answer.decision.with_rest(told.quantities, beside_unknown(scores, policy))
+        answer = replace(answer, decision=decision)
     return answer, told if answer.decision.is_unknown else None
 
 
