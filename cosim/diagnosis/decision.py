@@ -62,7 +62,7 @@ class Decision:
     """Names that help, and may yet imitate what is unknown: they are as likely as not."""
 
     def with_rest(self, follows: tuple[str, ...], doubtful: tuple[str, ...]) -> "Decision":
-        """The same where something is left without a name, that follows quantities and may be what some names imitate."""
+        """The same where something is left without a name, that follows quantities; names may imitate it."""
         if self.is_unknown:
             return self
         told = {
