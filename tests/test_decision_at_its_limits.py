@@ -165,6 +165,7 @@ def test_a_name_beside_something_unknown_is_as_likely_as_not_unless_it_removes_n
     sure, doubtful = effect("cogging", 80.0, 0.875), effect("delay", 80.0, 0.875 - LITTLE)
     found = decide([sure, doubtful], residual, ROUND)
     assert (found.is_unknown, found.doubtful) == (True, ("delay",))
+    assert decide([sure, replace(doubtful, removes=0.875)], residual, ROUND).doubtful == ()
     alone = decide([sure, doubtful], left(), ROUND)
     assert found.probabilities["cogging"] == alone.probabilities["cogging"]
     assert found.probabilities["delay"]["delay"] == pytest.approx(alone.probabilities["delay"]["delay"] / 2)

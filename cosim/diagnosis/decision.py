@@ -20,7 +20,9 @@ class EffectScores:
     explains: Mapping[str, float]
     """Share of the residual energy that the effect, or a rival in its place, removes."""
     predicted: float = 0.0
-    """What the held-out recordings lose without it."""
+    """What the held-out recordings lose without it ..."""
+    removes: float = 0.0
+    """... and the share of their residual energy that it removes."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,8 @@ def decide(effects: Sequence[EffectScores], residual: ResidualScores, policy: Po
 
 def beside_unknown(effects: Sequence[EffectScores], policy: Policy) -> tuple[str, ...]:
     """Names that leave too much to be sure where that has no name: a part of one cause may look like them."""
-    return tuple(one.effect for one in effects if one.explains[one.effect] < policy.sure_beside_unknown)
+    removed = {one.effect: max(one.explains[one.effect], one.removes) for one in effects}
+    return tuple(name for name, share in removed.items() if share < policy.sure_beside_unknown)
 
 
 def doubted(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> tuple[str, ...]:

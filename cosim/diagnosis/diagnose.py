@@ -158,8 +158,9 @@ def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Record
 
 
 def _scores(proof: Proof) -> list[EffectScores]:
+    said = {one.effect.id: (proof.predicted[one.effect.id], proof.removes[one.effect.id]) for one in proof.standing}
     return [
-        EffectScores(one.effect.id, one.own.evidence, margins(one), explains(one), proof.predicted[one.effect.id])
+        EffectScores(one.effect.id, one.own.evidence, margins(one), explains(one), *said[one.effect.id])
         for one in proof.standing
     ]
 

@@ -108,9 +108,9 @@ class Policy:
     imitation_share: float = 0.6
     """Share of the residual energy from which a name imitates nothing smaller. Unit: 1."""
     sure_beside_unknown: float = 0.9
-    """Share of the residual energy that a name must remove to be sure where something unknown is left. Unit: 1. Names
-    beside it were false in 15 of 19 cases of the own generator (.25 to .89; true ones .19, .95, .997 and one other);
-    of four measured machines three have .95 to .98, and a load-dependent friction less."""
+    """Share of the residual energy that a name must remove, in training or held out, to be sure where something unknown
+    is left. Unit: 1. Beside it 15 names of 19 in the own generator were false, with .03 to .89; true ones had .19,
+    .95 and .997 there, .95 to .98 on three measured machines."""
     beside: float = 0.7
     """... and beside the best one: this share of what that predicts. Unit: 1."""
     large_residual: float = 0.12

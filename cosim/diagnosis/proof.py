@@ -14,13 +14,15 @@ from pyfmi_models.mount import Mount
 
 @dataclass(frozen=True)
 class Proof:
-    """The effects that stand, the structure with just them, what each predicts, and those that do not stand."""
+    """The effects that stand, the structure with just them, what each predicts and removes, and those that do not."""
 
     chosen: Fit
     standing: tuple[AcceptedEffect, ...]
     predicted: dict[str, float]
     """Nats that the held-out recordings lose without an effect, by its id."""
     unproven: tuple[AcceptedEffect, ...]
+    removes: dict[str, float]
+    """Share of the held-out residual energy that each removes, by its id."""
 
 
 def prove(comparison: Comparison, examined: Examined, held: Predictive) -> Proof:
@@ -34,7 +36,8 @@ def prove(comparison: Comparison, examined: Examined, held: Predictive) -> Proof
     chosen, some = _longest(comparison, examined, order, held)
     chosen, standing, gains = _standing(comparison, examined, chosen, some, held)
     predicted = {one.effect.id: 0.0 for one in order} | {name: gain.nats for name, gain in gains.items()}
-    return Proof(chosen, tuple(standing), predicted, tuple(one for one in order if one not in standing))
+    removes = {name: gain.narrow for name, gain in gains.items()}
+    return Proof(chosen, tuple(standing), predicted, tuple(one for one in order if one not in standing), removes)
 
 
 def _standing(
