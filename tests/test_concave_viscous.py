@@ -6,8 +6,8 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.hypotheses import hypothesis_of
-from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.result import Diagnosis
+from cosim.estimation.prepare import prepare
 from pyfmi_models.card import Card, parse_card
 from pyfmi_models.effects.concave_viscous import ConcaveViscous
 
@@ -56,7 +56,11 @@ def test_grease_that_does_not_is_not_and_its_bound_says_from_which_speed_it_woul
     assert "root of the speed" in str(seen)
 
 
-def test_a_bend_that_a_law_may_have_left_is_not_enough() -> None:
-    own = hypothesis_of(ConcaveViscous(thinning_speed=0.1))
-    assert own.is_common_misfit
-    assert POLICY.least_bent > 23  # the one axis without an effect, of 200, that asked for it
+def test_a_bend_next_to_rest_that_a_law_may_have_left_is_not_enough() -> None:
+    mount = parse_card(CARD.replace("4.0", "12.0"), "axis.toml").plant()
+    prepared = prepare([recording(1, 1.0)], 30.0)
+    bends, levels = ConcaveViscous(thinning_speed=0.1, exponent=0.5), ConcaveViscous(thinning_speed=0.01, exponent=0.05)
+    grease = hypothesis_of(bends)
+    assert grease.is_common_misfit
+    assert grease.shows(bends, mount, prepared)
+    assert not grease.shows(levels, mount, prepared)

@@ -42,7 +42,8 @@ class Fitted(Protocol):
 def is_admissible(problem: Problem, one: Fitted) -> bool:
     """Whether an effect is what its name says, and can be told from this motion."""
     mount, effect = one.fit.mount, one.effect
-    if not hypothesis_of(effect).is_plausible(effect, mount):
+    own = hypothesis_of(effect)
+    if not (own.is_plausible(effect, mount) and own.shows(effect, mount, problem.prepared)):
         return False
     return not is_degenerate(problem, effect) and not needs_turns(effect, mount, problem.prepared)
 

@@ -132,6 +132,10 @@ class Hypothesis(Generic[Form]):
         """Whether a fitted effect, in the fitted mount that holds it, is what its name says."""
         return True
 
+    def shows(self, effect: Form, mount: Mount, prepared: Prepared) -> bool:
+        """Whether the recorded motion shows what tells the fitted effect from another law of friction."""
+        return True
+
     def way_back(self, effect: Form, mount: Mount) -> float:
         """How far motion must turn back to show the fitted effect [rad, m]."""
         return 0.0
