@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cosim.data.recording import Recording
@@ -22,6 +22,7 @@ def rooms(limits: Limits) -> list[Room]:
     return [room_of(limits, home, 12.0, 3, turned) for home in (0.0, 0.8) for turned in (False, True)]
 
 
+@settings(deadline=None)
 @given(low=SIZES, high=SIZES, speed=SIZES, acceleration=SIZES, frequency=st.floats(0.3, 30.0), turned=st.booleans())
 def test_no_motion_leaves_a_limit(
     low: float, high: float, speed: float, acceleration: float, frequency: float, turned: bool
@@ -41,6 +42,7 @@ def test_a_short_motion_that_first_moves_to_the_middle_has_time_for_its_tones(ac
         assert all(part.lasts >= 2.0 for part in motion.parts if isinstance(part, Tones)), motion.family
 
 
+@settings(deadline=None)
 @given(low=st.floats(0.05, 20.0), wide=st.floats(1.01, 10.0), frequency=st.floats(0.3, 30.0), turned=st.booleans())
 def test_no_tone_lies_in_the_forbidden_band(low: float, wide: float, frequency: float, turned: bool) -> None:
     limits = replace(LIMITS, frequency=frequency).with_given({"forbidden": f"{low}:{low * wide}"})

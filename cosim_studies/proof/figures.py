@@ -18,7 +18,7 @@ ENDS = ("none", "unknown", "crashed", "timeout", "failed")
 def draw_confusion(table: Mapping[str, Mapping[str, int]], path: Path) -> None:
     """Rows: what was concealed; columns: the first answer; numbers of cases, right ones in blue."""
     answers = {answer for line in table.values() for answer in line}
-    columns = [name for name in (*sorted(FAMILIES), *ENDS) if name in answers]
+    columns = [*sorted(answers - {*ENDS}), *(name for name in ENDS if name in answers)]
     rows = [label for label in (*sorted(FAMILIES), *OUTSIDE, "none") if label in table]
     with figure(path, 1, 1, (1.9 + 0.32 * len(columns), 1.6 + 0.27 * len(rows)), force=True) as (_, ((axes,),)):
         for y, label in enumerate(rows):
