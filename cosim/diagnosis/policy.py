@@ -110,7 +110,7 @@ class Policy:
     sure_beside_unknown: float = 0.9
     """Share of the residual energy that a name must remove, in training or held out, to be sure where something unknown
     is left. Unit: 1. Beside it 15 names of 19 in the own generator were false, with .03 to .89; true ones had .19,
-    .95 and .997 there, .95 to .98 on three measured machines."""
+    .95 and .997 there, .95 to .98 on two measured machines."""
     beside: float = 0.7
     """... and beside the best one: this share of what that predicts. Unit: 1."""
     large_residual: float = 0.12
