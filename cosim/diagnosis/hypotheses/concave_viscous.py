@@ -38,6 +38,7 @@ class ThinningGrease(Hypothesis[ConcaveViscous]):
     forms = (ConcaveViscous,)
     easiest: ClassVar[int] = -1
     unit_step: ClassVar[float] = -0.5
+    member: ClassVar[str] = "thinning_speed"
     rank: ClassVar[float] = 14.5
     needs_position: ClassVar[bool] = False
     imitated_by: ClassVar[str] = "speeds"
@@ -70,6 +71,10 @@ class ThinningGrease(Hypothesis[ConcaveViscous]):
         torque = mount.friction.viscous(v) * (1 + (v / effect.thinning_speed) ** 2) ** ((effect.exponent - 1) / 2)
         bend = projected(torque, np.column_stack([np.sign(v), v]))
         return bool(np.sqrt(np.mean(bend**2)) > LEAST_BEND * contact_level(mount))
+
+    def none(self, mount: Mount) -> float:
+        """A straight line."""
+        return 1.0
 
     def looked(self, seen: Seen, mount: Mount) -> str:
         """Lower speeds, above which the viscous torque is a root of the speed."""
