@@ -147,12 +147,21 @@ class Hypothesis:
     """What an effect declares, as a table."""
 
     def __init__(
-        self, plausible: bool = True, degenerate: bool = False, back: float = 0.0, timing: bool = True
+        self,
+        plausible: bool = True,
+        shown: bool = True,
+        degenerate: bool = False,
+        back: float = 0.0,
+        timing: bool = True,
     ) -> None:
-        self.plausible, self.degenerate, self.back, self.is_timing = plausible, degenerate, back, timing
+        self.plausible, self.shown, self.degenerate = plausible, shown, degenerate
+        self.back, self.is_timing = back, timing
 
     def is_plausible(self, effect: object, mount: object) -> bool:
         return self.plausible
+
+    def shows(self, effect: object, mount: object, prepared: object) -> bool:
+        return self.shown
 
     def is_degenerate(self, problem: object, effect: object) -> bool:
         return self.degenerate
@@ -199,6 +208,7 @@ def test_friction_is_told_by_the_longest_way_back_of_any_recording(
         (Effect(), {"at_bound": True}, True, False),
         (Effect(), {"degenerate": True}, True, False),
         (Effect(), {"plausible": False}, False, False),
+        (Effect(), {"shown": False}, False, False),
         (Effect(), {"back": 0.5}, False, False),
     ],
 )

@@ -80,7 +80,6 @@ def test_the_same_motion_costs_energy_where_the_law_is_passive(law: FrictionLaw,
 
 
 @pytest.mark.parametrize("law", PASSIVE.values(), ids=PASSIVE.keys())
-@settings(deadline=None)
 @given(motion=st.lists(st.tuples(st.floats(-9, 1.5), st.floats(-2, 1), st.booleans()), min_size=1, max_size=30))
 @settings(max_examples=60, deadline=None)
 def test_from_a_relaxed_contact_no_motion_ever_gains_energy(
@@ -93,7 +92,6 @@ def test_from_a_relaxed_contact_no_motion_ever_gains_energy(
     assert gained >= -1e-9 * moved
 
 
-@settings(deadline=None)
 @given(share=st.floats(-1, 1), size=st.floats(-9, 3), stretch=st.floats(-2, 1))
 @settings(max_examples=300, deadline=None)
 def test_fading_damping_wastes_power_in_every_state_at_every_speed_and_level(

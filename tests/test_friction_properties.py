@@ -39,7 +39,6 @@ def test_every_word_of_a_card_is_a_law_that_is_tested_here() -> None:
 
 
 @laws(VARIANTS)
-@settings(deadline=None)
 @given(share=shares, v=moving)
 @settings(max_examples=40, deadline=None)
 def test_friction_is_odd_in_the_direction_of_motion(law: FrictionLaw, share: float, v: float) -> None:
@@ -51,7 +50,6 @@ def test_friction_is_odd_in_the_direction_of_motion(law: FrictionLaw, share: flo
 
 
 @laws(VARIANTS | {f"one-sided {key}": law for key, law in ONE_SIDED.items()})
-@settings(deadline=None)
 @given(cycle=cycles)
 @settings(max_examples=25, deadline=None)
 def test_a_closed_cycle_never_creates_energy(law: FrictionLaw, cycle: list[tuple[float, float]]) -> None:
@@ -67,7 +65,6 @@ def test_a_closed_cycle_never_creates_energy(law: FrictionLaw, cycle: list[tuple
 
 
 @laws({key: replace(law, sigma1=0.0) if hasattr(law, "sigma1") else law for key, law in VARIANTS.items()})
-@settings(deadline=None)
 @given(motion=st.lists(st.tuples(st.floats(-9, -1), st.booleans()), min_size=1, max_size=40))
 @settings(max_examples=40, deadline=None)
 def test_from_a_relaxed_contact_no_motion_ever_gains_energy(law: FrictionLaw, motion: list[tuple[float, bool]]) -> None:
@@ -112,7 +109,6 @@ def test_no_state_of_a_contact_touches_another(law: FrictionLaw) -> None:
 
 
 @laws(WITH_MEMORY)
-@settings(deadline=None)
 @given(share=shares, v=moving)
 @settings(max_examples=40, deadline=None)
 def test_advance_starts_with_the_rate(law: FrictionLaw, share: float, v: float) -> None:
@@ -126,7 +122,6 @@ def test_advance_starts_with_the_rate(law: FrictionLaw, share: float, v: float) 
 
 
 @laws(WITH_MEMORY)
-@settings(deadline=None)
 @given(share=shares, v=moving, first=st.floats(0, 3), second=st.floats(0, 3))
 @settings(max_examples=40, deadline=None)
 def test_two_short_advances_are_one_long_one(
@@ -139,7 +134,6 @@ def test_two_short_advances_are_one_long_one(
 
 
 @laws(WITH_MEMORY)
-@settings(deadline=None)
 @given(motion=st.lists(moving, min_size=1, max_size=30))
 @settings(max_examples=25, deadline=None)
 def test_the_contact_never_carries_more_than_break_away(law: FrictionLaw, motion: list[float]) -> None:

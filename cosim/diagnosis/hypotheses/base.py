@@ -8,6 +8,7 @@ stands, one file an effect, what only a diagnosis asks. In the order in which it
     tuned(problem, found, ...)     what its grid knows only roughly, fitted
     multiple(effect, k)            a further wave of a ripple
     is_plausible(effect, mount)    whether the fitted effect is what its name says
+    shows(effect, mount, prepared) whether the motion tells it from another law of friction
     is_degenerate(problem, effect) whether fitted numbers are another effect's, or none's
     way_back(effect, mount)        how far motion must turn back to show it
     where(effect, reach)           where it acts, within what was visited
