@@ -11,6 +11,8 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
 
 import mutants
+import mutants_choice
+from mutants_choice import Declared
 from mutations import mutated, sites
 from reach import Reached, read
 
@@ -61,24 +63,83 @@ def test_the_same_seed_draws_the_same_mutants_from_every_group() -> None:
 
 def test_the_tests_of_a_module_are_those_that_are_near() -> None:
     root = mutants.HOME
-    assert mutants.belonging(root / "cosim" / "hardware" / "replay.py")[0] == "test_hardware_replay.py"
-    assert "test_adrc.py" in mutants.belonging(root / "pyfmi_models" / "adrc" / "controller.py")
-    assert "test_master.py" in mutants.belonging(root / "cosim" / "master" / "planning.py")
+    assert mutants_choice.belonging(root / "cosim" / "hardware" / "replay.py")[0] == "test_hardware_replay.py"
+    assert "test_adrc.py" in mutants_choice.belonging(root / "pyfmi_models" / "adrc" / "controller.py")
+    assert "test_master.py" in mutants_choice.belonging(root / "cosim" / "master" / "planning.py")
+
+
+SHORT = """LIMIT = 3
+TWICE = 2 * LIMIT
+
+@cached
+def one():
+    return LIMIT
+
+
+class A:
+    size: int = 4
+
+    def other(self):
+        def inner():
+            return 2
+
+        return self.size
+"""
+
+
+def test_a_line_belongs_to_the_innermost_function_around_it_or_declares_names() -> None:
+    found = [mutants_choice.around(SHORT, line) for line in range(1, 17)]
+    assert found[:7] == ["", "", "", "one", "one", "one", ""], "from its decorator on"
+    assert found[9:] == ["", "", "A.other", "A.other.<locals>.inner", "A.other.<locals>.inner", "A.other", "A.other"]
+    assert mutants_choice.declared(SHORT, 1) == Declared(frozenset({"LIMIT", "TWICE"})), "and what is made of it"
+    assert mutants_choice.declared(SHORT, 2) == Declared(frozenset({"TWICE"}))
+    assert mutants_choice.declared(SHORT, 10) == Declared(frozenset({"size"}), "A")
+    assert mutants_choice.declared(SHORT, 3) == Declared(frozenset())
 
 
 def test_the_tests_that_are_asked_call_the_function_in_question_the_cheapest_of_each_kind_first() -> None:
-    source = "LIMIT = 3\n\n\n@cached\ndef one():\n    return LIMIT\n\n\n"
-    source += "def other():\n    def inner():\n        return 2\n\n    return 1\n"
-    assert mutants.spanned(source, 1) == range(0)
-    assert mutants.spanned(source, 6) == range(4, 7), "from its decorator on, where Python says that it begins"
-    assert mutants.spanned(source, 11) == range(10, 12)
-    assert mutants.spanned(source, 13) == range(9, 14)
-    told = [("a[1]", 0.1, [4]), ("a[2]", 0.2, [4]), ("b", 0.3, [4, 9]), ("c", 0.4, [9]), ("d", 19.9, [4])]
-    reached = [Reached(f"tests/{test}", seconds, {"m.py": lines}) for test, seconds, lines in told]
-    assert mutants.calling("m.py", source, 6, reached) == ("a[1]", "b", "a[2]"), "all that fit into the time"
-    assert mutants.calling("m.py", source, 13, reached) == ("b", "c")
-    assert mutants.calling("m.py", source, 1, reached[:-1]) == ("a[1]", "b", "c", "a[2]"), "any of the module"
-    assert mutants.calling("other.py", source, 6, reached) == ()
+    told = [("a[1]", 0.1, ["one"]), ("a[2]", 0.2, ["one"]), ("b", 0.3, ["one", "A.other"])]
+    told += [("c", 0.4, ["A.other"]), ("d", 19.9, ["one"])]
+    reached = [Reached(f"tests/test_none.py::{test}", seconds, {"m.py": names}) for test, seconds, names in told]
+
+    def asked(line: int, module: str = "m.py") -> list[str]:
+        return [one.removeprefix("test_none.py::") for one in mutants_choice.calling(module, SHORT, line, reached)]
+
+    assert asked(6) == ["a[1]", "b", "a[2]"], "all that fit into the time"
+    assert asked(16) == ["b", "c"]
+    assert asked(1) == ["a[1]", "b", "c", "a[2]"], "any of the module, where no use is known"
+    assert asked(6, "other.py") == []
+
+
+def test_of_what_is_declared_outside_of_functions_the_tests_come_first_that_name_it_then_those_that_use_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for folder in ("cosim", "tests"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "cosim" / "m.py").write_text(SHORT + "\n\ndef idle():\n    return 1\n")
+    (tmp_path / "cosim" / "far.py").write_text("from cosim.m import TWICE\n\ndef far():\n    return TWICE\n")
+    (tmp_path / "cosim" / "same.py").write_text("def same():\n    return LIMIT\n")
+    names = "from cosim import m\n\ndef test_names():\n    assert m.LIMIT == 3\n\ndef test_idle():\n    pass\n"
+    (tmp_path / "tests" / "test_m.py").write_text(names)
+    monkeypatch.setattr(mutants_choice, "HOME", tmp_path)
+    calls: dict[str, dict[str, list[str]]] = {
+        "idle": {"cosim/m.py": ["idle"]},
+        "same": {"cosim/m.py": ["idle"], "cosim/same.py": ["same"]},
+        "far": {"cosim/m.py": ["idle"], "cosim/far.py": ["far"]},
+        "class": {"cosim/m.py": ["A.other"]},
+        "one": {"cosim/m.py": ["one"]},
+        "names": {},
+        "none": {},
+    }
+    reached = [Reached(f"tests/test_m.py::test_{name}", 0.1 + k / 10, calls[name]) for k, name in enumerate(calls)]
+
+    def asked(line: int) -> list[str]:
+        found = mutants_choice.calling("cosim/m.py", SHORT, line, reached)
+        return [one.removeprefix("test_m.py::test_") for one in found]
+
+    assert asked(1) == ["one", "far", "names", "idle", "same", "class"]
+    assert asked(2) == ["far", "idle", "same", "class", "one"], "TWICE is named nowhere, and used elsewhere only"
+    assert asked(10)[0] == "class", "a field: the functions of its class"
 
 
 def test_who_calls_what_is_noted_for_each_test_that_passes(tmp_path: Path) -> None:
@@ -91,8 +152,8 @@ def test_who_calls_what_is_noted_for_each_test_that_passes(tmp_path: Path) -> No
     assert [one.seconds for one in found] == sorted(one.seconds for one in found)
     source = (mutants.HOME / "cosim" / "diagnosis" / "proof.py").read_text("utf-8")
     line = source[: source.index("def prove(")].count("\n") + 1
-    assert all(line in one.calls["cosim/diagnosis/proof.py"] for one in found)
-    assert len(mutants.calling("cosim/diagnosis/proof.py", source, line, found)) == len(found)
+    assert all("prove" in one.calls["cosim/diagnosis/proof.py"] for one in found)
+    assert len(mutants_choice.calling("cosim/diagnosis/proof.py", source, line, found)) == len(found)
 
 
 def test_a_function_is_named_where_its_body_holds_a_line() -> None:

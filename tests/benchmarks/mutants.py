@@ -5,15 +5,15 @@
     python tests/benchmarks/mutants.py --journal FILE --ask MODULE=FILE_OF_TESTS ... --out results/mutants
 
 A mutant is a module with one operator, number or truth value changed, or one call left out (`mutations.py`). It is
-written into a copy of the tree, and tests run there until one fails: those that call the function which was changed,
-the cheapest of each kind first, for `BUDGET` seconds; without `--reach`, or where none is known to call it, the files
-of tests nearest to the module, by imports and names; outside of functions `DECLARING` too. Killed: a test failed that
-passes without the error, or no longer ended. Survived: none did. Which test calls what is not always seen (a test
-that finds made what one before it made calls less), so a survivor may be asked whole files more, by `--ask`.
+written into a copy of the tree, and tests run there until one fails, for `BUDGET` seconds (`mutants_choice.py`): those
+that call the function which was changed, the cheapest of each kind first; of what is declared outside of functions
+those that name or use it, the nearest first, and `DECLARING`; without `--reach`, or where none is known, the files of
+tests nearest to the module, by imports and names. Killed: a test failed that passes without the error, or no longer
+ended. Survived: none did. Which test calls what is not always seen (a test that finds made what one before it made
+calls less), so a survivor may be asked whole files more, by `--ask`.
 """
 
 import argparse
-import ast
 import json
 import os
 import re
@@ -22,7 +22,6 @@ import sys
 import tempfile
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
-from functools import cache
 from pathlib import Path
 from random import Random
 from shutil import copytree, ignore_patterns, rmtree
@@ -36,6 +35,7 @@ import scipy.signal  # noqa: F401
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 
+from mutants_choice import around, belonging, calling  # noqa: E402
 from mutants_fork import HOME, QUIET, Server, function_of, limited, prepared  # noqa: E402
 from mutants_page import Sample, Tried, journalled, written  # noqa: E402
 from mutations import mutated, sites  # noqa: E402
@@ -56,54 +56,10 @@ GROUPS = {
     ),
 }
 """Modules whose tests are tested; from each group as many mutants."""
-MOST, NEAREST = 4, 6
-"""Imports between a test and a module at most, and test files that are asked at most."""
-BUDGET, MANY = 20.0, 120
-"""Seconds that the tests of a mutant take without it in all, and how many tests that are at most."""
 LOST = ("FAILED", "ERROR")
 """What pytest says of a test that noticed."""
 DECLARING = ("test_parameter_ranges.py", "test_machine_ranges.py")
 """Tests of what a module only declares, which calls none of its functions: asked of lines outside of functions."""
-SLOW = ("test_attack", "test_prove", "test_proof", "test_serve", "test_benchmarks", "test_same_bits", "test_platforms")
-"""Test files that are not asked: a mutant that only they would notice counts as survived."""
-
-
-@cache
-def imported(path: Path) -> frozenset[Path]:
-    """Files of the tree that a file imports by itself, also inside of functions."""
-    found = set()
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-        names = [one.name for one in node.names] if isinstance(node, ast.Import) else []
-        if isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names = [node.module, *(f"{node.module}.{one.name}" for one in node.names)]
-        for name in names:
-            stem = name.replace(".", "/")
-            files = [place / f"{stem}{end}" for place in (HOME, HOME / "tests") for end in (".py", "/__init__.py")]
-            found |= {one for one in files if one.is_file()}
-    return frozenset(found - {path})
-
-
-def distance(test: Path, module: Path) -> int:
-    """Imports from a test to a module, at most `MOST` + 1."""
-    seen, edge = {test}, {test}
-    for steps in range(1, MOST + 1):
-        edge = {one for path in edge for one in imported(path)} - seen
-        if module in edge:
-            return steps
-        seen |= edge
-    return MOST + 1
-
-
-@cache
-def belonging(module: Path) -> tuple[str, ...]:
-    """The test files nearest to a module: by imports and by words of the name, the smallest of equally near first."""
-    words = set(str(module.relative_to(HOME).with_suffix("")).replace("/", "_").split("_"))
-    ranked = []
-    for test in (HOME / "tests").glob("test_*.py"):
-        steps, shared = distance(test, module), len(words & set(test.stem.split("_")[1:]))
-        if steps <= MOST and not test.stem.startswith(SLOW):
-            ranked.append((steps - 2 * shared, test.stat().st_size, test.name))
-    return tuple(name for *_, name in sorted(ranked)[:NEAREST])
 
 
 def drawn(seed: int, count: int) -> Iterator[tuple[str, Path, int]]:
@@ -144,39 +100,6 @@ def failed(tree: Path, tests: Sequence[str], without: Iterable[str] = ()) -> str
     return named[1] if named else tests[0]
 
 
-def spanned(source: str, line: int) -> range:
-    """The lines of the innermost function around a line; none outside of functions."""
-    kinds = (ast.FunctionDef, ast.AsyncFunctionDef)
-    around = [
-        range(min([node.lineno, *(one.lineno for one in node.decorator_list)]), (node.end_lineno or 0) + 1)
-        for node in ast.walk(ast.parse(source))
-        if isinstance(node, kinds)
-    ]
-    return min((one for one in around if line in one), key=len, default=range(0))
-
-
-def calling(module: str, source: str, line: int, reached: Sequence[Reached]) -> tuple[str, ...]:
-    """Tests that call the function around a line (outside of functions: any of the module), for `BUDGET` seconds.
-
-    Of each test function the cheapest case comes first, then the second of each.
-    """
-    begin = spanned(source, line)
-    told: dict[str, int] = {}
-    ranked = []
-    for one in reached:  # the cheapest first
-        lines = one.calls.get(module, [])
-        if begin.start in lines if begin else lines:
-            name = one.test.split("[")[0]
-            ranked.append((told.get(name, 0), one.seconds, one.test))
-            told[name] = told.get(name, 0) + 1
-    spent, found = 0.0, []
-    for _, seconds, test in sorted(ranked):
-        if not found or spent + seconds <= BUDGET:  # a cheap one may stand behind one that takes too long
-            spent += seconds
-            found.append(test.removeprefix("tests/"))
-    return tuple(found[:MANY])
-
-
 def _tested(tree: Path, tests: Sequence[str], said: Path, without: Iterable[str]) -> int:
     """Run tests here, in a fork that has all but the tree loaded already; what pytest ends with."""
     limited()
@@ -213,7 +136,7 @@ class Asking:
                     if known
                     else noticed(self.tree, files or belonging(path), self._broken)
                 )
-                if not witness and not files and not spanned(source, line):
+                if not witness and not files and not around(source, line):
                     witness = noticed(self.tree, DECLARING, self._broken)
             finally:
                 place.write_text(source, "utf-8")

@@ -3,7 +3,7 @@
     python tests/benchmarks/reach.py --out FILE [--files test_master.py ...]
 
 Each file of tests runs in a fork that notes every call of a function of the product. One line of JSON a test: its name,
-its seconds, and of each module the lines where the functions begin that it called.
+its seconds, and of each module the qualified names of the functions that it called: lines move, names seldom do.
 """
 
 import argparse
@@ -37,11 +37,11 @@ SECONDS = 240
 
 @dataclass(frozen=True)
 class Reached:
-    """A test: its name, its seconds, and of each module the first lines of what it called."""
+    """A test: its name, its seconds, and of each module the qualified names of what it called."""
 
     test: str
     seconds: float
-    calls: dict[str, list[int]]
+    calls: dict[str, list[str]]
 
 
 class Noting:
@@ -49,7 +49,7 @@ class Noting:
 
     def __init__(self, out: Path) -> None:
         self._out = out
-        self._calls: set[tuple[str, int]] = set()
+        self._calls: set[tuple[str, str]] = set()
         self._passed = False
 
     @pytest.hookimpl(hookwrapper=True)
@@ -69,12 +69,12 @@ class Noting:
 
     def _note(self, frame: FrameType, event: str, _: object) -> None:
         if event == "call" and frame.f_code.co_filename.startswith(TRACED):
-            self._calls.add((frame.f_code.co_filename, frame.f_code.co_firstlineno))
+            self._calls.add((frame.f_code.co_filename, frame.f_code.co_qualname))
 
-    def _by_module(self) -> dict[str, list[int]]:
-        found: dict[str, list[int]] = {}
-        for path, line in sorted(self._calls):
-            found.setdefault(str(Path(path).relative_to(PRODUCT)), []).append(line)
+    def _by_module(self) -> dict[str, list[str]]:
+        found: dict[str, list[str]] = {}
+        for path, name in sorted(self._calls):
+            found.setdefault(str(Path(path).relative_to(PRODUCT)), []).append(name)
         return found
 
 
