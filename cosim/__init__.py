@@ -14,11 +14,15 @@ costs next to nothing. What these raise on purpose is a `CosimError` or a `Model
 """
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
 from cosim.support.version import __version__
 
+TYPE_CHECKING = False
+"""As type checkers know it; to load `typing` takes long, in which a signal would meet Python's own traceback."""
+
 if TYPE_CHECKING:
+    from typing import Any
+
     from cosim.api.diagnose import DiagnosisResult, diagnose
     from cosim.api.export import Exported, export
     from cosim.api.identify import IdentifyResult, identify
@@ -73,7 +77,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     """Load a public name from its home, once."""
     if name not in _HOME_OF:
         raise AttributeError(f"module 'cosim' has no attribute {name!r}; it offers: {', '.join(__all__)}")

@@ -5,11 +5,12 @@ import subprocess
 import sys
 from contextlib import suppress
 from functools import partial
+from pathlib import Path
 
 import pytest
 from test_cli_run import ENVIRONMENT, call
 
-from cosim.cli import guarded
+from cosim.cli import guarded, main
 from cosim.support.interrupts import end_well
 
 
@@ -63,9 +64,61 @@ def test_a_signal_while_a_c_extension_is_loaded_is_an_interrupt(cause: BaseExcep
     assert getattr(ended.value, "code", None) == code
 
 
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (None, None)])
+def test_a_signal_while_a_verb_is_loaded_is_an_interrupt_whatever_becomes_of_it(
+    number: int | None, code: int | None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A C extension that is interrupted as it is loaded raises an ImportError of its own."""
+
+    def loaded(name: str) -> None:
+        with suppress(KeyboardInterrupt):
+            if number is not None:
+                signal.raise_signal(number)
+        raise ImportError(f"initialization of {name} failed")
+
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    monkeypatch.setattr("cosim.cli.import_module", loaded)
+    try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        with pytest.raises(ImportError if code is None else SystemExit) as ended:
+            main(["export", "paper_mount", "--out", "out"])
+        assert getattr(ended.value, "code", None) == code
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+        end_well()
+    said = {130: "cosim: interrupted\n", 143: "cosim: terminated\n", None: ""}
+    assert capsys.readouterr().err == said[code]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("library", ["casadi", "numpy"])
+def test_termination_ends_an_export_wherever_it_comes_with_a_word_and_leaves_nothing(
+    library: str, tmp_path: Path
+) -> None:
+    """Here: while the verb loads what it works with; SIGTERM comes from within."""
+    start = f"""
+import builtins, signal
+load = builtins.__import__
+def come(name, *given, **named):
+    if name.split(".")[0] == "{library}":
+        builtins.__import__ = load
+        signal.raise_signal(signal.SIGTERM)
+    return load(name, *given, **named)
+builtins.__import__ = come
+from cosim.cli import main
+main()
+"""
+    command = [sys.executable, "-c", start, "export", "paper_mount", "--out", "out"]
+    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (143, "cosim: terminated\n")
+    assert not [one for one in tmp_path.rglob("*") if one.is_file()]
+
+
 FINALIZED = """
 import signal, time
-from cosim.cli import guarded
+from cosim.cli import guarded, main
 from cosim.support.interrupts import end_well
 
 class Last:

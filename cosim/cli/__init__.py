@@ -65,6 +65,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if ended.code == INTERRUPTED and is_terminated():
             leave(Terminated())
         raise
+    except Exception as error:  # as a verb was loaded
+        if debug or not is_of_signal(error):
+            raise
+        leave(signalled())
 
 
 def check_given(arguments: Sequence[str]) -> None:
@@ -147,12 +151,22 @@ def guarded(verb: Callable[..., Any], debug: bool) -> Callable[..., Any]:
             if debug:
                 raise
             leave(error)
-        except Exception as error:  # what a C extension makes of a signal that comes while it works
-            if debug or not (is_interrupted() or isinstance(error.__cause__ or error.__context__, KeyboardInterrupt)):
+        except Exception as error:
+            if debug or not is_of_signal(error):
                 raise
-            leave(Terminated() if is_terminated() else KeyboardInterrupt())
+            leave(signalled())
 
     return call
+
+
+def is_of_signal(error: BaseException) -> bool:
+    """Whether an error is what a C extension makes of a signal that comes while it works or is loaded."""
+    return is_interrupted() or isinstance(error.__cause__ or error.__context__, KeyboardInterrupt)
+
+
+def signalled() -> KeyboardInterrupt:
+    """The signal that this process was sent."""
+    return Terminated() if is_terminated() else KeyboardInterrupt()
 
 
 def check_finite(options: Mapping[str, object]) -> None:
