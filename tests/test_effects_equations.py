@@ -1,0 +1,330 @@
+"""Every effect's equation, written again in plain Python from its docstring and asked at random motions."""
+
+import cmath
+import math
+from collections.abc import Callable
+from itertools import product
+from random import Random
+from types import SimpleNamespace
+from typing import Any
+
+import casadi as ca
+import numpy as np
+import pytest
+from effect_examples import example
+
+from pyfmi_models.effects import FORMS, Effect, FrictionWander, Motion
+from pyfmi_models.effects.backlash import Backlash
+from pyfmi_models.effects.compliance import LEAST_DAMPING
+
+FORM = {form.__name__: form for form in FORMS}
+Rows = list[float]
+
+
+def sign(x: float) -> float:
+    return float((x > 0) - (x < 0))
+
+
+def wave(a: float) -> float:
+    """Of the example of cogging: harmonics 0.4 and -0.2."""
+    return math.sin(a) + 0.4 * math.sin(2 * a) - 0.2 * math.sin(3 * a)
+
+
+HALF = float(np.ptp([wave(a) for a in np.linspace(0, 2 * math.pi, 100001)])) / 2
+
+
+def soft(x: float, w: float) -> float:
+    return w * math.log(1 + math.exp(x / w)) if x < 500 * w else x
+
+
+def held(x: float) -> float:
+    return min(max(x, -1.0), 1.0)
+
+
+def drooped(e: Any, u: float) -> float:
+    def s(x: float) -> float:
+        return math.sqrt(x**2 + 0.05**2) - 0.05
+
+    c = (1 / (1 - e.droop) - 1) / s(1)
+    return u / (1 + c * s(u / e.rated_torque))
+
+
+def table(e: Any, coefficients: Rows, low: float, high: float, value: float, other: float = 0.0) -> float:
+    """The sum of waves over [low, high]; of the example of products over 15 to 35 degC with one wave."""
+    x = min(max((value - low) / (high - low), 0), 1)
+    if not e.by:
+        return sum(c * math.cos(math.pi * k * x) for k, c in enumerate(coefficients))
+    y = min(max((other - 15) / 20, 0), 1)
+    shapes = (math.cos(math.pi * k * x) * math.cos(math.pi * n * y) for k, n in product(range(3), range(2)))
+    return sum(c * shape for c, shape in zip(coefficients, shapes, strict=True))
+
+
+def missing(e: Any, u: float) -> float:
+    """Of the example of a learned drive: -20 to 20 N m, dense where a command is below 1 N m."""
+    x = (u / (abs(u) + 1) + 20 / 21) / (40 / 21)
+    return sum(c * math.cos(math.pi * k * min(max(x, 0), 1)) for k, c in enumerate(e.missing))
+
+
+def bent(e: Any, m: Motion) -> float:
+    z, v = m.state[0], m.v
+    size = (z * z + 1e-6) ** ((e.n - 1) / 2)
+    return float(e.A * v - e.beta * abs(v) * size * z - e.gamma * v * size * abs(z)) / e.stroke
+
+
+def bump(x: float) -> float:
+    return math.exp(-min(x * x, 1000) / 2)
+
+
+def gear(e: Any, m: Motion, level: float) -> float:
+    way = m.payload * sign(m.v)
+    if way == 0:
+        return level + (e.driving + e.driven) / 2 * abs(m.payload)
+    return level + (e.driving if way > 0 else e.driven) * abs(m.payload)
+
+
+def spot(e: Any, m: Motion, level: float) -> float:
+    rise = (e.forward + e.backward) / 2 if m.v == 0 else e.forward if m.v > 0 else e.backward
+    return level * (1 + rise * bump((m.q - e.q_center) / e.width))
+
+
+LEVELS: dict[str, Callable[[Any, Motion, float], float]] = {
+    "FrictionAsymmetry": lambda e, m, g: g * (1 + e.level_asymmetry * sign(m.v)),
+    "StribeckEffect": lambda e, m, g: g + (e.Fs - g) * math.exp(-(abs(m.v / e.Vs) ** e.delta)),
+    "PeriodicFriction": lambda e, m, g: g * (1 + 0.2 * math.cos(3 * m.angle + 0.4)),
+    "LocalFriction": lambda e, m, g: g * (1 + 0.3 * bump((m.q - 1) / 0.05)),
+    "RoughSpot": spot,
+    "GearFriction": gear,
+    "LoadDependentFriction": lambda e, m, g: g + 0.2 * abs(m.payload),
+    "LoadScaledFriction": lambda e, m, g: g * (1 + 0.1 * abs(m.payload) / 2),
+    "DwellBreakaway": lambda e, m, g: g + 0.3 * math.log(1 + m.state[0] / 0.1),
+    "ThermalViscosity": lambda e, m, g: g * math.exp(-0.02 * (m.inputs["temperature"] - 20)),
+    "LearnedFriction": lambda e, m, g: (
+        g * math.exp(table(e, e.level_change, -1, 1.2, m.q, float(m.inputs["temperature"])))
+    ),
+    "LearnedAfterReversal": lambda e, m, g: (
+        g * math.exp(sum(c * (1 - math.tanh(m.v / 1e-4) * held(m.state[k])) / 2 for k, c in enumerate(e.level_change)))
+    ),
+}
+VISCOUS: dict[str, Callable[[Any, Motion, float], float]] = {
+    "FrictionAsymmetry": lambda e, m, f: f * (1 + e.viscous_asymmetry * sign(m.v)),
+    "ConcaveViscous": lambda e, m, f: f * (1 + (m.v / 0.3) ** 2) ** ((-0.4 - 1) / 2),
+    "ThermalViscosity": lambda e, m, f: f * math.exp(-0.04 * (m.inputs["temperature"] - 20)),
+    "WarmingViscosity": lambda e, m, f: f * math.exp(-0.04 * (m.inputs["temperature"] + m.state[0] - 20)),
+    "RubbedViscosity": lambda e, m, f: f * math.exp(-0.04 * (m.inputs["temperature"] + m.state[0] - 20)),
+}
+LOADS: dict[str, Callable[[Any, Motion], float]] = {
+    "Cogging": lambda e, m: 0.5 / HALF * wave(24 * m.angle + 0.3 + math.pi / 2),
+    "GravityUnbalance": lambda e, m: 1.5 * math.sin(m.angle + 0.2),
+    "TorqueOffset": lambda e, m: 0.7,
+    "QuadraticDrag": lambda e, m: 2 * m.v * abs(m.v),
+    "CableWrap": lambda e, m: 3 * (m.q - 0.2) * (1 + 0.5 * (m.q - 0.2) ** 2),
+    "AzimuthCentrifugal": lambda e, m: 3 * math.sin(m.q) * math.cos(m.q) * m.inputs["azimuth_rate"] ** 2,
+    "KnownLoad": lambda e, m: e.gain * m.inputs["load_torque"],
+    "BoucWen": lambda e, m: 0.8 * m.state[0],
+    "PeriodicDisturbance": lambda e, m: 0.6 * math.sin(2 * math.pi * 3 * m.t + 0.2),
+    "LearnedTorque": lambda e, m: table(e, e.torque, -1, 1.2, m.q),
+    "LearnedHysteresis": lambda e, m: 0.2 * held(m.state[0]) + 0.3 * held(m.state[1]),
+}
+INERTIAS: dict[str, Callable[[Any, Motion, float], float]] = {
+    "InertiaVariation": lambda e, m, J: J * (1 + 0.3 * math.cos(2 * m.angle + 0.4)),
+    "AltitudeInertia": lambda e, m, J: J + 3 * math.cos(m.inputs["altitude"]) ** 2,
+}
+READINGS: dict[str, Callable[[Any, Motion, float], float]] = {
+    "EncoderEccentricity": lambda e, m, q: (
+        q + 1e-3 * (math.sin(8 * m.angle + 0.3) + 0.2 * math.sin(2 * (8 * m.angle + 0.3)))
+    ),
+}
+AHEAD: dict[str, Callable[[Any, Motion], float]] = {"ClockSkew": lambda e, m: 4e-3 + 1e-4 * m.t}
+RATES: dict[str, Callable[[Any, Motion], Rows]] = {
+    "DwellBreakaway": lambda e, m: [1 - m.state[0] * abs(m.v) / 1e-3],
+    "WarmingViscosity": lambda e, m: [(15 - m.state[0]) / 30],
+    "RubbedViscosity": lambda e, m: [8 * abs(m.v) - m.state[0] / 30],
+    "BoucWen": lambda e, m: [bent(e, m)],
+    "LearnedHysteresis": lambda e, m: [(m.v - abs(m.v) * m.state[k]) / way for k, way in enumerate((0.1, 0.4))],
+    "LearnedAfterReversal": lambda e, m: [
+        (math.tanh(m.v / 1e-4) - m.state[k]) / time for k, time in enumerate((0.1, 0.4))
+    ],
+}
+APPLIED: dict[str, Callable[[Any, Rows, float], float]] = {
+    "ActuatorLag": lambda e, x, u: x[0],
+    "Delay": lambda e, x, u: x[0] - 0.4 * x[1] + 0.05 * x[2],
+    "TorqueSaturation": lambda e, x, u: u - 0.6 * (soft(u - 5, 0.1) - soft(-u - 5, 0.1)),
+    "DeadBand": lambda e, x, u: soft(u - 0.5, 0.125) - soft(-u - 0.5, 0.125),
+    "TorqueDroop": lambda e, x, u: drooped(e, u),
+    "LearnedDrive": lambda e, x, u: u - missing(e, u),
+}
+DRIVEN: dict[str, Callable[[Any, Rows, float], Rows]] = {
+    "ActuatorLag": lambda e, x, u: [(u - x[0]) / 4e-3],
+    "Delay": lambda e, x, u: [x[1] / 4e-3, x[2] / 4e-3, (60 * u - 60 * x[0] - 36 * x[1] - 9 * x[2]) / 4e-3],
+}
+RESPONSES: dict[str, Callable[[float], complex]] = {
+    "ActuatorLag": lambda w: 1 / complex(1, w * 4e-3),
+    "Delay": lambda w: cmath.exp(-1j * w * 4e-3),
+}
+
+
+def motions(effect: Effect, seed: int) -> list[Motion]:
+    """Forward, backward and at rest; states within and beyond their range."""
+    dice, found = Random(seed), []
+    for k in range(12):
+        names = ("temperature", "altitude", "azimuth_rate", "load_torque", "altitude_rate")
+        inputs = {name: dice.uniform(10, 40) if name == "temperature" else dice.uniform(-2, 2) for name in names}
+        speed = (0.0, dice.uniform(0.01, 2), -dice.uniform(0.01, 2), dice.uniform(-2e-4, 2e-4))[k % 4]
+        state = [abs(dice.uniform(-1.5, 1.5)) if one.low >= 0 else dice.uniform(-1.5, 1.5) for one in effect.states()]
+        place = dice.uniform(-1.5, 1.5)
+        found.append(Motion(dice.uniform(0, 9), place, speed, place + 0.2, inputs, dice.uniform(-3, 3), state))
+    return found
+
+
+def near(found: Any, expected: Any, rtol: float = 1e-7) -> None:
+    np.testing.assert_allclose(ca.DM(found).full().ravel(), np.ravel(expected), rtol=rtol, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("method", "name"),
+    [
+        *(("level", name) for name in LEVELS),
+        *(("viscous", name) for name in VISCOUS),
+        *(("inertia", name) for name in INERTIAS),
+        *(("reading", name) for name in READINGS),
+    ],
+)
+def test_what_an_effect_makes_of_a_value_is_its_equation(method: str, name: str) -> None:
+    expected = {"level": LEVELS, "viscous": VISCOUS, "inertia": INERTIAS, "reading": READINGS}[method][name]
+    effect = example(FORM[name])
+    for motion in motions(effect, 1):
+        near(getattr(effect, method)(1.7, motion), expected(effect, motion, 1.7))
+
+
+@pytest.mark.parametrize(
+    ("method", "name"),
+    [*(("load", name) for name in LOADS), *(("ahead", name) for name in AHEAD), *(("rate", name) for name in RATES)],
+)
+def test_what_an_effect_makes_of_a_motion_is_its_equation(method: str, name: str) -> None:
+    expected = {"load": LOADS, "ahead": AHEAD, "rate": RATES}[method][name]  # type: ignore[index]
+    effect = example(FORM[name])
+    for motion in motions(effect, 2):
+        rtol = 2e-6 if name == "Cogging" else 1e-7  # its half is the highest of 3072 points, not of all
+        near(getattr(effect, method)(motion), expected(effect, motion), rtol)
+
+
+@pytest.mark.parametrize("name", APPLIED)
+def test_what_a_drive_makes_of_a_command_is_its_equation(name: str) -> None:
+    effect = example(FORM[name])
+    for command in (-30.0, -5.0, -1.1, -0.3, 0.0, 0.02, 0.6, 4.9, 5.2, 25.0):
+        state = [0.3, -1.2, 2.0][: len(effect.states())]
+        near(effect.applied(ca.DM(state), command), APPLIED[name](effect, state, command))
+        near(effect.rate(ca.DM(state), command), DRIVEN[name](effect, state, command) if name in DRIVEN else [])
+
+
+@pytest.mark.parametrize("name", RESPONSES)
+def test_the_response_of_a_drive_is_that_of_its_equation(name: str) -> None:
+    omega = np.array([0.0, 1.0, 40.0, 250.0, 3e3])
+    np.testing.assert_allclose(example(FORM[name]).response(omega), [RESPONSES[name](w) for w in omega], rtol=1e-12)
+
+
+@pytest.mark.parametrize("degrees", [-40.0, 20.0, 60.0, 700.0])
+def test_a_warm_drive_gives_its_share_and_never_less_than_a_tenth(degrees: float) -> None:
+    effect = example(FORM["WarmTorqueDroop"])
+    given = effect.given({"temperature": degrees}).applied((), 6.0)
+    near(given, drooped(effect, 6.0) * max(0.1, 1 - 0.002 * (degrees - 20)))
+
+
+def test_a_spring_between_two_masses_is_its_equation_in_time_and_over_frequency() -> None:
+    """Antiresonance 20 Hz, resonance 25 Hz, both masses 2 kg m2: at s = j w the far mass moves k + d s of the near."""
+    spring = example(FORM["Compliance"])
+    far = 2 * (1 - 0.64)
+    k, d = far * (40 * math.pi) ** 2, 2 * 0.02 * far * 40 * math.pi
+    near(spring.share(), 0.36)
+    near(spring.torque(1e-3, 0.2, far), k * 1e-3 + d * 0.2)
+    for w, damping in product((1.0, 60.0, 40 * math.pi, 900.0), (0.02, 0.0)):
+        d = 2 * max(damping, LEAST_DAMPING) * far * 40 * math.pi
+        moved = (k + d * 1j * w) / (far * (1j * w) ** 2 + k + d * 1j * w)
+        found = FORM["Compliance"](antiresonance_hz=20.0, resonance_hz=25.0, damping_ratio=damping)
+        np.testing.assert_allclose(found.carried(np.array([w])), [moved], rtol=1e-12)
+
+
+def test_a_spring_before_the_axis_is_its_equation_in_time_and_over_frequency() -> None:
+    """Resonance 60 Hz; of 2 kg m2 the axis has 1.2, so the motor has 0.8."""
+    spring, motor, axis, w = example(FORM["LoadSideCompliance"]), 0.8, 1.2, 120 * math.pi
+    k = w**2 * motor * axis / 2
+    d = k * 2 * 0.02 / w
+    near(spring.share(), 0.6)
+    near(spring.antiresonance_hz(), 60 * math.sqrt(0.4))
+    near(spring.torque(1e-3, 0.2, axis), k * 1e-3 + d * 0.2)
+    omega = np.array([1.0, 60.0, 377.0, 2e3])
+    expected = [1 + motor * (1j * one) ** 2 / (k + d * 1j * one) for one in omega]
+    np.testing.assert_allclose(spring.demand(omega), expected, rtol=1e-12)
+
+
+PLAY = Backlash(gap_rad=0.01, load_friction=0.3, load_viscous=0.7, load_deflection=1e-3, contact_hz=30.0)
+
+
+@pytest.mark.parametrize(("twist", "rate"), [(0.004, 1.0), (0.006, 0.0), (0.006, 0.5), (0.006, -9.0), (-0.0051, -0.4)])
+def test_a_play_passes_nothing_in_its_gap_and_pushes_beyond_it_and_never_pulls(twist: float, rate: float) -> None:
+    far, side, depth = 1.5, sign(twist), max(abs(twist) - 0.005, 0)
+    k = far * (60 * math.pi) ** 2
+    d = 2 * 0.75 * far * 60 * math.pi * (1 - math.exp(-depth / 1e-5))
+    near(PLAY.torque(twist, rate, far), side * max(k * depth + d * side * rate, 0))
+
+
+def test_the_far_side_of_a_play_rubs_by_its_bristle_and_its_oil() -> None:
+    for speed, z in product((-0.2, 0.0, 0.5), (-8e-4, 0.0, 1e-3)):
+        near(PLAY.drag(speed, [0.0, 0.0, z]), 0.3 * z / 1e-3 + 0.7 * speed)
+        near(PLAY.further_rates(speed, [0.0, 0.0, z])[0], speed - abs(speed) * z / 1e-3)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_a_step_of_a_play_solves_its_implicit_equations(seed: int) -> None:
+    """Contact and friction at the end of the step: what they give changes the speed by just that."""
+    dice, far, dt = Random(seed), 1.5, 10 ** Random(seed).uniform(-5, -2)
+    twist, v, z = dice.uniform(-0.012, 0.012), dice.uniform(-1, 1), dice.uniform(-1e-3, 1e-3)
+    speed = dice.uniform(-1, 1)
+    after_twist, after, after_z, passed = map(float, PLAY.advance(twist, v, (z,), speed, dt, far))
+    assert after_twist == pytest.approx(twist + dt * (speed - after), abs=1e-14)
+    assert after_z == pytest.approx(z + dt * (after - abs(after) * after_z / 1e-3), abs=1e-13)
+    side = sign(twist + dt * (speed - v))
+    pushed = (v + dt * passed / far) / (1 + dt * 0.7 / far)
+    assert after == pytest.approx(pushed - dt * 0.3 * after_z / 1e-3 / far, abs=1e-12)
+    deep, before = side * (twist + dt * (speed - v) - dt * dt * passed / far) - 0.005, max(side * twist - 0.005, 0)
+    omega = 60 * math.pi
+    contact = side * far * max(omega**2 * deep + 2 * 0.75 * omega * (deep - before) / dt, 0)
+    assert passed == pytest.approx(contact, rel=1e-7, abs=1e-9)
+
+
+def wandered(t: float, e: Any) -> float:
+    """Relative change of the level in whole numbers: what is drawn is a congruential generator's, cubed by squares."""
+    modulus, multiplier = 94906249, 48271
+
+    def scrambled(seed: int) -> int:
+        number = seed + 1
+        for _ in range(3):
+            number = (multiplier * number + 1) % modulus
+            number = number * number % modulus
+        return number
+
+    def jump(count: int) -> float:
+        return e.jump_std * math.sqrt(3) * (2 * scrambled(e.seed * 7919 + (count + 1) * 104729) / modulus - 1)
+
+    number, slow = scrambled(e.seed), 0.0
+    for k in range(8):
+        number = (multiplier * number + 1) % modulus
+        rate = math.tan(math.pi / 2 * (k + 0.5) / 8) * (1 + 0.35 * (2 * number / modulus - 1)) / e.correlation_time
+        number = (multiplier * number + 1) % modulus
+        slow += math.sin(rate * t + 2 * math.pi * number / modulus)
+    count = math.floor(t / e.jump_period)
+    x = min((t / e.jump_period - count) / 0.02, 1)
+    return e.std * math.sqrt(2 / 8) * slow + jump(count - 1) + (jump(count) - jump(count - 1)) * (3 * x**2 - 2 * x**3)
+
+
+@pytest.mark.parametrize("t", [0.0, 0.01, 1.99, 2.0, 2.013, 2.039, 2.041, 7.7, 94.3])
+def test_friction_wanders_as_its_generator_says_in_whole_numbers(t: float) -> None:
+    numbers: dict[str, Any] = {"std": 0.1, "correlation_time": 0.7, "jump_std": 0.2, "jump_period": 2.0, "seed": 12}
+    found = FrictionWander(**numbers).level(2.0, SimpleNamespace(t=t))  # type: ignore[arg-type]
+    near(found, 2 * max(0.05, 1 + wandered(t, SimpleNamespace(**numbers))))
+
+
+def test_every_form_with_an_equation_of_its_own_is_asked_here() -> None:
+    asked = {*LEVELS, *VISCOUS, *LOADS, *INERTIAS, *READINGS, *AHEAD, *RATES, *APPLIED, *RESPONSES}
+    others = {"WarmTorqueDroop", "Compliance", "LoadSideCompliance", "Backlash", "FrictionWander", "Presliding"}
+    assert set(FORM) == asked | others, "Presliding: in test_effects_friction.py"
