@@ -7,7 +7,7 @@
 A mutant is a module with one operator, number or truth value changed, or one call left out (`mutations.py`). It is
 written into a copy of the tree, and tests run there until one fails, for `BUDGET` seconds (`mutants_choice.py`): those
 that call the function which was changed, the cheapest of each kind first; of what is declared outside of functions
-those that name or use it, the nearest first, and `DECLARING`; without `--reach`, or where none is known, the files of
+`DECLARING`, then those that name or use it, the nearest first; without `--reach`, or where none is known, the files of
 tests nearest to the module, by imports and names. Killed: a test failed that passes without the error, or no longer
 ended. Survived: none did. Which test calls what is not always seen (a test that finds made what one before it made
 calls less), so a survivor may be asked whole files more, by `--ask`.
@@ -17,7 +17,6 @@ import argparse
 import json
 import os
 import re
-import signal
 import sys
 import tempfile
 import tomllib
@@ -36,7 +35,7 @@ import scipy.signal  # noqa: F401
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
 
 from mutants_choice import around, belonging, calling  # noqa: E402
-from mutants_fork import HOME, QUIET, Server, function_of, limited, prepared  # noqa: E402
+from mutants_fork import HOME, QUIET, TOO_LONG, Server, function_of, limited, prepared  # noqa: E402
 from mutants_page import Sample, Tried, journalled, written  # noqa: E402
 from mutations import mutated, sites  # noqa: E402
 from reach import Reached, read  # noqa: E402
@@ -91,7 +90,7 @@ def failed(tree: Path, tests: Sequence[str], without: Iterable[str] = ()) -> str
     if not pid:
         os._exit(_tested(tree, tests, said, without))
     code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-    if code == -signal.SIGXCPU:
+    if code in TOO_LONG:
         return f"{tests[0]} (time)"
     if code in (0, 5):  # 5: no tests here
         return ""
@@ -131,13 +130,12 @@ class Asking:
             known = tuple(one for one in known if one not in self._broken)
             try:
                 place.write_text(text, "utf-8")
-                witness = (
-                    self._failed(known, module, source, line)
-                    if known
-                    else noticed(self.tree, files or belonging(path), self._broken)
-                )
-                if not witness and not files and not around(source, line):
-                    witness = noticed(self.tree, DECLARING, self._broken)
+                declares = not files and not around(source, line)
+                witness = noticed(self.tree, DECLARING, self._broken) if declares else ""
+                if not witness and known:
+                    witness = self._failed(known, module, source, line)
+                elif not witness:
+                    witness = noticed(self.tree, files or belonging(path), self._broken)
             finally:
                 place.write_text(source, "utf-8")
             if not witness or witness.endswith("(time)") or not self._failed([witness]):

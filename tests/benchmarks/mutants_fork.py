@@ -21,8 +21,10 @@ from typing import Any
 import pytest
 
 HOME = Path(__file__).parents[2]
-SECONDS = 150
-"""Of a processor that tests may take: a mutant that never ends is noticed too."""
+SECONDS, WAITED = 150, 900
+"""Of a processor that tests may take, and of the clock: a mutant that never ends, or waits for ever, is noticed too."""
+TOO_LONG = (-signal.SIGXCPU, -signal.SIGALRM)
+"""How a fork ends that took longer."""
 OURS = ("cosim", "cosim_studies", "pyfmi_models", "mutants", "mutants_page", "mutants_fork", "mutations", "reach")
 """What a fork loads anew, from the tree with the error."""
 QUIET = ("-n0", "-q", "-p", "no:cacheprovider")
@@ -46,6 +48,7 @@ def prepared(tree: Path, said: Path) -> None:
 def limited() -> None:
     """End this process by a signal once it took too long."""
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+    signal.alarm(WAITED)
 
 
 def _is_of_home(folder: str) -> bool:
@@ -137,7 +140,7 @@ class _Loop:
             return "" if code == 0 else None
         if code == FAILED:
             return witness.read_text("utf-8").removeprefix("tests/")
-        return f"{told['tests'][0].removeprefix('tests/')}{' (time)' if code == -signal.SIGXCPU else ''}"
+        return f"{told['tests'][0].removeprefix('tests/')}{' (time)' if code in TOO_LONG else ''}"
 
     def _work(self, session: pytest.Session, items: dict[str, pytest.Item], told: Any, witness: Path) -> int:
         limited()
