@@ -1,0 +1,189 @@
+"""Times, counts and words of the master: which moment a component is stepped at, and what is said of a run."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from oscillators import BOND, BOTH, H, Tiny, oscillator, plain
+from simulating import simulate
+from tiny_fmu import tiny
+
+import cosim.master.execution
+from cosim.fmi.component import Port
+from cosim.master.execution import CHUNK, chunks
+from cosim.master.isolated import _end
+from cosim.master.loop import library
+from cosim.master.pool import Pool
+from cosim.master.result import Statistics, _speed, remarks
+from cosim.master.typed import _digits, _rule
+from cosim.support.errors import StepError
+from cosim.system.algorithm import Energy, GaussSeidel, Iterated, Jacobi
+from cosim.system.wire import Wire
+
+__all__ = ["plain", "tiny"]
+
+HALVES = Energy(kind="energy", bonds=BOND, tolerance=1e-12, max_pieces=2)
+"""So little energy may be lost that each step is taken in two pieces."""
+
+
+@BOTH
+@pytest.mark.parametrize(
+    ("algorithm", "fail_at", "tick"),
+    [
+        (Jacobi(), 10.4, 10),
+        (Jacobi(), 10.6, 11),
+        (Iterated(kind="iterated"), 10.4, 10),
+        (Iterated(kind="iterated"), 10.6, 11),
+        (HALVES, 10.2, 10),
+        (HALVES, 10.3, 10),
+        (HALVES, 10.7, 10),
+        (HALVES, 10.8, 11),
+    ],
+)
+def test_a_component_is_stepped_at_the_time_of_its_step_or_piece(
+    plain: Tiny, algorithm: Any, fail_at: float, tick: int, compiled: bool
+) -> None:
+    """It fails from the step on whose middle lies behind; the middles of halves are at a quarter and three quarters."""
+    with pytest.raises(StepError) as caught:
+        oscillator(plain[3], algorithm, compiled=compiled, parameters={"spring": {"fail_at": fail_at * H}})
+    assert caught.value.tick == tick
+
+
+@pytest.mark.parametrize(
+    ("algorithm", "count"),
+    [(Jacobi(), 10), (GaussSeidel(kind="gauss-seidel"), 10), (HALVES, 19)],
+)
+def test_each_step_that_ends_with_a_warning_counts(plain: Tiny, algorithm: Any, count: int) -> None:
+    """From the middle of tick 10 on, 20 ticks in all; of the half-steps from the second of tick 10 on."""
+    for compiled in (True, False):
+        parameters = {"spring": {"fail_at": (10 + 0.6 * (algorithm is HALVES)) * H - 1e-9, "status": 1.0}}
+        run = oscillator(plain[2], algorithm, ticks=20, compiled=compiled, parameters=parameters)
+        assert run.statistics["warnings"] == count
+
+
+def test_pieces_of_a_run_follow_the_time_that_the_last_one_took(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tenth of a second each; at most eight times the last one, at least 16 ticks, at most 32,768."""
+    clock = iter(np.cumsum([0.0, 1e-3, 0.0, 0.09, 0.0, 1.0, 0.0, 100.0, *[0.0, 1e-7] * 20]))
+    monkeypatch.setattr(cosim.master.execution, "perf_counter", lambda: float(next(clock)))
+    sizes = [len(one) for one in chunks(200_000)]
+    assert sizes[:5] == [16, 128, 142, 16, 16]
+    assert sizes[5:10] == [128, 1024, 8192, CHUNK, CHUNK]
+    assert sum(sizes) == 200_000
+    assert [len(one) for one in chunks(5)] == [5]
+
+
+def test_statistics_are_of_the_ticks_that_were_run(tiny: Tiny) -> None:
+    run = simulate({"one": tiny[3]}, [], record={"y": "one.y"}, step=2e-3, ticks=300, decimation=7)
+    told = run.statistics
+    assert (told["steps"], told["step"], told["rows"], told["ended"]) == (300, 2e-3, 43, "")
+    assert told["simulated_seconds"] == pytest.approx(0.6)
+    assert told["ratio_to_real_time"] == pytest.approx(0.6 / told["seconds"])
+    assert told["microseconds_per_step"] == pytest.approx(1e6 * told["seconds"] / 300)
+
+
+def said(**changes: Any) -> Statistics:
+    quiet: dict[str, Any] = {"coupling": [], "unconnected": [], "notes": [], "warnings": 0, "steps": 400}
+    return quiet | changes  # type: ignore[return-value]
+
+
+def test_what_is_said_of_a_run_beside_its_speed() -> None:
+    assert remarks(said()) == []
+    assert remarks(said(coupling=[{"rounds": 1000, "greatest": 4, "at_limit": 0}])) == [
+        "coupled components took 2.5 passes a step, 4 at most"
+    ]
+    assert remarks(said(steps=0, coupling=[{"rounds": 0, "greatest": 0, "at_limit": 0}]))[0].startswith(
+        "coupled components took 0 passes a step"
+    )
+    assert remarks(said(page="run.html", unconnected=["a.b", "c.d"], notes=["So."], warnings=1234)) == [
+        "pictures: run.html",
+        "not connected, at their start values: a.b, c.d",
+        "So.",
+        "1,234 steps ended with a warning of their FMU",
+    ]
+    assert remarks(said(warnings=1)) == ["1 steps ended with a warning of their FMU"]
+    speed: Any = {"steps": 2000, "seconds": 0.25, "ratio_to_real_time": 8.0, "microseconds_per_step": 125.0}
+    assert _speed(speed | {"rows": 200, "loop": "compiled"}) == (
+        "2,000 steps in 0.25 s, 8 times real time, 125 us a step with recording (200 rows, compiled loop)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("gain", "offset", "quantum"), [(2.0, 0.0, 0.0), (1.5, 4.0, 0.0), (-1.0, 7.3, 2.0), (1.0, 0.0, 5.0)]
+)
+def test_a_wire_scales_shifts_and_rounds_in_its_own_unit_before_it_is_converted(
+    tiny: Tiny, gain: float, offset: float, quantum: float
+) -> None:
+    """What is sent is in degrees, so are offset and quantum; what arrives is in rad."""
+    from cosim.data.signals import Samples
+
+    sent = np.linspace(-20, 20, 33)
+    run = simulate(
+        {"one": tiny[3]},
+        [Wire("r", "one.a", gain=gain, offset=offset, quantum=quantum)],
+        record={"a": "one.a"},
+        step=1.0,
+        ticks=33,
+        signals={"r": Samples(sent, "deg")},
+    )
+    value = gain * sent + offset
+    rounded = quantum * np.floor(value / quantum + 0.5) if quantum else value
+    np.testing.assert_allclose(run.recording["a"], np.radians(rounded), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("code", "text"),
+    [
+        (0, "ended its process with exit code 0"),
+        (3, "ended its process with exit code 3"),
+        (-11, "crashed: SIGSEGV, segmentation fault,"),
+        (-9, "crashed: SIGKILL, killed, perhaps because memory ran out,"),
+        (-15, "crashed: SIGTERM,"),
+        (-99, "crashed with signal 99"),
+    ],
+)
+def test_how_a_component_ended_its_process_is_said_by_its_exit_code(code: int, text: str) -> None:
+    assert _end(code) == text
+
+
+@pytest.mark.parametrize(
+    ("value", "digits"),
+    [
+        (3.0, "3"),
+        (-0.25, "-0.25"),
+        (1e15, "1000000000000000"),
+        (1e16, "10000000000000000"),
+        (2.0**53 + 2, "9007199254740994"),
+    ],
+)
+def test_a_value_is_told_with_all_its_digits_and_no_point_that_it_has_not(value: float, digits: str) -> None:
+    assert _digits(value) == digits
+
+
+def port(kind: str, items: dict[int, str] | None = None) -> Port:
+    made = object.__new__(Port)
+    for name, value in {"type": kind, "items": items or {}}.items():
+        object.__setattr__(made, name, value)
+    return made
+
+
+def test_a_rule_of_a_type_says_what_it_takes() -> None:
+    largest = float(np.finfo(np.float32).max)
+    assert _rule(port("Float32"), largest * 1.001) == "that is beyond a Float32"
+    assert _rule(port("Float32"), -largest * 1.001) == "that is beyond a Float32"
+    assert _rule(port("Float32"), largest).startswith("a Float32 cannot hold that exactly; cast = true")
+    assert _rule(port("Boolean"), 2.0) == "a Boolean takes 0 or 1"
+    assert _rule(port("Int8"), 400.0) == "an Int8 takes whole numbers from -128 to 127"
+    assert _rule(port("Enumeration", {1: "off", 3: "on"}), 2.0) == "its items are: 1 (off), 3 (on)"
+
+
+def test_a_column_of_exact_integers_is_zero_where_nothing_was_sent_yet() -> None:
+    found = library()
+    assert found is not None
+    pool = Pool(found)
+    big = 2**63 - 25
+    number = pool.number(big.to_bytes(8, "little"))
+    column = pool.column(np.array([0.0, number, 0.0]), "UInt64")
+    assert column.tolist() == [0, big, 0]
+    assert pool.column(np.array([pool.number((-7).to_bytes(8, "little", signed=True))]), "Int64").tolist() == [-7]
+    assert math.isfinite(number)
