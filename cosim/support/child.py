@@ -30,7 +30,10 @@ def main() -> None:
     """Answer calls until the parent has no more, or is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_well()
-    watched(Path(sys.argv[1]))
+    try:
+        watched(Path(sys.argv[1]))
+    except FileNotFoundError:  # the parent was interrupted and has tidied up before this process was ready
+        return
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     _ANSWERS.append(answers)
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
