@@ -2,6 +2,9 @@
 
 import hashlib
 import importlib
+import io
+import posixpath
+import re
 import subprocess
 import sys
 import zipfile
@@ -73,6 +76,42 @@ def test_the_metadata_say_what_a_model_was_identified_from_and_how_well(tmp_path
     assert entries["recordings.0.name"] == "run1.csv"
     assert entries["recordings.0.sha256"] == "ab" * 32
     assert entries["evidence"] == origin["evidence"]
+
+
+ROLES = (
+    "document|requirement|specification|model|parameter|system|testcase|experiment(/(smoke-test|validation|"
+    "uncertainty-analysis))?|result|method|rationale|report|request|delivery|configuration|signature|"
+    "serialized-state(/.*)?|meta-data|other"
+)
+"""FMI-LS-REF 1.0.0-beta.1, table of roles."""
+
+
+def test_an_fmu_that_was_identified_lists_what_lies_in_it_beside_the_model(ssp: Path) -> None:
+    """As FMI-LS-REF has it: name and place of the manifest, its attributes, roles, and sources from there on."""
+    space = "{http://fmi-standard.org/fmi-ls-manifest}"
+    with zipfile.ZipFile(ssp) as archive:
+        raw = {name: archive.read(f"resources/{name}.fmu") for name in ("mount", "reference")}
+    inner = {name: zipfile.ZipFile(io.BytesIO(content)) for name, content in raw.items()}
+    folder = "extra/org.fmi-standard.fmi-ls-ref"
+    assert not [name for name in inner["reference"].namelist() if name.startswith("extra")], "nobody identified it"
+    root = etree.fromstring(inner["mount"].read(f"{folder}/fmi-ls-manifest.xml"))
+    assert (root.tag, root.get(f"{space}fmi-ls-name")) == ("fmiReferences", "org.fmi-standard.fmi-ls-ref")
+    assert root.get(f"{space}fmi-ls-version") == "1.0.0-beta.1"
+    assert root.get(f"{space}fmi-ls-description").startswith("Layered Standard providing information on related files")
+    listed = {one.get("source"): (one.get("role"), one.get("type")) for one in root}
+    assert listed == {
+        "../../documentation/index.html": ("document", "text/html"),
+        "identification.srmd": ("meta-data", "application/x-srmd-meta-data"),
+        "card.ssv": ("parameter", "application/x-ssp-parameter-set"),
+    }
+    assert {one.tag for one in root} == {"Related"}
+    assert all(re.fullmatch(ROLES, role) for role, _ in listed.values())
+    assert {posixpath.normpath(f"{folder}/{source}") for source in listed} <= set(inner["mount"].namelist())
+    assert inner["mount"].read(f"{folder}/card.ssv") == zipfile.ZipFile(ssp).read("resources/mount.ssv")
+    told = etree.fromstring(inner["mount"].read(f"{folder}/identification.srmd"))
+    assert told.get("checksum") is None, "an archive cannot state its own hash"
+    outside = etree.fromstring(zipfile.ZipFile(ssp).read("resources/mount.srmd"))
+    assert [one.text for one in told.iter()] == [one.text for one in outside.iter()]
 
 
 def test_a_card_that_nothing_was_identified_from_says_so(ssp: Path) -> None:

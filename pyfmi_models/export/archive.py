@@ -4,6 +4,7 @@ import os
 import tempfile
 import xml.etree.ElementTree as ET
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Literal
 
@@ -13,6 +14,7 @@ from pyfmi_models.export.codegen import Generated, generate
 from pyfmi_models.export.description import fmi2_description, fmi3_description, xml_text
 from pyfmi_models.export.documentation import documentation, resource
 from pyfmi_models.export.platforms import PLATFORMS, host
+from pyfmi_models.export.related import Related, references
 from pyfmi_models.export.universal import universal_binary
 from pyfmi_models.model import Model
 
@@ -24,11 +26,13 @@ def export_fmu(
     fmi: Literal[2, 3] = 3,
     force: bool = False,
     platforms: tuple[str, ...] = (),
+    related: Sequence[Related] = (),
 ) -> Path:
     """Write the model as an FMU for model exchange and co-simulation, and return its path.
 
     The archive holds the binary for each of the platforms (names of `PLATFORMS`; default: the host), its sources
-    and its documentation. Equal models give equal bytes. The file appears complete or not at all.
+    and its documentation, and the related files that are given, with their manifest (see `related`). Equal models
+    give equal bytes. The file appears complete or not at all.
     Raises ExportError if the file exists and `force` is not given, or the model cannot be exported.
     """
     path = Path(path)
@@ -40,6 +44,7 @@ def export_fmu(
     platforms = platforms or (host(),)
     files = _description(generated, fmi) | _binaries(generated, fmi, platforms) | _sources(generated, fmi)
     files |= documentation(generated, platforms) | _icon(model, fmi)
+    files |= references(related) if related else {}
     write_zip(path, files)
     return path
 

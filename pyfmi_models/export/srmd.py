@@ -17,18 +17,19 @@ KIND = "mount-cosim.identification"
 """The type of the classification, whose keywords are the keys of `origin` in a card: recordings.0.sha256, evidence."""
 
 
-def metadata(name: str, file: str, content: bytes, facts: Mapping[str, object]) -> bytes:
+def metadata(name: str, facts: Mapping[str, object], file: str = "", content: bytes = b"") -> bytes:
     """Write the metadata of one resource.
 
     Args:
         name: of the component.
-        file: the resource, relative to the metadata.
-        content: of the resource, for its SHA3-256.
         facts: by keyword; tables and lists are flattened, their keys joined by dots.
+        file: the resource, relative to the metadata; none where they lie in it, which cannot hold its own hash.
+        content: of the resource, for its SHA3-256.
     """
     spaces = {f"xmlns:{prefix}": one for prefix, one in NAMESPACES.items()}
-    checksum = hashlib.sha3_256(content).hexdigest()
-    about = {"version": "1.0.0", "name": name, "data": file, "checksum": checksum, "checksumType": "SHA3-256"}
+    about = {"version": "1.0.0", "name": name}
+    if file:
+        about |= {"data": file, "checksum": hashlib.sha3_256(content).hexdigest(), "checksumType": "SHA3-256"}
     root = ET.Element("srmd:SimulationResourceMetaData", {**spaces, **about})
     entries = ET.SubElement(root, "stc:Classification", type=KIND)
     for keyword, value in _flat(facts):

@@ -18,6 +18,7 @@ from jinja2 import Environment, StrictUndefined
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export.archive import export_fmu, write_zip
 from pyfmi_models.export.description import xml_text
+from pyfmi_models.export.related import Related, identified
 from pyfmi_models.export.srmd import metadata
 from pyfmi_models.export.units import BASE, parse_unit
 from pyfmi_models.model import Model, Variable
@@ -120,20 +121,23 @@ def export_ssp(
         raise ExportError(f"{path} exists; use force to replace it")
     found = {"SystemStructure.ssd": _structure(system), "documentation/index.html": _page(system)}
     for name, model in system.components.items():
-        found[f"resources/{name}.fmu"] = fmu = _fmu(model, fmi, platforms)
-        if name in system.origins:
-            found[f"resources/{name}.srmd"] = metadata(name, f"{name}.fmu", fmu, system.origins[name])
-        if model.parameters:
-            found[f"resources/{name}.ssv"] = _parameters(model)
+        numbers = _parameters(model) if model.parameters else b""
+        origin = system.origins.get(name, {})
+        found[f"resources/{name}.fmu"] = fmu = _fmu(model, fmi, platforms, identified(name, origin, numbers))
+        if origin:
+            found[f"resources/{name}.srmd"] = metadata(name, origin, f"{name}.fmu", fmu)
+        if numbers:
+            found[f"resources/{name}.ssv"] = numbers
     write_zip(path, found)
     return path
 
 
-def _fmu(model: Model | Archive, fmi: Literal[2, 3], platforms: tuple[str, ...]) -> bytes:
+def _fmu(model: Model | Archive, fmi: Literal[2, 3], platforms: tuple[str, ...], related: tuple[Related, ...]) -> bytes:
     if isinstance(model, Archive):
         return model.path.read_bytes()
     with tempfile.TemporaryDirectory() as folder:
-        return export_fmu(model, Path(folder) / "model.fmu", fmi=fmi, platforms=platforms).read_bytes()
+        path = Path(folder) / "model.fmu"
+        return export_fmu(model, path, fmi=fmi, platforms=platforms, related=related).read_bytes()
 
 
 def _root(tag: str, name: str, *prefixes: str) -> ET.Element:
