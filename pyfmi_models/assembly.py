@@ -137,13 +137,11 @@ class Assembly:
             start = [variable.start for variable in effect.states()]
             yield effect, motion._replace(state=states.get(name, start))
 
-    def applied(
-        self, command: Scalar, states: Mapping[str, Any], inputs: Mapping[str, Scalar]
-    ) -> tuple[Scalar, dict[str, Scalar]]:
+    def applied(self, command: Scalar, states: Mapping[str, Any], motion: Motion) -> tuple[Scalar, dict[str, Scalar]]:
         """Torque path: limit, then the drive effects in series. Return the applied torque and the rates of states."""
         rates, torque = {}, ca.fmax(-self.axis.torque_limit, ca.fmin(self.axis.torque_limit, command))
         for name, effect in self.of_kind(DriveEffect):
-            drive = effect.given(inputs)
+            drive = effect.given(motion)
             rates[name] = drive.rate(states[name], torque)
             torque = drive.applied(states[name], torque)
         return torque, rates

@@ -76,7 +76,7 @@ class _Side:
         this, own = self._mount.with_symbols(self._symbols, motion.v), self.own
         level = this.level(motion, own)
         resisting = this.law.contact(own["friction"], motion.v, level) + this.viscous(motion, own)
-        applied, rates = this.applied(command, own, motion.inputs)
+        applied, rates = this.applied(command, own, motion)
         rates |= {name: one.rate(motion._replace(state=own[name])) for name, one in this.of_kind(MotionEffect)}
         rates |= {"friction": this.law.rate(own["friction"], motion.v, level)}
         return this.axis.inertia, resisting + this.loads(motion, own), applied, ca.vertcat(*(rates[n] for n in own))

@@ -68,7 +68,7 @@ def written(mount: Assembly) -> tuple[list[Any], Any, dict[str, Scalar]]:
 
     this = mount.with_symbols(symbols, v)
     motion = this.at(t, q, v, given)
-    applied, rates = this.applied(given["tau"], own, given)
+    applied, rates = this.applied(given["tau"], own, motion)
     level = this.level(motion, own)
     friction = this.law.contact(own["friction"], v, level) + this.viscous(motion, own)
     motors, inertia, push = _motors(this, applied, own)

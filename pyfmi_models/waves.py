@@ -3,9 +3,9 @@
     cos(pi k x),   x = (p(s) - p(lo)) / (p(hi) - p(lo)), held between 0 and 1
 
 [lo, hi] is the range in which the quantity was seen. All waves are level at both ends, so beyond them a sum keeps its
-last value and its slope is continuous. For speed and command p(s) = s / (|s| + w), w = 0.05 of the largest size seen:
-half of the waves' room belongs to what is smaller than w, as most happens near zero. Over a turn the waves are cosine
-and sine of the angle's multiples.
+last value and its slope is continuous. For speed, acceleration and command p(s) = s / (|s| + w), w a share of the
+largest size seen (`WARP`): half of the waves' room belongs to what is smaller than w, as most happens near zero. Over
+a turn the waves are cosine and sine of the angle's multiples.
 """
 
 from collections.abc import Sequence
@@ -15,8 +15,9 @@ import casadi as ca
 
 from pyfmi_models.model import Scalar, Variable
 
-WARP = 0.05
-"""Share of the largest speed or command seen, below which the waves lie dense."""
+WARP = {"speed": 0.05, "command": 0.05, "acceleration": 0.3}
+"""Share of the largest value seen, below which the waves lie dense: friction and dead bands bend at a small one, what
+an acceleration does grows with it up to the largest."""
 UNITS = {
     "position": "rad",
     "turn": "rad",
@@ -24,6 +25,8 @@ UNITS = {
     "payload": "N.m",
     "temperature": "degC",
     "command": "N.m",
+    "acceleration": "rad/s2",
+    "way": "rad",
 }
 """What a table may go over, beside inputs of any name, and its unit for a rotary axis."""
 INPUT = "input."
@@ -67,7 +70,7 @@ def broken_range(name: str, key: str, seen: Sequence[float]) -> str:
 
 def spoken(name: str) -> str:
     """A quantity in words."""
-    return {"turn": "position over the turn"}.get(name, name.removeprefix(INPUT))
+    return {"turn": "position over the turn", "way": "way travelled"}.get(name, name.removeprefix(INPUT))
 
 
 def span(name: str, seen: Sequence[float], linear: bool = False) -> str:
@@ -81,9 +84,9 @@ def span(name: str, seen: Sequence[float], linear: bool = False) -> str:
 
 def _dense(value: Scalar, name: str, seen: Sequence[float]) -> Scalar:
     """A quantity, spread out near zero where most of it happens there."""
-    if name not in ("speed", "command"):
+    if name not in WARP:
         return value
-    return value / (ca.fabs(value) + WARP * max(abs(seen[0]), abs(seen[1])))
+    return value / (ca.fabs(value) + WARP[name] * max(abs(seen[0]), abs(seen[1])))
 
 
 def _cosines(c: Scalar, count: int) -> list[Scalar]:

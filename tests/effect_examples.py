@@ -60,6 +60,13 @@ NUMBERS: dict[str, dict[str, Any]] = {
         "waves": (2, 1),
         "level_change": (0.1, 0.2, -0.1, 0.05, 0.1, -0.2),
     },
+    "LearnedViscous": {
+        "over": "acceleration",
+        "seen": (-2.0, 2.0),
+        "viscous_torque": (0.0, 0.3, -0.2),
+        "at_speed": 0.5,
+    },
+    "LearnedGain": {"over": "position", "seen": (-1.0, 1.2), "more_command": (0.0, 0.05, 0.02, -0.01)},
     "LearnedDrive": {"command_seen": (-20.0, 20.0), "missing": (0.0, 0.1, 0.0, -0.2)},
     "LearnedHysteresis": {"strokes": (0.1, 0.4), "torque": (0.2, 0.3)},
     "LearnedAfterReversal": {"times": (0.1, 0.4), "level_change": (0.2, -0.1)},

@@ -56,7 +56,9 @@ NEUTRAL = {
     "ConcaveViscous": {"exponent": 1.0},
     "LearnedTorque": {"share": 0.0},
     "LearnedFriction": {"share": 0.0},
+    "LearnedViscous": {"share": 0.0},
     "LearnedDrive": {"share": 0.0},
+    "LearnedGain": {"share": 0.0},
     "LearnedHysteresis": {"share": 0.0},
     "LearnedAfterReversal": {"share": 0.0},
 }

@@ -200,7 +200,7 @@ def test_a_card_takes_the_form_with_a_temperature_by_its_key() -> None:
         parse_card(text + numbers + "warmth = 3.0\n", "c")
 
 
-@pytest.mark.parametrize("effect", [one for one in EXAMPLES if type(one).__name__ in ("BoucWen", "WarmTorqueDroop")])
+@pytest.mark.parametrize("effect", [one for one in EXAMPLES if type(one).__name__ == "BoucWen"])
 def test_a_card_with_what_an_inverse_cannot_follow_is_refused_by_a_diagnosis(effect: Any) -> None:
     with pytest.raises(InputError, match=f"The card holds {effect.id}, which a diagnosis cannot take into account yet"):
         check_effects(mount(effect))

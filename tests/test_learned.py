@@ -12,7 +12,8 @@ from export_models import Driver
 from pyfmi_models.card import parse_card
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.effects.base import Effect
-from pyfmi_models.effects.learned import LearnedDrive, LearnedFriction, LearnedTorque
+from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque, LearnedViscous
+from pyfmi_models.effects.learned_drive import LearnedDrive, LearnedGain
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHysteresis
 from pyfmi_models.errors import CardError
 from pyfmi_models.export import build_library
@@ -75,6 +76,47 @@ def test_a_product_table_is_friction_over_position_and_temperature() -> None:
         expected = np.exp(waves.ravel() @ effect.level_change)
         found = float(here.level(here.at(0.0, q, 0.1, {"temperature": degrees}))) / float(LAW.Fc)
         assert found == pytest.approx(expected, rel=1e-13)
+
+
+@pytest.mark.parametrize("viscous", [0.0, 1.0])
+def test_viscous_friction_that_is_learned_is_that_much_more_and_never_drives(viscous: float) -> None:
+    """3 N m at 0.5 rad/s where there is more; where there is less, above zero however large the table."""
+    more, less = (
+        LearnedViscous(over="position", seen=(-1.0, 1.2), viscous_torque=(torque,), at_speed=0.5)
+        for torque in (3.0, -3.0)
+    )
+    for v in (-0.7, 0.2):
+        here = mount(more).at(0.0, 0.1, v)
+        assert float(more.viscous(viscous * v, here)) == pytest.approx(viscous * v + 6.0 * v, rel=1e-9)
+        assert float(less.viscous(viscous * v, here)) == pytest.approx(viscous**2 / (viscous + 6.0) * v, abs=1e-9)
+    assert float(less.viscous(0.0, mount(less).at(0.0, 0.1, 0.0))) == 0.0
+
+
+def test_what_goes_over_the_acceleration_follows_it_by_a_state() -> None:
+    """A steady acceleration of 1.5 rad/s2, seen after some times of 0.02 s; from it, half of the range."""
+    effect = LearnedViscous(over="acceleration", seen=(-2.0, 2.0), viscous_torque=(0.0, 0.3), at_speed=1.0)
+    here, dt, state = mount(effect).at(0.0, 0.0, 0.0), 1e-3, 0.0
+    for k in range(300):
+        state += dt * float(ca.DM(effect.rate(here._replace(v=1.5e-3 * k, state=[state]))))
+    p = lambda s: s / (abs(s) + 0.6)  # noqa: E731
+    expected = 0.3 * np.cos(np.pi * (p(1.5) + p(2.0)) / (2 * p(2.0)))
+    assert float(effect.table(here._replace(v=1.5 * 0.3, state=[state]))) == pytest.approx(expected, rel=0.05)
+
+
+def test_what_goes_over_the_way_counts_it_there_and_back() -> None:
+    effect = LearnedFriction(over="way", seen=(0.0, 2.0), level_change=(0.0, 0.5))
+    here = mount(effect).at(0.0, 0.0, -0.7, {})._replace(state=[1.0])
+    assert float(ca.DM(effect.rate(here))) == 0.7
+    assert float(effect.level(1.0, here)) == pytest.approx(1.0)
+    assert float(effect.level(1.0, here._replace(state=[0.0]))) == pytest.approx(np.exp(0.5))
+
+
+def test_a_gain_that_is_learned_asks_for_more_command_where_the_motor_is_weak() -> None:
+    effect = LearnedGain(over="position", seen=(-1.0, 1.2), more_command=(0.0, 0.1))
+    weak, strong = (effect.given(mount(effect).at(0.0, q, 0.0)) for q in (-1.0, 1.2))
+    assert float(weak.applied((), 5.0)) == pytest.approx(5.0 * np.exp(-0.1))
+    assert float(strong.applied((), 5.0)) == pytest.approx(5.0 * np.exp(0.1))
+    assert "way" in replace(effect, over="way").broken_rule()
 
 
 def test_a_drive_gives_its_command_less_the_table() -> None:

@@ -23,7 +23,8 @@ from cosim.diagnosis.learned.proposal import Proposal, write_proposals
 from cosim.diagnosis.learned.spelled import Spelled
 from cosim.diagnosis.terminal import proposed
 from cosim.support.errors import OutputError
-from pyfmi_models.effects.learned import LearnedDrive, LearnedFriction, LearnedTorque
+from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque
+from pyfmi_models.effects.learned_drive import LearnedDrive
 
 PACKAGE = Path(str(pyfmi_models.__file__)).parent
 TESTS = Path(__file__).parent

@@ -137,7 +137,12 @@ LearnedTorque
     share 0..1 ~1 = 1 fixed
 LearnedFriction
     share 0..1 ~1 = 1 fixed
+LearnedViscous
+    share 0..1 ~1 = 1 fixed
+    at_speed 1e-09..inf ~1 = 1 fixed
 LearnedDrive
+    share 0..1 ~1 = 1 fixed
+LearnedGain
     share 0..1 ~1 = 1 fixed
 LearnedHysteresis
     share 0..1 ~1 = 1 fixed
@@ -205,6 +210,8 @@ LISTS = {
     "Cogging": ["harmonics -100..100"],
     "LearnedTorque": ["seen -1e+09..1e+09", "by_seen -1e+09..1e+09", "waves 0..40", "torque -1e+09..1e+09"],
     "LearnedFriction": ["seen -1e+09..1e+09", "by_seen -1e+09..1e+09", "waves 0..40", "level_change -5..5"],
+    "LearnedViscous": ["seen -1e+09..1e+09", "by_seen -1e+09..1e+09", "waves 0..40", "viscous_torque -1e+09..1e+09"],
+    "LearnedGain": ["seen -1e+09..1e+09", "by_seen -1e+09..1e+09", "waves 0..40", "more_command -5..5"],
     "LearnedDrive": ["command_seen -1e+09..1e+09", "missing -1e+09..1e+09"],
     "LearnedHysteresis": ["strokes 1e-09..1e+09", "torque 0..1e+09"],
     "LearnedAfterReversal": ["ways 1e-09..1e+09", "times 1e-09..1e+09", "level_change -5..5"],

@@ -13,6 +13,7 @@ from cosim.estimation.prepare import Array, Piece
 from cosim.estimation.rowwise import Rowwise, Stepwise, recurrence
 from cosim.estimation.tonal_disturbance import without_tones
 from pyfmi_models.effects import DriveEffect, MotionEffect, SensorEffect
+from pyfmi_models.effects.base import Motion
 from pyfmi_models.effects.presliding import LEAST_LEVEL
 from pyfmi_models.model import Scalar, structure_of, symbols_of
 from pyfmi_models.mount import Mount
@@ -85,7 +86,7 @@ class Equations:
         level, near = this.level(motion, own), this.inertia(this.axis.inertia, motion, own)
         torque = near * s["a"] + ca.jacobian(near, motion.q) * motion.v**2 / 2
         torque += this.law.contact(own["friction"], motion.v, level) + this.viscous(motion, own)
-        torque = self._true(_asked(this, torque + this.loads(motion, own)))
+        torque = self._true(_asked(this, torque + this.loads(motion, own), motion))
         rows = ca.vertcat(torque, ca.jacobian(torque, s["state"]).T, ca.jacobian(torque, s["free"]).T)
         return Rowwise(ca.vertcat(self._column, s["state"]), s["p"], rows)
 
@@ -189,14 +190,14 @@ class Equations:
         return Rowwise(self._column, self._symbols["p"], self._true(ca.vertcat(self._symbols["v"], self._symbols["a"])))
 
 
-def _asked(this: Mount, needed: Any) -> Any:
+def _asked(this: Mount, needed: Any, motion: Motion) -> Any:
     """Command [N m] for which drives that follow at once give what is needed: Newton's method, from what is needed.
 
     Past a knee the first step is exact where the drive is linear again; the others serve the bend.
     """
     for _, drive in reversed([(name, one) for name, one in this.of_kind(DriveEffect) if not one.states()]):
         command = ca.SX.sym("command")
-        rest = drive.applied((), command) - needed
+        rest = drive.given(motion).applied((), command) - needed
         slope = ca.fmax(ca.jacobian(rest, command), LEAST_SLOPE)
         step = ca.Function("step", [command], [command - rest / slope], {"allow_free": True})
         target = needed

@@ -125,8 +125,8 @@ class DriveEffect(Effect):
 
     place: ClassVar[str] = "Torque path"
 
-    def given(self, inputs: Mapping[str, Scalar]) -> Self:
-        """Return the effect at the values of the inputs that it names; `rate` and `applied` are then of that moment."""
+    def given(self, motion: Motion) -> Self:
+        """Return the effect at a motion and the inputs that it names; `rate` and `applied` are then of that moment."""
         return self
 
     def rate(self, state: Any, command: Scalar) -> Any:

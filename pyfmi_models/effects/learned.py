@@ -1,186 +1,25 @@
-"""A torque, a friction level or a drive error that has no name: tables over recorded quantities, as data.
+"""A torque, a friction level or viscous friction that has no name: tables over recorded quantities, as data.
 
-A table is a sum of waves over one quantity, or of products of waves over two (see `pyfmi_models/waves.py`):
-
-    table(s) = share sum_k c_k cos(pi k x(s)),   table(s, r) = share sum_kl c_kl cos(pi k x(s)) cos(pi l x(r))
-
-with x from 0 to 1 over the range that was seen; over "turn" c_0 + sum_k [c_(2k-1) cos(k angle) + c_2k sin(k angle)].
-Beyond the range a table keeps its last value. Several effects of this kind add up; nothing here is code.
-Waves that are level at both ends are the basis of smoothing splines: Solin and Sarkka, Stat. Comput. 30 (2020) 419.
+The tables are those of `learned_base.py`; what a drive does not give of its command is in `learned_drive.py`.
 """
 
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import log
 from typing import ClassVar, Self
 
 import casadi as ca
 import numpy as np
-import numpy.typing as npt
 
-from pyfmi_models.effects.base import DriveEffect, Effect, FrictionEffect, LoadEffect, Main, Motion, MotionEffect
-from pyfmi_models.effects.learned_table import LearnedTable
-from pyfmi_models.model import Scalar, Variable, parameter, structure, word
-from pyfmi_models.waves import INPUT, broken_range, input_of, span, spoken, waves
+from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Motion
+from pyfmi_models.effects.learned_base import MotionTable
+from pyfmi_models.model import Scalar, parameter, structure
 
-Array = npt.NDArray[np.float64]
-MOST_WAVES = 40
-"""Of one quantity; more is noise, and costs time in every step."""
-ROWS = 41
-"""Values of a table for a reader, over one quantity; a table of products has `COLUMNS` in each row."""
-COLUMNS = 5
+TINY = 1e-12
+"""Torque [N m] that keeps a quotient of two torques finite at rest, far below any friction."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class LearnedEffect(Effect):
-    """What a learned term declares beside its equation."""
-
-    kind: ClassVar[str]
-    """What its values are: torque, friction, drive, ..."""
-    filled: ClassVar[str]
-    """Field that holds the coefficients."""
-    unit_value: ClassVar[float] = 1.0
-    """First coefficient of a table that is one everywhere: of a relative change, one that doubles."""
-    in_torque: ClassVar[bool] = True
-    """Whether the coefficients are torques; else they are shares of the friction level."""
-    never_negative: ClassVar[bool] = False
-    """Whether a negative coefficient would give energy."""
-
-    def coefficients(self) -> Sequence[Scalar]:
-        """Coefficients of the waves or elements; those of a second quantity fastest."""
-        found: Sequence[Scalar] = getattr(self, self.filled)
-        return found
-
-    def quantities(self) -> tuple[str, ...]:
-        """What it goes over, as a card names it; nothing where it remembers the motion."""
-        return ()
-
-    def of_one(self) -> Self | None:
-        """The same effect with the value one everywhere; None where it remembers."""
-        if not self.quantities():
-            return None
-        changed: Self = replace(self, **{self.filled: (self.unit_value, *[0.0] * (len(self.coefficients()) - 1))})
-        return changed
-
-    def for_reader(self, unit: str) -> LearnedTable:
-        """The term as a table of plain numbers: quantity, values, their unit; `unit` is that of a torque."""
-        raise TypeError(f"{type(self).__name__} has no table")
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Table(LearnedEffect, MotionEffect):
-    """Where a table goes over, what was seen of it, and its waves at a motion."""
-
-    id: ClassVar[str] = "learned"
-    title: ClassVar[str] = "Learned term"
-    equation: ClassVar[str] = "Σ c cos(k π x)"
-    main: ClassVar[Main] = Main("share", unit="1", is_size=False)
-    told_apart_by: ClassVar[str] = "it has no name: it says over what the rest goes, not what makes it"
-    action: ClassVar[str] = "Look at the machine where the table is large; trust it only in the range it was seen in."
-    over: str = word("Quantity that the table goes over")
-    seen: tuple[float, ...] = structure("1", "Lowest and highest value seen", low=-1e9, high=1e9)
-    by: str = word("Second quantity, of a table of products", default="")
-    by_seen: tuple[float, ...] = structure("1", "Lowest and highest value seen of it", low=-1e9, high=1e9)
-    waves: tuple[float, ...] = structure("1", "Highest wave over each quantity", low=0, high=MOST_WAVES)
-    share: Scalar = parameter("1", "Share of the table that acts", default=1.0, low=0, high=1, fitted=False)
-
-    def quantities(self) -> tuple[str, ...]:
-        """`over`, and `by` of a table of products."""
-        return tuple(filter(None, (self.over, self.by)))
-
-    def inputs(self) -> tuple[Variable, ...]:
-        """What is not the axis's own business."""
-        pairs = ((self.over, self.seen), (self.by, self.by_seen))
-        return tuple({one.name: one for name, seen in pairs for one in input_of(name, seen)}.values())
-
-    def table(self, motion: Motion) -> Scalar:
-        """The sum above, times `share`."""
-        counts = [int(count) for count in self.waves] or [self._only()]
-        first = waves(_value(self.over, motion), self.over, self.seen, counts[0])
-        second = waves(_value(self.by, motion), self.by, self.by_seen, counts[1]) if self.by else [1.0]
-        products = (one * other for one in first for other in second)
-        return self.share * sum(c * shape for c, shape in zip(self.coefficients(), products, strict=True))
-
-    def _only(self) -> int:
-        many = len(self.coefficients()) - 1
-        return many // 2 if self.over == "turn" else many
-
-    def broken_rule(self) -> str:
-        """Quantities are known, ranges are ranges, and there is a coefficient for each wave."""
-        if "command" in (self.over, self.by):
-            return "what goes over the command is the drive's: its keys are command_seen and missing"
-        second = broken_range(self.by, "by_seen", self.by_seen) if self.by else ""
-        return broken_range(self.over, "seen", self.seen) or second or self._broken_size()
-
-    def _broken_size(self) -> str:
-        many, counts = len(self.coefficients()), list(self.waves)
-        if not self.by and (self.by_seen or counts):
-            return "by_seen and waves belong to a table of products, which names a second quantity in `by`"
-        if self.by and (len(counts) != 2 or any(count != int(count) for count in counts)):
-            return "waves must be two whole numbers, the highest wave over each quantity"
-        if (self.by and self.over == "turn") or self.by == "turn":
-            return "a table over the turn has no second quantity"
-        needed = int((counts[0] + 1) * (counts[1] + 1)) if self.by else many
-        if not many or many != needed or many > 4 * MOST_WAVES:
-            return f"the table has {many} coefficients; it needs {needed if self.by else f'1 to {4 * MOST_WAVES}'}"
-        odd = self.over == "turn" and many % 2 == 0
-        return "a table over the turn has a constant and pairs: an odd number of coefficients" if odd else ""
-
-    def follows(self) -> str:
-        """Say over what the table goes."""
-        return " and ".join(map(spoken, self.quantities()))
-
-    def values(self, count: int = 201, other: float | None = None) -> tuple[Array, Array]:
-        """Values of the quantity over its range, and of the table there.
-
-        A table of products is told at one value of the second quantity, by default the middle of its range.
-        """
-        edges = self.seen or (-np.pi, np.pi)
-        at = np.linspace(edges[0], edges[1], count)
-        return at, np.array([float(self.table(self._there(one, other))) for one in at])
-
-    def _there(self, value: float, other: float | None) -> Motion:
-        given = {self.over.removeprefix(INPUT): value}
-        if self.by:
-            given |= {self.by.removeprefix(INPUT): sum(self.by_seen) / 2 if other is None else other}
-        own = [given.get(name, 0.0) for name in ("position", "speed", "turn", "payload")]
-        return Motion(0.0, own[0], own[1], own[2], given, own[3])
-
-    def learned_in(self, linear: bool = False) -> str:
-        """Say the range, as `over position -1 to 1 rad`."""
-        pairs = ((self.over, self.seen), (self.by, self.by_seen))
-        return f"over {' and '.join(span(name, seen, linear) for name, seen in pairs if name)}"
-
-    def size(self) -> float:
-        """Half the range of the table's values where it was seen."""
-        others = self.by_seen or (None,)
-        return max(float(np.ptp(self.values(201, one)[1])) for one in others) / 2
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        return f"Something that depends on {self.follows()}, {self._sized(unit)}; a table learned from data."
-
-    def _sized(self, unit: str) -> str:
-        return f"{self.size():.2g} {unit}"
-
-    def for_reader(self, unit: str) -> LearnedTable:
-        """A torque, or a share of the friction level, over the range seen of one quantity or of two."""
-        unit = unit if self.in_torque else "1"
-        at, values = self.values(ROWS)
-        named: LearnedTable = {"kind": self.kind, "unit": unit, "over": spoken(self.over), "at": at.tolist()}
-        if not self.by:
-            return {**named, "value": self._acts(values).tolist()}
-        others = np.linspace(self.by_seen[0], self.by_seen[1], COLUMNS)
-        grid = np.array([self.values(ROWS, float(other))[1] for other in others])
-        return {**named, "by": spoken(self.by), "by_at": others.tolist(), "value": self._acts(grid).T.tolist()}
-
-    def _acts(self, table: Array) -> Array:
-        """What a table does: it is a torque, or the logarithm of a factor."""
-        return table if self.in_torque else np.asarray(np.expm1(table))
-
-
-@dataclass(frozen=True, kw_only=True)
-class LearnedTorque(_Table, LoadEffect):
+class LearnedTorque(MotionTable, LoadEffect):
     """A torque that resists: the table of the module, of `torque` coefficients, over position, speed or inputs.
 
         torque = share sum_k c_k cos(pi k x)
@@ -188,6 +27,7 @@ class LearnedTorque(_Table, LoadEffect):
     It may take or give energy over a round trip where it goes over the speed. Constant outside the range `seen`.
     """
 
+    id: ClassVar[str] = "learned"
     kind: ClassVar[str] = "torque"
     filled: ClassVar[str] = "torque"
     torque: tuple[float, ...] = structure("N.m", "Coefficients of the waves", low=-1e9, high=1e9)
@@ -198,7 +38,7 @@ class LearnedTorque(_Table, LoadEffect):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LearnedFriction(_Table, FrictionEffect):
+class LearnedFriction(MotionTable, FrictionEffect):
     """A friction level that depends on something: level exp(table), so friction never drives.
 
         level exp(share sum_k c_k cos(pi k x))
@@ -206,6 +46,7 @@ class LearnedFriction(_Table, FrictionEffect):
     To first order the table is the relative change of the level. Constant outside the range `seen`.
     """
 
+    id: ClassVar[str] = "learned"
     kind: ClassVar[str] = "friction"
     filled: ClassVar[str] = "level_change"
     unit_value: ClassVar[float] = log(2.0)
@@ -221,76 +62,32 @@ class LearnedFriction(_Table, FrictionEffect):
 
 
 @dataclass(frozen=True, kw_only=True)
-class LearnedDrive(LearnedEffect, DriveEffect):
-    """What a drive does not give of its command: applied = command - table(command).
+class LearnedViscous(MotionTable, FrictionEffect):
+    """Viscous friction that depends on something: so much more or less at the speed `at_speed`.
 
-        table = share sum_k c_k cos(pi k x),   x over `command_seen` as for a speed
+        viscous + m                      where m = table v / at_speed has the sign of v
+        viscous^2 / (viscous - m)        where it has not
 
-    A dead band, a bent torque constant or a limit that nobody wrote down. Constant outside the range seen.
+    To first order both are viscous + m; the second stays above zero, so friction never drives. Constant outside the
+    range `seen`.
     """
 
     id: ClassVar[str] = "learned"
-    title: ClassVar[str] = "Learned term"
-    equation: ClassVar[str] = "Σ c cos(k π x)"
-    main: ClassVar[Main] = Main("share", unit="1", is_size=False)
-    told_apart_by: ClassVar[str] = _Table.told_apart_by
-    action: ClassVar[str] = "Measure what the drive gives at small and at large commands."
-    kind: ClassVar[str] = "drive"
-    filled: ClassVar[str] = "missing"
-    command_seen: tuple[float, ...] = structure("N.m", "Lowest and highest command seen", low=-1e9, high=1e9)
-    missing: tuple[float, ...] = structure("N.m", "Coefficients of the waves", low=-1e9, high=1e9)
-    share: Scalar = parameter("1", "Share of the table that acts", default=1.0, low=0, high=1, fitted=False)
+    kind: ClassVar[str] = "viscous"
+    filled: ClassVar[str] = "viscous_torque"
+    at_speed: Scalar = parameter(
+        "rad/s", "Speed at which the torques are told", default=1.0, low=1e-9, tunable=False, fitted=False
+    )
+    viscous_torque: tuple[float, ...] = structure("N.m", "Coefficients of the waves", low=-1e9, high=1e9)
 
-    def applied(self, state: object, command: Scalar) -> Scalar:
-        """`command - table(command)`."""
-        shapes = waves(command, "command", self.command_seen, len(self.coefficients()) - 1)
-        table = sum(c * shape for c, shape in zip(self.coefficients(), shapes, strict=True))
-        return command - self.share * table
+    def viscous(self, viscous: Scalar, motion: Motion) -> Scalar:
+        """The equations above."""
+        table = self.table(motion)
+        more = table * motion.v / self.at_speed
+        size = ca.fabs(viscous)
+        return ca.if_else(table >= 0, viscous + more, viscous * size / (size + ca.fabs(more) + TINY))
 
-    def broken_rule(self) -> str:
-        """More command gives more torque, everywhere."""
-        if not self.missing or len(self.missing) > MOST_WAVES:
-            return f"missing has {len(self.missing)} coefficients; it needs 1 to {MOST_WAVES}"
-        if rule := broken_range("command", "command_seen", self.command_seen):
-            return rule
-        return "the drive gives less where it is asked for more" if self._falls() else ""
-
-    def learned_in(self, linear: bool = False) -> str:
-        """Say the range."""
-        return f"over {span('command', self.command_seen, linear)}"
-
-    def size(self) -> float:
-        """Half the range of what is missing."""
-        return float(np.ptp(self.curve(2001)[1])) / 2
-
-    def curve(self, count: int) -> tuple[Array, Array]:
-        """Commands over the range seen, and what is missing of each."""
-        command = np.linspace(self.command_seen[0], self.command_seen[1], count)
-        return command, command - np.asarray(ca.DM(self.applied((), ca.DM(command))).full().ravel())
-
-    def quantities(self) -> tuple[str, ...]:
-        """The command."""
-        return ("command",)
-
-    def for_reader(self, unit: str) -> LearnedTable:
-        """What is missing of commands over the range seen."""
-        command, missing = self.curve(ROWS)
-        return {"kind": self.kind, "command": command.tolist(), "missing": missing.tolist(), "unit": unit}
-
-    def _falls(self) -> bool:
-        command, missing = self.curve(2001)
-        return bool((np.diff(command - missing) <= 0).any())
-
-    def statement(self, unit: str = "N·m") -> str:
-        """Say it to a mechanic."""
-        return (
-            f"The drive gives up to {self.size():.2g} {unit} less or more than its command; a table learned from data."
-        )
-
-
-def _value(name: str, motion: Motion) -> Scalar:
-    """Where a motion is on a quantity."""
-    known: Mapping[str, Scalar] = {"position": motion.q, "turn": motion.angle, "speed": motion.v}
-    if name in known:
-        return known[name]
-    return ca.fabs(motion.payload) if name == "payload" else motion.inputs[name.removeprefix(INPUT)]
+    def of_one(self) -> Self:
+        """One per speed everywhere, so that a value is a coefficient of drag [N m s/rad]."""
+        first = (float(self.at_speed), *[0.0] * (len(self.coefficients()) - 1))
+        return replace(self, viscous_torque=first)

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import casadi as ca
 
 from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Main, Motion, MotionEffect
-from pyfmi_models.effects.learned import LearnedEffect
+from pyfmi_models.effects.learned_base import LearnedEffect
 from pyfmi_models.effects.learned_table import LearnedTable
 from pyfmi_models.model import Scalar, Variable, parameter, structure
 

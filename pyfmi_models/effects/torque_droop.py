@@ -1,12 +1,11 @@
 """A torque constant that droops with the torque, and with the temperature of the magnets."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self
 
 import casadi as ca
 
-from pyfmi_models.effects.base import DriveEffect, Main
+from pyfmi_models.effects.base import DriveEffect, Main, Motion
 from pyfmi_models.effects.thermal_viscosity import REFERENCE
 from pyfmi_models.model import Scalar, Variable, parameter
 
@@ -57,7 +56,6 @@ class WarmTorqueDroop(TorqueDroop):
     neodymium, -0.2 % for ferrite.
     """
 
-    is_determined: ClassVar[bool] = False  # an inverse knows no inputs in the torque path
     per_degC: Scalar = parameter("1/K", "Relative change of the torque constant per degree", low=-0.05, high=0.05)
     warmth: Scalar = 0.0
     """T - 20 degC of the moment, see `given`; no key of a card."""
@@ -66,9 +64,9 @@ class WarmTorqueDroop(TorqueDroop):
         """The temperature."""
         return (Variable(name="temperature", unit="degC", description="Temperature of the motor", start=REFERENCE),)
 
-    def given(self, inputs: Mapping[str, Scalar]) -> Self:
+    def given(self, motion: Motion) -> Self:
         """At this temperature."""
-        return replace(self, warmth=inputs["temperature"] - REFERENCE)
+        return replace(self, warmth=motion.inputs["temperature"] - REFERENCE)
 
     def applied(self, state: Any, command: Scalar) -> Scalar:
         """The equation above."""

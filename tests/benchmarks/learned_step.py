@@ -19,7 +19,8 @@ import numpy as np
 
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import Effect
-from pyfmi_models.effects.learned import LearnedDrive, LearnedFriction, LearnedTorque
+from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque
+from pyfmi_models.effects.learned_drive import LearnedDrive
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHysteresis
 from pyfmi_models.export import build_library
 from pyfmi_models.model import Model

@@ -45,10 +45,10 @@ FORMS = {
     "drive_deadband": r"u exp\(−\(u/",
     "reversal_kick": r"exp\(",
     "distance_memory_friction": r"exp\(",
-    "motor_ripple": r"sin\(2π\(q",
-    "drive_fade": r"k\d u T",
-    "sluggish_oil": r"v sin\(2π\(q",
-    "acceleration_drag": r"v a",
+    "motor_ripple": r"command.*sin\(2π\(q",
+    "drive_fade": r"command.*k\d T",
+    "sluggish_oil": r"v f.*sin\(2π\(q",
+    "acceleration_drag": r"v f.*\|a\|",
 }
 """What the equation of each effect that has a closed form must hold; hysteresis has none. The torque that a dead band
 at home withholds is a clipped line, of which tanh is the form there is; abroad it is a pulse."""

@@ -14,7 +14,7 @@ from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array
 from cosim.support.statistics import rms
-from pyfmi_models.effects.learned import LearnedEffect
+from pyfmi_models.effects.learned_base import LearnedEffect
 from pyfmi_models.mount import Mount
 
 KEPT = 0.8

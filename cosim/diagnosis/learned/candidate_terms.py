@@ -14,8 +14,11 @@ from typing import Any
 import numpy as np
 
 from cosim.diagnosis.dictionary import user_columns
+from cosim.diagnosis.learned.followed import followed
 from cosim.estimation.prepare import Array, Prepared
-from pyfmi_models.effects.learned import LearnedDrive, LearnedEffect, LearnedFriction, LearnedTorque
+from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque, LearnedViscous
+from pyfmi_models.effects.learned_base import LearnedEffect
+from pyfmi_models.effects.learned_drive import LearnedDrive, LearnedGain
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHysteresis
 from pyfmi_models.model import parameter
 from pyfmi_models.mount import Mount
@@ -25,6 +28,10 @@ WAVES = 12
 """Waves over a range: a bump of a tenth of it is still drawn."""
 FEW = 4
 """Waves over a column beside position and speed: temperature, load; its range is seldom filled."""
+FINE = 32
+"""Waves over position of a torque constant: 16 periods over the range, as magnets and teeth come many times a turn."""
+OVER_WAY = 8
+"""Waves over the way travelled: one fades over a tenth of it or longer."""
 BY = (4, 2)
 """Waves over position and over a column, in a table of products."""
 STROKES = (0.05, 0.1, 0.2, 0.4, 0.8)
@@ -119,6 +126,7 @@ def _of_motion(mount: Mount, prepared: Prepared) -> Iterator[CandidateTerm]:
     if rubs:
         yield _term("speed", LearnedFriction, _falling(WAVES, 0), over="speed", seen=v)
         yield _term("time since reversal", LearnedAfterReversal, [1.0] * len(TIMES), times=TIMES, creep=CREEP * top)
+        yield from _of_followed(prepared)
     if not prepared.has_position:
         return
     yield _term("position", LearnedTorque, _falling(WAVES), over="position", seen=q)
@@ -127,15 +135,34 @@ def _of_motion(mount: Mount, prepared: Prepared) -> Iterator[CandidateTerm]:
     if mount.motion == "rotary" and reach > 2 * pi:
         pairs = [one for one in _falling(WAVES)[1:] for _ in ("cosine", "sine")]
         yield _term("position over the turn", LearnedTorque, [1.0, *pairs], over="turn")
+        yield _term("torque and position", LearnedGain, [0.0, *pairs], over="turn")
+    else:
+        yield _term("torque and position", LearnedGain, _falling(FINE, 0), over="position", seen=q)
     if rubs:
         level = _falling(WAVES, 0)
+        yield _term("speed and position", LearnedViscous, level, over="position", seen=q, at_speed=top)
         yield _term("friction level over position", LearnedFriction, level, over="position", seen=q)
         after = {"ways": ways, "creep": CREEP * top}
         yield _term("distance since reversal", LearnedAfterReversal, [1.0] * len(ways), **after)
 
 
+def _of_followed(prepared: Prepared) -> Iterator[CandidateTerm]:
+    """What a state follows: the way travelled, and acceleration, which changes the drag."""
+    way, a = ranges_of("way", prepared), ranges_of("acceleration", prepared)
+    yield _term("way travelled", LearnedFriction, _falling(OVER_WAY, 0), over="way", seen=way)
+    fast = max(map(abs, prepared.ranges["v"]))
+    drag = _falling(WAVES, 0)
+    yield _term("speed and acceleration", LearnedViscous, drag, over="acceleration", seen=a, at_speed=fast)
+
+
+def ranges_of(name: str, prepared: Prepared) -> tuple[float, float]:
+    """Least and largest value of a quantity that is followed, at rows that count: a state needs time to begin with."""
+    found = np.concatenate([followed(name, piece)[piece.kept] for piece in prepared.pieces])
+    return float(found.min()), float(found.max())
+
+
 def _of_columns(mount: Mount, prepared: Prepared) -> Iterator[CandidateTerm]:
-    rubs = mount.friction.key != "none"
+    rubs, top = mount.friction.key != "none", max(map(abs, prepared.ranges["v"]))
     for name in user_columns(prepared):
         whole = np.concatenate([piece.extras[name] for piece in prepared.pieces])
         seen = (float(whole.min()), float(whole.max()))
@@ -143,8 +170,10 @@ def _of_columns(mount: Mount, prepared: Prepared) -> Iterator[CandidateTerm]:
         if not seen[0] < seen[1] or not (name.isidentifier() and name.isascii()):
             continue
         yield _term(f"torque over {name}", LearnedTorque, _falling(FEW), over=over, seen=seen)
+        yield _term(f"torque and {name}", LearnedGain, _falling(FEW, 0), over=over, seen=seen)
         if rubs:
             yield _term(f"friction level over {name}", LearnedFriction, _falling(FEW, 0), over=over, seen=seen)
+            yield _term(f"speed and {name}", LearnedViscous, _falling(FEW, 0), over=over, seen=seen, at_speed=top)
             if prepared.has_position:
                 yield _of_products(name, over, seen, prepared)
 

@@ -190,7 +190,8 @@ def complete(formula: Formula, rows: Rows, part: Partial) -> tuple[Formula, Arra
     inner = _inner_slopes(whole, rows)
     scale = np.linalg.norm(inner, axis=0) + 1e-300
     every = np.column_stack([inner / scale, columns / size])
-    spread = np.sqrt(np.diag(sandwich(every, rows.left - columns @ beta, part.blocks, RCOND)))
+    variance = np.diag(sandwich(every, rows.left - columns @ beta, part.blocks, RCOND))
+    spread = np.where(variance >= 0, np.sqrt(np.abs(variance)), np.nan)  # less than none: nothing is known
     errors = spread / np.concatenate([scale, size])
     told = tuple(map(float, errors[: inner.shape[1] + many]))
     return (replace(whole, errors=told), beta[many:]) if np.isfinite(told).all() else None

@@ -20,7 +20,7 @@ from cosim.diagnosis.learned.formula import Formula
 from cosim.diagnosis.learned.grams import columns_of, grams_of
 from cosim.diagnosis.learned.partial import partial
 from cosim.diagnosis.learned.proposal import Proposal
-from cosim.diagnosis.learned.select import fitted, path
+from cosim.diagnosis.learned.select import begun, fitted, paths
 from cosim.diagnosis.learned.spelled import Spelled
 from cosim.diagnosis.policy import Policy
 from cosim.diagnosis.predictive import Predictive
@@ -29,7 +29,7 @@ from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
 from cosim.support.statistics import rms
-from pyfmi_models.effects.learned import LearnedEffect
+from pyfmi_models.effects.learned_base import LearnedEffect
 from pyfmi_models.mount import Mount
 
 LEAST_GAIN = 0.01
@@ -164,12 +164,11 @@ def learn(comparison: Comparison, found: Fit, held: Predictive) -> Learned | Non
     """
     tried = [one for one in candidate_terms(found.mount, comparison.problem.prepared) if _is_recorded(one, held)]
     columns = [columns_of(found.mount, one, comparison.problem.prepared) for one in tried]
-    chosen = path(grams_of(comparison, found, columns, tried), range(len(tried)))
     best: Learned | None = None
-    for count in range(1, len(chosen.order) + 1):
-        own = _judged(comparison, found, [tried[k] for k in chosen.order[:count]], held)
+    for chosen in begun(paths(grams_of(comparison, found, columns, tried), range(len(tried)))):
+        own = _judged(comparison, found, [tried[k] for k in chosen.order], held)
         if own and (best is None or (not own.helps, own.after) < (not best.helps, best.after)):
-            best = replace(own, evidence=chosen.evidence[:count], predicted=chosen.predicted[:count])
+            best = replace(own, evidence=chosen.evidence, predicted=chosen.predicted)
     return _measured(comparison, found, best, held) if best and best.helps else best
 
 

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 
 from cosim.diagnosis.entries import BinsEntry
+from cosim.diagnosis.learned.followed import followed
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
 from cosim.support.statistics import Z95
 from pyfmi_models.effects import Effect
-from pyfmi_models.effects.learned import LearnedEffect
+from pyfmi_models.effects.learned_base import FOLLOWED, LearnedEffect
 from pyfmi_models.mount import Mount
 from pyfmi_models.waves import INPUT
 
@@ -110,6 +111,8 @@ def _recorded(name: str, prepared: Prepared) -> Array:
     if name in own:
         found = prepared.stacked(own[name])
         return np.mod(found + np.pi, 2 * np.pi) - np.pi if name == "turn" else found
+    if name in FOLLOWED:
+        return np.concatenate([followed(name, piece)[piece.kept] for piece in prepared.pieces])
     return np.concatenate([piece.extras[name.removeprefix(INPUT)][piece.kept] for piece in prepared.pieces])
 
 

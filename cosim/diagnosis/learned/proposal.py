@@ -1,6 +1,6 @@
 """A formula as the file of an effect, for a person to review: the form of docs/adding_physics.md, loaded by nobody.
 
-    load = f,   level (1 + f) but not below zero,   applied = command - f
+    load = f,   level (1 + f) and viscous + v f but not below zero,   applied = command - f or command / (1 + f)
 
 f is the formula of a learned table (`formula.py`), each quantity held at the ends of the range that was seen.
 """
@@ -15,6 +15,7 @@ from cosim.support.errors import OutputError
 from cosim.support.files import check_free, directory, replacing
 from cosim.support.version import __version__
 from pyfmi_models import effects
+from pyfmi_models.effects.learned_base import FOLLOWED, SEEN_WITHIN
 from pyfmi_models.waves import INPUT, spoken
 
 PREFIX = "proposed_"
@@ -25,8 +26,12 @@ KNOWN = {
     "turn": "ca.atan2(ca.sin(motion.angle), ca.cos(motion.angle))",
     "payload": "ca.fabs(motion.payload)",
     "command": "command",
+    "acceleration": f"(motion.v - motion.state[0]) / {SEEN_WITHIN}",
+    "way": "motion.state[0]",
 }
 """Quantities as an effect finds them; all others are inputs."""
+RATES = {"acceleration": KNOWN["acceleration"], "way": "ca.fabs(motion.v)"}
+"""Rate of the state that follows a quantity."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +42,16 @@ class Place:
     needed: tuple[str, ...]
     method: str
     returned: str
+    then: str = ""
+    """What follows: a method that needs what this one knows."""
 
 
+AT_ONCE = """
+    def applied(self, state: object, command: Scalar) -> Scalar:
+        \"\"\"The command, less by what is needed more.\"\"\"
+        return command / ca.fmax(1.0 + self.now, 0.1)
+"""
+"""Of a drive whose gain depends on the motion: the formula of the moment is kept for this."""
 PLACES = {
     "torque": Place("LoadEffect", ("Main", "Motion"), "load(self, motion: Motion) -> Scalar", "f"),
     "friction": Place(
@@ -46,6 +59,15 @@ PLACES = {
         ("Main", "Motion"),
         "level(self, level: Scalar, motion: Motion) -> Scalar",
         "level * ca.fmax(1.0 + f, 0.0)",
+    ),
+    "viscous": Place(
+        "FrictionEffect",
+        ("Main", "Motion"),
+        "viscous(self, viscous: Scalar, motion: Motion) -> Scalar",
+        "viscous + motion.v * ca.fmax(f, -ca.fabs(viscous) / (ca.fabs(motion.v) + 1e-9))",
+    ),
+    "gain": Place(
+        "DriveEffect", ("Main", "Motion"), "given(self, motion: Motion) -> Self", "replace(self, now=f)", AT_ONCE
     ),
     "drive": Place("DriveEffect", ("Main",), "applied(self, state: object, command: Scalar) -> Scalar", "command - f"),
 }
@@ -62,8 +84,8 @@ pyfmi_models/effects/ (docs/adding_physics.md). A card then holds it with
     effect = "{id}"
 """
 
-from dataclasses import dataclass
-from typing import ClassVar
+from dataclasses import {dataclasses}
+from typing import {typing}
 
 import casadi as ca
 
@@ -92,7 +114,7 @@ class {name}({base}):
         """The equation above."""
 {body}
         return {returned}
-
+{then}
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         return f"{{self.title}}: {{self.equation}}."
@@ -122,7 +144,9 @@ class Proposal:
             statement=self.statement,
             id=self.id,
             imports=", ".join(sorted((place.base, *place.needed))),
-            model_imports=", ".join(["Scalar", *(["Variable"] if self._columns() else []), "parameter"]),
+            model_imports=", ".join(["Scalar", *(["Variable"] if self._variables() else []), "parameter"]),
+            dataclasses="dataclass, replace" if place.then else "dataclass",
+            typing=", ".join([*(["Any"] if self._followed() else []), "ClassVar", *(["Self"] if place.then else [])]),
             ranges="\n".join(self._ranges()),
             name="".join(word.capitalize() for word in self.id.split("_")),
             base=place.base,
@@ -130,11 +154,12 @@ class Proposal:
             title=f"Proposed: {kind} over {' and '.join(map(spoken, self.spelled.names))}",
             main=self.spelled.outer_names[0],
             main_unit=self._coefficients()[0][-1],
-            parameters="\n".join(self._parameters()),
-            inputs="\n".join(self._inputs()),
+            parameters="\n".join([*self._parameters(), *(["    now: Scalar = 0.0"] if place.then else [])]),
+            inputs="\n".join([*self._inputs(), *self._states()]),
             method=place.method,
             body="\n".join(f"        {line}" for line in self._body()),
             returned=place.returned,
+            then=place.then,
         )
 
     def _seen(self) -> tuple[Sequence[float], ...]:
@@ -150,6 +175,26 @@ class Proposal:
 
     def _columns(self) -> list[str]:
         return [name for name in self.spelled.names if name not in KNOWN]
+
+    def _followed(self) -> list[str]:
+        return [name for name in self.spelled.names if name in FOLLOWED]
+
+    def _variables(self) -> list[str]:
+        return [*self._columns(), *self._followed()]
+
+    def _states(self) -> Iterator[str]:
+        """States and rates of what is followed: of the two quantities at most one is."""
+        if not self._followed():
+            return
+        (name,) = self._followed()
+        (one,) = self.spelled.effect.states()
+        described = f'unit="{one.unit}", description="{one.description}"'
+        yield "\n    def states(self) -> tuple[Variable, ...]:"
+        yield f'        """What the {spoken(name)} is told by."""'
+        yield f'        return (Variable(name="{one.name}", {described}),)'
+        yield "\n    def rate(self, motion: Motion) -> Any:"
+        yield '        """Follow it."""'
+        yield f"        return {RATES[name]}\n"
 
     def _ranges(self) -> Iterator[str]:
         for k, (name, seen) in enumerate(zip(self.spelled.names, self._seen(), strict=True)):

@@ -21,6 +21,10 @@ LEAST_PREDICTED = 3.0
 """What recordings left out must gain by one more term. Unit: nats. As for a named effect (`policy.least_predicted`)."""
 SURE_EVIDENCE = 26.0
 """Evidence from which a term is tried although no recording left out gains by it. Unit: nats; as `policy.floor`."""
+STARTS = 2
+"""First terms that are followed, of each ranking: more looks at held-out recordings would let luck decide."""
+NEAR = 0.5
+"""Share of the best first term's nats that another one must have."""
 ROUNDS = 2
 """Gauss-Newton steps after the linear one: the terms that scale friction are not quite linear."""
 
@@ -37,30 +41,87 @@ class Path:
         """The path with one more term."""
         return Path((*self.order, term), (*self.evidence, evidence), (*self.predicted, predicted))
 
+    def first(self, count: int) -> "Path":
+        """The path with no more than its first terms."""
+        return Path(self.order[:count], self.evidence[:count], self.predicted[:count])
 
-def path(grams: Grams, candidates: Sequence[int]) -> Path:
-    """Choose terms one after the other, each the one that recordings left out gain most by.
 
-    Where none of them gains, as each training recording may hold what no other does (another place, another
-    temperature), the largest evidence is followed if no misfit of a friction law reaches it: held-out recordings judge.
+def paths(grams: Grams, candidates: Sequence[int]) -> list[Path]:
+    """Choose terms one after the other, each the one that recordings left out gain most by; from several first ones.
+
+    What goes together in training (a place and the temperature there) is told apart by other recordings only: every
+    first term that gains nearly as much as the best has a path of its own, and the held-out recordings judge.
     """
-    found, now = Path(), _scores(grams, ())
-    while len(found.order) < MOST:
-        scores = {one: _scores(grams, (*found.order, one)) for one in candidates if one not in found.order}
-        gains = {one: (score[0] - now[0], score[1] - now[1]) for one, score in scores.items()}
-        best = _best(gains)
-        if best is None:
+    now = _scores(grams, ())
+    gains = _gains(grams, candidates, (), now)
+    starts = [Path().longer(one, *gains[one]) for one in _near(gains)]
+    return [path for start in starts for path in (start, _path(grams, candidates, start))]
+
+
+def begun(found: Sequence[Path]) -> list[Path]:
+    """Every path and all its beginnings, each set of terms once."""
+    known: dict[frozenset[int], Path] = {}
+    for path in found:
+        for count in range(1, len(path.order) + 1):
+            known.setdefault(frozenset(path.order[:count]), path.first(count))
+    return list(known.values())
+
+
+def _path(grams: Grams, candidates: Sequence[int], found: Path) -> Path:
+    """A path as long as its terms gain."""
+    for _ in range(1, MOST):
+        gains = _gains(grams, candidates, found.order, _scores(grams, found.order))
+        proven, large = _ranked(gains)
+        ranked = proven or large
+        if not ranked:
             break
-        found, now = found.longer(best, *gains[best]), scores[best]
+        best = max(ranked, key=lambda k: ranked[k])
+        found = _without_idle(grams, found.longer(best, *gains[best]))
     return found
 
 
-def _best(gains: Mapping[int, tuple[float, float]]) -> int | None:
-    """The next term, from the evidence and the predicted nats of each."""
+def _without_idle(grams: Grams, found: Path) -> Path:
+    """The path without the term that the last one made idle, if it made one so: it stood for what that one is."""
+    whole, _ = _scores(grams, found.order)
+    for one in found.order[:-1]:
+        rest = tuple(other for other in found.order if other != one)
+        if whole - _scores(grams, rest)[0] < LEAST_EVIDENCE:
+            return _along(grams, rest)
+    return found
+
+
+def _along(grams: Grams, order: Sequence[int]) -> Path:
+    """The path of these terms in this order."""
+    found = Path()
+    for one in order:
+        found = found.longer(one, *_gains(grams, [one], found.order, _scores(grams, found.order))[one])
+    return found
+
+
+def _gains(
+    grams: Grams, candidates: Sequence[int], chosen: tuple[int, ...], now: tuple[float, float]
+) -> dict[int, tuple[float, float]]:
+    """Evidence and predicted nats of each further term."""
+    scores = {one: _scores(grams, (*chosen, one)) for one in candidates if one not in chosen}
+    return {one: (here - now[0], there - now[1]) for one, (here, there) in scores.items()}
+
+
+def _ranked(gains: Mapping[int, tuple[float, float]]) -> tuple[dict[int, float], dict[int, float]]:
+    """Terms that may be next: by what recordings left out gain, and by evidence, if no misfit of a law reaches it.
+
+    No recording left out may gain, as each may hold what no other does: another place, temperature, way.
+    """
     proven = {k: there for k, (here, there) in gains.items() if here >= LEAST_EVIDENCE and there >= LEAST_PREDICTED}
-    large = {k: here for k, (here, _) in gains.items() if here >= SURE_EVIDENCE}
-    ranked = proven or large
-    return max(ranked, key=lambda k: ranked[k]) if ranked else None
+    return proven, {k: here for k, (here, _) in gains.items() if here >= SURE_EVIDENCE}
+
+
+def _near(gains: Mapping[int, tuple[float, float]]) -> list[int]:
+    """The best first terms: by what recordings left out gain, and by evidence."""
+    found: list[int] = []
+    for ranked in _ranked(gains):
+        order = sorted(ranked, key=lambda k: -ranked[k])
+        found += [k for k in order if ranked[k] >= NEAR * ranked[order[0]]][:STARTS]
+    return list(dict.fromkeys(found))
 
 
 def _scores(grams: Grams, chosen: Sequence[int]) -> tuple[float, float]:

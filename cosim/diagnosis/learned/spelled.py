@@ -5,10 +5,29 @@ from dataclasses import dataclass
 
 from cosim.diagnosis.entries import FormulaEntry, NumberEntry
 from cosim.diagnosis.learned.formula import Formula, Shape, interval
-from pyfmi_models.effects.learned import LearnedEffect
+from pyfmi_models.effects.learned_base import LearnedEffect
 from pyfmi_models.waves import INPUT, UNITS, spoken
 
-LETTERS = {"position": "q", "turn": "q", "speed": "v", "command": "u", "temperature": "T", "payload": "M"}
+LETTERS = {
+    "position": "q",
+    "turn": "q",
+    "speed": "v",
+    "command": "u",
+    "temperature": "T",
+    "payload": "M",
+    "acceleration": "a",
+    "way": "s",
+}
+LEFT = {
+    "torque": "torque",
+    "drive": "not given",
+    "friction": "friction × (1 + f), f",
+    "viscous": "added drag = v f, f",
+    "gain": "command × (1 + f), f",
+}
+"""What a formula says, by the kind of its term."""
+DRAG = {"N.m": "N.m.s/rad", "N": "N.s/m"}
+"""Unit of a coefficient of drag, by that of a torque."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +61,10 @@ class Spelled:
 
     def equation(self) -> str:
         """Return the formula for a reader."""
-        left = {"torque": "torque", "drive": "not given"}.get(self.effect.kind, "friction × (1 + f), f")
         pairs = zip(self.outer_names, self.formula.shapes, strict=True)
-        return f"{left} = " + " + ".join(" ".join([name, *self._factors(shape)]) for name, shape in pairs)
+        return f"{LEFT[self.effect.kind]} = " + " + ".join(
+            " ".join([name, *self._factors(shape)]) for name, shape in pairs
+        )
 
     def _factors(self, shape: Shape) -> Iterator[str]:
         placed = self.formula.placed()
@@ -60,7 +80,8 @@ class Spelled:
         powers = {"exponent": 0, "rate": -1}
         numbers = [(k, powers.get(number, 1)) for k, form in self.formula.forms for number in form.numbers]
         inner = [own[k] if power > 0 else _over("1", [(own[k], -power)]) for k, power in numbers]
-        base = ("N" if self.linear else "N.m") if self.effect.in_torque else "1"
+        torque = "N" if self.linear else "N.m"
+        base = DRAG[torque] if self.effect.kind == "viscous" else torque if self.effect.in_torque else "1"
         outer = [_over(base, [(own[k], form.power) for k, form in shape.parts]) for shape in self.formula.shapes]
         return (*inner, *outer)
 
@@ -92,6 +113,8 @@ def _over(base: str, powers: Sequence[tuple[str, int]]) -> str:
     parts = [_plain(unit, power) for unit, power in powers if power and unit != "1"]
     if not parts or parts == [base]:
         return "1" if parts else base
+    above, _, below = base.partition("/")
+    base, parts = above, [*([below] if below else []), *parts]
     return f"{base}/{parts[0]}" if len(parts) == 1 and "." not in parts[0] else f"{base}/({'.'.join(parts)})"
 
 
