@@ -104,8 +104,9 @@ def test_a_head_that_lacks_what_a_recording_needs_is_damaged(tmp_path: Path, ori
 
 
 @pytest.mark.parametrize(
-    "origin",
-    [ORIGIN, ORIGIN | {"inputs": [f"i{k}" for k in range(8)]}, ORIGIN | {"machine": {"encoder": {"heads": 4}}}],
+    "more",
+    [{}, {"inputs": [f"i{k}" for k in range(8)]}, {"machine": {"encoder": {"heads": 4}}}],
+    ids=["", "8", "heads"],
 )
 def test_a_head_that_has_it_is_whole(tmp_path: Path, more: dict[str, Any]) -> None:
     origin = ORIGIN | more
