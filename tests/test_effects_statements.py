@@ -84,6 +84,17 @@ def test_the_sentence_of_an_axis_that_slides_differs_in_its_units_alone(effect: 
         ("TorqueOffset", {"torque": -0.7}, "A constant 0.7 N·m pushes the axis forward, moving or not."),
         ("TorqueSaturation", {"knee_torque": 5.0}, "The drive saturates at 5 N·m: no more arrives."),
         (
+            "WarmTorqueDroop",
+            {"droop": 0.2, "rated_torque": 8.0, "per_degC": 0.002},
+            "Of a command of 8 N·m the drive loses 20 %, of less less, and gives 0.2 % more per degree.",
+        ),
+        (
+            "ThermalViscosity",
+            {"viscous_per_degC": 0.0, "coulomb_per_degC": -0.02},
+            "Sliding friction falls by 2 % per degree.",
+        ),
+        ("ThermalViscosity", {"viscous_per_degC": 0.0}, "Friction keeps its size."),
+        (
             "ThermalViscosity",
             {"viscous_per_degC": 0.04},
             "Viscous friction grows by 4 % per degree.",
