@@ -111,6 +111,22 @@ def test_the_tests_that_are_asked_call_the_function_in_question_the_cheapest_of_
     assert asked(6, "other.py") == []
 
 
+def test_of_the_tests_that_call_a_function_those_come_first_that_name_it_then_those_of_near_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for folder in ("cosim", "tests"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "cosim" / "m.py").write_text(SHORT)
+    (tmp_path / "tests" / "test_far.py").write_text("def test_idle():\n    pass\n\ndef test_name():\n    one()\n")
+    (tmp_path / "tests" / "test_near.py").write_text("from cosim import m\n\ndef test_idle():\n    pass\n")
+    monkeypatch.setattr(mutants_choice, "HOME", tmp_path)
+    mutants_choice.belonging.cache_clear()
+    names = ("far.py::test_idle", "far.py::test_name", "near.py::test_idle")
+    reached = [Reached(f"tests/test_{one}", 0.1 + k, {"cosim/m.py": ["one"]}) for k, one in enumerate(names)]
+    found = mutants_choice.calling("cosim/m.py", SHORT, 6, reached)
+    assert found == ("test_far.py::test_name", "test_near.py::test_idle", "test_far.py::test_idle")
+
+
 def test_of_what_is_declared_outside_of_functions_the_tests_come_first_that_name_it_then_those_that_use_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -1,8 +1,10 @@
 """Which tests are asked of a mutant: those that call what was changed, or use what was declared there.
 
-A line inside of a function belongs to the innermost one. A line outside declares something: a constant of the module, a
-field of a class. Of such a line the tests come first that name it, then those that call a function which uses it in the
-same class, in the same module, and elsewhere; last all others that call anything of the module.
+A line inside of a function belongs to the innermost one. Of hundreds of tests that call it those come first that name
+it, then those of files that are near the module, by imports and names, then all others. A line outside declares
+something: a constant of the module, a field of a class. Of such a line the tests come first that name it, then those
+that call a function which uses it in the same class, in the same module, and elsewhere; last all others that call
+anything of the module.
 """
 
 import ast
@@ -18,7 +20,7 @@ HOME = Path(__file__).parents[2]
 PRODUCT = ("cosim", "pyfmi_models")
 MOST, NEAREST = 4, 6
 """Imports between a test and a module at most, and test files that are asked at most."""
-BUDGET, MANY = 20.0, 120
+BUDGET, MANY = 20.0, 200
 """Seconds that the tests of a mutant take without it in all, and how many tests that are at most."""
 SLOW = ("test_attack", "test_prove", "test_proof", "test_serve", "test_benchmarks", "test_same_bits", "test_platforms")
 """Test files that are not asked: a mutant that only they would notice counts as survived."""
@@ -145,18 +147,30 @@ def users(module: str, what: Declared) -> dict[str, dict[str, int]]:
 
 
 @cache
-def _text(test: str) -> str:
-    """The text of a test, without its parameters."""
-    file, _, name = test.partition("::")
-    name, known = name.replace("::", "."), dict(functions(parsed(HOME / file)))
-    return ast.unparse(known[name]) if name in known else ""
+def _texts(file: str) -> dict[str, str]:
+    """The text of each test of a file."""
+    return {name: ast.unparse(node) for name, node in functions(parsed(HOME / file)) if "<locals>" not in name}
+
+
+def _names(test: str, word: str) -> bool:
+    """Whether the text of a test has a word."""
+    file, _, name = test.split("[")[0].partition("::")
+    return bool(re.search(rf"\b{re.escape(word)}\b", _texts(file).get(name.replace("::", "."), "")))
+
+
+def nearness_of_function(module: str, function: str, one: Reached) -> int | None:
+    """How far a test is from a function: 0 where it names it, 1 in a file near the module, else 2; None: too far."""
+    if function not in one.calls.get(module, []):
+        return None
+    if _names(one.test, function.rsplit(".")[-1]):
+        return 0
+    return 1 if one.test.split("::")[0].removeprefix("tests/") in belonging(HOME / module) else 2
 
 
 def nearness(module: str, what: Declared, one: Reached) -> int | None:
     """How far a test is from what a line declares: from who uses it, less the names that it tells; None: too far."""
     words = what.names | {what.inside.rsplit(".")[-1]} - {""}
-    text = _text(one.test.split("[")[0])
-    told = sum(bool(re.search(rf"\b{re.escape(word)}\b", text)) for word in words)
+    told = sum(_names(one.test, word) for word in words)
     if module not in one.calls and not (told and HOME / module in imported(HOME / one.test.split("::")[0])):
         return None
     using = users(module, what).items()
@@ -172,7 +186,7 @@ def calling(module: str, source: str, line: int, reached: Sequence[Reached]) -> 
     cases: dict[str, int] = {}
     ranked = []
     for one in reached:  # the cheapest first
-        near = nearness(module, what, one) if not function else 0 if function in one.calls.get(module, []) else None
+        near = nearness_of_function(module, function, one) if function else nearness(module, what, one)
         if near is not None:
             case = cases.setdefault(one.test.split("[")[0], 0)
             ranked.append((near + case, case, one.seconds, one.test))
