@@ -240,6 +240,22 @@ def test_a_lag_that_leaves_much_is_said_and_withholds_no_name(missing: float, wi
     assert [one.blocks_naming for one in clocks([Balance([run])], "run")] == [withholds]
 
 
+@pytest.mark.parametrize(("other", "told"), [(0.024, True), (0.0, False)])
+def test_a_lag_that_another_recording_contradicts_is_no_clocks(other: float, told: bool) -> None:
+    """An eccentric encoder's ripple looks late at one speed and early at another; a clock is that of all recordings."""
+
+    def run(seconds: float, late: float) -> Recording:
+        t = np.arange(500 * seconds) / 500
+        v = 0.3 * np.sin(1.7 * t) + 0.2 * np.sin(4.1 * t)
+        tau = 6 * np.gradient(v, t) + 2 * np.sign(v)
+        made = Recording("run", {"t": t, "tau": tau, "q": np.cumsum(v) / 500})
+        return delayed(late)(made) if late else made
+
+    pair = [Balance([run(60, 0.024)]), Balance([run(15, other)])]
+    assert abs(clock_offset(pair).lag - 0.024) < 0.004
+    assert bool(clocks(pair, "both")) is told
+
+
 DATA = Path(__file__).resolve().parents[2] / "shared" / "recordings"
 MEASURED = {
     "quasi_direct_pendulum": ("ddp", "direct_collocation", "energy_shaping", 0.15, 0.15),
