@@ -138,6 +138,9 @@ def test_the_evidence_that_is_asked_goes_with_what_held_out_recordings_say() -> 
     assert unknown(8.0, 0.25)
     assert not unknown(8.0 - LITTLE, 0.25)
     assert not unknown(8.0, 0.25 - LITTLE)
+    assert unknown(12.0, 0.1875), "half way between the shares, half way between the evidences"
+    assert not unknown(12.0 - LITTLE, 0.1875)
+    assert not unknown(12.0, 0.1875, -24.0 - LITTLE), "denied by the likelihood"
 
 
 def test_what_a_term_removes_about_turns_alone_is_nothing_unknown() -> None:

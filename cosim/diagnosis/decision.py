@@ -172,15 +172,19 @@ def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:
     """
     if term.away < policy.least_away_unnamed:
         return False
-    there = term.evidence >= policy.least_followed and term.share >= policy.follows
-    return term.evidence >= least and (there or term.evidence >= _floor_of(term, policy))
+    return term.evidence >= max(least, _floor_of(term, policy))
 
 
 def _floor_of(term: TermScores, policy: Policy) -> float:
     """Evidence that a term must have: the less, the more the held-out recordings agree."""
+    if term.share >= policy.follows:
+        return policy.least_followed
     if term.share < -policy.contradicted or term.predicted < -policy.denied * term.evidence:
         return policy.sure_floor
-    return policy.floor if term.share >= policy.supported else policy.floor_alone
+    if term.share < policy.supported:
+        return policy.floor_alone
+    agreed = (term.share - policy.supported) / (policy.follows - policy.supported)
+    return policy.floor + agreed * (policy.least_followed - policy.floor)
 
 
 def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
