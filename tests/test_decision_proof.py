@@ -48,6 +48,7 @@ class Fitted:
 class Candidate:
     evidence: float
     fit: Fitted
+    plain_gain: float = 0.5
 
 
 class Tables:
@@ -87,12 +88,12 @@ def structure(names: str, left: float = 0.0) -> Fitted:
     return Fitted(Structure(tuple(Named(one) for one in names)), left)
 
 
-def proven(tables: Tables, names: str, removed: float = 0.5) -> Proof:
+def proven(tables: Tables, names: str, removed: float = 0.5, evidence: float = 100.0) -> Proof:
     """Effects in the order of their evidence, each of which removes a share of what the base leaves."""
     whole = structure("b" + names)
     effects = []
     for place, name in enumerate(names):
-        own = Candidate(100.0 - place, structure("b" + names, left=np.sqrt(1 - removed)))
+        own = Candidate(evidence - place, structure("b" + names, left=np.sqrt(1 - removed)), removed)
         without = structure("b" + names.replace(name, ""), left=1.0)
         effects.append(AcceptedEffect((Named(name),), own, without, (), {}))  # type: ignore[arg-type]
     examined = Examined(structure("b", left=1.0), whole, tuple(reversed(effects)), None)  # type: ignore[arg-type]
@@ -152,3 +153,22 @@ def test_what_stands_alone_is_not_fitted_again() -> None:
     tables = Tables({"b": 0.0, "bx": 10.0})
     assert standing(proven(tables, "x")) == "x"
     assert tables.fitted == []
+
+
+@pytest.mark.parametrize(
+    ("names", "left", "nats", "expected"),
+    [("x", 0.5, 50.0, "x"), ("x", 0.51, 50.0, ""), ("x", 0.5, 3.0, "x"), ("x", 0.5, 2.9, ""), ("xy", 0.51, 50.0, "xy")],
+)
+def test_what_is_small_in_training_and_alone_must_halve_the_held_out_error_and_predict(
+    names: str, left: float, nats: float, expected: str
+) -> None:
+    small, sure = 0.9 * RULES.small_gain, RULES.small_evidence
+    likelihoods = {"b": 0.0, "bx": nats, "by": nats, "bxy": 2 * nats}
+    tables = Tables(likelihoods, {"b": 1.0, "bx": left, "by": left, "bxy": 0.3})
+    assert standing(proven(tables, names, small, sure - 1)) == expected
+
+
+def test_what_is_small_and_sure_need_not() -> None:
+    tables = Tables({"b": 0.0, "bx": 50.0}, {"b": 1.0, "bx": 0.8})
+    assert standing(proven(tables, "x", 0.9 * RULES.small_gain, RULES.small_evidence)) == "x"
+    assert standing(proven(tables, "x", RULES.small_gain, RULES.small_evidence - 1)) == "x"

@@ -100,10 +100,19 @@ def test_a_set_point_is_found_where_names_have_to_be_read(tmp_path: Path) -> Non
     assert 'tau = "torque_cmd", q = "pos_act", q_d = "pos_cmd"; --columns says it otherwise.' in note
 
 
-def test_where_our_own_names_stand_no_other_is_read(tmp_path: Path) -> None:
-    text = "t,tau,q,setpoint_position,motor_temperature\n" + rows(",", columns=(T, TAU, Q, Q, TAU))
+def test_where_our_own_names_stand_only_a_set_point_of_another_name_is_read(tmp_path: Path) -> None:
+    text = "t,tau,q,setpoint_position,motor_temperature\n" + rows(",", columns=(T, TAU, Q, 2 * Q, TAU))
     recording = Recording.read(written(tmp_path / "run.csv", text))
-    assert recording.columns == ("t", "tau", "q", "setpoint_position", "motor_temperature")
+    assert recording.columns == ("t", "tau", "q", "q_d", "motor_temperature")
+    np.testing.assert_allclose(recording["q_d"], 2 * Q, atol=1e-8)
+    assert ['q_d = "setpoint_position"; --columns says it otherwise.' in note for note in recording.notes] == [True]
+
+
+@pytest.mark.parametrize("names", ["q_d,q_ref", "q_ref,q_cmd"])
+def test_of_two_set_points_none_is_guessed(tmp_path: Path, names: str) -> None:
+    text = f"t,tau,q,{names}\n" + rows(",", columns=(T, TAU, Q, 2 * Q, 3 * Q))
+    recording = Recording.read(written(tmp_path / "run.csv", text))
+    assert recording.columns == ("t", "tau", "q", *names.split(","))
     assert recording.notes == ()
 
 

@@ -256,6 +256,22 @@ def test_a_lag_that_another_recording_contradicts_is_no_clocks(other: float, tol
     assert bool(clocks(pair, "both")) is told
 
 
+@pytest.mark.parametrize("half", [False, True])
+def test_a_loop_without_an_integral_follows_by_less_and_its_position_is_no_doubt(half: bool) -> None:
+    """A servo that lifts a pendulum by its gain alone reaches half of the way; with an integral it would reach all.
+
+    Then a position of half the way, on an axis that lifts nothing, is read in half its scale.
+    """
+    t = np.arange(6000) / 200
+    q = 0.5 * np.sin(1.1 * t) + 0.3 * np.sin(2.3 * t)
+    v = np.gradient(q, t)
+    tau = 0.006 * np.gradient(v, t) + 0.02 * np.tanh(v / 0.01) + (0.0 if half else 0.3) * np.sin(q + 0.7)
+    run = Recording("run", {"t": t, "tau": tau, "q": q, "q_d": 2 * q if half else q + tau / 0.3})
+    found = Judgement.of([run], Reference(0.006, 0.02))
+    likeliest, _ = found.alternatives[0]
+    assert likeliest.position == pytest.approx(0.5 if half else 1.0)
+
+
 DATA = Path(__file__).resolve().parents[2] / "shared" / "recordings"
 MEASURED = {
     "quasi_direct_pendulum": ("ddp", "direct_collocation", "energy_shaping", 0.15, 0.15),

@@ -8,7 +8,18 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import CandidateFit, best_of, is_hopeful, is_minor, least, refitted, stage, starts
+from cosim.diagnosis.search import (
+    CandidateFit,
+    best_of,
+    is_hopeful,
+    is_minor,
+    is_small,
+    least,
+    refitted,
+    search,
+    stage,
+    starts,
+)
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
@@ -124,3 +135,15 @@ def test_a_small_presliding_is_minor_however_much_it_removes() -> None:
     bent = CandidateFit(Presliding(sigma0=1e4), base, POLICY.least_bent - 1, 0.0, 0.5)
     assert is_minor(bent, POLICY)
     assert not is_minor(replace(bent, evidence=POLICY.least_bent + 1), POLICY)
+
+
+def test_what_is_small_is_taken_if_it_is_all_there_is_and_ends_the_search() -> None:
+    rng = np.random.default_rng(5)
+    comparison, base = compared(lambda q, _: 0.005 * np.sin(40 * q) + 0.02 * rng.standard_normal(len(q)))
+    first = stage(comparison, base)
+    best = best_of(comparison, first)
+    assert best is not None
+    assert best.effect.id == "cogging"
+    assert is_small(best, POLICY)
+    assert best_of(comparison, first, 1.0) is None, "beside another effect it may be what that one's equation lacks"
+    assert [len(one.current.mount.effects) for one in search(comparison, base).stages] == [0, 1]

@@ -1,7 +1,8 @@
 """Which column of a file serves as which of ours: as stated, as its format fixes it, or as its name says.
 
-A file that has our own names is taken as it is. Only where one of them is missing are the others' names read; what was
-concluded is said in a note, and what can be read in two ways is refused with the option that decides.
+A file that has our own names is taken as it is, but for a set point that has another name: without it a diagnosis
+knows less. Only where a name that is needed is missing are the others' names read; what was concluded is said in a
+note, and what can be read in two ways is refused with the option that decides.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,7 +21,9 @@ from cosim.support.errors import RecordingError
 from cosim.support.numbers import whole
 
 OPTIONAL = ("q_d", "temperature")
-"""Columns that are looked for where names have to be read anyway."""
+"""Columns that are looked for where names have to be read anyway ..."""
+ALWAYS = OPTIONAL[:1]
+"""... and where they have not."""
 OURS = ("t", "tau", "q", "v", *OPTIONAL)
 """Names of our columns."""
 
@@ -85,13 +88,12 @@ def _missing(
 ) -> dict[str, str]:
     """Return the file's names of those of our columns that are missing."""
     lacking = [rule for rule in ("t", *required) if not any(name in values for name in rule.split("|"))]
-    if not lacking:
-        return {}
-    if found.numbered:
+    if lacking and found.numbered:
         raise questions.unnamed(path, found, lacking)
     free = [name for name in values if name not in taken and name not in OURS]
     roles: dict[str, str] = {}
-    for rule in [*lacking, *(name for name in OPTIONAL if required and name not in values)]:
+    beside = (OPTIONAL if lacking else ALWAYS) if required else ()
+    for rule in [*lacking, *(name for name in beside if name not in values)]:
         role, name = _one(path, found, rule, [name for name in free if name not in roles.values()], units, given)
         roles |= {role: name} if name else {}
     return roles

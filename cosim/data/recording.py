@@ -20,6 +20,7 @@ from cosim.data.columns import Columns
 from cosim.data.formats import read_columns
 from cosim.data.one_run import one_run
 from cosim.data.questions import PERIOD
+from cosim.data.registers import continued
 from cosim.data.runs import named, split
 from cosim.data.spacing import with_time
 from cosim.data.times import read_clock
@@ -134,6 +135,7 @@ class Recording:
         told = others if "components" in found.origin else {}  # a run of ours has text on purpose
         numeric = {key: column for key, column in values.items() if key not in told}
         table, notes = numbers(path, numeric, ("t", *chosen(values, required)))
+        table, joined = continued(path.stem, table, stated)
         si = {column: unit(text) for column, text in stated.items() if column in table}
         table = {key: si[key].to_si(column) if key in si else column for key, column in table.items()}
         check_time(path, table["t"], MINIMUM_ROWS if required else 2, found.values)
@@ -143,7 +145,7 @@ class Recording:
         rows: JsonObject = {"rows": found.rows} if found.rows else {}
         origin = found.origin | {"file": {"name": path.name, "sha256": sha256} | rows}
         origin |= {"start": found.start or clock.start} if found.start or clock.start else {}
-        notes = (*found.notes, *served.notes, *clock.notes, *notes)
+        notes = (*found.notes, *served.notes, *clock.notes, *notes, *joined)
         return cls(name, table, {"t": "s"} | {key: one.si for key, one in si.items()}, origin, notes, others)
 
     def write(self, path: Path | str, force: bool = False) -> Path:

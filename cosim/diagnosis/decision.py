@@ -119,6 +119,10 @@ class Gain:
         """
         return min(self.narrow, self.wide) >= policy.halved and self.nats > -policy.floor
 
+    def matters_alone(self, policy: Policy) -> bool:
+        """Whether an effect that is small in training matters held out: it halves the error there, and predicts."""
+        return self.halves(policy) and self.nats >= policy.least_predicted
+
     def raises(self, policy: Policy) -> bool:
         """Whether the plain error is raised, in both bands or by much in one.
 

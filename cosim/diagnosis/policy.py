@@ -28,7 +28,8 @@ class Policy:
     small_gain: float = 0.15
     """Share of the plain residual energy below which an effect is small: it may imitate a corner of the missing ..."""
     small_evidence: float = 100.0
-    """... and must have this evidence. Unit: nats."""
+    """... and must have this evidence. Unit: nats. One that is alone and has less is taken if it halves the held-out
+    error (`halved`) and predicts: in 200 nulls of two generators none did."""
     least_bent: float = 60.0
     """Evidence that presliding must have. Unit: nats. Beside it what laws may lack at stops stands aside; laws that are
     smooth in speed differ there from one that is not: in nulls by 24, true ones have 180 and more."""

@@ -7,6 +7,7 @@ from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.decision import Gain, stands
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.rivals import AcceptedEffect, Examined
+from cosim.diagnosis.search import is_small
 from cosim.estimation.fit import Fit
 from cosim.estimation.problem import Problem
 from pyfmi_models.mount import Mount
@@ -48,10 +49,10 @@ def _standing(
     One that does not stand may be spoilt by another: the one that falls lowest is taken out, or the one that helps
     least, whichever leaves the better prediction in the end.
     """
-    problem, policy = comparison.problem, comparison.policy
+    problem = comparison.problem
     gains = {one.effect.id: _gain(problem, chosen, one, some, held) for one in some}
     nats = {one.effect.id: gains[one.effect.id].nats for one in some}
-    falling = [one for one in some if not stands(gains[one.effect.id], _share(problem, examined.base, one), policy)]
+    falling = [one for one in some if not _stands(comparison, examined, one, gains[one.effect.id])]
     if not falling:
         return chosen, list(some), gains
     out = {min(group, key=lambda one: nats[one.effect.id]).effect.id for group in (falling, some)}
@@ -61,6 +62,14 @@ def _standing(
         ways.append(_standing(comparison, examined, _with(problem, examined, rest), rest, held))
     best, kept, known = max(ways, key=lambda way: held.predicted(way[0]))
     return best, kept, gains | known
+
+
+def _stands(comparison: Comparison, examined: Examined, one: AcceptedEffect, gain: Gain) -> bool:
+    """Whether an effect stands on the held-out recordings."""
+    small = len(examined.effects) == 1 and is_small(one.own, comparison.policy)
+    if small and not gain.matters_alone(comparison.policy):
+        return False
+    return stands(gain, _share(comparison.problem, examined.base, one), comparison.policy)
 
 
 def _longest(

@@ -144,7 +144,7 @@ class Search:
 
 
 def search(comparison: Comparison, base: Fit, on_progress: OnProgress = lambda _: None) -> Search:
-    """Add the admissible effect of the largest evidence until none has enough."""
+    """Add the admissible effect of the largest evidence until none has enough; beside a small one nothing is added."""
     stages, largest = [stage(comparison, base, on_progress)], 0.0
     while True:
         now = stages[-1]
@@ -153,6 +153,8 @@ def search(comparison: Comparison, base: Fit, on_progress: OnProgress = lambda _
             return Search(base, tuple(stages))
         largest = max(largest, best.evidence)
         stages.append(stage(comparison, with_harmonics(comparison, best.fit, best.effect), on_progress))
+        if is_small(best, comparison.policy):
+            return Search(base, tuple(stages))
 
 
 def least(policy: Policy, largest: float, gain: float) -> float:
@@ -166,12 +168,20 @@ def least(policy: Policy, largest: float, gain: float) -> float:
 def best_of(comparison: Comparison, now: Stage, largest: float = 0.0) -> CandidateFit | None:
     """The admissible candidate of the largest evidence among those with enough, beside effects with at most `largest`.
 
-    Between delay and lag the set point decides.
+    A small one is taken if it is the only thing there is: then the held-out recordings must show that it matters.
     """
-    problem, policy = comparison.problem, comparison.policy
+    policy = comparison.policy
     enough = [one for one in now.tried if one.evidence >= least(policy, largest, one.plain_gain)]
-    fit = [one for one in enough if is_admissible(comparison, one) and not is_minor(one, policy)]
-    misfits = {id(one): misfits_of(problem.prepared, one.fit.mount, one.effect) for one in fit}
+    fit = [one for one in enough if is_admissible(comparison, one)]
+    best = _told(comparison, [one for one in fit if not is_minor(one, policy)])
+    if best or largest:
+        return best
+    return _told(comparison, [one for one in fit if not is_common(one, policy)])
+
+
+def _told(comparison: Comparison, fit: Sequence[CandidateFit]) -> CandidateFit | None:
+    """The best of some candidates that the set point does not exclude; between delay and lag it decides."""
+    misfits = {id(one): misfits_of(comparison.problem.prepared, one.fit.mount, one.effect) for one in fit}
     told = [one for one in fit if is_told(misfits[id(one)], one)]
     if not told:
         return None
@@ -196,10 +206,18 @@ def margin(comparison: Comparison, one: CandidateFit, other: CandidateFit) -> fl
 
 
 def is_minor(one: CandidateFit, policy: Policy) -> bool:
+    """Whether an effect explains little, and not surely, or what laws lack of any machine."""
+    return is_small(one, policy) or is_common(one, policy)
+
+
+def is_small(one: CandidateFit, policy: Policy) -> bool:
     """Whether an effect explains little, and not surely."""
-    if hypothesis_of(one.effect).is_common_misfit and one.evidence < policy.least_bent:
-        return True
     return one.plain_gain < policy.small_gain and one.evidence < policy.small_evidence
+
+
+def is_common(one: CandidateFit, policy: Policy) -> bool:
+    """Whether an effect is no more than what laws of friction lack of any machine."""
+    return hypothesis_of(one.effect).is_common_misfit and one.evidence < policy.least_bent
 
 
 def is_admissible(comparison: Comparison, one: CandidateFit) -> bool:
