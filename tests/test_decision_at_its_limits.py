@@ -143,6 +143,19 @@ def test_the_evidence_that_is_asked_goes_with_what_held_out_recordings_say() -> 
     assert not unknown(12.0, 0.1875, -24.0 - LITTLE), "denied by the likelihood"
 
 
+def test_beside_what_has_no_name_a_margin_counts_for_a_share() -> None:
+    one = EffectScores(
+        "cable_wrap", 60.0, {"gravity_unbalance": 9.0, "delay": 13.0}, {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
+    )
+    alone, beside = (
+        decide([one], left(share=share), replace(ROUND, margin_beside_unknown=0.25)) for share in (0.0, 1.0)
+    )
+    assert (alone.is_unknown, alone.sets["cable_wrap"]) == (False, ())
+    assert (beside.is_unknown, beside.sets["cable_wrap"]) == (True, ("gravity_unbalance",))
+    odds = beside.probabilities["cable_wrap"]
+    assert alone.probabilities["cable_wrap"]["cable_wrap"] > odds["cable_wrap"] > odds["gravity_unbalance"] > 0.02
+
+
 def test_what_a_term_removes_about_turns_alone_is_nothing_unknown() -> None:
     least = POLICY.least_away_unnamed
     for away, expected in ((least, True), (least - LITTLE, False)):

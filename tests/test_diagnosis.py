@@ -27,7 +27,7 @@ from cosim.estimation.blocks import Blocks
 from cosim.estimation.equations import _late
 from cosim.estimation.fit import fit
 from cosim.estimation.inverse import Inverse, stacked
-from cosim.estimation.prepare import choose_cutoff, derivative, noise_of, prepare, quality
+from cosim.estimation.prepare import choose_cutoff, derivative, lowpass, noise_of, prepare, quality
 from cosim.support.errors import InputError, RecordingError
 from cosim_studies.proof.demo import demo_case
 from cosim_studies.proof.generator import make_case, to_toml, write_case
@@ -111,6 +111,25 @@ class TestPreparation:
         assert np.abs(piece.v - np.interp(piece.t, t, v))[piece.inside].max() < 1e-3
         assert any("short beside what the filter passes" in said for said in quality(holed, 20.0))
         assert len(prepare([holed], 100.0).pieces) == 3
+
+    def test_where_polls_are_uneven_the_band_ends_where_lines_bridge_the_steps(self) -> None:
+        """A computer that polls a drive is late by one to four steps, time and again: no half second without."""
+        t, q, v, a = wander()
+        steps = np.random.default_rng(3).choice([1, 5], len(t), p=[0.9, 0.1])
+        rows = np.cumsum(15 * steps)
+        rows = rows[rows < len(t)]
+        polled = recorded((5 * a)[rows], t[rows], q[rows])
+        prepared = prepare([polled], 30.0)
+        assert 0.5 < prepared.cutoff < 6.0
+        (piece,) = prepared.pieces
+        slow = lowpass(v, float(t[1] - t[0]), prepared.cutoff)
+        assert np.abs(piece.v - np.interp(piece.t, t, slow))[piece.inside].max() < 0.05 * np.abs(slow).max()
+
+    def test_a_recording_that_is_nothing_but_holes_is_refused(self) -> None:
+        t, q, _, a = wander()
+        short = (t % 2.5) < 1.5
+        with pytest.raises(RecordingError, match=r"run has \d+ holes in time, and pieces without holes must be 2 s"):
+            prepare([recorded((5 * a)[short], t[short], q[short])], 30.0)
 
     def test_speeds_are_right_where_time_steps_jitter_to_one_side(self) -> None:
         t, q, v, a = wander()

@@ -1,7 +1,7 @@
 """The decision, from scores alone: what is named, what stays open, whether something unknown is left. No data here."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp
 
 from cosim.diagnosis.calibration import calibrated
@@ -23,6 +23,10 @@ class EffectScores:
     """What the held-out recordings lose without it ..."""
     removes: float = 0.0
     """... and the share of their residual energy that it removes."""
+
+    def with_margins_of(self, share: float) -> "EffectScores":
+        """The same with so much of each margin."""
+        return replace(self, margins={name: share * margin for name, margin in self.margins.items()})
 
 
 @dataclass(frozen=True)
@@ -76,9 +80,11 @@ class Decision:
 
 def decide(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Decision:
     """Decide what is named, what stays open and whether something without a name is left."""
-    sets = {one.effect: open_rivals(one, policy) for one in effects}
-    named = Decision(sets, {one.effect: _probabilities(one, sets[one.effect]) for one in effects}, False, ())
-    if not is_left(effects, residual, policy):
+    left = is_left(effects, residual, policy)
+    told = [one.with_margins_of(policy.margin_beside_unknown) for one in effects] if left else effects
+    sets = {one.effect: open_rivals(one, policy) for one in told}
+    named = Decision(sets, {one.effect: _probabilities(one, sets[one.effect]) for one in told}, False, ())
+    if not left:
         return named
     return named.with_rest(followed(residual, policy), beside_unknown(effects, policy))
 

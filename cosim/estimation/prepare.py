@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
 
 from cosim.data.recording import GAP, Gap, Recording
+from cosim.support.errors import RecordingError
 from cosim.support.statistics import rms
 
 Array = npt.NDArray[np.float64]
@@ -36,6 +37,12 @@ LEAST_SECONDS, TURNED = 2.0, 2 * EDGE
 """A contiguous piece shorter than this is left out, as is one of so few rows that all of them would be turned about."""
 BRIDGED = 0.25
 """A hole shorter than this share of the shortest period that the filter passes is bridged by a straight line."""
+
+
+NARROWER = (*CUTOFFS, 6.0, 4.5, 3.0, 2.0, 1.0)
+"""Bands that are tried where holes cut a recording to pieces: what is polled by a computer comes in uneven steps."""
+COVERED = 0.5
+"""Share of a recording's time that pieces must hold. Unit: 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,9 +149,17 @@ def derivative(x: Array, dt: float) -> Array:
 
 
 def prepare(recordings: Sequence[Recording], cutoff: float) -> Prepared:
-    """Filter, differentiate and cut recordings; `cutoff` [Hz] is lowered to 0.3 of the slowest sample rate."""
+    """Filter, differentiate and cut recordings.
+
+    `cutoff` [Hz] is lowered to 0.3 of the slowest sample rate, and on to where the lines that bridge short holes leave
+    pieces that hold most of each recording.
+
+    Raises:
+        RecordingError: holes leave of a recording too little in any band.
+    """
     slowest = max(recording.sample_time for recording in recordings)
     cutoff = min(cutoff, 0.3 / slowest)
+    cutoff = min(_telling(one, cutoff) for one in recordings)
     pieces = [piece for index, one in enumerate(recordings) for piece in _pieces(one, index, cutoff)]
     has_position = all("q" in recording for recording in recordings)
     return Prepared(tuple(r.name for r in recordings), tuple(pieces), cutoff, has_position)
@@ -168,15 +183,32 @@ def _holes(recording: Recording, cutoff: float) -> list[Gap]:
     return [gap for gap in recording.gaps if gap.end - gap.start > BRIDGED / cutoff]
 
 
-def _pieces(recording: Recording, index: int, cutoff: float) -> list[Piece]:
-    dt = recording.sample_time
-    ends = [gap.row for gap in _holes(recording, cutoff)]
+def _telling(recording: Recording, cutoff: float) -> float:
+    """The widest band up to `cutoff` [Hz] in which pieces hold enough of a recording."""
+    for band in (cutoff, *(one for one in NARROWER if one < cutoff)):
+        spans = _spans(recording, band)
+        held = sum(recording.t[span.stop - 1] - recording.t[span.start] for span in spans)
+        if spans and held >= COVERED * recording.duration:
+            return band
+    rule = f"pieces without holes must be {LEAST_SECONDS:g} s and {TURNED + 1} rows long and hold half of a recording"
+    raise RecordingError(
+        f"{recording.name} has {len(recording.gaps)} holes in time, and {rule}; record it in even steps.",
+        culprit=recording.name,
+        value=len(recording.gaps),
+    )
+
+
+def _spans(recording: Recording, cutoff: float) -> list[slice]:
+    """Rows between holes that are long enough."""
+    dt, ends = recording.sample_time, [gap.row for gap in _holes(recording, cutoff)]
     spans = zip([0, *ends], [*ends, len(recording)], strict=True)
     return [
-        _piece(recording, index, slice(first, last), cutoff)
-        for first, last in spans
-        if (last - first) * dt >= LEAST_SECONDS and last - first > TURNED
+        slice(first, last) for first, last in spans if (last - first) * dt >= LEAST_SECONDS and last - first > TURNED
     ]
+
+
+def _pieces(recording: Recording, index: int, cutoff: float) -> list[Piece]:
+    return [_piece(recording, index, span, cutoff) for span in _spans(recording, cutoff)]
 
 
 def _piece(recording: Recording, index: int, span: slice, cutoff: float) -> Piece:
