@@ -107,9 +107,10 @@ def _range(values: Array) -> float:
 def _step(values: Array) -> float:
     """What all values are whole numbers of; 0 where there is nothing such."""
     changes = np.diff(np.unique(values))
-    least = float(changes[changes > LEAST * values.max()].min(initial=values.max()))
-    exact = (_exact(least / parts, values) for parts in PARTS)
-    return next((one for one in exact if np.abs(values / one - np.rint(values / one)).max() < WHOLE), 0.0)
+    top = float(values.max())
+    least = float(np.min(changes[changes > LEAST * top], initial=top))
+    exact = [_exact(least / parts, values) for parts in PARTS]
+    return next((one for one in exact if float(np.abs(values / one - np.rint(values / one)).max()) < WHOLE), 0.0)
 
 
 def _exact(step: float, values: Array) -> float:
