@@ -118,5 +118,5 @@ def _exact(step: float, values: Array) -> float:
     for reach in REACHES:
         some = values[values <= reach * step]
         times = np.rint(some / step)
-        step = float(times @ some / max(times @ times, 1.0)) or step
+        step = float(times @ some) / max(float(times @ times), 1.0) or step
     return step
