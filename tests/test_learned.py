@@ -111,6 +111,16 @@ def test_what_goes_over_the_way_counts_it_there_and_back() -> None:
     assert float(effect.level(1.0, here._replace(state=[0.0]))) == pytest.approx(np.exp(0.5))
 
 
+def test_a_drive_that_overshoots_a_little_is_made_smaller_until_more_command_gives_more() -> None:
+    """One wave is steepest at zero, where its place rises by 10.5 a command (`test_learned_limits.py`)."""
+    falls = LearnedDrive(command_seen=(-1.0, 1.0), missing=(0.0, -1.1 / (np.pi * 10.5)))
+    assert "less where it is asked for more" in falls.broken_rule()
+    assert falls.admitted().broken_rule() == ""
+    assert falls.admitted().missing[1] == pytest.approx(falls.missing[1] * 0.99 / 1.1, rel=0.05)
+    for as_it_is in (replace(falls, missing=(0.0, -0.9 / (np.pi * 10.5))), replace(falls, missing=(0.0, -0.1))):
+        assert as_it_is.admitted() is as_it_is
+
+
 def test_a_gain_that_is_learned_asks_for_more_command_where_the_motor_is_weak() -> None:
     effect = LearnedGain(over="position", seen=(-1.0, 1.2), more_command=(0.0, 0.1))
     weak, strong = (effect.given(mount(effect).at(0.0, q, 0.0)) for q in (-1.0, 1.2))

@@ -13,6 +13,7 @@ from cosim.diagnosis.learned.partial import Partial
 from cosim.diagnosis.learned.spelled import Spelled
 from cosim.estimation.blocks import Blocks
 from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque
+from pyfmi_models.effects.learned_memory import LearnedAfterReversal
 
 Array = np.ndarray
 NOISE = 0.05
@@ -114,6 +115,34 @@ def test_a_product_that_begins_anywhere_is_read_as_one_of_lines() -> None:
     assert forms(formula) == {"line"}
     k1, k2, k3 = formula.coefficients  # of x, x y, y
     assert (-k1 / k2, -k3 / k2, k2) == pytest.approx((18.0, 0.3, 0.05), rel=0.05)
+
+
+def test_a_sine_of_many_periods_is_found() -> None:
+    (part, slopes), (there, own) = (made(POSITION, lambda x: 0.4 * np.sin(2 * np.pi * x / 0.14), k) for k in (1, 2))
+    noise = there.left - 0.4 * np.sin(2 * np.pi * there.over / 0.14)
+    formula = proposed(part, Rows.of(part, slopes), Unseen(Rows.of(there, own), there.blocks, noise, there.left))
+    assert formula is not None
+    assert formula.inner[1] == pytest.approx(0.14, rel=0.01)
+
+
+def test_what_fades_after_a_reversal_has_its_time() -> None:
+    """0.7 exp(-t / 0.3 s): the memory's own form, whatever else would fit as well."""
+    fading = LearnedAfterReversal(times=(0.1, 0.4), level_change=(0.1, 0.1))
+    law = lambda x: 0.7 * np.exp(-(x + 0.8) / 0.3)  # noqa: E731
+    both = [made(fading, law, seed) for seed in (1, 2)]
+    (part, slopes), (there, own) = ((replace(one, over=one.over + 0.8), rows) for one, rows in both)
+    noise = there.left - 0.7 * np.exp(-there.over / 0.3)
+    formula = proposed(part, Rows.of(part, slopes), Unseen(Rows.of(there, own), there.blocks, noise, there.left))
+    assert formula is not None
+    said = Spelled(fading, formula, False).as_json()
+    assert said["equation"] == "friction × (1 + f), f = k1 exp(−t/fade)"
+    assert said["parameters"]["fade"]["value"] == pytest.approx(0.3, rel=0.1)
+    assert [said["parameters"][name]["unit"] for name in ("fade", "k1")] == ["s", "1"]
+
+
+def test_of_two_forms_of_one_number_the_lower_power_is_the_shorter() -> None:
+    line, cube = (Formula((Shape(one),), (1.0,)) for one in FORMS if one.name in ("line", "cube"))
+    assert line.length < cube.length
 
 
 def test_where_no_form_fits_there_is_no_formula() -> None:

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pyfmi_models.effects.learned import COLUMNS, ROWS, LearnedDrive, LearnedFriction, LearnedTorque
+from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque
+from pyfmi_models.effects.learned_base import COLUMNS, ROWS
+from pyfmi_models.effects.learned_drive import LearnedDrive
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHysteresis
 from pyfmi_models.waves import broken_range, input_of, span, spoken, waves
 

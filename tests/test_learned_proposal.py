@@ -17,23 +17,27 @@ from test_learned_formula import POSITION, WARM, found
 from test_report_learned import TOLD
 
 import pyfmi_models
-from cosim.diagnosis.learned.forms import FORMS
+from cosim.diagnosis.learned.forms import FADE, FORMS
 from cosim.diagnosis.learned.formula import Formula, Shape
 from cosim.diagnosis.learned.proposal import Proposal, write_proposals
 from cosim.diagnosis.learned.spelled import Spelled
 from cosim.diagnosis.terminal import proposed
 from cosim.support.errors import OutputError
-from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque
-from pyfmi_models.effects.learned_drive import LearnedDrive
+from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque, LearnedViscous
+from pyfmi_models.effects.learned_drive import LearnedDrive, LearnedGain
+from pyfmi_models.effects.learned_memory import LearnedAfterReversal
 
 PACKAGE = Path(str(pyfmi_models.__file__)).parent
 TESTS = Path(__file__).parent
 NAMED = {form.name: form for form in FORMS}
 COLUMN = LearnedTorque(over="input.load", seen=(0.0, 10.0), torque=(0.0, 0.1))
 TURN = LearnedFriction(over="turn", level_change=(0.0, 0.1, 0.0))
+DRAG = LearnedViscous(over="acceleration", seen=(-3.0, 3.0), viscous_torque=(0.0, 0.1))
+GAIN = LearnedGain(over="temperature", seen=(10.0, 25.0), more_command=(0.0, 0.1))
+KICK = LearnedAfterReversal(times=(0.1, 0.4), level_change=(0.1, 0.1))
 DRIVE = LearnedDrive(command_seen=(-20.0, 20.0), missing=(0.0, 0.1))
 ASK = """
-import json, sys
+import json, math, sys
 from pyfmi_models.card import parse_card
 from pyfmi_models.effects.base import Motion
 asked = json.load(open("asked.json"))
@@ -44,10 +48,20 @@ for name, (kind, quantities) in asked.items():
     card.plant().model()
     (effect,) = card.effects
     rows = [dict(zip(quantities, row)) for row in zip(*quantities.values())]
-    motions = [Motion(0.0, r.get("position", 0.0), 0.1, r.get("turn", 0.0), r) for r in rows]
-    told[name] = [
-        float(effect.load(m) if kind == "torque" else effect.level(1.0, m) - 1 if kind == "friction" else
-              r["command"] - effect.applied((), r["command"])) for m, r in zip(motions, rows)]
+    def state(r):
+        if "time since reversal" in r:
+            return [1 - 2 * math.exp(-r["time since reversal"] / effect.fade)]
+        return [0.1 - 0.02 * r["acceleration"]] if "acceleration" in r else []
+    motions = [Motion(0.0, r.get("position", 0.0), 0.1, r.get("turn", 0.0), r, 0.0, state(r)) for r in rows]
+    says = {
+        "torque": lambda m, r: effect.load(m),
+        "friction": lambda m, r: effect.level(1.0, m) - 1,
+        "friction after a reversal": lambda m, r: effect.level(1.0, m) - 1,
+        "viscous": lambda m, r: (effect.viscous(10.0, m) - 10.0) / 0.1,
+        "gain": lambda m, r: 1 / effect.given(m).applied((), 1.0) - 1,
+        "drive": lambda m, r: r["command"] - effect.applied((), r["command"]),
+    }
+    told[name] = [float(says[kind](m, r)) for m, r in zip(motions, rows)]
 print(json.dumps(told))
 """
 
@@ -66,6 +80,9 @@ def proposals() -> tuple[Proposal, ...]:
         (DRIVE, simple(tanh, inner=(0.7,), coefficients=(0.4,), top=20.0)),
         (COLUMN, simple(power, Shape(None), inner=(0.6,), coefficients=(0.3, -0.1), top=10.0)),
         (TURN, simple(sine, inner=(0.2, 1.3), coefficients=(0.3,), top=3.1)),
+        (DRAG, simple(Shape(NAMED["size"]), inner=(), coefficients=(2.0,), top=3.0)),
+        (GAIN, simple(Shape(NAMED["line"]), inner=(), coefficients=(0.02,), top=25.0)),
+        (KICK, simple(Shape(FADE), inner=(0.3,), coefficients=(0.7,), top=2.0)),
     ]
     return tuple(Proposal(Spelled(effect, formula, False), "It was learned.") for effect, formula in formulas)
 
@@ -92,6 +109,7 @@ def asked(one: Proposal) -> dict[str, list[float]]:
     """Places inside the range that was seen, by the name of the quantity."""
     rng = np.random.default_rng(3)
     edges = {"position": (-0.8, 1.0), "temperature": (10.0, 25.0), "command": (-20.0, 20.0), "turn": (-3.1, 3.1)}
+    edges |= {"acceleration": (-3.0, 3.0), "time since reversal": (0.0, 2.0)}
     return {
         name.removeprefix("input."): rng.uniform(*edges.get(name, (0.0, 10.0)), 25).tolist()
         for name in one.spelled.names

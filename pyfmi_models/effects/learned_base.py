@@ -34,6 +34,8 @@ COLUMNS = 5
 SEEN_WITHIN = 0.02
 """T of the module [s]: a bandwidth of 8 Hz is above that of what moves an axis. Of half and twice it a drag by
 acceleration removes .97 and .94 of an error, of this .96."""
+SINCE = {"time since reversal": "s", "distance since reversal": "rad"}
+"""Quantities that a fading memory is a function of, with their units."""
 FOLLOWED = ("acceleration", "way")
 """Quantities that a state follows."""
 
@@ -61,6 +63,14 @@ class LearnedEffect(Effect):
     def quantities(self) -> tuple[str, ...]:
         """What it goes over, as a card names it; nothing where it remembers the motion."""
         return ()
+
+    def admitted(self) -> Self:
+        """The same, changed a little where it breaks a rule by a little."""
+        return self
+
+    def since(self) -> str:
+        """What it fades with, if it is one quantity that a formula may go over: `SINCE`."""
+        return ""
 
     def of_one(self) -> Self | None:
         """The same effect with the value one everywhere; None where it remembers."""

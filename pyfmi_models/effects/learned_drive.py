@@ -13,6 +13,11 @@ from pyfmi_models.effects.learned_table import LearnedTable
 from pyfmi_models.model import Scalar, parameter, structure
 from pyfmi_models.waves import broken_range, span, spoken, waves
 
+LEAST_RISE = 0.01
+"""Torque per command that is left of a table that was made smaller: with less a motion hardly tells the command."""
+OVERSHOT = 1.3
+"""Largest rise of what is missing per command of a table that is made smaller: one that is steeper is another one."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class LearnedDrive(LearnedEffect, DriveEffect):
@@ -72,8 +77,19 @@ class LearnedDrive(LearnedEffect, DriveEffect):
         return {"kind": self.kind, "command": command.tolist(), "missing": missing.tolist(), "unit": unit}
 
     def _falls(self) -> bool:
+        return self._steepest() >= 1
+
+    def _steepest(self) -> float:
+        """Largest rise of what is missing per command."""
         command, missing = self.curve(2001)
-        return bool((np.diff(command - missing) <= 0).any())
+        return float((np.diff(missing) / np.diff(command)).max())
+
+    def admitted(self) -> Self:
+        """A table that overshoots a little made smaller: more command gives more torque, at least `LEAST_RISE`."""
+        steepest = self._steepest()
+        if not 1 <= steepest < OVERSHOT:
+            return self
+        return replace(self, missing=tuple((1 - LEAST_RISE) / steepest * one for one in self.missing))
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""

@@ -118,6 +118,11 @@ class LearnedAfterReversal(_Memory, FrictionEffect):
         """`ways`, then `times`."""
         return (*self.ways, *self.times)
 
+    def since(self) -> str:
+        """The time or the way since the last reversal."""
+        both = self.ways and self.times
+        return "" if both else "distance since reversal" if self.ways else "time since reversal"
+
     def for_reader(self, unit: str) -> LearnedTable:
         """The elements, of the level."""
         ways, times, change = (list(one) for one in (self.ways, self.times, self.level_change))

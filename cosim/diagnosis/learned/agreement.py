@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.learned.formula import Formula, Rows, complete, shortest
-from cosim.diagnosis.learned.partial import Partial, partial, without
+from cosim.diagnosis.learned.formula import Formula, Rows, complete, fading, shortest
+from cosim.diagnosis.learned.partial import Partial, faded, partial, without
 from cosim.diagnosis.predictive import Predictive
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import Fit
@@ -57,7 +57,7 @@ class Unseen:
 
 def proposed(part: Partial, train: Rows, unseen: Unseen) -> Formula | None:
     """The shortest formula that is as good as the table; None where none is."""
-    return first_as_good(shortest(train), part, train, unseen)
+    return first_as_good(fading(train) if part.effect.since() else shortest(train), part, train, unseen)
 
 
 def first_as_good(formulas: Sequence[Formula], part: Partial, train: Rows, unseen: Unseen) -> Formula | None:
@@ -72,12 +72,13 @@ def first_as_good(formulas: Sequence[Formula], part: Partial, train: Rows, unsee
 def formula_of(
     learned: Mount, effect: LearnedEffect, found: Fit, comparison: Comparison, held: Predictive
 ) -> Formula | None:
-    """The formula of a learned effect of a mount; None where none is as good, or it remembers."""
+    """The formula of a learned effect of a mount; None where none is as good, or it goes round a loop."""
     problem = comparison.problem
-    if effect.of_one() is None:
+    rows = faded if effect.since() else partial
+    if effect.of_one() is None and not effect.since():
         return None
     part, there = (
-        partial(learned, effect, prepared, weight)
+        rows(learned, effect, prepared, weight)
         for prepared, weight in ((problem.prepared, problem.weight), (held.prepared, held.weight))
     )
     moving = found.free if effect.at_once else ()  # a line of the command is a scale of all numbers of the base at once

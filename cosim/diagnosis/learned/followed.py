@@ -1,4 +1,4 @@
-"""Quantities that a state follows along a recorded motion, as the plant's own state would (`learned_base.py`)."""
+"""Quantities that no moment tells, along a recorded motion: what the plant's own states follow (`learned_base.py`)."""
 
 import numpy as np
 from scipy.signal import lfilter
@@ -15,3 +15,10 @@ def followed(name: str, piece: Piece) -> Array:
     middle = np.concatenate([[0.0], (piece.v[1:] + piece.v[:-1]) / 2])
     past = lfilter([1 - keep], [1.0, -keep], middle)
     return np.asarray((piece.v - past) / SEEN_WITHIN)
+
+
+def since_reversal(name: str, piece: Piece) -> Array:
+    """The time or the way since the speed last changed its sign, or since the start, at all rows of a piece."""
+    turned = np.diff(np.sign(piece.v), prepend=np.sign(piece.v[:1])) != 0
+    last = np.maximum.accumulate(np.where(turned, np.arange(len(turned)), 0))
+    return np.asarray(piece.t - piece.t[last] if name == "time since reversal" else np.abs(piece.q - piece.q[last]))

@@ -16,6 +16,8 @@ import numpy as np
 from cosim.estimation.prepare import Array
 
 Starts = Callable[[float, float], Sequence[tuple[float, ...]]]
+MOST_PERIODS = 16
+"""Periods over the range: as many as the waves of a table draw. Half a period apart no valley of the loss is missed."""
 TINY = 1e-9
 """Added below a logarithm, relative to the range: a power has no value at nothing else."""
 
@@ -135,13 +137,23 @@ FORMS = (
         0,
         ("zero", "period"),
         lambda low, high: tuple(
-            (low + shift * (high - low) / n, (high - low) / n)
-            for n, shift in product((0.5, 1, 1.5, 2, 3, 4, 5, 6, 8, 10), (0.0, 0.25))
+            (float(low + shift * (high - low) / n), float((high - low) / n))
+            for n, shift in product(np.arange(0.5, MOST_PERIODS + 0.5, 0.5), (0.0, 0.25))
         ),
         lambda low, high: ((low - 2 * (high - low), 0.05 * (high - low)), (high, 4 * (high - low))),
     ),
 )
+FADE = Form(
+    "fade",
+    "ca.exp(-x / p0)",
+    "exp(−{x}/{p0})",
+    0,
+    ("fade",),
+    _widths(0.01, 0.03, 0.1, 0.3),
+    _within(1e-4, 3.0),
+)
+"""What is left of a reversal, over the time or the way since then: the answer of one state."""
 SECOND = tuple(one for one in FORMS if one.name in ("line", "exponential"))
 """Shapes of the second quantity of a product."""
 
-__all__ = ["FORMS", "SECOND", "Form"]
+__all__ = ["FADE", "FORMS", "SECOND", "Form"]

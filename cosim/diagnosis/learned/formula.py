@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import least_squares
 
-from cosim.diagnosis.learned.forms import FORMS, SECOND, Form
+from cosim.diagnosis.learned.forms import FADE, FORMS, SECOND, Form
 from cosim.diagnosis.learned.partial import Partial
 from cosim.estimation.blocks import sandwich
 from cosim.estimation.prepare import Array
@@ -71,9 +71,13 @@ class Formula:
 
     @property
     def length(self) -> int:
-        """Numbers and forms: how much there is to read; a number inside a form is read twice."""
-        parts = sum(len(shape.parts) for shape in self.shapes)
-        return len(self.shapes) + parts + 2 * sum(len(form.numbers) for _, form in self.forms)
+        """Numbers and forms: how much there is to read, in halves.
+
+        A number inside a form is read twice; of two powers the lower one is the shorter, a free one is none of them.
+        """
+        parts = [form for shape in self.shapes for _, form in shape.parts]
+        powers = sum(max(0, form.power - 1) for form in parts)
+        return 2 * (len(self.shapes) + len(parts) + 2 * sum(len(form.numbers) for _, form in self.forms)) + powers
 
     def placed(self) -> dict[tuple[int, Form], range]:
         """Where the numbers of each form are, among the inner ones."""
@@ -165,10 +169,18 @@ class Search:
         return 2 * float(best.cost), replace(formula, inner=tuple(map(float, best.x)))
 
 
+def fading(rows: Rows) -> list[Formula]:
+    """What fades after a reversal has one form: the others would need to know when that was."""
+    return [Search.of(rows.thinned()).fitted(Formula((Shape(FADE),), _tops(rows)))[1]]
+
+
+def _tops(rows: Rows) -> tuple[float, ...]:
+    return tuple(float(np.abs(one).max()) for one in rows.quantities)
+
+
 def shortest(rows: Rows) -> list[Formula]:
     """The best formula of each length, shortest first; a longer one only where it fits better."""
-    search = Search.of(rows.thinned())
-    tops = tuple(float(np.abs(one).max()) for one in rows.quantities)
+    search, tops = Search.of(rows.thinned()), _tops(rows)
     singles = sorted((search.fitted(Formula(shapes, tops)) for shapes in _singles(len(tops))), key=lambda one: one[0])
     tried = [*singles, *(search.fitted(Formula(s, tops)) for s in _sums([one for _, one in singles[:BEST]], len(tops)))]
     best: list[Formula] = []

@@ -205,7 +205,7 @@ def _allowed(
     """Fit terms that break no rule, with fewer waves where they would: a drive that falls where no row tells."""
     for _ in range(FEWER):
         mount, fit = fitted(comparison, found, terms)
-        effects = tuple(one.learned(one.coefficients.tolist()) for one in fit)
+        effects = tuple(one.learned(one.coefficients.tolist()).admitted() for one in fit)
         broken = [bool(effect.broken_rule()) for effect in effects]
         if not any(broken):
             return replace(mount, effects=(*mount.effects, *effects)), effects

@@ -15,7 +15,7 @@ from cosim.support.errors import OutputError
 from cosim.support.files import check_free, directory, replacing
 from cosim.support.version import __version__
 from pyfmi_models import effects
-from pyfmi_models.effects.learned_base import FOLLOWED, SEEN_WITHIN
+from pyfmi_models.effects.learned_base import FOLLOWED, SEEN_WITHIN, SINCE
 from pyfmi_models.waves import INPUT, spoken
 
 PREFIX = "proposed_"
@@ -71,6 +71,7 @@ PLACES = {
     ),
     "drive": Place("DriveEffect", ("Main",), "applied(self, state: object, command: Scalar) -> Scalar", "command - f"),
 }
+PLACES["friction after a reversal"] = PLACES["friction"]
 """Of each kind of learned term that has a value."""
 
 FILE = '''"""Proposed by `cosim diagnose` {version} from recordings; nobody has reviewed it yet.
@@ -133,7 +134,7 @@ class Proposal:
     def id(self) -> str:
         """Id of the effect, and name of its file."""
         quantities = "_and_".join(name.removeprefix(INPUT) for name in self.spelled.names)
-        return f"{PREFIX}{self.spelled.effect.kind}_over_{quantities}"
+        return f"{PREFIX}{self.spelled.effect.kind}_over_{quantities}".replace(" ", "_")
 
     def text(self) -> str:
         """Return the file."""
@@ -165,6 +166,8 @@ class Proposal:
     def _seen(self) -> tuple[Sequence[float], ...]:
         """The range of each quantity; () of the turn."""
         effect = self.spelled.effect
+        if effect.since():
+            return ((0.0, self.spelled.formula.tops[0]),)
         found = (getattr(effect, key, ()) for key in ("command_seen", "seen", "by_seen"))
         own = [seen for seen in found if seen]
         return tuple(() if name == "turn" else own.pop(0) for name in self.spelled.names)
@@ -174,10 +177,27 @@ class Proposal:
         return tuple(LETTERS.get(name, "xy"[k]) for k, name in enumerate(self.spelled.names))
 
     def _columns(self) -> list[str]:
-        return [name for name in self.spelled.names if name not in KNOWN]
+        return [name for name in self.spelled.names if name not in (*KNOWN, *SINCE)]
 
     def _followed(self) -> list[str]:
-        return [name for name in self.spelled.names if name in FOLLOWED]
+        return [name for name in self.spelled.names if name in (*FOLLOWED, *SINCE)]
+
+    def _rate(self, name: str) -> str:
+        """Rate of the state that follows a quantity; of a memory, as `LearnedAfterReversal` has it."""
+        if name in RATES:
+            return RATES[name]
+        by_time = name == "time since reversal"
+        ahead, speed = (self._direction(), "") if by_time else ("motion.v", "ca.fabs(motion.v) * ")
+        return f"({ahead} - {speed}motion.state[0]) / self.fade"
+
+    def _direction(self) -> str:
+        return f"ca.tanh(motion.v / {float(getattr(self.spelled.effect, 'creep', 1.0))!r})"
+
+    def _known(self, name: str) -> str:
+        """A quantity as the effect finds it; since a reversal, from what a memory of it has left."""
+        if name in SINCE:
+            return f"-self.fade * ca.log(ca.fmax((1 - {self._direction()} * motion.state[0]) / 2, 1e-9))"
+        return KNOWN.get(name, f'motion.inputs["{name.removeprefix(INPUT)}"]')
 
     def _variables(self) -> list[str]:
         return [*self._columns(), *self._followed()]
@@ -187,14 +207,14 @@ class Proposal:
         if not self._followed():
             return
         (name,) = self._followed()
-        (one,) = self.spelled.effect.states()
+        one, *_ = self.spelled.effect.states()
         described = f'unit="{one.unit}", description="{one.description}"'
         yield "\n    def states(self) -> tuple[Variable, ...]:"
         yield f'        """What the {spoken(name)} is told by."""'
         yield f'        return (Variable(name="{one.name}", {described}),)'
         yield "\n    def rate(self, motion: Motion) -> Any:"
         yield '        """Follow it."""'
-        yield f"        return {RATES[name]}\n"
+        yield f"        return {self._rate(name)}\n"
 
     def _ranges(self) -> Iterator[str]:
         for k, (name, seen) in enumerate(zip(self.spelled.names, self._seen(), strict=True)):
@@ -243,7 +263,7 @@ class Proposal:
 
     def _body(self) -> Iterator[str]:
         for name, letter, seen in zip(self.spelled.names, self._locals(), self._seen(), strict=True):
-            value = KNOWN.get(name, f'motion.inputs["{name.removeprefix(INPUT)}"]')
+            value = self._known(name)
             edge = f"SEEN_{letter.upper()}"
             yield f"{letter} = {f'ca.fmin(ca.fmax({value}, {edge}[0]), {edge}[1])' if seen else value}"
         pairs = zip(self.spelled.outer_names, self.spelled.formula.shapes, strict=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from cosim.diagnosis.entries import FormulaEntry, NumberEntry
 from cosim.diagnosis.learned.formula import Formula, Shape, interval
-from pyfmi_models.effects.learned_base import LearnedEffect
+from pyfmi_models.effects.learned_base import SINCE, LearnedEffect
 from pyfmi_models.waves import INPUT, UNITS, spoken
 
 LETTERS = {
@@ -17,6 +17,8 @@ LETTERS = {
     "payload": "M",
     "acceleration": "a",
     "way": "s",
+    "time since reversal": "t",
+    "distance since reversal": "d",
 }
 LEFT = {
     "torque": "torque",
@@ -24,6 +26,7 @@ LEFT = {
     "friction": "friction × (1 + f), f",
     "viscous": "added drag = v f, f",
     "gain": "command × (1 + f), f",
+    "friction after a reversal": "friction × (1 + f), f",
 }
 """What a formula says, by the kind of its term."""
 DRAG = {"N.m": "N.m.s/rad", "N": "N.s/m"}
@@ -41,7 +44,7 @@ class Spelled:
     @property
     def names(self) -> tuple[str, ...]:
         """Quantities, as a card names them."""
-        return self.effect.quantities()
+        return self.effect.quantities() or (self.effect.since(),)
 
     @property
     def letters(self) -> tuple[str, ...]:
@@ -87,7 +90,7 @@ class Spelled:
 
     def unit(self, which: int) -> str:
         """Unit of quantity number `which`."""
-        unit = UNITS.get(self.names[which], "1")
+        unit = (UNITS | SINCE).get(self.names[which], "1")
         return unit.replace("rad", "m").replace("N.m", "N") if self.linear else unit
 
     def numbers(self) -> tuple[tuple[str, float, float, str], ...]:
