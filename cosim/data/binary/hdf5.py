@@ -1,4 +1,4 @@
-"""HDF5, and MAT v7.3 which is HDF5: every dataset that is a vector, whatever its group."""
+"""HDF5, and MAT v7.3 which is HDF5: every dataset that is a vector or a table of them, whatever its group."""
 
 from collections import Counter
 from pathlib import Path
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.data.binary.packages import package, vectors
+from cosim.data.binary.packages import is_table, package, vectors
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, check_columns
 
@@ -28,12 +28,12 @@ def read(path: Path) -> Columns:
 
 
 def _vectors(path: Path, file: Any) -> dict[str, Any]:
-    """Return the numeric datasets by path that have at most one dimension longer than one."""
+    """Return the numeric datasets by path that have at most one dimension longer than one, and tables."""
     items: dict[str, Any] = {}
 
     def visit(name: str, item: Any) -> None:
         numeric = getattr(item, "dtype", None) is not None and item.dtype.kind in "fiub" and item.shape is not None
-        if numeric and sum(length > 1 for length in item.shape) <= 1:
+        if numeric and (sum(length > 1 for length in item.shape) <= 1 or is_table(item.shape)):
             items[name] = item
             check_columns(path, len(items))
 

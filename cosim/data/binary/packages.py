@@ -21,9 +21,23 @@ def package(name: str, extra: str, path: Path) -> Any:
         raise MissingPackageError(f"{path} needs the package {root} to be read: {install}") from error
 
 
+MOST_BESIDE = 100
+"""Signals of one table: of two dimensions the longer one is time, as tools for simulation log to arrays."""
+
+
+def is_table(shape: tuple[int, ...]) -> bool:
+    """Whether an array holds several signals beside each other."""
+    return len(shape) == 2 and 1 < min(shape) <= MOST_BESIDE and max(shape) > min(shape)
+
+
 def vectors(path: Path, found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Keep the numeric vectors that have the commonest length longer than one."""
-    numeric = {name: value for name, value in found.items() if value.ndim == 1 and value.dtype.kind in "fiub"}
+    """Keep the numeric vectors that have the commonest length longer than one; a table is its columns, `data_1` ..."""
+    numbers = {name: value for name, value in found.items() if value.dtype.kind in "fiub"}
+    numeric = {name: value for name, value in numbers.items() if value.ndim == 1}
+    for name, value in numbers.items():
+        if is_table(value.shape):
+            columns = value if len(value) > value.shape[1] else value.T
+            numeric |= {f"{name}_{k}": column for k, column in enumerate(columns.T, 1)}
     lengths = Counter(len(value) for value in numeric.values() if len(value) > 1)
     rows = lengths.most_common(1)[0][0] if lengths else 0
     kept = {name: value for name, value in numeric.items() if len(value) == rows}
