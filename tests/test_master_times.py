@@ -11,7 +11,7 @@ from tiny_fmu import tiny
 
 import cosim.master.execution
 from cosim.fmi.component import Port
-from cosim.master.execution import CHUNK, chunks
+from cosim.master.execution import chunks
 from cosim.master.isolated import _end
 from cosim.master.loop import library
 from cosim.master.pool import Pool
@@ -68,7 +68,7 @@ def test_pieces_of_a_run_follow_the_time_that_the_last_one_took(monkeypatch: pyt
     monkeypatch.setattr(cosim.master.execution, "perf_counter", lambda: float(next(clock)))
     sizes = [len(one) for one in chunks(200_000)]
     assert sizes[:5] == [16, 128, 142, 16, 16]
-    assert sizes[5:10] == [128, 1024, 8192, CHUNK, CHUNK]
+    assert sizes[5:10] == [128, 1024, 8192, 32_768, 32_768]
     assert sum(sizes) == 200_000
     assert [len(one) for one in chunks(5)] == [5]
 
