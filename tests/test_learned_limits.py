@@ -11,7 +11,6 @@ from pyfmi_models.effects.learned_drive import LearnedDrive
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHysteresis
 from pyfmi_models.waves import broken_range, input_of, span, spoken, waves
 
-
 ROWS, COLUMNS = 41, 5
 """Of a table for a reader: values over one quantity, and over the second."""
 
