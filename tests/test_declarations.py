@@ -34,6 +34,7 @@ STATES: dict[str, list[str]] = {
     "DwellBreakaway": ["age [s] 0..inf"],
     "LearnedHysteresis": ["memory1 [1] -1..1", "memory2 [1] -1..1"],
     "LearnedAfterReversal": ["memory1 [1] -1..1", "memory2 [1] -1..1"],
+    "LearnedViscous": ["followed_speed [rad/s]"],
     "WarmingViscosity": ["rise [K]"],
     "RubbedViscosity": ["rise [K]"],
 }
@@ -50,6 +51,7 @@ HELD = {
     "LoadSideCompliance": {"resonance_hz", "encoder_share"},
     "Delay": {"delay_ms"},
     "LearnedAfterReversal": {"creep"},
+    "LearnedViscous": {"at_speed"},
     "LoadScaledFriction": {"at_level"},
 }
 """Numbers that an FMU keeps from the start of a run to its end: they shape states, or are no machine's to change."""
@@ -73,7 +75,10 @@ MAINS: dict[str, Main] = {
     "GravityUnbalance": Main("mgl"),
     "InertiaVariation": Main("relative_amplitude", PERCENT, "%"),
     **dict.fromkeys(
-        ("LearnedTorque", "LearnedFriction", "LearnedDrive", "LearnedHysteresis", "LearnedAfterReversal"),
+        (
+            *("LearnedTorque", "LearnedFriction", "LearnedViscous", "LearnedDrive", "LearnedGain"),
+            *("LearnedHysteresis", "LearnedAfterReversal"),
+        ),
         Main("share", unit="1", **PLACE),
     ),
     "LoadDependentFriction": Main("coulomb_per_Nm", PERCENT, "% of the load"),
@@ -106,8 +111,8 @@ NO_TORQUE = {
 LATER = NO_TORQUE - {"AltitudeInertia", "EncoderEccentricity", "InertiaVariation"}
 LATER |= {"ActuatorLag", "Delay", "DeadBand", "LearnedDrive", "TorqueDroop", "WarmTorqueDroop", "TorqueSaturation"}
 """What changes what drive, springs and clocks make of a motion, not what each moment of it needs."""
-NOT_TOLD = {"BoucWen", "FrictionWander", "WarmTorqueDroop"}
-"""Of what a recorded motion cannot tell: chance, a memory that is not linear, an input in the torque path."""
+NOT_TOLD = {"BoucWen", "FrictionWander"}
+"""Of what a recorded motion cannot tell: chance, a memory that is not linear."""
 
 
 def told(one: Variable) -> str:
@@ -139,13 +144,17 @@ def test_learned_terms_say_what_their_coefficients_are() -> None:
     assert marks == {
         "LearnedTorque": (True, False),
         "LearnedFriction": (False, False),
+        "LearnedViscous": (True, False),
         "LearnedDrive": (True, False),
+        "LearnedGain": (False, False),
         "LearnedHysteresis": (True, True),
         "LearnedAfterReversal": (False, False),
     }
+    doubled = pytest.approx(0.6931471805599453)
     assert {name: form.unit_value for name, form in learned().items() if form.unit_value != 1} == {
-        "LearnedFriction": pytest.approx(0.6931471805599453)
-    }, "the logarithm of two: a level that is doubled"
+        "LearnedFriction": doubled,
+        "LearnedGain": doubled,
+    }, "the logarithm of two: of what is doubled"
 
 
 def learned() -> dict[str, Any]:

@@ -104,7 +104,19 @@ LEVELS: dict[str, Callable[[Any, Motion, float], float]] = {
         g * math.exp(sum(c * (1 - math.tanh(m.v / 1e-4) * held(m.state[k])) / 2 for k, c in enumerate(e.level_change)))
     ),
 }
+
+
+def followed(e: Any, m: Motion, f: float) -> float:
+    """Of the example of learned drag: over -2 to 2 rad/s2, dense below 0.6, told at 0.5 rad/s."""
+    a = (m.v - m.state[0]) / 0.02
+    x = min(max((a / (abs(a) + 0.6) + 2 / 2.6) / (4 / 2.6), 0), 1)
+    told = sum(c * math.cos(math.pi * k * x) for k, c in enumerate(e.viscous_torque))
+    more = told * m.v / 0.5
+    return f + more if told >= 0 else f * abs(f) / (abs(f) + abs(more))
+
+
 VISCOUS: dict[str, Callable[[Any, Motion, float], float]] = {
+    "LearnedViscous": followed,
     "FrictionAsymmetry": lambda e, m, f: f * (1 + e.viscous_asymmetry * sign(m.v)),
     "ConcaveViscous": lambda e, m, f: f * (1 + (m.v / 0.3) ** 2) ** ((-0.4 - 1) / 2),
     "ThermalViscosity": lambda e, m, f: f * math.exp(-0.04 * (m.inputs["temperature"] - 20)),
@@ -139,6 +151,7 @@ RATES: dict[str, Callable[[Any, Motion], Rows]] = {
     "WarmingViscosity": lambda e, m: [(15 - m.state[0]) / 30],
     "RubbedViscosity": lambda e, m: [8 * abs(m.v) - m.state[0] / 30],
     "BoucWen": lambda e, m: [bent(e, m)],
+    "LearnedViscous": lambda e, m: [(m.v - m.state[0]) / 0.02],
     "LearnedHysteresis": lambda e, m: [(m.v - abs(m.v) * m.state[k]) / way for k, way in enumerate((0.1, 0.4))],
     "LearnedAfterReversal": lambda e, m: [
         (math.tanh(m.v / 1e-4) - m.state[k]) / time for k, time in enumerate((0.1, 0.4))
@@ -225,8 +238,15 @@ def test_the_response_of_a_drive_is_that_of_its_equation(name: str) -> None:
 @pytest.mark.parametrize("degrees", [-40.0, 20.0, 60.0, 700.0])
 def test_a_warm_drive_gives_its_share_and_never_less_than_a_tenth(degrees: float) -> None:
     effect = example(FORM["WarmTorqueDroop"])
-    given = effect.given({"temperature": degrees}).applied((), 6.0)
+    given = effect.given(Motion(0.0, 0.0, 0.0, 0.0, {"temperature": degrees})).applied((), 6.0)
     near(given, drooped(effect, 6.0) * max(0.1, 1 - 0.002 * (degrees - 20)))
+
+
+@pytest.mark.parametrize("q", [-3.0, -0.4, 0.6, 1.3])
+def test_a_learned_torque_constant_is_the_exponential_of_its_table(q: float) -> None:
+    effect = example(FORM["LearnedGain"])
+    told = table(effect, list(effect.more_command), -1, 1.2, q)
+    near(effect.given(Motion(0.0, q, 0.0, q)).applied((), 6.0), 6 * math.exp(-told))
 
 
 def test_a_spring_between_two_masses_is_its_equation_in_time_and_over_frequency() -> None:
@@ -325,5 +345,13 @@ def test_friction_wanders_as_its_generator_says_in_whole_numbers(t: float) -> No
 
 def test_every_form_with_an_equation_of_its_own_is_asked_here() -> None:
     asked = {*LEVELS, *VISCOUS, *LOADS, *INERTIAS, *READINGS, *AHEAD, *RATES, *APPLIED, *RESPONSES}
-    others = {"WarmTorqueDroop", "Compliance", "LoadSideCompliance", "Backlash", "FrictionWander", "Presliding"}
+    others = {
+        "WarmTorqueDroop",
+        "LearnedGain",
+        "Compliance",
+        "LoadSideCompliance",
+        "Backlash",
+        "FrictionWander",
+        "Presliding",
+    }
     assert set(FORM) == asked | others, "Presliding: in test_effects_friction.py"
