@@ -7,7 +7,7 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.sanity.base import base_far_from_card
-from cosim.diagnosis.sanity.limits import encoder_step, no_set_point
+from cosim.diagnosis.sanity.limits import encoder_step, little_motion, no_set_point
 from cosim.estimation.fit import edges_of
 from cosim.estimation.prepare import prepare
 from pyfmi_models.friction import Coulomb
@@ -79,3 +79,15 @@ def test_a_missing_set_point_is_said_with_what_it_costs() -> None:
     assert one.statement.startswith("blind: no set point (q_d) was recorded.")
     assert "delay from a lag" in one.statement
     assert "no proof in closed loop" in one.statement
+
+
+@pytest.mark.parametrize(("hertz", "still", "told"), [(0.1, 0.0, False), (4.0, 0.0, True), (0.1, 0.97, True)])
+def test_hardly_any_motion_away_from_turns_is_said(hertz: float, still: float, told: bool) -> None:
+    """A shake at the band's own edge turns all the time; an axis that rests turns with its noise."""
+    t = np.arange(10_000) / 500
+    q = np.where(t < (1 - still) * t[-1], np.sin(2 * np.pi * hertz * t) / hertz, 0.0)
+    noise = np.random.default_rng(1).standard_normal(len(t))
+    recording = Recording("run", {"t": t, "tau": noise, "q": q + 1e-6 * noise})
+    found = little_motion(prepare([recording], 8.0))
+    assert bool(found) is told
+    assert all("run: only" in one.statement and not one.blocks_naming for one in found)

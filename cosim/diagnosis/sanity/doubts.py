@@ -11,7 +11,7 @@ from cosim.diagnosis.sanity.clocks import clocks
 from cosim.diagnosis.sanity.entry import Sanity
 from cosim.diagnosis.sanity.judgement import judged
 from cosim.diagnosis.sanity.likelihood import Reference
-from cosim.diagnosis.sanity.limits import encoder_step, no_set_point
+from cosim.diagnosis.sanity.limits import encoder_step, little_motion, no_set_point
 from cosim.diagnosis.sanity.other_machine import other_machine
 from cosim.estimation.fit import edges_of
 from cosim.estimation.problem import Problem
@@ -65,6 +65,7 @@ def of_base(
     return (
         *base_far_from_card(problem.mount, refitted, bounds, problem.top_speed),
         *encoder_step([*train, *heldout], problem.mount, problem.prepared.cutoff),
+        *little_motion(problem.prepared),
         *no_set_point([*train, *heldout]),
     )
 

@@ -17,6 +17,7 @@ Kind = Literal[
     "single_readings",
     "encoder_step",
     "no_set_point",
+    "little_motion",
 ]
 
 
