@@ -1,5 +1,6 @@
 """A signal ends a command wherever it comes, with its exit code and a word."""
 
+import errno
 import signal
 import subprocess
 import sys
@@ -32,16 +33,31 @@ def test_a_signal_that_comes_before_a_verb_begins_is_told_by_the_exit_code(
     assert "cosim: terminated" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (None, None)])
-def test_what_a_c_extension_makes_of_a_signal_is_an_interrupt(number: int | None, code: int | None) -> None:
-    """Some swallow the KeyboardInterrupt and raise an error of their own that does not even hold it."""
+@pytest.mark.parametrize(
+    ("error", "number", "code"),
+    [
+        (RuntimeError("error building a validator"), signal.SIGINT, 130),
+        (RuntimeError("error building a validator"), signal.SIGTERM, 143),
+        (RuntimeError("error building a validator"), None, None),
+        (OSError(errno.EBADF, "Bad file descriptor"), signal.SIGTERM, 143),
+        (OSError(errno.EBADF, "Bad file descriptor"), None, 2),
+        (OSError(errno.ENOSPC, "No space left on device"), signal.SIGTERM, 2),
+    ],
+)
+def test_what_a_c_extension_makes_of_a_signal_is_an_interrupt(
+    error: Exception, number: int | None, code: int | None
+) -> None:
+    """Some swallow the KeyboardInterrupt and raise an error of their own that does not even hold it.
+
+    Python's own `rmtree` closes a file a second time; a disk that is full is what a person must know all the same.
+    """
 
     def verb() -> None:
         with suppress(KeyboardInterrupt):
             end_well()
             if number is not None:
                 signal.raise_signal(number)
-        raise RuntimeError("error building a validator")
+        raise error
 
     before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
     try:

@@ -214,6 +214,8 @@ def noticed(folder: Path) -> None:
         expected = "" if change == "min(x, 3) + 0 -> Sub" else "test_looks.py::test_looks"
         assert mutants.noticed(folder, ["test_idle.py", "test_looks.py"]) == expected, change
         assert mutants.noticed(folder, ["test_looks.py"], without=["test_looks.py::test_looks"]) == ""
+    with pytest.raises(SystemExit, match="some are not there"):
+        mutants.failed(folder, ["test_looks.py::test_gone"])
 
 
 def served(folder: Path) -> None:
@@ -226,6 +228,7 @@ def served(folder: Path) -> None:
     (folder / "tests" / "test_both.py").write_text(body)
     server = mutants.Server(folder, ["test_both.py"])
     both = ["test_both.py::test_one", "test_both.py::test_held"]
+    assert server.tests == set(both)
 
     def found(old: str, new: str, function: str) -> str | None:
         (folder / "held.py").write_text(good.replace(old, new))

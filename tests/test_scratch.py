@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -66,3 +67,24 @@ def test_nothing_else_is_touched(tmp_path: Path) -> None:
         aged(one)
     tidied(tmp_path)
     assert all(one.exists() for one in others)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_a_signal_while_a_folder_is_removed_waits_until_it_is_gone(monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = Scratch()
+    path = Path(folder.name)
+    (path / "file").write_text("x")
+    removed = os.unlink
+
+    def unlink(*given: Any, **named: Any) -> None:
+        signal.raise_signal(signal.SIGINT)
+        removed(*given, **named)
+
+    monkeypatch.setattr(os, "unlink", unlink)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            folder.cleanup()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert not path.exists()

@@ -145,6 +145,8 @@ def guarded(verb: Callable[..., Any], debug: bool) -> Callable[..., Any]:
             if debug or (isinstance(error, OSError) and error.errno == errno.EPIPE):
                 raise
             abandon_stdout()
+            if is_interrupted() and getattr(error, "errno", 0) == errno.EBADF:  # a file closed twice, as by `rmtree`
+                leave(signalled())
             say(f"cosim: {surroundings(error)}")
             sys.exit(2)
         except KeyboardInterrupt as error:

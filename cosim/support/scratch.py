@@ -13,6 +13,8 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 
+from cosim.support.interrupts import uninterrupted
+
 PREFIX = "cosim-scratch-"
 """Of every such folder, and of nothing that a person would make."""
 YOUNG = 60.0
@@ -27,6 +29,11 @@ class Scratch(TemporaryDirectory[str]):
         super().__init__(prefix=PREFIX, ignore_cleanup_errors=True)
         if (handle := _held(Path(self.name))) is not None:
             weakref.finalize(self, os.close, handle)
+
+    def cleanup(self) -> None:
+        """Remove the folder; a signal that comes meanwhile waits, for half of it removed is as good as left."""
+        with uninterrupted():
+            super().cleanup()
 
 
 @cache

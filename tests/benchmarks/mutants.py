@@ -55,6 +55,8 @@ GROUPS = {
     ),
 }
 """Modules whose tests are tested; from each group as many mutants."""
+NO_SUCH_TEST = "ERROR: not found: "
+"""What pytest says of a name that no test has: no error was noticed there."""
 LOST = ("FAILED", "ERROR")
 """What pytest says of a test that noticed."""
 DECLARING = ("test_parameter_ranges.py", "test_machine_ranges.py")
@@ -94,7 +96,10 @@ def failed(tree: Path, tests: Sequence[str], without: Iterable[str] = ()) -> str
         return f"{tests[0]} (time)"
     if code in (0, 5):  # 5: no tests here
         return ""
-    lost = [one.split(" - ")[0] for one in said.read_text("utf-8", "replace").splitlines() if one.startswith(LOST)]
+    text = said.read_text("utf-8", "replace")
+    if NO_SUCH_TEST in text:
+        raise SystemExit(f"{tree}: of the tests that are asked some are not there: {text[-300:]}")
+    lost = [one.split(" - ")[0] for one in text.splitlines() if one.startswith(LOST)]
     named = re.search(r"tests/(test_\w+\.py::.*)", lost[-1]) if lost else None
     return named[1] if named else tests[0]
 
@@ -116,10 +121,12 @@ class Asking:
     """
 
     def __init__(self, tree: Path, reached: Sequence[Reached] = ()) -> None:
-        self.tree, self._reached = tree, reached
+        self.tree = tree
         self._broken: set[str] = set()  # tests that fail in the copy without an error too
         files = sorted({one.test.split("::")[0].removeprefix("tests/") for one in reached})
         self._server = Server(tree, files) if files else None
+        there = self._server.tests if self._server else frozenset()
+        self._reached = [one for one in reached if one.test.removeprefix("tests/") in there]
 
     def attempt(self, group: str, path: Path, site: int, files: Sequence[str] = ()) -> Tried:
         """Plant one error, run the tests (or whole files of them), take it back."""

@@ -75,6 +75,8 @@ class Server:
     Args:
         tree: where the tests lie.
         files: theirs, from the folder of tests on.
+
+    `tests` are those that it found there: a map of who calls what may be older.
     """
 
     def __init__(self, tree: Path, files: Sequence[str]) -> None:
@@ -87,7 +89,8 @@ class Server:
             os._exit(int(pytest.main([*QUIET, *names], plugins=[_Loop(tree, asked, answers)])))
         os.close(asked)
         os.close(answers)
-        self._read()  # all is loaded now: no error that is planted from now on gets in unasked
+        # All is loaded now: no error that is planted from now on gets in unasked.
+        self.tests = frozenset(one.removeprefix("tests/") for one in json.loads(self._read()))
 
     def failed(self, tests: Sequence[str], module: str = "", function: str = "") -> str | None:
         """Run tests, with a function as the tree's module has it now; what failed, or None where that cannot be done.
@@ -124,10 +127,10 @@ class _Loop:
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtestloop(self, session: pytest.Session) -> bool:
         items = {one.nodeid: one for one in session.items}
-        os.write(self._answers, b"ready\n")
-        with os.fdopen(self._asked) as asked:
+        with os.fdopen(self._asked) as asked, os.fdopen(self._answers, "w") as answers:
+            print(json.dumps(list(items)), file=answers, flush=True)
             for line in asked:
-                os.write(self._answers, (json.dumps(self._answered(session, items, json.loads(line))) + "\n").encode())
+                print(json.dumps(self._answered(session, items, json.loads(line))), file=answers, flush=True)
         return True
 
     def _answered(self, session: pytest.Session, items: dict[str, pytest.Item], told: Any) -> str | None:
