@@ -13,9 +13,9 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.deliver import as_json, deliver_quickly
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.learned.candidate_terms import candidate_terms
+from cosim.diagnosis.learned.candidate_terms import candidate_terms, resolved
 from cosim.diagnosis.learned.grams import columns_of, with_terms
-from cosim.diagnosis.learned.learn import SURE, Learned, learn
+from cosim.diagnosis.learned.learn import SURE, Learned, _judged, learn
 from cosim.diagnosis.learned.select import LEAST_EVIDENCE, begun, paths
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.predictive import Predictive
@@ -236,6 +236,28 @@ def test_a_hysteresis_that_would_give_energy_is_not_learned() -> None:
     found = learned(gives)
     for effect in found.effects if found else ():
         assert not isinstance(effect, LearnedHysteresis) or min(effect.torque) >= 0
+
+
+def test_a_column_has_no_more_waves_than_its_values_tell() -> None:
+    """Two nights at two temperatures tell no bend between them."""
+    two = np.concatenate([np.linspace(10, 11, 50), np.linspace(20, 21, 50)])
+    assert [resolved(4, values) for values in (two, np.linspace(0, 1, 100), np.array([0, 0.3, 0.6, 1.0]))] == [1, 4, 2]
+
+
+@pytest.mark.parametrize(("extra", "helps"), [(warm_place, True), (wanders, False)])
+def test_what_removes_much_of_an_error_is_delivered_though_the_rest_is_no_likelier(
+    extra: Extra, helps: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What nuisances could be is free in a likelihood, and error all the same in what is delivered."""
+    comparison, base, held = parts(extra)
+    terms = [
+        one for one in candidate_terms(MOUNT, comparison.problem.prepared) if one.name == "position and temperature"
+    ]
+    monkeypatch.setattr(Predictive, "log_likelihood", lambda *_: 0.0)
+    found = _judged(comparison, base, terms, held)
+    assert found is not None
+    assert found.gain == 0.0
+    assert found.helps is helps
 
 
 def test_terms_need_evidence_each() -> None:

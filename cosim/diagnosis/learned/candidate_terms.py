@@ -5,7 +5,7 @@ clocks as well, and the equation that is fitted is the one that is delivered. Si
 a coefficient of wave k has a prior of 1/k beside the size of its term, that of a random walk over the range.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, make_dataclass, replace
 from itertools import product
 from math import pi
@@ -169,16 +169,27 @@ def _of_columns(mount: Mount, prepared: Prepared) -> Iterator[CandidateTerm]:
         over = name if name == "temperature" else INPUT + name
         if not seen[0] < seen[1] or not (name.isidentifier() and name.isascii()):
             continue
-        yield _term(f"torque over {name}", LearnedTorque, _falling(FEW), over=over, seen=seen)
-        yield _term(f"torque and {name}", LearnedGain, _falling(FEW, 0), over=over, seen=seen)
+        few = resolved(FEW, whole)
+        yield _term(f"torque over {name}", LearnedTorque, _falling(few), over=over, seen=seen)
+        yield _term(f"torque and {name}", LearnedGain, _falling(few, 0), over=over, seen=seen)
         if rubs:
-            yield _term(f"friction level over {name}", LearnedFriction, _falling(FEW, 0), over=over, seen=seen)
-            yield _term(f"speed and {name}", LearnedViscous, _falling(FEW, 0), over=over, seen=seen, at_speed=top)
+            yield _term(f"friction level over {name}", LearnedFriction, _falling(few, 0), over=over, seen=seen)
+            yield _term(f"speed and {name}", LearnedViscous, _falling(few, 0), over=over, seen=seen, at_speed=top)
             if prepared.has_position:
-                yield _of_products(name, over, seen, prepared)
+                waves = BY[0], resolved(BY[1], whole)
+                yield _of_products(name, {"by": over, "by_seen": seen, "waves": waves}, prepared)
 
 
-def _of_products(name: str, by: str, seen: tuple[float, float], prepared: Prepared) -> CandidateTerm:
-    sizes = [a * b for a, b in product(_falling(BY[0]), _falling(BY[1]))]
-    shape = {"over": "position", "seen": prepared.ranges["q"], "by": by, "by_seen": seen, "waves": BY}
+def resolved(most: int, values: Array) -> int:
+    """How many waves the values of a column tell: a wave that fits into the widest gap between them is told by none.
+
+    Two nights at two temperatures tell a rise from one to the other, and no bend between.
+    """
+    gap = float(np.diff(np.sort(values)).max() / np.ptp(values))
+    return max(1, min(most, int(1 / gap)))
+
+
+def _of_products(name: str, by: Mapping[str, Any], prepared: Prepared) -> CandidateTerm:
+    sizes = [a * b for a, b in product(_falling(BY[0]), _falling(by["waves"][1]))]
+    shape = {"over": "position", "seen": prepared.ranges["q"], **by}
     return _term(f"position and {name}", LearnedFriction, [0.0, *sizes[1:]], **shape)

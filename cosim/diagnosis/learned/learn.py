@@ -194,7 +194,8 @@ def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], 
     gain = held.log_likelihood(held.residual(whole)) - held.log_likelihood(held.residual(found.mount))
     worse = any(rms(new) > rms(old) for old, new in pairs)
     interval = interval_of(left[0], left[1], held.protocol.pieces[0].dt)
-    refused = worse or gain < comparison.policy.least_predicted or after > (1 - LEAST_GAIN) * before or interval[0] <= 0
+    proven = gain >= comparison.policy.least_predicted or 1 - (after / before) ** 2 >= comparison.policy.follows
+    refused = worse or not proven or after > (1 - LEAST_GAIN) * before or interval[0] <= 0
     names = tuple(one.name for one in terms)
     return Learned(whole, effects, names, 0.0, before, after, interval, held.protocol.cutoff, not refused, gain=gain)
 
