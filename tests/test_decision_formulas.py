@@ -103,6 +103,7 @@ def test_hats_are_straight_lines_between_knots_a_second_apart(seconds: float) ->
         bent = np.random.default_rng(5).normal(0, 1, count + 1)
         np.testing.assert_allclose(hats @ bent, np.interp(t, knots, bent), atol=1e-9)
     assert adequacy.KNOT == 1.0
+    assert _hats(np.array([3.0, 10.2])).shape == (2, 8), "two rows that are far apart"
 
 
 @pytest.mark.parametrize(

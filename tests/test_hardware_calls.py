@@ -4,6 +4,7 @@ import ctypes
 import re
 import socket
 from pathlib import Path
+from time import sleep
 from types import SimpleNamespace
 from typing import Any
 
@@ -219,13 +220,20 @@ def test_a_loop_that_is_called_runs_what_it_is_told_and_ends_without_torque(monk
 def test_a_loop_in_a_thread_runs_until_it_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[Any] = []
     session = SimpleNamespace(stop=0)
-    monkeypatch.setattr(loops, "library", library_of(calls))
+
+    def run(*given: Any) -> None:
+        while not session.stop:
+            sleep(0.001)
+        sleep(0.05)  # its last cycle
+        calls.append(("hardware_run", *given[1:]))
+
+    monkeypatch.setattr(loops, "library", library_of(calls, hardware_run=run))
     one = Threaded(session, "sample")  # type: ignore[arg-type]
     one.start()
     one.go(3)
     one.stop()
     assert session.stop == 1
-    assert calls == [("hardware_run", "sample", 2**62), ("hardware_release",)]
+    assert calls == [("hardware_run", "sample", 2**62), ("hardware_release",)], "no torque once its last cycle is over"
 
 
 def test_a_bare_clock_is_asked_in_nanoseconds_and_answers_in_microseconds(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -286,6 +294,7 @@ STORY: dict[str, Any] = {
         ({"quantum": 1.01e30}, False),
         ({"inputs": ["q_d", *(f"i{k}" for k in range(6)), "q"]}, True),
         ({"inputs": ["q_d", *(f"i{k}" for k in range(7)), "q"]}, False),
+        ({"inputs": ["q_d"], "encoder": "q_d"}, True),
         ({"inputs": []}, False),
         ({"encoder": "p"}, False),
         ({"inputs": ["q", "p"]}, False),
@@ -296,7 +305,7 @@ STORY: dict[str, Any] = {
 )
 def test_a_story_has_what_a_replay_needs(changes: dict[str, Any], good: bool) -> None:
     if good:
-        assert Story.model_validate(STORY | changes).encoder == "q"
+        assert Story.model_validate(STORY | changes).encoder == changes.get("encoder", "q")
         return
     with pytest.raises(ValueError, match="validation error"):
         Story.model_validate(STORY | changes)

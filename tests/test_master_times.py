@@ -1,6 +1,8 @@
 """Times, counts and words of the master: which moment a component is stepped at, and what is said of a run."""
 
+import gc
 import math
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from cosim.fmi.component import Port
 from cosim.master.execution import chunks
 from cosim.master.isolated import _end
 from cosim.master.loop import library
+from cosim.master.loop.shared import opened
 from cosim.master.pool import Pool
 from cosim.master.result import Statistics, _speed, remarks
 from cosim.master.typed import _digits, _rule
@@ -175,6 +178,24 @@ def test_a_rule_of_a_type_says_what_it_takes() -> None:
     assert _rule(port("Boolean"), 2.0) == "a Boolean takes 0 or 1"
     assert _rule(port("Int8"), 400.0) == "an Int8 takes whole numbers from -128 to 127"
     assert _rule(port("Enumeration", {1: "off", 3: "on"}), 2.0) == "its items are: 1 (off), 3 (on)"
+
+
+def test_a_pool_that_was_never_made_has_nothing_to_free() -> None:
+    with pytest.raises(AttributeError):
+        Pool(SimpleNamespace())  # type: ignore[arg-type]
+    gc.collect()  # what its end raises would be told here
+
+
+@pytest.mark.parametrize("probe", [{}, {"loop_layout": lambda: 7}])
+def test_a_library_that_says_another_layout_or_none_was_built_from_another_version(
+    probe: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = SimpleNamespace(**probe)
+    monkeypatch.setattr("cosim.master.loop.shared.ctypes.CDLL", lambda _: made)
+    with pytest.raises(OSError, match="another version"):
+        opened("here.so", "loop_layout", 8)
+    made.loop_layout = lambda: 8
+    assert opened("here.so", "loop_layout", 8) is made
 
 
 def test_a_column_of_exact_integers_is_zero_where_nothing_was_sent_yet() -> None:

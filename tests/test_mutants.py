@@ -144,6 +144,7 @@ def test_of_what_is_declared_outside_of_functions_the_tests_come_first_that_name
         "far": {"cosim/m.py": ["idle"], "cosim/far.py": ["far"]},
         "class": {"cosim/m.py": ["A.other"]},
         "one": {"cosim/m.py": ["one"]},
+        "uses": {"cosim/far.py": ["far"]},
         "names": {},
         "none": {},
     }
@@ -153,8 +154,10 @@ def test_of_what_is_declared_outside_of_functions_the_tests_come_first_that_name
         found = mutants_choice.calling("cosim/m.py", SHORT, line, reached)
         return [one.removeprefix("test_m.py::test_") for one in found]
 
-    assert asked(1) == ["one", "far", "names", "idle", "same", "class"]
-    assert asked(2) == ["far", "idle", "same", "class", "one"], "TWICE is named nowhere, and used elsewhere only"
+    assert asked(1) == ["one", "far", "uses", "names", "idle", "same", "class"]
+    assert asked(2) == ["far", "uses", "idle", "same", "class", "one"], (
+        "TWICE is named nowhere, and used elsewhere only"
+    )
     assert asked(10)[0] == "class", "a field: the functions of its class"
 
 

@@ -171,10 +171,11 @@ def nearness(module: str, what: Declared, one: Reached) -> int | None:
     """How far a test is from what a line declares: from who uses it, less the names that it tells; None: too far."""
     words = what.names | {what.inside.rsplit(".")[-1]} - {""}
     told = sum(_names(one.test, word) for word in words)
-    if module not in one.calls and not (told and HOME / module in imported(HOME / one.test.split("::")[0])):
-        return None
     using = users(module, what).items()
-    return min([far for file, by in using for name, far in by.items() if name in one.calls.get(file, [])] + [3]) - told
+    used = [far for file, by in using for name, far in by.items() if name in one.calls.get(file, [])]
+    if used or module in one.calls or (told and HOME / module in imported(HOME / one.test.split("::")[0])):
+        return min([*used, 3]) - told
+    return None
 
 
 def calling(module: str, source: str, line: int, reached: Sequence[Reached]) -> tuple[str, ...]:
