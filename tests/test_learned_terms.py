@@ -50,3 +50,16 @@ def test_the_scores_count_what_their_titles_say() -> None:
     assert score("worse", rows) == pytest.approx(1 / 3)
     page = learned_terms_page._line(wrong)
     assert "| -0.25 | not given = k1 u | 1.90 |" in page
+
+
+def test_a_form_over_another_quantity_or_of_another_power_is_not_the_true_one() -> None:
+    for family, right, wrong in (
+        ("drive_fade", "command × (1 + f), f = k1 T", "command × (1 + f), f = k1 T²"),
+        (
+            "distance_memory_friction",
+            "friction × (1 + f), f = k1 exp(−d/fade)",
+            "friction × (1 + f), f = k1 exp(−t/fade)",
+        ),
+    ):
+        assert learned_terms_page.has_form(row(family, equation=right))
+        assert not learned_terms_page.has_form(row(family, equation=wrong))

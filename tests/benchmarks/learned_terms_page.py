@@ -43,10 +43,10 @@ FORMS = {
     "position_temperature_friction": r"k\d q T",
     "dead_band": r"tanh\(u",
     "drive_deadband": r"u exp\(−\(u/",
-    "reversal_kick": r"exp\(",
-    "distance_memory_friction": r"exp\(",
+    "reversal_kick": r"exp\(−t/",
+    "distance_memory_friction": r"exp\(−d/",
     "motor_ripple": r"command.*sin\(2π\(q",
-    "drive_fade": r"command.*k\d T",
+    "drive_fade": r"command.*k\d T(?![²³])",
     "sluggish_oil": r"v f.*sin\(2π\(q",
     "acceleration_drag": r"v f.*\|a\|",
 }
