@@ -235,3 +235,29 @@ def test_three_hundred_damaged_files_end_in_a_recording_or_a_sentence(tmp_path: 
                 assert len(sentence) < 2000, sentence
             path.unlink()
     assert 30 < read < 270, sys.stderr.write(f"{read} of 300 were read\n")
+
+
+@pytest.mark.parametrize(
+    ("formula", "runs"),
+    [
+        ("X1*2+1", True),
+        ("2.5e-3 * (X - 4) / 7", True),
+        ("__import__('os').system('true')", False),
+        ("X.__class__", False),
+        ("9**9**9**9", False),
+        ("where(X>0,X,0)", False),
+        ("exp(X)", False),
+    ],
+)
+def test_a_formula_in_a_file_runs_only_if_it_is_arithmetic(tmp_path: Path, formula: str, runs: bool) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    t = np.arange(3000) / 500
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(np.sin(t), t, name="torque", conversion={"formula": formula})])
+        file.append([asammdf.Signal(np.sin(3 * t), t, name="position")])
+        file.save(tmp_path / "run.mf4")
+    if runs:
+        assert np.isfinite(Recording.read(tmp_path / "run.mf4")["tau"]).all()
+    else:
+        with pytest.raises(RecordingError, match="converted by a formula that is no plain arithmetic"):
+            Recording.read(tmp_path / "run.mf4")
