@@ -1,6 +1,8 @@
 """The paper's tracking experiment: what friction costs, what compensation is worth, what noise makes of both."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,6 +12,7 @@ import numpy as np
 import pytest
 
 from cosim.cli import main
+from cosim.support.errors import CosimError
 from cosim_studies.paper.checks import Check, checks
 from cosim_studies.paper.conditions import CASES, Condition, condition, conditions, definitions, scaled
 from cosim_studies.paper.experiment import Outcome, run
@@ -43,6 +46,17 @@ def base(workshop: Workshop) -> dict[str, float]:
 @pytest.fixture(scope="module")
 def ideal(workshop: Workshop) -> dict[str, float]:
     return ise(workshop, condition("ideal"))
+
+
+def _ended(_: int) -> None:
+    """What the computer does to a process when its memory is full."""
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_a_process_that_is_ended_from_outside_is_one_sentence(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(CosimError, match=r"was ended from outside, or had no memory left"), everywhere(8) as spread:
+        list(spread(_ended, range(8)))
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def test_with_matched_parameters_only_the_dynamic_model_compensates_friction(ideal: dict[str, float]) -> None:

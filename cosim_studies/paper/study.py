@@ -2,12 +2,14 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
 from os import cpu_count
 from typing import Any, NamedTuple
 
+from cosim.support.errors import CosimError
 from cosim_studies.paper.conditions import CASES, Condition, conditions
 from cosim_studies.paper.experiment import Job, Outcome, run
 from cosim_studies.paper.workshop import Workshop
@@ -121,6 +123,9 @@ def everywhere(jobs: int) -> Iterator[Callable[..., Iterator[Any]]]:
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         try:
             yield pool.map
+        except BrokenProcessPool as error:  # to cancel what such a pool has still to do would be an error of its own
+            text = "a process that did a part of this was ended from outside, or had no memory left."
+            raise CosimError(text) from error
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise
