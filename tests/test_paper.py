@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,6 +47,21 @@ def base(workshop: Workshop) -> dict[str, float]:
 @pytest.fixture(scope="module")
 def ideal(workshop: Workshop) -> dict[str, float]:
     return ise(workshop, condition("ideal"))
+
+
+def _interrupted() -> None:
+    with everywhere(8) as spread:
+        spread(time.sleep, [60.0] * 8)
+        time.sleep(1.0)
+        raise KeyboardInterrupt
+
+
+def test_an_interrupt_ends_what_waits_without_a_word(capfd: pytest.CaptureFixture[str]) -> None:
+    started = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        _interrupted()
+    assert time.monotonic() - started < 30
+    assert "Traceback" not in capfd.readouterr().err
 
 
 def _ended(_: int) -> None:

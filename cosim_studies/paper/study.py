@@ -1,11 +1,12 @@
 """All runs of the tracking experiment: every condition, every case, every seed, on all cores."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
+from functools import partial
+from multiprocessing import active_children, get_context
 from os import cpu_count
 from typing import Any, NamedTuple
 
@@ -120,12 +121,20 @@ def everywhere(jobs: int) -> Iterator[Callable[..., Iterator[Any]]]:
     if workers < 2 or jobs < 2 * workers:
         yield map
         return
+    others = active_children()
     with ProcessPoolExecutor(workers, get_context("spawn")) as pool:
         try:
-            yield pool.map
-        except BrokenProcessPool as error:  # to cancel what such a pool has still to do would be an error of its own
+            yield partial(_mapped, pool)
+        except BrokenProcessPool as error:
             text = "a process that did a part of this was ended from outside, or had no memory left."
             raise CosimError(text) from error
         except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
+            for child in set(active_children()) - set(others):
+                child.terminate()
             raise
+
+
+def _mapped(pool: ProcessPoolExecutor, function: Callable[..., Any], *parts: Iterable[Any]) -> Iterator[Any]:
+    """As `pool.map`, but nothing is cancelled at the end: where processes are ended too that is a traceback."""
+    futures = [pool.submit(function, *one) for one in zip(*parts, strict=False)]
+    return (one.result() for one in futures)
