@@ -292,3 +292,10 @@ def test_a_table_of_several_signals_is_its_columns(tmp_path: Path, kind: str, tu
     np.testing.assert_allclose(run["tau"], made.TAU)
     np.testing.assert_allclose(run["q"], made.Q)
     assert set(run.columns) == {"t", "tau", "q"}
+
+
+def test_many_columns_of_gains_do_not_outnumber_the_vectors_of_a_recording(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    savemat(tmp_path / "run.mat", {"t": made.T, "tau": made.TAU, "q": made.Q, "gains": np.ones((4, 100))})
+    assert set(Recording.read(tmp_path / "run.mat").columns) == {"t", "tau", "q"}

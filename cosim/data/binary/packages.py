@@ -31,15 +31,26 @@ def is_table(shape: tuple[int, ...]) -> bool:
 
 
 def vectors(path: Path, found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Keep the numeric vectors that have the commonest length longer than one; a table is its columns, `data_1` ..."""
-    numbers = {name: value for name, value in found.items() if value.dtype.kind in "fiub"}
-    numeric = {name: value for name, value in numbers.items() if value.ndim == 1}
-    for name, value in numbers.items():
-        if is_table(value.shape):
-            columns = value if len(value) > value.shape[1] else value.T
-            numeric |= {f"{name}_{k}": column for k, column in enumerate(columns.T, 1)}
-    lengths = Counter(len(value) for value in numeric.values() if len(value) > 1)
+    """Keep the numeric vectors that have the commonest length longer than one; a table is its columns, `data_1` ...
+
+    A table counts once: many columns of gains must not outnumber the few vectors of a recording.
+    """
+    signals = {name: _beside(value) for name, value in found.items() if value.dtype.kind in "fiub"}
+    lengths = Counter(len(one) for one in signals.values() if len(one) > 1)
     rows = lengths.most_common(1)[0][0] if lengths else 0
-    kept = {name: value for name, value in numeric.items() if len(value) == rows}
-    check_cells(path, rows, len(kept))
-    return {name: np.asarray(value, dtype=np.float64) for name, value in kept.items()}
+    kept = {name: value for name, value in signals.items() if len(value) == rows}
+    check_cells(path, rows, sum(value.shape[1] for value in kept.values()))
+    return {
+        f"{name}_{k + 1}" if is_table(value.shape) else name: np.asarray(value[:, k], dtype=np.float64)
+        for name, value in kept.items()
+        for k in range(value.shape[1])
+    }
+
+
+def _beside(value: np.ndarray) -> np.ndarray:
+    """Signals of an array as columns; none of what is neither a vector nor a table."""
+    if value.ndim == 1:
+        return value[:, None]
+    if not is_table(value.shape):
+        return np.empty((0, 0))
+    return value if len(value) > value.shape[1] else value.T

@@ -3,7 +3,6 @@
 import posixpath
 import re
 import zipfile
-import zlib
 from collections.abc import Iterator
 from math import isfinite, nan
 from pathlib import Path
@@ -11,7 +10,7 @@ from urllib.parse import unquote, urlsplit
 from xml.etree import ElementTree
 
 from cosim.fmi.description import first_line
-from cosim.support.archive import contents
+from cosim.support.archive import DAMAGED, contents
 from cosim.support.errors import ScenarioError
 from cosim.support.files import cache_home, replacing, sha256
 
@@ -26,8 +25,6 @@ _SPACES = {
     "ssm": "ParameterMapping",
     "ssb": "SignalDictionary",
 }
-_DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, OSError)
-"""What `zipfile` raises at a member it cannot unpack: damaged, packed in a way it does not know, or with a password."""
 
 
 class Archive:
@@ -67,7 +64,7 @@ class Archive:
         try:
             with zipfile.ZipFile(self.path) as archive:
                 return archive.read(self.members[name])
-        except _DAMAGED as error:
+        except (*DAMAGED, OSError) as error:
             raise self.error(f'"{name}" is damaged or encrypted: {first_line(error)}') from error
 
     def xml(self, source: str, tag: str) -> ElementTree.Element:
