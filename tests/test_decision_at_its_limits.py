@@ -12,6 +12,7 @@ from cosim.diagnosis.decision import (
     Gain,
     ResidualScores,
     TermScores,
+    beside_rest,
     decide,
     doubted,
     followed,
@@ -154,6 +155,15 @@ def test_beside_what_has_no_name_a_margin_counts_for_a_share() -> None:
     assert (beside.is_unknown, beside.sets["cable_wrap"]) == (True, ("gravity_unbalance",))
     odds = beside.probabilities["cable_wrap"]
     assert alone.probabilities["cable_wrap"]["cable_wrap"] > odds["cable_wrap"] > odds["gravity_unbalance"] > 0.02
+
+
+def test_what_was_learned_for_what_has_no_name_leaves_rivals_as_open_as_what_is_left() -> None:
+    explained = {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
+    one = EffectScores("cable_wrap", 60.0, {"gravity_unbalance": 9.0}, explained)
+    rules = replace(ROUND, margin_beside_unknown=0.25)
+    learned, seen = beside_rest([one], ("time",), rules), decide([one], left(share=1.0), rules)
+    assert learned == seen
+    assert learned.sets["cable_wrap"] == ("gravity_unbalance",)
 
 
 def test_what_a_term_removes_about_turns_alone_is_nothing_unknown() -> None:

@@ -30,8 +30,6 @@ FULL = 0.998
 """Share of its range that a register without a sign must reach: what crosses zero is there just below its end."""
 EMPTY = (0.25, 0.75)
 """Shares of the range between which nothing may be read: a torque that is small beside its range fills both ends."""
-
-
 LEAST = 1e-11
 """Share of the largest value below which a difference is one of rounding: a register of 32 bits has 2e-10."""
 WHOLE = 0.05

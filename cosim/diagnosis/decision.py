@@ -80,13 +80,20 @@ class Decision:
 
 def decide(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Decision:
     """Decide what is named, what stays open and whether something without a name is left."""
-    left = is_left(effects, residual, policy)
-    told = [one.with_margins_of(policy.margin_beside_unknown) for one in effects] if left else effects
-    sets = {one.effect: open_rivals(one, policy) for one in told}
-    named = Decision(sets, {one.effect: _probabilities(one, sets[one.effect]) for one in told}, False, ())
-    if not left:
-        return named
-    return named.with_rest(followed(residual, policy), beside_unknown(effects, policy))
+    if is_left(effects, residual, policy):
+        return beside_rest(effects, followed(residual, policy), policy)
+    return _named(effects, policy)
+
+
+def beside_rest(effects: Sequence[EffectScores], follows: tuple[str, ...], policy: Policy) -> Decision:
+    """The answer where something without a name is left, that follows quantities: margins count for less there."""
+    told = [one.with_margins_of(policy.margin_beside_unknown) for one in effects]
+    return _named(told, policy).with_rest(follows, beside_unknown(effects, policy))
+
+
+def _named(effects: Sequence[EffectScores], policy: Policy) -> Decision:
+    sets = {one.effect: open_rivals(one, policy) for one in effects}
+    return Decision(sets, {one.effect: _probabilities(one, sets[one.effect]) for one in effects}, False, ())
 
 
 def beside_unknown(effects: Sequence[EffectScores], policy: Policy) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from cosim.diagnosis.adequacy import over_time, share_beside, share_left, share_
 from cosim.diagnosis.band import in_band
 from cosim.diagnosis.breakdown import parts
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import Decision, EffectScores, ResidualScores, beside_unknown, decide, least_left
+from cosim.diagnosis.decision import Decision, EffectScores, ResidualScores, beside_rest, decide, least_left
 from cosim.diagnosis.delivered import standing
 from cosim.diagnosis.entries import NotLearnedEntry
 from cosim.diagnosis.experiment import Experiment, best, told
@@ -229,9 +229,8 @@ def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Lear
     models = Structures(problem.mount, answer.base.mount, after)
     told = tried.judged_in(judged_band(heldout, models, problem.prepared.cutoff), answer.chosen.mount)
     policy, scores = answer.comparison.policy, _scores(answer.proof)
-    if told.says_unknown(policy, least_left(scores, policy)):
-        decision = answer.decision.with_rest(told.quantities, beside_unknown(scores, policy))
-        answer = replace(answer, decision=decision)
+    if not answer.decision.is_unknown and told.says_unknown(policy, least_left(scores, policy)):
+        answer = replace(answer, decision=beside_rest(scores, told.quantities, policy))
     return answer, told if answer.decision.is_unknown else None
 
 

@@ -37,8 +37,6 @@ LEAST_SECONDS, TURNED = 2.0, 2 * EDGE
 """A contiguous piece shorter than this is left out, as is one of so few rows that all of them would be turned about."""
 BRIDGED = 0.25
 """A hole shorter than this share of the shortest period that the filter passes is bridged by a straight line."""
-
-
 NARROWER = (*CUTOFFS, 6.0, 4.5, 3.0, 2.0, 1.0)
 """Bands that are tried where holes cut a recording to pieces: what is polled by a computer comes in uneven steps."""
 COVERED = 0.5

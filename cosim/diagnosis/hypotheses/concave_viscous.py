@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import ClassVar
 
+import casadi as ca
 import numpy as np
 
 from cosim.diagnosis.candidates import Candidate, Span, contact_level, has
@@ -68,8 +69,8 @@ class ThinningGrease(Hypothesis[ConcaveViscous]):
         v = prepared.stacked("v")[far_from_turns(prepared) > 0]
         if not len(v):
             return False
-        torque = mount.friction.viscous(v) * (1 + (v / effect.thinning_speed) ** 2) ** ((effect.exponent - 1) / 2)
-        bend = projected(torque, np.column_stack([np.sign(v), v]))
+        torque = effect.viscous(ca.DM(mount.friction.viscous(v)), mount.at(0.0, 0.0, ca.DM(v)))
+        bend = projected(np.asarray(torque).ravel(), np.column_stack([np.sign(v), v]))
         return bool(np.sqrt(np.mean(bend**2)) > LEAST_BEND * contact_level(mount))
 
     def none(self, mount: Mount) -> float:

@@ -33,7 +33,8 @@ FOLLOWS = 0.95
 """Squared correlation from which a column tells the same as another."""
 DRIVEN = 0.9
 """Correlation of torque and following error from which a position loop without an integral makes the one of the other.
-Unit: 1. A geared servo of such a loop has .94 and more in slow runs; with .7 and .95 the same is said of it."""
+Unit: 1. Twelve runs of a geared servo with such a loop have .93 and more, of 67 generated loops one .92, the others
+less than .9."""
 USUAL_RATE, RATES = 500.0, 1.6
 """Sample rates of recordings [Hz]: log-normal, a factor of 5 wide."""
 SIZES, ANY_SIZES = 1.5, 2.5

@@ -68,11 +68,8 @@ def no_set_point(recordings: Sequence[Recording]) -> tuple[Sanity, ...]:
 
 def little_motion(prepared: Prepared) -> tuple[Sanity, ...]:
     """Say that recordings of training hold hardly any motion away from turns."""
-    far, first, seconds = far_from_turns(prepared), 0, 0.0
-    for piece in prepared.pieces:
-        rows = len(piece.kept)
-        seconds += float(far[first : first + rows].sum()) * piece.dt * piece.stride
-        first += rows
+    seconds_of = np.concatenate([np.full(len(piece.kept), piece.dt * piece.stride) for piece in prepared.pieces])
+    seconds = float(far_from_turns(prepared) @ seconds_of)
     if seconds >= CLEAR_SECONDS:
         return ()
     text = (
