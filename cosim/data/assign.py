@@ -16,7 +16,7 @@ from cosim.data.checks import renamed, renamed_units
 from cosim.data.columns import Columns
 from cosim.data.limits import short
 from cosim.data.roles import counts, guess
-from cosim.data.text.names import spelled, suffixed_unit
+from cosim.data.text.names import bracketed, spelled, suffixed_unit
 from cosim.support.errors import RecordingError
 from cosim.support.numbers import whole
 
@@ -62,6 +62,9 @@ def assign(
     suffixes = {ours: suffixed_unit(theirs) for ours, theirs in sources.items() if ours not in had and ours in OURS}
     had |= {ours: text for ours, text in suffixes.items() if text}
     given = {name: spelled(text) for name, text in units.items()}
+    for ours, theirs in sources.items():
+        if ours in OURS and ours not in had and ours not in units and (text := bracketed(theirs)):
+            raise questions.unknown_unit(path, ours, theirs, text)
     if "q" in roles and "q" not in given and counts(roles["q"], had.get("q", "")):
         raise questions.counted(path, roles["q"])
     return Assigned(

@@ -10,12 +10,14 @@ from typing import Any
 import numpy as np
 
 from cosim.data.limits import LARGEST, listed, short
-from cosim.data.questions import untimed
+from cosim.data.questions import coarse_time, untimed
 from cosim.data.runs import many, split
 from cosim.support.errors import RecordingError
 
 SLOWEST = 10.0
 """Longest sample time of an axis [s]."""
+COARSE = 0.5
+"""Share of rows whose time is that of the row before, beyond which time is written with too few digits."""
 BRIDGED, WORTH = 0.05, 50
 """Steps of time up to so many s are put on an even grid; it may have so many times the rows of the recording."""
 
@@ -115,6 +117,9 @@ def check_time(path: Path, t: np.ndarray, minimum: int, values: Mapping[str, np.
         message = f"{path}: time {how} at row {row:,} {span}."
         if after < before and split(path)[0].is_file():
             raise many(path, values, t, message)
+        standing = float(np.mean(np.diff(t) == 0))
+        if after == before and standing > COARSE:
+            raise coarse_time(path, message, t)
         raise RecordingError(f"{message} Split the file there.", culprit=str(path), value=float(after))
 
 

@@ -43,10 +43,22 @@ def counted(path: Path, name: str) -> UndecidedError:
     return UndecidedError(f"{text}has 65,536 of them.", decided_by=deciding, culprit=str(path), value=name)
 
 
+EXAMPLES = {"t": "ms", "tau": "mN.m", "q": "deg", "v": "deg/s", "q_d": "deg", "temperature": "degC"}
+"""A unit for each of our columns, to show how an option is written."""
+
+
+def unknown_unit(path: Path, role: str, name: str, text: str) -> UndecidedError:
+    """Ask for the unit of a column whose own is not known."""
+    option = EXAMPLES.get(role, "1")
+    told = f'{path}: "{short(text)}" of column "{short(name)}" is no unit known here; say which it is in, for example '
+    deciding = {"units": {role: option}}
+    return UndecidedError(f"{told}--units {role}={option}.", decided_by=deciding, culprit=str(path), value=text)
+
+
 def unnamed(path: Path, found: Columns, lacking: Sequence[str]) -> UndecidedError:
     """Ask for the names of columns without any; the first that grows is offered as time."""
     growing = next((name for name, column in found.values.items() if _grows(column)), "")
-    rest = [name for name in found.values if name != growing]
+    rest = [name for name, column in found.values.items() if name != growing and _is_measured(column)]
     ours = [rule.split("|")[0] for rule in lacking if rule != "t" or growing]
     columns = dict(zip(ours, [growing, *rest] if "t" in ours else rest, strict=False))
     pairs = " ".join(f"{our}={theirs}" for our, theirs in columns.items())
@@ -74,12 +86,39 @@ def rates(path: Path, name: str, step: float, fitting: Sequence[str], said: str)
     return UndecidedError(text, decided_by=deciding, culprit=str(path), value=step, choices=tuple(fitting))
 
 
+def too_fast(path: Path, name: str, step: float) -> UndecidedError:
+    """Ask for the unit of a time that steps by less than any servo does in seconds, as a spreadsheet's days do."""
+    text = (
+        f'{path}: "{short(name)}" steps by {step:.3g}, which is {1 / step:.3g} Hz in seconds and '
+        f"{1 / (step * 86_400):.4g} Hz in days. Say which with --units t=day, or --units t=s."
+    )
+    deciding = {"units": {"t": "day"}}
+    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=step, choices=("day", "s"))
+
+
+def coarse_time(path: Path, message: str, t: np.ndarray) -> UndecidedError:
+    """Ask how far apart rows are whose time [s] is written with too few digits; its whole steps tell about how far."""
+    ends = np.flatnonzero(np.diff(t) > 0)
+    step = float(t[ends[-1]] - t[ends[0]]) / float(ends[-1] - ends[0]) if len(ends) > 1 else 1e-3
+    period = f"{1e3 * step:.3g}ms"
+    text = (
+        f"{message} It is written with too few digits; if the rows are evenly spaced, say --layout {PERIOD}={period}."
+    )
+    deciding = {"layout": {PERIOD: period}}
+    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=step)
+
+
 def untimed(path: Path, values: Mapping[str, np.ndarray], message: str) -> UndecidedError:
     """Ask which column is the time, or how far apart the rows are; `message` says what there is."""
     growing = next((name for name, column in values.items() if name and _grows(column)), "")
     deciding = {"columns": {"t": growing}} if growing else {"layout": {PERIOD: "1ms"}}
     text = f"{message} or, if its rows are evenly spaced, say --layout {PERIOD}=1ms."
     return UndecidedError(text, decided_by=deciding, culprit=str(path), value="t", choices=tuple(values))
+
+
+def _is_measured(column: np.ndarray) -> bool:
+    """Whether a column may be a signal: numbers, and not empty."""
+    return column.dtype.kind in "iub" or (column.dtype.kind == "f" and not bool(np.isnan(column).all()))
 
 
 def _grows(column: np.ndarray) -> bool:

@@ -20,7 +20,7 @@ COUNTED = ("count", "counts", "ticks", "increments", "inc")
 """Words that say that a position is in counts of an encoder."""
 
 STEMS: dict[str, Names] = {
-    "time": ("timestamp", "zeit", "uhrzeit"),
+    "time": ("timestamp", "zeit", "uhrzeit", "epoch"),
     "torque": ("torque", "moment", "effort", "kraft", "force"),
     "current": ("strom", "current", "ampere"),
     "position": ("position", "winkel", "angle", "encoder", "lage", "theta"),
@@ -43,6 +43,8 @@ WORDS: dict[str, Names] = {
     "measured": ("act", "ist", "fb", "fbk", "real", "enc", "encoder", "est"),
 }
 """Whole words of names in small letters."""
+QUANTITIES = ("time", "torque", "current", "position", "speed", "temperature")
+"""Kinds that the last part of a path tells alone: `pos_vel_mapper.pos_rel` is a position."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +82,12 @@ def _is(name: str, *kinds: str) -> bool:
 
 
 def _is_one(name: str, kind: str) -> bool:
+    last = re.split(r"[./]", name)[-1]
+    name = last if kind in QUANTITIES and any(_told(last, one) for one in QUANTITIES) else name
+    return _told(name, kind)
+
+
+def _told(name: str, kind: str) -> bool:
     words, whole = words_of(name), "".join(words_of(name))
     return any(word in WORDS[kind] for word in words) or any(stem in whole for stem in STEMS[kind])
 

@@ -1,10 +1,11 @@
 """Columns of time, however they count: time stamps, seconds since 1970, ms or us, checked against their sampling.
 
 A servo is sampled at 10 Hz to 50 kHz, and a recording of it lasts 2 s at least. So a column without a unit that steps
-by one second or more counts something smaller than seconds; where two units fit, it is refused and `--units t=...`
-decides.
+by one second or more counts something smaller than seconds; where two units fit, or it steps by less than 20 us as the
+days of a spreadsheet do, it is refused and `--units t=...` decides.
 """
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,8 @@ SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 YEARS = 1e9, 4.2e9
 """Seconds since 1970 of 2001 and 2103: a time between them is a date."""
 DAY = 86_400.0
+COUNTED = re.compile(r"(?<=:\d\d)[;:](\d{1,3})$")
+"""Milliseconds that are counted behind the seconds, as in 22:13:04;75 and 22:13:04:075."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,7 @@ def _parsed(column: np.ndarray) -> np.ndarray:
     """Read time stamps of text: 01.03.2024 22:13:04,5 and the like; text that is none stays."""
     import pandas as pd
 
-    texts = [str(text).replace(",", ".") for text in column]
+    texts = [_pointed(str(text)) for text in column]
     if ":" not in texts[0]:
         return column
     try:
@@ -75,6 +78,13 @@ def _parsed(column: np.ndarray) -> np.ndarray:
         return np.asarray(pd.to_timedelta(pd.Series(texts)), dtype="timedelta64[ns]")
     except (ValueError, OverflowError):
         return column
+
+
+def _pointed(text: str) -> str:
+    """Return a time stamp with a point before the parts of a second."""
+    if text.count(":") > 1 and (found := COUNTED.search(text)):
+        return f"{text[: found.start()]}.{int(found[1]):03d}"
+    return text.replace(",", ".")
 
 
 def _of_stamps(column: np.ndarray) -> Clock:
@@ -102,6 +112,8 @@ def _of_sampling(path: Path, column: np.ndarray, name: str) -> str:
     values = column.astype(np.float64)
     steps = np.diff(values[np.isfinite(values)])
     step = float(np.median(steps)) if len(steps) else 0.0
+    if step > 0 and float(np.max(steps)) < 1 / FASTEST:
+        raise questions.too_fast(path, name, step)
     if step < 1:
         return ""
     if name.startswith("#"):

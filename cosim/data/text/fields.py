@@ -4,7 +4,7 @@ import csv
 import re
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)?)", re.IGNORECASE)
-CLOCK = r"\d{1,2}:\d{2}(:\d{2}([.,]\d+)?)?( ?[AaPp][Mm])?"
+CLOCK = r"\d{1,2}:\d{2}(:\d{2}([.,;:]\d+)?)?( ?[AaPp][Mm])?"
 DATE = r"(\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[./-]\d{1,2}[./-]\d{2,4})"
 STAMP = re.compile(rf"({DATE}([T ]{CLOCK})?|{CLOCK})(Z| ?[+-]\d{{2}}:?\d{{2}})?")
 

@@ -29,7 +29,10 @@ DIALECTS = (
     ("|", ","),
     (" ", "."),
     (" ", ","),
+    (",", ","),
 )
+REMARKS = "Comment"
+"""Name of a last column that LabVIEW writes where no row has a comment."""
 COMMENTS = ("#", "%", "//")
 CLOCK_FORMAT = re.compile(r"(?:[hHmMsSdDyYfF]+[:./ -])+[hHmMsSdDyYfF]+")
 """How a row of units says what a time stamp looks like: hh:mm:ss."""
@@ -146,7 +149,7 @@ def _words(line: str, row: Sequence[str], separator: str, count: int) -> tuple[s
     """Return the fields of a line that may name `count` columns; a sign of a comment before them is taken off."""
     sign = next((sign for sign in COMMENTS if line.lstrip().startswith(sign)), "")
     fields = split(line.lstrip().removeprefix(sign), separator) if sign else list(row)
-    if len(fields) == count + 1 and not fields[-1]:
+    if len(fields) == count + 1 and fields[-1] in ("", REMARKS):
         fields = fields[:-1]
     if len(fields) == count - 1:
         fields = [*fields, ""]

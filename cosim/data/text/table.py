@@ -1,5 +1,6 @@
 """A table of text as columns: the preamble is left, the body is parsed at once."""
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
@@ -15,22 +16,67 @@ from cosim.data.text.layout import Layout
 from cosim.data.text.names import is_unit, spelled, split_unit
 from cosim.support.errors import RecordingError
 
+NOTHING = (
+    "", "#N/A", "#N/A N/A", "#NA", "-1.#IND", "-1.#QNAN", "-NaN", "-nan", "1.#IND", "1.#QNAN", "N/A", "NA", "NULL",
+    "NaN", "n/a", "nan", "null", "-", "--", "---", "n.a.", "#NV", "#VALUE!", "#DIV/0!", "NaN(ind)", "-nan(ind)", "None",
+)  # fmt: skip
+"""What stands for no value: Arrow's own words, dashes, and those of spreadsheets and C libraries."""
+
 
 def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
     """Parse the body of a text whose layout is known."""
-    body = _body(data, layout)
+    body, again = _without_header(path, _body(data, layout), _head(data, layout))
     check_cells(path, body.count(b"\n"), layout.count)
     table, notes = _parsed(path, body, layout)
     names, units = _names(layout)
-    kept = {name: as_array(column) for name, column in zip(names, table.columns, strict=True) if name or _holds(column)}
+    pairs = zip(names, table.columns, strict=True)
+    kept = {name: grouped(as_array(column), layout.decimal) for name, column in pairs if name or _holds(column)}
     return Columns(
-        kept, {name: unit for name, unit in units.items() if name in kept}, notes=notes, numbered=not layout.names
+        kept,
+        {name: unit for name, unit in units.items() if name in kept},
+        notes=again + notes,
+        numbered=not layout.names,
     )
 
 
 def _holds(column: Any) -> bool:
     """Whether a column without a name holds anything: a separator at the end of each row makes one that does not."""
     return not pa.types.is_null(column.type) and column.null_count < len(column)
+
+
+def _head(data: bytes, layout: Layout) -> tuple[bytes, ...]:
+    """Return the lines of names and units above the first sample, as they stand in the file."""
+    above = data.split(b"\n", layout.first)[: layout.first]
+    written = [line.strip() for line in above if line.strip()]
+    return tuple(written[-(1 + bool(layout.units)) :]) if layout.names else ()
+
+
+def _without_header(path: Path, body: bytes, head: Sequence[bytes]) -> tuple[bytes, tuple[str, ...]]:
+    """Leave out the names of the columns where they stand again among the samples: a logger that was started anew."""
+    if not any(line in body for line in head):
+        return body, ()
+    lines = body.split(b"\n")
+    kept = [line for line in lines if line.strip() not in head]
+    again = next((row for row, line in enumerate(lines, 1) if line.strip() in head), 0)
+    told = f"the names of the columns stand again at row {again:,}"
+    note = f"{path.stem}: {told}; such lines were left out ({len(lines) - len(kept):,})."
+    return b"\n".join(kept), ((note,) if again else ())
+
+
+def grouped(column: np.ndarray, decimal: str) -> np.ndarray:
+    """Read numbers whose thousands are parted, `1,931.5` or `1.931,5`; any other column is returned as it is.
+
+    One of them must have a group and a decimal sign, or two groups: `1,931` alone may be 1.931.
+    """
+    sign = "." if decimal == "," else ","
+    part = rf"({re.escape(decimal)}\d+)?"
+    number = re.compile(rf"[+-]?(\d{{1,3}}({re.escape(sign)}\d{{3}})*|\d+){part}")
+    texts = [str(text) for text in column] if column.dtype == object else []
+    if not texts or not all(number.fullmatch(text) for text in texts):
+        return column
+    if not any(text.count(sign) > 1 or (sign in text and decimal in text) for text in texts):
+        return column
+    return np.array([float(text.replace(sign, "").replace(decimal, ".")) for text in texts])
 
 
 def _body(data: bytes, layout: Layout) -> bytes:
@@ -95,7 +141,7 @@ def _read(body: bytes, layout: Layout, odd: Any) -> Any:
         parse_options=csv.ParseOptions(
             delimiter="\t" if layout.separator == " " else layout.separator, invalid_row_handler=odd
         ),
-        convert_options=csv.ConvertOptions(decimal_point=layout.decimal),
+        convert_options=csv.ConvertOptions(decimal_point=layout.decimal, null_values=[*NOTHING]),
     )
 
 

@@ -11,6 +11,8 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from cosim.data.columns import Columns
 
 
@@ -52,19 +54,19 @@ VOCABULARIES = (
     Vocabulary(
         "ODrive",
         (
-            r".*\bpos_estimate",
+            r".*\bpos_(estimate|rel|abs)",
             r".*\b(Iq_(setpoint|measured)|(effective_)?torque_setpoint|torque_estimate|input_torque)",
         ),
         {
-            r".*\b(pos_(estimate|setpoint)|input_pos)": "turn",
-            r".*\b(vel_(estimate|setpoint)|input_vel)": "turn/s",
+            r".*\b(pos_(estimate|rel|abs|setpoint)|input_pos)": "turn",
+            r".*\b(vel(_estimate|_setpoint)?|input_vel)": "turn/s",
             r".*\b((effective_)?torque_setpoint|torque_estimate|input_torque)": "N.m",
             r".*\bI[qd]_(setpoint|measured)": "A",
             r".*\btemperature": "degC",
         },
         {
             "tau": (r".*\beffective_torque_setpoint", r".*\btorque_setpoint", r".*\btorque_estimate"),
-            "q": (r".*\bpos_estimate",),
+            "q": (r".*\bpos_estimate", r".*\bpos_rel", r".*\bpos_abs"),
             "q_d": (r".*\bpos_setpoint", r".*\binput_pos"),
             "v": (r".*\bvel_estimate",),
         },
@@ -81,7 +83,7 @@ VOCABULARIES = (
         {r"(.*[.:])?r0*(80|79)\b.*": "N.m", r"(.*[.:])?r0*6[0-3]\b.*": "rpm", r"(.*[.:])?r0*482\b.*": "count"},
         {"tau": (r"(.*[.:])?r0*79\b.*", r"(.*[.:])?r0*80\b.*"), "v": (r"(.*[.:])?r0*63\b.*", r"(.*[.:])?r0*61\b.*")},
     ),
-    Vocabulary("LabVIEW", ("X_Value", "Comment"), {}, {"t": ("X_Value",)}),
+    Vocabulary("LabVIEW", ("X_Value",), {}, {"t": ("X_Value",)}),
     Vocabulary("PlotJuggler", ("__time",), {"__time": "s"}, {"t": ("__time",)}),
 )
 
@@ -101,4 +103,5 @@ def with_vocabulary(columns: Columns) -> Columns:
 
 
 def _matching(pattern: str, columns: Columns) -> list[str]:
-    return [name for name in columns.values if re.fullmatch(pattern, name)]
+    full = [name for name, column in columns.values.items() if column.dtype.kind != "f" or not np.isnan(column).all()]
+    return [name for name in full if re.fullmatch(pattern, name)]

@@ -1,0 +1,172 @@
+"""Files of machines that were not seen when the reader was written: read rightly, or asked; nothing taken silently."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.data.text.names import spelled, split_unit
+from cosim.data.text.table import grouped
+from cosim.support.errors import ManyRecordingsError, RecordingError, UndecidedError
+from cosim.support.units import unit
+
+ROWS = 400
+T = 0.005 * np.arange(ROWS)
+Q = np.sin(3 * T)
+TAU = 1.5 * np.cos(3 * T)
+DEG = np.degrees(1)
+
+
+def written(folder: Path, header: str, *columns: object, separator: str = ",", name: str = "run.csv") -> Path:
+    """Write columns, of numbers or of text, below a header."""
+    cells = [[one if isinstance(one, str) else f"{one:.10g}" for one in column] for column in columns]  # type: ignore[attr-defined]
+    lines = [separator.join(row) for row in zip(*cells, strict=True)]
+    path = folder / name
+    path.write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
+    return path
+
+
+def test_a_unit_in_brackets_that_is_not_known_is_asked_for_and_never_taken_for_ours(tmp_path: Path) -> None:
+    path = written(tmp_path, "Time (s),Torque (stone-ell),Position (deg)", T, TAU, Q * DEG)
+    sentence = '"stone-ell" of column "Torque (stone-ell)" is no unit known here; say which it is in, for example '
+    with pytest.raises(UndecidedError, match=re.escape(f"{sentence}--units tau=mN.m.")):
+        Recording.read(path)
+    np.testing.assert_allclose(Recording.read(path, units={"tau": "mN.m"})["tau"], 1e-3 * TAU, atol=1e-9)
+
+
+def test_a_number_in_brackets_is_no_unit(tmp_path: Path) -> None:
+    path = written(tmp_path, "t,torque(0),position(0)", T, TAU, Q)
+    np.testing.assert_allclose(Recording.read(path)["tau"], TAU, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("text", "newton_metres"),
+    [
+        ("oz-in", 0.0070615518),
+        ("ozf·in", 0.0070615518),
+        ("lb-ft", 1.3558179),
+        ("ft.lbf", 1.3558179),
+        ("lbf in", 0.11298483),
+        ("kgf.cm", 0.0980665),
+        ("Newton-Meter", 1.0),
+        ("mNewtonMeter", 1e-3),
+        ("NM", 1.0),
+    ],
+)
+def test_torques_of_other_countries_are_known(text: str, newton_metres: float) -> None:
+    known = unit(spelled(text))
+    assert known.factor == pytest.approx(newton_metres, rel=1e-6)
+    assert known.dimension == unit("N.m").dimension
+
+
+@pytest.mark.parametrize(
+    ("text", "radians"),
+    [("Grad", np.pi / 180), ("GRAD", np.pi / 180), ("gon", np.pi / 200), ("DEG", np.pi / 180), ("′", np.pi / 10800)],
+)
+def test_angles_as_other_tools_write_them_are_known(text: str, radians: float) -> None:
+    assert unit(spelled(text)).factor == pytest.approx(radians, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("header", "name", "text"),
+    [
+        ("in s", "time", "s"),
+        ("[ms]", "time", "ms"),
+        ("X1 Lageistwert/mm", "X1 Lageistwert", "mm"),
+        ("/axis/position/rad", "/axis/position/rad", ""),
+        ("[V]", "[V]", ""),
+    ],
+)
+def test_units_stand_alone_or_behind_a_stroke(header: str, name: str, text: str) -> None:
+    assert split_unit(header) == (name, text)
+
+
+def test_the_last_part_of_a_path_tells_what_it_is(tmp_path: Path) -> None:
+    names = "time,axis.vel_mapper.pos,axis.pos_loop.torque_ref"
+    read = Recording.read(written(tmp_path, names, T, Q, TAU))
+    assert "v" not in read
+    np.testing.assert_allclose([read["q"], read["tau"]], [Q, TAU], atol=1e-8)
+
+
+def test_relative_positions_of_an_odrive_are_in_turns(tmp_path: Path) -> None:
+    names = "time,axis0.pos_vel_mapper.pos_rel,axis0.controller.effective_torque_setpoint,axis0.controller.input_pos"
+    read = Recording.read(written(tmp_path, names, T, Q, TAU, Q))
+    np.testing.assert_allclose(read["q"], 2 * np.pi * Q, atol=1e-8)
+    np.testing.assert_allclose(read["q_d"], 2 * np.pi * Q, atol=1e-8)
+
+
+def test_days_of_a_spreadsheet_are_no_seconds(tmp_path: Path) -> None:
+    days = [f"{45352.5 + t / 86400:.11f}" for t in T]
+    path = written(tmp_path, "time,torque,position", days, TAU, Q)
+    with pytest.raises(UndecidedError, match=r"200 Hz in days\. Say which with --units t=day, or --units t=s\."):
+        Recording.read(path)
+    assert Recording.read(path, units={"t": "day"}).sample_time == pytest.approx(5e-3, rel=1e-3)
+
+
+@pytest.mark.parametrize("sign", [";", ":"])
+def test_milliseconds_behind_a_time_are_counted(tmp_path: Path, sign: str) -> None:
+    clock = [f"12:00:{int(t):02d}{sign}{round(1e3 * t) % 1000}" for t in T]
+    read = Recording.read(written(tmp_path, "Time,torque,position", clock, TAU, Q))
+    np.testing.assert_allclose(read.t, T, atol=1e-9)
+
+
+def test_names_that_stand_again_are_left_out_and_a_new_time_is_another_recording(tmp_path: Path) -> None:
+    header, half = "time_s,torque_Nm,pos_rad", ROWS // 2
+    path = written(tmp_path, header, T, TAU, Q)
+    lines = path.read_text().splitlines()
+    path.write_text("\n".join([*lines[: half + 1], header, *lines[half + 1 :]]))
+    read = Recording.read(path)
+    np.testing.assert_allclose(read["q"], Q, atol=1e-8)
+    assert f"the names of the columns stand again at row {half + 1}; such lines were left out (1)." in read.notes[0]
+    path.write_text("\n".join([*lines[: half + 1], header, *lines[1 : half + 1]]))
+    with pytest.raises(ManyRecordingsError, match="These are 2 recordings"):
+        Recording.read(path)
+    np.testing.assert_allclose(Recording.read(f"{path}:#2")["q"], Q[:half], atol=1e-8)
+
+
+def test_thousands_may_be_parted_where_that_is_certain(tmp_path: Path) -> None:
+    large = [f'"{1e6 * x:,.1f}"' for x in TAU]
+    read = Recording.read(written(tmp_path, "t,torque [uN.m],q", T, large, Q))
+    np.testing.assert_allclose(read["tau"], TAU, atol=1e-7)
+    german = [text.strip('"').translate(str.maketrans(",.", ".,")) for text in large]
+    columns = [[f"{x:.9f}".replace(".", ",") for x in column] for column in (T, Q)]
+    path = written(tmp_path, "t;torque [uN.m];q", columns[0], german, columns[1], separator=";")
+    np.testing.assert_allclose(Recording.read(path)["tau"], TAU, atol=1e-7)
+
+
+def test_quoted_decimal_commas_between_commas_are_read_and_a_single_group_is_no_thousand(tmp_path: Path) -> None:
+    columns = [[f'"{x:.6f}"'.replace(".", ",") for x in column] for column in (T, TAU, Q)]
+    read = Recording.read(written(tmp_path, "t,torque,q", *columns))
+    np.testing.assert_allclose([read["tau"], read["q"]], [TAU, Q], atol=1e-6)
+    assert grouped(np.array(["1,931", "2,125"], dtype=object), ".").dtype == object
+
+
+def test_a_time_of_too_few_digits_names_the_period(tmp_path: Path) -> None:
+    seconds = [f"2024-03-01 12:00:{int(10 * t):02d}" for t in T]
+    path = written(tmp_path, "timestamp,torque,position", seconds, TAU, Q)
+    with pytest.raises(UndecidedError, match="if the rows are evenly spaced, say --layout period=50ms"):
+        Recording.read(path)
+    assert Recording.read(path, layout={"period": "50ms"}).sample_time == pytest.approx(0.05)
+
+
+@pytest.mark.parametrize("word", ["---", "#NV", "-nan(ind)", "n.a."])
+def test_words_for_no_value_are_told_and_cost_no_other_column(tmp_path: Path, word: str) -> None:
+    holes = [word if row % 90 == 5 else f"{x:.6f}" for row, x in enumerate(TAU)]
+    read = Recording.read(written(tmp_path, "t,tau,q,load", T, TAU, Q, holes))
+    assert "load" not in read
+    with pytest.raises(RecordingError, match=r"holds nan at row 6, which is not a finite number \(5 such rows\)"):
+        Recording.read(written(tmp_path, "t,tau,q", T, holes, Q))
+
+
+def test_a_file_without_names_offers_no_empty_column(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(f";{t:.4f};{tau:.6f};{q:.6f}" for t, tau, q in zip(T, TAU, Q, strict=True)))
+    with pytest.raises(UndecidedError, match=r"--columns t=#2 tau=#3 q=#4\."):
+        Recording.read(path)
+
+
+def test_a_comment_column_of_labview_may_be_missing_below_its_name(tmp_path: Path) -> None:
+    path = written(tmp_path, "X_Value\tTorque\tAngle\tComment", T, TAU, Q, separator="\t", name="run.lvm")
+    np.testing.assert_allclose(Recording.read(path)["tau"], TAU, atol=1e-8)
