@@ -115,10 +115,7 @@ def _check_torque(recording: Recording, wanted: str) -> None:
     """A unit stated for tau must be one of torque or force, whichever of the two; a current needs its constant."""
     stated = recording.units.get("tau", "")
     try:
-        if not stated or unit(stated).dimension in (
-            unit("1").dimension,
-            *(unit(one).dimension for one in TORQUE.values()),
-        ):
+        if stated in ("", "1") or unit(stated).dimension in [unit(one).dimension for one in TORQUE.values()]:
             return
     except UnitError:
         return

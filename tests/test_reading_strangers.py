@@ -9,7 +9,8 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.data.text.names import spelled, split_unit
 from cosim.data.text.table import grouped
-from cosim.support.errors import ManyRecordingsError, RecordingError, UndecidedError
+from cosim.reading import read_recordings
+from cosim.support.errors import InputError, ManyRecordingsError, RecordingError, UndecidedError
 from cosim.support.units import unit
 
 ROWS = 400
@@ -34,6 +35,24 @@ def test_a_unit_in_brackets_that_is_not_known_is_asked_for_and_never_taken_for_o
     with pytest.raises(UndecidedError, match=re.escape(f"{sentence}--units tau=mN.m.")):
         Recording.read(path)
     np.testing.assert_allclose(Recording.read(path, units={"tau": "mN.m"})["tau"], 1e-3 * TAU, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "stated"), [("torque [%]", "%"), ("torque_permille", "0.1 %"), ("torque (‰)", "0.1 %")]
+)
+def test_a_share_of_the_rated_torque_is_asked_for(tmp_path: Path, name: str, stated: str) -> None:
+    path = written(tmp_path, f"t,{name},position", T, TAU, Q)
+    with pytest.raises(
+        UndecidedError, match=f'is in {stated}; say how much one is, for example --units "tau=0.04 N.m"'
+    ):
+        Recording.read(path)
+    np.testing.assert_allclose(Recording.read(path, units={"tau": "0.04 N.m"})["tau"], 0.04 * TAU, atol=1e-8)
+
+
+def test_an_angle_is_no_torque(tmp_path: Path) -> None:
+    path = written(tmp_path, "t,tau,q", T, TAU, Q)
+    with pytest.raises(InputError, match=r"it is a torque or force, in N\.m or a unit that becomes it"):
+        read_recordings([path], {}, [], ["tau=deg"], "rotary")
 
 
 def test_a_number_in_brackets_is_no_unit(tmp_path: Path) -> None:

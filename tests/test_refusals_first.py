@@ -15,6 +15,11 @@ def test_a_file_in_the_place_of_a_folder_is_told_before_the_work(tmp_path: Path)
         check_free(tmp_path / "taken" / "card.toml", force=True)
 
 
+def test_a_folder_below_what_is_no_folder_is_refused_before_the_work() -> None:
+    with pytest.raises(OutputError, match=r"The directory /dev/null/paper cannot be made: /dev/null is no folder\."):
+        check_free(Path("/dev/null/paper/README.md"), force=True)
+
+
 @pytest.mark.parametrize(
     "words",
     [

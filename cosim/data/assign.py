@@ -24,6 +24,8 @@ OPTIONAL = ("q_d", "temperature")
 """Columns that are looked for where names have to be read anyway ..."""
 ALWAYS = OPTIONAL[:1]
 """... and where they have not."""
+SHARES = ("%", "0.1 %", "count", "counts")
+"""Units of a torque that say how much only together with the rated torque of the motor."""
 OURS = ("t", "tau", "q", "v", *OPTIONAL)
 """Names of our columns."""
 
@@ -65,6 +67,9 @@ def assign(
     for ours, theirs in sources.items():
         if ours in OURS and ours not in had and ours not in units and (text := bracketed(theirs)):
             raise questions.unknown_unit(path, ours, theirs, text)
+    share = (had | given).get("tau", "")
+    if share in SHARES:
+        raise questions.share(path, sources.get("tau", "tau"), share)
     if "q" in roles and "q" not in given and counts(roles["q"], had.get("q", "")):
         raise questions.counted(path, roles["q"])
     return Assigned(

@@ -34,6 +34,15 @@ def current(path: Path, told: Guess) -> UndecidedError:
     return UndecidedError(text, decided_by=deciding, culprit=str(path), value=name, choices=told.among)
 
 
+def share(path: Path, name: str, stated: str) -> UndecidedError:
+    """Ask what one unit of a torque is that was recorded as a share of the rated one."""
+    text = (
+        f'{path}: "{short(name)}" is in {stated}; say how much one is, for example --units "tau=0.04 N.m" where 1 % is '
+    )
+    deciding = {"units": {"tau": "1 N.m"}}
+    return UndecidedError(f"{text}0.04 N.m.", decided_by=deciding, culprit=str(path), value=name)
+
+
 def counted(path: Path, name: str) -> UndecidedError:
     """Ask how large a count of an encoder is."""
     text = (

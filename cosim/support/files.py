@@ -32,8 +32,9 @@ def check_free(path: Path, force: bool) -> None:
     Raises:
         OutputError: the file exists and `force` is not set.
     """
-    if path.parent.is_file():
-        raise _no_directory(path.parent, path.parent)
+    above = next((one for one in path.parents if one.exists()), path.parent)
+    if above.exists() and not above.is_dir():
+        raise _no_directory(path.parent, above)
     if path.exists() and not force:
         raise OutputError(f"{path} exists already; give --force to overwrite it.", culprit=str(path))
 
@@ -54,7 +55,7 @@ def directory(path: Path) -> Path:
 
 def _no_directory(path: Path, why: Path | str) -> OutputError:
     """The refusal of a folder for results: a file has its name, or the system's own reason."""
-    reason = f"{why} is a file" if isinstance(why, Path) else why
+    reason = f"{why} is {'a file' if why.is_file() else 'no folder'}" if isinstance(why, Path) else why
     return OutputError(f"The directory {path} cannot be made: {reason}.", culprit=str(path))
 
 
