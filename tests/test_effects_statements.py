@@ -5,6 +5,7 @@ from math import log
 import pytest
 from effect_examples import EXAMPLES
 
+from cosim.diagnosis.findings import between
 from pyfmi_models.effects import FORMS, Effect
 
 BY_NAME = {form.__name__: form for form in FORMS}
@@ -107,18 +108,18 @@ def test_the_sentence_of_an_axis_that_slides_differs_in_its_units_alone(effect: 
         (
             "FrictionAsymmetry",
             {"level_asymmetry": 0.1},
-            "Sliding friction is 20 % higher moving forward than backward.",
+            "Sliding friction is higher moving forward than backward, by 20 % of their mean.",
         ),
         (
             "FrictionAsymmetry",
             {"level_asymmetry": -0.1, "viscous_asymmetry": 0.009},
-            "Sliding friction is 20 % higher moving backward than forward.",
+            "Sliding friction is higher moving backward than forward, by 20 % of their mean.",
         ),
         (
             "FrictionAsymmetry",
             {"level_asymmetry": 0.1, "viscous_asymmetry": -0.2},
-            "Viscous friction is 40 % higher moving backward than forward, "
-            "sliding friction is 20 % higher moving forward than backward.",
+            "Viscous friction is higher moving backward than forward, by 40 % of their mean, "
+            "sliding friction is higher moving forward than backward, by 20 % of their mean.",
         ),
         (
             "GearFriction",
@@ -147,3 +148,18 @@ def test_what_was_learned_says_over_what_and_how_large_it_is() -> None:
     assert said["LearnedFriction"].startswith(
         "Something that depends on position and temperature, 46 % of the friction;"
     )
+
+
+@pytest.mark.parametrize(
+    ("ends", "text"),
+    [
+        ((28.93, 31.42), "28.9 to 31.4"),
+        ((5.9953, 6.0047), "5.995 to 6.005"),
+        ((0.19769, 0.19831), "0.1977 to 0.1983"),
+        ((0.541, 0.578), "0.541 to 0.578"),
+        ((123456.0, 234567.0), "123456 to 234567"),
+        ((0.0, 0.0), "0 to 0"),
+    ],
+)
+def test_a_range_tells_its_ends_apart_with_equally_many_digits(ends: tuple[float, float], text: str) -> None:
+    assert between(*ends) == text

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from math import ceil, floor, log10
 
 import numpy as np
 
@@ -153,7 +154,19 @@ def _size(effect: Effect, numbers: Numbers, mount: Mount) -> tuple[str, str]:
     value, error = factor * numbers.values[name], factor * numbers.errors.get(name, float("nan"))
     text = f"{abs(value):.3g} {unit_on(unit, mount)}"
     ends = sorted((abs(value) - Z95 * error, abs(value) + Z95 * error))
-    return text, f"{ends[0]:.3g} to {ends[1]:.3g}" if np.isfinite(error) else ""
+    return text, between(*ends) if np.isfinite(error) else ""
+
+
+def between(low: float, high: float) -> str:
+    """Write a range with as many digits as tell its ends apart by three steps at least, both alike: 5.995 to 6.005.
+
+    Three digits of the larger end at least; nothing is written with a power of ten.
+    """
+    larger, width = max(abs(low), abs(high)), high - low
+    digits = 2 - floor(log10(larger)) if larger > 0 else 0
+    finer = ceil(log10(3 / width)) if width > 0 else digits
+    places = min(max(digits, finer, 0), 12)
+    return f"{low:.{places}f} to {high:.{places}f}"
 
 
 def _units(effect: Effect, mount: Mount) -> dict[str, str]:

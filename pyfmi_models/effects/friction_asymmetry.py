@@ -50,4 +50,4 @@ class FrictionAsymmetry(FrictionEffect):
 def _percent(name: str, asymmetry: float) -> tuple[float, str]:
     harder, easier = ("forward", "backward") if asymmetry > 0 else ("backward", "forward")
     size = 200 * abs(asymmetry)
-    return size, f"{name.capitalize()} is {size:.2g} % higher moving {harder} than {easier}"
+    return size, f"{name.capitalize()} is higher moving {harder} than {easier}, by {size:.2g} % of their mean"

@@ -53,7 +53,8 @@ class BendingContact(Hypothesis[Presliding]):
 
     def looked(self, seen: Seen, mount: Mount) -> str:
         """Softer contacts."""
-        return f"with a contact softer than {seen.high:.3g} {'N/m' if mount.motion == 'linear' else 'N·m/rad'}"
+        stiffness = f"{float(f'{seen.high:.3g}'):,.0f}" if seen.high >= 1000 else f"{seen.high:.3g}"
+        return f"with a contact softer than {stiffness} {'N/m' if mount.motion == 'linear' else 'N·m/rad'}"
 
     def tuned(self, problem: Problem, found: Fit, start: Presliding, evidence: Evidence) -> Fit:
         """Start from softer contacts too."""
