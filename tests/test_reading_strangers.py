@@ -42,9 +42,7 @@ def test_a_unit_in_brackets_that_is_not_known_is_asked_for_and_never_taken_for_o
 )
 def test_a_share_of_the_rated_torque_is_asked_for(tmp_path: Path, name: str, stated: str) -> None:
     path = written(tmp_path, f"t,{name},position", T, TAU, Q)
-    with pytest.raises(
-        UndecidedError, match=f'is in {stated}; say how much one is, for example --units "tau=0.04 N.m"'
-    ):
+    with pytest.raises(UndecidedError, match=f'is in {stated} of a torque .* for example --units "tau=0.04 N.m"'):
         Recording.read(path)
     np.testing.assert_allclose(Recording.read(path, units={"tau": "0.04 N.m"})["tau"], 0.04 * TAU, atol=1e-8)
 
@@ -53,6 +51,19 @@ def test_an_angle_is_no_torque(tmp_path: Path) -> None:
     path = written(tmp_path, "t,tau,q", T, TAU, Q)
     with pytest.raises(InputError, match=r"it is a torque or force, in N\.m or a unit that becomes it"):
         read_recordings([path], {}, [], ["tau=deg"], "rotary")
+
+
+def test_a_unit_that_is_not_known_costs_nothing_where_its_column_is_not_used(tmp_path: Path) -> None:
+    path = written(tmp_path, "t,torque [Nm],position [rad],lost motion [reference unit]", T, TAU, Q, Q)
+    read = Recording.read(path)
+    assert read.units.get("lost motion", "") == ""
+    np.testing.assert_allclose(read["lost motion"], Q, atol=1e-8)
+
+
+def test_a_unit_in_square_brackets_that_is_not_known_is_asked_for(tmp_path: Path) -> None:
+    path = written(tmp_path, "t,torque [stones],position [rad]", T, TAU, Q)
+    with pytest.raises(UndecidedError, match='"stones" of column "torque" is no unit known here; say which it is in'):
+        Recording.read(path)
 
 
 def test_a_number_in_brackets_is_no_unit(tmp_path: Path) -> None:

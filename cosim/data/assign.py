@@ -16,7 +16,7 @@ from cosim.data.checks import renamed, renamed_units
 from cosim.data.columns import Columns
 from cosim.data.limits import short
 from cosim.data.roles import counts, guess
-from cosim.data.text.names import bracketed, spelled, suffixed_unit
+from cosim.data.text.names import bracketed, is_unit, spelled, suffixed_unit
 from cosim.support.errors import RecordingError
 from cosim.support.numbers import whole
 
@@ -64,9 +64,12 @@ def assign(
     suffixes = {ours: suffixed_unit(theirs) for ours, theirs in sources.items() if ours not in had and ours in OURS}
     had |= {ours: text for ours, text in suffixes.items() if text}
     given = {name: spelled(text) for name, text in units.items()}
-    for ours, theirs in sources.items():
-        if ours in OURS and ours not in had and ours not in units and (text := bracketed(theirs)):
+    for ours in [name for name in values if name in OURS and name not in units]:
+        theirs = sources.get(ours, ours)
+        text = had.get(ours) or bracketed(theirs)
+        if text and not _known(text):
             raise questions.unknown_unit(path, ours, theirs, text)
+    had = {name: text for name, text in had.items() if _known(text)}
     share = (had | given).get("tau", "")
     if share in SHARES:
         raise questions.share(path, sources.get("tau", "tau"), share)
@@ -75,6 +78,10 @@ def assign(
     return Assigned(
         values, had | given, {name: sources.get(name, name) for name in values}, _notes(path, roles, had | given)
     )
+
+
+def _known(text: str) -> bool:
+    return text == "1" or is_unit(text)
 
 
 def numbered(name: str, found: Columns) -> str:

@@ -37,10 +37,12 @@ def current(path: Path, told: Guess) -> UndecidedError:
 def share(path: Path, name: str, stated: str) -> UndecidedError:
     """Ask what one unit of a torque is that was recorded as a share of the rated one."""
     text = (
-        f'{path}: "{short(name)}" is in {stated}; say how much one is, for example --units "tau=0.04 N.m" where 1 % is '
+        f'{path}: "{short(name)}" is in {stated} of a torque that the file does not name; say how much one of it is, '
     )
     deciding = {"units": {"tau": "1 N.m"}}
-    return UndecidedError(f"{text}0.04 N.m.", decided_by=deciding, culprit=str(path), value=name)
+    return UndecidedError(
+        f'{text}for example --units "tau=0.04 N.m".', decided_by=deciding, culprit=str(path), value=name
+    )
 
 
 def counted(path: Path, name: str) -> UndecidedError:
