@@ -9,7 +9,7 @@ from investigations import CABLE, written
 
 from cosim.estimation.problem import Problem
 from cosim.investigation.design import Plan, Rated, allowed, best, piece_of, plans, shown_by_motion, spare, strayed
-from cosim.investigation.families import fast_sweeps, fast_tone
+from cosim.investigation.families import fast_sweeps, fast_tone, slow_sweep
 from cosim.investigation.limits import Limits
 from cosim.investigation.machine import CoSimulated
 from cosim.investigation.motions import Rest, room_of
@@ -75,7 +75,28 @@ def test_a_motion_that_tells_less_than_a_set_asks_for_is_not_run() -> None:
     assert best([Plan(still, (1.9,), 1.0)], True) is None
     assert best([Plan(still, (), 0.5)], False, ("fast tone",)) is None
     assert best([Plan(still, (), 0.5)], False) is not None
+    assert best([Plan(still, (), 0.05)], False) is None  # hardly anything that was not visited
     assert np.isclose(Plan(still, (30.0, 4.0), 0.0).worth, 14.0)
+
+
+def test_what_could_not_be_tested_is_shown_before_new_ground_is_sought(problem: Problem) -> None:
+    fast = fast_tone(room_of(LIMITS, 0.0, 12.0, 1, False))
+    slow = slow_sweep(room_of(LIMITS, 0.0, 12.0, 1, False))
+    assert best([Plan(fast, (), 0.9, 0), Plan(slow, (), 0.2, 1)], False) == Plan(slow, (), 0.2, 1)
+    ours = problem.fit(problem.mount, 5)
+    names = ("load_dependent_friction", "compliance")
+    found = plans(room_of(LIMITS, 0.0, 12.0, 1, False), problem, ours, [], LIMITS, 0.0, names)
+    assert {one.motion.family: one.shows for one in found.plans}["fast tone"] == 1
+
+
+def test_an_effect_that_is_not_proven_is_asked_with_it(problem: Problem) -> None:
+    """A model with the cable follows one without it: what shows if there is one is what counts."""
+    without, cable = problem.mount, CABLE_WRAP(stiffness=2.0, home=0.05)  # type: ignore[call-arg]
+    question = Question("unproven", ("cable_wrap",), "unproven")
+    fits = (problem.fit(replace(without, effects=one), 15) for one in ((), (cable,)))
+    one = Duel(question, *fits)
+    assert one.general == "other"
+    assert nats(rated(problem, one))["slow sweep"] > 10.0
 
 
 def test_what_a_model_may_lack_grows_beyond_what_was_recorded(problem: Problem) -> None:

@@ -90,12 +90,13 @@ def test_a_sweep_goes_both_ways_as_far_as_the_time_allows(family: Callable[[Room
 
 
 def test_a_stop_and_go_rests_for_different_times_whatever_the_time() -> None:
-    for seconds in (8.0, 20.0):
+    for seconds, least in ((8.0, 2.0), (20.0, 2.9)):
         t = np.arange(0.0, seconds, 1e-3)
         moving = np.abs(stop_and_go(room_of(LIMITS, 0.0, seconds, 3, False)).sampled(t)[1]) > 1e-6
         starts, stops = (np.flatnonzero(np.diff(moving.astype(int)) == way) for way in (1, -1))
-        rests = t[starts[1:6]] - t[stops[:5]]
-        assert len(starts) >= 6
+        rests = t[starts[1:4]] - t[stops[:3]]
+        assert len(starts) >= (4 if seconds < 10 else 6)
+        assert rests[2] > least  # long enough for a contact to settle
         assert rests[2] / rests[0] == pytest.approx(10.0, rel=0.25)  # 3 s after 0.3 s, or a share of both
 
 

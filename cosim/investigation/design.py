@@ -27,6 +27,7 @@ from cosim.estimation.least_squares import projected
 from cosim.estimation.prepare import Array, Piece, Prepared, lowpass
 from cosim.estimation.problem import Problem
 from cosim.investigation.families import FAMILIES
+from cosim.investigation.ground import new_ground, visited
 from cosim.investigation.limits import KEPT, Limits
 from cosim.investigation.motions import FADE, Motion, Room
 from cosim.investigation.questions import Duel
@@ -36,10 +37,9 @@ ENOUGH = 10.0
 """Nats at which a question counts as settled: more for one is not worth less for another (odds of 20 000)."""
 LEAST = 2.0
 """Nats below which a motion is not worth running: odds of 7, less than the margin of a set."""
-CELLS = 12
-"""Classes of position and of speed (by its logarithm, and direction) in which is counted what was visited."""
-SLOWEST = 1e-3
-"""Share of the speed limit below which an axis stands."""
+
+LEAST_GROUND = 0.1
+"""Share of new ground below which a motion shows nothing new. Unit: 1."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,8 @@ class Plan:
     motion: Motion
     nats: tuple[float, ...]
     ground: float
+    shows: int = 0
+    """Effects that could not be tested so far and that it would show."""
 
     @property
     def worth(self) -> float:
@@ -80,10 +82,19 @@ class Rated(NamedTuple):
     refused: tuple[Refusal, ...]
 
 
-def plans(room: Room, problem: Problem, ours: Fit, duels: Sequence[Duel], limits: Limits, home: float) -> Rated:
+def plans(
+    room: Room,
+    problem: Problem,
+    ours: Fit,
+    duels: Sequence[Duel],
+    limits: Limits,
+    home: float,
+    untested: Collection[str] = (),
+) -> Rated:
     """Rate a motion of every family that keeps to the limits, by set point and by the torque that the model says.
 
-    One that would leave them is tried again slower, then nearer to where the axis stands, and refused at last.
+    `untested`: effects that no recording could show so far, and are in question. A motion that would leave the limits
+    is tried again slower, then nearer to where the axis stands, and refused at last.
     """
     weighed = [_Weighed(problem, duel) for duel in duels]
     seen = visited(problem.prepared, limits)
@@ -93,7 +104,8 @@ def plans(room: Room, problem: Problem, ours: Fit, duels: Sequence[Duel], limits
         if limit:
             refused.append(Refusal(motion, limit))
             continue
-        good.append(Plan(motion, tuple(one.nats(piece) for one in weighed), new_ground(piece, seen, limits)))
+        shows = len(shown_by_motion(untested, ours, [replace(piece, recording=0)], ours.rms))
+        good.append(Plan(motion, tuple(one.nats(piece) for one in weighed), new_ground(piece, seen, limits), shows))
     return Rated(tuple(good), tuple(refused))
 
 
@@ -147,12 +159,12 @@ def _top(known: Prepared, name: str) -> float:
 
 
 def best(found: Sequence[Plan], has_duels: bool, done: Sequence[str] = ()) -> Plan | None:
-    """The plan that tells most; of motions without a duel the one of most new ground, each family once."""
+    """The plan that tells most; without a duel the one that shows most, then of most new ground, each family once."""
     if has_duels:
-        top = max(found, key=lambda one: (one.worth, one.ground), default=None)
+        top = max(found, key=lambda one: (one.worth, one.shows, one.ground), default=None)
         return top if top and top.worth >= LEAST else None
-    fresh = [one for one in found if one.motion.family not in done and one.ground > 0]
-    return max(fresh, key=lambda one: one.ground, default=None)
+    fresh = [one for one in found if one.motion.family not in done and one.ground >= LEAST_GROUND]
+    return max(fresh, key=lambda one: (round(one.worth), one.shows, one.ground), default=None)
 
 
 def shown_by_motion(names: Collection[str], ours: Fit, pieces: Sequence[Piece], noise: float) -> set[str]:
@@ -238,26 +250,4 @@ def _noise(residual: Array) -> float:
     return max(power * correlation, 1e-300)
 
 
-Cells = frozenset[tuple[int, int]]
-
-
-def visited(prepared: Prepared, limits: Limits) -> Cells:
-    """Classes of position and speed that recordings visited."""
-    return frozenset().union(*(_cells(piece, limits) for piece in prepared.pieces))
-
-
-def new_ground(piece: Piece, seen: Cells, limits: Limits) -> float:
-    """Share of the classes that a motion visits and no recording did, relative to all of the motion's."""
-    own = _cells(piece, limits)
-    return len(own - seen) / max(len(own), 1)
-
-
-def _cells(piece: Piece, limits: Limits) -> Cells:
-    place = np.floor(CELLS * (piece.q - limits.low) / (limits.high - limits.low)).astype(int)
-    speed = np.abs(piece.v) / (SLOWEST * limits.speed)
-    pace = np.floor(np.log2(np.maximum(speed, 1.0))).astype(int) * np.sign(piece.v).astype(int)
-    both = np.column_stack([place, pace])[piece.inside]
-    return frozenset(map(tuple, np.unique(both, axis=0).tolist()))
-
-
-__all__ = ["Plan", "Rated", "Refusal", "allowed", "best", "new_ground", "piece_of", "plans", "torque_of", "visited"]
+__all__ = ["Plan", "Rated", "Refusal", "allowed", "best", "piece_of", "plans", "torque_of"]

@@ -108,15 +108,16 @@ def speed_ladder(room: Room) -> Motion:
 
 
 def stop_and_go(room: Room) -> Motion:
-    """The same move after rests of different lengths, which are shorter where the time is."""
-    left, many = room.seconds - 2 * FADE, 2 * len(RESTS)
-    shorter = min(1.0, RESTING * left / (2 * sum(RESTS)))
-    takes = (left - 2 * shorter * sum(RESTS)) / (many + 1)
+    """The same move after rests of different lengths: twice, or once and with shorter rests where the time is short."""
+    left = room.seconds - 2 * FADE
+    rests = RESTS * (2 if RESTING * left >= 2 * sum(RESTS) else 1)
+    shorter = min(1.0, RESTING * left / sum(rests))
+    takes = (left - shorter * sum(rests)) / (len(rests) + 1)
     speed = min(room.speed / 2, room.acceleration * max(takes - 1 / JERK, 0.0) / 3)
     way = min(speed * max(takes - speed / room.acceleration - 1 / JERK, 0.0), room.reach / 4)
     far = room.first if abs(room.first) >= way else room.second
     parts: list[Part] = []
-    for number, rest in enumerate(RESTS * 2):
+    for number, rest in enumerate(rests):
         to = 0.0 if number % 2 else way * (1.0 if far > 0 else -1.0)
         parts += [Move(to, speed, room.acceleration), Rest(shorter * rest)]
     return Motion("stop-and-go", "the same move after rests of different lengths", _filled(room, parts))

@@ -12,6 +12,7 @@ from typing import Literal
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.diagnose import diagnose as find
+from cosim.diagnosis.result import Diagnosis
 from cosim.estimation.fit import Fit
 from cosim.estimation.problem import Problem
 from cosim.investigation.design import Plan, Rated, allowed, best, pieces_of, plans, shown_by_motion
@@ -20,7 +21,7 @@ from cosim.investigation.limits import Limits
 from cosim.investigation.log import Log
 from cosim.investigation.machine import Machine
 from cosim.investigation.motions import Motion, Room, room_of
-from cosim.investigation.questions import Duel, Question, duels, problem_of, questions
+from cosim.investigation.questions import Duel, Question, duels, is_settled, problem_of, questions
 from cosim.investigation.story import Answered, End, Moved, Story
 from cosim.support.errors import InputError
 from pyfmi_models.card import Card
@@ -28,10 +29,6 @@ from pyfmi_models.effects import CATALOGUE
 
 SHORTEST = 8.0
 """Seconds that a motion must last, or it is not worth starting: the diagnosis leaves 3.5 s of a recording out."""
-AGAIN, AGAIN_NOTHING = 1, 2
-"""Rounds over new ground that an answer must survive where it leaves more than the noise, or where it is "nothing"."""
-GROUND = ("unknown", "not testable", "unconfirmed")
-"""Kinds of questions that are not between two structures: they are sought on new ground."""
 ROLES: tuple[Literal["train", "heldout"], ...] = ("train", "heldout")
 
 
@@ -114,7 +111,10 @@ class Investigation:
         if lasts < SHORTEST:
             return "budget spent", open_
         chosen = self._designed(open_, lasts)
-        return (self._moved(chosen), ()) if chosen else ("no motion tells", open_)
+        if chosen:
+            return self._moved(chosen), ()
+        is_all = {one.kind for one in open_} == {"unconfirmed"}
+        return ("answered", ()) if is_all else ("no motion tells", open_)
 
     def _diagnosed(self, number: int) -> Sequence[Question]:
         """Diagnose all recordings together; what is left open."""
@@ -129,26 +129,31 @@ class Investigation:
         return asked
 
     def _movable(self, asked: Sequence[Question]) -> Sequence[Question]:
-        """Questions that some motion may decide; the others are kept to be told at the end."""
+        """Questions that some motion may decide; others, and those asked in vain, are kept to be told at the end."""
         assert self.outcome is not None
-        if self._is_confirmed(self.outcome.diagnosis.verdict):
+        if self._is_confirmed(self.outcome.diagnosis):
             asked = [one for one in asked if one.kind != "unconfirmed"]
-        names = {name for one in asked if one.kind == "not testable" for name in one.effects}
-        if not names:
-            self.unmoved = ()
-            return asked
-        problem = problem_of(self.recordings["train"], self.card)
-        ours = problem.fit(self.outcome.card.plant(), 1)
-        pieces = pieces_of(self._room(self.settings.seconds, False), ours, problem, self.limits, self.machine.home)
-        shown = shown_by_motion(names, ours, pieces, ours.rms) if pieces else set()
+        told = {text for one in self.steps if isinstance(one, Answered) for text in one.open}
+        names = {n for one in asked if one.kind == "not testable" and one.statement not in told for n in one.effects}
+        shown = self._shown(names) if names else set()
         self.unmoved = tuple(one for one in asked if one.kind == "not testable" and not set(one.effects) <= shown)
         return [one for one in asked if one not in self.unmoved]
 
-    def _is_confirmed(self, verdict: tuple[str, ...]) -> bool:
-        """Whether the last answers before this one, as many as it takes, were the same."""
-        needed = AGAIN if verdict else AGAIN_NOTHING
-        before = [one.verdict for one in self.steps if isinstance(one, Answered)][-needed:]
-        return before == [verdict] * needed
+    def _shown(self, names: set[str]) -> set[str]:
+        """Of effects that no recording could show so far, those that some motion inside the limits shows."""
+        assert self.outcome is not None
+        problem = problem_of(self.recordings["train"], self.card)
+        ours = problem.fit(self.outcome.card.plant(), 1)
+        pieces = pieces_of(self._room(self.settings.seconds, False), ours, problem, self.limits, self.machine.home)
+        return shown_by_motion(names, ours, pieces, ours.rms) if pieces else set()
+
+    def _is_confirmed(self, found: Diagnosis) -> bool:
+        """Whether an answer needs no further round: the same as before it, or the first and all that is missing.
+
+        "Nothing" is never confirmed by rounds, but by new ground that is used up.
+        """
+        before = [one.verdict for one in self.steps if isinstance(one, Answered)]
+        return bool(found.verdict) and (before[-1] == found.verdict if before else is_settled(found))
 
     def _designed(self, asked: Sequence[Question], lasts: float) -> list[Plan | None] | None:
         """The motion that tells most and the same from the other end; None where none tells anything."""
@@ -160,16 +165,16 @@ class Investigation:
             return [Plan(multisine(room), (), 0.0) for room in rooms]
         pairs = duels(self.outcome, problem, asked)
         ours = pairs[0].ours if pairs else problem.fit(self.outcome.card.plant(), 1)
-        rated = plans(rooms[0], problem, ours, pairs, self.limits, self.machine.home)
+        untested = {name for one in asked if one.kind == "not testable" for name in one.effects}
+        rated = plans(rooms[0], problem, ours, pairs, self.limits, self.machine.home, untested)
         self.refused |= {one.motion.family: one.limit for one in rated.refused}
-        plan = self._best(rated, pairs, asked)
+        plan = self._best(rated, pairs)
         return [plan, self._turned(plan, rooms[1], problem, ours)] if plan else None
 
-    def _best(self, rated: Rated, pairs: Sequence[Duel], asked: Sequence[Question]) -> Plan | None:
+    def _best(self, rated: Rated, pairs: Sequence[Duel]) -> Plan | None:
+        """The motion that tells most between structures; where none promises enough, new ground may tell more."""
         done = [one.family for one in self.steps if isinstance(one, Moved)]
-        plan = best(rated.plans, True) if pairs else None
-        more = any(one.kind in GROUND for one in asked)
-        return plan or (best(rated.plans, False, done) if more or not pairs else None)
+        return (best(rated.plans, True) if pairs else None) or best(rated.plans, False, done)
 
     def _turned(self, plan: Plan, room: Room, problem: Problem, ours: Fit) -> Plan:
         """The same family from the other end; the same motion where that would leave a limit."""

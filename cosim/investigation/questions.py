@@ -12,7 +12,7 @@ from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
 from cosim.diagnosis.band import in_band
 from cosim.diagnosis.diagnose import Outcome
-from cosim.diagnosis.result import Diagnosis, Finding
+from cosim.diagnosis.result import Diagnosis, Finding, is_special
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Prepared
 from cosim.estimation.problem import Problem
@@ -22,9 +22,11 @@ from pyfmi_models.effects import CATALOGUE, Effect
 from pyfmi_models.model import Pair
 from pyfmi_models.mount import Mount
 
-Kind = Literal["set", "uncertain", "unknown", "not testable", "unconfirmed"]
+Kind = Literal["set", "uncertain", "unproven", "unknown", "not testable", "unconfirmed"]
 EVALUATIONS = 15
 """Evaluations of the model that a refit of a rival may spend: it starts from the diagnosis' own numbers."""
+UNPROVEN = 2
+"""Most effects that training proposes and the proof does not confirm about which is asked at once."""
 NEAR_FLOOR = 1.3
 """Held-out error, in units of the noise there, up to which nothing that matters is left. Unit: 1."""
 
@@ -51,8 +53,8 @@ class Duel:
     @property
     def general(self) -> Literal["ours", "other", ""]:
         """Which of both holds the other as a special case; "" where neither does."""
-        if self.question.kind == "uncertain":
-            return "ours"
+        if self.question.kind in ("uncertain", "unproven"):
+            return "ours" if self.question.kind == "uncertain" else "other"
         ours, other = ({one.id: one.special_case_of for one in fit.mount.effects} for fit in (self.ours, self.other))
         only, others = set(ours) - set(other), set(other) - set(ours)
         if any(others & set(ours[name]) for name in only):
@@ -74,21 +76,36 @@ def _weight(mount: Mount, prepared: Prepared) -> Any:
 
 
 def questions(found: Diagnosis) -> tuple[Question, ...]:
-    """Everything that a diagnosis leaves open and that matters, the likeliest to be settled first."""
+    """Everything that a diagnosis leaves open and that matters, the likeliest to be settled first.
+
+    "unconfirmed" is always among them: whether an answer needs another round depends on those before it.
+    """
     titles = {one.effect: one.title.lower() for one in found.findings}
     sets = [Question("set", group, " or ".join(titles.get(n, n) for n in group)) for group in found.ambiguous_with]
     paired = {name for group in found.ambiguous_with for name in group}
     lone = [one for one in found.in_model if one.answer == "ambiguous" and one.effect not in paired]
     unsure = [Question("uncertain", (one.effect,), f"whether it is {titles[one.effect]}") for one in lone]
     unknown = [Question("unknown", (), "something that has no name")] if "unknown" in found.verdict else []
-    asked = (*sets, *unsure, *unknown, *_not_testable(found))
-    settled = found.verdict and _is_near(found)
-    return asked if settled else (*asked, Question("unconfirmed", (), _confirmation(found)))
+    return (
+        *sets,
+        *unsure,
+        *_unproven(found),
+        *unknown,
+        *_not_testable(found),
+        Question("unconfirmed", (), _confirmation(found)),
+    )
 
 
-def _is_near(found: Diagnosis) -> bool:
-    """Whether the held-out error is down to the noise."""
-    return found.heldout.after_rms <= NEAR_FLOOR * found.heldout.floor_rms
+def _unproven(found: Diagnosis) -> Iterator[Question]:
+    """Effects that training proposes and the proof does not confirm, where the answer is not settled without them."""
+    lost = [] if is_settled(found) else [one for one in found.findings if one.answer == "not_proven"]
+    for one in sorted(lost, key=lambda one: -one.gain)[:UNPROVEN]:
+        yield Question("unproven", (one.effect,), f"whether there is {one.title.lower()}, which is not proven")
+
+
+def is_settled(found: Diagnosis) -> bool:
+    """Whether something is named and the held-out error is down to the noise."""
+    return bool(found.verdict) and found.heldout.after_rms <= NEAR_FLOOR * found.heldout.floor_rms
 
 
 def _confirmation(found: Diagnosis) -> str:
@@ -99,11 +116,11 @@ def _confirmation(found: Diagnosis) -> str:
 
 
 def _not_testable(found: Diagnosis) -> Iterator[Question]:
-    """Effects that no recording so far could show, where the held-out error is above the noise or nothing was found."""
-    if found.verdict and _is_near(found):
-        return
+    """Effects that no recording so far could show; where an answer is settled those that imitate what it names."""
+    named = {name for name in found.verdict if name in CATALOGUE}
+    only = {one for name in named for one in CATALOGUE[name][0].rivals if not is_special(one, [name])}
     for one in found.findings:
-        if one.answer == "not_testable" and one.action:
+        if one.answer == "not_testable" and one.action and (not is_settled(found) or one.effect in only):
             yield Question("not testable", (one.effect,), f"whether there is {one.title.lower()}", one.action)
 
 
@@ -117,8 +134,8 @@ def duels(outcome: Outcome, problem: Problem, asked: Sequence[Question]) -> list
 
 
 def _rivals(question: Question, outcome: Outcome) -> Iterator[Mount]:
-    """The delivered model with another effect in the place of the one that is in question, or without it."""
-    if question.kind not in ("set", "uncertain"):
+    """The delivered model with another effect in the place of the one that is in question, with it, or without it."""
+    if question.kind not in ("set", "uncertain", "unproven"):
         return
     mount, main = outcome.card.plant(), question.effects[0]
     own = len(mount.effects) - len(outcome.card.effects)
@@ -126,6 +143,8 @@ def _rivals(question: Question, outcome: Outcome) -> Iterator[Mount]:
     if question.kind == "uncertain":
         yield replace(mount, effects=rest)
     findings = {one.effect: one for one in outcome.diagnosis.findings}
+    if question.kind == "unproven":
+        yield replace(mount, effects=(*mount.effects, effect_of(findings[main])))
     for name in question.effects[1:]:
         yield replace(mount, effects=(*rest, effect_of(findings[name])))
 
