@@ -40,7 +40,8 @@ def test_only_the_one_true_name_counts(last: str, left_open: str, is_hit: bool) 
 
 
 def test_the_page_compares_both_designs_on_the_cases_that_were_open() -> None:
-    rows = [row(1, "log-odds", "", "cogging"), row(1, "random", "", ""), row(2, "log-odds", "cogging", "cogging") | {"further_s": "20"}]
+    kept = row(2, "log-odds", "cogging", "cogging") | {"further_s": "20"}
+    rows = [row(1, "log-odds", "", "cogging"), row(1, "random", "", ""), kept]
     text = page(rows, "command")
     assert "2 cases, 1 whose first answer is not the one true name" in text
     assert "| log-odds | 1 of 1 (21 to 100 %) |" in text
