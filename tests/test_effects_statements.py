@@ -7,6 +7,7 @@ from effect_examples import EXAMPLES
 
 from cosim.diagnosis.findings import between
 from pyfmi_models.effects import FORMS, Effect
+from pyfmi_models.effects.base import higher, percent
 
 BY_NAME = {form.__name__: form for form in FORMS}
 TURNING = {
@@ -30,17 +31,17 @@ TURNING = {
     "GravityUnbalance": "The axis is out of balance by 1.5 N·m.",
     "InertiaVariation": "The inertia rises and falls by 30 %, 2 times per turn.",
     "KnownLoad": "The known load acts with 1 N·m of drive torque for each N·m.",
-    "LearnedAfterReversal": "After a reversal friction is +11 % off for a while; learned from data.",
+    "LearnedAfterReversal": "After a reversal friction is 11 % higher for a while; learned from data.",
     "LearnedDrive": "The drive gives up to 0.25 N·m less or more than its command; a table learned from data.",
     "LearnedHysteresis": "Something goes round a loop of 0.5 N·m either way; learned from data.",
     "LoadDependentFriction": "Friction rises by 0.2 N·m for each N·m of load on the axis.",
     "LoadScaledFriction": "Friction rises by 0.1 N·m for each N·m of load on the axis.",
-    "LocalFriction": "Around 1 rad friction is +30 % off, over about 0.2 rad.",
+    "LocalFriction": "Around 1 rad friction is 30 % higher, over about 0.2 rad.",
     "PeriodicDisturbance": "Something shakes the axis 3 times a second with 0.6 N·m.",
     "PeriodicFriction": "Friction rises and falls by 20 %, 3 times per turn.",
     "Presliding": "Before it slides the axis bends like a spring of 2e+04 N·m per rad.",
     "QuadraticDrag": "Drag grows with the square of the speed, 2 N·m at 1 rad/s.",
-    "RoughSpot": "Around 0.3 rad friction is +80 % off moving forward and -30 % backward, over about 0.4 rad.",
+    "RoughSpot": "Around 0.3 rad friction is 80 % higher moving forward and 30 % lower backward, over about 0.4 rad.",
     "StribeckEffect": "Below about 0.02 rad/s friction changes with speed, to 4 N·m near standstill.",
     "ThermalViscosity": "Viscous friction falls by 4 % per degree and sliding friction falls by 2 % per degree.",
     "TorqueDroop": "Of a command of 8 N·m the drive loses 20 %, of less less.",
@@ -163,3 +164,11 @@ def test_what_was_learned_says_over_what_and_how_large_it_is() -> None:
 )
 def test_a_range_tells_its_ends_apart_with_equally_many_digits(ends: tuple[float, float], text: str) -> None:
     assert between(*ends) == text
+
+
+@pytest.mark.parametrize(
+    ("share", "text"), [(0.4226, "42 %"), (1.893, "189 %"), (0.997, "100 %"), (0.0123, "1.2 %"), (0.994, "99 %")]
+)
+def test_a_share_is_written_without_a_power_of_ten(share: float, text: str) -> None:
+    assert percent(share) == text
+    assert higher(-share) == f"{text} lower"

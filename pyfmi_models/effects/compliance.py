@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from pyfmi_models.effects.base import Coupling, Effect, Main, Transmission
+from pyfmi_models.effects.base import Coupling, Effect, Main, Transmission, percent
 from pyfmi_models.model import Scalar, parameter
 
 LEAST_DAMPING = 1e-4
@@ -73,7 +73,7 @@ class Compliance(_Compliance, Coupling):
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         name = "moving mass" if unit == "N" else "inertia"
-        return f"{100 * self.share():.2g} % of the {name} hangs on a spring that rings at {self.resonance_hz:.3g} Hz."
+        return f"{percent(self.share())} of the {name} hangs on a spring that rings at {self.resonance_hz:.3g} Hz."
 
 
 @dataclass(frozen=True, kw_only=True)

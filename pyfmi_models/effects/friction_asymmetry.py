@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Main, Motion
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion, percent
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -50,4 +50,4 @@ class FrictionAsymmetry(FrictionEffect):
 def _percent(name: str, asymmetry: float) -> tuple[float, str]:
     harder, easier = ("forward", "backward") if asymmetry > 0 else ("backward", "forward")
     size = 200 * abs(asymmetry)
-    return size, f"{name.capitalize()} is higher moving {harder} than {easier}, by {size:.2g} % of their mean"
+    return size, f"{name.capitalize()} is higher moving {harder} than {easier}, by {percent(size / 100)} of their mean"

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Motion
+from pyfmi_models.effects.base import FrictionEffect, Motion, percent
 from pyfmi_models.model import Scalar, parameter
 
 WAVES = 8
@@ -74,8 +74,8 @@ class FrictionWander(FrictionEffect):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        slow = f"Friction wanders by {100 * self.std:.2g} % (RMS) within {self.correlation_time:.2g} s"
-        jumps = f", and jumps by {100 * self.jump_std:.2g} % every {self.jump_period:.2g} s" if self.jump_std else ""
+        slow = f"Friction wanders by {percent(self.std)} (RMS) within {self.correlation_time:.2g} s"
+        jumps = f", and jumps by {percent(self.jump_std)} every {self.jump_period:.2g} s" if self.jump_std else ""
         return f"{slow}{jumps}: the same motion twice meets another friction."
 
 

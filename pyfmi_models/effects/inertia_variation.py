@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import InertiaEffect, Main, Motion, times
+from pyfmi_models.effects.base import InertiaEffect, Main, Motion, percent, times
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -39,4 +39,4 @@ class InertiaVariation(InertiaEffect):
         """Say it to a mechanic."""
         name, per = ("moving mass", "metre") if unit == "N" else ("inertia", "turn")
         size = 100 * self.relative_amplitude
-        return f"The {name} rises and falls by {size:.2g} %, {times(self.cycles_per_rev)} per {per}."
+        return f"The {name} rises and falls by {percent(size / 100)}, {times(self.cycles_per_rev)} per {per}."

@@ -10,7 +10,7 @@ from typing import ClassVar, Self
 import casadi as ca
 import numpy as np
 
-from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Motion
+from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Motion, percent
 from pyfmi_models.effects.learned_base import MotionTable
 from pyfmi_models.model import Scalar, parameter, structure
 
@@ -58,7 +58,7 @@ class LearnedFriction(MotionTable, FrictionEffect):
         return level * ca.exp(self.table(motion))
 
     def _sized(self, unit: str) -> str:
-        return f"{100 * float(np.expm1(self.size())):.2g} % of the friction"
+        return f"{percent(float(np.expm1(self.size())))} of the friction"
 
 
 @dataclass(frozen=True, kw_only=True)

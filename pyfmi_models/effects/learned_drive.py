@@ -7,7 +7,7 @@ from typing import ClassVar, Self
 import casadi as ca
 import numpy as np
 
-from pyfmi_models.effects.base import DriveEffect, Main, Motion
+from pyfmi_models.effects.base import DriveEffect, Main, Motion, percent
 from pyfmi_models.effects.learned_base import FOLLOWED, MOST_WAVES, ROWS, Array, LearnedEffect, TableEffect
 from pyfmi_models.effects.learned_table import LearnedTable
 from pyfmi_models.model import Scalar, parameter, structure
@@ -135,5 +135,5 @@ class LearnedGain(TableEffect, DriveEffect):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        size = 100 * float(np.expm1(self.size()))
-        return f"The drive's torque per command depends on {self.follows()}, {size:.2g} %; a table learned from data."
+        size = percent(float(np.expm1(self.size())))
+        return f"The drive's torque per command depends on {self.follows()}, {size}; a table learned from data."

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Main, Motion, MotionEffect
+from pyfmi_models.effects.base import FrictionEffect, LoadEffect, Main, Motion, MotionEffect, higher
 from pyfmi_models.effects.learned_base import LearnedEffect
 from pyfmi_models.effects.learned_table import LearnedTable
 from pyfmi_models.model import Scalar, Variable, parameter, structure
@@ -148,4 +148,4 @@ class LearnedAfterReversal(_Memory, FrictionEffect):
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         change = 100 * float(ca.exp(sum(self.level_change)) - 1)
-        return f"After a reversal friction is {change:+.2g} % off for a while; learned from data."
+        return f"After a reversal friction is {higher(change / 100)} for a while; learned from data."

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Main, Motion, times
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion, higher, percent, times
 from pyfmi_models.model import Scalar, parameter
 
 
@@ -37,7 +37,7 @@ class PeriodicFriction(_PositionFriction):
         """Say it to a mechanic."""
         per = "metre" if unit == "N" else "turn"
         size = 100 * self.relative_amplitude
-        return f"Friction rises and falls by {size:.2g} %, {times(self.cycles_per_rev)} per {per}."
+        return f"Friction rises and falls by {percent(size / 100)}, {times(self.cycles_per_rev)} per {per}."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,7 +58,7 @@ class LocalFriction(_PositionFriction):
         where = "m" if unit == "N" else "rad"
         size = 100 * self.relative_amplitude
         span = f"over about {4 * self.width:.2g} {where}"
-        return f"Around {self.q_center:.4g} {where} friction is {size:+.0f} % off, {span}."
+        return f"Around {self.q_center:.4g} {where} friction is {higher(size / 100)}, {span}."
 
 
 def bump(q: Scalar, center: Scalar, width: Scalar) -> Scalar:

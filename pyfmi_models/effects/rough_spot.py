@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Main, Motion
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion, higher
 from pyfmi_models.effects.position_friction import bump
 from pyfmi_models.model import Scalar, parameter
 
@@ -45,5 +45,5 @@ class RoughSpot(FrictionEffect):
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         where = "m" if unit == "N" else "rad"
-        sizes = f"{100 * self.forward:+.0f} % off moving forward and {100 * self.backward:+.0f} % backward"
+        sizes = f"{higher(self.forward)} moving forward and {higher(self.backward)} backward"
         return f"Around {self.q_center:.4g} {where} friction is {sizes}, over about {4 * self.width:.2g} {where}."

@@ -5,7 +5,7 @@ from typing import Any, ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Main, Motion
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion, percent
 from pyfmi_models.model import Recorded, Scalar, Variable, parameter
 
 REFERENCE = 20.0
@@ -114,4 +114,4 @@ class RubbedViscosity(_HeatedViscosity):
 
 
 def _change(per_degree: float) -> str:
-    return f"{'grows' if per_degree > 0 else 'falls'} by {100 * abs(per_degree):.2g} %"
+    return f"{'grows' if per_degree > 0 else 'falls'} by {percent(abs(per_degree))}"

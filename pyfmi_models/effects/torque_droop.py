@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Self
 
 import casadi as ca
 
-from pyfmi_models.effects.base import DriveEffect, Main, Motion
+from pyfmi_models.effects.base import DriveEffect, Main, Motion, percent
 from pyfmi_models.effects.thermal_viscosity import REFERENCE
 from pyfmi_models.model import Scalar, Variable, parameter
 
@@ -44,7 +44,7 @@ class TorqueDroop(DriveEffect):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        return f"Of a command of {self.rated_torque:.3g} {unit} the drive loses {100 * self.droop:.2g} %, of less less."
+        return f"Of a command of {self.rated_torque:.3g} {unit} the drive loses {percent(self.droop)}, of less less."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +75,7 @@ class WarmTorqueDroop(TorqueDroop):
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         how = "more" if self.per_degC > 0 else "less"
-        return f"{super().statement(unit)[:-1]}, and gives {100 * abs(self.per_degC):.2g} % {how} per degree."
+        return f"{super().statement(unit)[:-1]}, and gives {percent(abs(self.per_degC))} {how} per degree."
 
 
 LEAST_SHARE = 0.1
