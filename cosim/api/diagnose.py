@@ -123,22 +123,14 @@ def diagnose(
     folder = None if out is None else Path(out)
     if folder:
         check_out(folder, force, QUICK if quick else FILES)
-    believed = card if isinstance(card, Card) else read_card(card)
-    names = dict(believed.columns) | dict(columns or {})
-    fitted, held = read_all(train, "train", names, units), read_all(heldout, "heldout", names, units)
-    check_kind([*fitted, *held], believed.mount.motion)
-    check_split(fitted, held)
-    given = _Given(fitted, held, believed)
+    given = _read(train, heldout, card, columns or {}, units)
     if fmu is not None:
-        given = _beside(
-            BlackBox(Path(fmu), {name: Alias(own) for name, own in (variables or {}).items()}), given, on_progress
-        )
+        box = BlackBox(Path(fmu), {name: Alias(own) for name, own in (variables or {}).items()})
+        given = _beside(box, given, on_progress)
     listeners = _Listeners(on_progress, on_answer)
-    return (
-        _delivered(given, folder, command, listeners)
-        if folder and not quick
-        else _found(given, folder, command, listeners)
-    )
+    if folder and not quick:
+        return _delivered(given, folder, command, listeners)
+    return _found(given, folder, command, listeners)
 
 
 @dataclass(frozen=True)
@@ -157,6 +149,22 @@ class _Listeners(NamedTuple):
 
     on_progress: Callable[[str], None]
     on_answer: Callable[[Diagnosis], None]
+
+
+def _read(
+    train: Source | Sequence[Source],
+    heldout: Source | Sequence[Source],
+    card: str | Path | Card,
+    columns: Mapping[str, str],
+    units: Mapping[str, str] | None,
+) -> _Given:
+    """Read the card, and the recordings as it calls their columns; check that they belong together."""
+    believed = card if isinstance(card, Card) else read_card(card)
+    names = dict(believed.columns) | dict(columns)
+    fitted, held = read_all(train, "train", names, units), read_all(heldout, "heldout", names, units)
+    check_kind([*fitted, *held], believed.mount.motion)
+    check_split(fitted, held)
+    return _Given(fitted, held, believed)
 
 
 def _beside(box: BlackBox, given: _Given, on_progress: Callable[[str], None]) -> _Given:

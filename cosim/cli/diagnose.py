@@ -45,24 +45,18 @@ def diagnose(
 ) -> None:
     """Say which physics a card lacks, and prove it on a recording that was never fitted."""
     from cosim.api.diagnose import diagnose as find
-    from cosim.diagnosis.deliver import FILES, QUICK, check_out
-    from cosim.diagnosis.learned.proposal import check_folder
     from cosim.diagnosis.terminal import proposed, summary
     from pyfmi_models.card import read_card
 
     keep_freed_memory()
-    check_out(out, force, QUICK if quick else FILES)
-    if propose:
-        check_folder(propose, force)
+    _check_folders(out, propose, quick, force)
     believed = read_card(card)
     recordings = read_recordings((*train, *heldout), believed.columns, columns, units, believed.mount.motion, layout)
     seconds = sum(recording.duration for recording in recordings)
     say(f"Read {len(recordings)} recordings, {seconds:.0f} s; card {believed.mount.name}")
-    given: dict[str, Sequence[object]] = {"--heldout": heldout, "--card": [card], "--out": [out]}
-    given |= {"--columns": columns or (), "--units": units or (), "--layout": layout or ()}
-    given |= {"--fmu": [fmu] if fmu else (), "--variables": variables or ()}
-    given |= {"--propose": [propose] if propose else ()}
-    command = _command(train, given) + (" --quick" if quick else "")
+    given: dict[str, Sequence[object] | None] = {"--heldout": heldout, "--card": [card], "--out": [out]}
+    given |= {"--columns": columns, "--units": units, "--layout": layout}
+    given |= {"--fmu": [fmu] if fmu else (), "--variables": variables, "--propose": [propose] if propose else ()}
     with stage("looking for what the model lacks") as progress:
         found = find(
             recordings[: len(train)],
@@ -73,21 +67,27 @@ def diagnose(
             variables=pairs_of("--variables", variables),
             quick=quick,
             force=force,
-            command=command,
+            command=_command(train, given, quick),
             on_progress=progress.tell,
         )
-    files = found.propose(propose, force) if propose else ()
-    if as_json:
-        put_json(found.as_json())
-    else:
-        put(summary(found.diagnosis, out=out))
+    put_json(found.as_json()) if as_json else put(summary(found.diagnosis, out=out))
     if propose:
-        say(proposed(found.diagnosis, files))
+        say(proposed(found.diagnosis, found.propose(propose, force)))
     if check and found.missing:
         sys.exit(1)
 
 
-def _command(train: Sequence[Path], options: Mapping[str, Sequence[object]]) -> str:
+def _check_folders(out: Path, propose: Path | None, quick: bool, force: bool) -> None:
+    """Refuse at once what could not be written at the end (raises OutputError)."""
+    from cosim.diagnosis.deliver import FILES, QUICK, check_out
+    from cosim.diagnosis.learned.proposal import check_folder
+
+    check_out(out, force, QUICK if quick else FILES)
+    if propose:
+        check_folder(propose, force)
+
+
+def _command(train: Sequence[Path], options: Mapping[str, Sequence[object] | None], quick: bool) -> str:
     """The command line that does the same again."""
-    told = [word for name, values in options.items() for value in values for word in (name, str(value))]
-    return join(["cosim", "diagnose", *map(str, train), *told])
+    told = [word for name, values in options.items() for value in values or () for word in (name, str(value))]
+    return join(["cosim", "diagnose", *map(str, train), *told, *(["--quick"] if quick else [])])
