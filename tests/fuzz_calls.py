@@ -222,3 +222,11 @@ class Calls:
 def often(draw: Random, times: int) -> bool:
     """True, but for one time in that many and one."""
     return draw.randrange(times + 1) > 0
+
+
+def length_of(parameters: tuple[Parameter, ...], arguments: tuple[Any, ...], place: int) -> int:
+    """How many numbers of an array count: what the count after it says, else the first one of the call."""
+    counts = [i for i, one in enumerate(parameters) if one.kind == "count" and not one.form]
+    if parameters[place].form == "*":
+        return 1
+    return int(arguments[next((i for i in counts if i > place), counts[0])])

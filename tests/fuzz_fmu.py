@@ -16,7 +16,7 @@ from collections import Counter
 from math import isfinite
 from typing import Any
 
-from fuzz_calls import CELLS, PROGRAMS, SLOTS, Call, Calls, Parameter
+from fuzz_calls import CELLS, PROGRAMS, SLOTS, Call, Calls, Parameter, length_of
 from fuzz_rules import EVENT, EXCHANGE, HEAD, LEADS, ORDER, STEP, damaged, may_be_set
 from hypothesis import HealthCheck, Phase, given, seed, settings
 
@@ -24,14 +24,6 @@ OK, DISCARD, ERROR = 0, 2, 3
 Texts = tuple[bytes | None, bytes | None]  # token, folder of resources
 LOGGER2 = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
 LOGGER3 = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)
-
-
-def length_of(parameters: tuple[Parameter, ...], arguments: tuple[Any, ...], place: int) -> int:
-    """How many numbers of an array count: what the count after it says, else the first one of the call."""
-    counts = [i for i, one in enumerate(parameters) if one.kind == "count" and not one.form]
-    if parameters[place].form == "*":
-        return 1
-    return int(arguments[next((i for i in counts if i > place), counts[0])])
 
 
 class Slot:

@@ -7,6 +7,7 @@ diagnosis, public names without a docstring (a setter has its property's), and t
 import ast
 import sys
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
@@ -35,25 +36,60 @@ def is_setter(node: Function | ast.ClassDef) -> bool:
     return any(isinstance(one, ast.Attribute) and one.attr == "setter" for one in node.decorator_list)
 
 
-def spread(values: list[int]) -> str:
-    """Median, 90 % and largest."""
-    ranked = sorted(values)
-    return f"{len(ranked):,}; lines: median {median(ranked):g}, p90 {ranked[int(0.9 * len(ranked))]}, max {ranked[-1]}"
+@dataclass(frozen=True)
+class Measures:
+    """Sizes of a checkout."""
+
+    functions: list[int]
+    """Lines of each function, the shortest first."""
+    files: list[int]
+    """Lines of each file that holds any, the shortest first."""
+    dictionaries: int
+    """Occurrences of `dict[str, Any]`."""
+    instances: int
+    """Calls of `isinstance` in the diagnosis."""
+    public: int
+    bare: list[str]
+    """Public names without a docstring, each with its file."""
+    modules: list[str]
+    """Directly in `cosim/`."""
 
 
-def main() -> None:
-    root = Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parents[1])
+def measured(root: Path) -> Measures:
+    """Measure the packages of a checkout."""
     texts = {path: path.read_text("utf-8") for name in PACKAGES for path in sorted((root / name).rglob("*.py"))}
     trees = {path: ast.parse(text) for path, text in texts.items()}
     names = [(path, one) for path, tree in trees.items() for one in public(tree)]
-    bare = [f"{path.relative_to(root)}: {one.name}" for path, one in names if not ast.get_docstring(one)]
     diagnosis = [text for path, text in texts.items() if "diagnosis" in path.relative_to(root).parts]
-    print("functions:", spread([lines for tree in trees.values() for lines in functions(tree)]))
-    print("files:", spread([len(text.splitlines()) for text in texts.values() if text]))
-    print("dict[str, Any]:", sum(text.count("dict[str, Any]") for text in texts.values()))
-    print("isinstance in the diagnosis:", sum(text.count("isinstance(") for text in diagnosis))
-    print(f"public names: {len(names):,}, without a docstring: {len(bare)}", *bare)
-    print("modules in cosim/:", *(path.name for path in sorted((root / "cosim").glob("*.py"))))
+    return Measures(
+        functions=sorted(lines for tree in trees.values() for lines in functions(tree)),
+        files=sorted(len(text.splitlines()) for text in texts.values() if text),
+        dictionaries=sum(text.count("dict[str, Any]") for text in texts.values()),
+        instances=sum(text.count("isinstance(") for text in diagnosis),
+        public=len(names),
+        bare=[f"{path.relative_to(root)}: {one.name}" for path, one in names if not ast.get_docstring(one)],
+        modules=[path.name for path in sorted((root / "cosim").glob("*.py"))],
+    )
+
+
+def at_90(ranked: list[int]) -> int:
+    """What 90 % of sorted values do not exceed."""
+    return ranked[int(0.9 * len(ranked))]
+
+
+def spread(ranked: list[int]) -> str:
+    """Median, 90 % and largest."""
+    return f"{len(ranked):,}; lines: median {median(ranked):g}, p90 {at_90(ranked)}, max {ranked[-1]}"
+
+
+def main() -> None:
+    found = measured(Path(sys.argv[1] if len(sys.argv) > 1 else Path(__file__).parents[1]))
+    print("functions:", spread(found.functions))
+    print("files:", spread(found.files))
+    print("dict[str, Any]:", found.dictionaries)
+    print("isinstance in the diagnosis:", found.instances)
+    print(f"public names: {found.public:,}, without a docstring: {len(found.bare)}", *found.bare)
+    print("modules in cosim/:", *found.modules)
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ import math
 from collections.abc import Callable
 from itertools import product
 from random import Random
-from types import SimpleNamespace
 from typing import Any
 
 import casadi as ca
@@ -13,8 +12,7 @@ import numpy as np
 import pytest
 from effect_examples import example
 
-from pyfmi_models.effects import FORMS, Effect, FrictionWander, Motion
-from pyfmi_models.effects.backlash import Backlash
+from pyfmi_models.effects import FORMS, Effect, Motion
 
 FORM = {form.__name__: form for form in FORMS}
 Rows = list[float]
@@ -247,100 +245,6 @@ def test_a_learned_torque_constant_is_the_exponential_of_its_table(q: float) -> 
     effect = example(FORM["LearnedGain"])
     told = table(effect, list(effect.more_command), -1, 1.2, q)
     near(effect.given(Motion(0.0, q, 0.0, q)).applied((), 6.0), 6 * math.exp(-told))
-
-
-def test_a_spring_between_two_masses_is_its_equation_in_time_and_over_frequency() -> None:
-    """Antiresonance 20 Hz, resonance 25 Hz, both masses 2 kg m2: at s = j w the far mass moves k + d s of the near."""
-    spring = example(FORM["Compliance"])
-    far = 2 * (1 - 0.64)
-    k, d = far * (40 * math.pi) ** 2, 2 * 0.02 * far * 40 * math.pi
-    near(spring.share(), 0.36)
-    near(spring.torque(1e-3, 0.2, far), k * 1e-3 + d * 0.2)
-    for w, damping in product((1.0, 60.0, 40 * math.pi, 900.0), (0.02, 0.0)):
-        d = 2 * max(damping, 1e-4) * far * 40 * math.pi
-        moved = (k + d * 1j * w) / (far * (1j * w) ** 2 + k + d * 1j * w)
-        found = FORM["Compliance"](antiresonance_hz=20.0, resonance_hz=25.0, damping_ratio=damping)
-        np.testing.assert_allclose(found.carried(np.array([w])), [moved], rtol=1e-12)
-
-
-def test_a_spring_before_the_axis_is_its_equation_in_time_and_over_frequency() -> None:
-    """Resonance 60 Hz; of 2 kg m2 the axis has 1.2, so the motor has 0.8."""
-    spring, motor, axis, w = example(FORM["LoadSideCompliance"]), 0.8, 1.2, 120 * math.pi
-    k = w**2 * motor * axis / 2
-    d = k * 2 * 0.02 / w
-    near(spring.share(), 0.6)
-    near(spring.antiresonance_hz(), 60 * math.sqrt(0.4))
-    near(spring.torque(1e-3, 0.2, axis), k * 1e-3 + d * 0.2)
-    omega = np.array([1.0, 60.0, 377.0, 2e3])
-    expected = [1 + motor * (1j * one) ** 2 / (k + d * 1j * one) for one in omega]
-    np.testing.assert_allclose(spring.demand(omega), expected, rtol=1e-12)
-
-
-PLAY = Backlash(gap_rad=0.01, load_friction=0.3, load_viscous=0.7, load_deflection=1e-3, contact_hz=30.0)
-
-
-@pytest.mark.parametrize(("twist", "rate"), [(0.004, 1.0), (0.006, 0.0), (0.006, 0.5), (0.006, -9.0), (-0.0051, -0.4)])
-def test_a_play_passes_nothing_in_its_gap_and_pushes_beyond_it_and_never_pulls(twist: float, rate: float) -> None:
-    far, side, depth = 1.5, sign(twist), max(abs(twist) - 0.005, 0)
-    k = far * (60 * math.pi) ** 2
-    d = 2 * 0.75 * far * 60 * math.pi * (1 - math.exp(-depth / 1e-5))
-    near(PLAY.torque(twist, rate, far), side * max(k * depth + d * side * rate, 0))
-
-
-def test_the_far_side_of_a_play_rubs_by_its_bristle_and_its_oil() -> None:
-    for speed, z in product((-0.2, 0.0, 0.5), (-8e-4, 0.0, 1e-3)):
-        near(PLAY.drag(speed, [0.0, 0.0, z]), 0.3 * z / 1e-3 + 0.7 * speed)
-        near(PLAY.further_rates(speed, [0.0, 0.0, z])[0], speed - abs(speed) * z / 1e-3)
-
-
-@pytest.mark.parametrize("seed", range(30))
-def test_a_step_of_a_play_solves_its_implicit_equations(seed: int) -> None:
-    """Contact and friction at the end of the step: what they give changes the speed by just that."""
-    dice, far, dt = Random(seed), 1.5, 10 ** Random(seed).uniform(-5, -2)
-    twist, v, z = dice.uniform(-0.012, 0.012), dice.uniform(-1, 1), dice.uniform(-1e-3, 1e-3)
-    speed = dice.uniform(-1, 1)
-    after_twist, after, after_z, passed = map(float, PLAY.advance(twist, v, (z,), speed, dt, far))
-    assert after_twist == pytest.approx(twist + dt * (speed - after), abs=1e-14)
-    assert after_z == pytest.approx(z + dt * (after - abs(after) * after_z / 1e-3), abs=1e-13)
-    side = sign(twist + dt * (speed - v))
-    pushed = (v + dt * passed / far) / (1 + dt * 0.7 / far)
-    assert after == pytest.approx(pushed - dt * 0.3 * after_z / 1e-3 / far, abs=1e-12)
-    deep, before = side * (twist + dt * (speed - v) - dt * dt * passed / far) - 0.005, max(side * twist - 0.005, 0)
-    omega = 60 * math.pi
-    contact = side * far * max(omega**2 * deep + 2 * 0.75 * omega * (deep - before) / dt, 0)
-    assert passed == pytest.approx(contact, rel=1e-7, abs=1e-9)
-
-
-def wandered(t: float, e: Any) -> float:
-    """Relative change of the level in whole numbers: what is drawn is a congruential generator's, cubed by squares."""
-    modulus, multiplier = 94906249, 48271
-
-    def scrambled(seed: int) -> int:
-        number = seed + 1
-        for _ in range(3):
-            number = (multiplier * number + 1) % modulus
-            number = number * number % modulus
-        return number
-
-    def jump(count: int) -> float:
-        return e.jump_std * math.sqrt(3) * (2 * scrambled(e.seed * 7919 + (count + 1) * 104729) / modulus - 1)
-
-    number, slow = scrambled(e.seed), 0.0
-    for k in range(8):
-        number = (multiplier * number + 1) % modulus
-        rate = math.tan(math.pi / 2 * (k + 0.5) / 8) * (1 + 0.35 * (2 * number / modulus - 1)) / e.correlation_time
-        number = (multiplier * number + 1) % modulus
-        slow += math.sin(rate * t + 2 * math.pi * number / modulus)
-    count = math.floor(t / e.jump_period)
-    x = min((t / e.jump_period - count) / 0.02, 1)
-    return e.std * math.sqrt(2 / 8) * slow + jump(count - 1) + (jump(count) - jump(count - 1)) * (3 * x**2 - 2 * x**3)
-
-
-@pytest.mark.parametrize("t", [0.0, 0.01, 1.99, 2.0, 2.013, 2.039, 2.041, 7.7, 94.3])
-def test_friction_wanders_as_its_generator_says_in_whole_numbers(t: float) -> None:
-    numbers: dict[str, Any] = {"std": 0.1, "correlation_time": 0.7, "jump_std": 0.2, "jump_period": 2.0, "seed": 12}
-    found = FrictionWander(**numbers).level(2.0, SimpleNamespace(t=t))  # type: ignore[arg-type]
-    near(found, 2 * max(0.05, 1 + wandered(t, SimpleNamespace(**numbers))))
 
 
 def test_every_form_with_an_equation_of_its_own_is_asked_here() -> None:

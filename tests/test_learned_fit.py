@@ -2,49 +2,22 @@
 
 import json
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
-from test_unknown import FC, Array, Extra, iron, kick, night
+from learned_cases import droop, learned, parts, recording, wanders, warm_place
+from test_unknown import FC, Array, Extra, iron, kick
 
-from cosim.data.recording import Recording
-from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.deliver import as_json, deliver_quickly
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.learned.candidate_terms import candidate_terms, resolved
-from cosim.diagnosis.learned.grams import columns_of, with_terms
-from cosim.diagnosis.learned.learn import SURE, Learned, _judged, learn
-from cosim.diagnosis.learned.select import LEAST_EVIDENCE, begun, paths
+from cosim.diagnosis.learned.learn import SURE, learn
+from cosim.diagnosis.learned.select import begun, paths
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.protocol import CUTOFF
-from cosim.estimation.fit import Fit
-from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import prepare
-from cosim.estimation.problem import Problem
 from pyfmi_models.card import parse_card, read_card
-from pyfmi_models.effects.learned import LearnedFriction, LearnedViscous
-from pyfmi_models.effects.learned_drive import LearnedDrive, LearnedGain
-from pyfmi_models.effects.learned_memory import LearnedHysteresis
-from pyfmi_models.friction import Coulomb
-from pyfmi_models.mount import Axis, Mount
-
-NOISE = 0.05
-MOUNT = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=FC, sigma2=1.0), effects=())
-
-
-def warm_place(now: dict[str, Array]) -> Array:
-    """Friction that rises at one place with the temperature: a product, none of the catalogue."""
-    bump = np.exp(-((now["q"] / 0.15) ** 2))
-    return 0.15 * (now["temperature"] - 20) * bump * np.sign(now["v"])
-
-
-def droop(now: dict[str, Array]) -> Array:
-    """A drive whose torque falls behind its command, the more the more it is asked for."""
-    needed = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"]
-    return 0.05 * needed * np.abs(needed)
 
 
 def teeth(now: dict[str, Array]) -> Array:
@@ -71,49 +44,6 @@ def polish(now: dict[str, Array]) -> Array:
 
 def nothing(now: dict[str, Array]) -> Array:
     return 0 * now["t"]
-
-
-def gives(now: dict[str, Array]) -> Array:
-    """A loop the wrong way round, as of a delay that feeds energy in."""
-    return -0.3 * iron(now)
-
-
-def wanders(now: dict[str, Array]) -> Array:
-    """Large, and of another sign in each night: what was learned from two helps no third."""
-    return (-1.0 if now["run"][0] == 3 else 1.0) * np.cos(20 * now["q"])
-
-
-def recording(extra: Extra, seed: int) -> Recording:
-    now, rng = night(seed), np.random.default_rng(100 + seed)
-    tau = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"] + extra(now) + NOISE * rng.standard_normal(6000)
-    return Recording(f"night_{seed}", {n: now[n] for n in ("t", "q", "temperature")} | {"tau": tau})
-
-
-@cache
-def parts(extra: Extra) -> tuple[Comparison, Fit, Predictive]:
-    """The refitted base on two nights, and a third that proves."""
-    train, there = [recording(extra, 1), recording(extra, 2)], [recording(extra, 3)]
-    prepared = prepare(train, 10.0)
-    v = np.abs(prepared.stacked("v"))
-    problem = Problem(MOUNT, prepared, np.asarray(v > 0.02 * v.max(), float), 0.01)
-    base = problem.fit(MOUNT, 25)
-    comparison = Comparison.of(problem, base, POLICY)
-    return (
-        comparison,
-        base,
-        Predictive.of(comparison, prepare(there, 10.0), base, prepare(there, CUTOFF)).as_delivered(),
-    )
-
-
-@cache
-def tried(extra: Extra) -> Learned | None:
-    return learn(*parts(extra))
-
-
-def learned(extra: Extra) -> Learned | None:
-    """What is delivered."""
-    found = tried(extra)
-    return found if found and found.helps else None
 
 
 @pytest.mark.parametrize(
@@ -203,85 +133,6 @@ def test_no_recording_is_worse_off_than_before() -> None:
     assert found is not None
     assert not found.helps
     assert "is not in the model" in found.sentence()
-
-
-def test_columns_of_a_term_are_what_its_coefficients_add() -> None:
-    comparison, base, _ = parts(warm_place)
-    prepared = comparison.problem.prepared
-    for term in candidate_terms(base.mount, prepared):
-        if term.name in ("torque", "position and temperature", "hysteresis over a long stroke"):
-            columns, size = columns_of(base.mount, term, prepared), 1e-4
-            values = [size if k == 2 else 0.0 for k in range(term.count)]
-            torques = []
-            for one in (term, term.with_coefficients(values)):
-                mount, _ = with_terms(base.mount, [one])
-                torques.append(stacked(Inverse(mount, ()), prepared.pieces, np.zeros(0))[0])
-            np.testing.assert_allclose((torques[1] - torques[0]) / size, columns[:, 2], atol=2e-3)
-
-
-def test_the_effect_of_a_card_is_the_term_that_was_fitted() -> None:
-    comparison, base, _ = parts(warm_place)
-    prepared = comparison.problem.prepared
-    for term in candidate_terms(base.mount, prepared):
-        fitted = term.with_coefficients([0.01 * (k + 1) for k in range(term.count)])
-        there, _ = with_terms(base.mount, [fitted])
-        here = replace(base.mount, effects=(fitted.learned(fitted.coefficients.tolist()),))
-        torques = [stacked(Inverse(one, ()), prepared.pieces, np.zeros(0))[0] for one in (here, there)]
-        np.testing.assert_allclose(torques[0], torques[1], atol=1e-9)
-
-
-def test_friction_that_is_learned_never_drives_and_a_drive_gives_more_for_more() -> None:
-    for extra in (warm_place, droop):
-        found = learned(extra)
-        assert found is not None
-        for effect in found.effects:
-            assert effect.broken_rule() == ""
-            assert isinstance(effect, LearnedFriction | LearnedViscous | LearnedDrive | LearnedGain)
-
-
-def test_a_hysteresis_that_would_give_energy_is_not_learned() -> None:
-    found = learned(gives)
-    for effect in found.effects if found else ():
-        assert not isinstance(effect, LearnedHysteresis) or min(effect.torque) >= 0
-
-
-def test_a_column_has_no_more_waves_than_its_values_tell() -> None:
-    """Two nights at two temperatures tell no bend between them."""
-    two = np.concatenate([np.linspace(10, 11, 50), np.linspace(20, 21, 50)])
-    assert [resolved(4, values) for values in (two, np.linspace(0, 1, 100), np.array([0, 0.3, 0.6, 1.0]))] == [1, 4, 2]
-
-
-@pytest.mark.parametrize(("extra", "helps"), [(warm_place, True), (wanders, False)])
-def test_what_removes_much_of_an_error_is_delivered_though_the_rest_is_no_likelier(
-    extra: Extra, helps: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """What nuisances could be is free in a likelihood, and error all the same in what is delivered."""
-    comparison, base, held = parts(extra)
-    terms = [
-        one for one in candidate_terms(MOUNT, comparison.problem.prepared) if one.name == "position and temperature"
-    ]
-    monkeypatch.setattr(Predictive, "log_likelihood", lambda *_: 0.0)
-    found = _judged(comparison, base, terms, held)
-    assert found is not None
-    assert found.gain == 0.0
-    assert found.helps is helps
-
-
-def test_terms_need_evidence_each() -> None:
-    class Scores:
-        recordings = 2
-
-        def marginal(self, chosen, which):
-            return type("M", (), {"log_likelihood": 5.0 * len(chosen)})
-
-        def fitted(self, chosen, which):
-            return np.zeros(0)
-
-        def predicted(self, chosen, beta, which):
-            return 100.0 * len(chosen)
-
-    assert LEAST_EVIDENCE > 5
-    assert paths(Scores(), range(4)) == []
 
 
 def test_first_terms_that_gain_nearly_as_much_are_each_followed_and_held_out_recordings_judge() -> None:

@@ -1,7 +1,6 @@
 """The report: one file, no network, says the answer, survives hostile names."""
 
 import base64
-import io
 import os
 import re
 import shutil
@@ -22,11 +21,9 @@ from cosim.diagnosis.breakdown import part, samples
 from cosim.diagnosis.hypotheses import TRIED
 from cosim.diagnosis.report import lead, render, words, write_report
 from cosim.diagnosis.report.explorer import payload
-from cosim.diagnosis.report.figures_proof import relative
 from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.tables import limits, numbers
+from cosim.diagnosis.report.tables import numbers
 from cosim.diagnosis.terminal import summary
-from cosim.plots.quantities import minus, number, raised
 from cosim.plots.style import thin
 
 
@@ -189,14 +186,6 @@ def test_further_waves_of_a_ripple_stand_in_its_table() -> None:
     assert (rows["amplitude"], rows["amplitude, wave 2"], rows["phase, wave 2"]) == ("0.4200", "0.1250", "−0.3000")
 
 
-def test_where_nothing_is_missing_no_effect_is_left_out_of_the_first_screen_and_no_gain_is_claimed() -> None:
-    whole = diagnosis("none")
-    cells = " ".join(row[0] for row in limits(whole, Scales.of(whole)).rows).lower()
-    assert all(one.title.lower() in cells for one in whole.findings if one.answer in ("not_seen", "not_testable"))
-    assert "so there is no gain to prove" in page("none")
-    assert "so there is no gain to prove" not in page("two")
-
-
 def test_beside_another_teams_fmu_its_correction_is_what_to_use() -> None:
     whole = diagnosis("two")
     improved = whole.improved | {"correction": "correction.fmu", "ssp": "improved.ssp", "not_in_correction": ["delay"]}
@@ -225,43 +214,6 @@ def test_an_experiment_that_noise_would_hide_is_said_to_need_more_motion(differe
     html = render(replace(whole, next_experiment=whole.next_experiment | {"expected_difference": difference}))
     assert said in html
     assert ("Record motion that goes further or faster" in html) == (difference < 0.01)  # what the first table orders
-
-
-def test_units_are_printed_with_powers() -> None:
-    assert raised("N.m.s2/rad2") == "N·m·s²/rad²"
-
-
-def test_numbers_read_well() -> None:
-    assert [number(x) for x in (0.4203, 0.0, -12.34, 1234.0, float("nan"))] == ["0.42", "0", "−12", "1,200", "–"]
-    assert minus("-0.01 to 0.11, run-3") == "−0.01 to 0.11, run-3"
-    assert relative(FOUND[0]) == pytest.approx((8.4, 7.8, 9.0))
-
-
-@KINDS
-def test_terminal_summary_fits_80_columns(kind: str, motion: str) -> None:
-    from cosim.diagnosis.terminal import summary
-
-    text = summary(diagnosis(kind, motion))
-    assert max(map(len, text.splitlines())) <= 80
-    assert "not seen" in text
-    assert "\033" not in text
-    assert ("EITHER    gravity unbalance" in text) == (kind == "two")
-
-
-def test_terminal_is_bold_only_where_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cosim.diagnosis.terminal import print_summary, summary
-
-    class Terminal(io.StringIO):
-        def isatty(self) -> bool:
-            return True
-
-    for variable, value, bold in (("TERM", "xterm", True), ("TERM", "dumb", False), ("NO_COLOR", "1", False)):
-        monkeypatch.delenv("NO_COLOR", raising=False)
-        monkeypatch.setenv("TERM", "xterm")
-        monkeypatch.setenv(variable, value)
-        print_summary(diagnosis(), out := Terminal())
-        assert ("\033[1m" in out.getvalue()) == bold
-    assert "\033" not in summary(diagnosis(mount="\033[31mred"))
 
 
 def test_importing_the_report_does_not_load_matplotlib() -> None:

@@ -11,14 +11,11 @@ from tiny_fmu import described, tiny
 
 from cosim.data.recording import Recording
 from cosim.fmi.fmu import FmuComponent
-from cosim.fmi.types import elements, indexed
 from cosim.master.loop import library
 from cosim.master.pool import Pool
-from cosim.master.simulate import Options, run
-from cosim.support.errors import FmuError, StepError, WiringError
-from cosim.system.algorithm import GaussSeidel, Iterated
+from cosim.support.errors import FmuError, WiringError
+from cosim.system.algorithm import Iterated
 from cosim.system.faults import Freeze
-from cosim.system.scenario import parse_scenario
 from cosim.system.wire import Record, Wire
 
 __all__ = ["mirror", "tiny"]
@@ -148,162 +145,6 @@ def test_a_run_keeps_only_the_texts_that_it_still_needs() -> None:
     assert pool.content(pool.number(b"\0\1\0")) == b"\0\1\0"
 
 
-WIDER = [
-    ("Float32", "Float64"),
-    ("Int8", "Int16"),
-    ("UInt8", "Int16"),
-    ("UInt32", "Int64"),
-    ("Int32", "Float64"),
-    ("Int64", "Float64"),
-    ("Int16", "Float32"),
-    ("Boolean", "UInt8"),
-    ("Boolean", "Float64"),
-    ("Enumeration", "Int64"),
-    ("Int32", "Enumeration"),
-    ("Enumeration", "Float64"),
-]
-NARROWER = {
-    ("Float64", "Float32"): "a Float32 does not hold every Float64; cast = true",
-    ("Float64", "Int32"): "an Int32 does not hold every Float64; cast = true",
-    ("Int16", "Int8"): "an Int8 does not hold every Int16; cast = true",
-    ("Int8", "UInt8"): "an UInt8|a UInt8 does not hold every Int8",
-    ("UInt64", "Int64"): "an Int64 does not hold every UInt64",
-    ("Int8", "Boolean"): "a Boolean cannot hold an Int8",
-    ("Float64", "Enumeration"): "an Enumeration cannot hold every Float64",
-    ("String", "Binary"): "a Binary cannot hold a String",
-    ("Float64", "String"): "a String cannot hold a Float64",
-    ("String", "Float64"): "a Float64 cannot hold a String",
-}
-
-
-@pytest.mark.parametrize(("source", "target"), WIDER)
-def test_a_type_that_holds_all_values_of_another_takes_them(source: str, target: str, mirror: dict[int, Path]) -> None:
-    value = {"Boolean": True, "Enumeration": 30}.get(source, 30 if target == "Enumeration" else 100)
-    recording = simulate(
-        {"one": mirror[3], "two": mirror[3]},
-        [Wire(f"one.{named(source)[1]}", f"two.{named(target)[0]}")],
-        record={"y": f"two.{named(target)[1]}"},
-        step=0.1,
-        ticks=4,
-        parameters={"one": {named(source)[0]: value}},
-        algorithm=GaussSeidel(kind="gauss-seidel", order=["one", "two"]),  # no item is 0, which an output begins with
-    ).recording
-    assert recording["y"][-1] == value
-
-
-@pytest.mark.parametrize(("source", "target"), NARROWER)
-def test_a_type_that_does_not_is_refused_in_a_sentence(source: str, target: str, mirror: dict[int, Path]) -> None:
-    wire = Wire(f"one.{named(source)[1]}", f"two.{named(target)[0]}")
-    with pytest.raises(WiringError, match=NARROWER[source, target]) as raised:
-        simulate({"one": mirror[3], "two": mirror[3]}, [wire], record={"y": "two.float64_out"}, step=0.1, ticks=4)
-    assert wire.target in str(raised.value)
-    assert wire.source in str(raised.value)
-
-
-def fed_by_a_signal(mirror: dict[int, Path], kind: str, values: Any, compiled: bool = True, **wire: Any) -> np.ndarray:
-    into, out = named(kind)
-    recording = simulate(
-        {"m": mirror[3]},
-        [Wire("s", f"m.{into}", **wire)],
-        record={"y": f"m.{out}"},
-        step=0.1,
-        ticks=len(values),
-        signals={"s": np.array(values, dtype=float)},
-        compiled=compiled,
-    ).recording
-    return recording["y"]
-
-
-@LOOPS
-def test_a_cast_takes_the_nearest_value_and_never_one_out_of_range(compiled: bool, mirror: dict[int, Path]) -> None:
-    found = fed_by_a_signal(mirror, "Int8", [0.4, 0.6, -1.5, 127.4, 0.0], compiled, cast=True)
-    np.testing.assert_array_equal(found, [0, 0, 1, -2, 127])
-    found = fed_by_a_signal(mirror, "Float32", [0.1, 0.1, 0.1], compiled, cast=True)
-    assert found[-1] == np.float32(0.1)
-    with pytest.raises(StepError, match=r'at tick 1 .*"m.int8_in" is fed 128; an Int8 takes whole numbers from -128'):
-        fed_by_a_signal(mirror, "Int8", [0.0, 128.0], compiled, cast=True)
-    with pytest.raises(StepError, match=r'"m.float32_in" is fed 1.*e\+300; that is beyond'):
-        fed_by_a_signal(mirror, "Float32", [1e300], compiled, cast=True)
-
-
-@LOOPS
-@pytest.mark.parametrize(
-    ("kind", "value", "said"),
-    [
-        ("Int32", 2.5, "an Int32 takes whole numbers from -2147483648 to 2147483647"),
-        ("UInt8", -1.0, "a UInt8 takes whole numbers from 0 to 255"),
-        ("Boolean", 2.0, "a Boolean takes 0 or 1"),
-        ("Enumeration", 20.0, r"its items are: 10 \(calm\), 30 \(angry\)"),
-        ("Float32", 0.1, "a Float32 cannot hold that exactly; cast = true takes the nearest value"),
-    ],
-)
-def test_a_signal_that_does_not_fit_ends_the_run_with_the_variable_and_the_value(
-    kind: str, value: float, said: str, compiled: bool, mirror: dict[int, Path]
-) -> None:
-    good = 10.0 if kind == "Enumeration" else 0.0
-    with pytest.raises(StepError, match=rf'at tick 2 .*"m.{named(kind)[0]}" is fed .*{said}') as raised:
-        fed_by_a_signal(mirror, kind, [good, good, value], compiled)
-    assert f"is fed {value!r}".removesuffix(".0") in str(raised.value)
-    np.testing.assert_array_equal(fed_by_a_signal(mirror, kind, [good] * 3, compiled), [good] * 3)
-
-
-def test_an_integer_beyond_2_53_is_exact_or_an_error_but_never_rounded(mirror: dict[int, Path]) -> None:
-    def through(target: str, record: str | Record, value: int) -> Any:
-        return simulate(
-            {"one": mirror[3], "two": mirror[3]},
-            [Wire("one.int64_out", f"two.{target}_in")],
-            record={"y": record},
-            step=0.1,
-            ticks=4,
-            parameters={"one": {"int64_in": value}},
-        ).recording
-
-    assert through("int64", "two.int64_out", 2**53 + 1).others["y"][-1] == 2**53 + 1
-    assert through("float64", "two.float64_out", 2**53 - 1)["y"][-1] == 2**53 - 1
-    with pytest.raises(StepError, match=r'"one.int64_out" is 9007199254740992, and of integers only those below 2'):
-        through("float64", "two.float64_out", 2**53 + 1)
-    with pytest.raises(StepError, match=r'"two.int64_out" is 9007199254740992'):
-        through("int64", Record("two.int64_out", "mean"), 2**53 + 1)
-
-
-@LOOPS
-def test_a_map_puts_values_and_items_in_the_place_of_others(compiled: bool, mirror: dict[int, Path]) -> None:
-    text = f"""
-    step = 0.1
-    stop = 0.4
-    [components.one]
-    fmu = "{mirror[3]}"
-    parameters = {{ enumeration_in = "angry", int8_in = 3, boolean_in = true }}
-    [components.two]
-    fmu = "{mirror[3]}"
-    [[connections]]
-    from = "one.enumeration_out"
-    to = "two.enumeration_in"
-    map = {{ angry = "calm", calm = "angry" }}
-    [[connections]]
-    from = "one.int8_out"
-    to = "two.int8_in"
-    map = {{ 3 = 5, 5 = 7 }}
-    [[connections]]
-    from = "one.boolean_out"
-    to = "two.boolean_in"
-    map = {{ true = false, false = true }}
-    [record]
-    signals = {{ mood = "two.enumeration_in", n = "two.int8_in", not = "two.boolean_in" }}
-    """
-    recording = run(parse_scenario(text, "x.toml", Path()), Options(compiled=compiled)).recording
-    assert (recording["mood"][0], recording["mood"][-1]) == (30.0, 10.0)
-    assert recording["n"][-1] == 5.0
-    assert (recording["not"][0], recording["not"][-1]) == (1.0, 0.0)
-    wrongs = {
-        'angry = "sad"': 'names "sad", which "two.enumeration_in" does not have; there are: calm, angry',
-        "30 = 20": r"leaves 30 \(angry\), which the target does not know",
-    }
-    for wrong, said in wrongs.items():
-        with pytest.raises(WiringError, match=said):
-            run(parse_scenario(text.replace('angry = "calm", calm = "angry"', wrong), "x.toml", Path()))
-
-
 @pytest.mark.parametrize(
     ("parameters", "said"),
     [
@@ -364,79 +205,6 @@ def test_components_agree_within_a_tick_on_real_numbers_only(mirror: dict[int, P
                 ticks=2,
                 algorithm=Iterated(kind="iterated", components=("one", "two")),
             )
-
-
-@LOOPS
-def test_arrays_are_wired_whole_and_by_index_and_recorded_as_columns(compiled: bool, mirror: dict[int, Path]) -> None:
-    recording = simulate(
-        {"one": mirror[3], "two": mirror[3]},
-        [Wire("one.y", "two.u"), Wire("one.z[2,1]", "two.w[1,2]"), Wire("one.y[2]", "two.float64_in", gain=10.0)],
-        record={"y": "two.y", "z": "two.z", "x": "two.float64_out", "u": "two.u"},
-        step=0.1,
-        ticks=4,
-        parameters={"one": {"u": [7, 8, 9], "w": [[10, 20, 30], [40, 50, 60]]}},
-        compiled=compiled,
-    ).recording
-    names = [indexed("y", one) for one in elements((3,))] + [indexed("z", one) for one in elements((2, 3))]
-    assert list(recording)[1:] == [*names, "x", "u[1]", "u[2]", "u[3]"]
-    assert [recording[name][-1] for name in names] == [7, 8, 9, 1, 40, 3, 4, 5, 6]
-    assert recording["x"][-1] == 80
-    assert [recording[f"u[{n}]"][-1] for n in (1, 2, 3)] == [7, 8, 9]
-
-
-@LOOPS
-def test_structural_parameters_size_arrays_before_they_are_wired(compiled: bool, mirror: dict[int, Path]) -> None:
-    big = {"n": 5, "u": [1, 2, 3, 4, 5]}
-    recording = simulate(
-        {"one": mirror[3], "two": mirror[3]},
-        [Wire("one.y", "two.u")],
-        record={"y": "two.y"},
-        step=0.1,
-        ticks=4,
-        parameters={"one": big, "two": {"n": 5}},
-        compiled=compiled,
-    ).recording
-    assert [recording[f"y[{n}]"][-1] for n in range(1, 6)] == [1, 2, 3, 4, 5]
-    with pytest.raises(WiringError, match=r'"two.u" has 3 elements and "one.y" 5 elements; wire arrays of one shape'):
-        simulate(
-            {"one": mirror[3], "two": mirror[3]},
-            [Wire("one.y", "two.u")],
-            record={"y": "two.y"},
-            step=0.1,
-            ticks=4,
-            parameters={"one": big},
-        )
-
-
-def test_an_element_of_an_array_is_set_beside_the_start_values_of_the_others(mirror: dict[int, Path]) -> None:
-    recording = simulate(
-        {"m": mirror[3]}, [], record={"y": "m.y"}, step=0.1, ticks=2, parameters={"m": {"u[2]": 9.0}}
-    ).recording
-    assert [recording[f"y[{n}]"][-1] for n in (1, 2, 3)] == [1, 9, 3]
-
-
-@pytest.mark.parametrize("start", ["1 x 3", f"1 {'9' * 5000} 3", "1 ² 3"])
-def test_start_values_of_an_array_that_are_no_numbers_are_refused(
-    mirror: dict[int, Path], tmp_path: Path, start: str
-) -> None:
-    bad = described(mirror[3], tmp_path / "bad.fmu", description(3).replace('start="1 2 3"', f'start="{start}"'))
-    with pytest.raises(FmuError, match="must be a number"):
-        simulate({"m": bad}, [], record={"y": "m.y"}, step=0.1, ticks=2, parameters={"m": {"u[3]": 9.0}})
-
-
-@pytest.mark.parametrize(
-    ("wire", "said"),
-    [
-        (Wire("one.y", "two.float64_in"), '"two.float64_in" has one value and "one.y" 3 elements'),
-        (Wire("one.float64_out", "two.u"), '"two.u" has 3 elements and "one.float64_out" one value'),
-        (Wire("one.z", "two.u"), '"two.u" has 3 elements and "one.z" 2 x 3 elements'),
-        (Wire("one.y[4]", "two.u[1]"), "which is not an output"),
-        (Wire("one.y[1]", "two.u[0]"), r'"two.u\[0\]" cannot be fed: it does not exist'),
-    ],
-)
-def test_arrays_that_do_not_fit_are_refused(wire: Wire, said: str, mirror: dict[int, Path]) -> None:
-    with pytest.raises(WiringError, match=said):
-        simulate({"one": mirror[3], "two": mirror[3]}, [wire], record={"x": "two.float64_out"}, step=0.1, ticks=2)
 
 
 def test_a_second_run_of_the_same_component_begins_anew(mirror: dict[int, Path]) -> None:

@@ -1,0 +1,49 @@
+"""A simulated mount behind its server, and ASCOM's own client of it."""
+
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from math import radians
+from time import monotonic, sleep
+from typing import Any
+
+import pytest
+
+from cosim.models.cache import with_fmus
+from cosim.observatory.alpaca import Server
+from cosim.observatory.mount import Limits, SimulatedMount
+from cosim.observatory.pointing import Pointing
+from cosim.observatory.telescope import Telescope
+from cosim.system.scenario import read_scenario
+
+SPEED, ARCSEC = 20.0, 1 / 3600
+QUICK = Limits(velocity=radians(10), acceleration=radians(10))
+BEGUN = datetime(2026, 11, 21, 20, tzinfo=UTC)
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[Server]:
+    with (
+        SimulatedMount(with_fmus(read_scenario("two_axis")), limits=QUICK, speed=SPEED) as mount,
+        Server(Telescope(Pointing(mount, radians(9.0), BEGUN)), port=0, discovery=0) as one,
+    ):
+        yield one
+
+
+@pytest.fixture
+def telescope(server: Server) -> Iterator[Any]:
+    """The client's telescope, connected, unparked, at rest, not tracking."""
+    alpaca = pytest.importorskip("alpaca.telescope", reason="alpyca is not installed (pip install '.[alpaca]')")
+    one = alpaca.Telescope(f"127.0.0.1:{server.port}", 0)
+    one.Connected = True
+    until(lambda: not one.Slewing)
+    one.Unpark()
+    one.Tracking = False
+    yield one
+    until(lambda: not one.Slewing)
+
+
+def until(done: Callable[[], bool], seconds: float = 20.0) -> None:
+    last = monotonic() + seconds
+    while not done():
+        assert monotonic() < last
+        sleep(0.01)

@@ -1,0 +1,71 @@
+"""Recordings of an axis with physics that has no name, and what is learned from them."""
+
+from functools import cache
+
+import numpy as np
+from test_unknown import FC, Array, Extra, night
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.learned.learn import Learned, learn
+from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.predictive import Predictive
+from cosim.diagnosis.protocol import CUTOFF
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import prepare
+from cosim.estimation.problem import Problem
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+NOISE = 0.05
+MOUNT = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=FC, sigma2=1.0), effects=())
+
+
+def warm_place(now: dict[str, Array]) -> Array:
+    """Friction that rises at one place with the temperature: a product, none of the catalogue."""
+    bump = np.exp(-((now["q"] / 0.15) ** 2))
+    return 0.15 * (now["temperature"] - 20) * bump * np.sign(now["v"])
+
+
+def droop(now: dict[str, Array]) -> Array:
+    """A drive whose torque falls behind its command, the more the more it is asked for."""
+    needed = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"]
+    return 0.05 * needed * np.abs(needed)
+
+
+def wanders(now: dict[str, Array]) -> Array:
+    """Large, and of another sign in each night: what was learned from two helps no third."""
+    return (-1.0 if now["run"][0] == 3 else 1.0) * np.cos(20 * now["q"])
+
+
+def recording(extra: Extra, seed: int) -> Recording:
+    now, rng = night(seed), np.random.default_rng(100 + seed)
+    tau = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"] + extra(now) + NOISE * rng.standard_normal(6000)
+    return Recording(f"night_{seed}", {n: now[n] for n in ("t", "q", "temperature")} | {"tau": tau})
+
+
+@cache
+def parts(extra: Extra) -> tuple[Comparison, Fit, Predictive]:
+    """The refitted base on two nights, and a third that proves."""
+    train, there = [recording(extra, 1), recording(extra, 2)], [recording(extra, 3)]
+    prepared = prepare(train, 10.0)
+    v = np.abs(prepared.stacked("v"))
+    problem = Problem(MOUNT, prepared, np.asarray(v > 0.02 * v.max(), float), 0.01)
+    base = problem.fit(MOUNT, 25)
+    comparison = Comparison.of(problem, base, POLICY)
+    return (
+        comparison,
+        base,
+        Predictive.of(comparison, prepare(there, 10.0), base, prepare(there, CUTOFF)).as_delivered(),
+    )
+
+
+@cache
+def tried(extra: Extra) -> Learned | None:
+    return learn(*parts(extra))
+
+
+def learned(extra: Extra) -> Learned | None:
+    """What is delivered."""
+    found = tried(extra)
+    return found if found and found.helps else None

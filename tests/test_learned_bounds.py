@@ -1,0 +1,102 @@
+"""What a learned term may be: its columns, its signs, its waves, its energy, the evidence it needs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from learned_cases import MOUNT, droop, learned, parts, wanders, warm_place
+from test_unknown import Array, Extra, iron
+
+from cosim.diagnosis.learned.candidate_terms import candidate_terms, resolved
+from cosim.diagnosis.learned.grams import columns_of, with_terms
+from cosim.diagnosis.learned.learn import _judged
+from cosim.diagnosis.learned.select import LEAST_EVIDENCE, paths
+from cosim.diagnosis.predictive import Predictive
+from cosim.estimation.inverse import Inverse, stacked
+from pyfmi_models.effects.learned import LearnedFriction, LearnedViscous
+from pyfmi_models.effects.learned_drive import LearnedDrive, LearnedGain
+from pyfmi_models.effects.learned_memory import LearnedHysteresis
+
+
+def gives(now: dict[str, Array]) -> Array:
+    """A loop the wrong way round, as of a delay that feeds energy in."""
+    return -0.3 * iron(now)
+
+
+def test_columns_of_a_term_are_what_its_coefficients_add() -> None:
+    comparison, base, _ = parts(warm_place)
+    prepared = comparison.problem.prepared
+    for term in candidate_terms(base.mount, prepared):
+        if term.name in ("torque", "position and temperature", "hysteresis over a long stroke"):
+            columns, size = columns_of(base.mount, term, prepared), 1e-4
+            values = [size if k == 2 else 0.0 for k in range(term.count)]
+            torques = []
+            for one in (term, term.with_coefficients(values)):
+                mount, _ = with_terms(base.mount, [one])
+                torques.append(stacked(Inverse(mount, ()), prepared.pieces, np.zeros(0))[0])
+            np.testing.assert_allclose((torques[1] - torques[0]) / size, columns[:, 2], atol=2e-3)
+
+
+def test_the_effect_of_a_card_is_the_term_that_was_fitted() -> None:
+    comparison, base, _ = parts(warm_place)
+    prepared = comparison.problem.prepared
+    for term in candidate_terms(base.mount, prepared):
+        fitted = term.with_coefficients([0.01 * (k + 1) for k in range(term.count)])
+        there, _ = with_terms(base.mount, [fitted])
+        here = replace(base.mount, effects=(fitted.learned(fitted.coefficients.tolist()),))
+        torques = [stacked(Inverse(one, ()), prepared.pieces, np.zeros(0))[0] for one in (here, there)]
+        np.testing.assert_allclose(torques[0], torques[1], atol=1e-9)
+
+
+def test_friction_that_is_learned_never_drives_and_a_drive_gives_more_for_more() -> None:
+    for extra in (warm_place, droop):
+        found = learned(extra)
+        assert found is not None
+        for effect in found.effects:
+            assert effect.broken_rule() == ""
+            assert isinstance(effect, LearnedFriction | LearnedViscous | LearnedDrive | LearnedGain)
+
+
+def test_a_hysteresis_that_would_give_energy_is_not_learned() -> None:
+    found = learned(gives)
+    for effect in found.effects if found else ():
+        assert not isinstance(effect, LearnedHysteresis) or min(effect.torque) >= 0
+
+
+def test_a_column_has_no_more_waves_than_its_values_tell() -> None:
+    """Two nights at two temperatures tell no bend between them."""
+    two = np.concatenate([np.linspace(10, 11, 50), np.linspace(20, 21, 50)])
+    assert [resolved(4, values) for values in (two, np.linspace(0, 1, 100), np.array([0, 0.3, 0.6, 1.0]))] == [1, 4, 2]
+
+
+@pytest.mark.parametrize(("extra", "helps"), [(warm_place, True), (wanders, False)])
+def test_what_removes_much_of_an_error_is_delivered_though_the_rest_is_no_likelier(
+    extra: Extra, helps: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What nuisances could be is free in a likelihood, and error all the same in what is delivered."""
+    comparison, base, held = parts(extra)
+    terms = [
+        one for one in candidate_terms(MOUNT, comparison.problem.prepared) if one.name == "position and temperature"
+    ]
+    monkeypatch.setattr(Predictive, "log_likelihood", lambda *_: 0.0)
+    found = _judged(comparison, base, terms, held)
+    assert found is not None
+    assert found.gain == 0.0
+    assert found.helps is helps
+
+
+def test_terms_need_evidence_each() -> None:
+    class Scores:
+        recordings = 2
+
+        def marginal(self, chosen, which):
+            return type("M", (), {"log_likelihood": 5.0 * len(chosen)})
+
+        def fitted(self, chosen, which):
+            return np.zeros(0)
+
+        def predicted(self, chosen, beta, which):
+            return 100.0 * len(chosen)
+
+    assert LEAST_EVIDENCE > 5
+    assert paths(Scores(), range(4)) == []

@@ -1,0 +1,112 @@
+"""What a diagnosis is compared with: black boxes, sparse regression over a library, the true structure refitted."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_prove import row
+
+from cosim.estimation.prepare import prepare
+from cosim_studies.proof import baselines, marks
+from cosim_studies.proof.ceiling import _refitted, ceiling, in_card_words, judged, true_effect
+from cosim_studies.proof.generator import FAMILIES, make_case, write_given
+from cosim_studies.proof.tool import given
+
+
+def test_true_numbers_become_an_effect_of_the_library() -> None:
+    wave = {"cycles_per_rev": 3, "relative_amplitude": 0.3, "phase": 1.0}
+    periodic = true_effect({"effect": "position_friction", "parameters": wave})
+    assert type(periodic).__name__ == "PeriodicFriction"
+    assert in_card_words({"effect": "position_friction", "parameters": wave})["phase"] == pytest.approx(1 - np.pi / 2)
+    spot = {"q_center": 0.1, "relative_amplitude": 0.3, "width": 0.2}
+    assert type(true_effect({"effect": "position_friction", "parameters": spot})).__name__ == "LocalFriction"
+    for name in FAMILIES:
+        case = make_case(4, [name], duration=10.0) if name in ("delay", "stribeck", "clock_skew") else None
+        if case:
+            assert true_effect(case.truth["effects"][0]).id == name
+
+
+def test_the_true_structure_refitted_leaves_less_than_the_base(tmp_path: Path) -> None:
+    case = make_case(8, ["torque_offset"], duration=12.0)
+    write_given(case, tmp_path)
+    best = ceiling(str(tmp_path), case.truth["effects"])["heldout_rms"]
+    base = ceiling(str(tmp_path), [])["heldout_rms"]
+    assert best < 0.8 * base
+    assert (
+        "no structure" in ceiling(str(tmp_path), [{"effect": "rubbing", "listed": False, "parameters": {}}])["reason"]
+    )
+    assert len(given(str(tmp_path))[1]) == 2
+
+
+def test_a_ceiling_that_is_worse_than_the_base_it_contains_is_rejected(tmp_path: Path) -> None:
+    """In training or held out: it is then no excuse for a miss, and the case is counted as one without a gap."""
+    case = make_case(8, ["torque_offset"], duration=12.0)
+    write_given(case, tmp_path)
+    card, train, held = given(str(tmp_path))
+    base, best = _refitted([card.plant()], [true_effect(case.truth["effects"][0])], prepare(train, 20.0))
+    assert best.cost < base.cost
+    good = judged([held], base, best)
+    assert good["heldout_rms"] < good["base_rms"]
+    assert "worse than that of the base" in judged([held], base, best._replace(cost=2 * base.cost))["reason"]
+    assert "foretells less than the base" in judged([held], best, base._replace(cost=0.5 * best.cost))["reason"]
+    rejected = row("one", ["torque_offset"], []) | {"ceiling": {"reason": "refitted it foretells less"}}
+    assert (marks.gap_closed(rejected), marks.has_gap(rejected), marks.removable(rejected)) == (None, False, None)
+
+
+class Shown:
+    """A recording with a wave of position in what the base leaves, or noise alone."""
+
+    def __init__(self, name: str, seed: int, size: float) -> None:
+        rng = np.random.default_rng(seed)
+        self.name, self.heldout = name, name == "heldout"
+        self.t = np.arange(3000) * 8e-3
+        self.q = 0.8 * np.sin(0.7 * self.t + seed)
+        self.v = 0.56 * np.cos(0.7 * self.t + seed)
+        self.missing = size * np.sin(3 * self.q) + 0.1 * rng.standard_normal(self.t.size)
+        self.tau = np.gradient(self.v, self.t) + self.missing
+        self.extras: dict[str, np.ndarray] = {}
+
+
+@pytest.mark.parametrize("name", ["kernel", "boosting", "gp"])
+def test_a_black_box_learns_what_depends_on_position_and_is_quiet_on_noise(name: str) -> None:
+    names = ("train_1", "train_2", "heldout")
+    wave, noise = ([Shown(name, k, size) for k, name in enumerate(names)] for size in (1.0, 0.0))
+    learned, quiet = (baselines.compared(traces, names=("refit", name)) for traces in (wave, noise))
+    if "skipped" in learned[name]:
+        assert "scikit-learn is not installed; pip install 'mount-cosim[proof]'" in learned[name]["skipped"]
+        pytest.skip("scikit-learn comes with the extra `proof`")
+    assert learned[name]["heldout_rms"] < 0.3 * learned["refit"]["heldout_rms"]
+    assert (learned[name]["alarm"], quiet[name]["alarm"]) == (True, False)
+    assert quiet["refit"] == {"heldout_rms": baselines.rms(noise[2].missing), "alarm": False}
+
+
+def test_sparse_regression_finds_a_term_of_its_library_or_says_that_it_is_not_installed() -> None:
+    traces = [Shown(name, k, 1.0) for k, name in enumerate(("train_1", "train_2", "heldout"))]
+    found = baselines.compared(traces, names=("sindy",))["sindy"]
+    if "skipped" in found:
+        assert "pip install 'mount-cosim[proof]'" in found["skipped"]
+        return
+    assert found["alarm"]
+    assert found["heldout_rms"] < 0.3 * baselines.rms(traces[2].missing)
+
+
+def test_the_library_holds_waves_up_to_80_cycles_a_turn_and_what_a_delay_looks_like() -> None:
+    trace = Shown("train_1", 0, 0.0)
+    top = float(np.abs(trace.v).max())
+    for torque in (np.cos(80 * trace.q), np.sign(trace.v) * np.sin(12 * trace.q), np.gradient(trace.tau, trace.t)):
+        columns = baselines.terms(trace, top)
+        left = torque - columns @ np.linalg.lstsq(columns, torque, rcond=None)[0]
+        assert np.std(left) < 1e-6 * np.std(torque)
+    metre = Shown("train_1", 0, 0.0)
+    metre.q = trace.q / (2 * np.pi)
+    np.testing.assert_allclose(
+        baselines.terms(metre, top, 2 * np.pi)[:, 20:], baselines.terms(trace, top)[:, 20:], atol=1e-9
+    )
+
+
+def test_a_shortened_library_has_the_same_least_squares() -> None:
+    rng = np.random.default_rng(1)
+    columns, target = rng.standard_normal((500, 12)), rng.standard_normal(500)
+    short, aim = baselines._shortened(columns, target)
+    assert short.shape == (13, 12)
+    np.testing.assert_allclose(np.linalg.lstsq(short, aim)[0], np.linalg.lstsq(columns, target)[0], rtol=1e-9)

@@ -1,0 +1,197 @@
+"""What of a scenario fits a machine, and what a replay and a look take as it stands."""
+
+from types import SimpleNamespace
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.hardware import look as looking
+from cosim.hardware.look import look
+from cosim.hardware.replay import LAST, _check_ticks, _exact
+from cosim.hardware.virtual import parse_injection, plant_of
+from cosim.hardware.wired import _ends, refuse_what_has_no_machine
+from cosim.hardware.words import LIMITS
+from cosim.support.errors import HardwareError
+from cosim.system.algorithm import GaussSeidel, Jacobi
+from cosim.system.wire import Wire
+
+WIRES = [
+    Wire("k.tau", "m.tau"),
+    Wire("m.q", "k.q", quantum=1e-6),
+    Wire("r.position", "k.q_d"),
+]
+
+
+def scenario(**changes: Any) -> Any:
+    plain: dict[str, Any] = {"path": "s.toml", "components": {"k": 1, "m": 2}, "every": {}, "algorithm": Jacobi()}
+    return SimpleNamespace(**(plain | {"start": 0.0, "faults": (), "wires": WIRES} | changes))
+
+
+@pytest.mark.parametrize(
+    ("changes", "rule"),
+    [
+        ({"components": {"k": 1}}, "takes one controller and replaces one plant, and this has: k"),
+        ({"components": {"k": 1, "m": 2, "x": 3}}, "and this has: k, m, x"),
+        ({"every": {"k": 2}}, "both components step at each tick"),
+        ({"algorithm": GaussSeidel(kind="gauss-seidel")}, "both components step at each tick"),
+        ({"start": 0.5}, "a machine begins at 0 s, and this starts at 0.5 s"),
+        ({"faults": ("one",)}, "faults on wires belong to a simulation"),
+    ],
+)
+def test_what_a_simulation_can_do_and_a_machine_cannot_is_refused(changes: dict[str, Any], rule: str) -> None:
+    refuse_what_has_no_machine(scenario())
+    with pytest.raises(HardwareError, match=rule):
+        refuse_what_has_no_machine(scenario(**changes))
+
+
+def test_the_encoder_is_the_wire_with_a_quantum_and_the_torque_goes_the_other_way() -> None:
+    encoder, command = _ends(scenario())
+    assert (encoder.source, command.source) == ("m.q", "k.tau")
+
+
+@pytest.mark.parametrize(
+    ("wires", "rule"),
+    [
+        (WIRES[::2], "one wire must have the quantum of the encoder, and 0 have one"),
+        ([*WIRES, Wire("m.v", "k.v", quantum=1.0)], "and 2 have one"),
+        (WIRES[1:], "the plant gives one position to the controller and takes one torque from it"),
+        ([*WIRES, Wire("m.v", "k.v")], "the plant gives one position to the controller"),
+        ([*WIRES, Wire("k.x", "m.x")], "the plant gives one position to the controller"),
+        ([*WIRES, Wire("r.velocity", "k.v_d", gain=2.0)], '"k.v_d" has a gain, offset, quantum or noise'),
+        ([*WIRES, Wire("r.velocity", "k.v_d", offset=1e-9)], '"k.v_d" has a gain, offset, quantum or noise'),
+        ([*WIRES, Wire("r.velocity", "k.v_d", noise="n")], '"k.v_d" has a gain, offset, quantum or noise'),
+        ([*WIRES, Wire("r.velocity", "k.v_d", quantum=1e-9)], '"k.v_d" has a gain, offset, quantum or noise'),
+        ([*WIRES, Wire("r.velocity", "m.disturbance")], '"m.disturbance" is fed by a signal, and a machine has no'),
+    ],
+)
+def test_wires_that_no_machine_has_are_refused(wires: list[Wire], rule: str) -> None:
+    with pytest.raises(HardwareError, match=rule):
+        _ends(scenario(wires=wires))
+
+
+@pytest.mark.parametrize("kind", [np.uint32, np.int64, np.uint64, np.float64])
+def test_a_field_holds_whole_numbers_within_its_bounds_and_what_a_double_counts(kind: type) -> None:
+    given = np.array([0.0, 7.0, 0.5, -1.0, 2.0**32 - 1, 2.0**32, 2.0**53, 2.0**53 + 2, np.nan, np.inf, -(2.0**63)])
+    found = _exact(given, np.dtype(kind))
+    if kind is np.float64:
+        np.testing.assert_array_equal(found, given)
+        return
+    limits = np.iinfo(kind)
+    holds = [np.isfinite(x) and x == int(x) and limits.min <= int(x) <= min(limits.max, LAST) for x in given]
+    assert found.tolist() == [int(x) if held else 0 for x, held in zip(given, holds, strict=True)]
+    assert LAST == 2**53
+
+
+NOTHING = Recording("box", {"t": np.zeros(0)})
+
+
+@pytest.mark.parametrize(
+    ("ticks", "late", "rule"),
+    [
+        ([0, 1, 2], [0, 0, 0], ""),
+        ([3, 4, 7], [3, 0, 2], ""),
+        ([], [], "box has no cycles"),
+        ([1, 2], [0, 0], "box begins at cycle 1: its black box had room for the end of the session only"),
+        ([0, 1], [1, 0], "box begins at cycle 0"),
+        ([0, 1, 3, 4], [0, 0, 0, 0], "was altered: cycle 3 follows cycle 1"),
+        ([0, 1, 1], [0, 0, 0], "was altered: cycle 1 follows cycle 1"),
+        ([0, 1, 2], [0, 1, 0], "was altered: cycle 1 follows cycle 0"),
+    ],
+)
+def test_cycles_begin_with_the_session_and_follow_each_other_less_those_that_were_late(
+    ticks: list[int], late: list[int], rule: str
+) -> None:
+    given = np.array(ticks, dtype=np.int64), np.array(late, dtype=np.uint32)
+    if not rule:
+        _check_ticks(NOTHING, *given)
+        return
+    with pytest.raises(HardwareError, match=rule):
+        _check_ticks(NOTHING, *given)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("lost", {"kind": "lost", "at": 0.0}),
+        ("lost:1.5", {"kind": "lost", "at": 1.5}),
+        ("late:1:2:3", {"kind": "late", "at": 1.0, "lasts": 2.0, "size": 3.0}),
+    ],
+)
+def test_an_injection_has_up_to_three_numbers(text: str, said: dict[str, object]) -> None:
+    assert parse_injection(text) == said
+    with pytest.raises(HardwareError, match=r"the form is KIND\[:AT\[:LASTS\[:SIZE\]\]\]"):
+        parse_injection("late:1:2:3:4")
+
+
+@pytest.mark.parametrize(
+    ("tau", "q", "missing"), [("output", "output", 'input "tau"'), ("input", "input", 'output "q"')]
+)
+def test_a_plant_of_a_drive_takes_a_torque_and_gives_a_position(tau: str, q: str, missing: str) -> None:
+    started = []
+    ports = {"tau": SimpleNamespace(causality=tau), "q": SimpleNamespace(causality=q)}
+    component: Any = SimpleNamespace(name="m", ports=ports, start=started.append)
+    with pytest.raises(HardwareError, match=f"m is no plant of a drive: it has no {missing}"):
+        plant_of(component)
+    assert not started
+    ports |= {"tau": SimpleNamespace(causality="input"), "q": SimpleNamespace(causality="output")}
+    assert plant_of(component).position == "q"
+    assert started == [{}]
+
+
+def looked(monkeypatch: pytest.MonkeyPatch, table: dict[str, Any], seconds: float = 0.5, setpoint: float = 0.3) -> Any:
+    """What a look says where a black box has these columns; also how many cycles it watched."""
+    went: list[int] = []
+
+    class Watched:
+        wired = SimpleNamespace(inputs=("q", "q_d"), setpoints=np.array([[0.0, 0.0], [setpoint, 9.0]]))
+        statistics: ClassVar[dict[str, float]] = {"cycles": 4, "worst_wake_up_us": 3.0, "secret": 1}
+
+        def __init__(self, *_: Any) -> None: ...
+
+        def __enter__(self) -> "Watched":
+            return self
+
+        def __exit__(self, *_: Any) -> None: ...
+
+        advance = staticmethod(went.append)
+
+    columns = {name: np.array(column, float) for name, column in table.items()}
+    monkeypatch.setattr(looking, "Session", Watched)
+    monkeypatch.setattr(looking, "read_black_box", lambda _: None)
+    monkeypatch.setattr(looking, "recording_of", lambda *_: Recording("check", {"t": np.arange(4.0)} | columns))
+    limits = SimpleNamespace(**(dict.fromkeys(LIMITS, 2.0) | {"following_error": 0.1}))
+    machine: Any = SimpleNamespace(name="m", adapter="simulated", limits=limits)
+    return look(SimpleNamespace(step=1e-3), machine, seconds), went  # type: ignore[arg-type]
+
+
+SEEN = {"machine.read": [0, 1, 0, 0], "machine.encoder": [5, 9, 6, 7], "q": [0.2, 9.0, 0.26, 0.21]}
+
+
+def test_a_look_tells_what_answered_and_what_is_within_reach(monkeypatch: pytest.MonkeyPatch) -> None:
+    found, went = looked(monkeypatch, SEEN)
+    assert went == [500]
+    assert found["answered"] == "75.00% of 4 cycles"
+    assert (found["position"], found["first_set_point"]) == (0.21, 0.3)
+    assert found["moved_by"] == pytest.approx(0.06)
+    assert found["within_reach"] is True
+    assert found["limits"]["following_error"] == 0.1
+    assert (found["cycles"], "secret" in found) == (4, False)
+    assert looked(monkeypatch, SEEN, seconds=0.01, setpoint=0.32)[0]["within_reach"] is False
+    assert looked(monkeypatch, SEEN, seconds=0.01)[1] == [100], "a tenth of that would tell nothing"
+    assert looked(monkeypatch, SEEN, setpoint=0.1101)[0]["within_reach"] is True
+
+
+@pytest.mark.parametrize(
+    ("changes", "rule"),
+    [
+        ({"machine.read": [1, 1, 2, 1]}, "m does not answer"),
+        ({"machine.encoder": [5, 9, 6, 5]}, "The encoder of m gives no new samples"),
+    ],
+)
+def test_a_look_at_what_does_not_live_is_refused(
+    changes: dict[str, Any], rule: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises(HardwareError, match=rule):
+        looked(monkeypatch, SEEN | changes)
