@@ -142,8 +142,8 @@ def test_a_motion_leaves_room_for_what_the_axis_strayed_from_its_set_point(probl
     far, fast = strayed(known)
     assert 0 < far < 0.01
     (piece,) = known.pieces
-    shaken = piece.extras["q_d"] + 0.02 * np.sin(2 * np.pi * 2.0 * piece.t)
-    loose = replace(known, pieces=(replace(piece, extras=piece.extras | {"q_d": shaken}),))
+    disturbed = piece.extras["q_d"] + 0.02 * np.sin(2 * np.pi * 2.0 * piece.t)
+    loose = replace(known, pieces=(replace(piece, extras=piece.extras | {"q_d": disturbed}),))
     assert strayed(loose)[0] == pytest.approx(0.02, abs=far + 1e-3)
     assert strayed(loose)[1] == pytest.approx(0.25, abs=fast + 0.01)
     limits, ours = replace(LIMITS, speed=0.5), problem.fit(problem.mount, 5)

@@ -122,8 +122,8 @@ def imported() -> dict[str, Path]:
 
 def test_every_result_is_told_how_it_is_rebuilt() -> None:
     table = (ROOT / "results" / "README.md").read_text("utf-8")
-    untold = [one.name for one in (ROOT / "results").iterdir() if one.name != "README.md" and one.name not in table]
-    assert not untold, f"results/README.md does not say how these are rebuilt: {', '.join(untold)}"
+    missing = [one.name for one in (ROOT / "results").iterdir() if one.name != "README.md" and one.name not in table]
+    assert not missing, f"results/README.md does not say how these are rebuilt: {', '.join(missing)}"
 
 
 def test_no_result_names_a_folder_of_the_machine_that_made_it() -> None:

@@ -48,8 +48,8 @@ def test_a_ceiling_that_is_worse_than_the_base_it_contains_is_rejected(tmp_path:
     good = judged([held], base, best)
     assert good["heldout_rms"] < good["base_rms"]
     assert "worse than that of the base" in judged([held], base, best._replace(cost=2 * base.cost))["reason"]
-    assert "foretells less than the base" in judged([held], best, base._replace(cost=0.5 * best.cost))["reason"]
-    rejected = row("one", ["torque_offset"], []) | {"ceiling": {"reason": "refitted it foretells less"}}
+    assert "predicts less than the base" in judged([held], best, base._replace(cost=0.5 * best.cost))["reason"]
+    rejected = row("one", ["torque_offset"], []) | {"ceiling": {"reason": "refitted it predicts less"}}
     assert (marks.gap_closed(rejected), marks.has_gap(rejected), marks.removable(rejected)) == (None, False, None)
 
 

@@ -27,7 +27,7 @@ BASE = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma
 
 
 def run(name: str, amplitude: float, phase: float, seed: int, seconds: float = 12.0) -> Recording:
-    """A wandering motion of the base, shaken with two tones, with a little noise."""
+    """A wandering motion of the base, disturbed by two tones, with a little noise."""
     t, rng = np.arange(int(seconds * 250)) / 250, np.random.default_rng(seed)
     tones = [(a, 2 * np.pi * f, p) for a, f, p in zip((0.2, 0.1, 0.03), rng.uniform(0.1, 1, 3), (0, 1, 2), strict=True)]
     q, v, a = (sum(s * w**k * np.sin(w * t + p + k * np.pi / 2) for s, w, p in tones) for k in range(3))

@@ -29,8 +29,8 @@ SAMPLE = ("tick", "read", "status", "late", "request", "change", "value")
 MADE = {"machine.order": "torque", "machine.command": "command", "machine.state": "state"}
 MADE |= {"machine.faults": "faults", "machine.notes": "notes", "machine.controlword": "controlword"}
 """Columns that come out of it, and their fields of a record."""
-FIRST, LAST = 0, 2**53
-"""Cycles that are counted exactly."""
+LAST = 2**53
+"""Last of the cycles that are counted exactly."""
 
 
 @dataclass(frozen=True)

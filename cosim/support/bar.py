@@ -4,7 +4,7 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TaskProgres
 from rich.text import Text
 
 SURE = 1.0
-"""Seconds after which the speed of a stage is known well enough to foretell its end: it begins slowly."""
+"""Seconds after which the speed of a stage is known well enough to predict its end: it begins slowly."""
 
 
 class Left(TimeRemainingColumn):

@@ -140,17 +140,17 @@ def cluster(job: Job, address: str) -> Iterator[Pool]:
         if not threads:
             raise SweepError(f"The cluster at {address} has no workers.", culprit=address)
         _check_versions(client, address)
-        parcel = client.scatter(PortableJob.of(job), broadcast=True, hash=False)
+        portable = client.scatter(PortableJob.of(job), broadcast=True, hash=False)
         executor = client.get_executor(pure=False)
-        yield Pool(lambda number, point: executor.submit(_remote, parcel, number, point), threads, 2 * threads)
+        yield Pool(lambda number, point: executor.submit(_remote, portable, number, point), threads, 2 * threads)
     finally:
         with suppress(Exception):  # a cluster that is gone has closed them
             client.run(close_cells)
         client.close()
 
 
-def _remote(parcel: PortableJob, number: int, point: Point) -> Row:
-    return isolated(parcel.job_here(), number, point)
+def _remote(portable: PortableJob, number: int, point: Point) -> Row:
+    return isolated(portable.job_here(), number, point)
 
 
 def _client(address: str) -> Any:

@@ -94,7 +94,7 @@ class Energy(_Algorithm):
     """Non-iterative, for FMUs that cannot be taken back: a step is cut into pieces after the energy lost on the bonds.
 
     A bond is a pair of outputs that feed each other's components and multiply to a power (torque and speed). Each wire
-    between the components holds its value at the middle of a piece as the piece before foretells it (for equal pieces
+    between the components holds its value at the middle of a piece as the piece before predicts it (for equal pieces
     the correction of NEPCE, Benedikt et al. 2013); the size of the pieces is controlled so that the energy lost in one
     stays below `tolerance` times the greatest power on the bond times the step (ECCO: Sadjina et al., Engineering with
     Computers 33 (2017) 607). Of second order. `max_pieces`, a power of two, is the most there may be in a step; the

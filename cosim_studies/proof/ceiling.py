@@ -73,7 +73,7 @@ def judged(held: Sequence[Recording], base: Found, best: Found) -> Parsed:
     if best.cost > base.cost * (1 + 1e-9):
         return {"reason": "its fit ended worse than that of the base it contains", "base_rms": contained}
     if reached > contained:
-        return {"reason": "refitted it foretells less than the base it contains", "base_rms": contained}
+        return {"reason": "refitted it predicts less than the base it contains", "base_rms": contained}
     return {"heldout_rms": reached, "base_rms": contained}
 
 
