@@ -23,6 +23,13 @@ def test_how_far_a_rival_is_behind_in_evidence_stands_among_the_numbers() -> Non
     assert "Evidence by which rivals are behind: Torque offset, 126 nats." in html
 
 
+def test_of_rivals_that_remove_as_much_it_is_said_what_decides() -> None:
+    told = "Gravity unbalance: removes 96.9 % of the error energy, this 96.9 % (10 nats behind)"
+    whole = diagnosis("two")
+    html = render(replace(whole, findings=(replace(FOUND[0], less_likely=(told,)), *FOUND[1:], *RIVALS, *REST)))
+    assert "removes 96.9 % of the error energy, this 96.9 %: the detail of what is left decides</dd>" in html
+
+
 def test_nothing_is_to_be_done_about_what_did_not_prove_itself() -> None:
     weak = replace(FOUND[0], answer="not_proven", action="Check the bearing.")
     whole = replace(diagnosis("two"), findings=(weak, *FOUND[1:], *REST), verdict=("friction_asymmetry",))

@@ -88,7 +88,7 @@ def told(experiment: Experiment, has_controller: bool) -> NextExperiment:
     words: NextExperiment = {
         "separates": list(experiment.separates),
         "expected_difference": experiment.difference,
-        "description": f"record {experiment.title}, {SECONDS:.0f} s",
+        "description": f"record {experiment.title}, for {SECONDS:.0f}\N{NO-BREAK SPACE}s",
         "set_point": experiment.signal.model_dump(exclude_none=True),
     }
     return words | NextExperiment(scenario=SCENARIO) if has_controller else words

@@ -12,6 +12,8 @@ from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.result import Diagnosis, Finding, is_special
 
 NOTHING_YET = "Nothing yet: it did not hold on the run that was not fitted."
+ALIKE = 0.5
+"""Per cent of the error energy by which two that remove as much may differ."""
 _NATS = re.compile(r"^([^:]+): .*\(([\d,]+ nats) behind\)$").findall
 
 
@@ -93,8 +95,15 @@ def _apart(one: words.Block) -> str:
 
 
 def _plainly(rivals: tuple[str, ...]) -> str:
-    """Rivals without the unit of evidence, which stands among the numbers."""
-    return "; ".join(re.sub(r" \([\d,]+ nats behind\)", "", rival) for rival in rivals)
+    """Rivals without the unit of evidence, which stands among the numbers; where shares are equal, what parts them."""
+    return "; ".join(_plain(rival) for rival in rivals)
+
+
+def _plain(rival: str) -> str:
+    bare = re.sub(r" \([\d,]+ nats behind\)", "", rival)
+    shares = re.findall(r"([\d.]+) ?%", bare)
+    equal = len(shares) == 2 and abs(float(shares[0]) - float(shares[1])) < ALIKE
+    return f"{bare}: the detail of what is left decides" if equal else bare
 
 
 def do(one: words.Block, diagnosis: Diagnosis) -> str:
