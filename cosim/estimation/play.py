@@ -13,7 +13,7 @@ import casadi as ca
 import numpy as np
 
 from cosim.estimation.prepare import Array, Piece, Prepared
-from cosim.estimation.rowwise import Stepwise
+from cosim.estimation.compiled import CompiledWalk
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.base import Coupling
 from pyfmi_models.model import fields_of
@@ -50,7 +50,7 @@ def _searched(piece: Piece, gap: float, slowing: float, ratio: float) -> Array:
 
 
 @cache
-def _walk(kind: type[Coupling], names: tuple[str, ...]) -> Stepwise:
+def _walk(kind: type[Coupling], names: tuple[str, ...]) -> CompiledWalk:
     """The states and the torque passed on, from speeds before and after each step and dt."""
     column, numbers = ca.SX.sym("column", 3), ca.SX.sym("numbers", 1 + len(names))
     play = kind(**{name: numbers[1 + k] for k, name in enumerate(names)})
@@ -58,4 +58,4 @@ def _walk(kind: type[Coupling], names: tuple[str, ...]) -> Stepwise:
     before, after, dt = ca.vertsplit(column)
     twist, rate, *further = ca.vertsplit(state)[:-1]
     twist, speed, *others = play.advance(twist, before - rate, further, after, dt, numbers[0])
-    return Stepwise(state, column, numbers, ca.vertcat(twist, after - speed, *others))
+    return CompiledWalk(state, column, numbers, ca.vertcat(twist, after - speed, *others))
