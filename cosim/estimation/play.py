@@ -12,8 +12,8 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.compiled import CompiledWalk
+from cosim.estimation.prepare import Array, Piece, Prepared
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.base import Coupling
 from pyfmi_models.model import fields_of
