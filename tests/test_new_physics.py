@@ -14,6 +14,8 @@ from fmpy import simulate_fmu
 
 import cosim
 import pyfmi_models
+from cosim.diagnosis.hypotheses import TRIED
+from pyfmi_models.effects import CATALOGUE, FORMS
 
 ROOT = Path(__file__).parents[1]
 GUIDE = (ROOT / "docs" / "adding_physics.md").read_text("utf-8")
@@ -27,6 +29,17 @@ assert parse_card(card_text(card), "tube.toml") == card
 export_fmu(card.plant().model(), "tube.fmu")
 """
 QUICKLY = ("--out", "found", "--quick", "--json")
+
+
+def effects_in(paragraph: str) -> set[str]:
+    """The effects that a paragraph of the guide names, by its first words."""
+    (text,) = re.findall(rf"^{re.escape(paragraph)}.*?\n\n", GUIDE, re.MULTILINE | re.DOTALL)
+    return {name for name in re.findall(r"`(\w+)`", text.partition(" says that ")[0]) if name in CATALOGUE}
+
+
+def test_the_guide_says_which_effects_a_diagnosis_does_not_look_for_or_cannot_hold() -> None:
+    assert effects_in("An effect without a hypothesis") == set(CATALOGUE) - set(TRIED) - {"learned"}
+    assert effects_in("`is_determined = False`") == {form.id for form in FORMS if not form.is_determined}
 
 
 def blocks(language: str) -> list[str]:
