@@ -62,7 +62,7 @@ MAINS: dict[str, Main] = {
     "Cogging": Main("amplitude"),
     "Compliance": Main("resonance_hz", unit="Hz", **PLACE),
     "LoadSideCompliance": Main("resonance_hz", unit="Hz", **PLACE),
-    "ConcaveViscous": Main("exponent", unit="as power", **PLACE),
+    "ConcaveViscous": Main("exponent", unit="as power of speed", **PLACE),
     "DeadBand": Main("band"),
     "Delay": Main("delay_ms", unit="ms"),
     "DwellBreakaway": Main("torque_per_efold"),

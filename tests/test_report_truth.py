@@ -13,6 +13,7 @@ from report_example import FOUND, REST, RIVALS, diagnosis
 from cosim.diagnosis.advice import advice
 from cosim.diagnosis.breakdown import samples
 from cosim.diagnosis.deliver import as_json, chosen_of_sets
+from cosim.diagnosis.findings import Numbers, visible_from
 from cosim.diagnosis.report import lead, render, words
 from cosim.diagnosis.report.figures_dynamic import effect as draw
 from cosim.diagnosis.report.figures_proof import looked_for
@@ -26,6 +27,7 @@ from cosim.diagnosis.result import Diagnosis, Finding, Where
 from cosim.diagnosis.terminal import summary
 from cosim.plots.style import STYLE
 from pyfmi_models.effects import CATALOGUE
+from pyfmi_models.effects.friction_asymmetry import FrictionAsymmetry
 
 
 def drawn(finding: Finding, of: Diagnosis) -> Picture:
@@ -85,6 +87,8 @@ def test_a_direction_has_no_numbers() -> None:
     assert where(replace(FOUND[1], where=sides), Scales.of(whole)) == "both directions, differently"
     edge = Where(axis="speed", description="slower than 0.35", regions=((-0.35, 0.35),))
     assert where(replace(FOUND[1], where=edge), Scales.of(whole)) == "slower than 20°/s"
+    beyond = Where(axis="speed", description="faster than 0.35", regions=((-1.57, -0.35), (0.35, 1.57)))
+    assert where(replace(FOUND[1], where=beyond), Scales.of(whole)) == "faster than 20°/s"
 
 
 def test_a_probability_stands_beside_what_was_found_and_a_small_one_is_said() -> None:
@@ -273,3 +277,12 @@ def test_rows_of_a_lead_are_whole_sentences() -> None:
         whole = diagnosis(kind)
         assert all(re.match(r"^[A-Z0-9].*[.!]$", text) for text in lead.lead(whole, Scales.of(whole)))
         assert np.isfinite(whole.heldout.before_rms)
+
+
+def test_a_limit_is_of_the_number_that_is_told_as_the_size() -> None:
+    """The viscous part leads here: three of its standard errors, not of the level's."""
+    effect = FrictionAsymmetry(level_asymmetry=0.07, viscous_asymmetry=-0.18)
+    numbers = Numbers(
+        {"level_asymmetry": 0.07, "viscous_asymmetry": -0.18}, {"level_asymmetry": 0.064, "viscous_asymmetry": 0.006}
+    )
+    assert visible_from(effect, numbers) == pytest.approx(3 * 200 * 0.006)

@@ -21,6 +21,8 @@ from pyfmi_models.model import Variable, parameters_of
 from pyfmi_models.mount import LINEAR_UNITS, Mount
 
 Z95 = 1.96
+CYCLES = "cycles_per_rev"
+"""How often a ripple comes round: in a turn, or on a linear axis in a metre."""
 
 EXCLUDED_NATS, EXCLUDED_SHARE = 10.0, 0.02
 """Evidence (odds of 20 000 to 1) and share of the error energy by which a rival must be behind to be called ruled out:
@@ -86,7 +88,7 @@ def accepted(
         action=effect.action,
         evidence=f"removes {100 * one.own.plain_gain:.0f} % of the error energy in training "
         f"(evidence {one.own.evidence:.0f} nats; {predicted:.0f} nats on the held-out recordings){own.caveat}",
-        visible_from=_visible_from(effect, numbers),
+        visible_from=visible_from(effect, numbers),
     )
 
 
@@ -122,9 +124,9 @@ def _excludes(numbers: Numbers, name: str, none: float, known: Variable) -> bool
     return abs(value - none) > half and not whole and known.low < value < known.high
 
 
-def _visible_from(effect: Effect, numbers: Numbers) -> float | None:
+def visible_from(effect: Effect, numbers: Numbers) -> float | None:
     """Size that would still stand out three standard errors from nothing."""
-    main = effect.main
+    main = effect.leading()
     told = main.parameter in numbers.errors and main.is_size
     return 3 * main.factor * numbers.errors[main.parameter] if told else None
 
@@ -170,7 +172,8 @@ def between(low: float, high: float) -> str:
 
 
 def _units(effect: Effect, mount: Mount) -> dict[str, str]:
-    return {v.name: mount.in_axis_units(v).unit for v in parameters_of(effect)}
+    units = {v.name: mount.in_axis_units(v).unit for v in parameters_of(effect)}
+    return units | ({CYCLES: "1/m"} if mount.motion == "linear" and CYCLES in units else {})
 
 
 def unit_on(unit: str, mount: Mount) -> str:

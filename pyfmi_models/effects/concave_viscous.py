@@ -22,7 +22,7 @@ class ConcaveViscous(FrictionEffect):
     id: ClassVar[str] = "concave_viscous"
     title: ClassVar[str] = "Concave viscous friction"
     equation: ClassVar[str] = "σ₂ v [1 + (v/vₜ)²]^((n − 1)/2)"
-    main: ClassVar[Main] = Main("exponent", unit="as power", is_size=False)
+    main: ClassVar[Main] = Main("exponent", unit="as power of speed", is_size=False)
     to_record: ClassVar[str] = "record steady speeds up to the highest that is allowed, three a decade"
     rivals: ClassVar[tuple[str, ...]] = ("stribeck", "thermal_viscosity", "quadratic_drag")
     told_apart_by: ClassVar[str] = "the curve over the speed is the same early and late, and bends at high speed"

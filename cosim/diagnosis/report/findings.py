@@ -81,6 +81,8 @@ def where(finding: Finding, scales: Scales) -> str:
     scale, regions = scales.of_axis(finding.where.axis), finding.where.regions
     if finding.where.axis == "speed" and len(regions) == 1 and regions[0][0] == -regions[0][1]:
         return f"slower than {scale.text(regions[0][1])}"
+    if finding.where.axis == "speed" and len(regions) == 2 and regions[0][1] == -regions[1][0] < 0:
+        return f"faster than {scale.text(regions[1][0])}"
     spans = [scale.span(low, high) for low, high in regions[:4]]
     if len(regions) > 4:
         spans.append(f"{len(regions) - 4} more")
