@@ -159,6 +159,8 @@ def _sentence(error: ValidationError) -> str:
         return f"{where} is not a key of a card{_there(section, key)}"
     if first["type"] == "missing":
         return f"{where} is missing."
+    if first["type"] == "list_type" and key == "effects":
+        return '[effects] is one table; write [[effects]] above each effect, and in it effect = "cogging" or another.'
     rule = first["msg"][:1].lower() + first["msg"][1:]
     return f"{where} = {shown(first['input'])} breaks the rule: {rule}."
 

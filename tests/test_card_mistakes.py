@@ -89,7 +89,10 @@ MISTAKES = {
         SMALL + '[[effects]]\neffect = "coging"\n',
         f"{EFFECT}: effect = 'coging' is unknown; effects are: {', '.join(CATALOGUE)}.",
     ),
-    "effects as one table": (SMALL + '[effects]\neffect = "x"\n', "breaks the rule: input should be a valid list."),
+    "effects as one table": (
+        SMALL + '[effects]\neffect = "x"\n',
+        "[effects] is one table; write [[effects]] above each effect, ",
+    ),
     "missing amplitude": (
         SMALL + '[[effects]]\neffect = "cogging"\ncycles_per_rev = 3\n',
         f"{EFFECT} (cogging): amplitude is missing.",
