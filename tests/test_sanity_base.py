@@ -8,8 +8,10 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.diagnosis.sanity.base import base_far_from_card
 from cosim.diagnosis.sanity.limits import encoder_step, little_motion, no_set_point
+from cosim.diagnosis.sanity.load import load_far_from_card
 from cosim.estimation.fit import edges_of
 from cosim.estimation.prepare import prepare
+from pyfmi_models.effects import GravityUnbalance
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
@@ -91,3 +93,29 @@ def test_hardly_any_motion_away_from_turns_is_said(hertz: float, still: float, t
     found = little_motion(prepare([recording], 8.0))
     assert bool(found) is told
     assert all("run: only" in one.statement and not one.blocks_naming for one in found)
+
+
+def loaded(mgl: float, phase: float) -> Mount:
+    return replace(axis(), effects=(GravityUnbalance(mgl=mgl, phase=phase),))
+
+
+@pytest.mark.parametrize(
+    ("mgl", "phase", "turn", "is_another"),
+    [
+        (4.2, 0.1, 1.0, False),
+        (5.5, 0.1, 1.0, False),  # a payload that was weighed badly
+        (2.2, -1.5, 1.0, True),  # 5 N·m hang on the axis beside the card's 4
+        (9.0, 0.0, 1.0, True),
+        (4.0, 3.1, 1.0, True),
+        (8.0, 1.047, 0.05, False),  # pulls differently only where the axis was not
+    ],
+)
+def test_a_load_that_is_another_one_is_said(mgl: float, phase: float, turn: float, is_another: bool) -> None:
+    positions = 1.5708 + np.linspace(-3, 3, 200) * turn if turn < 1 else np.linspace(-1.5, 0.2, 200)
+    said = load_far_from_card(loaded(4.0, 0.0), loaded(mgl, phase), positions)
+    assert [one.finding for one in said] == ["base_far_from_card"] * is_another
+    assert all(f"4 N·m at 0° → {mgl:.3g} N·m" in one.statement for one in said)
+
+
+def test_an_axis_without_a_load_has_none_to_leave() -> None:
+    assert load_far_from_card(axis(), axis(), np.linspace(0, 1, 5)) == ()

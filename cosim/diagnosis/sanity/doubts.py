@@ -12,6 +12,7 @@ from cosim.diagnosis.sanity.entry import Sanity
 from cosim.diagnosis.sanity.judgement import judged
 from cosim.diagnosis.sanity.likelihood import Reference
 from cosim.diagnosis.sanity.limits import encoder_step, little_motion, no_set_point
+from cosim.diagnosis.sanity.load import load_far_from_card
 from cosim.diagnosis.sanity.other_machine import other_machine
 from cosim.estimation.fit import edges_of
 from cosim.estimation.problem import Problem
@@ -64,6 +65,7 @@ def of_base(
     bounds = edges_of(problem.mount, problem.prepared.pieces)
     return (
         *base_far_from_card(problem.mount, refitted, bounds, problem.top_speed),
+        *load_far_from_card(problem.mount, refitted, problem.prepared.stacked("q")),
         *encoder_step([*train, *heldout], problem.mount, problem.prepared.cutoff),
         *little_motion(problem.prepared),
         *no_set_point([*train, *heldout]),
