@@ -200,3 +200,21 @@ def test_a_file_without_names_offers_no_empty_column(tmp_path: Path) -> None:
 def test_a_comment_column_of_labview_may_be_missing_below_its_name(tmp_path: Path) -> None:
     path = written(tmp_path, "X_Value\tTorque\tAngle\tComment", T, TAU, Q, separator="\t", name="run.lvm")
     np.testing.assert_allclose(Recording.read(path)["tau"], TAU, atol=1e-8)
+
+
+@pytest.mark.parametrize("word", ["Y_Unit_Label", "Vertical Units", "unit", "Einheit"])
+def test_units_that_a_preamble_gives_column_by_column_are_those_of_the_columns(tmp_path: Path, word: str) -> None:
+    header = f"Written by a tool\nDate;2024/03/01\n{word};mN.m;deg\nEnd of header\nt;torque;angle"
+    read = Recording.read(written(tmp_path, header, T, TAU, Q, separator=";"))
+    np.testing.assert_allclose(read["tau"], 1e-3 * TAU, atol=1e-9)
+    np.testing.assert_allclose(read["q"], Q / DEG, atol=1e-8)
+
+
+def test_a_channel_in_volts_is_no_torque_until_its_scale_is_given(tmp_path: Path) -> None:
+    header = "Model,scope\nVertical Units,V,V\nTIME,CH1,CH2"
+    path = written(tmp_path, header, T, TAU, Q)
+    columns = {"tau": "CH1", "q": "CH2"}
+    with pytest.raises(InputError, match="becomes V; "):
+        read_recordings([path], columns, [], ["q=rad"], "rotary")
+    scaled = Recording.read(path, columns, {"tau": "2 N.m", "q": "rad"})
+    np.testing.assert_allclose(scaled["tau"], 2 * TAU, atol=1e-8)

@@ -36,6 +36,7 @@ REMARKS = "Comment"
 COMMENTS = ("#", "%", "//")
 CLOCK_FORMAT = re.compile(r"(?:[hHmMsSdDyYfF]+[:./ -])+[hHmMsSdDyYfF]+")
 """How a row of units says what a time stamp looks like: hh:mm:ss."""
+LABEL = re.compile(r"^(y_|vertical )?units?(_label)?\b|^einheit(en)?\b")
 WINDOW = 6
 """Lines of which all but one are samples where the samples begin; a preamble may hold a line or two like them."""
 NAMED = 1.5
@@ -52,6 +53,8 @@ class Layout:
     first: int
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
+    labels: tuple[str, ...] = ()
+    """Units, column by column, that a line of the preamble gives: LabVIEW's Y_Unit_Label, an oscilloscope's units."""
 
     def __str__(self) -> str:
         separator = next(name for name, sign in SEPARATORS.items() if sign == self.separator)
@@ -116,7 +119,16 @@ def _judged(lines: Sequence[str], separator: str, decimal: str, header: str) -> 
     if header:
         return score, _stated(rows, Layout(separator, decimal, count, first), header)
     names, units = _above(lines, rows, first, separator, count)
-    return score * (NAMED if names else 1.0), Layout(separator, decimal, count, first, names, units)
+    labels = () if units else _labels(rows[:first])
+    return score * (NAMED if names else 1.0), Layout(separator, decimal, count, first, names, units, labels)
+
+
+def _labels(preamble: Sequence[list[str]]) -> tuple[str, ...]:
+    """Return the last line of a preamble that begins with a word of units and holds one, as it stands."""
+    for row in reversed(preamble):
+        if row and LABEL.search(row[0].lower()) and any(is_unit(field) for field in row[1:]):
+            return ("", *row[1:])
+    return ()
 
 
 def _first(rows: Sequence[list[str]], values: Sequence[list[bool]], body: Sequence[int]) -> int:

@@ -151,12 +151,18 @@ def _names(layout: Layout) -> tuple[list[str], dict[str, str]]:
     Columns that differ by their unit alone keep it in their name; those of one name have their number there.
     """
     if not layout.names:
-        return [f"#{number + 1}" for number in range(layout.count)], {}
+        numbered = [f"#{number + 1}" for number in range(layout.count)]
+        return numbered, _known(numbered, layout.labels)
     parted = [split_unit(name) for name in layout.names]
     names = _distinct([name for name, _ in parted], [name.strip() for name in layout.names])
     units = {name: unit for name, (_, unit) in zip(names, parted, strict=True) if unit}
-    rows = {name: spelled(text.strip("[]() ")) for name, text in zip(names, layout.units, strict=False)}
-    return names, {name: text for name, text in rows.items() if is_unit(text)} | units
+    return names, _known(names, layout.labels) | _known(names, layout.units) | units
+
+
+def _known(names: Sequence[str], texts: Sequence[str]) -> dict[str, str]:
+    """Return those of the texts that are units, by the names of their columns."""
+    rows = {name: spelled(text.strip("[]() ")) for name, text in zip(names, texts, strict=False)}
+    return {name: text for name, text in rows.items() if is_unit(text)}
 
 
 def _distinct(bare: Sequence[str], whole: Sequence[str]) -> list[str]:
