@@ -7,7 +7,7 @@ from effect_examples import EXAMPLES
 
 from cosim.diagnosis.findings import between
 from pyfmi_models.effects import FORMS, Effect
-from pyfmi_models.effects.base import higher, percent
+from pyfmi_models.effects.shares import higher, percent
 
 BY_NAME = {form.__name__: form for form in FORMS}
 TURNING = {

@@ -49,17 +49,6 @@ class Motion(NamedTuple):
     state: Any = ()
 
 
-def percent(share: float) -> str:
-    """Return a share in per cent with two digits, and all of those before the point: 0.42 becomes 42 %, 1.893 189 %."""
-    value = 100 * share
-    return f"{value:.0f} %" if abs(value) >= 99.5 else f"{value:.2g} %"
-
-
-def higher(share: float) -> str:
-    """Say how far something is off, to either side: 42 % higher, 30 % lower."""
-    return f"{percent(abs(share))} {'higher' if share >= 0 else 'lower'}"
-
-
 def times(count: float) -> str:
     """How often, in words: "once", "24 times"."""
     return "once" if count == 1 else f"{count:.4g} times"

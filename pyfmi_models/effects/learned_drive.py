@@ -7,9 +7,10 @@ from typing import ClassVar, Self
 import casadi as ca
 import numpy as np
 
-from pyfmi_models.effects.base import DriveEffect, Main, Motion, percent
+from pyfmi_models.effects.base import DriveEffect, Main, Motion
 from pyfmi_models.effects.learned_base import FOLLOWED, MOST_WAVES, ROWS, Array, LearnedEffect, TableEffect
 from pyfmi_models.effects.learned_table import LearnedTable
+from pyfmi_models.effects.shares import percent
 from pyfmi_models.model import Scalar, parameter, structure
 from pyfmi_models.waves import broken_range, span, spoken, waves
 

@@ -5,7 +5,8 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Main, Motion, higher, percent, times
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion, times
+from pyfmi_models.effects.shares import higher, percent
 from pyfmi_models.model import Scalar, parameter
 
 

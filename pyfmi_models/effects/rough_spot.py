@@ -5,8 +5,9 @@ from typing import ClassVar
 
 import casadi as ca
 
-from pyfmi_models.effects.base import FrictionEffect, Main, Motion, higher
+from pyfmi_models.effects.base import FrictionEffect, Main, Motion
 from pyfmi_models.effects.position_friction import bump
+from pyfmi_models.effects.shares import higher
 from pyfmi_models.model import Scalar, parameter
 
 

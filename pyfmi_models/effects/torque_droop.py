@@ -5,7 +5,8 @@ from typing import Any, ClassVar, Self
 
 import casadi as ca
 
-from pyfmi_models.effects.base import DriveEffect, Main, Motion, percent
+from pyfmi_models.effects.base import DriveEffect, Main, Motion
+from pyfmi_models.effects.shares import percent
 from pyfmi_models.effects.thermal_viscosity import REFERENCE
 from pyfmi_models.model import Scalar, Variable, parameter
 
