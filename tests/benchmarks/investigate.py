@@ -3,11 +3,11 @@
     python tests/benchmarks/investigate.py --seed 4100 --cases 12 --out results/investigate
 
 A case is a mount of the home generator with one effect concealed (families in rotation), recorded on one short sine to
-be fitted and another for the proof: what a first run gives, every other round over a part of the way only. Cases whose
+be fitted and another for the proof: what a first run gives, half of them over a part of the way only. Cases whose
 first answer is not the one true name (a set, a doubtful name, "nothing", "unknown", another name) go on: by designed
 motions, and, the same case from the same first recordings, by many tones at random, each with the same seconds of
-further motion. Limits are position, speed and acceleration that the generator's own set points ask for, in every other
-two rounds half a turn of positions; the truth is never shown to the loop. Writes table.csv and README.md; what is done
+further motion. Limits are position, speed and acceleration that the generator's own set points ask for, in every
+other dozen half a turn of positions; the truth is never shown to the loop. Writes table.csv and README.md; what is done
 already in table.csv is not done again. `--all`: cases whose first answer is the true name go on, too.
 """
 
@@ -134,10 +134,10 @@ class Concealed:
 
 
 def cases(seed: int) -> Iterator[Case]:
-    """Families in rotation, strokes, rooms and sizes in turn, a machine of its own each."""
+    """Families in rotation, rooms, strokes and sizes in turn, a machine of its own each."""
     for number in count():
         turn = number // len(EFFECTS)
-        stroke, room = STROKES[turn % 2], ROOMS[turn // 2 % 2]
+        stroke, room = STROKES[turn // 2 % 2], ROOMS[turn % 2]
         yield Case(seed + number, EFFECTS[number % len(EFFECTS)], SIZES[(number + turn // 4) % 2], stroke, room)
 
 
