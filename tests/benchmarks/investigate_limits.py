@@ -35,7 +35,7 @@ from cosim.support.version import __version__
 sys.path.append(str(Path(__file__).parent))
 from limits_axes import Axis, axis, on_a_drive, over_udp
 
-RUNS = 25
+RUNS = 50
 """Motions a machine."""
 ROUNDING = 1e-6
 """Relative excess that is the encoder's step, or rounding."""

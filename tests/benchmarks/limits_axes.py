@@ -9,6 +9,7 @@ import re
 import sys
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,11 @@ class Axis:
     card: Card
     bandwidth: float
     """Of its loop [Hz]."""
+
+    @cached_property
+    def home(self) -> float:
+        """Where it stands behind a drive; asked once, as it is the same before each motion."""
+        return Driven(self.driven, WIDE, fast=True).home
 
 
 def concealed(rng: np.random.Generator, level: float) -> tuple[str, str]:
@@ -112,7 +118,13 @@ class Narrow(Driven):
     """A drive in this process with a torque and a speed of its own, behind a loop that has none."""
 
     own: tuple[float, float] = (0.0, 0.0)
+    stands: float = 0.0
     seen: list[CDrive] = field(default_factory=list)
+
+    @cached_property
+    def home(self) -> float:
+        """Where the axis is known to stand."""
+        return self.stands
 
     def _tighten(self, session: Session) -> None:
         """The hook before a session moves: it is the drive that is tightened here."""
@@ -124,7 +136,7 @@ class Narrow(Driven):
 
 def on_a_drive(one: Axis, motion: Motion, limits: Limits, path: Path) -> tuple[Recording, dict[str, int]]:
     """Follow a motion in this process; the recording, and how often the drive itself found what is beyond a limit."""
-    drive = Narrow(one.driven, WIDE, fast=True, own=(limits.torque, limits.speed))
+    drive = Narrow(one.driven, WIDE, fast=True, own=(limits.torque, limits.speed), stands=one.home)
     found = drive.record(motion, 0, path)
     return found, {name: sum(int(getattr(own, name)) for own in drive.seen) for name in ("limited", "overspeeds")}
 
