@@ -17,7 +17,9 @@ from pyfmi_models.waves import broken_range, span, spoken, waves
 LEAST_RISE = 0.01
 """Torque per command that is left of a table that was made smaller: with less a motion hardly tells the command."""
 OVERSHOT = 1.3
-"""Largest rise of what is missing per command of a table that is made smaller: one that is steeper is another one."""
+"""Largest rise of what is missing per command of a table that is only made smaller; a steeper one is flattened."""
+STEPS, CLOSER = 401, (1.0, 0.2, 0.04)
+"""Commands at which a table is flattened, and shares of the range in which they lie closer, as its waves do."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,17 +88,39 @@ class LearnedDrive(LearnedEffect, DriveEffect):
         return float((np.diff(missing) / np.diff(command)).max())
 
     def admitted(self) -> Self:
-        """A table that overshoots a little made smaller: more command gives more torque, at least `LEAST_RISE`."""
+        """A table that overshoots made flatter: more command gives more torque, at least `LEAST_RISE`."""
         steepest = self._steepest()
+        flat = self if steepest < OVERSHOT else self._flattened()
+        steepest = flat._steepest()
         if not 1 <= steepest < OVERSHOT:
-            return self
-        return replace(self, missing=tuple((1 - LEAST_RISE) / steepest * one for one in self.missing))
+            return flat if steepest < 1 else self
+        return replace(flat, missing=tuple((1 - LEAST_RISE) / steepest * one for one in flat.missing))
+
+    def _flattened(self) -> Self:
+        """A table that rises from no command to what it was no faster than it may: a series overshoots about a kink."""
+        whole = np.linspace(self.command_seen[0], self.command_seen[1], STEPS)
+        command = np.unique(np.concatenate([share * whole for share in CLOSER]))
+        shapes = waves(ca.DM(command), "command", self.command_seen, len(self.missing) - 1)
+        table = np.column_stack([np.broadcast_to(np.ravel(ca.DM(one).full()), len(command)) for one in shapes])
+        cut = _rising(command, table @ np.array(self.missing))
+        return replace(self, missing=tuple(np.linalg.lstsq(table, cut, rcond=None)[0].tolist()))
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         return (
             f"The drive gives up to {self.size():.2g} {unit} less or more than its command; a table learned from data."
         )
+
+
+def _rising(command: Array, missing: Array) -> Array:
+    """Values that rise, from no command outwards, by at most `1 - LEAST_RISE` a command."""
+    found, steps = missing.copy(), (1 - LEAST_RISE) * np.diff(command)
+    middle = int(np.argmin(np.abs(command)))
+    for k in range(middle, len(command) - 1):
+        found[k + 1] = min(found[k + 1], found[k] + steps[k])
+    for k in range(middle, 0, -1):
+        found[k - 1] = max(found[k - 1], found[k] - steps[k - 1])
+    return found
 
 
 @dataclass(frozen=True, kw_only=True)
