@@ -162,7 +162,7 @@ def test_a_memory_says_what_it_forgets_over_and_how_much_it_changes(ways: tuple[
     times = () if ways else (0.2,)
     found = LearnedAfterReversal(ways=ways, times=times, level_change=(math.log(0.75),))
     assert found.learned_in() == said
-    assert found.statement() == "After a reversal friction is -25 % off for a while; learned from data."
+    assert found.statement() == "After a reversal friction is 25 % lower for a while; learned from data."
     assert found.for_reader("N") == {
         "kind": "friction after a reversal",
         "ways": list(ways),
