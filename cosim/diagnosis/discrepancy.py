@@ -58,17 +58,14 @@ def discrepancy(mount: Mount, prepared: Prepared, policy: Policy) -> Discrepancy
 
 def _wander(level: Array, prepared: Prepared, policy: Policy) -> Array:
     """Level times cos(pi k t / T) in each recording, variance as of a first-order process."""
-    columns, first = [], 0
-    for piece in prepared.pieces:
-        rows = slice(first, first + len(piece.kept))
-        first = rows.stop
-        t = piece.t[piece.kept]
-        if not len(t):
-            continue
-        seconds = max(float(t[-1] - t[0]), 1e-9)
+    columns, t = [], prepared.stacked("t")
+    for one in np.unique(prepared.recording_of):
+        rows = prepared.recording_of == one
+        passed = t[rows] - t[rows][0]
+        seconds = max(float(passed[-1]), 1e-9)
         for k in range(WAVES):
             column = np.zeros(len(level))
             spread = 1 / np.sqrt(1 + (np.pi * k / seconds * policy.wander_seconds) ** 2)
-            column[rows] = level[rows] * np.cos(np.pi * k * (t - t[0]) / seconds) * spread
+            column[rows] = level[rows] * np.cos(np.pi * k * passed / seconds) * spread
             columns.append(column)
     return np.column_stack(columns)

@@ -125,7 +125,7 @@ def lowpass(columns: Array, dt: float, cutoff: float) -> Array:
     return np.asarray(passed[edge : len(passed) - edge])
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=1024)  # each piece has a time step of its own, and all of them are filtered in turn
 def _filter(dt: float, cutoff: float) -> tuple[Array, Array]:
     """Sections of the filter, and the states it settles in at a constant 1; designing costs as much as filtering."""
     sections = butter(4, cutoff, fs=1 / dt, output="sos")
