@@ -72,7 +72,7 @@ class Span:
     @property
     def reach(self) -> float:
         """Range of positions."""
-        return float(np.ptp(self.q))
+        return self.prepared.reach
 
 
 def of_both_ways(value: float | Pair | None) -> float:

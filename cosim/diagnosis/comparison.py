@@ -106,7 +106,7 @@ class Comparison:
 
     def _free(self, found: Fit, grams: Array) -> Array:
         free = np.ones(grams.shape[1] - 1)
-        free[: len(found.free)] = trust(found)
+        free[: len(found.free)] = trust(found, self.problem.prepared.reach)
         return free
 
     def _joined(self, own: Array, aside: Aside) -> tuple[Array, list[Group]]:

@@ -132,7 +132,7 @@ class Concealment:
     def _marginal(self, grams: Array, rows: Any, groups: list[Group], prior: Array, start: Marginal | None) -> Marginal:
         bands, found = self._comparison.bands, self._found
         free = np.ones(len(rows) - 1)
-        free[: len(found.free)] = trust(found)
+        free[: len(found.free)] = trust(found, self._comparison.problem.prepared.reach)
         free[len(free) - len(prior) :] = prior
         chosen = grams[:, rows][:, :, rows]
         rounds = {} if start is None else {"rounds": ROUNDS}

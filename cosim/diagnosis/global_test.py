@@ -83,7 +83,7 @@ class Scores:
         bands, many = comparison.bands, base.slopes.shape[1]
         groups = [Group(many + np.array(one.columns), one.prior) for one in comparison.nuisances.groups]
         free = np.ones(transformed.shape[1] - 1)
-        free[: len(base.free)] = trust(base)
+        free[: len(base.free)] = trust(base, comparison.problem.prepared.reach)
         now = marginal(bands.grams(transformed), free, groups, bands.count, bands.effective, comparison.floor)
         for group, size in zip(groups, now.sizes, strict=True):
             free[group.columns] = max(float(size), 1e-6 * group.prior)

@@ -7,16 +7,24 @@ from cosim.estimation.prepare import Array
 from pyfmi_models.friction import FrictionLaw
 from pyfmi_models.model import Pair
 
+PLACES = ("home", "q_center")
+"""Names of numbers that are places on the axis: their size says nothing, as the encoder's zero is anywhere."""
 
-def trust(found: Fit) -> Array:
-    """How far each free parameter may move from its fit before its tangent says nothing more: standard deviations."""
+
+def trust(found: Fit, reach: float) -> Array:
+    """How far each free parameter may move from its fit before its tangent says nothing more: standard deviations.
+
+    A place may lie anywhere in the motion, whose length is `reach` [rad, m].
+    """
     law = found.mount.friction
-    return np.array([_trust(law, name, value) for name, value in zip(found.free, found.values, strict=True)])
+    return np.array([_trust(law, name, value, reach) for name, value in zip(found.free, found.values, strict=True)])
 
 
-def _trust(law: FrictionLaw, name: str, value: float) -> float:
+def _trust(law: FrictionLaw, name: str, value: float, reach: float) -> float:
     if name.endswith("phase"):
         return 1.0
+    if name.endswith(PLACES):
+        return reach
     return (0.1 if name.startswith("friction.") and not is_linear(law, name) else 1.0) * max(abs(value), 1e-12)
 
 

@@ -105,6 +105,12 @@ class Prepared:
         return np.concatenate([np.full(len(piece.kept), piece.recording) for piece in self.pieces])
 
     @cached_property
+    def reach(self) -> float:
+        """Length of the positions visited [rad, m]."""
+        low, high = self.ranges["q"]
+        return high - low
+
+    @cached_property
     def ranges(self) -> dict[str, tuple[float, float]]:
         """Smallest and largest position and speed visited."""
         return {name: (float(self.stacked(name).min()), float(self.stacked(name).max())) for name in ("q", "v")}

@@ -146,7 +146,7 @@ def grams_of(comparison: Comparison, found: Fit, columns: Sequence[Array], added
         count,
         comparison.policy.coarsening,
         comparison.floor,
-        trust(found),
+        trust(found, comparison.problem.prepared.reach),
         groups,
         tuple(slice(int(first), int(last)) for first, last in pairwise(edges[2:])),
         np.concatenate([size[size > 0] for size in unit]) if unit else np.zeros(0),

@@ -66,7 +66,7 @@ class ClockOffset:
 
     @property
     def is_late(self) -> bool:
-        """Whether the lag is more than that of most drives, as far as it is known, and matters, and none contradicts it.
+        """Whether the lag is more than that of most drives, as far as it is known, and matters, and nothing denies it.
 
         Where what is not excluded reaches the end of what was tried, lag and viscosity were one thing.
         """
