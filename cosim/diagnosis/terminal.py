@@ -161,22 +161,32 @@ def _rest(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     """Return what was not seen, with the size that would have shown, and what could not be tested."""
     lines: list[str] = []
     least = unseen_torque(diagnosis, scales)
-    for answer, word in (("not_seen", "not seen"), ("not_testable", "no test")):
-        chosen = [finding for finding in diagnosis.findings if finding.answer == answer]
-        text = ", ".join(_limit(finding, least) for finding in chosen)
+    limits = ", ".join(_limit(one, least) for one in diagnosis.findings if one.answer == "not_seen")
+    untold = _untold([one for one in diagnosis.findings if one.answer == "not_testable"])
+    for word, text in (("not seen", limits), ("no test", untold)):
         if text:
             lines += textwrap.wrap(f"  {word:<9} {printable(text)}", WIDTH, subsequent_indent=" " * 12)
     return lines
 
 
 def _limit(finding: Finding, least: str) -> str:
-    """Return a name with the size from which it would have shown, or why it cannot be tested."""
-    said = finding.evidence
-    if finding.answer == "not_seen":
-        said = limit(finding) or least
-        said = f"< {said}" if said[:1].isdigit() else said
-    said = said.replace("\N{NO-BREAK SPACE}", " ")
-    return lowered(finding.title) + (f" ({said.rstrip('.')})" if said else "")
+    """Return a name with the size from which it would have shown."""
+    said = limit(finding) or least
+    return _with(lowered(finding.title), f"< {said}" if said[:1].isdigit() else said)
+
+
+def _untold(findings: Sequence[Finding]) -> str:
+    """Return names with why they cannot be tested, a reason that several share once."""
+    sharing: dict[str, list[str]] = {}
+    for finding in findings:
+        sharing.setdefault(finding.evidence.rstrip("."), []).append(lowered(finding.title))
+    each = {reason: f"each: {reason}" if len(names) > 1 and reason else reason for reason, names in sharing.items()}
+    return ", ".join(_with(", ".join(names), each[reason]) for reason, names in sharing.items())
+
+
+def _with(name: str, said: str) -> str:
+    said = said.replace("\N{NO-BREAK SPACE}", " ").rstrip(".")
+    return name + (f" ({said})" if said else "")
 
 
 def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:
