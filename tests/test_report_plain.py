@@ -54,7 +54,8 @@ def test_each_limit_stands_beside_the_effect_that_it_is_of() -> None:
 def test_a_reason_that_several_effects_share_stands_once_on_the_terminal() -> None:
     why = ("No size of it would have shown.", "Nothing turns.", "No size of it would have shown.")
     untold = [
-        replace(REST[0], effect=f"e{k}", title=f"E{k}", answer="not_testable", evidence=one) for k, one in enumerate(why)
+        replace(REST[0], effect=f"e{k}", title=f"E{k}", answer="not_testable", evidence=one)
+        for k, one in enumerate(why)
     ]
     said = " ".join(summary(replace(diagnosis("none"), findings=tuple(untold))).split())
     assert "no test e0, e2 (each: No size of it would have shown), e1 (Nothing turns)" in said

@@ -23,8 +23,12 @@ class Asymmetry(Hypothesis[FrictionAsymmetry]):
     view = "keep turning"
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
-        """Both directions alike, and their two differences as columns."""
-        if has(mount, FrictionAsymmetry) or mount.friction.key == "none":
+        """Both directions alike, their two differences as columns; beside an offset only where rest tells them apart.
+
+        Levels of two directions and an offset are two numbers of an axis that moves: with all three, one direction may
+        lose its friction altogether, and whatever the other has is explained by a name that it is not.
+        """
+        if has(mount, FrictionAsymmetry) or mount.friction.key == "none" or _is_alike(mount):
             return
         linear = ("level_asymmetry", "viscous_asymmetry")
         neutral = FrictionAsymmetry(level_asymmetry=0.0, viscous_asymmetry=0.0)
@@ -41,8 +45,13 @@ class Asymmetry(Hypothesis[FrictionAsymmetry]):
 
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """A law that says nothing of rest cannot tell it from an offset."""
-        if not mount.friction.states() and has(mount, TorqueOffset) and not has(mount, FrictionAsymmetry):
+        if _is_alike(mount) and not has(mount, FrictionAsymmetry):
             return "alike to the torque offset that was found, as the card's friction law says nothing of rest"
         if prepared.ranges["v"][0] >= 0 or prepared.ranges["v"][1] <= 0:
             return "these recordings hold no reversals"
         return super().why_not(mount, prepared)
+
+
+def _is_alike(mount: Mount) -> bool:
+    """Whether a constant torque is there already, and friction of two directions no more than that."""
+    return not mount.friction.states() and has(mount, TorqueOffset)

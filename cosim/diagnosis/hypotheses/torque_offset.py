@@ -18,8 +18,8 @@ class Offset(Hypothesis[TorqueOffset]):
     needs_position: ClassVar[bool] = False
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
-        """One column of ones."""
-        if has(mount, TorqueOffset):
+        """One column of ones; beside friction that differs between the directions only where rest tells them apart."""
+        if has(mount, TorqueOffset) or _is_alike(mount):
             return
 
         def start(c: Array) -> Effect:
@@ -29,6 +29,11 @@ class Offset(Hypothesis[TorqueOffset]):
 
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """A law that says nothing of rest cannot tell it from friction that differs between the directions."""
-        if not mount.friction.states() and has(mount, FrictionAsymmetry) and not has(mount, TorqueOffset):
+        if _is_alike(mount) and not has(mount, TorqueOffset):
             return "alike to the friction asymmetry that was found, as the card's friction law says nothing of rest"
         return super().why_not(mount, prepared)
+
+
+def _is_alike(mount: Mount) -> bool:
+    """Whether friction of two directions is there already, and a constant torque no more than that."""
+    return not mount.friction.states() and has(mount, FrictionAsymmetry)
