@@ -15,6 +15,7 @@ from cosim.diagnosis.breakdown import parts
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.decision import Decision, EffectScores, ResidualScores, beside_rest, decide, least_left
 from cosim.diagnosis.delivered import standing
+from cosim.diagnosis.denied import beyond_denial, without_denied
 from cosim.diagnosis.entries import NotLearnedEntry
 from cosim.diagnosis.experiment import Experiment, best, told
 from cosim.diagnosis.findings import accepted, rival_finding, standard_errors
@@ -111,13 +112,13 @@ def diagnose(
     sanity = (*sanity, *of_base(problem, base.mount, train, heldout))
     refitted = _improved(card, base.mount)
     on_model_ready("before", refitted.plant())
-    if any(one.blocks_naming for one in sanity):
-        withheld = without_names(problem, base.mount, train, heldout, sanity)
-        numbers = _base_parameters(Structures(problem.mount, base.mount, base.mount))
-        seconds = time.perf_counter() - started
-        return Outcome(replace(withheld, base_parameters=numbers, seconds=seconds), refitted, refitted, refitted)
+    if any(one.blocks_naming for one in beyond_denial(sanity)):
+        return _refused(refitted, without_names(problem, base.mount, train, heldout, sanity, started))
     comparison = Comparison.of(problem, base, POLICY)
     examined = examine(comparison, search(comparison, base, on_progress), on_progress)
+    sanity = without_denied(sanity, examined.chosen, examined.last)
+    if any(one.blocks_naming for one in sanity):
+        return _refused(refitted, without_names(problem, base.mount, train, heldout, sanity, started))
     on_progress("proving on the recording that was not fitted")
     answer = _answer(comparison, examined, heldout)
     answer, tried = _learned(answer, heldout)
@@ -128,17 +129,26 @@ def diagnose(
     experiment = _experiment(answer)
     described = _with_learned(_described(answer, train, heldout, card.mount.name), answer, learned, train, heldout)
     diagnosis = replace(
-        described,
+        _with_search(described, answer, examined, heldout),
         not_learned=_not_learned(tried) if answer.decision.is_unknown else {},
         sanity=sanity,
-        global_test=global_test(comparison, base).as_json(),
-        heldout=replace(
-            described.heldout, unvetoed_rms=heldout_rms(heldout, examined.chosen.mount, described.heldout.cutoff_hz)
-        ),
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,
     )
     return Outcome(diagnosis, delivered, first, refitted, experiment, learned.proposals() if learned else ())
+
+
+def _refused(refitted: Card, withheld: Diagnosis) -> Outcome:
+    """Nothing is named: all three cards are the base refitted."""
+    return Outcome(withheld, refitted, refitted, refitted)
+
+
+def _with_search(described: Diagnosis, answer: Answer, examined: Examined, heldout: Sequence[Recording]) -> Diagnosis:
+    """Add what the search says of itself: its global test, and the held-out error of what training alone proposed."""
+    held = described.heldout
+    unvetoed = heldout_rms(heldout, examined.chosen.mount, held.cutoff_hz)
+    tested = global_test(answer.comparison, examined.base).as_json()
+    return replace(described, global_test=tested, heldout=replace(held, unvetoed_rms=unvetoed))
 
 
 def _problem(train: Sequence[Recording], card: Card) -> Problem:
@@ -196,7 +206,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         data_quality=tuple(note for recording in (*train, *heldout) for note in quality(recording, prepared.cutoff)),
         friction_law=proposed_law(problem, answer.chosen),
         loop_bias=bias.as_json() if bias else {},
-        base_parameters=_base_parameters(models),
+        base_parameters=models.base_parameters(),
     )
 
 
@@ -216,7 +226,7 @@ def _with_learned(
         traces=signals,
         parts=parts(signals),
         regions_after=regions(signals, True, problem.mount.motion == "linear"),
-        base_parameters=_base_parameters(models),
+        base_parameters=models.base_parameters(),
     )
 
 
@@ -277,13 +287,6 @@ def _verdict(found: Sequence[Finding], decision: Decision) -> tuple[str, ...]:
     sure = [name for name in named if name not in decision.doubtful]
     doubtful = [name for name in named if name in decision.doubtful]
     return (*sure, *(("unknown",) if decision.is_unknown else ()), *doubtful)
-
-
-def _base_parameters(models: Structures) -> dict[str, tuple[float, float, float]]:
-    tables = [{v.name: v.start for v in m.parameters()} for m in (models.nominal, models.before, models.after)]
-    names = [name for name in tables[0] if name.startswith(("axis.", "friction.")) and name in tables[2]]
-    kept = [name for name in names if not name.endswith(("torque_limit", "smoothing"))]
-    return {name: (tables[0][name], tables[1][name], tables[2][name]) for name in kept}
 
 
 def _improved(card: Card, mount: Mount) -> Card:

@@ -39,6 +39,13 @@ class Structures:
     before: Mount
     after: Mount
 
+    def base_parameters(self) -> dict[str, tuple[float, float, float]]:
+        """Each number of the base, by its full name, in the three models."""
+        tables = [{v.name: v.start for v in one.parameters()} for one in (self.nominal, self.before, self.after)]
+        names = [name for name in tables[0] if name.startswith(("axis.", "friction.")) and name in tables[2]]
+        kept = [name for name in names if not name.endswith(("torque_limit", "smoothing"))]
+        return {name: (tables[0][name], tables[1][name], tables[2][name]) for name in kept}
+
 
 def residuals(prepared: Prepared, mount: Mount) -> list[Array]:
     """Measured minus model torque at all rows of each piece."""

@@ -1,5 +1,6 @@
 """A diagnosis that names nothing, as the recordings themselves are in doubt: the refitted base, and why."""
 
+import time
 from collections.abc import Sequence
 
 from cosim.data.recording import Recording
@@ -19,11 +20,17 @@ ACTION = "settle what is said about the recordings first, then diagnose again"
 
 
 def without_names(
-    problem: Problem, base: Mount, train: Sequence[Recording], heldout: Sequence[Recording], sanity: tuple[Sanity, ...]
+    problem: Problem,
+    base: Mount,
+    train: Sequence[Recording],
+    heldout: Sequence[Recording],
+    sanity: tuple[Sanity, ...],
+    started: float,
 ) -> Diagnosis:
     """Measure the refitted base and name no effect: what would be found is an error of the recordings.
 
-    The verdict is "unknown": something is wrong, and it is none of the effects.
+    The verdict is "unknown": something is wrong, and it is none of the effects. `started` is when the diagnosis was
+    [s of `time.perf_counter`].
     """
     models, linear = Structures(problem.mount, base, base), problem.mount.motion == "linear"
     signals = traces(train, heldout, models)
@@ -41,6 +48,8 @@ def without_names(
             note for recording in (*train, *heldout) for note in quality(recording, problem.prepared.cutoff)
         ),
         sanity=sanity,
+        base_parameters=models.base_parameters(),
+        seconds=time.perf_counter() - started,
     )
 
 
