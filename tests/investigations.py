@@ -27,6 +27,8 @@ observer_bandwidth = 120.0
 """
 DWELL = '\n[[effects]]\neffect = "dwell_breakaway"\ntorque_per_efold = 0.4\n'
 CABLE = '\n[[effects]]\neffect = "cable_wrap"\nstiffness = 2.0\nhome = 0.05\n'
+STIFFENING = f"{CABLE}hardening = 20.0\n"
+"""A cable that hardens: an even one is a load off the axis over so small a part of a turn."""
 SCENARIO = """
 name = "axis"
 step = 1e-3

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from investigations import CABLE, DWELL, LIMITS, written
+from investigations import CABLE, DWELL, LIMITS, STIFFENING, written
 
 from cosim.api.investigate import investigate
 from cosim.cli import main
@@ -18,7 +18,7 @@ from cosim.support.errors import InputError, OutputError
 
 
 def test_one_answer_needs_no_further_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    scenario, card, machine = written(tmp_path, CABLE)
+    scenario, card, machine = written(tmp_path, STIFFENING)
     words = ["investigate", scenario, "--card", card, "--machine", machine, "--out", str(tmp_path / "out")]
     with pytest.raises(SystemExit) as ended:
         main([*words, "--seconds", "10", "--budget", "1min", "--json"])
