@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.cli import main
+from cosim.cli import main, one_thread
 from cosim.data.recording import Recording
 from cosim.estimation.identify.estimate import Estimate, Outputs, estimate
 from cosim.support.errors import InputError, UndecidedError
@@ -162,3 +162,15 @@ def test_identify_says_what_it_does_and_what_it_could_not_determine_before_it_wr
         assert stages.index(one) < stages.index(after)
     careful = next(line for line in lines if line.startswith("careful: axis.inertia = "))
     assert "is not identifiable here. card.toml will hold it" in careful
+
+
+@pytest.mark.parametrize(("given", "threads"), [({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")])
+def test_linear_algebra_has_one_thread_unless_told(
+    given: dict[str, str], threads: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    for name, value in given.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.setattr(os, "environ", dict(os.environ))  # what is set here ends here
+    one_thread()
+    assert os.environ["OPENBLAS_NUM_THREADS"] == threads
