@@ -49,6 +49,7 @@ class FrictionAsymmetry(FrictionEffect):
 
 
 def _percent(name: str, asymmetry: float) -> tuple[float, str]:
+    """How far two directions differ, as a share of their mean, and in words."""
     harder, easier = ("forward", "backward") if asymmetry > 0 else ("backward", "forward")
-    size = 200 * abs(asymmetry)
-    return size, f"{name.capitalize()} is higher moving {harder} than {easier}, by {percent(size / 100)} of their mean"
+    size = 2 * abs(asymmetry)
+    return size, f"{name.capitalize()} is higher moving {harder} than {easier}, by {percent(size)} of their mean"

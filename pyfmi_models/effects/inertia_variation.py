@@ -39,5 +39,4 @@ class InertiaVariation(InertiaEffect):
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         name, per = ("moving mass", "metre") if unit == "N" else ("inertia", "turn")
-        size = 100 * self.relative_amplitude
-        return f"The {name} rises and falls by {percent(size / 100)}, {times(self.cycles_per_rev)} per {per}."
+        return f"The {name} rises and falls by {percent(self.relative_amplitude)}, {times(self.cycles_per_rev)} per {per}."

@@ -6,6 +6,7 @@ import numpy as np
 
 from cosim.diagnosis.sanity.entry import Sanity
 from cosim.estimation.prepare import Array
+from cosim.support.statistics import rms
 from pyfmi_models.effects import GravityUnbalance
 from pyfmi_models.mount import Mount
 
@@ -32,17 +33,13 @@ def load_far_from_card(card: Mount, refitted: Mount, positions: Array) -> tuple[
             "or counterweight, or another zero of the position.",
         )
         for one, other in both
-        if _rms(_pull(other, positions) - _pull(one, positions)) > OTHER * _rms(_pull(one, positions))
+        if rms(_pull(other, positions) - _pull(one, positions)) > OTHER * rms(_pull(one, positions))
     )
 
 
 def _pull(load: GravityUnbalance, positions: Array) -> Array:
     """Torque of a load [N m]."""
     return np.asarray(float(load.mgl) * np.sin(positions + float(load.phase)))
-
-
-def _rms(torque: Array) -> float:
-    return float(np.sqrt(np.mean(torque**2)))
 
 
 def _words(load: GravityUnbalance) -> str:
