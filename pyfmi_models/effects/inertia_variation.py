@@ -39,4 +39,5 @@ class InertiaVariation(InertiaEffect):
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         name, per = ("moving mass", "metre") if unit == "N" else ("inertia", "turn")
-        return f"The {name} rises and falls by {percent(self.relative_amplitude)}, {times(self.cycles_per_rev)} per {per}."
+        size, often = percent(self.relative_amplitude), times(self.cycles_per_rev)
+        return f"The {name} rises and falls by {size}, {often} per {per}."
