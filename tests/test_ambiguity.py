@@ -86,9 +86,9 @@ def test_nothing_is_unknown_where_nothing_is_left_and_what_is_left_says_what_it_
 
 def test_what_was_surely_learned_is_unknown_too_and_names_stay() -> None:
     named = decide([scores("cogging", 60.0)], QUIET, POLICY)
-    more = named.with_rest(("position",), ())
+    more = named.with_rest(("position",), (), POLICY)
     assert (more.is_unknown, more.depends_on, more.sets) == (True, ("position",), named.sets)
-    assert more.with_rest(("speed",), ()) == more
+    assert more.with_rest(("speed",), (), POLICY) == more
 
 
 def test_what_is_left_must_be_more_than_what_the_equations_of_strong_names_lack() -> None:

@@ -46,6 +46,8 @@ ROUND = replace(
     large_residual_there=0.25,
     large_residual_beside=0.0625,
     most_raised_beside_rest=0.5,
+    margin_within_set=0.25,
+    true_beside_unknown=0.375,
 )
 """Constants with which every product is exact, so that a limit can be met exactly."""
 LITTLE = 1e-6
@@ -186,7 +188,7 @@ def test_a_doubtful_name_excuses_nothing_that_is_left() -> None:
     assert decide([weak], left(), ROUND).doubtful == ()
 
 
-def test_a_name_beside_something_unknown_is_as_likely_as_not_unless_it_removes_nearly_all() -> None:
+def test_a_name_beside_something_unknown_is_less_likely_unless_it_removes_nearly_all() -> None:
     residual = left(share=1.0)
     sure, doubtful = effect("cogging", 80.0, 0.875), effect("delay", 80.0, 0.875 - LITTLE)
     found = decide([sure, doubtful], residual, ROUND)
@@ -194,7 +196,7 @@ def test_a_name_beside_something_unknown_is_as_likely_as_not_unless_it_removes_n
     assert decide([sure, replace(doubtful, removes=0.875)], residual, ROUND).doubtful == ()
     alone = decide([sure, doubtful], left(), ROUND)
     assert found.probabilities["cogging"] == alone.probabilities["cogging"]
-    assert found.probabilities["delay"]["delay"] == pytest.approx(alone.probabilities["delay"]["delay"] / 2)
+    assert found.probabilities["delay"]["delay"] == pytest.approx(0.375 * alone.probabilities["delay"]["delay"])
 
 
 def test_what_a_term_removes_about_turns_alone_is_what_laws_lack_there() -> None:
@@ -217,11 +219,13 @@ def test_probabilities_are_calibrated_posterior_shares_times_what_is_explained(m
     one = EffectScores("delay", evidence, {"lag": margin, "far": 9.0}, {"delay": 0.75, "lag": 0.5, "far": 0.25})
     found = decide([one], left(), ROUND).probabilities["delay"]
     total = 1 + exp(-margin) + exp(-9.0) + exp(-min(evidence, 700.0))
-    told = {"delay": calibrated(0.75 / total), "lag": calibrated(0.5 * exp(-margin) / total)}
+    whole = (1 + exp(-margin)) / total
+    lag = exp(-0.25 * margin) / (1 + exp(-0.25 * margin))
+    told = {"delay": calibrated(0.75 * whole * (1 - lag)), "lag": calibrated(0.5 * whole * lag)}
     scale = max(1.0, sum(told.values()))
     assert found == pytest.approx({name: value / scale for name, value in told.items()}, rel=1e-12)
 
 
 def test_what_is_decided_stays_when_something_more_is_left() -> None:
     decided = Decision({}, {}, True, ("time",))
-    assert decided.with_rest(("position",), ()) is decided
+    assert decided.with_rest(("position",), (), POLICY) is decided

@@ -65,14 +65,16 @@ class Decision:
     is_unknown: bool
     depends_on: tuple[str, ...]
     doubtful: tuple[str, ...] = ()
-    """Names that help, and may yet imitate what is unknown: they are as likely as not."""
+    """Names that help, and may yet imitate what is unknown."""
 
-    def with_rest(self, follows: tuple[str, ...], doubtful: tuple[str, ...]) -> "Decision":
+    def with_rest(self, follows: tuple[str, ...], doubtful: tuple[str, ...], policy: Policy) -> "Decision":
         """The same where something is left without a name, that follows quantities; names may imitate it."""
         if self.is_unknown:
             return self
         told = {
-            name: {one: value / 2 for one, value in members.items()} if name in doubtful else members
+            name: {one: policy.true_beside_unknown * value for one, value in members.items()}
+            if name in doubtful
+            else members
             for name, members in self.probabilities.items()
         }
         return Decision(self.sets, told, True, follows, doubtful)
@@ -88,12 +90,12 @@ def decide(effects: Sequence[EffectScores], residual: ResidualScores, policy: Po
 def beside_rest(effects: Sequence[EffectScores], follows: tuple[str, ...], policy: Policy) -> Decision:
     """The answer where something without a name is left, that follows quantities: margins count for less there."""
     told = [one.with_margins_of(policy.margin_beside_unknown) for one in effects]
-    return _named(told, policy).with_rest(follows, beside_unknown(effects, policy))
+    return _named(told, policy).with_rest(follows, beside_unknown(effects, policy), policy)
 
 
 def _named(effects: Sequence[EffectScores], policy: Policy) -> Decision:
     sets = {one.effect: open_rivals(one, policy) for one in effects}
-    return Decision(sets, {one.effect: _probabilities(one, sets[one.effect]) for one in effects}, False, ())
+    return Decision(sets, {one.effect: _probabilities(one, sets[one.effect], policy) for one in effects}, False, ())
 
 
 def beside_unknown(effects: Sequence[EffectScores], policy: Policy) -> tuple[str, ...]:
@@ -212,11 +214,19 @@ def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
     return tuple(one.name for one in ranked if one.share > least) or (residual.over_time,)
 
 
-def _probabilities(one: EffectScores, members: Sequence[str]) -> dict[str, float]:
+def _probabilities(one: EffectScores, members: Sequence[str], policy: Policy) -> dict[str, float]:
     """Posterior shares of an effect, its rivals and "none" (equal priors), times what each explains, calibrated."""
     odds = {one.effect: 0.0, **{name: -margin for name, margin in one.margins.items()}}
     top = max(odds.values())
     weights = {name: exp(value - top) for name, value in odds.items()}
     total = sum(weights.values()) + exp(-min(one.evidence, 700.0) - top)
-    told = {name: calibrated(weights[name] / total * one.explains[name]) for name in (one.effect, *members)}
+    shares = _within_set({name: weights[name] / total for name in (one.effect, *members)}, policy)
+    told = {name: calibrated(share * one.explains[name]) for name, share in shares.items()}
     return {name: value / max(1.0, sum(told.values())) for name, value in told.items()}
+
+
+def _within_set(shares: Mapping[str, float], policy: Policy) -> dict[str, float]:
+    """What members of a set share, by the part of their margins that counts there: shares ~ exp(-part x margin)."""
+    told = {name: share**policy.margin_within_set for name, share in shares.items()}
+    scale = sum(shares.values()) / max(sum(told.values()), 1e-300)
+    return {name: scale * value for name, value in told.items()}
