@@ -138,9 +138,10 @@ def test_dropped_files_are_shown_corrected_and_diagnosed(browser: Any, files: li
         dropped(page, [*files, bad])
         page.wait_for_selector("#start")
         for role in ("out", "train"):
+            page.evaluate("document.getElementById('main').dataset.before = 'yes'")
             page.select_option("#role-1", role)
-            until(lambda role=role: desk.store.all()[0].upload("run1.csv").role == role)  # type: ignore[misc]
-        holds(page, "document.getElementById('role-1').value === 'train'")
+            holds(page, "!document.getElementById('main').dataset.before")
+            assert desk.store.all()[0].upload("run1.csv").role == role
         page.click("#start")
         page.wait_for_selector("#problem")
         assert "bad.csv cannot be used" in page.inner_text("#problem")
@@ -156,6 +157,25 @@ def test_dropped_files_are_shown_corrected_and_diagnosed(browser: Any, files: li
         assert page.inner_text("h1") == serve_work.ANSWER["heading"]
         (job,) = desk.store.all()
         assert job.upload("heldout.csv").options["units"] == {"q": "deg"}
+
+
+LATE = """() => { const real = window.fetch; let first = true; window.fetch = async (...asked) => {
+  const late = first; first = false; const answer = await real(...asked);
+  if (late) await new Promise((done) => setTimeout(done, 500)); return answer; } }"""
+
+
+def test_an_answer_that_comes_late_does_not_undo_what_was_asked_after_it(
+    browser: Any, files: list[Path], tmp_path: Path
+) -> None:
+    with serving(tmp_path / "data", serve_work.quickly) as (_, address), opened(browser, address, DESK) as page:
+        dropped(page, files)
+        page.wait_for_selector("#start")
+        page.evaluate(LATE)
+        page.select_option("#role-1", "out")
+        page.evaluate("document.getElementById('start').click()")
+        page.wait_for_selector("#problem", timeout=20_000)
+        time.sleep(1.0)
+        assert page.locator("#problem").count() == 1
 
 
 def test_it_is_used_by_keyboard_alone(browser: Any, files: list[Path], tmp_path: Path) -> None:

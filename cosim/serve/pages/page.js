@@ -48,8 +48,14 @@ async function send(form) {
   await show(form.action, { method: "POST", body: new URLSearchParams(new FormData(form)) });
 }
 
-// Fetches a page and puts its content in the place of this one's.
-async function show(address, options) {
+// Fetches a page and puts its content in the place of this one's; what was asked later is shown later.
+let shown = Promise.resolve();
+function show(address, options) {
+  shown = shown.then(() => fetched(address, options));
+  return shown;
+}
+
+async function fetched(address, options) {
   try {
     const answer = await fetch(address, options);
     const fresh = new DOMParser().parseFromString(await answer.text(), "text/html");
