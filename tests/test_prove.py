@@ -162,15 +162,18 @@ def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path: Path) -> Non
         (["--seconds", "5"], "--seconds 5: a recording must last 10 s at least"),
         (["--workers", "0"], "--workers 0: it must be at least 1"),
         (["--workers", str(2**64)], "--workers 18446744073709551616: 1,024 are the most"),
+        (["--seed", "-1"], "--seed -1: it must be at least 0"),
         (["--seconds", "nan"], "--seconds nan: it must be a finite number"),
     ],
 )
 def test_wrong_wishes_end_with_one_sentence(wrong, message, tmp_path, capsys) -> None:
     with pytest.raises(SystemExit) as ended:
-        main(["prove", "--out", str(tmp_path / "out"), *wrong])
+        main(["prove", "--out", str(tmp_path / "out"), "--decks", str(tmp_path / "decks.md"), *wrong])
     assert ended.value.code == 2
-    assert message in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
+    said = capsys.readouterr().err
+    assert said.startswith(f"cosim: {message}")
+    assert said.count("\n") == 1
+    assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.parametrize(
