@@ -1,8 +1,10 @@
 """The loop that asks the machine: it decides, it keeps to its limits, and a kill loses nothing."""
 
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
+from shlex import split
 
 import pytest
 from investigations import CABLE, DWELL, LIMITS, STIFFENING, written
@@ -118,6 +120,30 @@ def test_a_limit_left_on_the_way_is_the_end_is_said_and_is_kept(
     assert "LEFT position" in str(done)
     again = investigate(*given[:2], out, machine=given[2], budget=100, seconds=10, limits=LIMITS)
     assert [one.number for one in again.story.steps if isinstance(one, Moved)] == [0, 1, 3]
+
+
+OPTIONS = """--card a.toml --out o --machine m.toml --budget 2min --seconds 12.5 --limits position=-0.5:0.5
+    --limits speed=0.2 --train 'run 1.csv' --train run2.csv --heldout run3.csv --seed 0"""
+ON_A_DRIVE = "--card a.toml --out o --machine virtual --drive udp://127.0.0.1:9 --key k --move"
+
+
+@pytest.mark.parametrize("options", [OPTIONS, ON_A_DRIVE])
+def test_the_command_that_is_recorded_asks_for_the_same(options: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[dict[str, object]] = []
+
+    def noted(*given: object, **options: object) -> None:
+        asked.append({"given": given, **options, "on_progress": None})
+        raise InputError("enough")
+
+    monkeypatch.setattr(sys.modules["cosim.api.investigate"], "investigate", noted)
+    monkeypatch.setattr("cosim.cli.investigate.machine_of", lambda *given: given)
+    with pytest.raises(SystemExit):
+        main(["investigate", "axis.toml", *split(options)])
+    recorded = str(asked[0]["command"])
+    with pytest.raises(SystemExit):
+        main(split(recorded)[1:])
+    assert asked[0] == asked[1]
+    assert not [one for one in split(options) if one not in recorded]
 
 
 @pytest.mark.parametrize(("text", "seconds"), [("300", 300), ("300s", 300), ("1.5min", 90), ("1 h", 3600)])

@@ -1,15 +1,13 @@
 """`cosim diagnose`: recordings and a card to what the card lacks, and a better card and FMU."""
 
 import sys
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from shlex import join
 from typing import Annotated
 
 import typer
 
 from cosim.cli.complete import cards
-from cosim.cli.options import Columns, Force, Layout, Units
+from cosim.cli.options import Columns, Force, Layout, Units, command_of
 from cosim.reading import pairs_of, read_recordings
 from cosim.support.memory import keep_freed_memory
 from cosim.support.terminal import put, put_json, say, stage
@@ -54,9 +52,9 @@ def diagnose(
     recordings = read_recordings((*train, *heldout), believed.columns, columns, units, believed.mount.motion, layout)
     seconds = sum(recording.duration for recording in recordings)
     say(f"Read {len(recordings)} recordings, {seconds:.0f} s; card {believed.mount.name}")
-    given: dict[str, Sequence[object] | None] = {"--heldout": heldout, "--card": [card], "--out": [out]}
+    given: dict[str, object] = {"--heldout": heldout, "--card": card, "--out": out}
     given |= {"--columns": columns, "--units": units, "--layout": layout}
-    given |= {"--fmu": [fmu] if fmu else (), "--variables": variables, "--propose": [propose] if propose else ()}
+    given |= {"--fmu": fmu, "--variables": variables, "--propose": propose, "--quick": quick}
     with stage("looking for what the model lacks") as progress:
         found = find(
             recordings[: len(train)],
@@ -67,7 +65,7 @@ def diagnose(
             variables=pairs_of("--variables", variables),
             quick=quick,
             force=force,
-            command=_command(train, given, quick),
+            command=command_of("diagnose", train, given),
             on_progress=progress.tell,
         )
     put_json(found.as_json()) if as_json else put(summary(found.diagnosis, out=out))
@@ -85,9 +83,3 @@ def _check_folders(out: Path, propose: Path | None, quick: bool, force: bool) ->
     check_out(out, force, QUICK if quick else FILES)
     if propose:
         check_folder(propose, force)
-
-
-def _command(train: Sequence[Path], options: Mapping[str, Sequence[object] | None], quick: bool) -> str:
-    """The command line that does the same again."""
-    told = [word for name, values in options.items() for value in values or () for word in (name, str(value))]
-    return join(["cosim", "diagnose", *map(str, train), *told, *(["--quick"] if quick else [])])

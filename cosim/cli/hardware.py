@@ -8,7 +8,7 @@ import typer
 
 from cosim.cli.drive import JsonOption, KeyOption, MachineOption, machine_of, virtual_drive
 from cosim.cli.firmware import firmware
-from cosim.cli.options import Force
+from cosim.cli.options import Force, command_of
 from cosim.cli.supervisor import alpaca, indi
 from cosim.support.terminal import put, put_json, say
 
@@ -45,7 +45,8 @@ def run(
     for one in (box, recording, report):
         check_free(one, force)
     ready = with_fmus(wanted, say)
-    command = f"cosim hardware run {scenario} --machine {machine}{f' --drive {drive}' if drive else ''} --out {out}"
+    words = {"--out": out, "--machine": machine, "--drive": drive, "--key": key, "--fast": fast}
+    command = command_of("hardware run", [scenario], words)
     try:
         with Session(
             ready, given, box, fast=fast, force=force, origin={"command": command, "cards": cards_of(wanted)}

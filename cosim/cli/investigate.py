@@ -2,14 +2,13 @@
 
 import re
 from pathlib import Path
-from shlex import join
 from typing import Annotated
 
 import typer
 
 from cosim.cli.complete import cards, scenarios
 from cosim.cli.drive import KeyOption, machine_of
-from cosim.cli.options import Force
+from cosim.cli.options import Force, command_of
 from cosim.reading import pairs_of
 from cosim.support.errors import InputError
 from cosim.support.terminal import put, put_json, say, stage
@@ -44,9 +43,9 @@ def investigate(
     from cosim.api.investigate import investigate as ask
     from cosim.investigation.log import PAGE
 
-    words = {"--card": card, "--machine": machine, "--drive": drive, "--budget": budget, "--seconds": f"{seconds:g}"}
-    words |= {"--limits": " ".join(limits or ()), "--out": str(out)}
-    command = join(["cosim", "investigate", scenario, *(w for name, v in words.items() if v for w in (name, v))])
+    words = {"--card": card, "--out": out, "--machine": machine, "--drive": drive, "--key": key, "--move": move}
+    words |= {"--budget": budget, "--seconds": seconds, "--limits": limits, "--train": train, "--heldout": heldout}
+    command = command_of("investigate", [scenario], words | {"--seed": seed})
     if drive and not move:
         raise InputError(f"--drive {drive} would move an axis; give --move to allow it.", culprit="--drive")
     moved = machine_of(machine or "virtual", drive, key) if drive else machine

@@ -1,5 +1,7 @@
-"""Options that more than one verb has."""
+"""Options that more than one verb has, and the command line that does the same again."""
 
+from collections.abc import Mapping, Sequence
+from shlex import join
 from typing import Annotated
 
 import typer
@@ -12,3 +14,20 @@ Layout = Annotated[
     list[str] | None, typer.Option("--layout", help="How texts are written: decimal=comma header=4 period=1ms ...")
 ]
 Force = Annotated[bool, typer.Option("--force", help="Overwrite what is there.")]
+
+
+def command_of(verb: str, arguments: Sequence[object], options: Mapping[str, object]) -> str:
+    """The command line that does the same again.
+
+    Args:
+        verb: "diagnose", "hardware run".
+        arguments: what stands before the options.
+        options: by name; a list is an option given several times, True one without a value; None, False and "" are
+            left out.
+    """
+    words = ["cosim", *verb.split(), *map(str, arguments)]
+    for name, given in options.items():
+        for value in given if isinstance(given, list) else [given]:
+            if value is not None and value is not False and value != "":
+                words += [name] if value is True else [name, str(value)]
+    return join(words)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from cosim.cli.complete import scenarios
-from cosim.cli.options import Force
+from cosim.cli.options import Force, command_of
 from cosim.support.files import in_bytes
 from cosim.support.terminal import put, put_json, say, stage
 
@@ -61,7 +61,8 @@ def run(
     if Path(scenario).suffix in (".ssp", ".ssd"):
         say(wanted.description)
     ready = with_fmus(wanted, say)
-    options = Options(None, force, None, not interpreted, f"cosim run {scenario} --out {out}")
+    command = command_of("run", [scenario], {"--out": out, "--interpreted": interpreted, "--outside": outside})
+    options = Options(None, force, None, not interpreted, command)
     apart = is_foreign(wanted) if isolate is None else isolate
     done = _run(ready, Delivery(out, options, apart, call_timeout, page))
     for line in str(done).removeprefix(f"{done.name}: ").splitlines():

@@ -9,6 +9,7 @@ from typing import Annotated
 
 import typer
 
+from cosim.cli.options import command_of
 from cosim.support.terminal import messages, put, put_json, say, stage
 
 PAUSE = 10.0
@@ -43,7 +44,7 @@ def sweep(
                 force=force,
                 retry=retry,
                 on_progress=on_progress,
-                command=f"cosim sweep {file} --out {out}",
+                command=command_of("sweep", [file], {"--out": out, "--cluster": cluster}),
             )
     except KeyboardInterrupt:
         say(f"what was done until then is in {out / 'table.parquet'}; the same command goes on from there")
