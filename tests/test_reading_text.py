@@ -52,6 +52,8 @@ READ = {
     "a row of units": ("Time;Torque;Position\ns;Nm;deg\n" + rows(";", ","), DEG),
     "a row of units in brackets": ("Time,Torque,Position\n[s],[Nm],[deg]\n" + rows(","), DEG),
     "a preamble": ("Logger 7\nSerial,123\nDate,2024-03-01\n\nTime,Torque,Position\n" + rows(","), 1.0),
+    "a preamble that ends with as many numbers": ("1000,0.001,5\nt,tau,q\n" + rows(","), 1.0),
+    "a preamble of two lines of numbers": ("Logger 7\n12;1;0,5\n13;2;0,5\n\nt;tau;q\n" + rows(";", ","), 1.0),
     "a separator at the end of each row": ("t;tau;q;\n" + rows(";", end=";"), 1.0),
     "quoted numbers": ('"t";"tau";"q"\n"' + rows('";"', ",", end='"').replace("\n", '\n"').rstrip('"'), 1.0),
     "a byte order mark": ("\ufefft,tau,q\n" + rows(","), 1.0),
@@ -124,6 +126,7 @@ def test_when_a_recording_began_is_kept(tmp_path: Path) -> None:
 REFUSED = {
     "no names": (rows(","), "does not name its 3 columns; say which is which, for example --columns t=#1 tau=#2 q=#3."),
     "no names and no time": (rows(",", columns=(TAU, Q)), "--columns tau=#1 q=#2 --layout period=1ms."),
+    "columns of words alone": ("1,a\nb,2\n" * 20, "say which is which, for example --layout period=1ms."),
     "20 Hz or 20 kHz": (
         "t,tau,q\n" + rows(",", columns=(np.arange(60_000) * 50.0, np.resize(TAU, 60_000), np.resize(Q, 60_000))),
         '"t" steps by 50, which is 20 Hz in ms or 2e+04 Hz in us. Say which with --units t=ms.',

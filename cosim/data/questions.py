@@ -74,10 +74,11 @@ def unnamed(path: Path, found: Columns, lacking: Sequence[str]) -> UndecidedErro
     columns = dict(zip(ours, [growing, *rest] if "t" in ours else rest, strict=False))
     pairs = " ".join(f"{our}={theirs}" for our, theirs in columns.items())
     layout = {} if growing or "t" not in lacking else {PERIOD: "1ms"}
-    period = "".join(f" --layout {key}={value}" for key, value in layout.items())
-    text = f"{path} does not name its {len(found.values)} columns; say which is which, for example --columns {pairs}"
+    options = [f"--columns {pairs}"] if pairs else []
+    options += [f"--layout {key}={value}" for key, value in layout.items()]
+    text = f"{path} does not name its {len(found.values)} columns; say which is which, for example {' '.join(options)}."
     names, deciding = tuple(found.values), {"columns": columns, "layout": layout}
-    return UndecidedError(f"{text}{period}.", decided_by=deciding, culprit=str(path), value=len(names), choices=names)
+    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=len(names), choices=names)
 
 
 def counting(path: Path, name: str, step: float) -> UndecidedError:

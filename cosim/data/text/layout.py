@@ -9,6 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 from cosim.data.limits import short
@@ -114,6 +115,8 @@ def _judged(lines: Sequence[str], separator: str, decimal: str, header: str) -> 
     body = [index for index, row in enumerate(rows) if len(row) == count and any(values[index])]
     score = sum(sum(values[index]) ** 2 / max(1, sum(map(bool, rows[index]))) for index in body)
     first = _first(rows, values, body)
+    if not header:
+        first = _below_names(lines, rows, first, separator, count)
     if header == "0":
         return score, Layout(separator, decimal, count, first)
     if header:
@@ -142,6 +145,15 @@ def _first(rows: Sequence[list[str]], values: Sequence[list[bool]], body: Sequen
         if index in full and sum(one in full for one in window) >= len(window) - 1:
             return index
     return min(full, default=body[0])
+
+
+def _below_names(lines: Sequence[str], rows: Sequence[list[str]], first: int, separator: str, count: int) -> int:
+    """Return the first sample where a preamble ends with lines of as many numbers: the line of names is below them."""
+    if any(_above(lines, rows, first, separator, count)):
+        return first
+    written = [index for index in range(first, len(rows)) if any(rows[index])][:WINDOW]
+    named = (after for index, after in pairwise(written) if _words(lines[index], rows[index], separator, count))
+    return next(named, first)
 
 
 def _above(
