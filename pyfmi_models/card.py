@@ -36,7 +36,10 @@ class MountSection(Section):
 
 
 class EncoderSection(Section):
-    """`[encoder]`: counts per turn (0: no quantisation), white noise RMS [rad], encoder turns per axis turn."""
+    """`[encoder]`: counts per turn (0: not known), white noise RMS [rad, m], encoder turns per axis turn.
+
+    Firmware and virtual drive count by them; the noise is a note for people: no calculation reads it.
+    """
 
     counts_per_rev: float = Field(default=0.0, ge=0, le=MOST_COUNTS)
     noise_rms: float = Field(default=0.0, ge=0, le=LARGEST_GIVEN)
