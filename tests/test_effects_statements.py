@@ -44,8 +44,10 @@ TURNING = {
     "RoughSpot": "Around 0.3 rad friction is 80 % higher moving forward and 30 % lower backward, over about 0.4 rad.",
     "StribeckEffect": "Below about 0.02 rad/s friction changes with speed, to 4 N·m near standstill.",
     "ThermalViscosity": "Viscous friction falls by 4 % per degree and sliding friction falls by 2 % per degree.",
-    "TorqueDroop": "Of a command of 8 N·m the drive loses 20 %, of less less.",
-    "WarmTorqueDroop": "Of a command of 8 N·m the drive loses 20 %, of less less, and gives 0.2 % less per degree.",
+    "TorqueDroop": "Of a command of 8 N·m the drive loses 20 %, of small ones less.",
+    "WarmTorqueDroop": (
+        "Of a command of 8 N·m the drive loses 20 %, of small ones less, and gives 0.2 % less per degree."
+    ),
     "TorqueOffset": "A constant 0.7 N·m pushes the axis backward, moving or not.",
     "TorqueSaturation": "The drive saturates at 5 N·m: 40 % of what is asked for beyond it arrives.",
 }
@@ -88,7 +90,7 @@ def test_the_sentence_of_an_axis_that_slides_differs_in_its_units_alone(effect: 
         (
             "WarmTorqueDroop",
             {"droop": 0.2, "rated_torque": 8.0, "per_degC": 0.002},
-            "Of a command of 8 N·m the drive loses 20 %, of less less, and gives 0.2 % more per degree.",
+            "Of a command of 8 N·m the drive loses 20 %, of small ones less, and gives 0.2 % more per degree.",
         ),
         (
             "ThermalViscosity",

@@ -193,7 +193,7 @@ def test_beside_another_teams_fmu_its_correction_is_what_to_use() -> None:
     html, said = render(beside), " ".join(summary(beside).split())
     assert "Model <b>theirs.fmu</b>" in html
     assert "<b>correction.fmu</b> in front of theirs.fmu is proven" in html
-    assert "No torque can give delay: that is in the card only." in html
+    assert "A torque cannot stand for delay: that is in the card only." in html
     assert "missing from theirs.fmu" in said
     assert "improved.ssp correction.fmu" in said
 

@@ -176,7 +176,7 @@ def test_a_black_line_over_nearly_everything_is_a_number_instead() -> None:
     often, seldom = (replace(whole.traces[0], intervals=((0.0, end),)) for end in (54.0, 5.0))
     with mpl.rc_context(STYLE):
         said = [recording(0, one, scales, (1.0, 1.0)).caption for one in (often, seldom)]
-    assert "Louder than the noise for 90 % of the time, rests and short returns counted." in said[0]
+    assert "Above the noise for 90 % of the time, rests and short returns counted." in said[0]
     assert "Black line" in said[1]
 
 

@@ -139,7 +139,7 @@ class TestGenerated:
         assert other_machine(train, [held]) == ()
         (one,) = other_machine(train, [Balance([replace(other, name="other")])])
         assert one.finding == "other_machine"
-        assert one.statement.startswith("other is held out, and is not of the machine that was trained on")
+        assert one.statement.startswith("other is held out, and is not of the machine of the training recordings")
         assert not one.blocks_naming
 
     @pytest.mark.parametrize(

@@ -155,8 +155,5 @@ def _note(recording: Recording, name: str, runs: list[Run]) -> str:
     row, rows = runs[0].first, sum(len(run.values) for run in runs)
     where = f"{name} = {recording[name][row]:.6g} in row {row + 1:,} ({recording.t[row]:.6g} s)"
     if rows == 1:
-        return f"{recording.name}: {where} is a false reading; it counts for nothing, its neighbours bridge it."
-    return (
-        f"{recording.name}: {rows} false readings, the first {where}; they count for nothing, their neighbours "
-        "bridge them."
-    )
+        return f"{recording.name}: {where} is a false reading; it is left out and interpolated."
+    return f"{recording.name}: {rows} false readings, the first {where}; they are left out and interpolated."

@@ -45,7 +45,9 @@ class TorqueDroop(DriveEffect):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        return f"Of a command of {self.rated_torque:.3g} {unit} the drive loses {percent(self.droop)}, of less less."
+        return (
+            f"Of a command of {self.rated_torque:.3g} {unit} the drive loses {percent(self.droop)}, of small ones less."
+        )
 
 
 @dataclass(frozen=True, kw_only=True)

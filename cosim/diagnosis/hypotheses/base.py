@@ -192,7 +192,8 @@ HELD = "the model has it already"
 NO_FRICTION = "the card says that there is no friction"
 NO_POSITION = "no position was recorded"
 UNSEEN = "no size of it would have shown in these recordings"
-"""Reasons why an effect cannot be tested."""
+RESTLESS = "a friction law that says nothing about rest cannot tell it from"
+"""Reasons why an effect cannot be tested; the last one goes on with the effect that was found."""
 
 
 def visited(reach: Reach) -> Where:

@@ -83,7 +83,7 @@ class LateTorque(Hypothesis[Drive]):
         if not any(piece.asked for piece in prepared.pieces):
             return NOTHING_ASKED
         if has(mount, DriveEffect):
-            return "alike to what was found in the drive"
+            return "the model has an effect of the drive already, from which it cannot be told"
         return super().why_not(mount, prepared)
 
 

@@ -6,7 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from cosim.diagnosis.candidates import Candidate, Span, has
-from cosim.diagnosis.hypotheses.base import Hypothesis, Reach
+from cosim.diagnosis.hypotheses.base import RESTLESS, Hypothesis, Reach
 from cosim.diagnosis.result import Where
 from cosim.estimation.prepare import Array, Prepared
 from pyfmi_models.effects import Effect, FrictionAsymmetry, TorqueOffset
@@ -46,7 +46,7 @@ class Asymmetry(Hypothesis[FrictionAsymmetry]):
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """A law that says nothing of rest cannot tell it from an offset."""
         if _is_alike(mount) and not has(mount, FrictionAsymmetry):
-            return "alike to the torque offset that was found, as the card's friction law says nothing of rest"
+            return f"{RESTLESS} the torque offset that was found"
         if prepared.ranges["v"][0] >= 0 or prepared.ranges["v"][1] <= 0:
             return "these recordings hold no reversals"
         return super().why_not(mount, prepared)

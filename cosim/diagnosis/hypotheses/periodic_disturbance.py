@@ -29,8 +29,7 @@ class Tone(Hypothesis[PeriodicDisturbance]):
     has_own_phase: ClassVar[bool] = True
     view = "spectrum"
     caveat: ClassVar[str] = (
-        "; its phase is that of each recording, told by the recording itself, by the one not "
-        "fitted too; card and FMU hold that of the first"
+        "; its phase is fitted in each recording, in the held-out one too; card and FMU hold that of the first"
     )
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
@@ -78,4 +77,4 @@ class Tone(Hypothesis[PeriodicDisturbance]):
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """A motion that repeats itself makes tones of its own, and a short recording holds too few waves."""
         slowest, fastest = detectable_band(prepared)
-        return TOO_SHORT if fastest < 2 * slowest else "what the motion repeats cannot be told from a tone"
+        return TOO_SHORT if fastest < 2 * slowest else "the motion repeats itself, which looks like a tone"

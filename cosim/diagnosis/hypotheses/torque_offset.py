@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import ClassVar
 
 from cosim.diagnosis.candidates import Candidate, Span, has
-from cosim.diagnosis.hypotheses.base import Hypothesis
+from cosim.diagnosis.hypotheses.base import RESTLESS, Hypothesis
 from cosim.estimation.prepare import Array, Prepared
 from pyfmi_models.effects import Effect, FrictionAsymmetry, TorqueOffset
 from pyfmi_models.mount import Mount
@@ -30,7 +30,7 @@ class Offset(Hypothesis[TorqueOffset]):
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """A law that says nothing of rest cannot tell it from friction that differs between the directions."""
         if _is_alike(mount) and not has(mount, TorqueOffset):
-            return "alike to the friction asymmetry that was found, as the card's friction law says nothing of rest"
+            return f"{RESTLESS} the friction asymmetry that was found"
         return super().why_not(mount, prepared)
 
 

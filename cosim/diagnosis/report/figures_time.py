@@ -79,8 +79,8 @@ def flagged_share(trace: Trace) -> float:
 def _flagged(trace: Trace) -> str:
     share = flagged_share(trace)
     if share > MOSTLY:
-        return f"Louder than the noise for {100 * min(share, 1):.0f} % of the time, rests and short returns counted."
-    return "Black line: louder than the noise for long." if share > 0 else ""
+        return f"Above the noise for {100 * min(share, 1):.0f} % of the time, rests and short returns counted."
+    return "Black line: above the noise for long." if share > 0 else ""
 
 
 def overlay(trace: Trace, span: tuple[float, float], scales: Scales, width: int = COLUMN) -> Picture:

@@ -221,6 +221,7 @@ def _refitted(diagnosis: Diagnosis) -> Iterator[str]:
     tested = diagnosis.loop_bias
     if tested and tested["biased"]:
         moves = [f"{name} by {100 * move:+.0f} %".replace("-", "−") for name, move in tested["moved"].items()]
-        yield f"The loop, or an imprecise friction law, biases them: instruments would move {', '.join(moves)}."
+        yield f"An instrumental-variable test with the set point would move {', '.join(moves)}: the control loop, or an"
+        yield "imprecise friction law, biases the fit."
     elif tested:
-        yield "Instruments from the set point do not move these numbers: the control loop did not bias them."
+        yield "An instrumental-variable test with the set point does not move them: the loop did not bias the fit."

@@ -138,7 +138,7 @@ def left_out(diagnosis: Diagnosis) -> list[str]:
     made = diagnosis.improved
     titles = {finding.effect: lowered(finding.title) for finding in diagnosis.findings}
     names = [titles.get(name, str(name)) for name in made.get("not_in_correction", ())]
-    said = [f"No torque can give {' and '.join(names)}: that is in the card only."] if names else []
+    said = [f"A torque cannot stand for {' and '.join(names)}: that is in the card only."] if names else []
     return said + ([f"There is no SSP: {closed(str(made['no_ssp']))}"] if made.get("no_ssp") else [])
 
 

@@ -58,8 +58,8 @@ def _far(
     numbers = f"{card.start:.3g} → {value:.3g} {raised(card.unit)}"
     if bounds and _at_bound(value, bounds, card.start):
         return [
-            f"Refitted, the {words}{side} ends at a bound of the fit ({numbers}): it stands for something else, or "
-            f"nothing tells it. Possible causes: {causes}."
+            f"Refitted, the {words}{side} ends at a bound of the fit ({numbers}): it stands in for something else, "
+            f"or these recordings do not determine it. Possible causes: {causes}."
         ]
     factor = value / card.start if card.start > 0 else 1.0
     if 1 / FAR <= factor <= FAR:

@@ -73,8 +73,8 @@ def little_motion(prepared: Prepared) -> tuple[Sanity, ...]:
     if seconds >= CLEAR_SECONDS:
         return ()
     text = (
-        f"{', '.join(prepared.names)}: only {seconds:.2g} s of clear motion away from turns, at a band of "
-        f"{prepared.cutoff:.3g} Hz. So what is slow cannot be judged, and that nothing was found says little. Record "
+        f"{', '.join(prepared.names)}: only {seconds:.2g} s of clear motion away from reversals, below "
+        f"{prepared.cutoff:.3g} Hz. So slow effects cannot be judged, and that nothing was found says little. Record "
         "longer strokes at speeds that last."
     )
     return (Sanity(finding="little_motion", statement=text),)

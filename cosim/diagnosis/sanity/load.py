@@ -28,9 +28,9 @@ def load_far_from_card(card: Mount, refitted: Mount, positions: Array) -> tuple[
     return tuple(
         Sanity(
             finding="base_far_from_card",
-            statement=f"Refitted, the load off the axis is another one ({_words(one)} → {_words(other)}): where the "
-            "axis was recorded the two differ by more than half of the card's load. Possible causes: another payload "
-            "or counterweight, or another zero of the position.",
+            statement=f"Refitted, the known load is another than the card's ({_words(one)} → {_words(other)}): where "
+            "the axis was recorded they differ by more than half of it. Possible causes: another payload or "
+            "counterweight, or another zero of the position.",
         )
         for one, other in both
         if rms(_pull(other, positions) - _pull(one, positions)) > OTHER * rms(_pull(one, positions))

@@ -25,8 +25,8 @@ def other_machine(train: Sequence[Balance], heldout: Sequence[Balance]) -> tuple
         if told and all(told):
             name, text = held.recordings[0].name, told[0]
             said = (
-                f"{name} is held out, and is not of the machine that was trained on: {text}. It proves nothing about "
-                "that machine."
+                f"{name} is held out, and is not of the machine of the training recordings: {text}. It proves nothing "
+                "about that machine."
             )
             found.append(Sanity(finding="other_machine", statement=said, alternatives=CAUSES))
     return tuple(found)
