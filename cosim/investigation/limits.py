@@ -6,6 +6,7 @@ have without an investigation. rad, rad/s, rad/s2, N m (m, N on a linear axis), 
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
+from math import ceil, floor, log10
 
 import numpy as np
 
@@ -72,12 +73,19 @@ class Limits:
 
     def left_in(self, recording: Recording) -> str:
         """The first limit that a recorded motion has left, in words; "" where it has left none."""
-        tau, q = recording["tau"], recording["q"]
-        dt = recording.sample_time
-        even = np.interp(np.arange(recording.t[0], recording.t[-1], dt), recording.t, q)  # late cycles leave gaps
-        speed = np.abs(derivative(lowpass(even, dt, SMOOTH_HZ), dt))
+        tau, q, speed = recording["tau"], recording["q"], np.abs(_speed(recording))
         within = (_high("position", self.high, q), _high("position", -self.low, -q))
         return next(filter(None, (*within, _high("speed", self.speed, speed), self.torque_left(tau))), "")
+
+    def that_allow(self, recording: Recording) -> str:
+        """Limits that allow what was recorded, as `--limits` takes them, in two digits: "speed=0.25 torque=12"."""
+        most = {"speed": np.abs(_speed(recording)).max(), "torque": np.abs(recording["tau"]).max()}
+        found = [f"{name}={_up(value / KEPT):g}" for name, value in most.items() if value > getattr(self, name)]
+        low, high = float(recording["q"].min()), float(recording["q"].max())
+        if low < self.low or high > self.high:
+            middle, half = (low + high) / 2, (high - low) / 2 / KEPT
+            found.append(f"position={-_up(half - middle):g}:{_up(half + middle):g}")
+        return " ".join(found)
 
     def torque_left(self, torque: Array) -> str:
         """Whether a torque is beyond its limit, in words; "" where it is not."""
@@ -86,6 +94,19 @@ class Limits:
     def as_json(self) -> dict[str, float]:
         """All limits by name."""
         return asdict(self)
+
+
+def _speed(recording: Recording) -> Array:
+    """Smoothed speed, over even steps: late cycles leave gaps."""
+    dt = recording.sample_time
+    even = np.interp(np.arange(recording.t[0], recording.t[-1], dt), recording.t, recording["q"])
+    return derivative(lowpass(even, dt, SMOOTH_HZ), dt)
+
+
+def _up(value: float) -> float:
+    """A number rounded up to two digits."""
+    step = 10.0 ** (floor(log10(abs(value))) - 1) if value else 1.0
+    return ceil(value / step) * step
 
 
 def _high(name: str, limit: float, values: Array) -> str:

@@ -73,7 +73,13 @@ class Investigation:
             known = self.log.moved(number)
             left = self.add(known, self.log.read(known), False) if known else self.run(motion, number, role)
             if left:
-                raise InputError(f"The first recording has left a limit: {left}; give other --limits.", culprit=left)
+                raise InputError(self._refusal(motion, left, motion is own), culprit=left)
+
+    def _refusal(self, motion: Motion, left: str, is_own: bool) -> str:
+        """Say that a first recording has left a limit, and of the scenario's own motion which option lets it run."""
+        recording = [*self.recordings["train"], *self.recordings["heldout"]][-1]
+        rule = f"--limits {self.limits.that_allow(recording)} would allow it" if is_own else "give other --limits"
+        return f"The first recording has left a limit on {motion.title}: {left}; {rule}."
 
     def go_on(self) -> Story:
         """Round after round, until one answer is left or nothing more can be done."""
