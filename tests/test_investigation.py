@@ -91,7 +91,9 @@ def test_limits_that_are_none_are_refused_before_anything_moves(
 
 def test_a_machine_that_leaves_a_limit_is_not_moved_again(tmp_path: Path) -> None:
     given = written(tmp_path, CABLE)
-    with pytest.raises(InputError, match=r"limit on the set point of axis: torque \S+ beyond 1.5; --limits torque=\S+ would"):
+    with pytest.raises(
+        InputError, match=r"limit on the set point of axis: torque \S+ beyond 1.5; --limits torque=\S+ would"
+    ):
         investigate(*given[:2], tmp_path / "out", machine=given[2], limits={"torque": "1.5"})
     assert len([*(tmp_path / "out" / "recordings").iterdir()]) == 1
 

@@ -9,13 +9,17 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from browsing import PATIENCE, axe_script, browser, violations
 from report_example import diagnosis
 from test_cli_run import call, scenario
 from tiny_fmu import tiny
 
+from cosim.data.recording import Recording
 from cosim.diagnosis.report import render
+from cosim.investigation.page import write_page
+from cosim.investigation.story import Answered, Moved, Story
 from pyfmi_models.card import read_card
 from pyfmi_models.export.codegen import generate
 from pyfmi_models.export.documentation import documentation
@@ -38,6 +42,19 @@ def of_run(scenario: Path, tmp_path: Path) -> str:
     return (tmp_path / "out" / "run.html").read_text("utf-8")
 
 
+def of_story(folder: Path, linear: bool = False) -> str:
+    """The page of an investigation of two motions and an answer."""
+    t = np.arange(0.0, 10.0, 1e-2)
+    steps: list[Moved | Answered] = []
+    for number, role in enumerate(("train", "heldout")):
+        Recording.of({"t": t, "tau": np.cos(t), "q": 0.3 * np.sin(t)}).write(folder / f"{role}.parquet", True)
+        steps.append(Moved(number, f"{role}.parquet", role, "tone", "a sine of 0.16 Hz", 10.0, 4.0))
+    steps.append(Answered(2, ("cogging",), ("whether it is cogging or friction",), ("set",), 0.8, 0.2, 0.1, 3.0))
+    limits = dict.fromkeys(("low", "high", "speed", "acceleration", "torque", "frequency"), 1.0)
+    story = Story(tuple(steps), "no motion tells", ("record two loads",), ("tone: speed 2 beyond 1",), limits)
+    return write_page(folder / "story.html", story, folder, "cosim investigate x", linear).read_text("utf-8")
+
+
 def check_areas(html: str) -> None:
     """There is one main landmark, and what scrolls can be reached by keyboard and has a name."""
     assert len(re.findall("<main>", html)) == len(re.findall("</main>", html)) == 1
@@ -54,6 +71,26 @@ def test_the_page_of_a_run_has_landmarks_reachable_areas_and_plain_words(of_run:
     check_areas(of_run)
     assert "one in 1 steps" not in of_run
     assert re.search(r"rows, one (each step|in \d+ steps)\.", of_run)
+
+
+def test_the_page_of_an_investigation_has_landmarks_reachable_areas_and_units(tmp_path: Path) -> None:
+    html = of_story(tmp_path)
+    check_areas(html)
+    assert "<th></th>" not in html
+    assert "held-out error [N·m]" in html
+    assert "<td>rad/s²</td>" in html
+    html = of_story(tmp_path, linear=True)
+    assert "held-out error [N]" in html
+    assert "<td>m/s²</td>" in html
+
+
+def test_the_picture_of_an_investigation_keeps_12_px_on_a_phone(tmp_path: Path) -> None:
+    html = of_story(tmp_path)
+    width = float(re.findall(r'viewBox="0 0 (\d+) ', html)[0])
+    size, least = (
+        float(re.findall(rf"svg \{{[^}}]*{name}: ([\d.]+)px", html)[0]) for name in ("font-size", "min-width")
+    )
+    assert size * least / width >= 12
 
 
 def test_texts_of_a_run_page_keep_12_px_on_a_phone(of_run: str) -> None:
@@ -86,7 +123,6 @@ def test_time_to_go_is_told_when_the_speed_is_known_and_not_before() -> None:
 
 
 def test_a_picture_of_correlations_says_what_its_colours_mean() -> None:
-    import numpy as np
     from matplotlib.figure import Figure
 
     from cosim.estimation.identify import figures
@@ -135,6 +171,10 @@ def test_axe_finds_nothing_in_the_page_of_an_fmu(browser: Any, tmp_path: Path) -
 
 def test_axe_finds_nothing_in_the_page_of_a_run(browser: Any, of_run: str, tmp_path: Path) -> None:
     check_by_axe(browser, of_run, tmp_path)
+
+
+def test_axe_finds_nothing_in_the_page_of_an_investigation(browser: Any, tmp_path: Path) -> None:
+    check_by_axe(browser, of_story(tmp_path), tmp_path)
 
 
 def test_a_report_is_small_and_soon_ready(browser: Any, tmp_path: Path) -> None:

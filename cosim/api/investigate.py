@@ -114,5 +114,5 @@ def _written(work: Investigation, story: Story, out: Path, command: str) -> Inve
     found = deliver_quickly(work.outcome, train, heldout, work.card, out / DIAGNOSIS, command)
     with replacing(out / STORY, force=True) as partial:
         partial.write_text(json.dumps(story.as_json(), indent=2) + "\n", "utf-8")
-    write_page(out / PAGE, story, out, command)
+    write_page(out / PAGE, story, out, command, work.card.mount.motion == "linear")
     return InvestigateResult(story, found, work.outcome.card)

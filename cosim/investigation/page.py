@@ -22,27 +22,51 @@ SIZE = (720, 260)
 POINTS = 400
 """Points of a line for each recording, at most twice as many."""
 ROLES = {"train": "to fit", "heldout": "for the proof"}
+WIDEST = "svg { max-width: 760px; min-width: 660px; }"
+"""The picture keeps its size on a phone, and scrolls: its letters stay legible."""
+LIMITS = {
+    "low": ("lowest position", "{}"),
+    "high": ("highest position", "{}"),
+    "speed": ("speed", "{}/s"),
+    "acceleration": ("acceleration", "{}/s²"),
+    "torque": ("torque", "{}"),
+    "frequency": ("frequency of a tone", "Hz"),
+    "forbidden_from": ("no tone from", "Hz"),
+    "forbidden_to": ("no tone up to", "Hz"),
+}
+"""What a limit is called, and its unit behind that of a length."""
 
 
 def write_page(path: Path, story: Story, folder: Path, command: str, linear: bool = False) -> Path:
     """Write the page of a story whose recordings lie in `folder`, in the place of an older one; returns its path."""
-    style = (files("cosim") / "plots" / "run_page.css").read_text("utf-8") + "svg { max-width: 760px; }"
+    style = (files("cosim") / "plots" / "run_page.css").read_text("utf-8") + WIDEST
     head = '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
     head += f"<style>{style}</style><title>Investigation: {escape(story.last.words)}</title>"
-    body = "".join([*_head(story, command), _picture(story, folder, linear), _steps(story), *_rest(story)])
+    body = "".join(
+        [*_head(story, command, linear), _picture(story, folder, linear), _steps(story, linear), *_rest(story, linear)]
+    )
     with replacing(path, force=True) as partial:
         partial.write_text(f'<!doctype html><html lang="en">{head}<body><main>{body}</main></body></html>\n', "utf-8")
     return path
 
 
-def _head(story: Story, command: str) -> Iterator[str]:
+def _force(linear: bool) -> str:
+    return "N" if linear else "N·m"
+
+
+def _wide(label: str, inside: str) -> str:
+    """What scrolls sideways where it must, also by keyboard."""
+    return f'<div class="wide" tabindex="0" role="region" aria-label="{label}">{inside}</div>'
+
+
+def _head(story: Story, command: str, linear: bool) -> Iterator[str]:
     first, last = story.first, story.last
     facts = {
         "s of motion": f"{story.seconds:.0f}",
         "s after the first answer": f"{story.further:.0f}",
         "answers": str(sum(isinstance(one, Answered) for one in story.steps)),
-        "held-out error, first": f"{first.after:.3g}",
-        "held-out error, last": f"{last.after:.3g}",
+        f"{_force(linear)}, held-out error, first": f"{first.after:.3g}",
+        f"{_force(linear)}, held-out error, last": f"{last.after:.3g}",
     }
     yield f"<h1>{escape(last.words[0].upper() + last.words[1:])}</h1><p>{escape(SENTENCES[story.ended])}</p>"
     yield f'<p class="quiet">{escape(command)} · {escape(__version__)}</p>'
@@ -67,14 +91,18 @@ def _picture(story: Story, folder: Path, linear: bool) -> str:
     for t, q, colour in lines:
         chart.line(np.asarray(t), np.asarray(q), colour)
     said = "Blue: recorded to be fitted. Orange: recorded for the proof."
-    return f'<h2>What was moved</h2>{chart.svg()}<p class="quiet">{said}</p>'
+    return f'<h2>What was moved</h2>{_wide("Position in all motions", chart.svg())}<p class="quiet">{said}</p>'
 
 
-def _steps(story: Story) -> str:
+def _steps(story: Story, linear: bool) -> str:
     rows = "".join(f"<tr><td>{one.number}</td>{_row(one)}</tr>" for one in story.steps)
-    names = ("step", "what", "", "s", "expected [nats]", "held-out error", "noise")
-    head = "".join(f"<th>{name}</th>" for name in names)
-    return f'<h2>Step by step</h2><div class="wide"><table><tr>{head}</tr>{rows}</table></div>'
+    unit = _force(linear)
+    names = ("step", "what", "motion, or answer")
+    numbers = ("s", "expected [nats]", f"held-out error [{unit}]", f"noise [{unit}]")
+    head = "".join(f"<th>{name}</th>" for name in names) + "".join(f'<th class="n">{name}</th>' for name in numbers)
+    table = _wide("Step by step", f"<table><tr>{head}</tr>{rows}</table>")
+    said = "Nats: by how much a motion was expected to part two answers; 3 nats are odds of 20 to 1."
+    return f'<h2>Step by step</h2>{table}<p class="quiet">{said}</p>'
 
 
 def _row(one: Moved | Answered) -> str:
@@ -89,13 +117,20 @@ def _row(one: Moved | Answered) -> str:
     return f"<td><b>answer</b></td><td><b>{escape(one.words)}</b>{open_}</td><td></td><td></td>{numbers}"
 
 
-def _rest(story: Story) -> Iterator[str]:
+def _rest(story: Story, linear: bool) -> Iterator[str]:
     if story.otherwise:
         yield "<h2>What else would tell</h2>" + "".join(f"<p>{escape(one)}</p>" for one in story.otherwise)
     if story.refused:
         yield "<h2>Not moved, as a limit would have been left</h2>"
         yield "".join(f"<p>{escape(one)}</p>" for one in story.refused)
-    rows = "".join(f'<tr><td>{name}</td><td class="n">{value:.4g}</td></tr>' for name, value in story.limits.items())
-    yield f"<h2>Limits</h2><table>{rows}</table><p class='quiet'>SI units; checked before and in what was recorded.</p>"
+    rows = "".join(_limit(name, value, linear) for name, value in story.limits.items() if value or "forb" not in name)
+    yield f"<h2>Limits</h2><table>{rows}</table><p class='quiet'>Checked before, and in what was recorded.</p>"
     yield '<p><a href="diagnosis/diagnosis.json">The last diagnosis</a>, <a href="diagnosis/card.toml">the card</a>, '
     yield '<a href="story.json">this story as data</a></p>'
+
+
+def _limit(name: str, value: float, linear: bool) -> str:
+    """A limit as a row; a forbidden band from 0 to 0 is none."""
+    words, unit = LIMITS[name]
+    told = _force(linear) if name == "torque" else unit.format("m" if linear else "rad")
+    return f'<tr><td>{words}</td><td class="n">{value:.4g}</td><td>{told}</td></tr>'
