@@ -153,6 +153,14 @@ def parse_card(text: str, path: str) -> Card:
     )
 
 
+RULES = {
+    "model_type": "it must be a section with keys",
+    "dict_type": "it must be a section with keys",
+    "string_type": "it must be text in quotes",
+}
+"""What pydantic tells in words of Python, in words of the card."""
+
+
 def _sentence(error: ValidationError) -> str:
     errors = error.errors()  # a misspelt key comes first: it leaves another one missing
     first = next((one for one in errors if one["type"] == "extra_forbidden"), errors[0])
@@ -164,7 +172,7 @@ def _sentence(error: ValidationError) -> str:
         return f"{where} is missing."
     if first["type"] == "list_type" and key == "effects":
         return '[effects] is one table; write [[effects]] above each effect, and in it effect = "cogging" or another.'
-    rule = first["msg"][:1].lower() + first["msg"][1:]
+    rule = RULES.get(first["type"]) or first["msg"][:1].lower() + first["msg"][1:]
     return f"{where} = {shown(first['input'])} breaks the rule: {rule}."
 
 

@@ -40,6 +40,14 @@ MISTAKES = {
         SMALL.replace("2.0", '"2.0"'),
         "bad.toml: [mount] inertia = '2.0' breaks the rule: input should be a valid number.",
     ),
+    "no section": (
+        'mount = 3\n[friction]\nmodel = "none"\n',
+        "bad.toml: [mount] = 3 breaks the rule: it must be a section with keys.",
+    ),
+    "a number for a name": (
+        SMALL + "[columns]\ntau = 3\n",
+        "bad.toml: [columns] tau = 3 breaks the rule: it must be text in quotes.",
+    ),
     "wrong word": (
         SMALL + '[controller]\nkp = 1\nkd = 1\ncompensation = "C9"\n',
         "compensation = 'C9' breaks the rule: input should be 'C1', 'C2a', 'C2b', 'C3a', 'C3b' or 'C2a+C3a'.",

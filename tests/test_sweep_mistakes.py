@@ -18,8 +18,8 @@ __all__ = ["folder", "tiny"]
     ("old", "new", "sentence"),
     [
         ("[vary]", "rums = 3\n[vary]", '"rums" is no key of a sweep; keys there are: scenario, method, runs, seed,'),
-        (K + "\n" + R, "", "vary breaks a rule: dictionary should have at least 1 item"),
-        (K, '"plant.k" = []', "vary.plant.k: values breaks a rule: tuple should have at least 1 item"),
+        (K + "\n" + R, "", "vary breaks a rule: it needs 1 or more entries, not 0."),
+        (K, '"plant.k" = []', "vary.plant.k: values breaks a rule: it needs 1 or more entries, not 0."),
         (
             K,
             '"plant.k" = { low = 1.0, high = 2.0 }',

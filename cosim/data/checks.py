@@ -107,7 +107,7 @@ def _is_number(value: Any) -> bool:
 def check_time(path: Path, t: np.ndarray, minimum: int, values: Mapping[str, np.ndarray]) -> None:
     """Refuse a table that is too short or whose time does not grow; `values` are its columns by their own names."""
     if len(t) < minimum:
-        message = f"{path} has {len(t)} rows; at least {minimum} are needed."
+        message = f"{path} has {len(t)} row{'s' * (len(t) != 1)}; at least {minimum} are needed."
         raise RecordingError(message, culprit=str(path), value=len(t))
     wrong = np.flatnonzero(np.diff(t) <= 0)
     if len(wrong):

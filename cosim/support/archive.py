@@ -43,7 +43,9 @@ def contents(path: Path, error: Complaint) -> list[zipfile.ZipInfo]:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
     except (*DAMAGED, OSError) as reason:
-        raise error(f"it is no zip archive that can be read: {_said(reason)}") from reason
+        raise error(
+            "it is no zip archive" if "not a zip" in str(reason) else f"its zip archive is damaged: {_said(reason)}"
+        ) from reason
     for member in members[:MEMBERS]:
         wrong = _wrong(member)
         if wrong:

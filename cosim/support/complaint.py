@@ -9,6 +9,15 @@ from cosim.support.numbers import shown as display
 from cosim.support.plain import Parsed
 
 Location = tuple[int | str, ...]
+RULES = {
+    **dict.fromkeys(("model_type", "dict_type", "dataclass_type"), "it must be a section with keys"),
+    **dict.fromkeys(("list_type", "tuple_type"), "it must be a list in square brackets"),
+    "string_type": "it must be text in quotes",
+    "union_tag_not_found": "it needs a {discriminator}",
+    "union_tag_invalid": "{discriminator} '{tag}' is none of {expected_tags}",
+    "too_short": "it needs {min_length} or more entries, not {actual_length}",
+}
+"""What pydantic tells in words of Python, in words of the file."""
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 """What pydantic calls a key that a model, or a dataclass, does not have."""
 
@@ -29,7 +38,13 @@ def complaint(error: ValidationError, path: str, noun: str, keys: Callable[[Loca
         return {"message": message, "culprit": where, "choices": choices}
     if first["type"] == "missing":
         return {"message": f'{path}: "{where}" is missing.', "culprit": where}
-    value, rule = first["input"], first["msg"].removeprefix("Value error, ").rstrip(".")
+    value, rule = first["input"], _rule(first)
     shown = "" if isinstance(value, dict | list) else f" = {display(value)}"
     message = f"{path}: {where}{shown} breaks a rule: {rule[0].lower()}{rule[1:]}."
     return {"message": message, "culprit": where, "value": value}
+
+
+def _rule(first: Any) -> str:
+    """The rule that is broken, in words of the file."""
+    told = RULES.get(first["type"], "").format(**first.get("ctx", {}))
+    return told or str(first["msg"]).removeprefix("Value error, ").rstrip(".")
