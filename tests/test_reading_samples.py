@@ -227,6 +227,31 @@ def test_channels_of_another_sample_time_are_left_out_and_said_so() -> None:
     assert recording.origin["start"].startswith("2024-03-01T22:13:04")
 
 
+NO_TIMES = {
+    "ticks beyond any year": ("twincat_scope.csv", r"(Starttime of export\t)\d+", "9" * 25),
+    "ticks of 6000 digits": ("twincat_scope.csv", r"(Starttime of export\t)\d+", "9" * 6000),
+    "a digit that is none": ("twincat_scope.csv", r"(Starttime of export\t)\d+", "²"),
+    "a day that is none": ("PHD2_GuideLog.txt", r"(Guiding Begins at )\d{4}-\d\d-\d\d", "2024-99-99"),
+    "a pixel scale of 0": ("PHD2_GuideLog.txt", r"(Pixel scale = )[\d.]+", "0.0"),
+    "a period of 0": ("halscope.log", r"(Sampling period is )\d+", "0"),
+    "a period of 6000 digits": ("halscope.log", r"(Sampling period is )\d+", "9" * 6000),
+}
+"""What a damaged head of a file says of times and scales."""
+
+
+@pytest.mark.parametrize("what", NO_TIMES)
+def test_a_head_that_says_no_time_costs_the_time_alone(tmp_path: Path, what: str) -> None:
+    name, before, after = NO_TIMES[what]
+    text = re.sub(before, rf"\g<1>{after}", (SAMPLES / name).read_text("utf-8"))
+    (tmp_path / name).write_text(text, "utf-8")
+    whole, damaged = preview(SAMPLES / name), preview(tmp_path / name)
+    assert len(damaged.recording) == len(whole.recording)
+    assert after not in damaged.recording.origin.get("start", "")
+    said = " ".join((*damaged.recording.notes, *map(str, damaged.undecided)))
+    assert ("period" in what) == ("--layout period=" in said)
+    assert ("scale" in what) == ("the log states no pixel scale" in said)
+
+
 def test_other_topics_of_a_bag_are_named(tmp_path: Path) -> None:
     recording = Recording.read(sample("ros2.mcap", tmp_path))
     assert "of its topics /joint_states was read; left out: /load." in " ".join(recording.notes)

@@ -30,6 +30,7 @@ from cosim.serve.pages import home_page, job_page
 from cosim.serve.store import UnknownJobError
 from cosim.serve.uploads import check_size, receive
 from cosim.support.errors import CosimError
+from cosim.support.numbers import whole
 
 CARD_SUFFIX = ".toml"
 REPORT = "report.html"
@@ -81,7 +82,7 @@ class Addresses:
             else:
                 path, most = self._desk.place(name, given)
                 stated = request.headers.get("content-length", "")
-                size = await receive(request.stream(), int(stated) if stated.isdigit() else 0, path, most)
+                size = await receive(request.stream(), whole(stated) or 0, path, most)
                 await run_in_threadpool(self._desk.received, name, path, size)
         except UnicodeDecodeError:
             return JSONResponse({"problem": f"{given} is not a card: it is not UTF-8 text."}, 400)

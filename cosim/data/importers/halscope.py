@@ -17,7 +17,7 @@ from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, short
 from cosim.support.errors import RecordingError
 
-PERIOD = re.compile(r"Sampling period is (\d+) ns")
+PERIOD = re.compile(r"Sampling period is ([0-9]{1,12}) ns")
 
 
 def recognises(lines: Sequence[str]) -> bool:
@@ -26,7 +26,7 @@ def recognises(lines: Sequence[str]) -> bool:
 
 
 def read(path: Path, data: bytes, lines: Sequence[str]) -> Columns:
-    """Read a log of halscope; time starts at 0 and steps by the sampling period."""
+    """Read a log of halscope; time starts at 0 and steps by the sampling period, and is none where that is 0."""
     found = PERIOD.match(lines[0])
     period = int(found[1]) * 1e-9 if found else 0.0
     rows = [row for line in data.decode("utf-8", "replace").split("\n")[1:] if (row := line.split())]
@@ -41,4 +41,5 @@ def read(path: Path, data: bytes, lines: Sequence[str]) -> Columns:
         raise RecordingError(text, culprit=str(path), value=torn)
     values = np.array([row[1::2] for row in whole], dtype=np.float64)
     table = {label: values[:, place] for place, label in enumerate(labels)}
-    return Columns({"t": np.arange(len(values)) * period} | table, {"t": "s"}, format="LinuxCNC halscope")
+    time = {"t": np.arange(len(values)) * period} if period else {}
+    return Columns(time | table, dict.fromkeys(time, "s"), format="LinuxCNC halscope")

@@ -9,6 +9,7 @@ Source: `GuidingHeader` and `GuideStep` in guidinglog.cpp of PHD2, log version 2
 import csv
 import re
 from collections.abc import Sequence
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from cosim.data.columns import Columns
 from cosim.data.limits import short
 from cosim.support.errors import RecordingError
 
-SCALE = re.compile(r"Pixel scale = ([\d.]+) arc-sec/px")
+SCALE = re.compile(r"Pixel scale = (?!0*\.?0* )(\d+\.?\d*) arc-sec/px")
 BEGINS = re.compile(r"Guiding Begins at (\d{4}-\d\d-\d\d) (\d\d:\d\d:\d\d)")
 ANGLES = ("RARawDistance", "DECRawDistance", "RAGuideDistance", "DECGuideDistance")
 OTHERS = {"RADuration": "ms", "DECDuration": "ms", "StarMass": "", "SNR": ""}
@@ -52,7 +53,7 @@ def read(path: Path, data: bytes, lines: Sequence[str]) -> Columns:
         table,
         {name: text for name, text in units.items() if text and name in table},
         format="PHD2 guide log",
-        start=f"{began[1]}T{began[2]}" if began else "",
+        start=_start(f"{began[1]}T{began[2]}") if began else "",
         roles={"q": "RARawDistance"},
         lacks={"tau": NO_TORQUE},
         notes=tuple(notes),
@@ -75,3 +76,11 @@ def _steps(path: Path, section: str) -> tuple[dict[str, np.ndarray], int]:
 
 def _column(rows: Sequence[Sequence[str]], place: int) -> np.ndarray:
     return np.array([float(row[place] or 0) for row in rows])
+
+
+def _start(text: str) -> str:
+    """Return when guiding began; nothing where the log holds no date."""
+    try:
+        return datetime.fromisoformat(text).isoformat()
+    except ValueError:
+        return ""

@@ -7,6 +7,7 @@ Sources: Beckhoff Information System, TE13xx Scope View, "Export in csv" and "Sc
 tests of github.com/CagtayFabry/pytcs show the layouts.
 """
 
+import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
@@ -29,6 +30,8 @@ KEYS: tuple[str, ...] = (
     *("Unit ScaleFactor", "Unit Offset"),
 )
 STARTS = ("Starttime of export", "StartRecord")
+TICKS = re.compile(r"[0-9]{1,18}")
+"""A file time, up to the year 4769."""
 TICK, EPOCH = 1e-7, 11_644_473_600
 """A tick of Windows' file time [s], and the start of 1970 in it [s]."""
 
@@ -138,6 +141,6 @@ def _units(keys: dict[str, list[str]], names: Sequence[str]) -> list[str]:
 
 def _start(facts: dict[str, list[str]]) -> str:
     cells = next((facts[key] for key in STARTS if key in facts), [])
-    if len(cells) < 2 or not cells[1].isdigit():
+    if len(cells) < 2 or not TICKS.fullmatch(cells[1]):
         return ""
     return datetime.fromtimestamp(int(cells[1]) * TICK - EPOCH, UTC).isoformat(timespec="milliseconds")
