@@ -60,6 +60,13 @@ def test_a_wrong_first_name_is_put_right_by_motion_and_a_kill_loses_nothing(
     assert done.story.seconds <= 42.5
     again = investigate(*given[:2], out, **asked)  # type: ignore[arg-type]
     assert [one.number for one in again.story.steps] == [one.number for one in done.story.steps]
+    planned = [one for one in done.story.steps if isinstance(one, Moved)][2:]
+    assert planned
+    assert all(one.nats or one.ground for one in planned)
+    assert all(one.random_ground is not None and one.random_ground < one.ground for one in planned if not one.nats)
+    page = (out / "story.html").read_text("utf-8")
+    assert f"{planned[0].ground:.0%} new ground" in page
+    assert f"{planned[0].random_ground:.0%}" in page
 
 
 def test_a_folder_of_another_investigation_is_refused(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ from cosim.estimation.inverse import Inverse
 from cosim.estimation.least_squares import projected
 from cosim.estimation.prepare import Array, Piece, Prepared, lowpass
 from cosim.estimation.problem import Problem
-from cosim.investigation.families import FAMILIES
+from cosim.investigation.families import AT_RANDOM, FAMILIES
 from cosim.investigation.ground import new_ground, visited
 from cosim.investigation.limits import KEPT, Limits
 from cosim.investigation.motions import FADE, Motion, Room
@@ -51,6 +51,8 @@ class Plan:
     ground: float
     shows: int = 0
     """Effects that could not be tested so far and that it would show."""
+    at_random: tuple[float, float] | None = None
+    """Worth and new ground of many tones at random in its place, for as long; None where those would leave a limit."""
 
     @property
     def worth(self) -> float:
@@ -167,6 +169,12 @@ def best(found: Sequence[Plan], has_duels: bool, done: Sequence[str] = ()) -> Pl
     return max(fresh, key=lambda one: (round(one.worth), one.shows, one.ground), default=None)
 
 
+def beside_random(plan: Plan, found: Sequence[Plan]) -> Plan:
+    """The plan with what motion at random, among those that may be run, promises in its place."""
+    tones = next((one for one in found if one.motion.family == AT_RANDOM), None)
+    return replace(plan, at_random=(tones.worth, tones.ground)) if tones else plan
+
+
 def shown_by_motion(names: Collection[str], ours: Fit, pieces: Sequence[Piece], noise: float) -> set[str]:
     """Of some effects those that a diagnosis would look for in recordings of these motions, with noise.
 
@@ -250,4 +258,4 @@ def _noise(residual: Array) -> float:
     return max(power * correlation, 1e-300)
 
 
-__all__ = ["Plan", "Rated", "Refusal", "allowed", "best", "piece_of", "plans", "torque_of"]
+__all__ = ["Plan", "Rated", "Refusal", "allowed", "beside_random", "best", "piece_of", "plans", "torque_of"]

@@ -15,6 +15,8 @@ SPEEDS = (0.03, 0.1, 0.3, 1.0)
 """Shares of the speed limit of a ladder of speeds: three a decade, down to a creep. Unit: 1."""
 RESTS = (0.3, 1.0, 3.0)
 """Rests before the same move [s]."""
+AT_RANDOM = "multisine"
+"""The family of motion at random."""
 TONES = 10
 """Tones of a multisine: a decade has four or more of them."""
 RESTING = 0.6
@@ -152,7 +154,7 @@ def multisine(room: Room) -> Motion:
     every = np.geomspace(2 / room.seconds, room.frequency, TONES).tolist()
     hertz = sorted({room.outside(one) for one in every})
     phases = np.random.default_rng(room.seed).uniform(0, 2 * pi, TONES).tolist()[: len(hertz)]
-    return Motion("multisine", "many tones at once", _tones(room, hertz, phases))
+    return Motion(AT_RANDOM, "many tones at once", _tones(room, hertz, phases))
 
 
 def _tones(room: Room, hertz: list[float], phases: list[float]) -> tuple[Part, ...]:

@@ -15,7 +15,7 @@ from cosim.diagnosis.diagnose import diagnose as find
 from cosim.diagnosis.result import Diagnosis
 from cosim.estimation.fit import Fit
 from cosim.estimation.problem import Problem
-from cosim.investigation.design import Plan, Rated, allowed, best, pieces_of, plans, shown_by_motion
+from cosim.investigation.design import Plan, Rated, allowed, beside_random, best, pieces_of, plans, shown_by_motion
 from cosim.investigation.families import FAMILIES, multisine, tone
 from cosim.investigation.limits import Limits
 from cosim.investigation.log import Log
@@ -175,6 +175,7 @@ class Investigation:
         rated = plans(rooms[0], problem, ours, pairs, self.limits, self.machine.home, untested)
         self.refused |= {one.motion.family: one.limit for one in rated.refused}
         plan = self._best(rated, pairs)
+        plan = plan and beside_random(plan, rated.plans)
         return [plan, self._turned(plan, rooms[1], problem, ours)] if plan else None
 
     def _best(self, rated: Rated, pairs: Sequence[Duel]) -> Plan | None:
@@ -196,19 +197,19 @@ class Investigation:
                 left = self.add(known, self.log.read(known), False)
             else:
                 assert plan is not None
-                left = self.run(plan.motion, number, role, plan.worth)
+                left = self.run(plan.motion, number, role, plan)
             if left:
                 break
         return None
 
-    def run(self, motion: Motion, number: int, role: Literal["train", "heldout"], nats: float = 0.0) -> str:
-        """Run a motion and keep its recording; the limit that it left."""
+    def run(self, motion: Motion, number: int, role: Literal["train", "heldout"], plan: Plan | None = None) -> str:
+        """Run a motion, of a plan or the first ones, and keep its recording; the limit that it left."""
         path = self.log.path(number, motion.family)
         self.on_progress(f"moving: {motion.title}")
         recording = self.machine.record(motion, number, path)
         file = path.relative_to(self.log.folder).as_posix()
-        step = Moved(number, file, role, motion.family, motion.title, motion.seconds, nats)
-        return self.add(step, recording, True)
+        step = Moved(number, file, role, motion.family, motion.title, motion.seconds)
+        return self.add(_promised(step, plan) if plan else step, recording, True)
 
     def _room(self, lasts: float, turned: bool) -> Room:
         seed = self.settings.seed + 1000 * len(self.steps) + turned
@@ -220,6 +221,12 @@ class Investigation:
     def _told(self, step: Moved | Answered) -> None:
         self.steps.append(step)
         self.on_step(step)
+
+
+def _promised(step: Moved, plan: Plan) -> Moved:
+    """The step with what its motion promised, and tones at random in its place."""
+    nats, ground = plan.at_random or (None, None)
+    return replace(step, nats=plan.worth, ground=plan.ground, random_nats=nats, random_ground=ground)
 
 
 def _otherwise(asked: Sequence[Question]) -> list[str]:

@@ -21,6 +21,10 @@ SIZE = (720, 260)
 """px."""
 POINTS = 400
 """Points of a line for each recording, at most twice as many."""
+PROMISED = (
+    "Promised: nats are the log of the odds between two causes that the motion was to give, 3 are 20 to 1; new ground "
+    "is the share of a motion that no recording had visited. At random: many tones with random phases for as long."
+)
 ROLES = {"train": "to fit", "heldout": "for the proof"}
 WIDEST = "svg { max-width: 760px; min-width: 660px; }"
 """The picture keeps its size on a phone, and scrolls: its letters stay legible."""
@@ -98,23 +102,31 @@ def _steps(story: Story, linear: bool) -> str:
     rows = "".join(f"<tr><td>{one.number}</td>{_row(one)}</tr>" for one in story.steps)
     unit = _force(linear)
     names = ("step", "what", "motion, or answer")
-    numbers = ("s", "expected [nats]", f"held-out error [{unit}]", f"noise [{unit}]")
+    numbers = ("s", "promised", "at random", f"held-out error [{unit}]", f"noise [{unit}]")
     head = "".join(f"<th>{name}</th>" for name in names) + "".join(f'<th class="n">{name}</th>' for name in numbers)
     table = _wide("Step by step", f"<table><tr>{head}</tr>{rows}</table>")
-    said = "Nats: by how much a motion was expected to part two answers; 3 nats are odds of 20 to 1."
-    return f'<h2>Step by step</h2>{table}<p class="quiet">{said}</p>'
+    return f'<h2>Step by step</h2>{table}<p class="quiet">{PROMISED}</p>'
 
 
 def _row(one: Moved | Answered) -> str:
     if isinstance(one, Moved):
         left = f" Left: {one.left}." if one.left else ""
         link = f'<a href="{escape(one.file)}">{escape(one.title)}</a>, {ROLES[one.role]}.{escape(left)}'
-        nats = f"{one.nats:.1f}" if one.nats else ""
-        numbers = f'<td class="n">{one.seconds:.0f}</td><td class="n">{nats}</td>'
+        told = (f"{one.seconds:.0f}", *_promises(one))
+        numbers = "".join(f'<td class="n">{text}</td>' for text in told)
         return f"<td>moved</td><td>{link}</td>{numbers}<td></td><td></td>"
     open_ = f"<br>Open: {escape('; '.join(one.open))}." if one.open else ""
     numbers = f'<td class="n">{one.after:.3g}</td><td class="n">{one.floor:.3g}</td>'
-    return f"<td><b>answer</b></td><td><b>{escape(one.words)}</b>{open_}</td><td></td><td></td>{numbers}"
+    return f"<td><b>answer</b></td><td><b>{escape(one.words)}</b>{open_}</td><td></td><td></td><td></td>{numbers}"
+
+
+def _promises(one: Moved) -> tuple[str, str]:
+    """What a motion promised, and tones at random in its place; nothing is promised of the first ones."""
+    if one.nats:
+        return f"{one.nats:.1f} nats", "" if one.random_nats is None else f"{one.random_nats:.1f} nats"
+    if one.ground:
+        return f"{one.ground:.0%} new ground", "" if one.random_ground is None else f"{one.random_ground:.0%}"
+    return "", ""
 
 
 def _rest(story: Story, linear: bool) -> Iterator[str]:

@@ -29,6 +29,11 @@ class Moved:
     seconds: float
     nats: float = 0.0
     """Expected log-odds between the structures that were open; 0 where new ground was sought."""
+    ground: float = 0.0
+    """Share of it that no recording had visited."""
+    random_nats: float | None = None
+    """What many tones at random of as many seconds promised in its place; None where they would leave a limit."""
+    random_ground: float | None = None
     left: str = ""
     """The limit that the recorded motion left."""
 
@@ -132,7 +137,7 @@ def _line(one: Moved | Answered) -> str:
 
 def moved_of(row: Parsed) -> Moved:
     """A recording as the journal tells it."""
-    return Moved(**{name: row[name] for name in Moved.__dataclass_fields__})
+    return Moved(**{name: row[name] for name in Moved.__dataclass_fields__ if name in row})
 
 
 def answered_of(row: Parsed) -> Answered:
