@@ -164,9 +164,7 @@ LATE = """() => { const real = window.fetch; let first = true; window.fetch = as
   if (late) await new Promise((done) => setTimeout(done, 500)); return answer; } }"""
 
 
-def test_an_answer_that_comes_late_does_not_undo_what_was_asked_after_it(
-    browser: Any, files: list[Path], tmp_path: Path
-) -> None:
+def test_a_late_answer_does_not_undo_what_was_asked_after_it(browser: Any, files: list[Path], tmp_path: Path) -> None:
     with serving(tmp_path / "data", serve_work.quickly) as (_, address), opened(browser, address, DESK) as page:
         dropped(page, files)
         page.wait_for_selector("#start")
@@ -183,9 +181,7 @@ def test_it_is_used_by_keyboard_alone(browser: Any, files: list[Path], tmp_path:
         page.keyboard.press("Tab")
         assert page.evaluate("document.activeElement.textContent") == "To the content"
         to(page, "files")
-        page.set_input_files(
-            "#files", files
-        )  # Space opens the browser's own window: headless, it cannot be closed again
+        page.set_input_files("#files", files)  # Space opens the browser's own window: headless, it cannot be closed
         page.wait_for_selector("#start")
         to(page, "role-2")
         page.keyboard.press("ArrowDown")
