@@ -30,10 +30,10 @@ SIZES = {"desk": (1280, 800), "phone": (390, 844)}
 
 
 @cache
-def of_fmu() -> str:
-    return documentation(generate(read_card("paper_mount").plant().model()), ("x86_64-linux",))[
-        "documentation/index.html"
-    ].decode()
+def of_fmu(part: str = "plant") -> str:
+    card = read_card("paper_mount")
+    model = card.plant().model() if part == "plant" else card.controller_model()
+    return documentation(generate(model), ("x86_64-linux",))["documentation/index.html"].decode()
 
 
 @pytest.fixture
@@ -165,8 +165,14 @@ def test_axe_finds_nothing_in_a_report_on_a_desk_on_a_phone_or_in_the_dark(
     check_by_axe(browser, render(diagnosis(*REPORTS[kind])), tmp_path)
 
 
-def test_axe_finds_nothing_in_the_page_of_an_fmu(browser: Any, tmp_path: Path) -> None:
-    check_by_axe(browser, of_fmu(), tmp_path)
+@pytest.mark.parametrize("part", ["plant", "controller"])
+def test_axe_finds_nothing_in_the_page_of_an_fmu(browser: Any, part: str, tmp_path: Path) -> None:
+    check_by_axe(browser, of_fmu(part), tmp_path)
+
+
+def test_the_diagram_of_an_fmu_keeps_9_px_on_a_phone() -> None:
+    width, least = re.findall(r'viewBox="\S+ 0 (\d+)[^"]*".*?min-width:min\(\S+px,(\d+)px\)', of_fmu("controller"))[0]
+    assert 13 * min(1, int(least) / int(width)) >= 9
 
 
 def test_axe_finds_nothing_in_the_page_of_a_run(browser: Any, of_run: str, tmp_path: Path) -> None:

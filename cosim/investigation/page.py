@@ -26,8 +26,8 @@ PROMISED = (
     "is the share of a motion that no recording had visited. At random: many tones with random phases for as long."
 )
 ROLES = {"train": "to fit", "heldout": "for the proof"}
-WIDEST = "svg { max-width: 760px; min-width: 660px; }"
-"""The picture keeps its size on a phone, and scrolls: its letters stay legible."""
+WIDEST = "svg { max-width: 760px; min-width: 660px; } .wide td:nth-child(3) { min-width: 15em; }"
+"""Picture and texts keep their width on a phone, and scroll: they stay legible."""
 LIMITS = {
     "low": ("lowest position", "{}"),
     "high": ("highest position", "{}"),

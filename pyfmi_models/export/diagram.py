@@ -9,6 +9,8 @@ from pyfmi_models.model import Model, Variable
 
 LETTER, LINE, PAD, GAP = 7.4, 19, 14, 46
 """Width of a letter, height of a line, space inside a box and between boxes, in pixels."""
+LEGIBLE = 700
+"""Width below which a wide diagram is not made narrower: its letters would be too small, so it scrolls."""
 _STYLE = (
     "svg text{font:13px system-ui,sans-serif;fill:#1d2b36}svg .title{font-weight:600}"
     "svg rect{fill:#eef4f8;stroke:#4a7fa5;stroke-width:1.3}svg .beside{fill:#fbf6ea;stroke:#b08a3c}"
@@ -107,7 +109,8 @@ def _svg(boxes: list[_Box], arrows: list[str], name: str) -> str:
     left, right = min(box.x for box in boxes) - 10, max(box.x + box.width for box in boxes) + 10
     height = max(box.y + box.height for box in boxes) + 10
     view = f'viewBox="{left:g} 0 {right - left:g} {height:g}" width="{right - left:g}"'
-    start = f'<svg xmlns="http://www.w3.org/2000/svg" {view} style="max-width:100%;height:auto" role="img"'
+    shown = f"max-width:100%;min-width:min({right - left:g}px,{LEGIBLE}px);height:auto"
+    start = f'<svg xmlns="http://www.w3.org/2000/svg" {view} style="{shown}" role="img"'
     title = f"<title>Block diagram of {escape(name)}</title>"
     drawn = "".join([*arrows, *(box.drawn() for box in boxes)])
     return f"{start}>{title}<style>{_STYLE}</style>{_TIP}{drawn}</svg>"

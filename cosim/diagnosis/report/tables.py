@@ -129,7 +129,8 @@ def worst(trace: Trace, scales: Scales) -> Table:
     rows = tuple(
         (f"{edges[i]:.0f} to {edges[i + 1]:.0f} s", *decimals((before[i] * factor, after[i] * factor))) for i in order
     )
-    return Table(("Worst seconds", "Before", f"After [{scales.torque.unit}]"), rows, (1, 2), "narrow")
+    unit = scales.torque.unit
+    return Table(("Worst seconds", f"Before [{unit}]", f"After [{unit}]"), rows, (1, 2), "narrow")
 
 
 def parameters(diagnosis: Diagnosis) -> Table:
