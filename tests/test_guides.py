@@ -1,19 +1,22 @@
-"""What the guide to scenarios shows is what happens."""
+"""What the guides to scenarios and investigations show is what happens."""
 
 import re
+import shlex
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
+from cosim.cli import main
 from cosim.master.simulate import run
 from cosim.models.cache import with_fmus
 from cosim.sweep import conduct, read_sweep
 from cosim.system.diagram import draw
 from cosim.system.scenario import read_scenario
 
-GUIDE = (Path(__file__).parents[1] / "docs" / "scenarios.md").read_text("utf-8")
+DOCS = Path(__file__).parents[1] / "docs"
+GUIDE = (DOCS / "scenarios.md").read_text("utf-8")
 BLOCKS = re.findall(r"```(\w+)\n(.*?)```", GUIDE, re.DOTALL)
 
 
@@ -30,6 +33,29 @@ def scenario(tmp_path: Path) -> Path:
 def test_the_drawing_in_the_guide_is_the_one_of_its_scenario(scenario: Path) -> None:
     drawn = next(text for kind, text in BLOCKS if kind == "text")
     assert "\n".join(draw(read_scenario(scenario))) == drawn.rstrip("\n")
+
+
+def test_what_is_built_from_a_card_is_drawn_as_that_whether_it_is_built_or_not(scenario: Path) -> None:
+    text = "\n".join(draw(with_fmus(read_scenario(scenario))))
+    assert text == "\n".join(draw(read_scenario(scenario)))
+
+
+def test_the_investigation_of_the_guide_puts_its_first_name_right(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    blocks = re.findall(r"```(\w+)\n(.*?)```", (DOCS / "investigate.md").read_text("utf-8"), re.DOTALL)
+    for _, text in blocks:
+        if named := re.match(r"# (\w+\.toml)", text):
+            (tmp_path / named[1]).write_text(text, "utf-8")
+    command = next(text for _, text in blocks if text.startswith("cosim investigate loop.toml"))
+    told = next(text for kind, text in blocks if kind == "text")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as ended:
+        main(shlex.split(command.replace("\\\n", " "))[1:])
+    assert not ended.value.code
+    said = capsys.readouterr().out
+    without_numbers = [re.sub(r"held-out.*| [\d.]+ .*", "", text).splitlines() for text in (told, said)]
+    assert without_numbers[0] == without_numbers[1]
 
 
 def test_the_scenario_of_the_guide_tracks_and_its_encoder_hangs(scenario: Path) -> None:

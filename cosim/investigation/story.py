@@ -4,9 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
+from cosim.diagnosis.report.words import lowered
 from cosim.diagnosis.result import Diagnosis
 from cosim.investigation.questions import Question
 from cosim.support.plain import JsonObject, Parsed
+from pyfmi_models.effects import CATALOGUE
 
 End = Literal["answered", "budget spent", "no motion tells", "limit left"]
 SENTENCES: dict[End, str] = {
@@ -63,7 +65,8 @@ class Answered:
     @property
     def words(self) -> str:
         """The verdict as one reads it."""
-        return ", ".join(one.replace("_", " ") for one in self.verdict) or "nothing is missing"
+        titles = (CATALOGUE[one][0].title if one in CATALOGUE else one.replace("_", " ") for one in self.verdict)
+        return ", ".join(map(lowered, titles)) or "nothing is missing"
 
 
 @dataclass(frozen=True)

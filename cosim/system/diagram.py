@@ -111,8 +111,9 @@ def _what(scenario: Scenario, owner: str) -> str:
 
 
 def origin(component: Any) -> str:
-    """Say where a component comes from."""
-    return str(component.fmu or component.python or component.model or f"the {component.part} of {component.card}")
+    """Say where a component comes from; what was built from a card or model is told by that, not by its place here."""
+    built = component.model or (f"the {component.part} of {component.card}" if component.card else "")
+    return str(built or component.fmu or component.python)
 
 
 def in_short(scenario: Scenario) -> str:
