@@ -104,6 +104,8 @@ def test_a_recording_that_overshoots_is_named() -> None:
     t = np.arange(0.0, 10.0, 1e-2)
     recording = Recording.of({"t": t, "tau": np.sin(t), "q": 1.2 * np.sin(t)})
     assert LIMITS.left_in(recording).startswith("position 1.2 beyond 1")
+    below = Recording.of({"t": t, "tau": np.sin(t), "q": -0.15 - 0.6 * np.cos(0.5 * t)})
+    assert replace(LIMITS, low=-0.7).left_in(below) == "position -0.75 beyond -0.7"
     assert LIMITS.that_allow(recording) == "speed=1.4 position=-1.4:1.4"
     assert LIMITS.with_given({"speed": "1.4", "position": "-1.4:1.4"}).left_in(recording) == ""
     still = Recording.of({"t": t, "tau": 60 * np.sin(t), "q": 0.4 * np.sin(t)})

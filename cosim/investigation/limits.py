@@ -67,14 +67,14 @@ class Limits:
 
     def left_by(self, q: Array, v: Array, a: Array) -> str:
         """The first limit that a planned motion would leave, in words; "" where it leaves none."""
-        within = (_high("position", self.high, q), _high("position", -self.low, -q))
+        within = (_high("position", self.high, q), _low("position", self.low, q))
         moving = (_high("speed", self.speed, np.abs(v)), _high("acceleration", self.acceleration, np.abs(a)))
         return next(filter(None, (*within, *moving)), "")
 
     def left_in(self, recording: Recording) -> str:
         """The first limit that a recorded motion has left, in words; "" where it has left none."""
         tau, q, speed = recording["tau"], recording["q"], np.abs(_speed(recording))
-        within = (_high("position", self.high, q), _high("position", -self.low, -q))
+        within = (_high("position", self.high, q), _low("position", self.low, q))
         return next(filter(None, (*within, _high("speed", self.speed, speed), self.torque_left(tau))), "")
 
     def that_allow(self, recording: Recording) -> str:
@@ -112,6 +112,11 @@ def _up(value: float) -> float:
 def _high(name: str, limit: float, values: Array) -> str:
     most = float(values.max())
     return f"{name} {most:.4g} beyond {limit:.4g}" if most > limit + SLACK * abs(limit) else ""
+
+
+def _low(name: str, limit: float, values: Array) -> str:
+    least = float(values.min())
+    return f"{name} {least:.4g} beyond {limit:.4g}" if least < limit - SLACK * abs(limit) else ""
 
 
 def _numbers(name: str, text: str) -> dict[str, float]:
