@@ -51,15 +51,16 @@ OnProgress = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Outcome:
-    """A diagnosis, and three cards: the model it ends with, what training alone proposes, the base refitted."""
+    """A diagnosis, and cards: the model it ends with, what training alone proposes, the base refitted, names alone."""
 
     diagnosis: Diagnosis
     card: Card
     proposed: Card
     refitted: Card
+    named: Card
     experiment: Experiment | None = None
     proposals: tuple[Proposal, ...] = ()
-    """Effect files for a person to review, of formulas that are as good as what was learned."""
+    """Effect files to review, of formulas that are as good as what was learned."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,7 @@ def diagnose(
     answer, tried = _learned(answer, heldout)
     learned = tried if tried and tried.helps else None
     model = learned.mount if learned else answer.chosen.mount
-    delivered, first = (_improved(card, one) for one in (model, examined.chosen.mount))
+    delivered, first, named = (_improved(card, one) for one in (model, examined.chosen.mount, answer.chosen.mount))
     on_model_ready("after", delivered.plant())
     experiment = _experiment(answer)
     described = _with_learned(_described(answer, train, heldout, card.mount.name), answer, learned, train, heldout)
@@ -135,12 +136,11 @@ def diagnose(
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,
     )
-    return Outcome(diagnosis, delivered, first, refitted, experiment, learned.proposals() if learned else ())
+    return Outcome(diagnosis, delivered, first, refitted, named, experiment, learned.proposals() if learned else ())
 
 
 def _refused(refitted: Card, withheld: Diagnosis) -> Outcome:
-    """Nothing is named: all three cards are the base refitted."""
-    return Outcome(withheld, refitted, refitted, refitted)
+    return Outcome(withheld, refitted, refitted, refitted, refitted)  # nothing is named
 
 
 def _with_search(described: Diagnosis, answer: Answer, examined: Examined, heldout: Sequence[Recording]) -> Diagnosis:

@@ -83,8 +83,10 @@ TITLES = {
 NOTES = {
     "measured": "Held-out RMS by the protocol of each recording's README; `first look` is what that README found by "
     "hand. How each is read stands in tests/benchmarks/measured.py: columns, units, card, what is held out. `refitted` "
-    "is the base of the card with its numbers fitted, `with effects` the delivered model, `no veto` what training "
-    "alone proposed. Of a set the model holds the first member. The official protocol of EMPS simulates the position "
+    "is the base of the card with its numbers fitted, `names alone` what is delivered "
+    "without a learned term, `with what is learned` the delivered model (the same where nothing was learned), `no "
+    "veto` what training alone proposed. Of a set the model holds the first member. The official protocol of EMPS "
+    "simulates the position "
     "in open loop from the force, with 20 samples to start from (tests/benchmarks/official.py). Copies of two machines "
     "with one mistake each: `python tests/benchmarks/corrupted.py --data FOLDER --out results/measured`.\n\n"
     "Of the screws each recording holds one speed, for 3 to 128 s. Their means are judged against each other, as those "

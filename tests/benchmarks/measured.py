@@ -59,14 +59,14 @@ def rows(machine: Machine) -> Iterator[dict[str, Any]]:
         train, held = (_read(machine, tables, Path(folder)) for tables in (machine.train, machine.heldout))
         others = {name: _read(machine, tables, Path(folder)) for name, tables in machine.elsewhere.items()}
     outcome = diagnose(train, held, card)
-    models = {"refitted": outcome.refitted.plant(), "with effects": outcome.card.plant()}
-    models["no veto"] = outcome.proposed.plant()
+    models = {"refitted": outcome.refitted, "names alone": outcome.named, "with what is learned": outcome.card}
+    models |= {"no veto": outcome.proposed}
     found = outcome.diagnosis
     judged = [("", held, machine.score, machine.unit)]
     judged += [(name, recordings, machine.score, machine.unit) for name, recordings in others.items()]
     judged += [(name, held, score, unit) for name, (score, unit) in machine.otherwise.items()]
     for name, recordings, score, unit in judged:
-        numbers = {key: f"{score(mount, recordings):.3g}" for key, mount in models.items()}
+        numbers = {key: f"{score(model.plant(), recordings):.3g}" for key, model in models.items()}
         yield {
             "machine": f"{machine.name}{', ' if name else ''}{name}",
             "concealed": machine.concealed if not name else "",
