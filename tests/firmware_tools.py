@@ -14,6 +14,7 @@ from pyfmi_models.card import Card
 from pyfmi_models.export import build_library
 from pyfmi_models.export.build import compile_shared
 from pyfmi_models.export.firmware import FLAGS, LINK, Project, firmware, target_of
+from pyfmi_models.model import Model
 
 RESET, ENABLE = 2, 1
 FAULT, OFF, ON = 0, 1, 2
@@ -22,11 +23,12 @@ EMULATOR = "qemu-arm"
 
 
 def project_of(card: Card, target: str) -> Project:
+    return project_of_model(card.controller_model(), quantum_of(card), target)
+
+
+def project_of_model(model: Model, quantum: float, target: str) -> Project:
     machine = target_of(target)
-    quantum = quantum_of(card)
-    return firmware(
-        card.controller_model(), machine, encoder=INPUT, quantum=quantum, command=OUTPUT, origin="firmware_tools"
-    )
+    return firmware(model, machine, encoder=INPUT, quantum=quantum, command=OUTPUT, origin="firmware_tools")
 
 
 def program_of(project: Project, target: str) -> Path:
@@ -63,8 +65,11 @@ def answers(program: Path, target: str, rows: np.ndarray, model_outputs: int) ->
 
 
 def fmu_answers(card: Card, rows: np.ndarray) -> np.ndarray:
-    """Outputs of the card's FMU for the samples from the one that enables on, the position without wraps."""
-    model, quantum = card.controller_model(), quantum_of(card)
+    return model_answers(card.controller_model(), quantum_of(card), rows)
+
+
+def model_answers(model: Model, quantum: float, rows: np.ndarray) -> np.ndarray:
+    """Outputs of the FMU for the samples from the one that enables on, the position without wraps."""
     driver = Driver(model, build_library(model), 3).start()
     position = unwrapped(rows[:, 0])[2:]
     names, found = [one.name for one in model.inputs], []
