@@ -8,7 +8,6 @@ from typing import Annotated
 
 import typer
 
-from cosim.support.errors import ProofError
 from cosim.support.terminal import put, put_json, say, stage
 
 
@@ -31,16 +30,16 @@ def prove(
     force: Annotated[bool, typer.Option("--force", help="Start over, whatever is there.")] = False,
 ) -> None:
     """Conceal effects in simulated recordings, seal the truth, diagnose, open, and score against the bars."""
-    from cosim_studies.proof.conduct import GENERATOR, Benchmark, code, conduct
+    from cosim_studies.proof.conduct import GENERATOR, Benchmark, check, code, conduct
     from cosim_studies.proof.ledger import enlist
 
-    _check(cases, seed, seconds, workers)
+    benchmark = Benchmark(seed, cases, seconds)
+    check(benchmark, workers)
     if decks is not None:
         enlist(decks, GENERATOR, seed, cases, purpose, code())
     command = f"cosim prove --cases {cases} --seed {seed} --seconds {seconds:g} --out {out}"
     try:
         with _reporting(f"{cases} concealed cases") as on_progress:
-            benchmark = Benchmark(seed, cases, seconds)
             found = conduct(
                 benchmark, out, workers=workers, force=force, on_seal=say, on_progress=on_progress, command=command
             )
@@ -52,21 +51,6 @@ def prove(
     else:
         put("\n".join(_line(score) for score in found["scores"]))
     say(f"read {out / 'README.md'}")
-
-
-def _check(cases: int, seed: int, seconds: float, workers: int | None) -> None:
-    """Refuse wishes that cannot be met before anything is said or listed (raises ProofError)."""
-    from cosim.sweep.pool import MOST
-    from cosim_studies.proof.conduct import LEAST_SECONDS
-
-    for name, value, least in (("--cases", cases, 1), ("--seed", seed, 0), ("--workers", workers, 1)):
-        if value is not None and value < least:
-            raise ProofError(f"{name} {value}: it must be at least {least}.", culprit=name, value=value)
-    if workers is not None and workers > MOST:
-        raise ProofError(f"--workers {workers}: {MOST:,} are the most.", culprit="--workers", value=workers)
-    if seconds < LEAST_SECONDS:
-        text = f"--seconds {seconds:g}: a recording must last {LEAST_SECONDS:g} s at least."
-        raise ProofError(text, culprit="--seconds", value=seconds)
 
 
 @contextmanager

@@ -66,7 +66,7 @@ def conduct(
         ProofError: a wish cannot be met, or a seal is broken.
         OutputError: `out` holds another proof.
     """
-    _check(benchmark, workers)
+    check(benchmark, workers)
     wanted = cases_of(benchmark.seed, benchmark.cases)
     identity = {
         "generator": GENERATOR,
@@ -95,7 +95,8 @@ def conduct(
     return result
 
 
-def _check(benchmark: Benchmark, workers: int | None) -> None:
+def check(benchmark: Benchmark, workers: int | None) -> None:
+    """Refuse wishes that cannot be met (raises ProofError)."""
     wished = (("--cases", benchmark.cases, 1), ("--seed", benchmark.seed, 0), ("--workers", workers, 1))
     for name, value, least in wished:
         if value is not None and value < least:
