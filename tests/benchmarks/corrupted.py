@@ -136,6 +136,14 @@ def _ask(machine: Machine, there: Connection) -> None:
         there.send({"ended": f"traceback: {type(error).__name__}: {error}"})
 
 
+UNTOLD = (
+    "What no balance of torques tells: the pendulum of 1 kg swings nearly free, and a free swing is the same with any "
+    "weight; the motor turns one way at constant speeds, where no acceleration, stop or return dates the position or "
+    "gives its scale (a gear or another count changes the orders of the cogging alone, which are not known before)."
+)
+"""Why copies may pass."""
+
+
 def page(found: list[dict[str, str]], command: str) -> str:
     """The table for people."""
     head = list(found[0])
@@ -152,6 +160,8 @@ def page(found: list[dict[str, str]], command: str) -> str:
         "| " + " | ".join(head) + " |",
         "|" + " --- |" * len(head),
         *("| " + " | ".join(row.values()) + " |" for row in found),
+        "",
+        UNTOLD,
     ]
     return "\n".join(lines) + "\n"
 
