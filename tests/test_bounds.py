@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.diagnosis.bounds import SeenFrom
+from cosim.diagnosis.bounds import SeenFrom, tested
 from cosim.diagnosis.candidates import columns_of
 from cosim.diagnosis.concealment import Concealment, Hidden
 from cosim.diagnosis.hypotheses import candidates
@@ -79,3 +79,24 @@ def test_a_louder_rest_raises_the_bound() -> None:
     louder = replace(here.base, residual=here.base.residual + 10 * here.base.rms * noise)
     assert Concealment(here.comparison, here.base, [columns]).is_found(hidden, size)
     assert not Concealment(here.comparison, louder, [columns]).is_found(hidden, size)
+
+
+class Deaf:
+    """A stand-in that finds each member from a size of its own on: the number of its only column."""
+
+    def energy(self, hidden: Hidden, weights: np.ndarray) -> float:
+        return 0.02
+
+    def is_found(self, hidden: Hidden, weights: np.ndarray) -> bool:
+        return bool(np.abs(weights).max() >= hidden.columns[0])
+
+
+@pytest.mark.parametrize(("harder", "most"), [(2.0, 10.0), (20.0, 60.0)])
+def test_forms_that_no_number_of_a_bound_tells_apart_share_the_hardest_ones(harder: float, most: float) -> None:
+    """An even cable and one that hardens: where the one is seen twenty times later, the bound is its own."""
+    cable = next(one for one in stand().members() if one.effect == "cable_wrap")
+    one = replace(cable, directions=(np.ones(1), -np.ones(1)), least=0.0, most=1e9)
+    pairs = [(one, Hidden("cable_wrap", np.array([found]), np.ones(1), 0.0)) for found in (1.0, harder)]
+    (bound,) = tested(Deaf(), {"cable_wrap": pairs}).values()  # type: ignore[arg-type]
+    assert harder <= bound.size < most
+    assert bound.power == 1.0
