@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.diagnosis.bounds import SeenFrom, tested
+from cosim.diagnosis.bounds import SeenFrom
+from cosim.diagnosis.bounds import tested as seen_from
 from cosim.diagnosis.candidates import columns_of
 from cosim.diagnosis.concealment import Concealment, Hidden
 from cosim.diagnosis.hypotheses import candidates
@@ -97,6 +98,6 @@ def test_forms_that_no_number_of_a_bound_tells_apart_share_the_hardest_ones(hard
     cable = next(one for one in stand().members() if one.effect == "cable_wrap")
     one = replace(cable, directions=(np.ones(1), -np.ones(1)), least=0.0, most=1e9)
     pairs = [(one, Hidden("cable_wrap", np.array([found]), np.ones(1), 0.0)) for found in (1.0, harder)]
-    (bound,) = tested(Deaf(), {"cable_wrap": pairs}).values()  # type: ignore[arg-type]
+    (bound,) = seen_from(Deaf(), {"cable_wrap": pairs}).values()  # type: ignore[arg-type]
     assert harder <= bound.size < most
     assert bound.power == 1.0
