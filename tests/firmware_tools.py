@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+import pytest
 from export_models import Driver
 
 from cosim.cli.firmware import INPUT, OUTPUT, quantum_of
@@ -134,6 +135,12 @@ def effort(project: Project, program: Path, rows: np.ndarray) -> tuple[list[int]
 def missing_emulator() -> str:
     """Why the Cortex-A9 cannot run here; empty where it can."""
     return "" if shutil.which(EMULATOR) else f"{EMULATOR} is not installed (apt-get install qemu-user)"
+
+
+def need(target: str) -> None:
+    """Skip a test where programs for a target cannot run."""
+    if target == "cortex-a9" and missing_emulator():
+        pytest.skip(missing_emulator())
 
 
 def emulator_version() -> str:

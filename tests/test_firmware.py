@@ -39,8 +39,7 @@ def project(target: str) -> Project:
 
 @cache
 def program(target: str) -> Path:
-    if target == "cortex-a9" and tools.missing_emulator():
-        pytest.skip(tools.missing_emulator())
+    tools.need(target)
     return tools.program_of(project(target), target)
 
 
@@ -79,8 +78,7 @@ def test_the_compiler_of_the_reader_makes_the_same_bits_without_a_warning(tmp_pa
     compiler = line.split()[0]
     if shutil.which(compiler) is None:
         pytest.skip(f"{compiler} is not installed")
-    if target == "cortex-a9" and tools.missing_emulator():
-        pytest.skip(tools.missing_emulator())
+    tools.need(target)
     project(target).write(tmp_path)
     subprocess.run(line.replace("gcc ", "gcc -Wall -Wextra -Werror ", 1), shell=True, cwd=tmp_path, check=True)
     found = tools.answers(tmp_path / "controller", target, rows(), 5)

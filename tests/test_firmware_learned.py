@@ -48,8 +48,7 @@ def rows() -> np.ndarray:
 
 @pytest.mark.parametrize("target", ["host", "cortex-a9"])
 def test_what_was_learned_gives_the_bits_of_the_fmu_on_a_board(target: str) -> None:
-    if target == "cortex-a9" and tools.missing_emulator():
-        pytest.skip(tools.missing_emulator())
+    tools.need(target)
     model, fed = ahead(), rows()
     program = tools.program_of(tools.project_of_model(model, QUANTUM, target), target)
     found = tools.answers(program, target, fed, 2)[2:, 2:]

@@ -96,9 +96,11 @@ def _smallest(concealment: Concealment, members: Sequence[tuple[Member, Hidden]]
     seen = [(member, hidden, size) for member, hidden, size in sizes if size is not None]
     if not seen:
         return None
-    worst = {m.place: max(size for other, _, size in seen if other.place == m.place) for m, _, _ in seen}
-    most = ALIKE * min(worst.values())  # forms that no number of the bound tells apart share it: the hardest counts
-    shared = [one for one in seen if worst[one[0].place] <= most]
+    hardest: dict[float, float] = {}  # forms that no number of the bound tells apart share it
+    for member, _, size in seen:
+        hardest[member.place] = max(size, hardest.get(member.place, 0.0))
+    most = ALIKE * min(hardest.values())
+    shared = [one for one in seen if hardest[one[0].place] <= most]
     size = max(one[2] for one in shared)
     while True:
         hits = [concealment.is_found(h, size * way) for m, h, _ in shared for way in m.directions]

@@ -59,8 +59,12 @@ def rows(machine: Machine) -> Iterator[dict[str, Any]]:
         train, held = (_read(machine, tables, Path(folder)) for tables in (machine.train, machine.heldout))
         others = {name: _read(machine, tables, Path(folder)) for name, tables in machine.elsewhere.items()}
     outcome = diagnose(train, held, card)
-    models = {"refitted": outcome.refitted, "names alone": outcome.named, "with what is learned": outcome.card}
-    models |= {"no veto": outcome.proposed}
+    models = {
+        "refitted": outcome.refitted,
+        "names alone": outcome.named,
+        "with what is learned": outcome.card,
+        "no veto": outcome.proposed,
+    }
     found = outcome.diagnosis
     judged = [("", held, machine.score, machine.unit)]
     judged += [(name, recordings, machine.score, machine.unit) for name, recordings in others.items()]
