@@ -5,9 +5,11 @@ nuisances; only their torques and tangents differ.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from math import inf
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -62,19 +64,19 @@ class Comparison:
     noise: NoiseOverSpeed
     inertia: float
     """Inertia [kg m2, kg] that carries the reading's noise into the torque."""
+    offered: dict[Fit, "_Offered"] = field(default_factory=dict)
+    """What is offered beside a fit that will be screened, until then."""
 
     @classmethod
     def of(cls, problem: Problem, base: Fit, policy: Policy) -> "Comparison":
         """Set up from the refitted base: noise over speed is what the base leaves beside the best of every effect."""
         prepared, weight = problem.prepared, problem.weight
         nuisances = discrepancy(base.mount, prepared, policy)
+        known, residual = _beside(problem, base, nuisances)
+        offered = _Offered.beside(problem, base, nuisances, residual)
         counted = (weight > 0).astype(float)
-        known = np.column_stack([base.slopes, nuisances.columns]) * counted[:, None]
-        residual = projected(base.residual * counted, known)
-        tried = candidates(base.mount, prepared, residual, np.abs(nuisances.level))
-        groups = columns_of(base.mount, tried, prepared, base.values)
         best: dict[type[Effect], tuple[float, Array]] = {}
-        for one, columns in zip(tried, groups, strict=True):
+        for one, columns in zip(offered.tried, offered.columns, strict=True):
             share = _share(residual, columns * counted[:, None], known)
             form = type(one.instances[0])
             if share > best.get(form, (0.0,))[0]:
@@ -85,7 +87,7 @@ class Comparison:
         # A base that lacks much may be left with no inertia; then the card knows better what noise there is.
         inertia = max(float(base.mount.axis.inertia), float(problem.mount.axis.inertia))
         floor = bands.least_noise(prepared, inertia, policy)
-        return cls(problem, policy, bands, nuisances, floor, noise, inertia)
+        return cls(problem, policy, bands, nuisances, floor, noise, inertia, {base: offered})
 
     @cached_property
     def _nuisances(self) -> Array:
@@ -95,9 +97,16 @@ class Comparison:
     def _nuisance_grams(self) -> Array:
         return self.bands.grams(self._nuisances)
 
+    @cached_property
+    def _evidence(self) -> WeakKeyDictionary[Fit, dict[Aside, float]]:
+        return WeakKeyDictionary()
+
     def evidence(self, found: Fit, aside: Aside = NONE) -> float:
-        """Log marginal likelihood of a fitted structure, phases that each recording tells priced."""
-        return self._marginal(found, aside).log_likelihood - self.policy.phase_price * found.phases
+        """Log marginal likelihood of a fitted structure, phases that each recording tells priced; computed once."""
+        known = self._evidence.setdefault(found, {})
+        if aside not in known:
+            known[aside] = self._marginal(found, aside).log_likelihood - self.policy.phase_price * found.phases
+        return known[aside]
 
     def _marginal(self, found: Fit, aside: Aside) -> Marginal:
         own = self.bands.transform(np.column_stack([found.residual, found.slopes]))
@@ -131,12 +140,11 @@ class Comparison:
 
     def screen(self, found: Fit) -> list[Screened]:
         """Score every candidate beside a fitted structure."""
-        prepared, counted = self.problem.prepared, (self.problem.weight > 0)[:, None]
-        known = np.column_stack([found.slopes, self.nuisances.columns]) * counted
-        residual = projected(found.residual * counted[:, 0], known)
-        tried = candidates(found.mount, prepared, residual, np.abs(self.nuisances.level))
-        groups = columns_of(found.mount, tried, prepared, found.values)
-        return self.score(found, tried, groups)
+        own = self.offered.pop(found, None)
+        if not own:
+            residual = _beside(self.problem, found, self.nuisances)[1]
+            own = _Offered.beside(self.problem, found, self.nuisances, residual)
+        return self.score(found, own.tried, own.columns)
 
     def score(self, found: Fit, tried: Sequence[Candidate], groups: Sequence[Array]) -> list[Screened]:
         """Score columns of candidates beside a fitted structure."""
@@ -210,6 +218,25 @@ class Comparison:
         out[:, :size, size:], out[:, size:, :size] = cross, np.swapaxes(cross, 1, 2)
         out[:, size:, size:] = self.bands.grams(added)
         return out
+
+
+class _Offered(NamedTuple):
+    """The candidates beside a fit, and the columns of each."""
+
+    tried: Sequence[Candidate]
+    columns: Sequence[Array]
+
+    @classmethod
+    def beside(cls, problem: Problem, found: Fit, nuisances: Discrepancy, residual: Array) -> "_Offered":
+        tried = candidates(found.mount, problem.prepared, residual, np.abs(nuisances.level))
+        return cls(tried, columns_of(found.mount, tried, problem.prepared, found.values))
+
+
+def _beside(problem: Problem, found: Fit, nuisances: Discrepancy) -> tuple[Array, Array]:
+    """Tangents of a fit with the nuisances, at the rows that count, and what they leave of its residual there."""
+    counted = (problem.weight > 0).astype(float)
+    known = np.column_stack([found.slopes, nuisances.columns]) * counted[:, None]
+    return known, projected(found.residual * counted, known)
 
 
 class _Plain:

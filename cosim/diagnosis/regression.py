@@ -50,7 +50,9 @@ def kernel(rows: Array, target: Array, ridge: float = 1e-2) -> Model:
         powers -= half
         return np.asarray(np.exp(powers, out=powers))
 
-    columns = np.concatenate([lifted(part) for part in _chunks(rows)])
+    columns = np.empty((len(rows), len(centres)))
+    for into, part in zip(_chunks(columns), _chunks(rows), strict=True):
+        into[:] = lifted(part)
     normal = columns.T @ columns
     weights = np.linalg.solve(normal + ridge * np.trace(normal) / len(normal) * np.eye(len(normal)), columns.T @ target)
     return lambda others: np.concatenate([lifted(part) @ weights for part in _chunks(others)])

@@ -3,8 +3,9 @@
 Expressions are compiled once for a structure; its numbers are parameters.
 """
 
+from collections.abc import Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -22,6 +23,20 @@ READING = ("t", "q", "v", "a")
 NEWTON = 3
 LEAST_SLOPE = 1e-2
 """A drive that gives less than this share of what more is asked for is undone as if it gave this share."""
+
+
+class Slopes(NamedTuple):
+    """Derivatives of a state, (live, rows + 1), by those free parameters that change it at all."""
+
+    live: list[int]
+    values: Array
+
+
+class _Affine(NamedTuple):
+    """A step that is linear in its own state, and its derivatives by these: the states before, the free parameters."""
+
+    rows: Rowwise
+    by: list[int]
 
 
 class Equations:
@@ -118,27 +133,26 @@ class Equations:
         """Columns in the middle of a step and at its end, and dt."""
         return ca.vertcat(self._column, self._symbols["end"], self._symbols["dt"])
 
-    def states(self, steps: Array, full: Array) -> tuple[Array, list[Array]]:
-        """States along the rows from zero on, (states, rows + 1), and their derivatives, (free, rows + 1) each.
+    def states(self, steps: Sequence[Array], full: Array) -> tuple[Array, list[Slopes]]:
+        """States along the rows from zero on, (states, rows + 1), and the derivatives of each by the free parameters.
 
         Effects go by their rates, friction by the law's closed form. A step that is linear in its own state is a
         recurrence, solved for all rows at once; others are walked. `steps` are the columns of each step.
         """
         return self._at_once(steps, full) if self._affine else self._walked(steps, full)
 
-    def _at_once(self, steps: Array, full: Array) -> tuple[Array, list[Array]]:
-        states, slopes = np.zeros((self.count, steps.shape[1] + 1)), list[Array]()
-        for k, affine in enumerate(self._affine):
-            out = affine(np.vstack([steps, states[:, :-1]]), full)
+    def _at_once(self, steps: Sequence[Array], full: Array) -> tuple[Array, list[Slopes]]:
+        states, slopes = np.zeros((self.count, len(steps[0]) + 1)), list[Slopes]()
+        for k, one in enumerate(self._affine):
+            out = one.rows([*steps, *states[:, :-1]], full)
             states[k] = recurrence(out[0], out[1][:, None])[:, 0]
-            kept, added = out[2:].reshape(2, k + len(self._free), steps.shape[1])
+            kept, added = out[2:].reshape(2, len(one.by), len(steps[0]))
             change = kept * states[k, :-1] + added
-            drift = change[k:] + sum((change[j] * slopes[j][:, :-1] for j in range(k)), start=0.0)
-            slopes.append(recurrence(out[0], drift.T).T)
+            slopes.append(_carried(out[0], {j - k: row for j, row in zip(one.by, change, strict=True)}, slopes))
         return states, slopes
 
     @cached_property
-    def _affine(self) -> list[Rowwise]:
+    def _affine(self) -> list["_Affine"]:
         """For each state what its step keeps of it, what it adds, and how both change; [] where one is not linear."""
         state = self._symbols["state"]
         kept = [ca.jacobian(self._following[k], state[k]) for k in range(self.count)]
@@ -147,23 +161,25 @@ class Equations:
         added = [ca.substitute(self._following[k], state[k], 0.0) for k in range(self.count)]
         return [self._changing(k, *both) for k, both in enumerate(zip(kept, added, strict=True))]
 
-    def _changing(self, k: int, kept: Any, added: Any) -> Rowwise:
-        """Both parts of a step, and their derivatives by the states before and the free parameters."""
+    def _changing(self, k: int, kept: Any, added: Any) -> "_Affine":
+        """Both parts of a step, and their derivatives by those states before and free parameters that change them."""
         s = self._symbols
         by = ca.vertcat(ca.SX(0, 1), *(s["state"][j] for j in range(k)), s["free"])
-        rows = ca.vertcat(kept, added, ca.jacobian(kept, by).T, ca.jacobian(added, by).T)
-        return Rowwise(ca.vertcat(self._step_column, s["state"]), s["p"], rows)
+        slopes = [ca.jacobian(one, by) for one in (kept, added)]
+        own = [j for j in range(by.numel()) if any(one[j].nnz() for one in slopes)]
+        rows = ca.vertcat(kept, added, *(one[j] for one in slopes for j in own))
+        return _Affine(Rowwise(ca.vertcat(self._step_column, s["state"]), s["p"], rows), own)
 
-    def _walked(self, steps: Array, full: Array) -> tuple[Array, list[Array]]:
+    def _walked(self, steps: Sequence[Array], full: Array) -> tuple[Array, list[Slopes]]:
         """A state's step may depend on itself and on those before it, so their derivatives are carried one by one."""
-        states, rows = self._step(steps, full), steps.shape[1]
-        out = self._step_slopes(np.vstack([steps, states[:, :-1]]), full)
+        states, rows = self._step(np.vstack(steps), full), len(steps[0])
+        out = self._step_slopes([*steps, *states[:, :-1]], full)
         between = out[: self.count**2].reshape(self.count, self.count, rows)
         by_free = out[self.count**2 :].reshape(self.count, len(self._free), rows)
-        slopes: list[Array] = []
+        slopes = list[Slopes]()
         for k in range(self.count):
-            drift = by_free[k] + sum((between[k, j] * slopes[j][:, :-1] for j in range(k)), start=0.0)
-            slopes.append(recurrence(between[k, k], drift.T).T)
+            by = {j - k: between[k, j] for j in range(k)} | dict(enumerate(by_free[k]))
+            slopes.append(_carried(between[k, k], by, slopes))
         return states, slopes
 
     @cached_property
@@ -188,6 +204,22 @@ class Equations:
     @cached_property
     def _motion(self) -> Rowwise:
         return Rowwise(self._column, self._symbols["p"], self._true(ca.vertcat(self._symbols["v"], self._symbols["a"])))
+
+
+def _carried(kept: Array, change: Mapping[int, Array], before: Sequence[Slopes]) -> Slopes:
+    """Derivatives of a state by free parameters, of which a step keeps a part and adds a change.
+
+    The change is by the free parameters, from 0 on, and by the states before, from -1 down to the first.
+    """
+    through = [(row, before[j]) for j, row in change.items() if j < 0]
+    live = sorted({j for j in change if j >= 0}.union(*(one.live for _, one in through)))
+    drift = np.zeros((len(live), len(kept)))
+    for row, one in through:
+        drift[np.searchsorted(live, one.live)] += row * one.values[:, :-1]
+    for j, row in change.items():
+        if j >= 0:
+            drift[live.index(j)] += row
+    return Slopes(live, recurrence(kept, drift.T).T)
 
 
 def _asked(this: Mount, needed: Any, motion: Motion) -> Any:

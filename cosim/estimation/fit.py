@@ -26,7 +26,7 @@ from pyfmi_models.mount import Mount
 PRIOR_FACTOR = 2.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
     """Result: the mount with fitted numbers, its torque (rows,), the derivatives (rows, free), and the residual.
 

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from cosim.estimation.equations import Equations, equations_of
+from cosim.estimation.equations import Equations, Slopes, equations_of
 from cosim.estimation.play import stepped_torque
 from cosim.estimation.prepare import Array, Piece
 from cosim.estimation.row_weights import described_rows
@@ -66,7 +66,8 @@ class Inverse:
 
     def momentary(self, piece: Piece, values: Array) -> Array:
         """Torque that the motion and the states need, and its derivatives: (rows, 1 + free), filtered once more."""
-        return piece.lowpass(np.column_stack(self._momentary(piece, self._with(values))))
+        # One signal after the other in memory is how they are filtered.
+        return piece.lowpass(np.vstack(self._momentary(piece, self._with(values))).T)
 
     def behind(self, piece: Piece, columns: Array, values: Array) -> Array:
         """The same after springs, drive and clocks, which act on a torque as a whole, and with what shakes the axis."""
@@ -97,22 +98,21 @@ class Inverse:
         return full
 
     def _momentary(self, piece: Piece, full: Array) -> tuple[Array, Array]:
-        """Torque that the motion of each moment and the states need, and its derivatives (rows, free)."""
+        """Torque that the motion of each moment and the states need, and its derivatives (free, rows)."""
         rows = self._equations.columns(piece)
         state, slopes = self._states(piece, rows, full)
-        out = self._equations.torque(np.vstack([rows, state]), full)
+        out = self._equations.torque([*rows, *state], full)
         torque, by_state, by_free = out[0], out[1 : 1 + len(state)], out[1 + len(state) :]
         for row, slope in zip(by_state, slopes, strict=True):
-            by_free = by_free + row * slope
-        return torque, by_free.T
+            by_free[slope.live] += row * slope.values
+        return torque, by_free
 
-    def _states(self, piece: Piece, rows: Array, full: Array) -> tuple[Array, list[Array]]:
-        """States of effects and friction along the motion, (states, rows), and their derivatives (free, rows) each."""
+    def _states(self, piece: Piece, rows: Array, full: Array) -> tuple[Array, list[Slopes]]:
+        """States of effects and friction along the motion, (states, rows), and their derivatives."""
         if self._equations.count == 0:
             return np.zeros((0, len(piece.t))), []
         middle, end = (rows[:, 1:] + rows[:, :-1]) / 2, rows[:, 1:]
-        steps = np.vstack([middle, end, np.full(len(piece.t) - 1, piece.dt)])
-        return self._equations.states(steps, full)
+        return self._equations.states([*middle, *end, np.full(len(piece.t) - 1, piece.dt)], full)
 
     def _parts(self, kind: type[Effect]) -> list[str]:
         return [name for name, part in self.mount.components().items() if isinstance(part, kind)]

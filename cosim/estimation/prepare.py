@@ -221,20 +221,19 @@ def _piece(recording: Recording, index: int, span: slice, cutoff: float) -> Piec
     tau = lowpass(table["tau"], dt, cutoff)
     q, v, a = _motion(table, dt, cutoff)
     step = max(1, int(1 / (8 * cutoff * dt)))
-    coarse = dt * step
+    coarse, t = dt * step, grid[::step].copy()  # copies: what is thinned must not keep all rows alive
     return Piece(
         recording=index,
-        t=grid[::step],
-        q=q[::step],
-        v=v[::step],
-        a=a[::step],
+        t=t,
+        q=q[::step].copy(),
+        v=v[::step].copy(),
+        a=a[::step].copy(),
         tau=lowpass(tau[::step], coarse, cutoff),
-        inside=_inside(grid[::step], float(grid[0]), float(grid[-1]))
-        & ~recording.is_masked(grid[::step], 0.5 / cutoff),
+        inside=_inside(t, float(grid[0]), float(grid[-1])) & ~recording.is_masked(t, 0.5 / cutoff),
         dt=coarse,
         cutoff=cutoff,
         stride=max(1, int(1 / (KEPT_RATE * cutoff * coarse))),
-        extras={n: c[::step] for n, c in table.items() if n not in ("t", "tau", "q", "v")},
+        extras={n: c[::step].copy() for n, c in table.items() if n not in ("t", "tau", "q", "v")},
         reading_noise=noise_of(table["q" if "q" in table else "v"], dt) * sqrt(dt) if len(grid) > LEAST_ROWS else 0.0,
     )
 

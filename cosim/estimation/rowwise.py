@@ -1,6 +1,6 @@
 """Evaluate a CasADi expression at every row of long signals, or carry a state along them, fast."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import casadi as ca
@@ -73,16 +73,17 @@ class Rowwise:
         self._size, self._outputs = function.sz_w(), function.size1_out(0)
         self._program = [_instruction(function, k) for k in range(function.n_instructions())]
 
-    def __call__(self, columns: Array, parameters: Array) -> Array:
-        """Evaluate: (inputs, rows) and (parameters,) -> (outputs, rows)."""
-        out, numbers = np.empty((self._outputs, columns.shape[1])), [np.float64(one) for one in parameters]
+    def __call__(self, columns: Sequence[Array] | Array, parameters: Array) -> Array:
+        """Evaluate: inputs of shape (rows,) each and (parameters,) -> (outputs, rows)."""
+        rows = len(columns[0])
+        out, numbers = np.empty((self._outputs, rows)), [np.float64(one) for one in parameters]
         with np.errstate(all="ignore"):  # both sides of a choice are evaluated, whatever the other one is
-            for first in range(0, columns.shape[1], CHUNK):
+            for first in range(0, rows, CHUNK):
                 part = slice(first, first + CHUNK)
-                self._walk((columns[:, part], numbers), out[:, part])
+                self._walk(([one[part] for one in columns], numbers), out[:, part])
         return out
 
-    def _walk(self, given: tuple[Array, list[np.float64]], out: Array) -> None:
+    def _walk(self, given: tuple[list[Array], list[np.float64]], out: Array) -> None:
         work: list[Any] = [None] * self._size
         for code, target, sources, operation in self._program:
             if operation:
