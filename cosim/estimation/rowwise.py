@@ -9,7 +9,7 @@ from scipy.linalg.lapack import dtbtrs
 
 from cosim.estimation.prepare import Array
 
-CHUNK = 4096
+CHUNK = 8192
 """Rows evaluated at once: an intermediate result of so many stays in the cache."""
 STRIDE = 64
 """Steps written out one after the other: calling a step takes longer than doing it."""
