@@ -115,3 +115,13 @@ class TestPreparation:
         ripple = 1e-3 * np.sin(3 * t)
         run = Recording("steady", {"t": t, "tau": 2.0 + ripple, "v": 0.4 + 10 * ripple})
         assert judged([run], [], Reference(5.0, 2.0)) == ()
+
+
+def test_what_is_thinned_keeps_no_full_recording_alive() -> None:
+    """A view of every tenth row holds all of them."""
+    t = np.arange(0.0, 6.0, 1e-4)
+    moving = {"t": t, "tau": np.sin(3 * t), "q": np.sin(t), "q_d": np.sin(t), "temperature": 20 + t}
+    (piece,) = prepare([Recording.of(moving)], 10.0).pieces
+    signals = (piece.t, piece.q, piece.v, piece.a, *piece.extras.values())
+    assert len(piece.t) < len(t) / 10
+    assert all(one.flags.owndata for one in signals)
