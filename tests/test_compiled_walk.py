@@ -27,19 +27,27 @@ def moved(rows: int = 5_000) -> np.ndarray:
 
 def test_a_compiled_walk_has_the_bits_of_the_interpreted_one() -> None:
     walk = _walk(Backlash, FIELDS)
-    found = walk(moved(), NUMBERS)
+    (found,) = walk(moved(), NUMBERS[None])
     assert walk._compiled is not None
     assert np.array_equal(found, Stepwise(*walk._expressions)(moved(), NUMBERS))
     assert np.abs(found).max(axis=1).min() > 0
 
 
+def test_several_sets_of_numbers_at_once_have_the_bits_of_each_alone() -> None:
+    walk, sets = _walk(Backlash, FIELDS), np.array([NUMBERS, 2 * NUMBERS, 0.5 * NUMBERS])
+    found = walk(moved(), sets)
+    assert found.shape == (3, 4, 5_001)
+    assert all(np.array_equal(one, walk(moved(), own[None])[0]) for one, own in zip(found, sets, strict=True))
+    assert not np.array_equal(found[0], found[1])
+
+
 def test_a_walk_over_columns_that_are_not_in_one_piece_of_memory() -> None:
     walk = _walk(Backlash, FIELDS)
-    assert np.array_equal(walk(np.asfortranarray(moved()), NUMBERS), walk(moved(), NUMBERS))
+    assert np.array_equal(walk(np.asfortranarray(moved()), NUMBERS[None]), walk(moved(), NUMBERS[None]))
 
 
 def test_a_walk_over_no_rows_is_its_start() -> None:
-    assert np.array_equal(_walk(Backlash, FIELDS)(moved()[:, :0], NUMBERS), np.zeros((4, 1)))
+    assert np.array_equal(_walk(Backlash, FIELDS)(moved()[:, :0], NUMBERS[None]), np.zeros((1, 4, 1)))
 
 
 def decaying() -> CompiledWalk:
@@ -55,18 +63,20 @@ def test_without_a_compiler_the_walk_is_interpreted(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(compiled, "compile_shared", fails)
     walk = decaying()
     assert walk._compiled is None
-    assert walk(np.array([[1.0, 0.0, 1.0]]), np.array([0.5])).tolist() == [[0.0, 1.0, 0.5, 1.25]]
+    found = walk(np.array([[1.0, 0.0, 1.0]]), np.array([[0.5], [0.0]]))
+    assert found.tolist() == [[[0.0, 1.0, 0.5, 1.25]], [[0.0, 1.0, 0.0, 1.0]]]
 
 
 def test_a_damaged_library_in_the_cache_is_done_without(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     damaged = tmp_path / "walk.so"
     damaged.write_bytes(b"no library")
     monkeypatch.setattr(compiled, "compile_shared", lambda *_: damaged)
-    assert decaying()(np.ones((1, 2)), np.array([0.0])).tolist() == [[0.0, 1.0, 1.0]]
+    assert decaying()(np.ones((1, 2)), np.array([[0.0]])).tolist() == [[[0.0, 1.0, 1.0]]]
 
 
 def test_what_is_compiled_is_found_again(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path))
     first, again = decaying(), decaying()
-    assert first(np.ones((1, 2)), np.array([0.5])).tolist() == again(np.ones((1, 2)), np.array([0.5])).tolist()
+    walked = [one(np.ones((1, 2)), np.array([[0.5]])).tolist() for one in (first, again)]
+    assert walked[0] == walked[1]
     assert len(list(tmp_path.glob("libraries/*/walk*"))) == 1

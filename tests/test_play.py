@@ -19,7 +19,7 @@ FAR, DT = 2.0, 1e-3
 def torque(play: Backlash, v: np.ndarray) -> np.ndarray:
     """Torque passed on to the far side, the near one moving at v."""
     a = np.gradient(v, DT)
-    return stepped_torque(play, FAR, v, a, DT) + FAR * a
+    return stepped_torque([play], [FAR], v, a, DT)[0] + FAR * a
 
 
 def test_a_far_side_in_its_gap_takes_no_torque() -> None:
@@ -60,8 +60,8 @@ def test_the_momentum_that_is_told_hardly_depends_on_how_dense_the_rows_are(rows
     t = 1e-3 * np.arange(20000)
     v, a = 0.2 * np.sin(3 * t), 0.6 * np.cos(3 * t)
     play = Backlash(gap_rad=5e-3, load_friction=0.2, load_viscous=0.3)
-    fine = np.cumsum(stepped_torque(play, FAR, v, a, 1e-3)) * 1e-3
-    coarse = np.cumsum(stepped_torque(play, FAR, v[::rows], a[::rows], rows * 1e-3)) * rows * 1e-3
+    fine = np.cumsum(stepped_torque([play], [FAR], v, a, 1e-3)) * 1e-3
+    coarse = np.cumsum(stepped_torque([play], [FAR], v[::rows], a[::rows], rows * 1e-3)) * rows * 1e-3
     assert np.std(coarse - fine[::rows]) < 0.05 * np.std(fine)
 
 
@@ -72,7 +72,7 @@ def test_a_search_slows_the_far_side_by_dry_and_by_viscous_friction() -> None:
     piece, dry, ratio = prepared.pieces[0], 0.02, 10.0
     step = max(1, int(1 / (SEARCHED * piece.dt)))
     play = Backlash(gap_rad=5e-3, load_friction=dry, load_viscous=ratio * dry)
-    exact = stepped_torque(play, 1.0, piece.v[::step], piece.a[::step], step * piece.dt)
+    exact = stepped_torque([play], [1.0], piece.v[::step], piece.a[::step], step * piece.dt)[0]
     told = far_torques(prepared, ((5e-3, dry),), ratio)[:, 0]
     expected = piece.lowpass(np.interp(piece.t, piece.t[::step], exact))[piece.kept]
     np.testing.assert_allclose(told, expected, atol=1e-12)

@@ -15,6 +15,7 @@ from cosim.diagnosis.diagnose import diagnose as find
 from cosim.diagnosis.entries import Improved
 from cosim.diagnosis.learned.proposal import Proposal, write_proposals
 from cosim.diagnosis.result import Diagnosis, Finding
+from cosim.diagnosis.side_by_side import side_by_side
 from cosim.diagnosis.terminal import summary
 from cosim.fmi.alias import Alias
 from cosim.reading import check_kind
@@ -187,9 +188,9 @@ def _found(given: _Given, out: Path | None, command: str, listeners: _Listeners)
 def _delivered(given: _Given, out: Path, command: str, listeners: _Listeners) -> DiagnosisResult:
     """Diagnose with the loops closed beside it, and write all files."""
     train, heldout, card = given.train, given.heldout, given.card
-    with Loops(card, heldout) as loops:
+    with Loops(card, heldout) as loops, side_by_side(listeners.on_progress) as refits:
         loops.close("nominal", card.plant())
-        outcome = find(train, heldout, card, listeners.on_progress, loops.close)
+        outcome = find(train, heldout, card, listeners.on_progress, loops.close, refits)
         listeners.on_answer(outcome.diagnosis)
         done = deliver(
             outcome, train, heldout, card, out, command, loops, listeners.on_progress, given.more, given.base

@@ -31,11 +31,11 @@ from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.proof import Proof, prove
 from cosim.diagnosis.protocol import CUTOFF, Structures, heldout_rms, judge, judged_band, traces
 from cosim.diagnosis.regression import black_box_rms
-from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Trace
+from cosim.diagnosis.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.rivals import Examined, examine, explains, margins
 from cosim.diagnosis.sanity.admission import check_effects, check_recordings
 from cosim.diagnosis.sanity.doubts import doubts, of_base, single_readings
-from cosim.diagnosis.search import search
+from cosim.diagnosis.search import InTurn, search
 from cosim.diagnosis.withheld import without_names
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import Fit
@@ -85,6 +85,7 @@ def diagnose(
     card: Card,
     on_progress: OnProgress = lambda _: None,
     on_model_ready: Callable[[str, Mount], None] = lambda *_: None,
+    refits: InTurn | None = None,
 ) -> Outcome:
     """Find what physics a card lacks.
 
@@ -97,6 +98,7 @@ def diagnose(
         on_progress: told, in a few words, what is being done.
         on_model_ready: told the refitted base ("before") and the model it ends with ("after") as soon as they stand, so
             that something can be done with them meanwhile.
+        refits: what refits structures (default: one after the other); the answer is the same.
 
     Raises:
         InputError: the card holds an effect that a diagnosis cannot take into account yet.
@@ -116,7 +118,8 @@ def diagnose(
     if any(one.blocks_naming for one in beyond_denial(sanity)):
         return _refused(refitted, without_names(problem, base.mount, train, heldout, sanity, started))
     comparison = Comparison.of(problem, base, POLICY)
-    examined = examine(comparison, search(comparison, base, on_progress), on_progress)
+    with refits or InTurn(on_progress) as several:
+        examined = examine(comparison, search(comparison, base, several), several)
     sanity = without_denied(sanity, examined.chosen, examined.last)
     if any(one.blocks_naming for one in sanity):
         return _refused(refitted, without_names(problem, base.mount, train, heldout, sanity, started))
@@ -295,6 +298,3 @@ def _improved(card: Card, mount: Mount) -> Card:
     effects = mount.effects[1:] if load else mount.effects
     section = card.mount.model_copy(update={"inertia": float(mount.axis.inertia)})
     return replace(card, mount=section, friction=mount.friction, unbalance=load, effects=tuple(effects))
-
-
-__all__ = ["HeldOut", "Outcome", "diagnose"]

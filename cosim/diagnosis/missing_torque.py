@@ -1,7 +1,9 @@
 """The file of missing torque: one row for each row of each recording, empty where nothing can be said."""
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -9,6 +11,11 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.result import Array, Trace
 from cosim.support.files import replacing
 
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+ROWS = 2**19
+"""Rows that are made and written at a time."""
 HOLE = 1.5
 """A step of a trace longer than this many of its usual steps is a hole: nothing was judged inside."""
 
@@ -19,24 +26,30 @@ def write_missing_torque(traces: Sequence[Trace], recordings: Sequence[Recording
     Values are null where the diagnosis says nothing: where filters settle at the ends of a recording, inside gaps and
     beside them, at readings that were left out.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
+    from pyarrow import parquet
 
-    parts = []
-    for trace, recording in zip(traces, recordings, strict=True):
-        silent = ~covered(trace.t, recording.t)
-        signals = {"missing_torque": trace.missing, "band": trace.band, "after": trace.tau - trace.after}
-        values = {name: np.interp(recording.t, trace.t, signal) for name, signal in signals.items()}
-        columns = {name: pa.array(column, mask=silent) for name, column in values.items()}
-        names = pa.array([recording.name] * len(recording))
-        parts.append(pa.table({"recording": names, "t": recording.t, **columns}))
-    with replacing(path, True) as partial:
-        pq.write_table(pa.concat_tables(parts), partial)
+    tables = (one for both in zip(traces, recordings, strict=True) for one in _tables(*both))
+    first = next(tables)
+    with replacing(path, True) as partial, parquet.ParquetWriter(partial, first.schema) as file:
+        for one in itertools.chain([first], tables):
+            file.write_table(one)
+
+
+def _tables(trace: Trace, recording: Recording) -> Iterator["pa.Table"]:
+    """The rows of a recording, some at a time: all columns together are as large as the recording itself."""
+    import pyarrow as pa
+
+    signals = {"missing_torque": trace.missing, "band": trace.band, "after": trace.tau - trace.after}
+    for first in range(0, len(recording), ROWS):
+        t = recording.t[first : first + ROWS]
+        silent, names = ~covered(trace.t, t), pa.array([recording.name]).take(pa.array(np.zeros(len(t), int)))
+        columns = {n: pa.array(np.interp(t, trace.t, signal), mask=silent) for n, signal in signals.items()}
+        yield pa.table({"recording": names, "t": t, **columns})
 
 
 def covered(known: Array, wanted: Array) -> np.ndarray:
     """Which wanted times lie between two neighbouring known times, (rows,) of bool."""
-    step = HOLE * float(np.median(np.diff(known)))
-    after = np.searchsorted(known, wanted, "right").clip(1, len(known) - 1)
-    inside = (wanted >= known[0]) & (wanted <= known[-1])
-    return np.asarray(inside & (known[after] - known[after - 1] <= step) | np.isin(wanted, known))
+    steps = np.diff(known)
+    whole = np.concatenate([[False], steps <= HOLE * float(np.median(steps)), [False]])
+    after = np.searchsorted(known, wanted, "right")
+    return np.asarray(whole[after] | (known[after - 1] == wanted))

@@ -1,16 +1,15 @@
 """Each effect that was found, taken out and challenged: is it needed, and who else could stand in its place?"""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.instrumental_variable import Misfits, excludes, misfits_of, settled
 from cosim.diagnosis.policy import Policy
-from cosim.diagnosis.search import CandidateFit, Search, Stage, is_admissible, margin, stage, weighed
+from cosim.diagnosis.search import IN_TURN, CandidateFit, InTurn, Search, Stage, is_admissible, margin, stage, weighed
 from cosim.estimation.fit import Fit
 from pyfmi_models.effects import Effect
 
-OnProgress = Callable[[str], None]
 ROUNDS = 4
 
 
@@ -48,27 +47,27 @@ class Examined:
     """What was tried beside the structure that stands."""
 
 
-def examine(comparison: Comparison, found: Search, on_progress: OnProgress = lambda _: None) -> Examined:
+def examine(comparison: Comparison, found: Search, refits: InTurn = IN_TURN) -> Examined:
     """Take out, challenge and swap until nothing changes."""
     chosen, known = found.chosen, {_names(one.current): one for one in found.stages}
     for _ in range(ROUNDS):
-        effects, better = _round(comparison, chosen, known, on_progress)
+        effects, better = _round(comparison, chosen, known, refits)
         if better is None:
             break
         chosen = better
     else:  # swaps went in a circle: what stands is examined as it is
-        effects = [_challenged(comparison, chosen, group, known, on_progress) for group in grouped(comparison, chosen)]
+        effects = [_challenged(comparison, chosen, group, known, refits) for group in grouped(comparison, chosen)]
     if _names(chosen) not in known:
-        known[_names(chosen)] = stage(comparison, chosen, on_progress)
+        known[_names(chosen)] = stage(comparison, chosen, refits)
     return Examined(found.base, chosen, tuple(effects), known[_names(chosen)])
 
 
 def _round(
-    comparison: Comparison, chosen: Fit, known: dict[tuple[str, ...], Stage], on_progress: OnProgress
+    comparison: Comparison, chosen: Fit, known: dict[tuple[str, ...], Stage], refits: InTurn
 ) -> tuple[list[AcceptedEffect], Fit | None]:
     effects = []
     for group in grouped(comparison, chosen):
-        one = _challenged(comparison, chosen, group, known, on_progress)
+        one = _challenged(comparison, chosen, group, known, refits)
         if one.own.evidence < comparison.policy.keep_evidence and len(grouped(comparison, chosen)) > 1:
             return [], one.without
         best = settled(one.misfits, one.own, one.rivals)
@@ -101,14 +100,14 @@ def _challenged(
     chosen: Fit,
     group: tuple[Effect, ...],
     known: dict[tuple[str, ...], Stage],
-    on_progress: OnProgress,
+    refits: InTurn,
 ) -> AcceptedEffect:
     problem = comparison.problem
-    on_progress(group[0].title)
+    refits.on_progress(group[0].title)
     rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
     without = problem.fit(replace(chosen.mount, effects=rest), 15)
     if _names(without) not in known:
-        known[_names(without)] = stage(comparison, without, on_progress)
+        known[_names(without)] = stage(comparison, without, refits)
     beside = known[_names(without)]
     own = weighed(comparison, chosen, beside.current, effect=group[0])
     rivals = [one for one in beside.tried if one.effect.id != group[0].id and is_admissible(comparison, one)]

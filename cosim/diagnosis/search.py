@@ -54,24 +54,51 @@ class Stage:
     screened: tuple[Screened, ...]
 
 
-def stage(comparison: Comparison, current: Fit, on_progress: OnProgress = lambda _: None) -> Stage:
+Start = tuple[Effect, int]
+"""An effect that is worth a refit, and how many members of its form were tried."""
+
+
+class InTurn:
+    """The refits of a stage, one after the other; a context, after which none comes.
+
+    Args:
+        on_progress: told, in a few words, what is being refitted.
+    """
+
+    def __init__(self, on_progress: OnProgress = lambda _: None) -> None:
+        self.on_progress = on_progress
+
+    def __enter__(self) -> "InTurn":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def __call__(self, comparison: Comparison, current: Fit, worth: Sequence[Start]) -> list[CandidateFit]:
+        """Refit a structure with each of some effects."""
+        found = []
+        for number, (effect, many) in enumerate(worth, 1):
+            self.say(effect, number, len(worth))
+            found.append(refitted(comparison, current, effect, many))
+        return found
+
+    def say(self, effect: Effect, number: int, of: int) -> None:
+        """Say what is being refitted, and how far a stage is."""
+        self.on_progress(f"{effect.title} ({number} of {of})")
+
+
+IN_TURN = InTurn()
+
+
+def stage(comparison: Comparison, current: Fit, refits: InTurn = IN_TURN) -> Stage:
     """Screen all candidates beside a structure and refit the best forms."""
     screened = comparison.screen(current)
-    worth = starts(screened, comparison.policy)
-    fits = [
-        refitted(comparison, current, effect, many, _counted(on_progress, number, len(worth)))
-        for number, (effect, many) in enumerate(worth, 1)
-    ]
+    fits = refits(comparison, current, starts(screened, comparison.policy))
     return Stage(current, tuple(sorted(fits, key=lambda one: -one.evidence)), tuple(screened))
 
 
-def _counted(on_progress: OnProgress, number: int, of: int) -> OnProgress:
-    """Say with every text how far a search is."""
-    return lambda text: on_progress(f"{text} ({number} of {of})")
-
-
-def starts(screened: Sequence[Screened], policy: Policy) -> list[tuple[Effect, int]]:
-    """Effects worth a refit, and how many members of their form were tried."""
+def starts(screened: Sequence[Screened], policy: Policy) -> list[Start]:
+    """Effects worth a refit."""
     forms: dict[type[Effect], list[Screened]] = {}
     for one in screened:
         forms.setdefault(one.form, []).append(one)
@@ -99,11 +126,8 @@ def _key(one: Screened) -> object:
     return one.form if hypothesis_of(one.candidate.instances[0]).finds_its_way else id(one)
 
 
-def refitted(
-    comparison: Comparison, current: Fit, effect: Effect, many: int, on_progress: OnProgress = lambda _: None
-) -> CandidateFit:
+def refitted(comparison: Comparison, current: Fit, effect: Effect, many: int) -> CandidateFit:
     """Add an effect to a fitted structure, refit everything, weigh it."""
-    on_progress(effect.title)
     problem = comparison.problem
     grown = replace(current.mount, effects=(*current.mount.effects, effect))
     found, aside = problem.fit(grown, 12), aside_for(effect.id)
@@ -143,16 +167,16 @@ class Search:
         return self.stages[-1].current
 
 
-def search(comparison: Comparison, base: Fit, on_progress: OnProgress = lambda _: None) -> Search:
+def search(comparison: Comparison, base: Fit, refits: InTurn = IN_TURN) -> Search:
     """Add the admissible effect of the largest evidence until none has enough; beside a small one nothing is added."""
-    stages, largest = [stage(comparison, base, on_progress)], 0.0
+    stages, largest = [stage(comparison, base, refits)], 0.0
     while True:
         now = stages[-1]
         best = best_of(comparison, now, largest)
         if best is None or _is_full(best, comparison):
             return Search(base, tuple(stages))
         largest = max(largest, best.evidence)
-        stages.append(stage(comparison, with_harmonics(comparison, best.fit, best.effect), on_progress))
+        stages.append(stage(comparison, with_harmonics(comparison, best.fit, best.effect), refits))
         if is_small(best, comparison.policy):
             return Search(base, tuple(stages))
 

@@ -17,20 +17,24 @@ WALK = """\
 #include "step.h"
 
 __attribute__((visibility("default")))
-void walk(const double *columns, const double *parameters, long long rows, double *states)
+void walk(const double *columns, const double *parameters, long long rows, long long sets, double *states)
 {
-    double column[INPUTS], before[STATES] = {0}, after[STATES], work[WORK];
-    const double *arg[ARGUMENTS] = {before, column, parameters};
-    double *res[RESULTS] = {after};
+    double column[INPUTS], after[STATES], work[WORK];
+    const double *arg[ARGUMENTS];
+    double *res[RESULTS] = {after}, before[sets][STATES];
     long long integers[INTEGERS];
-    for (int j = 0; j < STATES; j++)
-        states[j * (rows + 1)] = 0.0;
+    for (long long n = 0; n < sets; n++)
+        for (int j = 0; j < STATES; j++)
+            before[n][j] = states[(n * STATES + j) * (rows + 1)] = 0.0;
     for (long long k = 0; k < rows; k++) {
         for (int i = 0; i < INPUTS; i++)
             column[i] = columns[i * rows + k];
-        step(arg, res, integers, work, 0);
-        for (int j = 0; j < STATES; j++)
-            before[j] = states[j * (rows + 1) + k + 1] = after[j];
+        for (long long n = 0; n < sets; n++) {  /* none waits for another: a processor does several at once */
+            arg[0] = before[n], arg[1] = column, arg[2] = parameters + n * PARAMETERS;
+            step(arg, res, integers, work, 0);
+            for (int j = 0; j < STATES; j++)
+                before[n][j] = states[(n * STATES + j) * (rows + 1) + k + 1] = after[j];
+        }
     }
 }
 """
@@ -48,13 +52,13 @@ class CompiledWalk:
         self._expressions = (state, column, parameters, following)
 
     def __call__(self, columns: Array, parameters: Array) -> Array:
-        """Walk from zero: (inputs, rows) and (parameters,) -> states (states, rows + 1), the start among them."""
+        """Walk from zero: (inputs, rows), (sets, parameters) -> states (sets, states, rows + 1), the start included."""
         if self._compiled is None:
-            return self._interpreted(columns, parameters)
-        rows = columns.shape[1]
+            return np.stack([self._interpreted(columns, one) for one in parameters])
+        rows, sets = columns.shape[1], len(parameters)
         given, numbers = np.ascontiguousarray(columns, float), np.ascontiguousarray(parameters, float)
-        states = np.empty((self._expressions[0].numel(), rows + 1))
-        self._compiled(given.ctypes.data, numbers.ctypes.data, rows, states.ctypes.data)
+        states = np.empty((sets, self._expressions[0].numel(), rows + 1))
+        self._compiled(given.ctypes.data, numbers.ctypes.data, rows, sets, states.ctypes.data)
         return states
 
     @cached_property
@@ -70,7 +74,7 @@ class CompiledWalk:
             walk = ctypes.CDLL(str(library)).walk
         except (ExportError, OSError):
             return None
-        walk.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_longlong, ctypes.c_void_p]
+        walk.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_longlong, ctypes.c_longlong, ctypes.c_void_p]
         walk.restype = None
         return walk
 
@@ -79,7 +83,12 @@ class CompiledWalk:
         step = ca.Function("step", [state, column, parameters], [ca.cse(ca.densify(following))])
         code = ca.CodeGenerator("step.c")
         code.add(step)
-        sizes = {"INPUTS": column.numel(), "STATES": state.numel(), "ARGUMENTS": step.sz_arg()}
-        sizes |= {"RESULTS": step.sz_res(), "INTEGERS": step.sz_iw() + 1, "WORK": step.sz_w() + 1}
+        sizes = {"INPUTS": column.numel(), "STATES": state.numel(), "PARAMETERS": parameters.numel()}
+        sizes |= {
+            "ARGUMENTS": step.sz_arg(),
+            "RESULTS": step.sz_res(),
+            "INTEGERS": step.sz_iw() + 1,
+            "WORK": step.sz_w() + 1,
+        }
         macros = "".join(f"#define {name} {size}\n" for name, size in sizes.items())
         return {"step.h": code.dump().encode(), "walk.c": (macros + WALK).encode()}

@@ -102,24 +102,18 @@ def fit(
     pull = _prior(prior or mount, free, rms(weight * tau) * 1e-2 / log(factor))
     # Pieces without weight are only looked at once, at the end.
     used, unused = _weighted(pieces, weight)
-    cache: dict[bytes, tuple[Array, Array]] = {}
+    model = _Model(inverse, [pieces[k] for k in used.pieces])
     best: list[tuple[Array, Array]] = []
-
-    def evaluate(u: Array) -> tuple[Array, Array]:
-        key = u.tobytes()
-        if key not in cache:
-            cache.clear()
-            cache[key] = stacked(inverse, [pieces[k] for k in used.pieces], own.matrix @ u)
-        return cache[key]
-
     tau_used, weight_used = tau[used.rows], weight[used.rows]
 
     def residuals(u: Array) -> Array:
-        return np.concatenate([weight_used * (tau_used - evaluate(u)[0]), pull(own.matrix @ u)[0]])
+        values = own.matrix @ u
+        return np.concatenate([weight_used * (tau_used - model.torque(values)), pull(values)[0]])
 
     def jacobian(u: Array) -> Array:
-        best[:] = [evaluate(u)]  # asked for where the fit goes on from, and so last where it ends
-        slopes = np.concatenate([-weight_used[:, None] * evaluate(u)[1], np.diag(pull(own.matrix @ u)[1])])
+        values = own.matrix @ u
+        best[:] = [model.whole(values)]  # asked for where the fit goes on from, and so last where it ends
+        slopes = np.concatenate([-weight_used[:, None] * best[0][1], np.diag(pull(values)[1])])
         return np.asarray(slopes @ own.matrix)
 
     found = least_squares(residuals, jacobian, own.of(start), (own.low, own.high), evaluations)
@@ -128,6 +122,35 @@ def fit(
     phases = inverse.phases(pieces[0], values)
     fitted = with_values(mount, (*free, *phases), np.array([*values, *phases.values()]))
     return Fit(fitted, free, values, torque, slopes, tau - torque, len(phases) * len(pieces))
+
+
+class _Model:
+    """Torque of a structure at the kept rows for one set of numbers after another, and its derivatives where asked for.
+
+    Both are found together, but where the last derivatives were not asked for: after a step that was taken back comes
+    another one that may be, and torque alone is cheaper.
+    """
+
+    def __init__(self, inverse: Inverse, pieces: Sequence[Piece]) -> None:
+        self._inverse, self._pieces = inverse, pieces
+        self._last: tuple[bytes, tuple[Array, Array]] = b"", (np.zeros(0), np.zeros((0, 0)))
+        self._goes_on = True
+
+    def torque(self, values: Array) -> Array:
+        """Torque (rows,)."""
+        if self._goes_on:
+            torque = self.whole(values)[0]
+            self._goes_on = False
+            return torque
+        alone = Inverse(with_values(self._inverse.mount, self._inverse.free, values), ())
+        return stacked(alone, self._pieces, np.zeros(0))[0]
+
+    def whole(self, values: Array) -> tuple[Array, Array]:
+        """Torque, and its derivatives (rows, free)."""
+        self._goes_on, key = True, values.tobytes()
+        if self._last[0] != key:
+            self._last = key, stacked(self._inverse, self._pieces, values)
+        return self._last[1]
 
 
 class _Part(NamedTuple):

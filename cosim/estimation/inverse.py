@@ -9,7 +9,7 @@ their phase is another in each piece, found in the torque recorded there (`tonal
 those of the plant: the same objects, with measured motion put in (`equations.py`).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -141,20 +141,26 @@ class Inverse:
         v, a = self._equations.motion(piece, full)
         spectrum = Spectrum(piece.lowpass(a)[:, None], piece.dt)
 
-        def added(numbers: Array) -> Array:
-            total: Array = np.zeros_like(a)
-            far = self._behind_motors(numbers)
-            for prefix in couplings:
-                coupling = self._set(prefix, numbers)
-                far = far * coupling.share()
-                carried = coupling.carried(spectrum.omega)
-                if carried is None:
-                    total += piece.lowpass(stepped_torque(coupling, far, v, a, piece.dt))
+        def added(sets: Sequence[Array]) -> Array:
+            total = np.zeros((len(sets), len(a)))
+            for several in zip(*map(self._far, sets), strict=True):
+                far, parts = zip(*several, strict=True)
+                carried = [one.carried(spectrum.omega) for one in parts]
+                if carried[0] is None:
+                    total += piece.lowpass(stepped_torque(parts, far, v, a, piece.dt).T).T
                 else:
-                    total += spectrum.times(far * (carried - 1))[:, 0]
+                    total += [spectrum.times(f * (c - 1))[:, 0] for f, c in zip(far, carried, strict=True)]
             return total
 
         return self._with_changes(columns, full, added, ("axis.inertia", *motors, *couplings))
+
+    def _far(self, full: Array) -> Iterator[tuple[float, Any]]:
+        """Couplings, the nearest first, each with the inertia behind it."""
+        far = self._behind_motors(full)
+        for prefix, _ in self.mount.trailing():
+            coupling = self._set(prefix, full)
+            far = far * coupling.share()
+            yield far, coupling
 
     def _behind_motors(self, full: Array) -> float:
         """Inertia that the transmissions leave for the axis."""
@@ -180,7 +186,7 @@ class Inverse:
             motor = numbers[self.names.index("axis.inertia")] - self._behind_motors(numbers)
             return np.asarray(both[:, 1] - motor * both[:, 0])
 
-        out = self._with_changes(columns, full, added, ("axis.inertia", *motors))
+        out = self._with_changes(columns, full, _each(added), ("axis.inertia", *motors))
         out[:, 1:] += spectrum.times(self._demand(full, spectrum.omega) - 1, slice(2, None))
         return out
 
@@ -190,15 +196,20 @@ class Inverse:
         return np.asarray(np.prod([np.ones_like(omega, dtype=np.complex128), *parts], axis=0))
 
     def _with_changes(
-        self, columns: Array, full: Array, added: Callable[[Array], Array], prefixes: Sequence[str]
+        self, columns: Array, full: Array, added: Callable[[Sequence[Array]], Array], prefixes: Sequence[str]
     ) -> Array:
-        """Add a torque that depends on some parts, and its derivatives, by differences."""
-        now, out = added(full), columns.copy()
+        """Add a torque that depends on some parts, and its derivatives, by differences.
+
+        `added` gives the torque (sets, rows) for several sets of numbers.
+        """
+        bumped = {
+            1 + k: self._bumped(full, name) for k, name in enumerate(self.free) if name.startswith(tuple(prefixes))
+        }
+        now, *others = added([full, *(other for other, _ in bumped.values())])
+        out = columns.copy()
         out[:, 0] += now
-        for column, name in enumerate(self.free):
-            if name.startswith(tuple(prefixes)):
-                other, change = self._bumped(full, name)
-                out[:, 1 + column] += (added(other) - now) / change
+        for (column, (_, change)), other in zip(bumped.items(), others, strict=True):
+            out[:, column] += (other - now) / change
         return out
 
     def _undone_drive(self, columns: Array, full: Array, dt: float) -> Array:
@@ -248,7 +259,7 @@ class Inverse:
         def added(numbers: Array) -> Array:
             return np.asarray(sum(torque for _, torque in in_phase(piece, residual, self._tones(numbers), rows)))
 
-        return self._with_changes(columns, full, added, prefixes)
+        return self._with_changes(columns, full, _each(added), prefixes)
 
     def _tones(self, full: Array) -> list[Tone]:
         """What shakes the axis, as the torque in front of the drive shows it."""
@@ -264,6 +275,11 @@ class Inverse:
     def _telling(self, piece: Piece) -> npt.NDArray[np.bool_]:
         """Rows whose rest tells a phase."""
         return np.asarray(piece.inside & described_rows(self.mount.friction, piece.v))
+
+
+def _each(added: Callable[[Array], Array]) -> Callable[[Sequence[Array]], Array]:
+    """The same for several sets of numbers, one after the other."""
+    return lambda sets: np.vstack([added(numbers) for numbers in sets])
 
 
 def stacked(inverse: Inverse, pieces: Sequence[Piece], values: Array) -> tuple[Array, Array]:

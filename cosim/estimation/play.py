@@ -6,6 +6,7 @@ The far side is simulated behind the recorded near one: it coasts, rubs and is c
 is stiffer than the band of a diagnosis, so one implicit step a row is enough; exact bouncing would explain nothing.
 """
 
+from collections.abc import Sequence
 from functools import cache, lru_cache
 from typing import Any
 
@@ -21,15 +22,24 @@ from pyfmi_models.model import fields_of
 SEARCHED = 150.0
 """Rows a second that tell where in a grid the play is."""
 
+AT_ONCE = 8
+"""Plays of a grid that are simulated together: more do not take less time each, but more memory."""
 
-def stepped_torque(coupling: Coupling, far: float, v: Array, a: Array, dt: float) -> Array:
-    """Torque [N m] that a far mass of inertia `far` adds at rows dt apart, the near side at speed v, acceleration a."""
-    numbers = np.array([far, *(getattr(coupling, name) for name in fields_of(coupling))])
+
+def stepped_torque(couplings: Sequence[Coupling], far: Sequence[float], v: Array, a: Array, dt: float) -> Array:
+    """Torque [N m] that far masses of inertia `far` add at rows dt apart, the near side at speed v, acceleration a.
+
+    For several couplings of one kind at once: (couplings, rows).
+    """
+    names = fields_of(couplings[0])
+    numbers = [
+        [one, *(getattr(coupling, name) for name in names)] for coupling, one in zip(couplings, far, strict=True)
+    ]
     columns = np.vstack([v[:-1], v[1:], np.full(len(v) - 1, dt)])
-    kind: Any = type(coupling)
-    passed = _walk(kind, fields_of(coupling))(columns, numbers)[-1]
+    kind: Any = type(couplings[0])
+    passed = _walk(kind, names)(columns, np.array(numbers))[:, -1]
     # A step's torque is that of its middle: a row has half of the step before it and half of the one after it.
-    return np.asarray((passed + np.append(passed[1:], passed[-1])) / 2 - far * a)
+    return np.asarray((passed + np.column_stack([passed[:, 1:], passed[:, -1]])) / 2 - np.outer(far, a))
 
 
 @lru_cache(maxsize=4)
@@ -38,15 +48,16 @@ def far_torques(prepared: Prepared, plays: tuple[tuple[float, float], ...], rati
 
     `ratio` is viscous over dry friction [s/rad]. It serves a search: rows are no denser than `SEARCHED` asks for.
     """
-    found = [np.column_stack([_searched(piece, *play, ratio) for play in plays]) for piece in prepared.pieces]
-    return np.concatenate(found)
+    several = [Backlash(gap_rad=gap, load_friction=slow, load_viscous=ratio * slow) for gap, slow in plays]
+    groups = [several[first : first + AT_ONCE] for first in range(0, len(several), AT_ONCE)]
+    return np.concatenate([np.column_stack([_searched(piece, some) for some in groups]) for piece in prepared.pieces])
 
 
-def _searched(piece: Piece, gap: float, slowing: float, ratio: float) -> Array:
+def _searched(piece: Piece, plays: Sequence[Backlash]) -> Array:
     step = max(1, int(1 / (SEARCHED * piece.dt)))
-    play = Backlash(gap_rad=gap, load_friction=slowing, load_viscous=ratio * slowing)
-    coarse = stepped_torque(play, 1.0, piece.v[::step], piece.a[::step], step * piece.dt)
-    return piece.lowpass(np.interp(piece.t, piece.t[::step], coarse))[piece.kept]
+    coarse = stepped_torque(plays, [1.0] * len(plays), piece.v[::step], piece.a[::step], step * piece.dt)
+    fine = np.vstack([np.interp(piece.t, piece.t[::step], one) for one in coarse])
+    return piece.lowpass(fine.T)[piece.kept]
 
 
 @cache

@@ -47,10 +47,11 @@ class Cell:
     Args:
         quiet: keep what the process writes to stderr for the reason of a crash, in place of showing it.
         keep: file descriptors that the process inherits, for example that of a lock which shall outlive this process.
+        one_thread: let linear algebra have one thread: the cores are busy with other runs already.
     """
 
-    def __init__(self, quiet: bool = True, keep: tuple[int, ...] = ()) -> None:
-        self._quiet, self._keep = quiet, keep
+    def __init__(self, quiet: bool = True, keep: tuple[int, ...] = (), one_thread: bool = True) -> None:
+        self._quiet, self._keep, self._one_thread = quiet, keep, one_thread
         self._process: subprocess.Popen[bytes] | None = None
         self._said: IO[bytes] | None = None
         self._folder: Scratch | None = None
@@ -132,8 +133,7 @@ class Cell:
         self._said = tempfile.TemporaryFile("a+b") if self._quiet else None  # noqa: SIM115 it lives as long as the process
         home = str(Path(__file__).parents[2])
         paths = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
-        # One thread of linear algebra each: the cores are busy with runs already.
-        environment = os.environ | {"PYTHONPATH": paths, "OMP_NUM_THREADS": "1"}
+        environment = os.environ | {"PYTHONPATH": paths} | ({"OMP_NUM_THREADS": "1"} if self._one_thread else {})
         environment |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)
         command = [sys.executable, "-m", "cosim.support.child", str(Path(folder) / BOARD), str(os.getpid())]
         # A session of its own: Ctrl-C at the terminal reaches the parent alone, which then ends this process.
@@ -203,6 +203,11 @@ class Cell:
         self._said.seek(0)
         lines = self._said.read().decode("utf-8", "replace").strip().splitlines()
         return f'; it last said "{lines[-1].strip()}"' if lines else ""
+
+
+def cores() -> int:
+    """Return how many processes this one may use at a time."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _reserve(board: Path, folder: Scratch) -> None:

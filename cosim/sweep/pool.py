@@ -1,6 +1,5 @@
 """Who does the runs: processes of this machine, or those of a Dask cluster; to the sweep both are the same."""
 
-import os
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -9,7 +8,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
-from cosim.support.cell import Cell, LostError
+from cosim.support.cell import Cell, LostError, cores
 from cosim.support.errors import MissingPackageError, SweepError
 from cosim.sweep.design import Point
 from cosim.sweep.job import Job, Row, work
@@ -107,11 +106,6 @@ def most_workers(workers: int | None, runs: int) -> int:
     if workers is not None and workers > MOST:
         raise SweepError(f"--workers {workers}: {MOST:,} are the most.", culprit="workers", value=workers)
     return min(workers or cores(), runs)
-
-
-def cores() -> int:
-    """Return how many processes this one may use at a time."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager

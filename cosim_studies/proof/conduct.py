@@ -9,11 +9,12 @@ from pathlib import Path
 from time import sleep
 
 from cosim.diagnosis.calibration import OFFSET, SLOPE
+from cosim.support.cell import cores
 from cosim.support.errors import ProofError
 from cosim.support.plain import Parsed
 from cosim.support.version import __version__
 from cosim.sweep.journal import Journal
-from cosim.sweep.pool import MOST, cores
+from cosim.sweep.pool import MOST
 from cosim_studies.proof.cases import CaseSpec, cases_of
 from cosim_studies.proof.page import MADE, proof, write
 from cosim_studies.proof.play import CaseRunner, Tool
