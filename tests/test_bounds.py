@@ -13,6 +13,7 @@ from cosim.diagnosis.bounds import tested as seen_from
 from cosim.diagnosis.candidates import columns_of
 from cosim.diagnosis.concealment import Concealment, Hidden
 from cosim.diagnosis.hypotheses import candidates
+from cosim.estimation.inverse import Inverse, stacked
 
 sys.path.append(str(Path(__file__).parent / "benchmarks"))
 from bounds import Stand, case, drawn
@@ -101,3 +102,24 @@ def test_forms_that_no_number_of_a_bound_tells_apart_share_the_hardest_ones(hard
     (bound,) = seen_from(Deaf(), {"cable_wrap": pairs}).values()  # type: ignore[arg-type]
     assert harder <= bound.size < most
     assert bound.power == 1.0
+
+
+@pytest.mark.parametrize(("nameless", "last"), [(9.0, 30.0), (40.0, 20.0), (30.0, 10.0)])
+def test_the_bound_of_a_resonance_ends_before_what_would_not_be_called_a_spring(nameless: float, last: float) -> None:
+    spring = next(one for one in stand().members() if one.effect == "compliance")
+    places = (10.0, 20.0, 30.0, 40.0)
+    members = [replace(spring, place=place, directions=(np.ones(1),), has_name=place != nameless) for place in places]
+    hidden = Hidden("compliance", np.array([0.0]), np.ones(1), 0.0)
+    (bound,) = seen_from(Deaf(), {"compliance": [(one, hidden) for one in members]}).values()  # type: ignore[arg-type]
+    assert (bound.size, bound.places) == (last, (10.0, last))
+
+
+def test_of_a_knee_all_that_it_takes_is_concealed() -> None:
+    here = stand()
+    knee = next(one for one in here.members() if one.effect == "torque_saturation")
+    assert knee.instance.slope == 0.5  # type: ignore[attr-defined]
+    grown = replace(here.base.mount, effects=(*here.base.mount.effects, knee.instance))
+    pieces = here.problem.prepared.pieces
+    needed = [stacked(Inverse(one, ()), pieces, np.zeros(0))[0] for one in (grown, here.base.mount)]
+    np.testing.assert_allclose(knee.columns[:, 0], needed[0] - needed[1], atol=1e-9)
+    assert np.abs(knee.columns).max() > 0.01 * np.abs(needed[1]).max()

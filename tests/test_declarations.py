@@ -106,7 +106,7 @@ NO_TORQUE = {
 }
 """What no torque added to the command can do: couplings, sensors, clocks, and an inertia that changes."""
 LATER = NO_TORQUE - {"AltitudeInertia", "EncoderEccentricity", "InertiaVariation"}
-LATER |= {"ActuatorLag", "Delay", "DeadBand", "LearnedDrive", "TorqueDroop", "WarmTorqueDroop", "TorqueSaturation"}
+LATER |= {"ActuatorLag", "Delay", "LearnedDrive"}
 """What changes what drive, springs and clocks make of a motion, not what each moment of it needs."""
 NOT_TOLD = {"BoucWen", "FrictionWander"}
 """Of what a recorded motion cannot tell: chance, a memory that is not linear."""

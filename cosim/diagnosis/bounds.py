@@ -83,7 +83,7 @@ def _last(concealment: Concealment, members: Sequence[tuple[Member, Hidden]]) ->
     order = sorted(members, key=lambda pair: -pair[0].easiest * pair[0].place)
     last: list[float] = []
     for member, hidden in order:
-        if not all(concealment.is_found(hidden, weights) for weights in member.directions):
+        if not (member.has_name and all(concealment.is_found(hidden, way) for way in member.directions)):
             break
         last.append(member.place)
     sure = last[:-1] or last

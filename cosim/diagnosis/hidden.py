@@ -10,7 +10,7 @@ from math import pi
 
 import numpy as np
 
-from cosim.diagnosis.admissibility import needs_turns
+from cosim.diagnosis.admissibility import is_degenerate, needs_turns
 from cosim.diagnosis.candidates import Candidate, Span, columns_of
 from cosim.diagnosis.hypotheses import HYPOTHESES, hypothesis_of
 from cosim.estimation.prepare import Array, Prepared
@@ -45,6 +45,8 @@ class Member:
     most: float = np.inf
     """... and above which it cannot be."""
     phases: int = 0
+    has_name: bool = True
+    """Whether it would be given its name where it is as it stands here."""
 
     @property
     def effect(self) -> str:
@@ -69,15 +71,12 @@ def members(problem: Problem, mount: Mount, span: Span, tried: Sequence[Candidat
     columns = columns_of(mount, even, problem.prepared, values)
     torque = rms(problem.prepared.stacked("tau"))
     many = {name: sum(one.effect == name for one in tried) for name in {one.effect for one in chosen}}
-    made = [
-        _member(one, own, mount, torque, many[one.effect], problem.sample_time)
-        for one, own in zip(even, columns, strict=True)
-    ]
+    made = [_member(one, own, problem, mount, torque, many[one.effect]) for one, own in zip(even, columns, strict=True)]
     tones = [one for one in chosen if hypothesis_of(one.instances[0]).has_own_phase]
     return [*made, *_tones(problem.prepared, tones, torque, many)]
 
 
-def _member(one: Candidate, columns: Array, mount: Mount, torque: float, many: int, step: float) -> Member:
+def _member(one: Candidate, columns: Array, problem: Problem, mount: Mount, torque: float, many: int) -> Member:
     instance, own = one.instances[0], hypothesis_of(one.instances[0])
     main = instance.main
     size = column_rms(columns)
@@ -90,9 +89,14 @@ def _member(one: Candidate, columns: Array, mount: Mount, torque: float, many: i
         prior=np.ones(columns.shape[1]) if one.finite else 0.5 * torque / size,
         many=many,
         none=own.none(mount),
-        least=own.least(step),
+        least=own.least(problem.sample_time),
         most=min(high, MOST_TORQUE * torque if main.unit == "N.m" else np.inf),
+        has_name=not own.easiest or _has_name(problem, mount, instance),
     )
+
+
+def _has_name(problem: Problem, mount: Mount, effect: Effect) -> bool:
+    return hypothesis_of(effect).shows(effect, mount, problem.prepared) and not is_degenerate(problem, effect)
 
 
 def _directions(one: Candidate, count: int) -> tuple[Array, ...]:
@@ -101,7 +105,7 @@ def _directions(one: Candidate, count: int) -> tuple[Array, ...]:
     own, main = hypothesis_of(instance), instance.main.parameter
     low = next(variable.low for variable in parameters_of(instance) if variable.name == main)
     if own.easiest:
-        return (own.unit_step * unit[0],)
+        return (unit[0],)
     if len(one.instances) == 2:
         return (*unit, *-unit) if hasattr(instance, "phase") else tuple(unit)
     unit[0] /= abs(float(getattr(instance, main))) if one.finite and getattr(instance, main) else 1.0

@@ -20,6 +20,7 @@ class DeadBand(DriveEffect):
     """
 
     id: ClassVar[str] = "dead_band"
+    at_once: ClassVar[bool] = True
     title: ClassVar[str] = "Dead band of the drive"
     equation: ClassVar[str] = "the drive gives nothing within the band"
     main: ClassVar[Main] = Main("band")

@@ -28,6 +28,7 @@ class TorqueDroop(DriveEffect):
     """
 
     id: ClassVar[str] = "torque_droop"
+    at_once: ClassVar[bool] = True
     title: ClassVar[str] = "Droop of the torque constant"
     equation: ClassVar[str] = "u / (1 + c |u|/u₀), times 1 + k (T − 20 °C) where the motor's temperature is known"
     main: ClassVar[Main] = Main("droop", 100.0, "% at the rated torque")

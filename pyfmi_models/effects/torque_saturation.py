@@ -29,6 +29,7 @@ class TorqueSaturation(DriveEffect):
     """
 
     id: ClassVar[str] = "torque_saturation"
+    at_once: ClassVar[bool] = True
     title: ClassVar[str] = "Torque saturation"
     equation: ClassVar[str] = "the drive gives less above the knee"
     main: ClassVar[Main] = Main("knee_torque", is_size=False)

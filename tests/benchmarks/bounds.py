@@ -105,8 +105,6 @@ def drawn(member: Member, bound: SeenFrom, draw: np.random.Generator, runs: int)
     main, own = member.instance.main.parameter, hypothesis_of(member.instance)
     known = {variable.name: variable for variable in parameters_of(member.instance)}
     numbers: dict[str, Any] = {} if own.easiest else {main: bound.size}
-    if "slope" in known:
-        numbers["slope"] = 1 + own.unit_step
     if "cycles_per_rev" in known or "frequency_hz" in known:
         low, high = bound.places
         numbers[own.member] = float(np.exp(draw.uniform(np.log(low), np.log(high))))

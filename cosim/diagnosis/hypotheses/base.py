@@ -97,8 +97,6 @@ class Hypothesis(Generic[Form]):
     """Where the main number says where the effect sets in: whether less (-1) or more (1) of it is easier to find."""
     member: ClassVar[str] = ""
     """The parameter by which what is concealed differs: cycles, a frequency, a width."""
-    unit_step: ClassVar[float] = 1.0
-    """Weight of the column that is concealed where the effect has no size of its own."""
     sizes: ClassVar[tuple[str, ...]] = ()
     """Parameters of which one must differ from none, where that is not the main number alone."""
     caveat: ClassVar[str] = ""
@@ -232,6 +230,11 @@ def with_numbers(one: Candidate, **numbers: float) -> Candidate:
     """A candidate with other nonlinear numbers."""
     change: Any = replace
     return replace(one, instances=tuple(change(instance, **numbers) for instance in one.instances))
+
+
+def of_that_size(one: Candidate, **numbers: float) -> Candidate:
+    """A candidate whose column is all that the effect changes with these numbers, not its derivative at none of it."""
+    return replace(with_numbers(one, **numbers), linear=())
 
 
 def in_cycles_a_turn(seen: Seen, mount: Mount) -> str:

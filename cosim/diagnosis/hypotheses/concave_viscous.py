@@ -1,6 +1,6 @@
 """Viscous friction that rises less than linearly."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import ClassVar
 
@@ -8,7 +8,7 @@ import casadi as ca
 import numpy as np
 
 from cosim.diagnosis.candidates import Candidate, Span, contact_level, has
-from cosim.diagnosis.hypotheses.base import Evidence, Hypothesis, Reach, Seen
+from cosim.diagnosis.hypotheses.base import Evidence, Hypothesis, Reach, Seen, of_that_size
 from cosim.diagnosis.result import Where
 from cosim.diagnosis.tuning import refound
 from cosim.estimation.fit import Fit
@@ -26,6 +26,9 @@ Friction that is another law's leaves .032 of it at most (`policy.large_residual
 THINNING = (0.03, 0.1, 0.3)
 """Speeds from which on grease thins that are tried, relative to the top speed: two a decade of what bends in sight."""
 
+ROOT = 0.5
+"""Exponent of a middling one."""
+
 
 class ThinningGrease(Hypothesis[ConcaveViscous]):
     """A power of the speed below one, from three speeds on.
@@ -38,7 +41,6 @@ class ThinningGrease(Hypothesis[ConcaveViscous]):
 
     forms = (ConcaveViscous,)
     easiest: ClassVar[int] = -1
-    unit_step: ClassVar[float] = -0.5
     member: ClassVar[str] = "thinning_speed"
     rank: ClassVar[float] = 14.5
     needs_position: ClassVar[bool] = False
@@ -61,7 +63,7 @@ class ThinningGrease(Hypothesis[ConcaveViscous]):
 
     def tuned(self, problem: Problem, found: Fit, start: ConcaveViscous, evidence: Evidence) -> Fit:
         """Start from each speed: what thins early and little resembles what thins late and much."""
-        starts = [replace(start, thinning_speed=share * problem.top_speed, exponent=0.5) for share in THINNING]
+        starts = [replace(start, thinning_speed=share * problem.top_speed, exponent=ROOT) for share in THINNING]
         return refound(problem, found, evidence, starts)
 
     def shows(self, effect: ConcaveViscous, mount: Mount, prepared: Prepared) -> bool:
@@ -76,6 +78,10 @@ class ThinningGrease(Hypothesis[ConcaveViscous]):
     def none(self, mount: Mount) -> float:
         """A straight line."""
         return 1.0
+
+    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
+        """A root of the speed from each speed on."""
+        return [of_that_size(one, exponent=ROOT) for one in tried]
 
     def looked(self, seen: Seen, mount: Mount) -> str:
         """Lower speeds, above which the viscous torque is a root of the speed."""

@@ -1,17 +1,20 @@
 """What a drive withholds."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import ClassVar
 
 import numpy as np
 
 from cosim.diagnosis.candidates import Candidate, Span, has
-from cosim.diagnosis.hypotheses.base import QUICK_CHANGES, Hypothesis, Reach, Seen
+from cosim.diagnosis.hypotheses.base import QUICK_CHANGES, Hypothesis, Reach, Seen, of_that_size
 from cosim.diagnosis.result import Where
 from cosim.estimation.prepare import Array
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.torque_saturation import TorqueSaturation
 from pyfmi_models.mount import Mount
+
+HALF = 0.5
+"""Slope past the knee of a middling one."""
 
 
 class Saturation(Hypothesis[TorqueSaturation]):
@@ -19,7 +22,6 @@ class Saturation(Hypothesis[TorqueSaturation]):
 
     forms = (TorqueSaturation,)
     easiest: ClassVar[int] = -1
-    unit_step: ClassVar[float] = -0.5
     rank: ClassVar[float] = 15
     needs_position: ClassVar[bool] = False
     view = "load"
@@ -37,6 +39,10 @@ class Saturation(Hypothesis[TorqueSaturation]):
 
                 full = TorqueSaturation(knee_torque=knee, slope=1.0)
                 yield Candidate("torque_saturation", (full,), ("slope",), start)
+
+    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
+        """Half of what is asked for past each knee."""
+        return [of_that_size(one, slope=HALF) for one in tried]
 
     def looked(self, seen: Seen, mount: Mount) -> str:
         """Lower knees, past which half of what is asked for comes."""
