@@ -170,3 +170,43 @@ def test_other_exceptions_that_python_ignores_are_told_as_ever() -> None:
     assert code == 0
     assert said.startswith("Exception ignored in: ")
     assert said.endswith("ValueError: of a finalizer\n")
+
+
+ASKED = """
+import os, signal, time
+import casadi as ca
+from cosim.cli import guarded, main
+from cosim.support.interrupts import end_well
+
+class Shaped:
+    asked = 0
+
+    @property
+    def shape(self):
+        self.asked += 1
+        if self.asked == 1:
+            os.kill(os.getpid(), signal.{name})
+        return 1, 1
+
+def verb():
+    try:
+        ca.fmax(ca.SX.sym("x"), Shaped())
+    except NotImplementedError:
+        pass  # it is no number
+    time.sleep(600)
+
+end_well()
+guarded(verb, False)()
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "said"), [("SIGINT", 130, "cosim: interrupted\n"), ("SIGTERM", 143, "cosim: terminated\n")]
+)
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_a_signal_that_comes_where_casadi_takes_errors_for_an_answer_is_not_lost(
+    name: str, code: int, said: str
+) -> None:
+    command = [sys.executable, "-c", ASKED.format(name=name)]
+    done = subprocess.run(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
+    assert (done.returncode, done.stderr) == (code, said)

@@ -15,7 +15,10 @@ ENDING = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasatt
 """Signals that ask a process to end, beside Ctrl-C."""
 
 AGAIN = 0.01
-"""Seconds until a signal is raised again that came where Python ignores exceptions; by then it has left that place."""
+"""Seconds until a signal is raised again that came where exceptions are lost; by then it has left that place."""
+FORGETFUL = f"{os.sep}casadi{os.sep}"
+"""In the path of code that loses exceptions: CasADi asks a value for its shape, in Python, and takes an error for a no.
+Of 150 signals into a search four were lost there."""
 
 
 class Terminated(KeyboardInterrupt):
@@ -49,7 +52,27 @@ def is_terminated() -> bool:
 
 def _end(number: int, frame: FrameType | None) -> None:
     _HEARD.append(number)
+    if _is_lost(frame):
+        _again(number)
+        return
     raise KeyboardInterrupt if number == signal.SIGINT else Terminated
+
+
+def _is_lost(frame: FrameType | None) -> bool:
+    """Whether an exception that is raised here may never arrive."""
+    while frame:
+        if FORGETFUL in frame.f_code.co_filename:
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _again(number: int) -> None:
+    """Raise a signal again in a moment."""
+    again = threading.Timer(AGAIN, _raise_again, [number])
+    again.daemon = True
+    with suppress(RuntimeError):  # no thread begins while Python ends, and it does end
+        again.start()
 
 
 @dataclass(frozen=True)
@@ -65,10 +88,7 @@ class _Heard:
         if not (_HEARD and issubclass(ignored.exc_type, KeyboardInterrupt)):
             self.before(ignored)
             return
-        again = threading.Timer(AGAIN, _raise_again, [_HEARD[-1]])
-        again.daemon = True
-        with suppress(RuntimeError):  # no thread begins while Python ends, and it does end
-            again.start()
+        _again(_HEARD[-1])
 
 
 def _raise_again(number: int) -> None:
