@@ -5,7 +5,7 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.estimation.prepare import Prepared, prepare
-from cosim.estimation.row_weights import weights
+from cosim.estimation.row_weights import remembers, weights
 from pyfmi_models.friction import Coulomb, LuGre
 
 COULOMB, LUGRE = Coulomb(Fc=1.0), LuGre(Fc=1.0, Fs=1.2, Vs=0.01, sigma0=1e4)
@@ -50,3 +50,20 @@ def test_a_recording_that_moves_slowly_counts_and_one_at_rest_does_not() -> None
 
 def test_one_speed_in_all_recordings_is_no_group() -> None:
     assert weights(COULOMB, recorded([np.full(600, 1.0)] * 2)) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("step", "rests"), [(1e-6, 1.0), (3e-4, 0.0)])
+def test_a_bristle_that_slides_within_the_encoders_step_says_nothing_at_rest(step: float, rests: float) -> None:
+    t = np.arange(1200) / 100
+    way = np.where(t < 6, t, 6.0 + 2 * step * np.sin(20 * t))
+    read = step * np.rint(way / step)
+    prepared = prepare([Recording("run", {"t": t, "q": read, "tau": np.ones_like(t)})], 5.0)
+    assert prepared.seen == pytest.approx(2 * step if rests < 1 else prepared.seen)
+    assert remembers(LUGRE, prepared) is (rests == 1.0)
+    still = prepared.stacked("t") > 7
+    assert np.median(weights(LUGRE, prepared)[still]) == rests
+
+
+def test_a_law_without_memory_remembers_nothing() -> None:
+    assert not remembers(COULOMB, recorded([np.full(600, 1.0)]))
+    assert remembers(LUGRE, recorded([np.full(600, 1.0)]))

@@ -20,6 +20,9 @@ WHOLE, MOSTLY = 0.05, 0.95
 MOST = 10.0
 """Multiples above this say nothing: there rounding of the values in the file adds up."""
 
+SEEN_STEPS = 2.0
+"""Steps that a displacement needs to be seen: each of its two ends is known to one."""
+
 
 def resolution(values: Array) -> float:
     """Return the step of a column in its own unit, 0 where it is too fine to be seen."""

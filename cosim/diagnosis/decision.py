@@ -52,6 +52,8 @@ class ResidualScores:
     over_time: str = "time"
     share_beside: float = 0.0
     """The same beside what friction laws cannot agree on."""
+    in_place: tuple[str, ...] = ()
+    """Quantities of which a term explains more than a name did that was taken out for it."""
 
 
 @dataclass(frozen=True)
@@ -174,6 +176,8 @@ def is_left(effects: Sequence[EffectScores], residual: ResidualScores, policy: P
     """Whether something is left that is no misfit of a friction law, nor of the equations of what is named."""
     large = residual.share > policy.large_residual or residual.share_there > policy.large_residual_there
     large = large or residual.share_beside > policy.large_residual_beside
+    if residual.in_place:
+        return True
     doubtful = doubted(effects, residual, policy)
     least = least_left([one for one in effects if one.effect not in doubtful], policy)
     return large or any(_is_no_misfit(one, least, policy) for one in residual.terms)
@@ -208,6 +212,8 @@ def _floor_of(term: TermScores, policy: Policy) -> float:
 
 def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
     """Quantities that the residual follows elsewhere, the best first; where there is none, how it goes over time."""
+    if residual.in_place:
+        return residual.in_place
     best = max((one.share for one in residual.terms), default=0.0)
     least = max(policy.follows, policy.beside * best)
     ranked = sorted(residual.terms, key=lambda one: -one.share)

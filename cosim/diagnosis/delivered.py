@@ -11,7 +11,7 @@ from cosim.diagnosis.search import weighed
 
 def standing(comparison: Comparison, proof: Proof) -> Sequence[AcceptedEffect]:
     """The effects that stand, each weighed beside just those that are delivered with it."""
-    return [_weighed(comparison, proof, one) for one in proof.standing] if proof.unproven else proof.standing
+    return [one if one.own.fit is proof.chosen else _weighed(comparison, proof, one) for one in proof.standing]
 
 
 def _weighed(comparison: Comparison, proof: Proof, one: AcceptedEffect) -> AcceptedEffect:

@@ -18,7 +18,7 @@ from cosim.diagnosis.delivered import standing
 from cosim.diagnosis.denied import beyond_denial, without_denied
 from cosim.diagnosis.entries import NotLearnedEntry
 from cosim.diagnosis.experiment import Experiment, best, told
-from cosim.diagnosis.findings import accepted, rival_finding, standard_errors
+from cosim.diagnosis.findings import accepted, rival_finding, standard_errors, taken_finding
 from cosim.diagnosis.flexible import flexible_terms
 from cosim.diagnosis.global_test import global_test
 from cosim.diagnosis.law_selection import proposed_law
@@ -26,6 +26,7 @@ from cosim.diagnosis.learned.learn import NOTHING_TRIED, Learned, learn
 from cosim.diagnosis.learned.proposal import Proposal
 from cosim.diagnosis.locate import regions
 from cosim.diagnosis.loop_bias import loop_bias
+from cosim.diagnosis.nameless import Nameless, nameless
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.proof import Proof, prove
@@ -69,9 +70,14 @@ class Answer:
 
     comparison: Comparison
     base: Fit
-    proof: Proof
     decision: Decision
     held: Predictive
+    found: Nameless
+
+    @property
+    def proof(self) -> Proof:
+        """What stands on the held-out recordings."""
+        return self.found.proof
 
     @property
     def chosen(self) -> Fit:
@@ -165,9 +171,9 @@ def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Record
     """Prove, measure what is left, decide."""
     prepared = prepare(heldout, comparison.problem.prepared.cutoff)
     held = Predictive.of(comparison, prepared, examined.base, prepare(heldout, CUTOFF))
-    proof = prove(comparison, examined, held)
-    residual, policy = _residual_scores(comparison, proof, held), comparison.policy
-    return Answer(comparison, examined.base, proof, decide(_scores(proof), residual, policy), held)
+    found = nameless(comparison, examined, prove(comparison, examined, held), held)
+    residual = _residual_scores(comparison, found, held)
+    return Answer(comparison, examined.base, decide(_scores(found.proof), residual, comparison.policy), held, found)
 
 
 def _scores(proof: Proof) -> list[EffectScores]:
@@ -178,12 +184,12 @@ def _scores(proof: Proof) -> list[EffectScores]:
     ]
 
 
-def _residual_scores(comparison: Comparison, proof: Proof, held: Predictive) -> ResidualScores:
-    left, there = share_left(comparison, proof.chosen), held.residual(proof.chosen.mount)
-    terms = flexible_terms(comparison, proof.chosen, held)
-    shown = over_time(comparison, proof.chosen)
-    beside = share_beside(comparison, proof.chosen, there, held)
-    return ResidualScores(left, share_there(comparison, there, held), terms, shown, beside)
+def _residual_scores(comparison: Comparison, found: Nameless, held: Predictive) -> ResidualScores:
+    chosen = found.proof.chosen
+    left, there = share_left(comparison, chosen), held.residual(chosen.mount)
+    terms, shown = flexible_terms(comparison, chosen, held), over_time(comparison, chosen)
+    beside = share_beside(comparison, chosen, there, held)
+    return ResidualScores(left, share_there(comparison, there, held), terms, shown, beside, found.quantities)
 
 
 def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Recording], name: str) -> Diagnosis:
@@ -280,6 +286,7 @@ def _findings(answer: Answer, signals: Sequence[Trace]) -> list[Finding]:
     named = {finding.effect for finding in found}
     rivals = [finding for finding in rivals if finding.effect not in named]
     lost = [replace(rival_finding(one.own, 0.0, mount), answer="not_proven") for one in answer.proof.unproven]
+    lost += [taken_finding(one.own, term.name, mount) for one, term in answer.found.taken]
     named |= {finding.effect for finding in (*rivals, *lost)}
     largest = max((one.own.evidence for one in answer.proof.standing), default=0.0)
     return [*found, *rivals, *lost, *not_found(comparison, answer.chosen, sorted(named), largest)]

@@ -1,7 +1,7 @@
 """From structures to sentences: findings of effects that stand, that rival them, or that were not proven."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, floor, log10
 
 import numpy as np
@@ -149,6 +149,12 @@ def rival_finding(rival: CandidateFit, probability: float, mount: Mount) -> Find
         told_apart_by=effect.told_apart_by,
         action=advice(effect, False),
     )
+
+
+def taken_finding(one: CandidateFit, quantity: str, mount: Mount) -> Finding:
+    """Describe an effect in whose place something without a name explains more."""
+    evidence = f"what goes with {quantity} explains more in its place"
+    return replace(rival_finding(one, 0.0, mount), answer="not_proven", evidence=evidence)
 
 
 def _size(effect: Effect, numbers: Numbers, mount: Mount) -> tuple[str, str]:

@@ -136,5 +136,10 @@ class Policy:
     """The same, in training or held out, beside what friction laws cannot agree on and a level that wanders, noise
     taken out. Unit: 1. 180 nulls of two generators left at most .032."""
 
+    @property
+    def excluded_beside_unknown(self) -> float:
+        """Evidence by which a rival is excluded where something has no name. Unit: nats."""
+        return self.set_margin / self.margin_beside_unknown
+
 
 POLICY = Policy()

@@ -41,6 +41,16 @@ def prove(comparison: Comparison, examined: Examined, held: Predictive) -> Proof
     return Proof(chosen, tuple(standing), predicted, tuple(one for one in order if one not in standing), removes)
 
 
+def without(comparison: Comparison, examined: Examined, proof: Proof, out: AcceptedEffect, held: Predictive) -> Proof:
+    """The proof of what is left where one of the effects that stand is taken out."""
+    rest = [one for one in proof.standing if one is not out]
+    chosen, standing, gains = _standing(comparison, examined, _with(comparison.problem, examined, rest), rest, held)
+    fallen = tuple(one for one in rest if one not in standing)
+    predicted = proof.predicted | {name: gain.nats for name, gain in gains.items()}
+    removes = {name: gain.narrow for name, gain in gains.items()}
+    return Proof(chosen, tuple(standing), predicted, (*proof.unproven, *fallen), removes)
+
+
 def _standing(
     comparison: Comparison, examined: Examined, chosen: Fit, some: Sequence[AcceptedEffect], held: Predictive
 ) -> tuple[Fit, list[AcceptedEffect], dict[str, Gain]]:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
 
 from cosim.data.recording import GAP, Gap, Recording
+from cosim.data.resolution import SEEN_STEPS, resolution
 from cosim.support.errors import RecordingError
 from cosim.support.statistics import rms
 
@@ -64,6 +65,8 @@ class Piece:
     extras: dict[str, Array] = field(default_factory=dict)
     reading_noise: float = 0.0
     """Amplitude density of the reading's white noise [rad s^1/2, m s^1/2]; of a speed's where only that was read."""
+    step: float = 0.0
+    """Step of the encoder [rad, m]; 0 where it is too fine to be seen."""
 
     def lowpass(self, columns: Array) -> Array:
         """Second pass of the filter, along the first axis."""
@@ -109,6 +112,11 @@ class Prepared:
         """Length of the positions visited [rad, m]."""
         low, high = self.ranges["q"]
         return high - low
+
+    @cached_property
+    def seen(self) -> float:
+        """Way [rad, m] below which the encoders show no displacement."""
+        return SEEN_STEPS * max(piece.step for piece in self.pieces)
 
     @cached_property
     def ranges(self) -> dict[str, tuple[float, float]]:
@@ -206,9 +214,7 @@ def _spans(recording: Recording, cutoff: float) -> list[slice]:
     """Rows between holes that are long enough."""
     dt, ends = recording.sample_time, [gap.row for gap in _holes(recording, cutoff)]
     spans = zip([0, *ends], [*ends, len(recording)], strict=True)
-    return [
-        slice(first, last) for first, last in spans if (last - first) * dt >= LEAST_SECONDS and last - first > TURNED
-    ]
+    return [slice(a, b) for a, b in spans if (b - a) * dt >= LEAST_SECONDS and b - a > TURNED]
 
 
 def _pieces(recording: Recording, index: int, cutoff: float) -> list[Piece]:
@@ -220,21 +226,22 @@ def _piece(recording: Recording, index: int, span: slice, cutoff: float) -> Piec
     dt = float(grid[-1] - grid[0]) / (len(grid) - 1)
     tau = lowpass(table["tau"], dt, cutoff)
     q, v, a = _motion(table, dt, cutoff)
-    step = max(1, int(1 / (8 * cutoff * dt)))
-    coarse, t = dt * step, grid[::step].copy()  # copies: what is thinned must not keep all rows alive
+    each = max(1, int(1 / (8 * cutoff * dt)))
+    coarse, t = dt * each, grid[::each].copy()  # copies: what is thinned must not keep all rows alive
     return Piece(
         recording=index,
         t=t,
-        q=q[::step].copy(),
-        v=v[::step].copy(),
-        a=a[::step].copy(),
-        tau=lowpass(tau[::step], coarse, cutoff),
+        q=q[::each].copy(),
+        v=v[::each].copy(),
+        a=a[::each].copy(),
+        tau=lowpass(tau[::each], coarse, cutoff),
         inside=_inside(t, float(grid[0]), float(grid[-1])) & ~recording.is_masked(t, 0.5 / cutoff),
         dt=coarse,
         cutoff=cutoff,
         stride=max(1, int(1 / (KEPT_RATE * cutoff * coarse))),
-        extras={n: c[::step].copy() for n, c in table.items() if n not in ("t", "tau", "q", "v")},
+        extras={n: c[::each].copy() for n, c in table.items() if n not in ("t", "tau", "q", "v")},
         reading_noise=noise_of(table["q" if "q" in table else "v"], dt) * sqrt(dt) if len(grid) > LEAST_ROWS else 0.0,
+        step=resolution(recording["q"]) if "q" in table else 0.0,
     )
 
 

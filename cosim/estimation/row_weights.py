@@ -24,6 +24,17 @@ def least_speed(v: Array) -> float:
     return CLEAR_MOTION * float(np.abs(v).max())
 
 
+def remembers(law: FrictionLaw, prepared: Prepared) -> bool:
+    """Whether recordings show what a law remembers: not where a contact slides before the encoder shows it bend.
+
+    Behind such an encoder a bristle answers rounding and noise with a part of the level, at rest and at turns.
+    """
+    stiffness, level = (getattr(law, name, None) for name in ("sigma0", "Fc"))
+    if isinstance(law, MemorylessLaw) or not stiffness or level is None:
+        return not isinstance(law, MemorylessLaw)
+    return float(np.mean(level)) / float(stiffness) >= prepared.seen
+
+
 def described_rows(law: FrictionLaw, v: Array) -> npt.NDArray[np.bool_]:
     """Rows at these speeds of which the law says something: all, or without memory those in clear motion."""
     if isinstance(law, MemorylessLaw):
@@ -37,7 +48,8 @@ def weights(law: FrictionLaw, prepared: Prepared) -> Array:
     Rest is judged by the speeds of its own recording: one at a hundredth of the others' speed moves all the same.
     """
     v = prepared.stacked("v")
-    says = np.concatenate([_says(law, piece.v[piece.kept], least_speed(v)) for piece in prepared.pieces])
+    shown = law if remembers(law, prepared) else law.steady()
+    says = np.concatenate([_says(shown, piece.v[piece.kept], least_speed(v)) for piece in prepared.pieces])
     new = says / _repeated(v, says, prepared.recording_of)
     return np.asarray(np.sqrt(new * says.sum() / max(new.sum(), 1e-300)))
 

@@ -12,7 +12,7 @@ from cosim.diagnosis.result import Where
 from cosim.diagnosis.tuning import refound
 from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.play import far_torques
-from cosim.estimation.prepare import Array
+from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
 from cosim.support.statistics import rms
 from pyfmi_models.effects import Effect
@@ -48,6 +48,7 @@ class Play(Hypothesis[Backlash]):
     """Plays of a grid that look most like the residual; it is fine, as what happens in a gap happens or does not."""
 
     forms = (Backlash,)
+    tables = ("distance since reversal", "hysteresis over a long stroke")
     finds_its_way: ClassVar[bool] = True
     is_common_misfit: ClassVar[bool] = True
     easiest: ClassVar[int] = 1
@@ -95,6 +96,10 @@ class Play(Hypothesis[Backlash]):
         for first in tried[:1]:
             for gap in (np.geomspace(GAPS[0], GAPS[-1], CONCEALED) * span.reach).tolist():
                 yield with_numbers(first, gap_rad=gap)
+
+    def shows(self, effect: Backlash, mount: Mount, prepared: Prepared) -> bool:
+        """A gap that the encoder does not show is its rounding."""
+        return float(effect.gap_rad) >= prepared.seen
 
     def looked(self, seen: Seen, mount: Mount) -> str:
         """Wider gaps."""

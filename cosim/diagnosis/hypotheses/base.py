@@ -82,6 +82,8 @@ class Hypothesis(Generic[Form]):
     needs_position: ClassVar[bool] = True
     imitated_by: ClassVar[str] = ""
     """Nuisance that is this effect in another form: beside it the effect would be explained away."""
+    tables: ClassVar[tuple[str, ...]] = ()
+    """Terms that may be learned which are this effect in another form: where one is better, the name is still right."""
     is_common_misfit: ClassVar[bool] = False
     """Whether laws of friction lack the like of it so often that it needs the evidence `policy.least_bent`."""
     finds_its_way: ClassVar[bool] = False

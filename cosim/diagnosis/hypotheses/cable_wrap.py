@@ -24,6 +24,7 @@ class Cable(Hypothesis[CableWrap]):
     """A spring, even or hardening."""
 
     forms = (CableWrap,)
+    tables = ("position", "position over the turn")
     rank: ClassVar[float] = 13
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:

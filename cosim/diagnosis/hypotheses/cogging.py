@@ -29,6 +29,7 @@ class Ripple(Hypothesis[Cogging]):
     """Torque with so many cycles a turn."""
 
     forms = (Cogging,)
+    tables = ("position", "position over the turn")
     member: ClassVar[str] = "cycles_per_rev"
     rank: ClassVar[float] = 9
     view = "one pitch"

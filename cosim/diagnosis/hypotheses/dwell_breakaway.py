@@ -29,6 +29,7 @@ class Settling(Hypothesis[DwellBreakaway]):
     """A break-away torque that grows with the rest before it."""
 
     forms = (DwellBreakaway,)
+    tables = ("time since reversal",)
     member: ClassVar[str] = "memory_rad"
     rank: ClassVar[float] = 6
     view = "rest before a start"

@@ -16,6 +16,7 @@ class Unbalance(Hypothesis[GravityUnbalance]):
     """A weight, once per turn."""
 
     forms = (GravityUnbalance,)
+    tables = ("position", "position over the turn")
     rank: ClassVar[float] = 10
     view = "slow and fast"
 

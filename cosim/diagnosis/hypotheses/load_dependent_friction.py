@@ -18,6 +18,7 @@ class LoadFriction(Hypothesis[LoadDependentFriction]):
     """A rise of the level alone, or of level and viscous friction alike."""
 
     forms = (LoadDependentFriction, LoadScaledFriction)
+    tables = ("friction level over position",)
     rank: ClassVar[float] = 5
     view = "load"
 

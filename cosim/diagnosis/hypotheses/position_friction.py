@@ -32,6 +32,7 @@ class FrictionRipple(Hypothesis[PeriodicFriction]):
     """Friction that rises and falls so many times a turn."""
 
     forms = (PeriodicFriction,)
+    tables = ("friction level over position",)
     member: ClassVar[str] = "cycles_per_rev"
     rank: ClassVar[float] = 3
     view = "one pitch"
@@ -72,6 +73,7 @@ class RoughSpot(Hypothesis[LocalFriction]):
     """Friction that is off around one place."""
 
     forms = (LocalFriction,)
+    tables = ("friction level over position",)
     rank: ClassVar[float] = 4
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:

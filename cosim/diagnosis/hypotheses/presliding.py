@@ -10,7 +10,7 @@ from cosim.diagnosis.candidates import Candidate, Span, contact_level
 from cosim.diagnosis.hypotheses.base import Evidence, Hypothesis, Seen
 from cosim.diagnosis.tuning import refound, revived
 from cosim.estimation.fit import Fit
-from cosim.estimation.prepare import Array
+from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.presliding import Presliding
@@ -26,6 +26,7 @@ class BendingContact(Hypothesis[Presliding]):
     """Contacts of several reaches, from a ten-thousandth of the motion to all of it."""
 
     forms = (Presliding,)
+    tables = ("time since reversal", "distance since reversal", "hysteresis over a long stroke")
     easiest: ClassVar[int] = -1
     rank: ClassVar[float] = 8
     imitated_by: ClassVar[str] = "stops"
@@ -60,6 +61,10 @@ class BendingContact(Hypothesis[Presliding]):
         """Start from softer contacts too."""
         softer = [replace(start, sigma0=start.sigma0 / times) for times in SOFTER]
         return refound(problem, revived(problem, found, start), evidence, softer)
+
+    def shows(self, effect: Presliding, mount: Mount, prepared: Prepared) -> bool:
+        """What bends by less than the encoder shows is its rounding."""
+        return self.way_back(effect, mount) >= prepared.seen
 
     def way_back(self, effect: Presliding, mount: Mount) -> float:
         """What the contact bends: where motion goes one way, it is a lagged torque over speed."""

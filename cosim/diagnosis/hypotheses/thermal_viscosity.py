@@ -21,6 +21,7 @@ class ThermalFriction(Hypothesis[ThermalViscosity]):
     """By the recorded temperature; without one by the time since a cold start, or by rubbing."""
 
     forms = (ThermalViscosity, WarmingViscosity, RubbedViscosity)
+    tables = ("friction level over temperature", "speed and temperature")
     sizes: ClassVar[tuple[str, ...]] = ("viscous_per_degC", "coulomb_per_degC")
     rank: ClassVar[float] = 7
     needs_position: ClassVar[bool] = False

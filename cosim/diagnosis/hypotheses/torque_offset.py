@@ -14,6 +14,7 @@ class Offset(Hypothesis[TorqueOffset]):
     """A constant."""
 
     forms = (TorqueOffset,)
+    tables = ("position",)
     rank: ClassVar[float] = 11
     needs_position: ClassVar[bool] = False
 

@@ -21,6 +21,7 @@ class Saturation(Hypothesis[TorqueSaturation]):
     """Less torque above a knee."""
 
     forms = (TorqueSaturation,)
+    tables = ("torque",)
     easiest: ClassVar[int] = -1
     rank: ClassVar[float] = 15
     needs_position: ClassVar[bool] = False

@@ -162,7 +162,7 @@ def learn(comparison: Comparison, found: Fit, held: Predictive) -> Learned | Non
 
     Where nothing is better on the held-out recordings, what came nearest is returned, and does not help.
     """
-    tried = [one for one in candidate_terms(found.mount, comparison.problem.prepared) if _is_recorded(one, held)]
+    tried = [one for one in candidate_terms(found.mount, comparison.problem.prepared) if is_recorded(one, held)]
     columns = [columns_of(found.mount, one, comparison.problem.prepared) for one in tried]
     best: Learned | None = None
     for chosen in begun(paths(grams_of(comparison, found, columns, tried), range(len(tried)))):
@@ -185,7 +185,7 @@ def _measured(comparison: Comparison, found: Fit, learned: Learned, held: Predic
 
 def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], held: Predictive) -> Learned | None:
     """Fit some terms and ask the held-out recordings, which may veto; None where no fit breaks no rule."""
-    whole, effects = _allowed(comparison, found, terms)
+    whole, effects = allowed(comparison, found, terms)
     if not effects:
         return None
     pairs = list(zip(_left(held.protocol, found.mount), _left(held.protocol, whole), strict=True))
@@ -200,7 +200,7 @@ def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], 
     return Learned(whole, effects, names, 0.0, before, after, interval, held.protocol.cutoff, not refused, gain=gain)
 
 
-def _allowed(
+def allowed(
     comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]
 ) -> tuple[Mount, tuple[LearnedEffect, ...]]:
     """Fit terms that break no rule, with fewer waves where they would: a drive that falls where no row tells."""
@@ -225,7 +225,7 @@ def _left(held: Prepared, mount: Mount) -> list[Array]:
     ]
 
 
-def _is_recorded(term: CandidateTerm, held: Predictive) -> bool:
+def is_recorded(term: CandidateTerm, held: Predictive) -> bool:
     """Whether the held-out recordings have what a term goes over."""
     return all(one.name in piece.extras for one in term.effect.inputs() for piece in held.prepared.pieces)
 

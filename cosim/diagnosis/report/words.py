@@ -30,7 +30,11 @@ MEANINGS = (
         "Two possible causes",
         "The rivals are too close to separate. The improved model holds the one named first, which is the likelier.",
     ),
-    ("not_proven", "Not proven", "It fits better, but not on runs the fit never saw."),
+    (
+        "not_proven",
+        "Not proven",
+        "It fits better, but not on runs the fit never saw, or something without a name fits better still.",
+    ),
     ("not_seen", "Not seen", "It would have shown from the size given."),
     ("not_testable", "Cannot be tested", "The recordings lack the condition given; it says how to record it."),
     ("unknown", "Unknown", "Error above the noise that no known effect lowers."),

@@ -9,7 +9,7 @@ from math import pi, sqrt
 import numpy as np
 
 from cosim.data.recording import Recording
-from cosim.data.resolution import resolution
+from cosim.data.resolution import SEEN_STEPS, resolution
 from cosim.diagnosis.sanity.entry import Sanity
 from cosim.estimation.prepare import Prepared
 from cosim.estimation.row_weights import far_from_turns
@@ -24,8 +24,6 @@ CLEAR_SECONDS = 1.0
 """Seconds of clear motion away from turns below which what is slow cannot be judged: the rest is measured there in
 cells of a quarter of a second. Unit: s. None of 65 machines of two generators has less; a measured joint that hardly
 moved for 20 s has none."""
-SEEN = 2.0
-"""Steps that a displacement needs to be seen: each of its two ends is known to one."""
 
 
 def encoder_step(recordings: Sequence[Recording], mount: Mount, cutoff: float) -> tuple[Sanity, ...]:
@@ -41,7 +39,7 @@ def encoder_step(recordings: Sequence[Recording], mount: Mount, cutoff: float) -
     unit, size = ("mm" if mount.motion == "linear" else "mrad"), 1e3 * step
     text = (
         f"The encoder of {name} counts in steps of {size:.3g} {unit}: the analysis ends at {cutoff:.3g} Hz, and a "
-        f"presliding reach or a play below about {SEEN * size:.2g} {unit} cannot be seen."
+        f"presliding reach or a play below about {SEEN_STEPS * size:.2g} {unit} cannot be seen."
     )
     return (Sanity(finding="encoder_step", statement=text),)
 

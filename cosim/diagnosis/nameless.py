@@ -1,0 +1,117 @@
+"""Names that something without a name takes away: in an effect's place a term of another kind explains far more.
+
+A torque constant that waves with the position looks like friction that does, drag that grows with acceleration like a
+drive that saturates: to a list, what is not on it is the nearest thing that is. So each effect that stands is compared
+with every term that may be learned, in its place and in the same nats,
+
+    lead = worth(others + term) - ln(terms tried) - worth(others + effect)
+
+and leaves where the lead is one by which a rival is excluded where something has no name, and the held-out recordings
+do not contradict it. A term that is the effect in another form (`Hypothesis.tables`), or another law of friction over
+speed, takes nothing away. What then remains is asked again beside that term: names come in twos and threes where each
+imitates a part.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from math import inf, log
+
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.dictionary import OF_LAW
+from cosim.diagnosis.hypotheses import hypothesis_of
+from cosim.diagnosis.learned.candidate_terms import CandidateTerm, candidate_terms
+from cosim.diagnosis.learned.grams import Grams, columns_of, grams_of
+from cosim.diagnosis.learned.learn import allowed, is_recorded
+from cosim.diagnosis.predictive import Predictive
+from cosim.diagnosis.proof import Proof, without
+from cosim.diagnosis.rivals import AcceptedEffect, Examined
+from cosim.estimation.fit import Fit
+
+
+@dataclass(frozen=True)
+class Nameless:
+    """What stands when names that something else explains better are gone: the proof, and who took which name."""
+
+    proof: Proof
+    taken: tuple[tuple[AcceptedEffect, CandidateTerm], ...] = ()
+
+    @property
+    def quantities(self) -> tuple[str, ...]:
+        """What the terms go over, each once."""
+        return tuple(dict.fromkeys(term.name for _, term in self.taken))
+
+    @property
+    def terms(self) -> tuple[CandidateTerm, ...]:
+        """The terms, each once."""
+        return tuple({term.name: term for _, term in self.taken}.values())
+
+
+@dataclass(frozen=True)
+class _Challenge:
+    """An effect, the term that leads it by most, the lead [nats], and the structure without the effect."""
+
+    effect: AcceptedEffect
+    term: CandidateTerm
+    lead: float
+    beside: Fit
+
+
+def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Predictive) -> Nameless:
+    """Take away the names that something without a name explains far better, the worst first."""
+    found, least = Nameless(proof), comparison.policy.excluded_beside_unknown
+    every = candidate_terms(comparison.problem.mount, comparison.problem.prepared)
+    tried = [one for one in every if one.name not in OF_LAW and is_recorded(one, held)]
+    while found.proof.standing:
+        challenges = [_challenge(comparison, found, one, tried) for one in found.proof.standing]
+        worst = max(challenges, key=lambda one: one.lead)
+        if worst.lead < least or not _holds(comparison, found, worst, held):
+            break
+        left = without(comparison, examined, found.proof, worst.effect, held)
+        found = Nameless(left, (*found.taken, (worst.effect, worst.term)))
+    return found
+
+
+def _challenge(
+    comparison: Comparison, found: Nameless, one: AcceptedEffect, tried: Sequence[CandidateTerm]
+) -> _Challenge:
+    """What leads an effect by most, beside the terms that took a name already."""
+    beside = _without(comparison, found.proof, one)
+    own = _worth(_grams(comparison, found.proof.chosen, found.terms), range(len(found.terms)))
+    other = [term for term in tried if term.name not in hypothesis_of(one.effect).tables]
+    grams = _grams(comparison, beside, other)
+    known = [k for k, term in enumerate(other) if term.name in found.quantities]
+    leads = {k: _worth(grams, {*known, k}) - own - log(len(other)) for k in range(len(other))}
+    if not leads:
+        return _Challenge(one, tried[0], -inf, beside)
+    best = max(leads, key=lambda k: leads[k])
+    return _Challenge(one, other[best], leads[best], beside)
+
+
+def _without(comparison: Comparison, proof: Proof, out: AcceptedEffect) -> Fit:
+    """The structure that stands without one of its effects, refitted."""
+    own = len(comparison.problem.mount.effects)
+    effects = proof.chosen.mount.effects
+    rest = tuple(effect for k, effect in enumerate(effects) if k < own or effect.id != out.effect.id)
+    return comparison.problem.fit(replace(proof.chosen.mount, effects=rest), 10)
+
+
+def _grams(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]) -> Grams:
+    columns = [columns_of(found.mount, one, comparison.problem.prepared) for one in terms]
+    return grams_of(comparison, found, columns, terms)
+
+
+def _worth(grams: Grams, chosen: Iterable[int]) -> float:
+    """Log-likelihood of a structure with some terms."""
+    return grams.marginal(sorted(chosen), list(range(grams.recordings))).log_likelihood
+
+
+def _holds(comparison: Comparison, found: Nameless, one: _Challenge, held: Predictive) -> bool:
+    """Whether the held-out recordings gain by the term, and do not prefer the name by as much as excludes a rival."""
+    terms = {term.name: term for term in (*found.terms, one.term)}
+    whole, effects = allowed(comparison, one.beside, tuple(terms.values()))
+    if not effects:
+        return False
+    gain = held.log_likelihood(held.residual(whole)) - held.log_likelihood(held.residual(one.beside.mount))
+    policy = comparison.policy
+    least = found.proof.predicted[one.effect.effect.id] - policy.excluded_beside_unknown
+    return gain >= max(policy.least_predicted, least)

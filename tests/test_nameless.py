@@ -1,0 +1,92 @@
+"""A name leaves where something without a name explains far more in its place; where it does not, the name stays."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.diagnosis import diagnose as whole
+from cosim.diagnosis.decision import ResidualScores, decide, followed
+from cosim.diagnosis.hypotheses import HYPOTHESES
+from cosim.diagnosis.learned.candidate_terms import candidate_terms
+from cosim.diagnosis.nameless import nameless
+from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.result import Diagnosis
+from cosim.estimation.prepare import prepare
+from cosim_studies.proof.generator import ANY, make_case, write_given
+from cosim_studies.proof.tool import given
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+RIPPLING_MOTOR, RUBBING_SPOTS = (594088557, "motor_ripple", 0.39), (1314500131, "position_friction", 0.25)
+"""Machines of the own generator, of decks that are development data: seed, what is concealed, size."""
+TIME, AXIS = np.arange(2000) / 100, Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=1.0))
+
+
+def diagnosed(machine: tuple[int, str, float], folder: Path) -> tuple[Diagnosis, tuple[Any, ...]]:
+    """What is said of a machine, and what `nameless` was asked."""
+    seed, concealed, size = machine
+    write_given(make_case(seed, [concealed], size, machine=ANY), folder)
+    card, train, held = given(str(folder))
+    asked: list[tuple[Any, ...]] = []
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(whole, "nameless", lambda *parts: (asked.append(parts), nameless(*parts))[1])
+        return whole.diagnose(train, [held], card).diagnosis, asked[0]
+
+
+@pytest.fixture(scope="module")
+def rippling_motor(tmp_path_factory: pytest.TempPathFactory) -> tuple[Diagnosis, tuple[Any, ...]]:
+    return diagnosed(RIPPLING_MOTOR, tmp_path_factory.mktemp("motor"))
+
+
+def test_a_torque_constant_that_waves_is_no_friction_over_position(
+    rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
+) -> None:
+    said, _ = rippling_motor
+    assert said.verdict == ("unknown",)
+    assert said.depends_on == ("torque and position",)
+    taken = next(one for one in said.findings if one.effect == "position_friction")
+    assert taken.answer == "not_proven"
+    assert taken.evidence == "what goes with torque and position explains more in its place"
+    assert said.learned["quantities"] == ["torque and position"]
+    assert said.heldout.after_rms < 0.5 * said.heldout.before_rms
+
+
+def test_a_name_is_not_taken_by_less_than_excludes_a_rival(rippling_motor: tuple[Diagnosis, tuple[Any, ...]]) -> None:
+    _, (comparison, examined, proof, held) = rippling_motor
+    never = replace(comparison.policy, margin_beside_unknown=1e-3)
+    left = nameless(replace(comparison, policy=never), examined, proof, held)
+    assert left.taken == ()
+    assert left.proof is proof
+
+
+def test_a_name_is_not_taken_where_held_out_recordings_contradict(
+    rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
+) -> None:
+    _, (comparison, examined, proof, held) = rippling_motor
+    sure = replace(proof, predicted={name: 1e6 for name in proof.predicted})
+    assert nameless(comparison, examined, sure, held).taken == ()
+
+
+def test_friction_over_position_keeps_its_name(tmp_path: Path) -> None:
+    said, _ = diagnosed(RUBBING_SPOTS, tmp_path)
+    assert said.verdict == ("position_friction",)
+
+
+def test_what_takes_a_name_is_unknown_whatever_is_left_beside_it() -> None:
+    residual = ResidualScores(0.0, 0.0, in_place=("torque and position",))
+    assert decide([], residual, POLICY).is_unknown
+    assert followed(residual, POLICY) == ("torque and position",)
+    assert not decide([], ResidualScores(0.0, 0.0), POLICY).is_unknown
+
+
+def test_tables_of_hypotheses_are_terms_that_exist() -> None:
+    turns = {"t": TIME, "q": 9 * np.sin(TIME), "tau": np.cos(TIME), "temperature": 20 + TIME}
+    stays = turns | {"q": np.sin(TIME)}
+    named = {
+        one.name for run in (turns, stays) for one in candidate_terms(AXIS, prepare([Recording("one", run)], 10.0))
+    }
+    assert {table for one in HYPOTHESES for table in one.tables} <= named
