@@ -9,6 +9,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from cosim.data.recording import Recording
+from cosim.data.set_points import PIECE
 from cosim.data.signals import (
     Chirp,
     Constant,
@@ -99,9 +100,10 @@ def test_steps_act_from_the_tick_of_their_time() -> None:
     np.testing.assert_array_equal(values(signal, 9)[0], [0.5] * 3 + [1.0] * 4 + [-2.0] * 2)
 
 
+@pytest.mark.parametrize(("ticks", "chunk"), [(1000, 7), (2 * PIECE + 5, 9000)])
 @pytest.mark.parametrize("signal", [*MOTIONS, Noise(kind="noise", rms=2.0, seed=3)], ids=lambda signal: signal.kind)
-def test_chunks_do_not_matter(signal: Signal) -> None:
-    np.testing.assert_array_equal(values(signal, 1000, 7), values(signal, 1000, 1000))
+def test_chunks_do_not_matter(signal: Signal, ticks: int, chunk: int) -> None:
+    np.testing.assert_array_equal(values(signal, ticks, chunk), values(signal, ticks, ticks))
 
 
 def test_noise_is_white_of_its_size_and_repeats_by_its_seed() -> None:

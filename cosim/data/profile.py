@@ -1,9 +1,14 @@
-"""Motions whose position, velocity and acceleration belong together exactly."""
+"""Motions whose position, velocity and acceleration belong together exactly.
+
+Powers are written as products: `**` asks libm, which differs between machines in the last bit.
+"""
 
 from itertools import pairwise
 from math import sqrt
 
 import numpy as np
+
+from cosim.support.elementary import cube_root
 
 Motion = tuple[np.ndarray, np.ndarray, np.ndarray]
 """Position, velocity and acceleration, each of the shape of t."""
@@ -17,9 +22,10 @@ def envelope(motion: Motion, t: np.ndarray, rise: float) -> Motion:
     if rise <= 0:
         return motion
     x = np.clip(t / rise, 0.0, 1.0)
-    s = x**3 * (10 - 15 * x + 6 * x**2)
-    ds = 30 * x**2 * (1 - x) ** 2 / rise
-    dds = 60 * x * (1 - x) * (1 - 2 * x) / rise**2
+    bump = x * (1 - x)
+    s = x * x * x * (10 - x * (15 - 6 * x))
+    ds = 30 * bump * bump / rise
+    dds = 60 * bump * (1 - 2 * x) / (rise * rise)
     q, v, a = motion
     return s * q, ds * q + s * v, dds * q + 2 * ds * v + s * a
 
@@ -54,16 +60,15 @@ def _slew(pieces: list[tuple[float, ...]], t: float, here: float, there: float, 
 
 def _durations(distance: float, velocity: float, acceleration: float, jerk: float) -> tuple[float, float, float]:
     """Return the time of constant jerk, the time of rising velocity and the time of cruising, in s."""
-    reached = velocity * jerk >= acceleration**2
+    reached = velocity / acceleration >= acceleration / jerk
     jerk_time = acceleration / jerk if reached else sqrt(velocity / jerk)
     rise = jerk_time + velocity / acceleration if reached else 2 * jerk_time
     cruise = distance / velocity - rise
     if cruise >= 0:
         return jerk_time, rise, cruise
-    if distance >= 2 * acceleration**3 / jerk**2 and reached:
-        jerk_time = acceleration / jerk
-        return jerk_time, jerk_time / 2 + sqrt((jerk_time / 2) ** 2 + distance / acceleration), 0.0
-    jerk_time = (distance / (2 * jerk)) ** (1 / 3)
+    if reached and distance >= 2 * acceleration * jerk_time * jerk_time:
+        return jerk_time, jerk_time / 2 + sqrt(jerk_time * jerk_time / 4 + distance / acceleration), 0.0
+    jerk_time = cube_root(distance / (2 * jerk))
     return jerk_time, 2 * jerk_time, 0.0
 
 

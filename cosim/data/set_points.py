@@ -10,13 +10,26 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from cosim.data.profile import Motion, envelope, slews
 from cosim.data.star import SIDEREAL_RATE, path
+from cosim.support.elementary import sine_and_cosine
 from cosim.support.numbers import LONGEST
 
 Stream = Callable[[np.ndarray], np.ndarray]
 Positive = Annotated[float, Field(gt=0)]
 Dwell = Annotated[float, Field(ge=0)]
+PIECE = 12_288
+"""Ticks computed at a time: arrays of 96 KiB stay in the cache, and malloc keeps them instead of giving them back."""
 ZENITH = 1 / 3600
 """Stars that pass the zenith closer than this [deg] are refused: there is no azimuth to go to."""
+
+
+def in_pieces(motion: Callable[[np.ndarray], np.ndarray], step: float) -> Stream:
+    """Make a stream of a motion over time [s]; a tick lasts `step` seconds."""
+
+    def give(ticks: np.ndarray) -> np.ndarray:
+        starts = range(0, max(len(ticks), 1), PIECE)
+        return np.concatenate([motion(ticks[k : k + PIECE] * step) for k in starts], axis=1)
+
+    return give
 
 
 class SignalSection(BaseModel):
@@ -54,7 +67,7 @@ class SetPoint(SignalSection):
 
     def stream(self, step: float) -> Stream:
         """Make a stream of the motion."""
-        return lambda ticks: np.stack(envelope(self.motion(ticks * step), ticks * step, self.smooth_start))
+        return in_pieces(lambda t: np.stack(envelope(self.motion(t), t, self.smooth_start)), step)
 
 
 class Sine(SetPoint):
@@ -137,7 +150,7 @@ class Star(SignalSection):
     def stream(self, step: float) -> Stream:
         """Make a stream of the path."""
         place = np.deg2rad([self.latitude_deg, self.declination_deg, 15 * self.hour_angle_h]).tolist()
-        return lambda ticks: np.concatenate(path(ticks * step, *place))
+        return in_pieces(lambda t: np.concatenate(path(t, *place)), step)
 
 
 class Multisine(SetPoint):
@@ -188,7 +201,7 @@ class Chirp(SetPoint):
         rate = 2 * pi * self.start + slope * rising
         angle = 2 * pi * self.start * t + slope * rising * (t - rising / 2)
         bend = np.where(t < self.duration, slope, 0.0)
-        sine, cosine = self.amplitude * np.sin(angle), self.amplitude * np.cos(angle)
+        sine, cosine = (self.amplitude * one for one in sine_and_cosine(angle))
         return sine, rate * cosine, bend * cosine - rate * rate * sine
 
 
@@ -224,6 +237,11 @@ class Slews(SetPoint):
 def _sum_of_sines(t: np.ndarray, rates: list[float], sizes: list[float], phases: list[float]) -> Motion:
     position, velocity, acceleration = np.zeros_like(t), np.zeros_like(t), np.zeros_like(t)
     for rate, size, phase in zip(rates, sizes, phases, strict=True):
-        sine, cosine = size * np.sin(rate * t + phase), size * np.cos(rate * t + phase)
-        position, velocity, acceleration = position + sine, velocity + rate * cosine, acceleration - rate * rate * sine
+        sine, cosine = sine_and_cosine(rate * t + phase)
+        sine *= size
+        cosine *= rate * size
+        position += sine
+        velocity += cosine
+        sine *= rate * rate
+        acceleration -= sine
     return position, velocity, acceleration

@@ -21,6 +21,7 @@ from cosim.hardware.blackbox import read_black_box, recording_of
 from cosim.hardware.machine import Machine
 from cosim.hardware.session import Session
 from cosim.hardware.words import ENTERED
+from cosim.support.elementary import sine_and_cosine
 from cosim.support.errors import HardwareError
 from cosim.support.scratch import Scratch
 from cosim.system.scenario import Scenario
@@ -124,10 +125,11 @@ def _set_points(session: Session, position: float, way: float) -> None:
     """Replace the set points of a session, before it begins, by those of the move."""
     w, inputs = 2 * np.pi * FREQUENCY, session.wired.inputs
     t = np.arange(session.wired.setpoints.shape[1]) * session.scenario.step
+    sine, cosine = sine_and_cosine(w * t)
     rows: dict[str, Any] = {
-        "q_d": position + way / 2 * (1 - np.cos(w * t)),
-        "v_d": way / 2 * w * np.sin(w * t),
-        "a_d": way / 2 * w**2 * np.cos(w * t),
+        "q_d": position + way / 2 * (1 - cosine),
+        "v_d": way / 2 * w * sine,
+        "a_d": way / 2 * w * w * cosine,
     }
     for name in set(rows) & set(inputs):
         session.wired.setpoints[inputs.index(name)] = rows[name]

@@ -14,6 +14,7 @@ import numpy as np
 from cosim.data.profile import envelope, slews
 from cosim.estimation.prepare import Array
 from cosim.investigation.limits import KEPT, Limits
+from cosim.support.elementary import sine_and_cosine
 
 Sampled = tuple[Array, Array, Array]
 """Position, speed and acceleration, one value a row."""
@@ -108,8 +109,8 @@ class Tones:
         q, v, a = (np.zeros_like(t) for _ in range(3))
         for hertz, size, phase in zip(self.hertz, self.sizes, self.phases, strict=True):
             w = 2 * pi * hertz
-            wave = size * np.sin(w * t + phase)
-            q, v, a = q + wave, v + size * w * np.cos(w * t + phase), a - w * w * wave
+            sine, cosine = sine_and_cosine(w * t + phase)
+            q, v, a = q + size * sine, v + size * w * cosine, a - w * w * (size * sine)
         q, v, a = envelope((q, v, a), t, FADE)
         q, v, a = envelope((q, -v, a), self.lasts - t, FADE)
         return here + q, -v, a
