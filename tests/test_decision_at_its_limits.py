@@ -229,3 +229,10 @@ def test_probabilities_are_calibrated_posterior_shares_times_what_is_explained(m
 def test_what_is_decided_stays_when_something_more_is_left() -> None:
     decided = Decision({}, {}, True, ("time",))
     assert decided.with_rest(("position",), (), POLICY) is decided
+
+
+def test_a_term_that_removes_next_to_nothing_is_no_unknown() -> None:
+    sure = TermScores("acceleration", 1000.0, 100.0, 0.0, plain=ROUND.least_plain_gain)
+    barely = replace(sure, plain=0.99 * ROUND.least_plain_gain)
+    said = [decide([], ResidualScores(0.0, 0.0, [one]), ROUND).is_unknown for one in (sure, barely)]
+    assert said == [True, False]

@@ -40,6 +40,8 @@ class TermScores:
     """Share of the held-out residual energy that it predicts."""
     away: float = 1.0
     """Share of the training residual energy that it removes which it removes away from turns."""
+    plain: float = 1.0
+    """Share of the training residual energy that it removes."""
 
 
 @dataclass(frozen=True)
@@ -191,9 +193,9 @@ def least_left(named: Sequence[EffectScores], policy: Policy) -> float:
 def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:
     """Whether what the residual follows is more than a friction law's misfit: sure, or held out as well as trained.
 
-    What it removes about turns alone is what laws lack there.
+    What it removes about turns alone is what laws lack there, and what it hardly removes is about nothing that matters.
     """
-    if term.away < policy.least_away_unnamed:
+    if term.away < policy.least_away_unnamed or term.plain < policy.least_plain_gain:
         return False
     return term.evidence >= max(least, _floor_of(term, policy))
 

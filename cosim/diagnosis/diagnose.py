@@ -9,17 +9,15 @@ import numpy as np
 from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
 from cosim.diagnosis.absent import not_found
-from cosim.diagnosis.adequacy import over_time, share_beside, share_left, share_there
 from cosim.diagnosis.band import in_band
 from cosim.diagnosis.breakdown import parts
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import Decision, EffectScores, ResidualScores, beside_rest, decide, least_left
+from cosim.diagnosis.decision import Decision, beside_rest, decide, least_left
 from cosim.diagnosis.delivered import standing
 from cosim.diagnosis.denied import beyond_denial, without_denied
 from cosim.diagnosis.entries import NotLearnedEntry
 from cosim.diagnosis.experiment import Experiment, best, told
 from cosim.diagnosis.findings import accepted, rival_finding, standard_errors, taken_finding
-from cosim.diagnosis.flexible import flexible_terms
 from cosim.diagnosis.global_test import global_test
 from cosim.diagnosis.law_selection import proposed_law
 from cosim.diagnosis.learned.learn import NOTHING_TRIED, Learned, learn
@@ -33,9 +31,10 @@ from cosim.diagnosis.proof import Proof, prove
 from cosim.diagnosis.protocol import CUTOFF, Structures, heldout_rms, judge, judged_band, traces
 from cosim.diagnosis.regression import black_box_rms
 from cosim.diagnosis.result import Diagnosis, Finding, Trace
-from cosim.diagnosis.rivals import Examined, examine, explains, margins
+from cosim.diagnosis.rivals import Examined, examine
 from cosim.diagnosis.sanity.admission import check_effects, check_recordings
 from cosim.diagnosis.sanity.doubts import doubts, of_base, single_readings
+from cosim.diagnosis.scores import effect_scores, residual_scores
 from cosim.diagnosis.search import InTurn, search
 from cosim.diagnosis.withheld import without_names
 from cosim.estimation.blocks import Blocks
@@ -172,24 +171,10 @@ def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Record
     prepared = prepare(heldout, comparison.problem.prepared.cutoff)
     held = Predictive.of(comparison, prepared, examined.base, prepare(heldout, CUTOFF))
     found = nameless(comparison, examined, prove(comparison, examined, held), held)
-    residual = _residual_scores(comparison, found, held)
-    return Answer(comparison, examined.base, decide(_scores(found.proof), residual, comparison.policy), held, found)
-
-
-def _scores(proof: Proof) -> list[EffectScores]:
-    said = {one.effect.id: (proof.predicted[one.effect.id], proof.removes[one.effect.id]) for one in proof.standing}
-    return [
-        EffectScores(one.effect.id, one.own.evidence, margins(one), explains(one), *said[one.effect.id])
-        for one in proof.standing
-    ]
-
-
-def _residual_scores(comparison: Comparison, found: Nameless, held: Predictive) -> ResidualScores:
-    chosen = found.proof.chosen
-    left, there = share_left(comparison, chosen), held.residual(chosen.mount)
-    terms, shown = flexible_terms(comparison, chosen, held), over_time(comparison, chosen)
-    beside = share_beside(comparison, chosen, there, held)
-    return ResidualScores(left, share_there(comparison, there, held), terms, shown, beside, found.quantities)
+    residual = residual_scores(comparison, found, held)
+    return Answer(
+        comparison, examined.base, decide(effect_scores(found.proof), residual, comparison.policy), held, found
+    )
 
 
 def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Recording], name: str) -> Diagnosis:
@@ -247,7 +232,7 @@ def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Lear
     after = tried.mount if tried.helps else answer.chosen.mount
     models = Structures(problem.mount, answer.base.mount, after)
     told = tried.judged_in(judged_band(heldout, models, problem.prepared.cutoff), answer.chosen.mount)
-    policy, scores = answer.comparison.policy, _scores(answer.proof)
+    policy, scores = answer.comparison.policy, effect_scores(answer.proof)
     if not answer.decision.is_unknown and told.says_unknown(policy, least_left(scores, policy)):
         answer = replace(answer, decision=beside_rest(scores, told.quantities, policy))
     return answer, told if answer.decision.is_unknown else None

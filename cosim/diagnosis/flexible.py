@@ -33,9 +33,10 @@ def _scored(
     pair = np.column_stack([found.residual, found.residual - columns @ beta])
     without, with_it = projected(pair * problem.weight[:, None], found.slopes * problem.weight[:, None]).T
     away = away_from_turns(problem, with_it, without)
+    plain = 1 - float(with_it @ with_it) / max(float(without @ without), 1e-300)
     after = residual - term.columns(held.prepared) @ beta
     gain = held.log_likelihood(after) - held.log_likelihood(residual)
     # The base was bent to what is missing in training, so its own parameters are free beside what is predicted.
     left = projected(np.column_stack([residual, after]) * held.weight[:, None], slopes * held.weight[:, None])
     before, now = (left**2).sum(0)
-    return TermScores(name, evidence, gain, 1 - float(now) / max(float(before), 1e-300), away)
+    return TermScores(name, evidence, gain, 1 - float(now) / max(float(before), 1e-300), away, plain)
