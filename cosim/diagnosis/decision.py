@@ -177,9 +177,7 @@ def open_rivals(one: EffectScores, policy: Policy) -> tuple[str, ...]:
 def is_left(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> bool:
     """Whether something is left that is no misfit of a friction law, nor of the equations of what is named."""
     large = residual.share > policy.large_residual or residual.share_there > policy.large_residual_there
-    large = large or residual.share_beside > policy.large_residual_beside
-    if residual.in_place:
-        return True
+    large = large or residual.share_beside > policy.large_residual_beside or bool(residual.in_place)
     doubtful = doubted(effects, residual, policy)
     least = least_left([one for one in effects if one.effect not in doubtful], policy)
     return large or any(_is_no_misfit(one, least, policy) for one in residual.terms)

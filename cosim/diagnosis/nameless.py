@@ -62,7 +62,8 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
     every = candidate_terms(comparison.problem.mount, comparison.problem.prepared)
     tried = [one for one in every if one.name not in OF_LAW and is_recorded(one, held)]
     while found.proof.standing:
-        challenges = [_challenge(comparison, found, one, tried) for one in found.proof.standing]
+        own = _worth(_grams(comparison, found.proof.chosen, found.terms), range(len(found.terms)))
+        challenges = [_challenge(comparison, found, one, own, tried) for one in found.proof.standing]
         worst = max(challenges, key=lambda one: one.lead)
         if worst.lead < least or not _holds(comparison, found, worst, held):
             break
@@ -72,11 +73,10 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
 
 
 def _challenge(
-    comparison: Comparison, found: Nameless, one: AcceptedEffect, tried: Sequence[CandidateTerm]
+    comparison: Comparison, found: Nameless, one: AcceptedEffect, own: float, tried: Sequence[CandidateTerm]
 ) -> _Challenge:
-    """What leads an effect by most, beside the terms that took a name already."""
+    """What leads an effect by most, beside the terms that took a name already; `own`: the worth of all that stands."""
     beside = _without(comparison, found.proof, one)
-    own = _worth(_grams(comparison, found.proof.chosen, found.terms), range(len(found.terms)))
     other = [term for term in tried if term.name not in hypothesis_of(one.effect).tables]
     grams = _grams(comparison, beside, other)
     known = [k for k, term in enumerate(other) if term.name in found.quantities]

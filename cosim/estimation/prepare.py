@@ -7,7 +7,7 @@ of 1.8 N, all of it artefact.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from math import sqrt
 
@@ -218,7 +218,8 @@ def _spans(recording: Recording, cutoff: float) -> list[slice]:
 
 
 def _pieces(recording: Recording, index: int, cutoff: float) -> list[Piece]:
-    return [_piece(recording, index, span, cutoff) for span in _spans(recording, cutoff)]
+    step = resolution(recording["q"]) if "q" in recording else 0.0
+    return [replace(_piece(recording, index, span, cutoff), step=step) for span in _spans(recording, cutoff)]
 
 
 def _piece(recording: Recording, index: int, span: slice, cutoff: float) -> Piece:
@@ -241,7 +242,6 @@ def _piece(recording: Recording, index: int, span: slice, cutoff: float) -> Piec
         stride=max(1, int(1 / (KEPT_RATE * cutoff * coarse))),
         extras={n: c[::each].copy() for n, c in table.items() if n not in ("t", "tau", "q", "v")},
         reading_noise=noise_of(table["q" if "q" in table else "v"], dt) * sqrt(dt) if len(grid) > LEAST_ROWS else 0.0,
-        step=resolution(recording["q"]) if "q" in table else 0.0,
     )
 
 

@@ -29,10 +29,10 @@ def remembers(law: FrictionLaw, prepared: Prepared) -> bool:
 
     Behind such an encoder a bristle answers rounding and noise with a part of the level, at rest and at turns.
     """
+    if isinstance(law, MemorylessLaw):
+        return False
     stiffness, level = (getattr(law, name, None) for name in ("sigma0", "Fc"))
-    if isinstance(law, MemorylessLaw) or not stiffness or level is None:
-        return not isinstance(law, MemorylessLaw)
-    return float(np.mean(level)) / float(stiffness) >= prepared.seen
+    return not stiffness or level is None or bool(np.mean(level) / stiffness >= prepared.seen)
 
 
 def described_rows(law: FrictionLaw, v: Array) -> npt.NDArray[np.bool_]:
