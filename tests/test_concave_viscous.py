@@ -8,6 +8,7 @@ from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.hypotheses import hypothesis_of
 from cosim.diagnosis.result import Diagnosis
 from cosim.estimation.prepare import prepare
+from cosim.estimation.problem import Problem
 from pyfmi_models.card import Card, parse_card
 from pyfmi_models.effects.concave_viscous import ConcaveViscous
 
@@ -54,6 +55,15 @@ def test_grease_that_does_not_is_not_and_its_bound_says_from_which_speed_it_woul
     seen = {one.effect: one for one in diagnosis.findings}["concave_viscous"]
     assert seen.answer == "not_seen"
     assert "root of the speed" in str(seen)
+
+
+@pytest.mark.parametrize(("thinning", "degenerate"), [(0.029, True), (0.031, False)])
+def test_what_thins_below_the_speeds_that_are_tried_is_a_level(thinning: float, degenerate: bool) -> None:
+    """Its share of the top speed; there it would be the contact's friction, and that nothing."""
+    mount, prepared = parse_card(CARD, "axis.toml").plant(), prepare([recording(1, 1.0)], 30.0)
+    problem = Problem(mount, prepared, np.ones(len(prepared.recording_of)), 0.01)
+    grease = ConcaveViscous(thinning_speed=thinning * problem.top_speed, exponent=0.0)
+    assert hypothesis_of(grease).is_degenerate(problem, grease) is degenerate
 
 
 def test_a_bend_next_to_rest_that_a_law_may_have_left_is_not_enough() -> None:

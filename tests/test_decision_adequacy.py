@@ -69,6 +69,16 @@ def left(residual: Array) -> Any:
     return SimpleNamespace(residual=residual)
 
 
+RIGHT, RIGHT_LONG = left(np.zeros(2 * RATE)), left(np.zeros(4 * RATE))
+"""Structures that leave nothing in training."""
+
+
+def elsewhere(v: Array, moved: Array | None = None) -> Any:
+    """Held-out recordings at a speed, and what may be otherwise there."""
+    columns = np.empty((len(v), 0)) if moved is None else moved
+    return SimpleNamespace(prepared=Motion({"v": [v]}), moved=lambda _: columns)
+
+
 def test_a_constant_rest_counts_whole_and_one_that_changes_within_a_quarter_of_a_second_not_at_all() -> None:
     comparison = comparing(steady(4), 2.0)
     fast = np.tile([1.0, -1.0], 2 * RATE)
@@ -100,13 +110,30 @@ def test_where_friction_is_small_a_tenth_of_the_torque_stands_for_it(level: floa
 
 
 def test_what_is_left_elsewhere_is_told_by_the_friction_of_training() -> None:
-    there: Any = SimpleNamespace(prepared=Motion({"v": [np.repeat([1.0, 0.0], RATE)]}))
+    there = elsewhere(np.repeat([1.0, 0.0], RATE))
     rest = np.repeat([1.0, 50.0], RATE)
-    assert share_there(comparing(steady(2), 4.0), rest, there) == pytest.approx(0.25, rel=1e-12)
+    assert share_there(comparing(steady(2), 4.0), RIGHT, rest, there) == pytest.approx(0.25, rel=1e-12)
+
+
+@pytest.mark.parametrize(("open_", "expected"), [(2.0, 0.0), (0.02, 0.125), (0.0, 0.25)])
+def test_what_training_leaves_open_is_not_left_elsewhere(open_: float, expected: float) -> None:
+    """A rest of 1 N m; a number whose error there is `open_` N m moves by one error, as cells are wrong by .04 N m."""
+    there = elsewhere(np.ones(RATE), np.full((RATE, 1), open_))
+    four = np.ones(4)
+    told = 1 - open_**2 * (four @ four) / (open_**2 * (four @ four) + 0.04**2)
+    found = share_there(comparing(steady(2), 4.0), RIGHT, np.ones(RATE), there)
+    assert found == pytest.approx(0.25 * told, rel=1e-9)
+    assert found == pytest.approx(expected, abs=0.01)
+
+
+def test_cells_elsewhere_are_as_uncertain_as_those_of_training_are_wrong() -> None:
+    there = elsewhere(np.ones(RATE), np.full((RATE, 1), 0.1))
+    wrong = left(np.full(2 * RATE, 0.4))
+    assert share_there(comparing(steady(2), 4.0), wrong, np.ones(RATE), there) == pytest.approx(0.25 / 1.25, rel=1e-9)
 
 
 def test_friction_of_training_is_that_of_clear_motion_by_its_weight() -> None:
-    there: Any = SimpleNamespace(prepared=Motion({"v": [np.ones(RATE)]}))
+    there = elsewhere(np.ones(RATE))
     motion = Motion({"v": [np.repeat([1.0, 0.0], 2 * RATE)], "tau": [np.full(4 * RATE, 2.0)]})
     level, weight = (
         np.repeat([2.0, 6.0, 70.0], [RATE, RATE, 2 * RATE]),
@@ -114,7 +141,9 @@ def test_friction_of_training_is_that_of_clear_motion_by_its_weight() -> None:
     )
     clear = np.r_[np.full(RATE, 3.0), np.full(RATE - 1, 1.0)]  # the last row before the rest is near a turn
     expected = 1.0 / np.sqrt(clear @ level[: 2 * RATE - 1] ** 2 / clear.sum())
-    assert share_there(comparing(motion, level, weight), np.ones(RATE), there) == pytest.approx(expected, rel=1e-3)
+    assert share_there(comparing(motion, level, weight), RIGHT_LONG, np.ones(RATE), there) == pytest.approx(
+        expected, rel=1e-3
+    )
 
 
 @pytest.mark.parametrize("size", [1.0, 1e-6])

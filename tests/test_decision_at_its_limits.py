@@ -231,8 +231,9 @@ def test_what_is_decided_stays_when_something_more_is_left() -> None:
     assert decided.with_rest(("position",), (), POLICY) is decided
 
 
-def test_a_term_that_removes_next_to_nothing_is_no_unknown() -> None:
+def test_a_term_that_removes_next_to_nothing_in_training_and_held_out_is_no_unknown() -> None:
     sure = TermScores("acceleration", 1000.0, 100.0, 0.0, plain=ROUND.least_plain_gain)
     barely = replace(sure, plain=0.99 * ROUND.least_plain_gain)
-    said = [decide([], ResidualScores(0.0, 0.0, [one]), ROUND).is_unknown for one in (sure, barely)]
-    assert said == [True, False]
+    there = replace(barely, share=ROUND.least_plain_gain)
+    said = [decide([], ResidualScores(0.0, 0.0, [one]), ROUND).is_unknown for one in (sure, barely, there)]
+    assert said == [True, False, True]

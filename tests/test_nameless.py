@@ -10,9 +10,9 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.diagnosis import diagnose as whole
 from cosim.diagnosis.decision import ResidualScores, decide, followed
-from cosim.diagnosis.hypotheses import HYPOTHESES
+from cosim.diagnosis.hypotheses import HYPOTHESES, hypothesis_of
 from cosim.diagnosis.learned.candidate_terms import candidate_terms
-from cosim.diagnosis.nameless import nameless
+from cosim.diagnosis.nameless import Nameless, _challenge, nameless
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.result import Diagnosis
 from cosim.estimation.prepare import prepare
@@ -69,6 +69,21 @@ def test_a_name_is_not_taken_where_held_out_recordings_contradict(
     _, (comparison, examined, proof, held) = rippling_motor
     sure = replace(proof, predicted={name: 1e6 for name in proof.predicted})
     assert nameless(comparison, examined, sure, held).taken == ()
+
+
+def test_what_took_a_name_stands_beside_every_rival_of_the_next(
+    rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
+) -> None:
+    """Also where it is the next effect itself in another form: else the rest would be the next one's to explain."""
+    comparison, _, proof, _ = rippling_motor[1]
+    (effect,) = proof.standing
+    tried = candidate_terms(comparison.problem.mount, comparison.problem.prepared)
+    barred = hypothesis_of(effect.effect).tables
+    own = next(one for one in tried if one.name in barred)
+    beside = Nameless(proof, ((effect, own),))
+    alone, both = (_challenge(comparison, found, effect, 0.0, tried) for found in (Nameless(proof), beside))
+    assert both.lead > alone.lead
+    assert both.term.name not in (own.name, *barred)
 
 
 def test_friction_over_position_keeps_its_name(tmp_path: Path) -> None:

@@ -58,7 +58,7 @@ def left(extra: Extra) -> tuple[ResidualScores, Decision]:
     comparison = Comparison.of(problem, base, POLICY)
     held = Predictive.of(comparison, there, base, there)
     rest = held.residual(base.mount)
-    sizes = share_left(comparison, base), share_there(comparison, rest, held)
+    sizes = share_left(comparison, base), share_there(comparison, base, rest, held)
     shown, beside = over_time(comparison, base), share_beside(comparison, base, rest, held)
     residual = ResidualScores(*sizes, flexible_terms(comparison, base, held), shown, beside)
     return residual, decide([], residual, POLICY)

@@ -15,6 +15,8 @@ from cosim.estimation.least_squares import projected
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.row_weights import far_from_turns
 
+LEAST_WRONG = 0.01
+"""Error of a cell, at least, relative to the friction: no law is better. Unit: 1."""
 CELL = 0.25
 """Seconds over which the rest is averaged: noise and presliding go, what lasts stays."""
 LEAST_FRICTION = 0.1
@@ -30,10 +32,29 @@ def share_left(comparison: Comparison, found: Fit) -> float:
     return _slow(found.residual, clear, prepared) / _friction(comparison, clear)
 
 
-def share_there(comparison: Comparison, residual: Array, held: Predictive) -> float:
-    """Slow part of what a structure leaves of recordings that it was not fitted to, by the friction of those it was."""
+def share_there(comparison: Comparison, found: Fit, residual: Array, held: Predictive) -> float:
+    """Slow part of what a structure leaves of recordings that it was not fitted to, by the friction of those it was.
+
+    Beside what its numbers may be otherwise there: a base that training hardly tells foretells other speeds badly, and
+    nothing is missing for that. They move as far as cells say that are as uncertain as those of training are wrong.
+    """
     clear = comparison.problem.weight * far_from_turns(comparison.problem.prepared)
-    return _slow(residual, far_from_turns(held.prepared), held.prepared) / _friction(comparison, clear)
+    friction, clear_there = _friction(comparison, clear), far_from_turns(held.prepared)
+    wrong = max(_slow(found.residual, clear, comparison.problem.prepared), LEAST_WRONG * friction)
+    left = residual - _moved(residual, held.moved(found), clear_there, held.prepared, wrong)
+    return _slow(left, clear_there, held.prepared) / friction
+
+
+def _moved(residual: Array, columns: Array, weight: Array, prepared: Prepared, wrong: float) -> Array:
+    """What unit-normal amounts of some columns explain of a residual, told by means over cells of an error `wrong`."""
+    cell, _ = _cells(prepared)
+    count = np.bincount(cell, weight)
+    sums = np.column_stack([np.bincount(cell, weight * one) for one in (residual, *columns.T)])
+    means = np.divide(sums, count[:, None], out=np.zeros_like(sums), where=count[:, None] > 0)
+    root = np.sqrt(count / max(count.max(initial=0.0), 1e-300))[:, None] / wrong
+    whole = np.vstack([root * means[:, 1:], np.eye(columns.shape[1])])
+    target = np.concatenate([root[:, 0] * means[:, 0], np.zeros(columns.shape[1])])
+    return np.asarray(columns @ np.linalg.lstsq(whole, target, rcond=None)[0])
 
 
 def share_beside(comparison: Comparison, found: Fit, residual_there: Array, held: Predictive) -> float:

@@ -193,7 +193,7 @@ def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:
 
     What it removes about turns alone is what laws lack there, and what it hardly removes is about nothing that matters.
     """
-    if term.away < policy.least_away_unnamed or term.plain < policy.least_plain_gain:
+    if term.away < policy.least_away_unnamed or max(term.plain, term.share) < policy.least_plain_gain:
         return False
     return term.evidence >= max(least, _floor_of(term, policy))
 

@@ -77,14 +77,14 @@ def _challenge(
 ) -> _Challenge:
     """What leads an effect by most, beside the terms that took a name already; `own`: the worth of all that stands."""
     beside = _without(comparison, found.proof, one)
-    other = [term for term in tried if term.name not in hypothesis_of(one.effect).tables]
-    grams = _grams(comparison, beside, other)
-    known = [k for k, term in enumerate(other) if term.name in found.quantities]
-    leads = {k: _worth(grams, {*known, k}) - own - log(len(other)) for k in range(len(other))}
-    if not leads:
+    barred = (*hypothesis_of(one.effect).tables, *found.quantities)
+    terms = [*found.terms, *(term for term in tried if term.name not in barred)]
+    if not terms:
         return _Challenge(one, tried[0], -inf, beside)
+    grams, known = _grams(comparison, beside, terms), range(len(found.terms))
+    leads = {k: _worth(grams, {*known, k}) - own - log(len(terms)) for k in range(len(terms))}
     best = max(leads, key=lambda k: leads[k])
-    return _Challenge(one, other[best], leads[best], beside)
+    return _Challenge(one, terms[best], leads[best], beside)
 
 
 def _without(comparison: Comparison, proof: Proof, out: AcceptedEffect) -> Fit:

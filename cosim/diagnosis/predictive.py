@@ -8,6 +8,7 @@ Friction and load are not the same on two days, and what training cannot tell of
 are common to a model with an effect and without it, and far larger than many an effect: they must not decide.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -93,12 +94,21 @@ class Predictive:
     def predicted(self, found: Fit) -> float:
         """Log-likelihood of a structure fitted to training, what that leaves open of its effects integrated out."""
         own = [k for k, name in enumerate(found.free) if name not in self.base]
+        return self.log_likelihood(self.residual(found.mount), self.left_open(found, own))
+
+    def left_open(self, found: Fit, which: Sequence[int]) -> Array:
+        """Torque of what training leaves open of some fitted numbers: columns (rows, n) of amounts of one error."""
         weight = self.training.weight
         slopes, blocks = found.slopes * weight[:, None], Blocks.of(self.training.prepared)
-        spread = covariance(slopes, found.residual * weight, blocks)[np.ix_(own, own)]
+        spread = covariance(slopes, found.residual * weight, blocks)[np.ix_(which, which)]
         size, axes = np.linalg.eigh(spread / np.outer(scale := _sizes(spread), scale))
-        open_ = self.slopes(found)[:, own] @ (scale[:, None] * axes * np.sqrt(np.maximum(size, 0)))
-        return self.log_likelihood(self.residual(found.mount), open_)
+        return np.asarray(self.slopes(found)[:, which] @ (scale[:, None] * axes * np.sqrt(np.maximum(size, 0))))
+
+    def moved(self, found: Fit) -> Array:
+        """Torque of all that may be otherwise there: what training leaves open, and the base's numbers themselves."""
+        base = next((group for group in self.nuisances.groups if group.name == BASE), None)
+        own = self.nuisances.columns[:, base.columns] * base.prior if base else np.empty((len(self.weight), 0))
+        return np.column_stack([self.left_open(found, range(len(found.free))), own])
 
     def log_likelihood(self, residual: Array, open_: Array | None = None) -> float:
         """Log-likelihood of a residual at the kept rows, nuisances integrated out.

@@ -25,4 +25,4 @@ def residual_scores(comparison: Comparison, found: Nameless, held: Predictive) -
     left, there = share_left(comparison, chosen), held.residual(chosen.mount)
     terms, shown = flexible_terms(comparison, chosen, held), over_time(comparison, chosen)
     beside = share_beside(comparison, chosen, there, held)
-    return ResidualScores(left, share_there(comparison, there, held), terms, shown, beside, found.quantities)
+    return ResidualScores(left, share_there(comparison, chosen, there, held), terms, shown, beside, found.quantities)

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
 
 from cosim.data.recording import GAP, Gap, Recording
-from cosim.data.resolution import SEEN_STEPS, resolution
+from cosim.data.resolution import resolution
 from cosim.support.errors import RecordingError
 from cosim.support.statistics import rms
 
@@ -112,11 +112,6 @@ class Prepared:
         """Length of the positions visited [rad, m]."""
         low, high = self.ranges["q"]
         return high - low
-
-    @cached_property
-    def seen(self) -> float:
-        """Way [rad, m] below which the encoders show no displacement."""
-        return SEEN_STEPS * max(piece.step for piece in self.pieces)
 
     @cached_property
     def ranges(self) -> dict[str, tuple[float, float]]:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from scipy.ndimage import minimum_filter1d
 
 from cosim.estimation.prepare import Array, Piece, Prepared
+from cosim.estimation.visible import least_way
 from pyfmi_models.friction import FrictionLaw, MemorylessLaw
 
 CLEAR_MOTION = 0.02
@@ -25,14 +26,14 @@ def least_speed(v: Array) -> float:
 
 
 def remembers(law: FrictionLaw, prepared: Prepared) -> bool:
-    """Whether recordings show what a law remembers: not where a contact slides before the encoder shows it bend.
+    """Whether recordings show what a law remembers: not where a contact slides before anything shows it bend.
 
-    Behind such an encoder a bristle answers rounding and noise with a part of the level, at rest and at turns.
+    Such a bristle answers rounding, noise and what the filter does to a stop with a part of the level.
     """
     if isinstance(law, MemorylessLaw):
         return False
     stiffness, level = (getattr(law, name, None) for name in ("sigma0", "Fc"))
-    return not stiffness or level is None or bool(np.mean(level) / stiffness >= prepared.seen)
+    return not stiffness or level is None or bool(np.mean(level) / stiffness >= least_way(prepared))
 
 
 def described_rows(law: FrictionLaw, v: Array) -> npt.NDArray[np.bool_]:

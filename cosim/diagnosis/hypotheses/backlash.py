@@ -14,6 +14,7 @@ from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.play import far_torques
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
+from cosim.estimation.visible import least_way
 from cosim.support.statistics import rms
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.backlash import Backlash
@@ -98,8 +99,8 @@ class Play(Hypothesis[Backlash]):
                 yield with_numbers(first, gap_rad=gap)
 
     def shows(self, effect: Backlash, mount: Mount, prepared: Prepared) -> bool:
-        """A gap that the encoder does not show is its rounding."""
-        return float(effect.gap_rad) >= prepared.seen
+        """A gap that recordings do not show is rounding, or the filter."""
+        return float(effect.gap_rad) >= least_way(prepared)
 
     def looked(self, seen: Seen, mount: Mount) -> str:
         """Wider gaps."""

@@ -75,6 +75,10 @@ class ThinningGrease(Hypothesis[ConcaveViscous]):
         bend = projected(np.asarray(torque).ravel(), np.column_stack([np.sign(v), v]))
         return bool(np.sqrt(np.mean(bend**2)) > LEAST_BEND * contact_level(mount))
 
+    def is_degenerate(self, problem: Problem, effect: ConcaveViscous) -> bool:
+        """What thins at lower speeds than are tried is level from there on: the contact's friction by another name."""
+        return bool(effect.thinning_speed < THINNING[0] * problem.top_speed)
+
     def none(self, mount: Mount) -> float:
         """A straight line."""
         return 1.0

@@ -12,6 +12,7 @@ from cosim.diagnosis.tuning import refound, revived
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
+from cosim.estimation.visible import least_way
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.mount import Mount
@@ -63,8 +64,8 @@ class BendingContact(Hypothesis[Presliding]):
         return refound(problem, revived(problem, found, start), evidence, softer)
 
     def shows(self, effect: Presliding, mount: Mount, prepared: Prepared) -> bool:
-        """What bends by less than the encoder shows is its rounding."""
-        return self.way_back(effect, mount) >= prepared.seen
+        """What bends by less than recordings show is rounding, or the filter."""
+        return self.way_back(effect, mount) >= least_way(prepared)
 
     def way_back(self, effect: Presliding, mount: Mount) -> float:
         """What the contact bends: where motion goes one way, it is a lagged torque over speed."""

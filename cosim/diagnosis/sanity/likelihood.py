@@ -11,7 +11,7 @@ No single piece may say more than a `MOST_*`: each rests on a model of its own t
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import exp, log, pi
+from math import copysign, exp, log, pi
 
 import numpy as np
 
@@ -80,7 +80,7 @@ class Evidence:
         found = _gain(solution.inertia, known.inertia * torque / position, explanation.inertia)
         if known.coulomb:
             found += _gain(solution.coulomb, known.coulomb * torque, explanation.friction)
-        found += float(np.clip(solution.sign, -MOST_SIGN, MOST_SIGN)) * (0.5 if torque > 0 else -0.5)
+        found -= float(np.logaddexp(0.0, -copysign(1.0, torque) * np.clip(solution.sign, -MOST_SIGN, MOST_SIGN)))
         found += (
             self._size(balance, explanation)
             + self._gravity(balance, order)
@@ -112,7 +112,9 @@ class Evidence:
             return 0.0
         one, other = balance.solution(1.0), balance.solution(order)
         rows = min(one.independent, other.independent)
-        gain = 0.5 * rows * log((one.left + balance.overlooked) / (other.left + balance.overlooked))
+        told = 0.5 * rows * log((one.left + balance.overlooked) / (other.left + balance.overlooked))
+        # For another order than the stated one speaks no more than what overlooked physics, one wave, may not leave.
+        gain = min(told, 0.5 * (one.left - other.left) / balance.overlooked)
         most = MOST_GRAVITY if order * balance.reach > pi else 0.0
         return float(np.clip(max(one.explained, other.explained) * gain, -MOST_GRAVITY, most))
 
