@@ -46,6 +46,16 @@ class TestPreparation:
             # What is left is the filters' memory of the ends of the record, half a second away.
             assert np.abs(left[piece.inside]).max() < 1e-5 * np.abs(tau).max()
 
+    @pytest.mark.parametrize("share", [0.6, 0.75, 0.9, 1.0])
+    def test_a_line_near_the_cutoff_is_kept_at_its_place(self, share: float) -> None:
+        t, q, _, _ = wander(rate=1000.0)
+        line = share * 100.0
+        prepared = prepare([recorded(np.sin(2 * np.pi * line * t), t, q)], 100.0)
+        kept, power = prepared.stacked("t"), prepared.stacked("tau")
+        spectrum = np.abs(np.fft.rfft(power * np.hanning(len(power))))
+        found = np.fft.rfftfreq(len(power), float(kept[1] - kept[0]))[int(np.argmax(spectrum))]
+        assert found == pytest.approx(line, abs=0.1)
+
     def test_a_noisy_encoder_narrows_the_band(self) -> None:
         t, q, v, a = wander()
         rng = np.random.default_rng(1)

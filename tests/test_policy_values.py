@@ -1,0 +1,83 @@
+"""Constants of the policy between what was measured on either side of them, in numbers that do not move with them.
+
+What a limit does at its edges stands in test_decision_at_its_limits.py; here is where the limits themselves lie.
+"""
+
+import pytest
+
+from cosim.diagnosis.decision import Gain, ResidualScores, TermScores, is_left, stands
+from cosim.diagnosis.policy import POLICY
+
+BETWEEN = {
+    "moved_prior": (0.05, 0.3),  # friction repeats to 10 to 20 %; .3 gives the same verdicts
+    "small_gain": (0.1, 0.2),
+    "least_bent": (24, 180),  # nulls, true contacts
+    "evidence_if_large": (5, 19),  # what removes a fifth in nulls: 5 at most, or 19 and predicts nothing
+    "least_above_noise": (4.1, 6.8),  # false springs, true ones
+    "least_away": (0.07, 0.19),  # friction at turns, true timing
+    "keep_evidence": (5, 15),  # a further wave, a first effect
+    "further_share": (0.37, 0.53),  # false ones beside true ones, true ones
+    "large_gain": (0.15, 0.3),
+    "margin_within_set": (0.2, 0.8),  # within 1.9 nats of the likeliest
+    "most_raised_beside_rest": (0.06, 0.5),  # a true contact, the half that it must gain at rest
+    "supported": (0.03, 0.1),  # chance in nulls, the largest share of one
+    "denied": (3, 7),  # where something is missing, nulls
+    "least_away_unnamed": (0.32, 0.46),  # nulls, where something is missing
+    "true_beside_unknown": (0.06, 0.27),  # 5 of 38
+    "large_residual": (0.118, 0.15),  # the most that 96 nulls left
+    "large_residual_there": (0.118, 0.4),
+    "large_residual_beside": (0.032, 0.09),  # the most that 180 nulls left
+    "sure_beside_unknown": (0.89, 0.95),  # false names, true ones on two generators and two machines
+}
+
+
+@pytest.mark.parametrize("name", BETWEEN)
+def test_a_constant_lies_between_what_was_measured(name: str) -> None:
+    low, high = BETWEEN[name]
+    assert low < getattr(POLICY, name) < high
+
+
+def test_forms_that_are_refitted_are_more_than_imitate_each_other() -> None:
+    """Delay, lag, presliding and backlash imitate each other, each in a form or two."""
+    assert POLICY.refitted >= 8
+
+
+def unknown(evidence: float, share: float, predicted: float = 0.0) -> bool:
+    return is_left([], ResidualScores(0.0, 0.0, (TermScores("position", evidence, predicted, share),)), POLICY)
+
+
+@pytest.mark.parametrize(
+    ("evidence", "share", "predicted", "expected"),
+    [
+        (30.0, 0.06, 5.0, True),
+        (30.0, 0.04, 5.0, False),  # supported by too little
+        (24.0, 0.06, 5.0, False),
+        (11.0, 0.35, 9.0, True),  # it predicts a third of what is left
+        (9.0, 0.35, 9.0, False),
+        (45.0, 0.0, 0.0, True),
+        (36.0, 0.0, 0.0, False),  # a level that wanders follows anything slow by chance
+        (77.0, -0.7, -20.0, False),  # of seven nulls with 31 to 77 nats two added .7 and 10 to the residual
+        (77.0, 0.0, -540.0, False),  # two others lost 7 and 8 times as much
+        (120.0, -0.7, -20.0, True),
+    ],
+)
+def test_what_nulls_and_machines_with_something_unnamed_showed(
+    evidence: float, share: float, predicted: float, expected: bool
+) -> None:
+    assert unknown(evidence, share, predicted) is expected
+
+
+@pytest.mark.parametrize(
+    ("gain", "share", "expected"),
+    [
+        (Gain(3.5, 0.1, 0.1), 0.1, True),
+        (Gain(2.5, 0.1, 0.1), 0.1, False),  # three nats of proof
+        (Gain(2.5, 0.6, 0.6), 0.1, True),  # or half of the error
+        (Gain(10.0, 0.1, -0.05), 0.1, False),  # one band is worse off
+        (Gain(10.0, 0.1, -0.02), 0.1, True),
+        (Gain(10.0, 0.1, 0.1), 0.015, False),  # of what the base leaves a fiftieth
+        (Gain(35.0, 0.1, 0.1), 0.015, True),
+    ],
+)
+def test_what_an_effect_must_show_held_out(gain: Gain, share: float, expected: bool) -> None:
+    assert stands(gain, share, POLICY) is expected
