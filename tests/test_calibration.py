@@ -67,3 +67,25 @@ def test_the_command_finds_the_curve_that_made_the_truth(tmp_path: Path) -> None
     offset, slope = (float(one) for one in said.split("OFFSET, SLOPE = ")[1].splitlines()[0].split(", "))
     assert offset == pytest.approx(0.5, abs=0.15)
     assert slope == pytest.approx(0.4, abs=0.1)
+
+
+def test_a_world_is_judged_by_the_curve_of_the_other(tmp_path: Path) -> None:
+    """In one world probabilities come true as they are, in the other half as far from even odds."""
+    rng, files = np.random.default_rng(4), []
+    for world, slope in (("honest", 1.0), ("boasting", 0.5)):
+        rows = []
+        for printed in rng.uniform(0.5, 0.98, 1500):
+            truth = ["cogging"] if rng.random() < calibrated(printed, 0.0, slope) else ["delay"]
+            effect = {"effect": "cogging", "answer": "found", "probability": printed}
+            rows.append({"effects": truth, "answer": {"effects": [effect]}})
+        rows.append({"effects": ["delay"], "status": "crashed", "answer": None})
+        files.append(tmp_path / world / "deck.json")
+        files[-1].parent.mkdir()
+        files[-1].write_text(json.dumps({"rows": rows, "seed": 1, "code": "0" * 64}), "utf-8")
+    command = [sys.executable, str(BENCHMARK.parent / "calibration_crossed.py"), *map(str, files)]
+    subprocess.run([*command, "--out", str(tmp_path)], capture_output=True, check=True)
+    lines = (tmp_path / "crossed.md").read_text("utf-8").splitlines()
+    told = {cells[1].strip(): cells[2:5] for line in lines if len(cells := line.split("|")) == 6}
+    assert float(told["honest"][0].split()[0]) < 0.05 < float(told["honest"][2].split()[0])
+    assert float(told["boasting"][0].split()[0]) > 0.08
+    assert float(told["boasting"][1].split(": ")[1].split(",")[1]) == pytest.approx(1.0, abs=0.2)
