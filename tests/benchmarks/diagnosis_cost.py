@@ -26,15 +26,17 @@ EFFECTS = ("cogging", "delay")
 
 
 class Case(NamedTuple):
-    """One recording's length [s], rows a second, share of the usual noise."""
+    """One recording's length [s], rows a second, share of the usual noise, and whether `--quick` is given."""
 
     seconds: float
     rate_hz: int
     noise: float
+    quick: bool = False
 
 
 CASES = (
     *(Case(seconds, 1000, 1.0) for seconds in (30, 60, 120, 240)),
+    Case(60, 1000, 1.0, quick=True),
     *(Case(seconds, 10_000, 1.0) for seconds in (60, 300)),
     *(Case(seconds, 10_000, 0.01) for seconds in (60, 300)),
 )
@@ -66,6 +68,7 @@ def measured(case: Case, seed: int) -> dict[str, Any]:
         train, held = [str(folder / f"{one}.parquet") for one in RECORDINGS[:2]], str(folder / "heldout.parquet")
         command = [sys.executable, "-m", "cosim", "diagnose", *train, "--heldout", held, "--json"]
         command += ["--card", str(folder / "card.toml"), "--out", str(folder / "out")]
+        command += ["--quick"] * case.quick
         begun = time.perf_counter()
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
             assert process.stdout is not None
@@ -82,7 +85,7 @@ def row(one: dict[str, Any]) -> str:
     """One line of the table."""
     samples = 3 * one["seconds"] * one["rate_hz"] / 1e6
     return (
-        f"| {one['seconds']:g} | {one['rate_hz']} | {one['noise']:g} | {samples:.3g} | {one['wall']:.0f} | "
+        f"| {one['seconds']:g}{' --quick' * one['quick']} | {one['rate_hz']} | {one['noise']:g} | {samples:.3g} | {one['wall']:.0f} | "
         f"{one['cpu']:.0f} | {one['memory']:.0f} | {' + '.join(one['verdict']) or 'none'} |"
     )
 
