@@ -131,7 +131,11 @@ class TestCommand:
         assert rows.num_rows == sum(
             pq.read_table(folder / f).num_rows for f in ("train_1.parquet", "train_2.parquet", "heldout.parquet")
         )
-        assert "<html" in (out / "report.html").read_text()
+        page = (out / "report.html").read_text()
+        assert "<html" in page
+        assert "not passive" in printed["data_quality"][0]
+        assert "Notes on the card and the recordings" in page
+        assert "it is not passive" in page
         assert len(list(out.glob("*.fmu"))) == 2
         assert self.run(self.arguments(folder, out)) == 2
         assert "exists already" in capsys.readouterr().err

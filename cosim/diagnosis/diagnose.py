@@ -141,6 +141,7 @@ def diagnose(
         _with_search(described, answer, examined, heldout),
         not_learned=_not_learned(tried) if answer.decision.is_unknown else {},
         sanity=sanity,
+        data_quality=(*card.remarks(), *described.data_quality),
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,
     )

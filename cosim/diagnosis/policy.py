@@ -36,7 +36,7 @@ class Policy:
     phase_price: float = 1.15
     """Price of a phase that is found in each recording anew. Unit: nats."""
     refitted: int = 8
-    """Forms of effects that are refitted in a stage by each of the three screening statistics."""
+    """Forms of effects that are refitted in a stage by each of the two screening statistics."""
     least_evidence: float = 15.0
     """Evidence that the first effect must have. Unit: nats ..."""
     large_gain: float = 0.25

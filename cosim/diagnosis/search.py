@@ -1,8 +1,7 @@
 """Search: which effects are worth a refit, what each is worth after it, and what comes next.
 
-In every stage each form of an effect is screened by three statistics - the evidence of a linear step, the share of the
-plain energy, the same evidence without what is fast - and the best forms by any of them are refitted. Nothing is
-dropped because something else was rejected.
+In every stage each form of an effect is screened by two statistics - the evidence of a linear step, the share of the
+plain energy - and the best forms by either are refitted. Nothing is dropped because something else was rejected.
 """
 
 from collections.abc import Callable, Sequence

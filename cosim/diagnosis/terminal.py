@@ -11,6 +11,7 @@ from cosim.diagnosis.report.findings import do, where
 from cosim.diagnosis.report.lead import heading
 from cosim.diagnosis.report.next_experiment import to_record
 from cosim.diagnosis.report.quantities import Scales
+from cosim.diagnosis.report.untrained import untrained
 from cosim.diagnosis.report.words import (
     ANSWERS,
     Block,
@@ -53,6 +54,7 @@ def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -
         [""],
         [line for block in blocks(diagnosis) for line in _block(block, scales)],
         _goes_with(diagnosis),
+        _wrapped(untrained(diagnosis, scales), 2) if "unknown" in diagnosis.verdict else [],
         _rest(diagnosis, scales),
         _wrapped(diagnosis.learned.get("statement", "") or diagnosis.not_learned.get("statement", ""), 0),
         _formulas(diagnosis),

@@ -84,8 +84,9 @@ def measured(case: Case, seed: int) -> dict[str, Any]:
 def row(one: dict[str, Any]) -> str:
     """One line of the table."""
     samples = 3 * one["seconds"] * one["rate_hz"] / 1e6
+    length = f"{one['seconds']:g}{' --quick' * one['quick']}"
     return (
-        f"| {one['seconds']:g}{' --quick' * one['quick']} | {one['rate_hz']} | {one['noise']:g} | {samples:.3g} | {one['wall']:.0f} | "
+        f"| {length} | {one['rate_hz']} | {one['noise']:g} | {samples:.3g} | {one['wall']:.0f} | "
         f"{one['cpu']:.0f} | {one['memory']:.0f} | {' + '.join(one['verdict']) or 'none'} |"
     )
 

@@ -20,6 +20,7 @@ from cosim.diagnosis.report.learned import nameless
 from cosim.diagnosis.report.next_experiment import next_experiment
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.sheet import Picture
+from cosim.diagnosis.report.untrained import untrained
 from cosim.diagnosis.result import Diagnosis, Trace
 from cosim.plots.quantities import joined
 
@@ -134,7 +135,8 @@ def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
         left = f"{unit.text(rest)} of error on unseen runs stays unexplained, beyond the noise."
     goes = f"It goes with {', '.join(diagnosis.depends_on)}." if diagnosis.depends_on else ""
     misfit = "" if goes or rest <= 0.5 * held.floor_rms or words.verdict(diagnosis) == "withheld" else MISFIT
-    return [text for text in (left, goes, misfit) if text]
+    there = "" if rest <= 0.5 * held.floor_rms else untrained(diagnosis, scales)
+    return [text for text in (left, there, goes, misfit) if text]
 
 
 def _proof_sentence(diagnosis: Diagnosis, scales: Scales) -> str:
