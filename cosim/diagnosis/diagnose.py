@@ -9,6 +9,7 @@ import numpy as np
 from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
 from cosim.diagnosis.absent import not_found
+from cosim.diagnosis.alternatives import prove_sets
 from cosim.diagnosis.band import in_band
 from cosim.diagnosis.breakdown import parts
 from cosim.diagnosis.comparison import Comparison
@@ -27,7 +28,7 @@ from cosim.diagnosis.loop_bias import loop_bias
 from cosim.diagnosis.nameless import Nameless, nameless
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.predictive import Predictive
-from cosim.diagnosis.proof import Proof, prove
+from cosim.diagnosis.proof import Proof
 from cosim.diagnosis.protocol import CUTOFF, Structures, heldout_rms, judge, judged_band, traces
 from cosim.diagnosis.regression import black_box_rms
 from cosim.diagnosis.result import Diagnosis, Finding, Trace
@@ -171,7 +172,8 @@ def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Record
     """Prove, measure what is left, decide."""
     prepared = prepare(heldout, comparison.problem.prepared.cutoff)
     held = Predictive.of(comparison, prepared, examined.base, prepare(heldout, CUTOFF))
-    found = nameless(comparison, examined, prove(comparison, examined, held), held)
+    examined, proof = prove_sets(comparison, examined, held)
+    found = nameless(comparison, examined, proof, held)
     residual = residual_scores(comparison, found, held)
     return Answer(
         comparison, examined.base, decide(effect_scores(found.proof), residual, comparison.policy), held, found
