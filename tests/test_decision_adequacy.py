@@ -175,6 +175,8 @@ def test_what_begins_late_in_a_recording_counts_as_what_is_there_from_its_start(
 class Hypothesis:
     """What an effect declares, as a table."""
 
+    sizes = ()
+
     def __init__(
         self,
         plausible: bool = True,
@@ -209,7 +211,7 @@ class Effect:
 
 def asked(monkeypatch: pytest.MonkeyPatch, at_bound: bool = False, **said: Any) -> None:
     monkeypatch.setattr(admissibility, "hypothesis_of", lambda effect: Hypothesis(**said))
-    monkeypatch.setattr(admissibility, "at_bound", lambda effect: at_bound)
+    monkeypatch.setattr(admissibility, "at_bound", lambda effect, sizes: at_bound)
 
 
 def to_and_fro(*reach: float) -> Motion:

@@ -43,6 +43,16 @@ def test_at_a_bound_no_size_is_told() -> None:
     assert told(Delay(delay_ms=0.999 * known.high), delay_ms=0.01 * known.high)
 
 
+def test_of_several_sizes_one_inside_its_range_is_no_bound() -> None:
+    """Another generator's friction of two directions has a viscous part beyond what a card may hold."""
+    sizes = hypothesis_of(FrictionAsymmetry(level_asymmetry=0.1)).sizes
+    for edge in (0.95, -0.95):
+        assert not at_bound(FrictionAsymmetry(level_asymmetry=0.33, viscous_asymmetry=edge), sizes)
+        assert at_bound(FrictionAsymmetry(level_asymmetry=0.33, viscous_asymmetry=edge))
+        assert at_bound(FrictionAsymmetry(level_asymmetry=0.0, viscous_asymmetry=edge), sizes), "nothing is no size"
+        assert at_bound(FrictionAsymmetry(level_asymmetry=edge, viscous_asymmetry=-edge), sizes)
+
+
 def test_of_several_sizes_one_that_is_told_is_enough() -> None:
     one = FrictionAsymmetry(level_asymmetry=0.3, viscous_asymmetry=0.1)
     assert told(one, level_asymmetry=0.05, viscous_asymmetry=0.5)

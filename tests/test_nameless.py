@@ -86,6 +86,18 @@ def test_what_took_a_name_stands_beside_every_rival_of_the_next(
     assert both.term.name not in (own.name, *barred)
 
 
+def test_however_bad_its_shape_an_effects_own_table_speaks_for_its_name(
+    rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
+) -> None:
+    comparison, _, proof, _ = rippling_motor[1]
+    (effect,) = proof.standing
+    tried = candidate_terms(comparison.problem.mount, comparison.problem.prepared)
+    leads = [_challenge(comparison, Nameless(proof), effect, own, tried).lead for own in (-1e9, -2e9)]
+    assert leads[0] == leads[1] < 1e6
+    others = [one for one in tried if one.name not in hypothesis_of(effect.effect).tables]
+    assert _challenge(comparison, Nameless(proof), effect, -1e9, others).lead > 0.9e9
+
+
 def test_friction_over_position_keeps_its_name(tmp_path: Path) -> None:
     said, _ = diagnosed(RUBBING_SPOTS, tmp_path)
     assert said.verdict == ("position_friction",)

@@ -14,7 +14,7 @@ BETWEEN = {
     "least_bent": (24, 180),  # nulls, true contacts
     "evidence_if_large": (5, 19),  # what removes a fifth in nulls: 5 at most, or 19 and predicts nothing
     "least_above_noise": (4.1, 6.8),  # false springs, true ones
-    "least_away": (0.07, 0.19),  # friction at turns, true timing
+    "least_away": (0.07, 0.093),  # friction at turns, true timing
     "keep_evidence": (5, 15),  # a further wave, a first effect
     "further_share": (0.37, 0.53),  # false ones beside true ones, true ones
     "large_gain": (0.15, 0.3),

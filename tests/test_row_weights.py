@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.hypotheses import hypothesis_of
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.estimation.row_weights import remembers, weights
 from cosim.estimation.visible import least_way
-from pyfmi_models.friction import Coulomb, LuGre
+from pyfmi_models.effects.presliding import Presliding
+from pyfmi_models.friction import LAWS, Coulomb, LuGre
+from pyfmi_models.mount import Axis, Mount
 
 COULOMB, LUGRE = Coulomb(Fc=1.0), LuGre(Fc=1.0, Fs=1.2, Vs=0.01, sigma0=1e3)
 SOFT, SECONDS = replace(LUGRE, sigma0=1e2), (3, 6, 12)
@@ -75,6 +78,19 @@ def test_a_bristle_that_slides_within_what_the_filter_smears_is_not_remembered(r
     prepared = prepare([Recording("run", turning)], 5.0)
     assert least_way(prepared) == pytest.approx(0.25 * np.sqrt(0.5) / (2 * np.pi * 5) ** 2, rel=0.05)
     assert remembers(replace(LUGRE, sigma0=LUGRE.Fc / reach), prepared) is remembered
+
+
+def test_what_a_bristle_bends_goes_by_what_it_holds_at_rest() -> None:
+    """A Coulomb level that a fit has lost is none: before it slides the bristle holds Fs."""
+    t = np.arange(1200) / 100
+    prepared = prepare([Recording("run", {"t": t, "q": np.sin(t), "tau": np.ones_like(t)})], 5.0)
+    lost = replace(LUGRE, sigma0=LUGRE.Fs / (2 * least_way(prepared)), Fc=1e-3 * LUGRE.Fs)
+    assert remembers(lost, prepared)
+    assert not remembers(replace(lost, Fs=0.4 * LUGRE.Fs), prepared)
+    contact, still = Presliding(sigma0=lost.sigma0), replace(COULOMB, Fc=lost.Fc)
+    for law, shown in ((LAWS["static"](Fc=lost.Fc, Fs=LUGRE.Fs, Vs=0.1, sigma2=0.0), True), (still, False)):
+        mount = Mount(name="axis", axis=Axis(inertia=1.0), friction=law, effects=(contact,))
+        assert hypothesis_of(contact).shows(contact, mount, prepared) is shown
 
 
 def test_a_law_without_memory_remembers_nothing() -> None:

@@ -50,9 +50,10 @@ def is_admissible(problem: Problem, one: Fitted) -> bool:
 
 def is_degenerate(problem: Problem, effect: Effect) -> bool:
     """Whether an effect is really something else, lies at a bound, or is what no card may hold."""
-    if effect.broken_rule() or at_bound(effect):
+    own = hypothesis_of(effect)
+    if effect.broken_rule() or at_bound(effect, own.sizes):
         return True
-    return hypothesis_of(effect).is_degenerate(problem, effect)
+    return own.is_degenerate(problem, effect)
 
 
 def needs_turns(effect: Effect, mount: Mount, prepared: Prepared) -> bool:

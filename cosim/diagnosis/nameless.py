@@ -4,11 +4,12 @@ A torque constant that waves with the position looks like friction that does, dr
 drive that saturates: to a list, what is not on it is the nearest thing that is. So each effect that stands is compared
 with every term that may be learned, in its place and in the same nats,
 
-    lead = worth(others + term) - ln(terms tried) - worth(others + effect)
+    lead = worth(others + term) - ln(terms tried) - max(worth(others + effect), worth(others + its own table))
 
 and leaves where the lead is one by which a rival is excluded where something has no name, and the held-out recordings
 do not contradict it. A term that is the effect in another form (`Hypothesis.tables`), or another law of friction over
-speed, takes nothing away. What then remains is asked again beside that term: names come in twos and threes where each
+speed, takes nothing away: where the effect's own table is as good, it is its shape that is wrong, not its name. What
+then remains is asked again beside that term: names come in twos and threes where each
 imitates a part.
 """
 
@@ -77,14 +78,17 @@ def _challenge(
 ) -> _Challenge:
     """What leads an effect by most, beside the terms that took a name already; `own`: the worth of all that stands."""
     beside = _without(comparison, found.proof, one)
-    barred = (*hypothesis_of(one.effect).tables, *found.quantities)
-    terms = [*found.terms, *(term for term in tried if term.name not in barred)]
+    tables = hypothesis_of(one.effect).tables
+    free = [term for term in tried if term.name not in found.quantities]
+    alike = [term for term in free if term.name in tables]
+    terms = [*found.terms, *(term for term in free if term.name not in tables)]
     if not terms:
         return _Challenge(one, tried[0], -inf, beside)
-    grams, known = _grams(comparison, beside, terms), range(len(found.terms))
-    leads = {k: _worth(grams, {*known, k}) - own - log(len(terms)) for k in range(len(terms))}
-    best = max(leads, key=lambda k: leads[k])
-    return _Challenge(one, terms[best], leads[best], beside)
+    grams, known = _grams(comparison, beside, [*terms, *alike]), range(len(found.terms))
+    worth = [_worth(grams, {*known, k}) for k in range(len(terms) + len(alike))]
+    kind = max([own, *(value - log(len(alike)) for value in worth[len(terms) :])])
+    best = max(range(len(terms)), key=lambda k: worth[k])
+    return _Challenge(one, terms[best], worth[best] - log(len(terms)) - kind, beside)
 
 
 def _without(comparison: Comparison, proof: Proof, out: AcceptedEffect) -> Fit:

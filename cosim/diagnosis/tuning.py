@@ -64,6 +64,12 @@ def freed(problem: Problem, found: Fit, name: str) -> Fit:
     return problem.fit(found.mount, 10, (name,))
 
 
-def at_bound(effect: Effect) -> bool:
-    """Whether a parameter of an effect is at the upper end of its range."""
-    return any(variable.start >= variable.high for variable in parameters_of(effect))
+def at_bound(effect: Effect, sizes: Sequence[str] = ()) -> bool:
+    """Whether a parameter of an effect is at an end of its range; of several `sizes` all that are not nothing.
+
+    A range from 0 on ends at nothing, which is no bound: there an effect is small.
+    """
+    variables = parameters_of(effect)
+    ends = {one.name: one.start >= one.high or (one.low < 0 and one.start <= one.low) for one in variables}
+    own = [ends.pop(one.name) for one in variables if one.name in sizes and one.start]
+    return any(ends.values()) or (bool(own) and all(own))

@@ -32,8 +32,9 @@ def remembers(law: FrictionLaw, prepared: Prepared) -> bool:
     """
     if isinstance(law, MemorylessLaw):
         return False
-    stiffness, level = (getattr(law, name, None) for name in ("sigma0", "Fc"))
-    return not stiffness or level is None or bool(np.mean(level) / stiffness >= least_way(prepared))
+    stiffness, *levels = (getattr(law, name, None) for name in ("sigma0", "Fc", "Fs"))
+    held = max((float(np.mean(level)) for level in levels if level is not None), default=None)
+    return not stiffness or held is None or bool(held / stiffness >= least_way(prepared))
 
 
 def described_rows(law: FrictionLaw, v: Array) -> npt.NDArray[np.bool_]:

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.diagnosis.candidates import Candidate, Span, contact_level
+from cosim.diagnosis.candidates import Candidate, Span, contact_level, rest_level
 from cosim.diagnosis.hypotheses.base import Evidence, Hypothesis, Seen
 from cosim.diagnosis.tuning import refound, revived
 from cosim.estimation.fit import Fit
@@ -69,4 +69,4 @@ class BendingContact(Hypothesis[Presliding]):
 
     def way_back(self, effect: Presliding, mount: Mount) -> float:
         """What the contact bends: where motion goes one way, it is a lagged torque over speed."""
-        return contact_level(mount) / float(effect.sigma0)
+        return rest_level(mount) / float(effect.sigma0)
