@@ -11,7 +11,7 @@ from cosim.diagnosis.policy import POLICY
 BETWEEN = {
     "moved_prior": (0.05, 0.3),  # friction repeats to 10 to 20 %; .3 gives the same verdicts
     "small_gain": (0.1, 0.2),
-    "least_bent": (24, 180),  # nulls, true contacts
+    "least_bent": (24, 48),  # nulls, true contacts
     "evidence_if_large": (5, 19),  # what removes a fifth in nulls: 5 at most, or 19 and predicts nothing
     "least_above_noise": (4.1, 6.8),  # false springs, true ones
     "least_away": (0.07, 0.093),  # friction at turns, true timing
