@@ -134,9 +134,11 @@ class Gain:
     def halves(self, policy: Policy) -> bool:
         """Whether the plain error energy is halved in both bands, and the likelihood does not clearly speak against it.
 
-        What is slow is free to wander in the likelihood, so that an effect of it may gain nothing there.
+        What is slow is free to wander in the likelihood, so that an effect of it may gain nothing there. Where next to
+        nothing is left, the likelihood is not asked: it judges the few parts in a hundred that the equation misses.
         """
-        return min(self.narrow, self.wide) >= policy.halved and self.nats > -policy.floor
+        removed = min(self.narrow, self.wide)
+        return removed >= policy.cleared or (removed >= policy.halved and self.nats > -policy.floor)
 
     def matters_alone(self, policy: Policy) -> bool:
         """Whether an effect that is small in training matters held out: it halves the error there, and predicts."""
