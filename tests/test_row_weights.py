@@ -86,6 +86,7 @@ def test_what_a_bristle_bends_goes_by_what_it_holds_at_rest() -> None:
     prepared = prepare([Recording("run", {"t": t, "q": np.sin(t), "tau": np.ones_like(t)})], 5.0)
     lost = replace(LUGRE, sigma0=LUGRE.Fs / (2 * least_way(prepared)), Fc=1e-3 * LUGRE.Fs)
     assert remembers(lost, prepared)
+    assert not remembers(replace(lost, Fc=0.4 * LUGRE.Fs), prepared), "a level that is there counts"
     assert not remembers(replace(lost, Fs=0.4 * LUGRE.Fs), prepared)
     contact, still = Presliding(sigma0=lost.sigma0), replace(COULOMB, Fc=lost.Fc)
     for law, shown in ((LAWS["static"](Fc=lost.Fc, Fs=LUGRE.Fs, Vs=0.1, sigma2=0.0), True), (still, False)):

@@ -85,11 +85,6 @@ def contact_level(mount: Mount) -> float:
     return of_both_ways(getattr(mount.friction, "Fc", None))
 
 
-def rest_level(mount: Mount) -> float:
-    """What a friction law holds at rest, the mean of both directions [N m]: Fs, or the Coulomb level."""
-    return max(of_both_ways(getattr(mount.friction, "Fs", None)), contact_level(mount))
-
-
 def has(mount: Mount, kind: type[Any]) -> bool:
     """Whether a mount holds an effect of a kind."""
     return any(isinstance(effect, kind) for effect in mount.effects)

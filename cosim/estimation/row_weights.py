@@ -9,7 +9,7 @@ import numpy.typing as npt
 from scipy.ndimage import minimum_filter1d
 
 from cosim.estimation.prepare import Array, Piece, Prepared
-from cosim.estimation.visible import least_way
+from cosim.estimation.visible import held_level, least_way
 from pyfmi_models.friction import FrictionLaw, MemorylessLaw
 
 CLEAR_MOTION = 0.02
@@ -32,9 +32,8 @@ def remembers(law: FrictionLaw, prepared: Prepared) -> bool:
     """
     if isinstance(law, MemorylessLaw):
         return False
-    stiffness, *levels = (getattr(law, name, None) for name in ("sigma0", "Fc", "Fs"))
-    held = max((float(np.mean(level)) for level in levels if level is not None), default=None)
-    return not stiffness or held is None or bool(held / stiffness >= least_way(prepared))
+    stiffness, held = getattr(law, "sigma0", None), held_level(law)
+    return not stiffness or not held or bool(held / stiffness >= least_way(prepared))
 
 
 def described_rows(law: FrictionLaw, v: Array) -> npt.NDArray[np.bool_]:

@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from cosim.diagnosis.candidates import Candidate, Span, contact_level, rest_level
+from cosim.diagnosis.candidates import Candidate, Span, contact_level
 from cosim.diagnosis.hypotheses.base import Evidence, Hypothesis, Seen
 from cosim.diagnosis.tuning import refound, revived
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
-from cosim.estimation.visible import least_way
+from cosim.estimation.visible import held_level, least_way
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.mount import Mount
@@ -69,4 +69,4 @@ class BendingContact(Hypothesis[Presliding]):
 
     def way_back(self, effect: Presliding, mount: Mount) -> float:
         """What the contact bends: where motion goes one way, it is a lagged torque over speed."""
-        return rest_level(mount) / float(effect.sigma0)
+        return held_level(mount.friction) / float(effect.sigma0)
