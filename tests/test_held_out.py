@@ -115,7 +115,8 @@ def test_what_halves_the_error_stands_where_the_likelihood_cannot_tell() -> None
     half = POLICY.halved
     assert stands(Gain(-1.0, half, half), 0.9, POLICY)
     assert not stands(Gain(-1.0, half, half - 0.01), 0.9, POLICY)
-    assert not stands(Gain(-POLICY.floor, 0.9, 0.9), 0.9, POLICY)
+    assert not stands(Gain(-POLICY.floor, 0.89, 0.89), 0.9, POLICY)
+    assert stands(Gain(-POLICY.floor, 0.9, 0.9), 0.9, POLICY), "where next to nothing is left it is not asked"
 
 
 def test_an_effect_that_raises_the_plain_error_does_not_stand_whatever_its_likelihood() -> None:
