@@ -17,12 +17,13 @@ from cosim.diagnosis.search import CandidateFit
 
 
 def prove_sets(comparison: Comparison, examined: Examined, held: Predictive) -> tuple[Examined, Proof]:
-    """Keep the effects that predict; of a set whose first does not, the member that predicts best."""
+    """Keep the effects that predict; of a set whose first does not, the member that predicts best.
+
+    One effect gives way: what was fitted in another's place was fitted beside the names that training gave.
+    """
     proof = prove(comparison, examined, held)
-    for refused in proof.unproven:
-        ways = [(examined, proof), *_ways(comparison, examined, proof, refused, held)]
-        examined, proof = max(ways, key=lambda way: held.predicted(way[1].chosen))
-    return examined, proof
+    ways = [way for refused in proof.unproven for way in _ways(comparison, examined, proof, refused, held)]
+    return max(ways, key=lambda way: held.predicted(way[1].chosen), default=(examined, proof))
 
 
 def _ways(

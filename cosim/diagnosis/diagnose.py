@@ -137,12 +137,11 @@ def diagnose(
     delivered, first, named = (_improved(card, one) for one in (model, examined.chosen.mount, answer.chosen.mount))
     on_model_ready("after", delivered.plant())
     experiment = _experiment(answer)
-    described = _with_learned(_described(answer, train, heldout, card.mount.name), answer, learned, train, heldout)
+    described = _with_learned(_described(answer, train, heldout, card), answer, learned, train, heldout)
     diagnosis = replace(
         _with_search(described, answer, examined, heldout),
         not_learned=_not_learned(tried) if answer.decision.is_unknown else {},
         sanity=sanity,
-        data_quality=(*card.remarks(), *described.data_quality),
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,
     )
@@ -180,7 +179,7 @@ def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Record
     )
 
 
-def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Recording], name: str) -> Diagnosis:
+def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Recording], card: Card) -> Diagnosis:
     """What stands, measured on all recordings and put into words."""
     problem, decision = answer.comparison.problem, answer.decision
     prepared, linear = problem.prepared, problem.mount.motion == "linear"
@@ -196,11 +195,11 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         parts=parts(signals),
         regions=regions(signals, False, linear),
         regions_after=regions(signals, True, linear),
-        mount=name,
+        mount=card.mount.name,
         motion=problem.mount.motion,
         ambiguous_with=tuple((name, *members) for name, members in decision.sets.items() if members),
         depends_on=decision.depends_on,
-        data_quality=tuple(note for recording in (*train, *heldout) for note in quality(recording, prepared.cutoff)),
+        data_quality=(*card.remarks(), *(n for one in (*train, *heldout) for n in quality(one, prepared.cutoff))),
         friction_law=proposed_law(problem, answer.chosen),
         loop_bias=bias.as_json() if bias else {},
         base_parameters=models.base_parameters(),

@@ -83,7 +83,7 @@ class Policy:
     """Share of the plain held-out error energy that an effect may remove instead. Unit: 1."""
     cleared: float = 0.9
     """The same, from which the likelihood of held-out recordings is not asked. Unit: 1. A true inertia over position
-    removed .99 in both bands at -103 nats; in nulls nothing removes half."""
+    removed .99 in both bands at -103 nats; of 19 small effects in 200 nulls one removed half, none predicted."""
     sure_predicted: float = 30.0
     """The same, from which an effect may be small. Unit: nats."""
     most_raised: float = 0.03

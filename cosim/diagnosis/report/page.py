@@ -128,14 +128,14 @@ def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     """Say how much error is left above the noise, and what it goes with."""
     held, unit = diagnosis.heldout, scales.torque
     rest = float(np.sqrt(max(held.after_rms**2 - held.floor_rms**2, 0.0)))
-    if rest <= 0.5 * held.floor_rms:
+    if quiet := rest <= 0.5 * held.floor_rms:
         error, noise = unit.text(held.after_rms), unit.text(held.floor_rms)
         left = f"Hardly anything: {error} of error on unseen runs against {noise} of noise."
     else:
         left = f"{unit.text(rest)} of error on unseen runs stays unexplained, beyond the noise."
     goes = f"It goes with {', '.join(diagnosis.depends_on)}." if diagnosis.depends_on else ""
-    misfit = "" if goes or rest <= 0.5 * held.floor_rms or words.verdict(diagnosis) == "withheld" else MISFIT
-    there = "" if rest <= 0.5 * held.floor_rms else untrained(diagnosis, scales)
+    misfit = "" if goes or quiet or words.verdict(diagnosis) == "withheld" else MISFIT
+    there = "" if quiet else untrained(diagnosis, scales)
     return [text for text in (left, there, goes, misfit) if text]
 
 
