@@ -1,0 +1,58 @@
+"""What the diagnosis cannot name is unknown: an effect found by its name, and the same without that name."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.dictionary import dictionary
+from cosim.estimation.prepare import prepare
+from cosim_studies.proof.generator import make_case, to_toml
+from cosim_studies.proof.outside import SHAPED
+from pyfmi_models.card import parse_card
+
+sys.path.append(str(Path(__file__).parent / "benchmarks"))
+
+import leave_one_out
+
+
+def recorded(effect: str, seed: int) -> list[Recording]:
+    made = make_case(seed, [effect], duration=30.0)
+    frames = [*made.train, made.heldout]
+    return [Recording(f"run_{k}", {n: f[n].to_numpy(float) for n in f.columns}) for k, f in enumerate(frames)]
+
+
+def test_a_cogging_that_has_no_name_is_unknown() -> None:
+    card = parse_card(to_toml(make_case(3, ["cogging"], duration=30.0).card), "card.toml")
+    *train, held = recorded("cogging", 3)
+    assert diagnose(train, [held], card).diagnosis.verdict == ("cogging",)
+    with leave_one_out.left_out("cogging"):
+        verdict = diagnose(train, [held], card).diagnosis.verdict
+    assert leave_one_out.kind(" + ".join(verdict)) == "unknown"
+    assert "cogging" not in verdict
+
+
+def test_the_shapes_that_are_left_out_are_in_the_dictionary() -> None:
+    assert set(leave_one_out.SHAPES) == set(SHAPED)
+    prepared = prepare(recorded("thermal_tilt", 3)[:2], 10.0)
+    assert {name for terms in leave_one_out.SHAPES.values() for name in terms} <= set(dictionary(prepared))
+    for effect, terms in leave_one_out.SHAPES.items():
+        with leave_one_out.left_out(effect):
+            left = set(leave_one_out.flexible.dictionary(prepared))
+        assert left == set(dictionary(prepared)) - set(terms)
+
+
+@pytest.mark.parametrize(
+    ("answer", "amounts_to"),
+    [
+        ("unknown", "unknown"),
+        ("unknown + delay", "unknown"),
+        ("delay + unknown", "name and unknown"),
+        ("delay + backlash", "name"),
+        ("none", "none"),
+    ],
+)
+def test_answers_are_counted_by_what_they_amount_to(answer: str, amounts_to: str) -> None:
+    assert leave_one_out.kind(answer) == amounts_to
