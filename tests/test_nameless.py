@@ -12,7 +12,7 @@ from cosim.diagnosis import diagnose as whole
 from cosim.diagnosis.decision import ResidualScores, decide, followed
 from cosim.diagnosis.hypotheses import HYPOTHESES, hypothesis_of
 from cosim.diagnosis.learned.candidate_terms import candidate_terms
-from cosim.diagnosis.nameless import Nameless, _challenge, nameless
+from cosim.diagnosis.nameless import Nameless, _challenge, _Offered, nameless
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.result import Diagnosis
 from cosim.estimation.prepare import prepare
@@ -81,7 +81,9 @@ def test_what_took_a_name_stands_beside_every_rival_of_the_next(
     barred = hypothesis_of(effect.effect).tables
     own = next(one for one in tried if one.name in barred)
     beside = Nameless(proof, ((effect, own),))
-    alone, both = (_challenge(comparison, found, effect, 0.0, tried) for found in (Nameless(proof), beside))
+    alone, both = (
+        _challenge(comparison, found, effect, 0.0, _Offered(tried, [])) for found in (Nameless(proof), beside)
+    )
     assert both.lead > alone.lead
     assert both.term.name not in (own.name, *barred)
 
@@ -92,10 +94,10 @@ def test_however_bad_its_shape_an_effects_own_table_speaks_for_its_name(
     comparison, _, proof, _ = rippling_motor[1]
     (effect,) = proof.standing
     tried = candidate_terms(comparison.problem.mount, comparison.problem.prepared)
-    leads = [_challenge(comparison, Nameless(proof), effect, own, tried).lead for own in (-1e9, -2e9)]
+    leads = [_challenge(comparison, Nameless(proof), effect, own, _Offered(tried, [])).lead for own in (-1e9, -2e9)]
     assert leads[0] == leads[1] < 1e6
     others = [one for one in tried if one.name not in hypothesis_of(effect.effect).tables]
-    assert _challenge(comparison, Nameless(proof), effect, -1e9, others).lead > 0.9e9
+    assert _challenge(comparison, Nameless(proof), effect, -1e9, _Offered(others, [])).lead > 0.9e9
 
 
 def test_friction_over_position_keeps_its_name(tmp_path: Path) -> None:

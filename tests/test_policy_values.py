@@ -74,7 +74,8 @@ def test_what_nulls_and_machines_with_something_unnamed_showed(
         (Gain(2.5, 0.1, 0.1), 0.1, False),  # three nats of proof
         (Gain(2.5, 0.6, 0.6), 0.1, True),  # or half of the error
         (Gain(-103.0, 0.99, 0.99), 0.1, True),  # a true inertia over position
-        (Gain(-103.0, 0.8, 0.8), 0.1, False),
+        (Gain(-70.0, 0.74, 0.74), 0.1, True),  # another one
+        (Gain(-103.0, 0.6, 0.6), 0.1, False),
         (Gain(10.0, 0.1, -0.05), 0.1, False),  # one band is worse off
         (Gain(10.0, 0.1, -0.02), 0.1, True),
         (Gain(10.0, 0.1, 0.1), 0.015, False),  # of what the base leaves a fiftieth

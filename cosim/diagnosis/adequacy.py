@@ -39,7 +39,7 @@ def share_there(comparison: Comparison, found: Fit, residual: Array, held: Predi
     nothing is missing for that. They move as far as cells say that are as uncertain as those of training are wrong.
     """
     clear = comparison.problem.weight * far_from_turns(comparison.problem.prepared)
-    friction, clear_there = _friction(comparison, clear), far_from_turns(held.prepared)
+    friction, clear_there = _friction(comparison, clear), _clear_there(comparison, held)
     wrong = max(_slow(found.residual, clear, comparison.problem.prepared), LEAST_WRONG * friction)
     left = residual - _moved(residual, held.moved(found), clear_there, held.prepared, wrong)
     return _slow(left, clear_there, held.prepared) / friction
@@ -63,8 +63,7 @@ def share_beside(comparison: Comparison, found: Fit, residual_there: Array, held
     What is left of either cannot be friction of another law, so that little of it is no misfit.
     """
     prepared, nuisances = comparison.problem.prepared, comparison.nuisances.columns
-    clear, clear_there = (far_from_turns(one) for one in (prepared, held.prepared))
-    trained = comparison.problem.weight * clear
+    trained, clear_there = comparison.problem.weight * far_from_turns(prepared), _clear_there(comparison, held)
     left = _beside(found.residual, trained, nuisances)
     there = _beside(residual_there, clear_there, held.nuisances.columns)
     sizes = (_lasting(left, trained, prepared), _lasting(there, clear_there, held.prepared))
@@ -82,6 +81,15 @@ def over_time(comparison: Comparison, found: Fit) -> str:
         for name, factor in zip(left, (np.abs(level), level), strict=True):
             left[name] += float(np.sum(projected(rest[rows], hats * (clear * factor)[rows, None]) ** 2))
     return min(left, key=lambda name: left[name])
+
+
+def _clear_there(comparison: Comparison, held: Predictive) -> Array:
+    """Rows of clear motion of held-out recordings where training has been: of the rest no model was ever fitted."""
+    weight = far_from_turns(held.prepared)
+    for axis in ("q", "v", "tau"):
+        trained, there = comparison.problem.prepared.stacked(axis), held.prepared.stacked(axis)
+        weight = weight * ((there >= trained.min()) & (there <= trained.max()))
+    return np.asarray(weight)
 
 
 def _friction(comparison: Comparison, clear: Array) -> float:

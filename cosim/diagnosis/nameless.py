@@ -6,11 +6,10 @@ with every term that may be learned, in its place and in the same nats,
 
     lead = worth(others + term) - ln(terms tried) - max(worth(others + effect), worth(others + its own table))
 
-and leaves where the lead is one by which a rival is excluded where something has no name, and the held-out recordings
-do not contradict it. A term that is the effect in another form (`Hypothesis.tables`), or another law of friction over
-speed, takes nothing away: where the effect's own table is as good, it is its shape that is wrong, not its name. What
-then remains is asked again beside that term: names come in twos and threes where each
-imitates a part.
+beside what a law of friction over speed may lack, and leaves where the lead is one by which a rival is excluded where
+something has no name, and the held-out recordings do not contradict it. A term that is the effect in another form
+(`Hypothesis.tables`) takes nothing away: where the effect's own table is as good, it is its shape that is wrong, not
+its name. What then remains is asked again beside that term: names come in twos and threes where each imitates a part.
 """
 
 from collections.abc import Iterable, Sequence
@@ -57,14 +56,29 @@ class _Challenge:
     beside: Fit
 
 
+@dataclass(frozen=True)
+class _Offered:
+    """Terms that may take a name, and those a friction law may lack, which stand beside name and term alike."""
+
+    free: list[CandidateTerm]
+    law: list[CandidateTerm]
+
+    @classmethod
+    def by(cls, comparison: Comparison, held: Predictive) -> "_Offered":
+        """What training and held-out recordings offer."""
+        every = candidate_terms(comparison.problem.mount, comparison.problem.prepared)
+        free = [one for one in every if one.name not in OF_LAW and is_recorded(one, held)]
+        return cls(free, [one for one in every if one.name in OF_LAW])
+
+
 def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Predictive) -> Nameless:
     """Take away the names that something without a name explains far better, the worst first."""
     found, least = Nameless(proof), comparison.policy.excluded_beside_unknown
-    every = candidate_terms(comparison.problem.mount, comparison.problem.prepared)
-    tried = [one for one in every if one.name not in OF_LAW and is_recorded(one, held)]
+    offered = _Offered.by(comparison, held)
     while found.proof.standing:
-        own = _worth(_grams(comparison, found.proof.chosen, found.terms), range(len(found.terms)))
-        challenges = [_challenge(comparison, found, one, own, tried) for one in found.proof.standing]
+        known = [*offered.law, *found.terms]
+        own = _worth(_grams(comparison, found.proof.chosen, known), range(len(known)))
+        challenges = [_challenge(comparison, found, one, own, offered) for one in found.proof.standing]
         worst = max(challenges, key=lambda one: one.lead)
         if worst.lead < least or not _holds(comparison, found, worst, held):
             break
@@ -74,18 +88,18 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
 
 
 def _challenge(
-    comparison: Comparison, found: Nameless, one: AcceptedEffect, own: float, tried: Sequence[CandidateTerm]
+    comparison: Comparison, found: Nameless, one: AcceptedEffect, own: float, offered: _Offered
 ) -> _Challenge:
     """What leads an effect by most, beside the terms that took a name already; `own`: the worth of all that stands."""
     beside = _without(comparison, found.proof, one)
     tables = hypothesis_of(one.effect).tables
-    free = [term for term in tried if term.name not in found.quantities]
+    law, free = offered.law, [term for term in offered.free if term.name not in found.quantities]
     alike = [term for term in free if term.name in tables]
     terms = [*found.terms, *(term for term in free if term.name not in tables)]
     if not terms:
-        return _Challenge(one, tried[0], -inf, beside)
-    grams, known = _grams(comparison, beside, [*terms, *alike]), range(len(found.terms))
-    worth = [_worth(grams, {*known, k}) for k in range(len(terms) + len(alike))]
+        return _Challenge(one, offered.free[0], -inf, beside)
+    grams, known = _grams(comparison, beside, [*law, *terms, *alike]), range(len(law) + len(found.terms))
+    worth = [_worth(grams, {*known, k + len(law)}) for k in range(len(terms) + len(alike))]
     kind = max([own, *(value - log(len(alike)) for value in worth[len(terms) :])])
     best = max(range(len(terms)), key=lambda k: worth[k])
     return _Challenge(one, terms[best], worth[best] - log(len(terms)) - kind, beside)

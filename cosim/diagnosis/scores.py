@@ -1,9 +1,12 @@
 """What the decision is made from: numbers of what stands, and of what is left."""
 
+from math import inf
+
 from cosim.diagnosis.adequacy import over_time, share_beside, share_left, share_there
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.decision import EffectScores, ResidualScores
 from cosim.diagnosis.flexible import flexible_terms
+from cosim.diagnosis.hypotheses import hypothesis_of
 from cosim.diagnosis.nameless import Nameless
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.proof import Proof
@@ -20,9 +23,22 @@ def effect_scores(proof: Proof) -> list[EffectScores]:
 
 
 def residual_scores(comparison: Comparison, found: Nameless, held: Predictive) -> ResidualScores:
-    """What is left beside what stands, and what took names away."""
-    chosen = found.proof.chosen
+    """What is left beside what stands, and what took names away.
+
+    What follows an effect's own table (`Hypothesis.tables`) and is less than the effect is the same in another form.
+    """
+    chosen, shapes = found.proof.chosen, _own_shapes(found.proof)
     left, there = share_left(comparison, chosen), held.residual(chosen.mount)
     terms, shown = flexible_terms(comparison, chosen, held), over_time(comparison, chosen)
+    terms = [one for one in terms if one.evidence > shapes.get(one.name, -inf)]
     beside = share_beside(comparison, chosen, there, held)
     return ResidualScores(left, share_there(comparison, chosen, there, held), terms, shown, beside, found.quantities)
+
+
+def _own_shapes(proof: Proof) -> dict[str, float]:
+    """Terms that are effects that stand in another form, and the evidence of those effects [nats]."""
+    shapes: dict[str, float] = {}
+    for one in proof.standing:
+        for name in hypothesis_of(one.effect).tables:
+            shapes[name] = max(one.own.evidence, shapes.get(name, -inf))
+    return shapes

@@ -34,5 +34,5 @@ class Problem:
         return float(np.linalg.norm(self.weight * found.residual) / np.sqrt(np.count_nonzero(self.weight)))
 
     def fit(self, mount: Mount, evaluations: int, freed: Sequence[str] = ()) -> Fit:
-        """Fit a structure, its base held weakly to the card; `freed` names endings of parameters, as in `fit`."""
+        """Fit a structure, its base held to the card; `freed` names endings of parameters, as in `fit`."""
         return fit(mount, self.prepared.pieces, self.weight, self.mount, evaluations, freed=freed)
