@@ -46,6 +46,7 @@ SHAPES = {
 """Terms of `cosim/diagnosis/dictionary.py` that say what an effect outside the list follows."""
 SIZES = (0.45, 1.0)
 """Of an effect: what is concealed well enough to be found, mostly."""
+EVERY = [*SHAPED, *FAMILIES]
 WHOLE, NAME, SHAPE = "as it is", "without the name", "without the shape"
 
 
@@ -116,11 +117,13 @@ def page(rows: Sequence[dict[str, Any]], options: argparse.Namespace, seconds: f
     shaped = [row for row in one[WHOLE] if row["effect"] in SHAPES]
     head = "| cases | unknown first | a name, and unknown | a name alone | none | unknown, share |"
     lines = ["# Left out of the diagnosis", ""]
-    lines += [f"    {command} --cases {options.cases} --seed {options.seed} --out {options.out}", ""]
+    chosen = "" if options.effects == EVERY else f" --effects {' '.join(options.effects)}"
+    lines += [f"    {command} --cases {options.cases} --seed {options.seed}{chosen} --out {options.out}", ""]
     lines += [
         f"mount-cosim {__version__}, code {code()[:16]}, seed {options.seed}: {options.cases} cases of each of "
-        f"{len(FAMILIES)} listed effects and of {len(SHAPES)} outside the list, of machines of any class, sizes "
-        f"{SIZES[0]} to {SIZES[1]}, {seconds / 60:.0f} minutes. No number on this page was written by hand.",
+        f"{len(set(options.effects) & set(FAMILIES))} listed effects and of {len(set(options.effects) & set(SHAPES))} "
+        f"outside the list, of machines of any class, sizes {SIZES[0]} to {SIZES[1]}, {seconds / 60:.0f} minutes. No "
+        "number on this page was written by hand.",
         "",
         f"Listed effects that are the first name while they may be named: "
         f"{len(one[NAME])} of {len(one[WHOLE]) - len(shaped)}. Below, each without that name.",
@@ -144,7 +147,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--cases", type=int, default=4, help="of each effect")
     parser.add_argument("--seed", type=int, required=True)
-    parser.add_argument("--effects", nargs="*", default=[*SHAPED, *FAMILIES], metavar="EFFECT")
+    parser.add_argument("--effects", nargs="*", default=EVERY, metavar="EFFECT")
     parser.add_argument("--out", type=Path, required=True)
     options, begun = parser.parse_args(), time.perf_counter()
     seeds = np.random.default_rng(options.seed).integers(2**31, size=options.cases * len(options.effects)).tolist()
