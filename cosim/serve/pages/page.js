@@ -77,6 +77,7 @@ function replace(fresh, path) {
   const problem = byId("problem"), target = (!elsewhere && focused && byId(focused)) || document.querySelector("h1");
   target.focus({ preventScroll: !elsewhere });
   if (problem) { say(problem.textContent); problem.scrollIntoView({ block: "nearest" }); }
+  else if (byId("main").dataset.live) say(stage());
   if (elsewhere) scrollTo(0, 0);
   prepare();
 }
@@ -101,7 +102,7 @@ async function follow() {
     byId("status").className = "unseen";
     if (now.dataset.live !== before) {
       replace(fresh, location.pathname);
-      say(document.querySelector("h1").textContent + ": " + byId("main").dataset.state);
+      say(`${document.querySelector("h1").textContent}: ${stage() || byId("main").dataset.state}`);
       return;
     }
     renew(fresh);
@@ -110,6 +111,9 @@ async function follow() {
   }
   setTimeout(follow, SECOND);
 }
+
+// What a diagnosis under way does: a page may be shown for the first time after it was begun, and it is not said again.
+const stage = () => (byId("main").dataset.live && byId("progress").dataset.said) || "";
 
 function renew(fresh) {
   document.querySelector("h1").textContent = fresh.querySelector("h1").textContent;
