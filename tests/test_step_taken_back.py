@@ -1,5 +1,6 @@
-"""A step that a fit takes back: the next one costs the torque alone, to the last bit the same."""
+"""What a fit looks at: nothing twice, torque alone after a step that it takes back; and the prior beside it."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from cosim.data.recording import Recording
 from cosim.estimation import fit as fitting
 from cosim.estimation.fit import fit, free_parameters
 from cosim.estimation.inverse import Inverse, stacked
-from cosim.estimation.prepare import Prepared, prepare
+from cosim.estimation.prepare import Piece, Prepared, prepare
 from pyfmi_models.effects import Cogging, Delay, Effect
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
@@ -48,6 +49,26 @@ def test_torque_alone_has_the_bits_of_torque_with_its_derivatives(prepared: Prep
 
 
 def test_after_a_step_taken_back_torque_comes_alone(prepared: Prepared, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[int, bytes]] = []
+
+    def counted(inverse: Inverse, pieces: Sequence[Piece], values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        where = np.array([variable.start for variable in inverse.mount.parameters()])
+        asked.append((len(inverse.free), (values if len(inverse.free) else where).tobytes()))
+        return stacked(inverse, pieces, values)
+
+    monkeypatch.setattr(fitting, "stacked", counted)
+    start = replace(MOUNT, effects=(replace(PLAY, gap_rad=0.05),))
+    found = fit(start, prepared.pieces, np.ones(len(prepared.recording_of)), MOUNT, 25)
+    counts = [count for count, _ in asked]
+    assert 0 < counts.count(0) < len(asked) <= 25
+    assert counts[0] == len(found.free)
+    assert len(set(asked)) == len(asked)  # nothing is looked at twice
+    torque, slopes = stacked(Inverse(found.mount, found.free), prepared.pieces, found.values)
+    np.testing.assert_allclose(found.torque, torque, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(found.slopes, slopes, rtol=1e-6, atol=1e-6)
+
+
+def test_evaluations_are_spent_once(prepared: Prepared, monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[int] = []
 
     def counted(inverse: Inverse, *arguments: object) -> tuple[np.ndarray, np.ndarray]:
@@ -55,9 +76,20 @@ def test_after_a_step_taken_back_torque_comes_alone(prepared: Prepared, monkeypa
         return stacked(inverse, *arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(fitting, "stacked", counted)
-    found = fit(replace(MOUNT, effects=(PLAY,)), prepared.pieces, np.ones(len(prepared.recording_of)), MOUNT, 25)
-    assert 0 < asked.count(0) < len(asked)
-    assert asked[0] == asked[-1] == len(found.free)
-    torque, slopes = stacked(Inverse(found.mount, found.free), prepared.pieces, found.values)
-    np.testing.assert_allclose(found.torque, torque, rtol=1e-9, atol=1e-9)
-    np.testing.assert_allclose(found.slopes, slopes, rtol=1e-6, atol=1e-6)
+    fit(replace(MOUNT, effects=(PLAY,)), prepared.pieces, np.ones(len(prepared.recording_of)), MOUNT, 4)
+    assert len(asked) == 4
+
+
+def test_a_prior_that_is_a_share_of_the_misfit_has_exact_derivatives() -> None:
+    rng, pull = np.random.default_rng(4), fitting._Prior(np.array([2.0, 0.0, 0.5]))
+    rest, slopes, values = rng.normal(size=30), rng.normal(size=(30, 3)), np.array([3.0, -1.0, 0.2])
+
+    def rows(values: np.ndarray, at: np.ndarray) -> np.ndarray:
+        return np.asarray(np.linalg.norm(rest + slopes @ (values - at)) * pull(values)[0])
+
+    step = 1e-6 * np.eye(3)
+    by_hand = [(rows(values + one, values) - rows(values - one, values)) / 2e-6 for one in step]
+    np.testing.assert_allclose(pull.slopes(values, rest, slopes), np.column_stack(by_hand), rtol=1e-6, atol=1e-9)
+    assert rows(values, values)[0] == pytest.approx(np.linalg.norm(rest) * np.log(1.5) / (20 * np.log(2)))
+    assert rows(values, values)[1] == 0
+    assert not pull.slopes(values, np.zeros(30), slopes).any()

@@ -130,8 +130,7 @@ def diagnose(
     if any(one.blocks_naming for one in sanity):
         return _refused(refitted, without_names(problem, base.mount, train, heldout, sanity, started))
     on_progress("proving on the recording that was not fitted")
-    answer = _answer(comparison, examined, heldout)
-    answer, tried = _learned(answer, heldout)
+    answer, tried = _learned(_answer(comparison, examined, heldout), heldout)
     learned = tried if tried and tried.helps else None
     model = learned.mount if learned else answer.chosen.mount
     delivered, first, named = (_improved(card, one) for one in (model, examined.chosen.mount, answer.chosen.mount))

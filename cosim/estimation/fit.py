@@ -5,15 +5,15 @@ and a prior that keeps what the recordings cannot tell at the card's number,
 
     minimise |w r|^2 (1 + sum ln(p / p_card)^2 / (INDEPENDENT ln(PRIOR_FACTOR)^2)),
 
-to first order: the log-normal prior of the base's positive parameters beside as many independent errors as the misfit
-has. What a law of friction misses it misses in each stroke again, so these are no more in longer recordings; where the
-model is right the prior fades with the residual.
+the log-normal prior of the base's positive parameters beside as many independent errors as the misfit has, whose size
+is not known. What a law of friction misses it misses in each stroke again, so these are no more in longer recordings;
+where the model is right the prior fades with the residual.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import inf, log, sqrt
+from math import log, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,10 +34,6 @@ INDEPENDENT = 400.0
 """Independent rows beyond which more say nothing new, as there the model's own misfit is the limit (Miller and Dunson,
 J. Am. Stat. Assoc. 114 (2019) 1113; evidence counts no more either). With 100 or 25 two more of ten strong effects that
 a base without prior absorbed are named, and of a measured axis one is lost, whose truth is far from the card."""
-ROUNDS = 3
-"""Fits one after the other, each beside the misfit that the one before it left ..."""
-SETTLED = 0.1
-"""... at most: they end where it changes by less than this share."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,32 +107,27 @@ def fit(
     start = np.array([known[name].start for name in free])
     edges = _edges(mount, [known[name] for name in free], pieces)
     own = coordinates(mount, free, np.array([_scale(known[name]) for name in free]), edges)
-    centre = _centre(prior or mount, free)
+    pull = _Prior(_centre(prior or mount, free))
     # Pieces without weight are only looked at once, at the end.
     used, unused = _weighted(pieces, weight)
     model = _Model(inverse, [pieces[k] for k in used.pieces])
-    best: list[tuple[Array, Array]] = []
     tau_used, weight_used = tau[used.rows], weight[used.rows]
 
     def residuals(u: Array) -> Array:
         values = own.matrix @ u
-        return np.concatenate([weight_used * (tau_used - model.torque(values)), pull(values)[0]])
+        rest = weight_used * (tau_used - model.torque(values))
+        return np.concatenate([rest, np.linalg.norm(rest) * pull(values)[0]])
 
     def jacobian(u: Array) -> Array:
         values = own.matrix @ u
-        best[:] = [model.whole(values)]  # asked for where the fit goes on from, and so last where it ends
-        slopes = np.concatenate([-weight_used[:, None] * best[0][1], np.diag(pull(values)[1])])
-        return np.asarray(slopes @ own.matrix)
+        torque, slopes = model.whole(values)
+        rest, slopes = weight_used * (tau_used - torque), -weight_used[:, None] * slopes
+        return np.concatenate([slopes, pull.slopes(values, rest, slopes)]) @ own.matrix
 
-    found, misfit = own.of(start), inf
-    for _ in range(ROUNDS):
-        before, misfit = misfit, float(np.linalg.norm(weight_used * (tau_used - model.torque(own.matrix @ found))))
-        if abs(before - misfit) < SETTLED * misfit:
-            break
-        pull = _Prior(centre, misfit / (sqrt(INDEPENDENT) * log(PRIOR_FACTOR)))
-        found = least_squares(residuals, jacobian, found, (own.low, own.high), evaluations)
+    found = least_squares(residuals, jacobian, own.of(start), (own.low, own.high), evaluations)
     values = np.clip(own.matrix @ found, *edges)
-    torque, slopes = _joined(used, best[0], unused, lambda rest: stacked(inverse, [pieces[k] for k in rest], values))
+    seen = model.whole(own.matrix @ found)
+    torque, slopes = _joined(used, seen, unused, lambda rest: stacked(inverse, [pieces[k] for k in rest], values))
     phases = inverse.phases(pieces[0], values)
     fitted = with_values(mount, (*free, *phases), np.array([*values, *phases.values()]))
     return Fit(fitted, free, values, torque, slopes, tau - torque, len(phases) * len(pieces))
@@ -151,24 +142,27 @@ class _Model:
 
     def __init__(self, inverse: Inverse, pieces: Sequence[Piece]) -> None:
         self._inverse, self._pieces = inverse, pieces
-        self._last: tuple[bytes, tuple[Array, Array]] = b"", (np.zeros(0), np.zeros((0, 0)))
+        self._here: dict[bytes, tuple[Array, Array]] = {}
+        self._tried: dict[bytes, tuple[Array, Array]] = {}
         self._goes_on = True
 
     def torque(self, values: Array) -> Array:
         """Torque (rows,)."""
         if self._goes_on:
-            torque = self.whole(values)[0]
             self._goes_on = False
-            return torque
+            return self._looked_up(values)[0]
         alone = Inverse(with_values(self._inverse.mount, self._inverse.free, values), ())
         return stacked(alone, self._pieces, np.zeros(0))[0]
 
     def whole(self, values: Array) -> tuple[Array, Array]:
-        """Torque, and its derivatives (rows, free)."""
-        self._goes_on, key = True, values.tobytes()
-        if self._last[0] != key:
-            self._last = key, stacked(self._inverse, self._pieces, values)
-        return self._last[1]
+        """Torque, and its derivatives (rows, free); of the last values that were asked for they are at hand."""
+        self._goes_on, self._here = True, {values.tobytes(): self._looked_up(values)}
+        return self._here[values.tobytes()]
+
+    def _looked_up(self, values: Array) -> tuple[Array, Array]:
+        known, key = self._here | self._tried, values.tobytes()
+        self._tried = {key: known[key] if key in known else stacked(self._inverse, self._pieces, values)}
+        return self._tried[key]
 
 
 class _Part(NamedTuple):
@@ -254,14 +248,19 @@ def _centre(mount: Mount, free: Sequence[str]) -> Array:
 
 
 class _Prior(NamedTuple):
-    """Log-normal pull of parameters towards their centres, where those are above zero."""
+    """Log-normal pull of parameters towards their centres, where those are above zero, as a share of the misfit."""
 
     centre: Array
-    weight: float
 
     def __call__(self, values: Array) -> tuple[Array, Array]:
-        """Residuals, and their derivatives by the parameters."""
-        pulled = self.centre > 0
+        """Pull of each parameter, and its derivative by that."""
+        pulled, width = self.centre > 0, sqrt(INDEPENDENT) * log(PRIOR_FACTOR)
         centre = np.where(pulled, self.centre, 1.0)
         safe = np.where(pulled, np.maximum(values, 1e-3 * centre), 1.0)
-        return self.weight * np.log(safe / centre) * pulled, self.weight / safe * pulled
+        return np.log(safe / centre) * pulled / width, pulled / safe / width
+
+    def slopes(self, values: Array, rest: Array, slopes: Array) -> Array:
+        """Derivatives of |rest| times the pull by the parameters, (parameters, parameters)."""
+        size, (pull, own) = float(np.linalg.norm(rest)), self(values)
+        grows = rest @ slopes / size if size else np.zeros(len(values))
+        return np.asarray(np.diag(size * own) + np.outer(pull, grows))

@@ -118,10 +118,12 @@ class Grams:
     def predicted(self, chosen: Sequence[int], beta: Array, which: Sequence[int]) -> float:
         """Log-likelihood of what fitted numbers leave of other recordings; only the nuisances are free there."""
         tangents, far = len(self.trust), self.many
-        own = np.zeros((self.parts.shape[-1], 1 + far - tangents))
-        own[[0, *(1 + k for k in range(tangents)), *(1 + k for k in self._places(chosen))], 0] = [1.0, *-beta]
-        own[1 + tangents : 1 + far, 1:] = np.eye(far - tangents)
-        grams = own.T @ self.parts[which].sum(0) @ own
+        places = [0, *(1 + k for k in range(tangents)), *(1 + k for k in self._places(chosen))]
+        kept = [*places, *range(1 + tangents, 1 + far)]
+        own = np.zeros((len(kept), 1 + far - tangents))
+        own[: len(places), 0] = [1.0, *-beta]
+        own[len(places) :, 1:] = np.eye(far - tangents)
+        grams = own.T @ self.parts[which].sum(0)[:, kept][:, :, kept] @ own
         groups = [Group(np.asarray(one.columns) - tangents, one.prior) for one in self.nuisances]
         free = np.ones(far - tangents)
         return marginal(grams, free, groups, *self._rows(which), self.floor).log_likelihood
