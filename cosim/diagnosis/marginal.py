@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg.lapack import dpotri
 
 from cosim.estimation.prepare import Array
 
@@ -78,7 +77,8 @@ def marginal(
         normal = (weight @ rows).reshape(xx.shape[1:]) + np.diag(1 / variance)
         scale = 1 / np.sqrt(np.diag(normal))
         factor = np.linalg.cholesky(normal * np.outer(scale, scale) + 1e-12 * np.eye(len(scale)))
-        covariance = _inverse(np.asarray(factor)) * np.outer(scale, scale)
+        inverse = np.linalg.inv(factor) * scale
+        covariance = inverse.T @ inverse
         beta = covariance @ (weight @ xy)
         left = yy - 2 * xy @ beta + rows @ np.outer(beta, beta).ravel()
         if last == rounds:
@@ -89,14 +89,6 @@ def marginal(
     penalty = sum((size / group.prior) ** 2 for size, group in zip(sizes, groups, strict=True)) / 2
     fit = float(np.sum(effective * np.log(noise)) + weight @ left + beta @ (beta / variance)) / 2
     return Marginal(-fit - log_normal / 2 - float(np.sum(np.log(variance))) / 2 - penalty, noise, sizes, beta)
-
-
-def _inverse(factor: Array) -> Array:
-    """Inverse of the matrix whose lower Cholesky factor this is."""
-    lower, _ = dpotri(factor, lower=1)
-    whole = np.asarray(lower + lower.T)  # above the diagonal the factor is zero, and stays so
-    whole.flat[:: len(whole) + 1] /= 2
-    return whole
 
 
 def _size(u: Array, var: Array, prior: float) -> float:
