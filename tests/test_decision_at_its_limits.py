@@ -98,6 +98,9 @@ def test_a_rival_at_the_margin_of_a_set_is_beaten() -> None:
         (Gain(4.0, -0.5, -0.5, at_rest=0.5 - LITTLE), 0.5, False),
         (Gain(4.0 - LITTLE, -0.5, -0.5, at_rest=0.5), 0.5, False),
         (Gain(4.0, -0.5 - LITTLE, 0.5, at_rest=0.9), 0.5, False),
+        (Gain(-999.0, 0.0, 0.0, at_rest=0.875), 0.5, True),
+        (Gain(-999.0, 0.0, -LITTLE, at_rest=0.875), 0.5, False),
+        (Gain(-999.0, 0.0, 0.0, at_rest=0.875 - LITTLE), 0.5, False),
     ],
 )
 def test_an_effect_stands_from_its_limits_on(gain: Gain, share: float, expected: bool) -> None:

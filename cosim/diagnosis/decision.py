@@ -7,6 +7,9 @@ from math import exp
 from cosim.diagnosis.calibration import calibrated
 from cosim.diagnosis.policy import Policy
 
+IN_BURSTS = "time, in bursts"
+"""What the rest is said to go with where it comes now and then."""
+
 
 @dataclass(frozen=True)
 class EffectScores:
@@ -56,6 +59,8 @@ class ResidualScores:
     """The same beside what friction laws cannot agree on."""
     in_place: tuple[str, ...] = ()
     """Quantities of which a term explains more than a name did that was taken out for it."""
+    in_bursts: float = 0.0
+    """Share of its energy that comes in bursts."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +93,9 @@ def decide(effects: Sequence[EffectScores], residual: ResidualScores, policy: Po
     """Decide what is named, what stays open and whether something without a name is left."""
     if is_left(effects, residual, policy):
         return beside_rest(effects, followed(residual, policy), policy)
-    return _named(effects, policy)
+    named = _named(effects, policy)
+    # What comes in bursts is no part of what a name says, and no name imitates it.
+    return named.with_rest((IN_BURSTS,), (), policy) if residual.in_bursts > policy.large_in_bursts else named
 
 
 def beside_rest(effects: Sequence[EffectScores], follows: tuple[str, ...], policy: Policy) -> Decision:
@@ -135,10 +142,12 @@ class Gain:
         """Whether the plain error energy is halved in both bands, and the likelihood does not clearly speak against it.
 
         What is slow is free to wander in the likelihood, so that an effect of it may gain nothing there. Where next to
-        nothing is left, the likelihood is not asked: it judges the few parts in a hundred that the equation misses.
+        nothing is left, the likelihood is not asked: it judges the few parts in a hundred that the equation misses. Nor
+        is it where that is so at rest, whose rows hardly count in it.
         """
         removed = min(self.narrow, self.wide)
-        return removed >= policy.cleared or (removed >= policy.halved and self.nats > -policy.floor)
+        at_rest = self.at_rest >= policy.cleared and removed >= 0
+        return removed >= policy.cleared or at_rest or (removed >= policy.halved and self.nats > -policy.floor)
 
     def matters_alone(self, policy: Policy) -> bool:
         """Whether an effect that is small in training matters held out: it halves the error there, and predicts."""

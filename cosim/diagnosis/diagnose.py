@@ -29,7 +29,7 @@ from cosim.diagnosis.nameless import Nameless, nameless
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.proof import Proof
-from cosim.diagnosis.protocol import CUTOFF, Structures, heldout_rms, judge, judged_band, traces
+from cosim.diagnosis.protocol import CUTOFF, Structures, heldout_rms, judge, judged_band, of_the_best, traces
 from cosim.diagnosis.regression import black_box_rms
 from cosim.diagnosis.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.rivals import Examined, examine
@@ -152,11 +152,16 @@ def _refused(refitted: Card, withheld: Diagnosis) -> Outcome:
 
 
 def _with_search(described: Diagnosis, answer: Answer, examined: Examined, heldout: Sequence[Recording]) -> Diagnosis:
-    """Add what the search says of itself: its global test, and the held-out error of what training alone proposed."""
-    held = described.heldout
+    """Add what the search says of itself: its global test, and the held-out error of what training alone proposed.
+
+    Of the effects that training proposed held-out recordings chose some: the range of what these gain knows that.
+    """
+    held, many = described.heldout, 2 ** len(examined.effects)
+    interval = of_the_best(held.confidence_interval, held.before_rms - held.after_rms, many)
     unvetoed = heldout_rms(heldout, examined.chosen.mount, held.cutoff_hz)
     tested = global_test(answer.comparison, examined.base).as_json()
-    return replace(described, global_test=tested, heldout=replace(held, unvetoed_rms=unvetoed))
+    held = replace(held, unvetoed_rms=unvetoed, confidence_interval=interval)
+    return replace(described, global_test=tested, heldout=held)
 
 
 def _problem(train: Sequence[Recording], card: Card) -> Problem:

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtri
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.flagged import Residual, Spans, flagged, noise_at
@@ -139,6 +140,13 @@ def interval_of(before: Array, after: Array, dt: float) -> tuple[float, float]:
         count,
         RESAMPLES,
     )
+
+
+def of_the_best(interval: tuple[float, float], value: float, many: int) -> tuple[float, float]:
+    """Widen the 95 % range of a value that was the best of `many`: each must hold at 5 % / many (Bonferroni)."""
+    wider = float(ndtri(0.025 / many) / ndtri(0.025))
+    low, high = (value + wider * (end - value) for end in interval)
+    return low, high
 
 
 def traces(train: Sequence[Recording], heldout: Sequence[Recording], models: Structures) -> tuple[Trace, ...]:

@@ -105,7 +105,7 @@ class HeldOut:
     after_rms: float
     floor_rms: float
     confidence_interval: tuple[float, float]
-    """95 % range of before_rms - after_rms from a block bootstrap."""
+    """95 % range of before_rms - after_rms from a block bootstrap, as wide as the choice of effects there asks."""
     sliding: dict[str, float] = field(default_factory=dict)
     """The same RMS values over samples in clear motion only, with the cutoff and the least speed used."""
     cutoff_hz: float = 30.0

@@ -3,6 +3,7 @@
 from math import inf
 
 from cosim.diagnosis.adequacy import over_time, share_beside, share_left, share_there
+from cosim.diagnosis.bursts import burst_share
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.decision import EffectScores, ResidualScores
 from cosim.diagnosis.flexible import flexible_terms
@@ -32,7 +33,8 @@ def residual_scores(comparison: Comparison, found: Nameless, held: Predictive) -
     terms, shown = flexible_terms(comparison, chosen, held), over_time(comparison, chosen)
     terms = [one for one in terms if one.evidence > shapes.get(one.name, -inf)]
     beside = share_beside(comparison, chosen, there, held)
-    return ResidualScores(left, share_there(comparison, chosen, there, held), terms, shown, beside, found.quantities)
+    there_left, bursts = share_there(comparison, chosen, there, held), burst_share(comparison, chosen)
+    return ResidualScores(left, there_left, terms, shown, beside, found.quantities, bursts)
 
 
 def _own_shapes(proof: Proof) -> dict[str, float]:

@@ -73,6 +73,8 @@ def _action(diagnosis: Diagnosis, own: Finding | None) -> str:
     if is_about(diagnosis, ("unknown",)) and (order := to_record(diagnosis)):
         return order
     on = diagnosis.depends_on[0] if diagnosis.depends_on else ""
+    if on.endswith("bursts"):
+        return "record at rest, with all around it off and on, and look for what shakes it: floor, pump, another axis"
     if on.endswith("time"):
         return "repeat the same run, cold and warm, and compare"
     return f"{f'vary {on} alone' if on else 'look at the machine there'}, then repeat the run"
