@@ -19,6 +19,6 @@ def _weighed(comparison: Comparison, proof: Proof, one: AcceptedEffect) -> Accep
     many = len(problem.mount.effects)
     own, added = chosen.mount.effects[:many], chosen.mount.effects[many:]
     rest = tuple(effect for effect in added if effect.id != one.effect.id)
-    without = problem.fit(replace(chosen.mount, effects=(*own, *rest)), 15)
+    without = problem.fit(replace(chosen.mount, effects=(*own, *rest)), 45)
     (first, *_) = (effect for effect in added if effect.id == one.effect.id)
     return replace(one, own=weighed(comparison, chosen, without, effect=first), without=without)

@@ -117,7 +117,7 @@ def diagnose(
     sanity = (*doubts(train, heldout, card), *single_readings(given, (*train, *heldout)))
     problem = _problem(train, card)
     on_progress("refitting the base")
-    base = problem.fit(problem.mount, 25)
+    base = problem.fit(problem.mount, 75)
     sanity = (*sanity, *of_base(problem, base.mount, train, heldout))
     refitted = _improved(card, base.mount)
     on_model_ready("before", refitted.plant())

@@ -24,4 +24,4 @@ def with_harmonics(comparison: Comparison, found: Fit, ripple: Effect) -> Fit:
     more = tuple(one.candidate.start(one.coefficients) for one in scored if one.evidence > least)
     if not more:
         return found
-    return comparison.problem.fit(replace(found.mount, effects=(*found.mount.effects, *more)), 10)
+    return comparison.problem.fit(replace(found.mount, effects=(*found.mount.effects, *more)), 30)

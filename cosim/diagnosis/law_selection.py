@@ -39,7 +39,7 @@ def proposed_law(problem: Problem, chosen: Fit) -> LawProposal:
 
 
 def _fitted_gain(problem: Problem, chosen: Fit, form: type[FrictionLaw]) -> float:
-    other = problem.fit(replace(chosen.mount, friction=_instead(chosen.mount.friction, form)), 12)
+    other = problem.fit(replace(chosen.mount, friction=_instead(chosen.mount.friction, form)), 36)
     left, all_of_it = (float(np.sum((problem.weight * one.residual) ** 2)) for one in (other, chosen))
     return 1 - left / all_of_it
 

@@ -110,7 +110,7 @@ def _without(comparison: Comparison, proof: Proof, out: AcceptedEffect) -> Fit:
     own = len(comparison.problem.mount.effects)
     effects = proof.chosen.mount.effects
     rest = tuple(effect for k, effect in enumerate(effects) if k < own or effect.id != out.effect.id)
-    return comparison.problem.fit(replace(proof.chosen.mount, effects=rest), 10)
+    return comparison.problem.fit(replace(proof.chosen.mount, effects=rest), 30)
 
 
 def _grams(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]) -> Grams:

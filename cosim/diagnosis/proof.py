@@ -107,7 +107,7 @@ def _with(problem: Problem, examined: Examined, some: Sequence[AcceptedEffect]) 
         return examined.base
     own = examined.chosen.mount.effects[: len(problem.mount.effects)]
     kept = tuple(effect for one in some for effect in one.effects)
-    return problem.fit(replace(examined.chosen.mount, effects=(*own, *kept)), 10)
+    return problem.fit(replace(examined.chosen.mount, effects=(*own, *kept)), 30)
 
 
 def _gain(
@@ -118,7 +118,7 @@ def _gain(
     if len(standing) != 1 or len(without.mount.effects) != len(problem.mount.effects):
         own = len(problem.mount.effects)
         rest = [e for k, e in enumerate(chosen.mount.effects) if e.id != one.effect.id or k < own]
-        without = problem.fit(replace(chosen.mount, effects=tuple(rest)), 10)
+        without = problem.fit(replace(chosen.mount, effects=tuple(rest)), 30)
     after, before = (held.predicted(fit) for fit in (chosen, without))
     return _gained(after - before, without.mount, chosen.mount, held)
 

@@ -105,7 +105,7 @@ def _challenged(
     problem = comparison.problem
     refits.on_progress(group[0].title)
     rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
-    without = problem.fit(replace(chosen.mount, effects=rest), 15)
+    without = problem.fit(replace(chosen.mount, effects=rest), 45)
     if _names(without) not in known:
         known[_names(without)] = stage(comparison, without, refits)
     beside = known[_names(without)]

@@ -129,7 +129,7 @@ def refitted(comparison: Comparison, current: Fit, effect: Effect, many: int) ->
     """Add an effect to a fitted structure, refit everything, weigh it."""
     problem = comparison.problem
     grown = replace(current.mount, effects=(*current.mount.effects, effect))
-    found, aside = problem.fit(grown, 12), aside_for(effect.id)
+    found, aside = problem.fit(grown, 36), aside_for(effect.id)
     before = comparison.evidence(current, aside)
     found = hypothesis_of(effect).tuned(problem, found, effect, lambda fit: comparison.evidence(fit, aside) - before)
     return weighed(comparison, found, current, many)

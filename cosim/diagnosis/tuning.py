@@ -30,12 +30,12 @@ def revived(problem: Problem, found: Fit, start: Effect) -> Fit:
     if not dead:
         return found
     again = replace(found.mount, effects=(*found.mount.effects[:-1], start))
-    other = problem.fit(with_values(again, dead, np.array([card[name] for name in dead])), 12)
+    other = problem.fit(with_values(again, dead, np.array([card[name] for name in dead])), 36)
     return min((found, other), key=problem.error)
 
 
 def refound(
-    problem: Problem, found: Fit, evidence: Callable[[Fit], float], others: Sequence[Effect], steps: int = 12
+    problem: Problem, found: Fit, evidence: Callable[[Fit], float], others: Sequence[Effect], steps: int = 36
 ) -> Fit:
     """The best of a fit and those from other starts: a start is known to an order of magnitude at most."""
     tried = [problem.fit(replace(found.mount, effects=(*found.mount.effects[:-1], one)), steps) for one in others]
@@ -53,7 +53,7 @@ def in_cycles(problem: Problem, found: Fit) -> Fit:
     whole = [] if problem.mount.motion == "linear" else [max(1.0, float(round(ripple.cycles_per_rev)))]
     for cycles in (*whole, ripple.cycles_per_rev):
         effects = (*best.mount.effects[:-1], replace(ripple, cycles_per_rev=cycles))
-        settled = problem.fit(replace(best.mount, effects=effects), 8)
+        settled = problem.fit(replace(best.mount, effects=effects), 24)
         if problem.error(settled) < problem.error(best) * (1 + LEAST_GAIN):
             return settled
     return found
@@ -61,7 +61,7 @@ def in_cycles(problem: Problem, found: Fit) -> Fit:
 
 def freed(problem: Problem, found: Fit, name: str) -> Fit:
     """Fit again with a number that a fit leaves as it is otherwise."""
-    return problem.fit(found.mount, 10, (name,))
+    return problem.fit(found.mount, 30, (name,))
 
 
 def at_bound(effect: Effect, sizes: Sequence[str] = ()) -> bool:

@@ -128,7 +128,7 @@ def _shared(problem: Problem, found: Fit, evidence: Evidence) -> Fit:
         gap_rad=1.0, load_share=SHARE, load_friction=HALF * law["Fc"], load_viscous=HALF * law["sigma2"], **bent
     )
     fits = [
-        problem.fit(replace(halved, effects=(*halved.effects[:-1], replace(behind, gap_rad=gap))), 8)
+        problem.fit(replace(halved, effects=(*halved.effects[:-1], replace(behind, gap_rad=gap))), 24)
         for gap in (SHARED_GAPS * reach).tolist()
     ]
     return max(fits, key=evidence)

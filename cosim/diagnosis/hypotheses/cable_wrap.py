@@ -45,7 +45,7 @@ class Cable(Hypothesis[CableWrap]):
 
     def tuned(self, problem: Problem, found: Fit, start: CableWrap, evidence: Evidence) -> Fit:
         """Fit how it hardens."""
-        return problem.fit(freed(problem, found, "hardening").mount, 4)
+        return problem.fit(freed(problem, found, "hardening").mount, 12)
 
     def is_degenerate(self, problem: Problem, effect: CableWrap) -> bool:
         """Far from its home it is an offset."""

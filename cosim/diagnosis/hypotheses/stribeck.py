@@ -95,7 +95,7 @@ def _shaped(problem: Problem, found: Fit) -> Fit:
     """Try the sharper Stribeck curve of the literature too, and any shape if that fits clearly better."""
     gauss: Any = found.mount.effects[-1]
     sharper = replace(found.mount, effects=(*found.mount.effects[:-1], replace(gauss, delta=SHARP)))
-    best = min((found, problem.fit(sharper, 12)), key=problem.error)
+    best = min((found, problem.fit(sharper, 36)), key=problem.error)
     free = freed(problem, best, "delta")
     better = problem.error(free) * (1 + LEAST_GAIN) < problem.error(best)
     return free if better and not at_bound(free.mount.effects[-1]) else best
