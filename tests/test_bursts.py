@@ -11,7 +11,6 @@ from motions import RATE, Array, Motion
 from cosim.diagnosis.bursts import ABOVE, burst_share
 from cosim.diagnosis.decision import IN_BURSTS, EffectScores, ResidualScores, decide
 from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.protocol import of_the_best
 
 SECONDS = 40
 T = np.arange(SECONDS * RATE) / RATE
@@ -22,7 +21,8 @@ def comparing(v: Array, scale: float = 1.0, weight: Array | None = None) -> Any:
     motion.cutoff = 20.0  # type: ignore[attr-defined]
     counted = np.ones(2 * len(v)) if weight is None else weight
     problem = SimpleNamespace(prepared=motion, weight=counted)
-    return SimpleNamespace(problem=problem, noise=SimpleNamespace(at=lambda v: np.full(len(v), scale)))
+    rows = SimpleNamespace(slices=(slice(0, len(v)), slice(len(v), 2 * len(v))))
+    return SimpleNamespace(problem=problem, bands=rows, noise=SimpleNamespace(at=lambda v: np.full(len(v), scale)))
 
 
 def noise(size: Array | float = 1.0, seed: int = 1) -> Array:
@@ -91,10 +91,3 @@ def test_bursts_are_unknown_and_take_nothing_from_a_name() -> None:
     assert shaken.is_unknown
     assert shaken.depends_on == (IN_BURSTS,)
     assert (shaken.sets, shaken.probabilities, shaken.doubtful) == (named.sets, named.probabilities, ())
-
-
-def test_the_range_of_the_best_of_some_is_wider_and_of_one_the_same() -> None:
-    assert of_the_best((1.0, 4.0), 2.0, 1) == pytest.approx((1.0, 4.0))
-    low, high = of_the_best((1.0, 4.0), 2.0, 4)
-    assert (low, high) == pytest.approx((2 - 1.2744, 2 + 2 * 1.2744), rel=1e-4)  # 2.4977 and 1.9600 of a normal
-    assert of_the_best((0.0, 0.0), 0.0, 8) == (0.0, 0.0)

@@ -119,7 +119,11 @@ class TestCommand:
         schema = json.loads((files("cosim") / "diagnosis" / "schema.json").read_text())
         jsonschema.Draft202012Validator(schema).validate(printed)
         assert sorted(printed["verdict"]) == ["cogging", "friction_asymmetry"]
-        assert printed["heldout"]["after_rms"] < 0.3 * printed["heldout"]["before_rms"]
+        assert printed["heldout"]["after_rms"] < 0.15 * printed["heldout"]["before_rms"]
+        (ripple,) = [one["parameters"] for one in printed["effects"] if one["effect"] == "cogging"]
+        assert (
+            ripple["cycles_per_rev"] == 20
+        )  # a refit that ends before it has settled leaves 20.8, and .18 of the error
         first = printed["effects"][0]
         assert first["answer"] == "found"
         assert first["standard_errors"]

@@ -11,6 +11,7 @@ from cosim.diagnosis.decision import Gain, stands
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.predictive import Predictive
+from cosim.diagnosis.protocol import of_the_best
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from cosim_studies.proof.generator import make_case, write_case
@@ -132,3 +133,10 @@ def test_a_diagnosis_never_ends_with_a_model_that_is_worse_than_the_base(tmp_pat
     found = diagnose(train, [held], card).diagnosis
     assert found.heldout.after_rms <= found.heldout.before_rms
     assert "dwell_breakaway" not in found.verdict
+
+
+def test_the_range_of_the_best_of_some_is_wider_and_of_one_the_same() -> None:
+    assert of_the_best((1.0, 4.0), 2.0, 1) == pytest.approx((1.0, 4.0))
+    low, high = of_the_best((1.0, 4.0), 2.0, 4)
+    assert (low, high) == pytest.approx((2 - 1.2744, 2 + 2 * 1.2744), rel=1e-4)  # 2.4977 and 1.9600 of a normal
+    assert of_the_best((0.0, 0.0), 0.0, 8) == (0.0, 0.0)

@@ -32,12 +32,11 @@ TINY = 1e-300
 
 def burst_share(comparison: Comparison, found: Fit) -> float:
     """Share of the energy of the training residual that comes in bursts; 0 where too little was recorded to tell."""
-    prepared, first, parts = comparison.problem.prepared, 0, []
+    prepared, parts = comparison.problem.prepared, []
     clear = (comparison.problem.weight * far_from_turns(prepared) > 0).astype(float)
     rest = found.residual / comparison.noise.at(prepared.stacked("v"))
     seconds = max(SECONDS, PERIODS / prepared.cutoff)
-    for piece in prepared.pieces:
-        rows = slice(first, first := first + len(piece.kept))
+    for piece, rows in zip(prepared.pieces, comparison.bands.slices, strict=True):
         parts += [_windows(piece, rest[rows], clear[rows], seconds), np.full((1, 3), np.nan)]
     windows = np.concatenate(parts)
     known = np.isfinite(windows).all(1)

@@ -3,6 +3,7 @@
 import numpy as np
 
 from cosim.diagnosis.breakdown import bars
+from cosim.diagnosis.decision import IN_BURSTS
 from cosim.diagnosis.report.figures_where import NAMES, runs
 from cosim.diagnosis.report.next_experiment import is_about, to_record
 from cosim.diagnosis.report.quantities import Scales
@@ -73,7 +74,7 @@ def _action(diagnosis: Diagnosis, own: Finding | None) -> str:
     if is_about(diagnosis, ("unknown",)) and (order := to_record(diagnosis)):
         return order
     on = diagnosis.depends_on[0] if diagnosis.depends_on else ""
-    if on.endswith("bursts"):
+    if on == IN_BURSTS:
         return "record at rest, with all around it off and on, and look for what shakes it: floor, pump, another axis"
     if on.endswith("time"):
         return "repeat the same run, cold and warm, and compare"
