@@ -15,6 +15,7 @@ from cosim.cli.investigate import seconds_of
 from cosim.data.recording import Recording
 from cosim.investigation.machine import CoSimulated
 from cosim.investigation.motions import Motion
+from cosim.investigation.page import write_page
 from cosim.investigation.story import Moved
 from cosim.support.errors import InputError, OutputError
 
@@ -34,10 +35,10 @@ def test_one_answer_needs_no_further_motion(tmp_path: Path, capsys: pytest.Captu
     assert "<script" not in page
 
 
-def test_a_wrong_first_name_is_put_right_by_motion_and_a_kill_loses_nothing(
+def test_an_open_set_is_settled_by_motion_and_a_kill_loses_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The first recordings hardly rest: what settles at rest is taken for Stribeck friction until the axis stops."""
+    """The first recordings hardly rest: what settles at rest may be a play or a drag until it moves more."""
     given, out = written(tmp_path, DWELL), tmp_path / "out"
     asked = {"machine": given[2], "budget": 42.5, "seconds": 10.0, "limits": LIMITS}
     record = CoSimulated.record
@@ -55,16 +56,21 @@ def test_a_wrong_first_name_is_put_right_by_motion_and_a_kill_loses_nothing(
     monkeypatch.setattr(CoSimulated, "record", record)
     done = investigate(*given[:2], out, **asked)  # type: ignore[arg-type]
     assert {name: (out / "recordings" / name).read_bytes() for name in kept} == kept
-    assert done.story.first.verdict != ("dwell_breakaway",)
+    assert done.story.first.kinds == ("set",)
     assert done.missing == ("dwell_breakaway",)
+    assert done.story.ended == "answered"
     assert done.story.seconds <= 42.5
     again = investigate(*given[:2], out, **asked)  # type: ignore[arg-type]
     assert [one.number for one in again.story.steps] == [one.number for one in done.story.steps]
     planned = [one for one in done.story.steps if isinstance(one, Moved)][2:]
     assert planned
-    assert all(one.nats or one.ground for one in planned)
-    assert all(one.random_ground is not None and one.random_ground < one.ground for one in planned if not one.nats)
+    assert all(one.random_nats is not None and one.random_nats <= one.nats for one in planned)
+    assert all(one.random_ground is not None and one.random_ground < one.ground for one in planned)
     page = (out / "story.html").read_text("utf-8")
+    assert f"{planned[0].nats:.1f} nats" in page
+    assert f"{planned[0].random_nats:.1f} nats" in page
+    sought = tuple(replace(one, nats=0.0) if one in planned else one for one in done.story.steps)
+    page = write_page(tmp_path / "sought.html", replace(done.story, steps=sought), out, "").read_text("utf-8")
     assert f"{planned[0].ground:.0%} new ground" in page
     assert f"{planned[0].random_ground:.0%}" in page
 

@@ -14,6 +14,7 @@ from cosim.diagnosis.search import refitted
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Cogging, Effect, PeriodicFriction, TorqueOffset
+from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.friction import Coulomb
@@ -35,7 +36,13 @@ SWING = moved(1.5 * np.sin(0.9 * T))
 
 
 @pytest.mark.parametrize(
-    "effect", [Presliding(sigma0=20.0), PeriodicFriction(cycles_per_rev=14.0, relative_amplitude=0.3)]
+    "effect",
+    [
+        Presliding(sigma0=20.0),
+        PeriodicFriction(cycles_per_rev=14.0, relative_amplitude=0.3),
+        Backlash(gap_rad=0.2),
+        Backlash(gap_rad=1e-4, load_deflection=0.09),
+    ],
 )
 def test_what_needs_a_turn_is_not_believed_where_motion_goes_one_way(effect: Effect) -> None:
     assert needs_turns(effect, MOUNT, ONE_WAY)

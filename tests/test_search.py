@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.base_moved import owed_to_base
+from cosim.diagnosis.comparison import NONE, Comparison
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.search import (
     CandidateFit,
@@ -19,8 +20,9 @@ from cosim.diagnosis.search import (
     search,
     stage,
     starts,
+    weighed,
 )
-from cosim.estimation.fit import Fit
+from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Cogging, LocalFriction, PeriodicFriction, StribeckEffect, TorqueOffset
@@ -147,3 +149,15 @@ def test_what_is_small_is_taken_if_it_is_all_there_is_and_ends_the_search() -> N
     assert is_small(best, POLICY)
     assert best_of(comparison, first, 1.0) is None, "beside another effect it may be what that one's equation lacks"
     assert [len(one.current.mount.effects) for one in search(comparison, base).stages] == [0, 1]
+
+
+def test_what_the_base_gains_by_other_numbers_of_its_own_is_no_merit_of_an_effect() -> None:
+    comparison, base = compared(lambda q, _: 0 * q)
+    beside = comparison.problem.fit(replace(base.mount, effects=(TorqueOffset(torque=1e-9),)), 1)
+    held, near = (
+        comparison.problem.fit(with_values(base.mount, ["axis.inertia"], np.array([inertia])), 1)
+        for inertia in (0.1, 2.5)
+    )
+    assert comparison.evidence(beside) - comparison.evidence(held) > POLICY.least_evidence
+    assert weighed(comparison, beside, held).evidence < 1.0
+    assert owed_to_base(comparison, beside, near, NONE) == 0.0, "within what owners may be off"

@@ -11,6 +11,7 @@ from math import inf, log
 from cosim.diagnosis.admissibility import away_from_turns, gets_memory, in_time, removed_at_rest
 from cosim.diagnosis.admissibility import is_admissible as is_what_it_says
 from cosim.diagnosis.asked import is_asked_for
+from cosim.diagnosis.base_moved import owed_to_base
 from cosim.diagnosis.comparison import Comparison, Screened, aside_for
 from cosim.diagnosis.harmonics import with_harmonics
 from cosim.diagnosis.hypotheses import hypothesis_of
@@ -33,7 +34,8 @@ class CandidateFit:
     evidence: float
     """Nats above the structure without the effect, search priced."""
     price: float
-    """Nats that the search among the members of its form costs; taken off already."""
+    """Nats that are not its own: what the search among the members of its form costs, and what is owed to other numbers
+    of the base; taken off already."""
     plain_gain: float
     """Share of the plain residual energy removed."""
     above_noise: float = inf
@@ -140,8 +142,8 @@ def weighed(
 ) -> CandidateFit:
     """What an effect of a fitted structure (the last one) is worth beside the structure without it."""
     effect = effect or found.mount.effects[-1]
-    price = log(max(many, 1))
     aside = aside_for(effect.id)
+    price = log(max(many, 1)) + owed_to_base(comparison, found, current, aside)
     gain = comparison.evidence(found, aside) - comparison.evidence(current, aside) - price
     own, problem = hypothesis_of(effect), comparison.problem
     loud = comparison.above_noise(found, current) if own.must_stand_out else inf

@@ -102,6 +102,10 @@ class Play(Hypothesis[Backlash]):
         """A gap that recordings do not show is rounding, or the filter."""
         return float(effect.gap_rad) >= least_way(prepared)
 
+    def way_back(self, effect: Backlash, mount: Mount) -> float:
+        """The gap and what the contact bends: where motion goes one way, the far side lies on one flank."""
+        return float(effect.gap_rad) + float(effect.load_deflection)
+
     def looked(self, seen: Seen, mount: Mount) -> str:
         """Wider gaps."""
         return f"wider than {seen.low:.2g} {'m' if mount.motion == 'linear' else 'rad'}"
