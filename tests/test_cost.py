@@ -12,9 +12,10 @@ from scipy.signal import butter, sosfiltfilt
 from cosim.diagnosis import regression
 from cosim.diagnosis.closed_loop import Loops
 from cosim.diagnosis.regression import kernel
+from cosim.estimation.filters import lowpass
 from cosim.estimation.fit import fit
 from cosim.estimation.inverse import Inverse, stacked
-from cosim.estimation.prepare import lowpass, prepare
+from cosim.estimation.prepare import prepare
 from cosim.estimation.rowwise import recurrence
 from cosim_studies.demo import beside
 from cosim_studies.proof.generator import make_case, write_case

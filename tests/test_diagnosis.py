@@ -19,7 +19,7 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.protocol import Structures, judge, traces
 from cosim.estimation.blocks import Blocks
-from cosim.estimation.prepare import prepare
+from cosim.estimation.prepare import Band, prepare
 from cosim.support.errors import InputError
 from cosim_studies.proof.demo import demo_case
 from cosim_studies.proof.generator import make_case, to_toml, write_case
@@ -51,8 +51,8 @@ class TestEvidence:
         t, q, v, a = wander()
         pair = [recorded(5 * a + 2 * np.sign(v) + off, t, q, name) for off, name in ((0.3, "one"), (-0.3, "two"))]
         models = Structures(axis(), axis(), axis())
-        judged = judge(pair, models, 30.0)
-        each = [judge([one], models, 30.0).before_rms for one in pair]
+        judged = judge(pair, models, Band(30.0))
+        each = [judge([one], models, Band(30.0)).before_rms for one in pair]
         assert judged.name == "one, two"
         assert judged.before_rms == pytest.approx(np.sqrt(np.mean(np.square(each))), rel=1e-6)
         assert [trace.heldout for trace in traces(pair[:1], pair, models)] == [False, True, True]

@@ -9,15 +9,16 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.diagnosis.admissibility import needs_turns
 from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.hypotheses import hypothesis_of
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.search import refitted
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.estimation.problem import Problem
-from pyfmi_models.effects import Cogging, Effect, PeriodicFriction, TorqueOffset
+from pyfmi_models.effects import Cogging, Effect, LocalFriction, PeriodicFriction, TorqueOffset
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
 from pyfmi_models.effects.presliding import Presliding
-from pyfmi_models.friction import Coulomb
+from pyfmi_models.friction import Coulomb, LuGre
 from pyfmi_models.mount import Axis, Mount
 
 Array = npt.NDArray[np.float64]
@@ -58,6 +59,13 @@ def test_a_contact_stiff_enough_to_slide_on_the_way_back_may_be_believed() -> No
 @pytest.mark.parametrize("effect", [Cogging(cycles_per_rev=14.0, amplitude=0.1), TorqueOffset(torque=0.1)])
 def test_a_torque_over_position_needs_no_turn(effect: Effect) -> None:
     assert not needs_turns(effect, MOUNT, ONE_WAY)
+
+
+@pytest.mark.parametrize(("width", "is_one"), [(1e-5, False), (5e-3, True)])
+def test_a_spot_across_which_the_contact_bends_is_a_place_where_the_axis_rested(width: float, is_one: bool) -> None:
+    spot = LocalFriction(q_center=0.3, width=width, relative_amplitude=0.4)
+    bristle = replace(MOUNT, friction=LuGre(sigma0=1e4, sigma1=50.0, sigma2=0.0, Fc=1.0, Fs=1.0, Vs=0.01))
+    assert hypothesis_of(spot).shows(spot, bristle, SWING) is is_one
 
 
 def test_a_tone_is_not_found_in_the_noise_of_many_short_recordings_by_a_phase_in_each() -> None:

@@ -7,8 +7,9 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.sanity.admission import check_recordings
 from cosim.diagnosis.sanity.judgement import judged
 from cosim.diagnosis.sanity.likelihood import Reference
+from cosim.estimation.filters import derivative, lowpass
 from cosim.estimation.inverse import Inverse
-from cosim.estimation.prepare import choose_cutoff, derivative, lowpass, noise_of, prepare, quality
+from cosim.estimation.prepare import choose_cutoff, noise_of, prepare, quality
 from cosim.support.errors import RecordingError
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount

@@ -11,9 +11,10 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.candidates import span_of
 from cosim.diagnosis.diagnose import Outcome, diagnose
 from cosim.diagnosis.periodogram import tones
+from cosim.estimation.filters import gain, lowpass
 from cosim.estimation.fit import fit
 from cosim.estimation.inverse import Inverse
-from cosim.estimation.prepare import gain, lowpass, prepare
+from cosim.estimation.prepare import prepare
 from cosim_studies.proof.ceiling import ceiling
 from cosim_studies.proof.generator import make_case, to_toml, write_case
 from pyfmi_models.card import parse_card, read_card

@@ -4,6 +4,10 @@ Differentiated noise of the reading ends the band (`choose_cutoff`). Where waves
 recordings predict what lies above it, that is no noise: then the band goes on to where the noise is `NOISE_LIMIT` of
 the torque. Else a motor's cogging, which comes at its cycles times the turns a second, is not seen, and what of it
 gets through the filter is taken for something else.
+
+The motion that goes into the models may be read in a wider band than that of the torque (`Band.motion`): what a filter
+smears of a turn no law has, and what noise it lets pass makes a bristle creep at rest. Between the two lies a band in
+which the base explains most of what was recorded.
 """
 
 from collections.abc import Sequence
@@ -14,7 +18,10 @@ import numpy.typing as npt
 from cosim.data.recording import Recording
 from cosim.diagnosis.candidates import span_of
 from cosim.diagnosis.periodogram import peaks
-from cosim.estimation.prepare import Array, Piece, Prepared, choose_cutoff, lowpass, prepare
+from cosim.estimation.filters import lowpass
+from cosim.estimation.prepare import Array, Band, Piece, Prepared, choose_cutoff, prepare
+from cosim.estimation.problem import Problem
+from cosim.estimation.row_weights import weights
 from pyfmi_models.mount import Mount
 
 NOISE_LIMIT = 0.1
@@ -24,13 +31,42 @@ LEAST_PREDICTED = 0.3
 other mechanics have 0.01 at most: nothing of them is predicted; of a motor's ripple of 72 a turn 0.84 and 0.97 are."""
 
 
+MOTION = (1.4, 2.0, 2.8, 4.0)
+"""Bands that are tried for the motion, relative to that of the torque: half an octave apart, as what is smeared goes
+with the square of the band."""
+LESS = 0.97
+"""What the base must leave in a wider band of the motion, relative to the best narrower one. Unit: 1. Of 130 machines
+of two generators 69 have a wider one; with .94 the band is the same in 117, with .99 in 107."""
+LOOK = 12
+"""Evaluations of the base in each of them."""
+
+
 def in_band(train: Sequence[Recording], mount: Mount) -> Prepared:
     """Prepare recordings of training in their band."""
     inertia = float(mount.axis.inertia)
     narrow, wide = choose_cutoff(train, inertia), choose_cutoff(train, inertia, NOISE_LIMIT)
     prepared = prepare(train, wide)
     shown = wide > narrow and prepared.has_position and predicted(prepared, mount, narrow) > LEAST_PREDICTED
-    return prepared if shown else prepare(train, narrow)
+    return with_motion_read(train, mount, prepared if shown else prepare(train, narrow))
+
+
+def with_motion_read(train: Sequence[Recording], mount: Mount, prepared: Prepared) -> Prepared:
+    """The same in the band of the motion in which the refitted base leaves least."""
+    best, (base, least) = prepared, _left_by_base(mount, mount, prepared)
+    for times in MOTION:
+        wider = prepare(train, Band(prepared.cutoff, times * prepared.cutoff))
+        base, left = _left_by_base(mount, base, wider)
+        if not left < LESS * least:
+            break
+        best, least = wider, left
+    return best
+
+
+def _left_by_base(card: Mount, start: Mount, prepared: Prepared) -> tuple[Mount, float]:
+    """The refitted base, and the RMS of what it leaves."""
+    problem = Problem(card, prepared, weights(card.friction, prepared), max(piece.dt for piece in prepared.pieces))
+    found = problem.fit(start, LOOK)
+    return found.mount, problem.error(found)
 
 
 def predicted(prepared: Prepared, mount: Mount, narrow: float) -> float:

@@ -20,9 +20,10 @@ import numpy as np
 from scipy.interpolate import BPoly, make_interp_spline
 
 from cosim.data.recording import Recording
+from cosim.estimation.filters import derivative, lowpass
 from cosim.estimation.fit import fit
 from cosim.estimation.inverse import Inverse
-from cosim.estimation.prepare import Array, Piece, choose_cutoff, derivative, lowpass, prepare
+from cosim.estimation.prepare import Array, Piece, choose_cutoff, prepare
 from cosim.fmi.alias import Alias
 from cosim.master.simulate import simulate
 from cosim.support.errors import InputError, StepError

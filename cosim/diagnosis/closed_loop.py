@@ -15,7 +15,8 @@ import numpy as np
 from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
 from cosim.diagnosis.protocol import CUTOFF
-from cosim.estimation.prepare import Array, lowpass
+from cosim.estimation.filters import lowpass
+from cosim.estimation.prepare import Array
 from cosim.estimation.set_point import set_point
 from cosim.master.simulate import simulate
 from cosim.support.errors import StepError

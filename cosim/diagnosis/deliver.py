@@ -208,6 +208,7 @@ def _heldout(held: HeldOut) -> JsonObject:
         "after_rms": held.after_rms,
         "floor_rms": held.floor_rms,
         "cutoff_hz": held.cutoff_hz,
+        "motion_hz": held.motion_hz,
         "unvetoed_rms": held.unvetoed_rms,
         "confidence_interval": list(held.confidence_interval),
         "clear_motion": held.sliding,

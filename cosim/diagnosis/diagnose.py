@@ -4,8 +4,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
 from cosim.diagnosis.absent import not_found
@@ -40,7 +38,7 @@ from cosim.diagnosis.search import InTurn, search
 from cosim.diagnosis.withheld import without_names
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import Fit
-from cosim.estimation.prepare import Array, Prepared, prepare, quality
+from cosim.estimation.prepare import Band, prepare, quality
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import weights
 from pyfmi_models.card import Card
@@ -158,7 +156,7 @@ def _with_search(described: Diagnosis, answer: Answer, examined: Examined, heldo
     """
     held, many = described.heldout, 2 ** len(examined.effects)
     interval = of_the_best(held.confidence_interval, held.before_rms - held.after_rms, many)
-    unvetoed = heldout_rms(heldout, examined.chosen.mount, held.cutoff_hz)
+    unvetoed = heldout_rms(heldout, examined.chosen.mount, Band(held.cutoff_hz, held.motion_hz))
     tested = global_test(answer.comparison, examined.base).as_json()
     held = replace(held, unvetoed_rms=unvetoed, confidence_interval=interval)
     return replace(described, global_test=tested, heldout=held)
@@ -168,12 +166,12 @@ def _problem(train: Sequence[Recording], card: Card) -> Problem:
     mount = card.plant()
     prepared = in_band(train, mount)
     slowest = max(recording.sample_time for recording in train)
-    return Problem(mount, prepared, _weight(mount, prepared), slowest)
+    return Problem(mount, prepared, weights(mount.friction, prepared), slowest)
 
 
 def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Recording]) -> Answer:
     """Prove, measure what is left, decide."""
-    prepared = prepare(heldout, comparison.problem.prepared.cutoff)
+    prepared = prepare(heldout, comparison.problem.prepared.band)
     held = Predictive.of(comparison, prepared, examined.base, prepare(heldout, CUTOFF))
     examined, proof = prove_sets(comparison, examined, held)
     found = nameless(comparison, examined, proof, held)
@@ -194,7 +192,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
     return Diagnosis(
         verdict=_verdict(found, decision),
         findings=tuple(found),
-        heldout=replace(judge(heldout, models, prepared.cutoff), black_box_rms=black_box_rms(signals)),
+        heldout=replace(judge(heldout, models, prepared.band), black_box_rms=black_box_rms(signals)),
         traces=signals,
         parts=parts(signals),
         regions=regions(signals, False, linear),
@@ -218,7 +216,7 @@ def _with_learned(
         return named
     problem = answer.comparison.problem
     models = Structures(problem.mount, answer.base.mount, learned.mount)
-    signals, held = traces(train, heldout, models), judge(heldout, models, problem.prepared.cutoff)
+    signals, held = traces(train, heldout, models), judge(heldout, models, problem.prepared.band)
     return replace(
         named,
         learned=learned.as_json(),
@@ -237,7 +235,7 @@ def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Lear
         return answer, None
     after = tried.mount if tried.helps else answer.chosen.mount
     models = Structures(problem.mount, answer.base.mount, after)
-    told = tried.judged_in(judged_band(heldout, models, problem.prepared.cutoff), answer.chosen.mount)
+    told = tried.judged_in(judged_band(heldout, models, problem.prepared.band), answer.chosen.mount)
     policy, scores = answer.comparison.policy, effect_scores(answer.proof)
     if not answer.decision.is_unknown and told.says_unknown(policy, least_left(scores, policy)):
         answer = replace(answer, decision=beside_rest(scores, told.quantities, policy))
@@ -257,11 +255,6 @@ def _experiment(answer: Answer) -> Experiment | None:
                 pair = one.effect.id, rival.effect.id
                 return best(one.own.fit.mount, rival.fit.mount, pair, answer.comparison.problem.prepared)
     return None
-
-
-def _weight(mount: Mount, prepared: Prepared) -> Array:
-    """The rows that count, and how much; all where there is no friction that could hold at rest."""
-    return np.ones(len(prepared.recording_of)) if mount.friction.key == "none" else weights(mount.friction, prepared)
 
 
 def _findings(answer: Answer, signals: Sequence[Trace]) -> list[Finding]:

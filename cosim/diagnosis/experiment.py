@@ -14,10 +14,11 @@ import numpy as np
 
 from cosim.data.signals import Chirp, Multisine, Sine, Slews
 from cosim.diagnosis.entries import NextExperiment
+from cosim.estimation.filters import lowpass
 from cosim.estimation.fit import free_parameters
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.least_squares import projected
-from cosim.estimation.prepare import Array, Piece, Prepared, lowpass
+from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.support.statistics import rms
 from pyfmi_models.card import Card
 from pyfmi_models.mount import Mount

@@ -21,9 +21,10 @@ from scipy.optimize import minimize_scalar
 
 from cosim.diagnosis.hypotheses.delay_and_lag import Drive, milliseconds, timed
 from cosim.estimation.discrepancy_basis import speed_shapes, stop_distances, stop_operators
+from cosim.estimation.filters import derivative
 from cosim.estimation.fit import free_parameters
 from cosim.estimation.inverse import Inverse
-from cosim.estimation.prepare import Array, Piece, Prepared, derivative
+from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.tonal_disturbance import without_tones
 from cosim.support.statistics import hann
 from pyfmi_models.effects import ActuatorLag, Delay, DriveEffect, Effect

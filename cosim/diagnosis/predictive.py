@@ -59,8 +59,7 @@ class Predictive:
     @classmethod
     def of(cls, comparison: Comparison, prepared: Prepared, base: Fit, protocol: Prepared) -> "Predictive":
         """Weigh held-out rows as the training rows are."""
-        many, friction = len(prepared.recording_of), base.mount.friction
-        weight = np.ones(many) if friction.key == "none" else weights(friction, prepared)
+        weight = weights(base.mount.friction, prepared)
         scale = comparison.noise.at(prepared.stacked("v"))
         bands = Bands.of(prepared, weight, scale, comparison.policy)
         floor = bands.least_noise(prepared, comparison.inertia, comparison.policy)

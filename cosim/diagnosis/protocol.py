@@ -19,7 +19,7 @@ from cosim.estimation.discrepancy_basis import discrepancy_basis
 from cosim.estimation.fit import free_parameters
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.least_squares import projected
-from cosim.estimation.prepare import Array, Piece, Prepared, prepare
+from cosim.estimation.prepare import Array, Band, Piece, Prepared, prepare
 from cosim.estimation.row_weights import least_speed
 from cosim.support.statistics import bootstrap_range, rms
 from pyfmi_models.mount import Mount
@@ -64,12 +64,12 @@ def is_noise(narrow: Sequence[float], wide: Sequence[float]) -> bool:
     return any(after > NOISY**2 * before for before, after in zip(narrow, wide, strict=True))
 
 
-def judge(recordings: Sequence[Recording], models: Structures, cutoff: float) -> HeldOut:
+def judge(recordings: Sequence[Recording], models: Structures, band: Band) -> HeldOut:
     """Compare the three models on recordings that none of them was fitted to.
 
-    Where the protocol's band is mostly noise, the band of the analysis (`cutoff`, Hz) is what is judged.
+    Where the protocol's band is mostly noise, the `band` of the analysis is what is judged.
     """
-    prepared = judged_band(recordings, models, cutoff)
+    prepared = judged_band(recordings, models, band)
     inside = np.concatenate([piece.inside for piece in prepared.pieces])
     left = {
         name: np.concatenate(residuals(prepared, mount))[inside]
@@ -82,29 +82,31 @@ def judge(recordings: Sequence[Recording], models: Structures, cutoff: float) ->
         after_rms=rms(left["after"]),
         floor_rms=_floor(prepared, models.after),
         confidence_interval=interval_of(left["before"], left["after"], prepared.pieces[0].dt),
-        sliding=_sliding(recordings, models, cutoff),
+        sliding=_sliding(recordings, models, band),
         cutoff_hz=prepared.cutoff,
+        motion_hz=max(prepared.band),
     )
 
 
-def judged_band(recordings: Sequence[Recording], models: Structures, cutoff: float) -> Prepared:
+def judged_band(recordings: Sequence[Recording], models: Structures, band: Band) -> Prepared:
     """Recordings in the band in which `judge` compares models on them."""
     own, protocol = (
-        [heldout_rms(recordings, one, band) ** 2 for one in (models.before, models.after)] for band in (cutoff, CUTOFF)
+        [heldout_rms(recordings, one, edges) ** 2 for one in (models.before, models.after)]
+        for edges in (band, Band(CUTOFF))
     )
-    is_above = cutoff > CUTOFF and own[0] > 2 * protocol[0]
-    return prepare(recordings, cutoff if is_above or is_noise(own, protocol) else CUTOFF)
+    is_above = band.cutoff > CUTOFF and own[0] > 2 * protocol[0]
+    return prepare(recordings, band if is_above or is_noise(own, protocol) else CUTOFF)
 
 
-def heldout_rms(recordings: Sequence[Recording], mount: Mount, cutoff: float = CUTOFF) -> float:
+def heldout_rms(recordings: Sequence[Recording], mount: Mount, band: float | Band = CUTOFF) -> float:
     """RMS of the torque residual of one model by the protocol, in its band or another [Hz]."""
-    prepared = prepare(recordings, cutoff)
+    prepared = prepare(recordings, band)
     inside = np.concatenate([piece.inside for piece in prepared.pieces])
     return rms(np.concatenate(residuals(prepared, mount))[inside])
 
 
-def _sliding(recordings: Sequence[Recording], models: Structures, cutoff: float) -> dict[str, float]:
-    prepared = prepare(recordings, cutoff)
+def _sliding(recordings: Sequence[Recording], models: Structures, band: Band) -> dict[str, float]:
+    prepared = prepare(recordings, band)
     v, inside = (np.concatenate([getattr(piece, name) for piece in prepared.pieces]) for name in ("v", "inside"))
     least = least_speed(v[inside])
     moving = inside & (np.abs(v) > least)
@@ -112,6 +114,7 @@ def _sliding(recordings: Sequence[Recording], models: Structures, cutoff: float)
         "before_rms": rms(np.concatenate(residuals(prepared, models.before))[moving]),
         "after_rms": rms(np.concatenate(residuals(prepared, models.after))[moving]),
         "cutoff_hz": prepared.cutoff,
+        "motion_hz": max(prepared.band),
         "least_speed": least,
     }
 

@@ -109,6 +109,7 @@ class HeldOut:
     sliding: dict[str, float] = field(default_factory=dict)
     """The same RMS values over samples in clear motion only, with the cutoff and the least speed used."""
     cutoff_hz: float = 30.0
+    motion_hz: float = 30.0
     """Cutoff of the low-pass in front of these RMS values [Hz]."""
     unvetoed_rms: float | None = None
     """RMS with all effects that training alone proposed, before this recording's veto."""

@@ -15,7 +15,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from cosim.estimation.prepare import Array, Piece, Prepared, derivative, lowpass
+from cosim.estimation.filters import derivative, lowpass
+from cosim.estimation.prepare import Array, Piece, Prepared
 
 SLOW = 1.0
 """Hz: a loop follows motion this slow as well as it ever will."""

@@ -37,7 +37,7 @@ def without_names(
     return Diagnosis(
         verdict=("unknown",),
         findings=tuple(_untestable(name) for name in TRIED),
-        heldout=judge(heldout, models, problem.prepared.cutoff),
+        heldout=judge(heldout, models, problem.prepared.band),
         traces=signals,
         parts=parts(signals),
         regions=regions(signals, False, linear),

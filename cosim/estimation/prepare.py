@@ -4,19 +4,25 @@ The same zero-phase low-pass acts twice on both sides of J q'' + tau_f + ... = t
 and torque), once, after the nonlinear model has been evaluated on the filtered motion, on model and measured torque.
 So linear terms match exactly; with the second pass on the model alone the residual of EMPS at 30 Hz was 3.1 N instead
 of 1.8 N, all of it artefact.
+
+The first pass may be wider (`Band.motion`): a turn of acceleration a is smeared by a / (2 pi f)^2, and friction is not
+linear in the motion, so what a narrow filter smears is a misfit of every law. Then the second pass acts twice, so that
+the band is the same.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
+from scipy.signal import butter, sosfiltfilt
 
 from cosim.data.recording import GAP, Gap, Recording
 from cosim.data.resolution import resolution
+from cosim.estimation.filters import EDGE, derivative, gain, lowpass, passes_of
 from cosim.support.errors import RecordingError
 from cosim.support.statistics import rms
 
@@ -29,8 +35,6 @@ STEADY = 0.1
 """Without a set point, a speed that varies by less than this share is taken for constant: what a loop leaves of it."""
 LEAST_ROWS = 100
 """Rows from which the noise of a reading can be judged."""
-EDGE = 15
-"""Rows by which signals are continued at both ends, turned about their last row, before they are filtered."""
 KEPT_RATE = 2.5
 """Kept rows a second, at least, relative to the cutoff: after two passes of the filter 2 % of what lies at half that
 rate is left, so nothing folds into the band. With 1.4 a ripple of order 60 was found as one of order 65."""
@@ -44,12 +48,21 @@ COVERED = 0.5
 """Share of a recording's time that pieces must hold. Unit: 1."""
 
 
+class Band(NamedTuple):
+    """Cutoffs [Hz] of an analysis: of the torque that is compared, and of the motion that goes into the models."""
+
+    cutoff: float
+    motion: float = 0.0
+    """Not below `cutoff`, which it is where it is 0."""
+
+
 @dataclass(frozen=True, eq=False)
 class Piece:
     """A contiguous piece of a recording at the rate where the model is evaluated.
 
     All arrays have one value a row: time, filtered position, speed, acceleration; `tau` is filtered twice. `inside`
-    marks rows away from the edges, where filters and initial states have settled.
+    marks rows away from the edges, where filters and initial states have settled. `motion` is the cutoff of the first
+    pass [Hz], 0 where it is that of the second.
     """
 
     recording: int
@@ -67,10 +80,16 @@ class Piece:
     """Amplitude density of the reading's white noise [rad s^1/2, m s^1/2]; of a speed's where only that was read."""
     step: float = 0.0
     """Step of the encoder [rad, m]; 0 where it is too fine to be seen."""
+    motion: float = 0.0
 
     def lowpass(self, columns: Array) -> Array:
         """Second pass of the filter, along the first axis."""
-        return lowpass(columns, self.dt, self.cutoff)
+        return lowpass(columns, self.dt, self.cutoff, passes_of(self.cutoff, self.motion))
+
+    def gain(self, hertz: float) -> float:
+        """What all passes together leave of a tone."""
+        own = gain(hertz, self.dt, self.cutoff)
+        return own**2 * (gain(hertz, self.dt, self.motion) if self.motion > self.cutoff else 1.0)
 
     @cached_property
     def asked(self) -> bool:
@@ -97,6 +116,13 @@ class Prepared:
     pieces: tuple[Piece, ...]
     cutoff: float
     has_position: bool
+    motion: float = 0.0
+    """Cutoff [Hz] in which the motion was read; 0 where it is `cutoff`."""
+
+    @property
+    def band(self) -> Band:
+        """Both cutoffs."""
+        return Band(self.cutoff, self.motion)
 
     def stacked(self, name: str) -> Array:
         """One signal of all pieces at the kept rows, one after the other."""
@@ -119,57 +145,22 @@ class Prepared:
         return {name: (float(self.stacked(name).min()), float(self.stacked(name).max())) for name in ("q", "v")}
 
 
-def lowpass(columns: Array, dt: float, cutoff: float) -> Array:
-    """Fourth-order Butterworth, forward and backward: no phase, -6 dB at the cutoff [Hz]; along the first axis."""
-    if cutoff >= 0.45 / dt:
-        return columns
-    sections, settled = _filter(dt, cutoff)
-    # What SciPy's `sosfiltfilt` does, but that finds out anew each time how the filter settles: a third of its time.
-    edge = min(EDGE, len(columns) - 1)
-    before, after = 2 * columns[:1] - columns[edge:0:-1], 2 * columns[-1:] - columns[-2::-1][:edge]
-    settled = settled.reshape(*settled.shape, *[1] * (columns.ndim - 1))
-    passed = np.concatenate([before, columns, after])
-    for _ in ("forward", "backward"):
-        passed = sosfilt(sections, passed, axis=0, zi=settled * passed[:1])[0][::-1]
-    return np.asarray(passed[edge : len(passed) - edge])
-
-
-@lru_cache(maxsize=1024)  # each piece has a time step of its own, and all of them are filtered in turn
-def _filter(dt: float, cutoff: float) -> tuple[Array, Array]:
-    """Sections of the filter, and the states it settles in at a constant 1; designing costs as much as filtering."""
-    sections = butter(4, cutoff, fs=1 / dt, output="sos")
-    return np.asarray(sections), np.asarray(sosfilt_zi(sections))
-
-
-def gain(hertz: float, dt: float, cutoff: float) -> float:
-    """What one pass of `lowpass` leaves of a tone."""
-    if cutoff >= 0.45 / dt:
-        return 1.0
-    ratio = np.tan(np.pi * min(hertz * dt, 0.49)) / np.tan(np.pi * cutoff * dt)
-    return float(1 / (1 + ratio**8))
-
-
-def derivative(x: Array, dt: float) -> Array:
-    """Five-point central difference; the two rows at each end repeat the nearest one."""
-    inner = (x[:-4] - 8 * x[1:-3] + 8 * x[3:-1] - x[4:]) / (12 * dt)
-    return np.concatenate([inner[:1], inner[:1], inner, inner[-1:], inner[-1:]])
-
-
-def prepare(recordings: Sequence[Recording], cutoff: float) -> Prepared:
+def prepare(recordings: Sequence[Recording], band: float | Band) -> Prepared:
     """Filter, differentiate and cut recordings.
 
-    `cutoff` [Hz] is lowered to 0.3 of the slowest sample rate, and on to where the lines that bridge short holes leave
-    pieces that hold most of each recording.
+    Cutoffs [Hz] are lowered to 0.3 of the slowest sample rate, the first on to where the lines that bridge short holes
+    leave pieces that hold most of each recording.
 
     Raises:
         RecordingError: holes leave of a recording too little in any band.
     """
     slowest = max(recording.sample_time for recording in recordings)
-    cutoff = min(cutoff, 0.3 / slowest)
+    cutoff, motion = (min(edge, 0.3 / slowest) for edge in (band if isinstance(band, Band) else Band(band)))
     cutoff = min(_telling(one, cutoff) for one in recordings)
-    pieces = [piece for index, one in enumerate(recordings) for piece in _pieces(one, index, cutoff)]
+    read = Band(cutoff, motion if motion > cutoff else 0.0)
+    pieces = [piece for index, one in enumerate(recordings) for piece in _pieces(one, index, read)]
     has_position = all("q" in recording for recording in recordings)
-    return Prepared(tuple(r.name for r in recordings), tuple(pieces), cutoff, has_position)
+    return Prepared(tuple(r.name for r in recordings), tuple(pieces), cutoff, has_position, read.motion)
 
 
 def quality(recording: Recording, cutoff: float) -> tuple[str, ...]:
@@ -212,17 +203,18 @@ def _spans(recording: Recording, cutoff: float) -> list[slice]:
     return [slice(a, b) for a, b in spans if (b - a) * dt >= LEAST_SECONDS and b - a > TURNED]
 
 
-def _pieces(recording: Recording, index: int, cutoff: float) -> list[Piece]:
+def _pieces(recording: Recording, index: int, band: Band) -> list[Piece]:
     step = resolution(recording["q"]) if "q" in recording else 0.0
-    return [replace(_piece(recording, index, span, cutoff), step=step) for span in _spans(recording, cutoff)]
+    return [replace(_piece(recording, index, span, band), step=step) for span in _spans(recording, band.cutoff)]
 
 
-def _piece(recording: Recording, index: int, span: slice, cutoff: float) -> Piece:
+def _piece(recording: Recording, index: int, span: slice, band: Band) -> Piece:
     grid, table = _on_grid(recording, span)
     dt = float(grid[-1] - grid[0]) / (len(grid) - 1)
-    tau = lowpass(table["tau"], dt, cutoff)
-    q, v, a = _motion(table, dt, cutoff)
-    each = max(1, int(1 / (8 * cutoff * dt)))
+    cutoff, first = band.cutoff, max(band)
+    tau = lowpass(table["tau"], dt, first)
+    q, v, a = _motion(table, dt, first)
+    each = max(1, int(1 / (8 * first * dt)))
     coarse, t = dt * each, grid[::each].copy()  # copies: what is thinned must not keep all rows alive
     return Piece(
         recording=index,
@@ -230,10 +222,11 @@ def _piece(recording: Recording, index: int, span: slice, cutoff: float) -> Piec
         q=q[::each].copy(),
         v=v[::each].copy(),
         a=a[::each].copy(),
-        tau=lowpass(tau[::each], coarse, cutoff),
+        tau=lowpass(tau[::each], coarse, cutoff, passes_of(*band)),
         inside=_inside(t, float(grid[0]), float(grid[-1])) & ~recording.is_masked(t, 0.5 / cutoff),
         dt=coarse,
         cutoff=cutoff,
+        motion=band.motion,
         stride=max(1, int(1 / (KEPT_RATE * cutoff * coarse))),
         extras={n: c[::each].copy() for n, c in table.items() if n not in ("t", "tau", "q", "v")},
         reading_noise=noise_of(table["q" if "q" in table else "v"], dt) * sqrt(dt) if len(grid) > LEAST_ROWS else 0.0,

@@ -9,7 +9,7 @@ import numpy.typing as npt
 from scipy.ndimage import minimum_filter1d
 
 from cosim.estimation.prepare import Array, Piece, Prepared
-from cosim.estimation.visible import held_level, least_way
+from cosim.estimation.visible import bend, least_way
 from pyfmi_models.friction import FrictionLaw, MemorylessLaw
 
 CLEAR_MOTION = 0.02
@@ -32,8 +32,7 @@ def remembers(law: FrictionLaw, prepared: Prepared) -> bool:
     """
     if isinstance(law, MemorylessLaw):
         return False
-    stiffness, held = getattr(law, "sigma0", None), held_level(law)
-    return not stiffness or not held or bool(held / stiffness >= least_way(prepared))
+    return not bend(law) or bend(law) >= least_way(prepared)
 
 
 def described_rows(law: FrictionLaw, v: Array) -> npt.NDArray[np.bool_]:
@@ -46,9 +45,13 @@ def described_rows(law: FrictionLaw, v: Array) -> npt.NDArray[np.bool_]:
 def weights(law: FrictionLaw, prepared: Prepared) -> Array:
     """Weight of each kept row in a fit: 0 where the law says nothing; squares of the others average 1.
 
+    All rows count alike where there is no friction that could hold at rest.
+
     Rest is judged by the speeds of its own recording: one at a hundredth of the others' speed moves all the same.
     """
     v = prepared.stacked("v")
+    if law.key == "none":
+        return np.ones(len(v))
     shown = law if remembers(law, prepared) else law.steady()
     says = np.concatenate([_says(shown, piece.v[piece.kept], least_speed(v)) for piece in prepared.pieces])
     new = says / _repeated(v, says, prepared.recording_of)

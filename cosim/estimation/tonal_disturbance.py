@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from cosim.estimation.prepare import Array, Piece, Prepared, gain
+from cosim.estimation.prepare import Array, Piece, Prepared
 from pyfmi_models.effects.base import TonalEffect
 from pyfmi_models.mount import Mount
 
@@ -55,6 +55,6 @@ def in_phase(piece: Piece, rest: Array, tones: Sequence[Tone], rows: Rows) -> It
         waves = np.column_stack([np.sin(angle), np.cos(angle)])
         a, b = np.linalg.lstsq(waves[rows], rest[rows], rcond=None)[0]
         phase = float(np.arctan2(b, a))
-        torque = tone.amplitude * gain(tone.hertz, piece.dt, piece.cutoff) ** 2 * np.sin(angle + phase)
+        torque = tone.amplitude * piece.gain(tone.hertz) * np.sin(angle + phase)
         rest = rest - torque
         yield phase, torque

@@ -32,8 +32,14 @@ def held_level(law: FrictionLaw) -> float:
     return sliding if sliding >= LOST * rest else rest
 
 
+def bend(law: FrictionLaw) -> float:
+    """Way [rad, m] by which the law's contact bends before it slides; 0 where it does not bend."""
+    stiffness = getattr(law, "sigma0", None)
+    return held_level(law) / float(np.mean(stiffness)) if stiffness else 0.0
+
+
 def least_way(prepared: Prepared) -> float:
     """Way [rad, m] below which neither the encoders nor the filtered motion show a displacement."""
     step = max(piece.step for piece in prepared.pieces)
-    smear = rms(prepared.stacked("a")) / (2 * pi * prepared.cutoff) ** 2
+    smear = rms(prepared.stacked("a")) / (2 * pi * max(prepared.band)) ** 2
     return max(SEEN_STEPS * step, SMEARED * smear)

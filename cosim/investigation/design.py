@@ -21,10 +21,11 @@ import numpy as np
 
 from cosim.diagnosis.candidates import contact_level
 from cosim.diagnosis.hypotheses import candidates
+from cosim.estimation.filters import lowpass
 from cosim.estimation.fit import Fit, free_parameters
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.least_squares import projected
-from cosim.estimation.prepare import Array, Piece, Prepared, lowpass
+from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.problem import Problem
 from cosim.investigation.families import AT_RANDOM, FAMILIES
 from cosim.investigation.ground import new_ground, visited

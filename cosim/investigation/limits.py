@@ -11,7 +11,8 @@ from math import ceil, floor, log10
 import numpy as np
 
 from cosim.data.recording import Recording
-from cosim.estimation.prepare import Array, derivative, lowpass
+from cosim.estimation.filters import derivative, lowpass
+from cosim.estimation.prepare import Array
 from cosim.support.errors import InputError
 
 KEPT = 0.9

@@ -14,7 +14,6 @@ from cosim.diagnosis.band import in_band
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.result import Diagnosis, Finding, is_special
 from cosim.estimation.fit import Fit
-from cosim.estimation.prepare import Prepared
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import weights
 from pyfmi_models.card import Card
@@ -66,13 +65,7 @@ def problem_of(train: Sequence[Recording], card: Card) -> Problem:
     """What fits of the training recordings share, in the band of the diagnosis."""
     good, mount = [*map(cleaned, train)], card.plant()
     prepared = in_band(good, mount)
-    return Problem(mount, prepared, _weight(mount, prepared), max(one.sample_time for one in good))
-
-
-def _weight(mount: Mount, prepared: Prepared) -> Any:
-    import numpy as np
-
-    return np.ones(len(prepared.recording_of)) if mount.friction.key == "none" else weights(mount.friction, prepared)
+    return Problem(mount, prepared, weights(mount.friction, prepared), max(one.sample_time for one in good))
 
 
 def questions(found: Diagnosis) -> tuple[Question, ...]:

@@ -20,7 +20,8 @@ from cosim.diagnosis.hypotheses.base import (
 )
 from cosim.diagnosis.periodogram import peaks
 from cosim.diagnosis.result import Where
-from cosim.estimation.prepare import Array
+from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.visible import bend, least_way
 from pyfmi_models.effects import Effect, LocalFriction, PeriodicFriction
 from pyfmi_models.mount import Mount
 
@@ -94,6 +95,10 @@ class RoughSpot(Hypothesis[LocalFriction]):
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """None: where a spot is, is one of too many places; the bound is that of a ripple."""
         return ()
+
+    def shows(self, effect: LocalFriction, mount: Mount, prepared: Prepared) -> bool:
+        """A spot that the contact bends across, or that no recording resolves, is a place where the axis rested."""
+        return float(effect.width) >= max(bend(mount.friction), least_way(prepared))
 
     def where(self, effect: LocalFriction, reach: Reach) -> Where:
         """Two widths to each side of its centre."""

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from cosim.data.recording import Recording
+from cosim.estimation.filters import lowpass
 from cosim.estimation.prepare import LEAST_SECONDS as SHORTEST
-from cosim.estimation.prepare import lowpass
 from cosim.support.errors import InputError, RecordingError
 from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount

@@ -18,7 +18,8 @@ import numpy as np
 from cosim.data.recording import Recording
 from cosim.diagnosis.sanity.balance import Balance, Estimate
 from cosim.diagnosis.sanity.explanations import ANY_INERTIA, Explanation
-from cosim.estimation.prepare import LEAST_SECONDS, Array, derivative
+from cosim.estimation.filters import derivative
+from cosim.estimation.prepare import LEAST_SECONDS, Array
 
 MOST_GRAVITY = 6.0
 """Nats: a ripple twice a turn, or a spring over several, can look like gravity of another order. A wave of which less
