@@ -12,6 +12,12 @@ from cosim.diagnosis.rivals import AcceptedEffect, Examined
 from cosim.diagnosis.search import CandidateFit
 
 
+@pytest.fixture(autouse=True)
+def all_are_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Effects that are only their names are never anything else in disguise."""
+    monkeypatch.setattr("cosim.diagnosis.proof.is_degenerate", lambda *_: False)
+
+
 class Recorded(Tables):
     """The same with recordings of which nothing is asked."""
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from cosim.diagnosis.admissibility import is_degenerate
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.decision import Gain, stands
 from cosim.diagnosis.predictive import Predictive
@@ -62,7 +63,7 @@ def _standing(
     problem = comparison.problem
     gains = {one.effect.id: _gain(problem, chosen, one, some, held) for one in some}
     nats = {one.effect.id: gains[one.effect.id].nats for one in some}
-    falling = [one for one in some if not _stands(comparison, examined, one, gains[one.effect.id])]
+    falling = [one for one in some if not _stands(comparison, examined, chosen, one, gains[one.effect.id])]
     if not falling:
         return chosen, list(some), gains
     out = {min(group, key=lambda one: nats[one.effect.id]).effect.id for group in (falling, some)}
@@ -74,8 +75,10 @@ def _standing(
     return best, kept, gains | known
 
 
-def _stands(comparison: Comparison, examined: Examined, one: AcceptedEffect, gain: Gain) -> bool:
-    """Whether an effect stands on the held-out recordings."""
+def _stands(comparison: Comparison, examined: Examined, chosen: Fit, one: AcceptedEffect, gain: Gain) -> bool:
+    """Whether an effect stands on the held-out recordings, and is still what its name says in the structure there."""
+    if is_degenerate(comparison.problem, one.within(chosen.mount)):
+        return False
     small = len(examined.effects) == 1 and is_small(one.own, comparison.policy)
     if small and not gain.matters_alone(comparison.policy):
         return False

@@ -1,6 +1,6 @@
 """Each effect that was found, taken out and challenged: is it needed, and who else could stand in its place?"""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from cosim.diagnosis.comparison import Comparison
@@ -9,6 +9,7 @@ from cosim.diagnosis.policy import Policy
 from cosim.diagnosis.search import IN_TURN, CandidateFit, InTurn, Search, Stage, is_admissible, margin, stage, weighed
 from cosim.estimation.fit import Fit
 from pyfmi_models.effects import Effect
+from pyfmi_models.mount import Mount
 
 ROUNDS = 4
 
@@ -29,11 +30,19 @@ class AcceptedEffect:
     @property
     def effect(self) -> Effect:
         """The effect; of a ripple its strongest wave."""
-        return max(self.effects, key=lambda one: float(getattr(one, "amplitude", 0.0)))
+        return _strongest(self.effects)
+
+    def within(self, mount: Mount) -> Effect:
+        """The same effect as a mount has it, whose effects were fitted anew."""
+        return _strongest([one for one in mount.effects if one.id == self.effect.id][-len(self.effects) :])
 
     def margin(self, rival: CandidateFit) -> float:
         """Nats by which this effect is better than a rival."""
         return self.margins[rival.effect.id]
+
+
+def _strongest(waves: Sequence[Effect]) -> Effect:
+    return max(waves, key=lambda one: float(getattr(one, "amplitude", 0.0)))
 
 
 @dataclass(frozen=True)
