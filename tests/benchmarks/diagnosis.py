@@ -99,9 +99,10 @@ NOTES = {
     "no Stribeck curve is named there, as it should be. The motor hardly turns back, where friction cannot be told "
     "from torque: fewer of the cogging's orders are found than it has, what bends like a contact there may not be "
     "named, so that `unknown` stands before the cogging, which removes .88 of the error energy (from .9 on it were "
-    "sure), and with the neighbour motor turned the model is worse than the base, as the README warns. Real machines leave more than simulated ones: `unknown` beside a name says so. What is learned of the servo "
-    "lowers the error of the held-out runs in the tool's own band, and "
-    "raises it in the rows that its README judges (faster than 0.08 rad/s, the duty unfiltered): .19 to .21 V.",
+    "sure), and with the neighbour motor turned the model is worse than the base, as the README warns. Real "
+    "machines leave more than simulated ones: `unknown` beside a name says so. What is learned of the servo lowers the "
+    "error of the held-out runs in the tool's own band, and raises it in the rows that its README judges (faster than "
+    "0.08 rad/s, the duty unfiltered): .19 to .21 V.",
     "emps": "Card `emps` (linear, symmetric Coulomb + viscous); trained on estimation.parquet, held out "
     "validation_pulses.parquet. RMS in N. `clear` is clear motion only, |v| > 2 mm/s, 100 Hz on both sides, as in the "
     "recording's README; the other two follow the protocol of 30 Hz over all samples. The held-out recording has a "
