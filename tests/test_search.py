@@ -154,10 +154,15 @@ def test_what_is_small_is_taken_if_it_is_all_there_is_and_ends_the_search() -> N
 def test_what_the_base_gains_by_other_numbers_of_its_own_is_no_merit_of_an_effect() -> None:
     comparison, base = compared(lambda q, _: 0 * q)
     beside = comparison.problem.fit(replace(base.mount, effects=(TorqueOffset(torque=1e-9),)), 1)
-    held, near = (
-        comparison.problem.fit(with_values(base.mount, ["axis.inertia"], np.array([inertia])), 1)
-        for inertia in (0.1, 2.5)
-    )
-    assert comparison.evidence(beside) - comparison.evidence(held) > POLICY.least_evidence
-    assert weighed(comparison, beside, held).evidence < 1.0
-    assert owed_to_base(comparison, beside, near, NONE) == 0.0, "within what owners may be off"
+
+    def at(inertia: float) -> Fit:
+        return comparison.problem.fit(with_values(base.mount, ["axis.inertia"], np.array([inertia])), 1)
+
+    def with_card(inertia: float) -> Comparison:
+        axis = replace(comparison.problem.mount.axis, inertia=inertia)
+        return replace(comparison, problem=replace(comparison.problem, mount=replace(base.mount, axis=axis)))
+
+    assert comparison.evidence(beside) - comparison.evidence(at(0.1)) > POLICY.least_evidence
+    assert weighed(with_card(0.1), beside, at(0.1)).evidence < 1.0
+    assert owed_to_base(with_card(2.5), beside, at(2.5), NONE) == 0.0, "within what owners may be off"
+    assert owed_to_base(comparison, beside, at(0.1), NONE) == 0.0, "the base comes back to the card"

@@ -1,7 +1,8 @@
 """What the base gains by other numbers of its own is no merit of the effect beside which it took them.
 
-A fit sits where the plain error is least, which evidence need not prefer: beside an effect a base may end at numbers
-that explain what is fast far better, with the effect or without it.
+A fit sits where the plain error is least, which evidence need not prefer: beside an effect a base may leave the card
+for numbers that explain what is fast far better, with the effect or without it. Where it comes back to the card, it
+was the base that had stood in for the effect.
 """
 
 from math import log
@@ -24,10 +25,12 @@ def owed_to_base(comparison: Comparison, found: Fit, current: Fit, aside: Aside)
         aside: nuisances that stand aside for the effect.
 
     Returns:
-        At least 0; 0 where no number of the base is more than `FAR` from what it is without the effect.
+        At least 0; 0 where no number of the base is further from the card than without the effect, by more than `FAR`.
     """
     known, moved = current.parameters(), found.parameters()
-    if not any(_is_far(known[name], moved[name]) for name in known if name in moved and is_of_base(name)):
+    card = {variable.name: variable.start for variable in comparison.problem.mount.parameters()}
+    shared = [name for name in known if name in moved and name.startswith(("axis.", "friction."))]
+    if not any(_has_left(card[name], known[name], moved[name]) for name in shared):
         return 0.0
     names = [name for name in known if name in moved]
     there = with_values(current.mount, names, found.values[[found.free.index(name) for name in names]])
@@ -35,10 +38,8 @@ def owed_to_base(comparison: Comparison, found: Fit, current: Fit, aside: Aside)
     return max(0.0, comparison.evidence(alone, aside) - comparison.evidence(current, aside))
 
 
-def is_of_base(name: str) -> bool:
-    """Whether a parameter, by its full name, is one of the axis or its friction law."""
-    return name.startswith(("axis.", "friction."))
-
-
-def _is_far(before: float, after: float) -> bool:
-    return min(before, after) > 0 and abs(log(after / before)) > log(FAR)
+def _has_left(card: float, before: float, after: float) -> bool:
+    """Whether a number is further from the card's than before, by more than the factor."""
+    if min(card, before, after) <= 0:
+        return False
+    return abs(log(after / card)) - abs(log(before / card)) > log(FAR)
