@@ -25,7 +25,6 @@ loop_hz = 1000.0
 record_hz = 500.0
 observer_bandwidth = 120.0
 """
-DWELL = '\n[[effects]]\neffect = "dwell_breakaway"\ntorque_per_efold = 0.4\n'
 CABLE = '\n[[effects]]\neffect = "cable_wrap"\nstiffness = 2.0\nhome = 0.05\n'
 STIFFENING = f"{CABLE}hardening = 20.0\n"
 """A cable that hardens: an even one is a load off the axis over so small a part of a turn."""

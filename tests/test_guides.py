@@ -40,7 +40,7 @@ def test_what_is_built_from_a_card_is_drawn_as_that_whether_it_is_built_or_not(s
     assert text == "\n".join(draw(read_scenario(scenario)))
 
 
-def test_the_investigation_of_the_guide_settles_what_its_first_recordings_leave_open(
+def test_the_investigation_of_the_guide_puts_its_first_name_right(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     blocks = re.findall(r"```(\w+)\n(.*?)```", (DOCS / "investigate.md").read_text("utf-8"), re.DOTALL)
