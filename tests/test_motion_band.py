@@ -1,5 +1,7 @@
 """The motion that goes into the models is read in the band in which friction is neither smeared nor made to creep."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -45,7 +47,8 @@ def test_a_base_whose_motion_is_not_smeared_has_the_numbers_of_the_machine() -> 
     problem, cutoff = _problem(RUNS, LUGRE), choose_cutoff(RUNS, INERTIA)
     assert problem.prepared.band.motion >= 1.4 * cutoff == pytest.approx(1.4 * problem.prepared.cutoff)
     base = problem.fit(LUGRE.plant(), 50)
-    narrow = type(problem)(problem.mount, prepare(RUNS, cutoff), np.ones(len(prepare(RUNS, cutoff).recording_of)), 1e-3)
+    prepared = prepare(RUNS, cutoff)
+    narrow = replace(problem, prepared=prepared, weight=np.ones(len(prepared.recording_of)))
     smeared = narrow.fit(LUGRE.plant(), 50)
     assert problem.error(base) < 0.5 * narrow.error(smeared)
     assert base.parameters()["friction.Fc"] == pytest.approx(LEVEL, rel=0.05)
