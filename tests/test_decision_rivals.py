@@ -44,6 +44,7 @@ class Candidate:
     fit: Fitted
     evidence: float
     plain_gain: float = 0.5
+    adds: bool = False
 
 
 @dataclass(frozen=True)
@@ -91,21 +92,31 @@ def play(monkeypatch: pytest.MonkeyPatch) -> Play:
         tried: dict[str, list[Candidate]] | None = None,
         misfits: dict[str, float] | None = None,
         counts: dict[str, int] | None = None,
+        gains: dict[str, float] | None = None,
     ) -> Examined:
         def stage(comparison: Any, current: Fitted, told: Any) -> Tried:
             return Tried(current, tuple((tried or {}).get("".join(sorted(current.names)), [])))
 
         def weighed(comparison: Any, chosen: Fitted, before: Fitted, effect: Named) -> Candidate:
-            return Candidate(effect, replace(chosen, count=(counts or {}).get(effect.id, 0)), evidence[effect.id])
+            fit, gain = replace(chosen, count=(counts or {}).get(effect.id, 0)), (gains or {}).get(effect.id, 0.5)
+            return Candidate(effect, fit, evidence[effect.id], gain)
 
         monkeypatch.setattr(rivals, "stage", stage)
         monkeypatch.setattr(rivals, "weighed", weighed)
         monkeypatch.setattr(rivals, "margin", lambda _, own, other: own.evidence - other.evidence)
         monkeypatch.setattr(rivals, "is_admissible", lambda _, one: not one.effect.id.isupper())
         monkeypatch.setattr(rivals, "misfits_of", lambda *_: misfits or {})
+        monkeypatch.setattr(
+            rivals, "best_of", lambda _, beside, __: next((one for one in beside.tried if one.adds), None)
+        )
+        monkeypatch.setattr(rivals, "is_full", lambda *_: False)
         return examine(Tables(), Found(fitted("b"), fitted("b" + names)))  # type: ignore[arg-type]
 
     return examined
+
+
+def adds(one: Candidate) -> bool:
+    return one.adds
 
 
 def rival(name: str, evidence: float, count: int = 0, beside: str = "b") -> Candidate:
@@ -196,3 +207,17 @@ def test_effects_of_one_kind_are_one_group_and_those_of_the_card_in_none() -> No
     one = Fitted(Structure((Named("b"), Named("x"), Named("y"), Named("x", 2.0))))
     groups = grouped(Tables(), one)  # type: ignore[arg-type]
     assert [[effect.id for effect in group] for group in groups] == [["x", "x"], ["y"]]
+
+
+def test_what_has_evidence_only_beside_an_effect_that_was_swapped_in_is_added(play: Play) -> None:
+    behind = replace(rival("p", 900.0, beside="br"), adds=True)
+    beside = {"b": [rival("r", 60.0)], "br": [behind]}
+    found = play("x", {"x": 50.0, "r": 60.0, "p": 900.0}, beside)
+    assert chosen(found) == "brp"
+
+
+def test_beside_an_effect_that_explains_little_nothing_is_added(play: Play) -> None:
+    least = RULES.small_evidence - 1
+    beside = {"b": [], "bx": [replace(rival("p", 900.0, beside="bx"), adds=True)]}
+    found = play("x", {"x": least, "p": 900.0}, beside, gains={"x": RULES.small_gain / 2})
+    assert chosen(found) == "bx"

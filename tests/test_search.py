@@ -166,3 +166,14 @@ def test_what_the_base_gains_by_other_numbers_of_its_own_is_no_merit_of_an_effec
     assert weighed(with_card(0.1), beside, at(0.1)).evidence < 1.0
     assert owed_to_base(with_card(2.5), beside, at(2.5), NONE) == 0.0, "within what owners may be off"
     assert owed_to_base(comparison, beside, at(0.1), NONE) == 0.0, "the base comes back to the card"
+
+
+def test_a_curve_is_found_where_the_refitted_friction_has_taken_its_level_over() -> None:
+    """Friction that falls over all recorded speeds: refitted without a curve, twice its level."""
+    comparison, base = compared(lambda _, v: 2.0 * np.exp(-((v / 0.8) ** 2)) * np.sign(v))
+    level = float(base.mount.friction.Fc)  # type: ignore[attr-defined]
+    assert level > 1.9 * LEVEL
+    found = refitted(comparison, base, StribeckEffect(Fs=level, Vs=0.01), 1)
+    assert isinstance(found.effect, StribeckEffect)
+    assert found.effect.Fs == pytest.approx(2 * LEVEL, rel=0.05)
+    assert comparison.problem.error(found.fit) < 0.3 * comparison.problem.error(base)

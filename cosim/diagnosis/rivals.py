@@ -6,7 +6,20 @@ from dataclasses import dataclass, field, replace
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.instrumental_variable import Misfits, excludes, misfits_of, settled
 from cosim.diagnosis.policy import Policy
-from cosim.diagnosis.search import IN_TURN, CandidateFit, InTurn, Search, Stage, is_admissible, margin, stage, weighed
+from cosim.diagnosis.search import (
+    IN_TURN,
+    CandidateFit,
+    InTurn,
+    Search,
+    Stage,
+    best_of,
+    is_admissible,
+    is_full,
+    is_small,
+    margin,
+    stage,
+    weighed,
+)
 from cosim.estimation.fit import Fit
 from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount
@@ -57,18 +70,33 @@ class Examined:
 
 
 def examine(comparison: Comparison, found: Search, refits: InTurn = IN_TURN) -> Examined:
-    """Take out, challenge and swap until nothing changes."""
+    """Take out, challenge and swap, and add what has evidence beside what was swapped in, until nothing changes."""
     chosen, known = found.chosen, {_names(one.current): one for one in found.stages}
     for _ in range(ROUNDS):
         effects, better = _round(comparison, chosen, known, refits)
+        if better is None:
+            better = _grown(comparison, effects, _beside(comparison, chosen, known, refits))
         if better is None:
             break
         chosen = better
     else:  # swaps went in a circle: what stands is examined as it is
         effects = [_challenged(comparison, chosen, group, known, refits) for group in grouped(comparison, chosen)]
-    if _names(chosen) not in known:
-        known[_names(chosen)] = stage(comparison, chosen, refits)
-    return Examined(found.base, chosen, tuple(effects), known[_names(chosen)])
+    return Examined(found.base, chosen, tuple(effects), _beside(comparison, chosen, known, refits))
+
+
+def _beside(comparison: Comparison, fit: Fit, known: dict[tuple[str, ...], Stage], refits: InTurn) -> Stage:
+    """What was tried beside a structure, found once."""
+    if _names(fit) not in known:
+        known[_names(fit)] = stage(comparison, fit, refits)
+    return known[_names(fit)]
+
+
+def _grown(comparison: Comparison, effects: Sequence[AcceptedEffect], beside: Stage) -> Fit | None:
+    """The structure with one more effect, of which the search, which went another way, may not have known."""
+    if any(is_small(one.own, comparison.policy) for one in effects):
+        return None
+    best = best_of(comparison, beside, max((one.own.evidence for one in effects), default=0.0))
+    return None if best is None or is_full(best, comparison) else best.fit
 
 
 def _round(
@@ -114,10 +142,7 @@ def _challenged(
     problem = comparison.problem
     refits.on_progress(group[0].title)
     rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
-    without = problem.fit(replace(chosen.mount, effects=rest), 45)
-    if _names(without) not in known:
-        known[_names(without)] = stage(comparison, without, refits)
-    beside = known[_names(without)]
+    beside = _beside(comparison, problem.fit(replace(chosen.mount, effects=rest), 45), known, refits)
     own = weighed(comparison, chosen, beside.current, effect=group[0])
     rivals = [one for one in beside.tried if one.effect.id != group[0].id and is_admissible(comparison, one)]
     best: dict[str, CandidateFit] = {}

@@ -174,7 +174,7 @@ def search(comparison: Comparison, base: Fit, refits: InTurn = IN_TURN) -> Searc
     while True:
         now = stages[-1]
         best = best_of(comparison, now, largest)
-        if best is None or _is_full(best, comparison):
+        if best is None or is_full(best, comparison):
             return Search(base, tuple(stages))
         largest = max(largest, best.evidence)
         stages.append(stage(comparison, with_harmonics(comparison, best.fit, best.effect), refits))
@@ -256,6 +256,7 @@ def is_admissible(comparison: Comparison, one: CandidateFit) -> bool:
     return not hypothesis_of(one.effect).must_stand_out or is_asked_for(comparison, one.fit, one.effect)
 
 
-def _is_full(best: CandidateFit, comparison: Comparison) -> bool:
+def is_full(best: CandidateFit, comparison: Comparison) -> bool:
+    """Whether a structure with this effect has more than may be named."""
     added = best.fit.mount.effects[len(comparison.problem.mount.effects) :]
     return len({effect.id for effect in added}) > comparison.policy.most_effects or len(added) > MOST_WAVES

@@ -34,6 +34,9 @@ PROPORTIONAL = ("load_share", "load_friction", "load_viscous")
 """Numbers of a play that its torque is proportional to: the motion of the far side stays."""
 AROUND = (0.5, 1.0, 2.0)
 """Gaps from which a fit goes on, relative to the one that it found."""
+MOST = 0.7
+"""Share of the inertia behind the play from which it goes on too: a play of a half was found as one of a third, at a
+quarter of its evidence, from smaller shares."""
 HALF, SHARED_GAPS = 0.5, np.geomspace(1e-4, 2e-3, 5)
 """Share of the card's friction behind the play, and gaps relative to the motion, from which all is fitted anew. The law
 refitted without a play has long taken over what the far side does: from there no step leads to two halves. Of four
@@ -81,12 +84,15 @@ class Play(Hypothesis[Backlash]):
             yield Candidate("backlash", (middling,), (), start)
 
     def tuned(self, problem: Problem, found: Fit, start: Backlash, evidence: Evidence) -> Fit:
-        """Go on from gaps around the one that was found: whether a flank is met jumps with the gap."""
+        """Go on from gaps around the one that was found (whether a flank is met jumps with the gap), then from more."""
         found = max((found, _shared(problem, found, evidence)), key=evidence)
         if evidence(found) <= 0:
             return found
         play: Any = found.mount.effects[-1]
-        return refound(problem, found, evidence, [replace(play, gap_rad=times * play.gap_rad) for times in AROUND], 25)
+        around = [replace(play, gap_rad=times * play.gap_rad) for times in AROUND]
+        found = refound(problem, found, evidence, around, 25)
+        play = found.mount.effects[-1]
+        return refound(problem, found, evidence, [replace(play, load_share=MOST)])
 
     def is_degenerate(self, problem: Problem, effect: Backlash) -> bool:
         """With hardly anything behind it the play is one more bristle of the friction."""

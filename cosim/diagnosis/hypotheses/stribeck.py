@@ -9,7 +9,7 @@ import numpy as np
 from cosim.diagnosis.candidates import Candidate, Span, contact_level, has
 from cosim.diagnosis.hypotheses.base import Evidence, Hypothesis, Reach, Seen
 from cosim.diagnosis.result import Where
-from cosim.diagnosis.tuning import LEAST_GAIN, at_bound, freed, refound, revived
+from cosim.diagnosis.tuning import LEAST_GAIN, at_bound, freed
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
@@ -61,9 +61,14 @@ class StribeckCurve(Hypothesis[StribeckEffect]):
         )
 
     def tuned(self, problem: Problem, found: Fit, start: StribeckEffect, evidence: Evidence) -> Fit:
-        """Start from every width, then try other shapes."""
-        found = revived(problem, found, start)
-        return _shaped(problem, refound(problem, found, evidence, _widths(problem, start)))
+        """Start from every width, then try other shapes.
+
+        A friction that was refitted without a curve lies somewhere on it: from a level that holds what falls, or from a
+        slope that has gone, no step leads back. So these fits start from the card's friction.
+        """
+        others, card = found.mount.effects[:-1], problem.mount.friction
+        starts = [replace(found.mount, friction=card, effects=(*others, one)) for one in _widths(problem, start)]
+        return _shaped(problem, max((found, *(problem.fit(one, 36) for one in starts)), key=evidence))
 
     def is_degenerate(self, problem: Problem, effect: StribeckEffect) -> bool:
         """A curve narrower than recorded speeds can tell is a level."""
