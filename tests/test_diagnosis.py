@@ -165,6 +165,17 @@ class TestCommand:
         assert {effect.id for effect in read_card(out / "card.toml").effects} == {"cogging", "friction_asymmetry"}
         assert self.run(self.arguments(folder, out, "--quick")) == 2
         assert "exists already" in capsys.readouterr().err
+        self.with_a_report_beside(out)
+        assert self.run(self.arguments(folder, out, "--quick", "--force")) == 0
+        assert {path.name for path in out.iterdir()} == {"diagnosis.json", "card.toml", "mine.txt"}
+
+    def with_a_report_beside(self, out: Path) -> None:
+        """What a whole diagnosis would have left, which tells of another answer then, and a file of the user."""
+        told = json.loads((out / "diagnosis.json").read_text())
+        told["improved"]["fmu"] = "axis_improved.fmu"
+        (out / "diagnosis.json").write_text(json.dumps(told))
+        for name in ("report.html", "missing_torque.parquet", "axis_improved.fmu", "mine.txt"):
+            (out / name).write_text("before")
 
     def spoiled(self, folder: Path, tmp_path: Path, column: str, change: object) -> list[str]:
         import pandas as pd

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from shlex import split
 
+import numpy as np
 import pytest
 from investigations import CABLE, LIMITS, STIFFENING, written
 
@@ -169,3 +170,18 @@ def test_a_budget_is_a_time(text: str, seconds: float) -> None:
 def test_a_budget_that_is_no_time_is_refused(text: str) -> None:
     with pytest.raises(InputError, match="it is a time above 0"):
         seconds_of(text)
+
+
+def test_what_is_refused_before_anything_has_moved_leaves_the_folder_free(tmp_path: Path) -> None:
+    given, out = written(tmp_path, CABLE), tmp_path / "out"
+    with pytest.raises(InputError, match=r"--budget 5s: the first two motions last 20 s; give more"):
+        investigate(*given[:2], out, machine=given[2], budget=5, seconds=10, limits=LIMITS)
+    assert not [*out.iterdir()]
+
+
+def test_a_recording_of_a_proof_is_another_one(tmp_path: Path) -> None:
+    given, path = written(tmp_path, CABLE), tmp_path / "run.csv"
+    t = np.arange(0, 20, 0.01)
+    np.savetxt(path, np.c_[t, np.sin(t), np.cos(t)], delimiter=",", header="t,q,tau", comments="")
+    with pytest.raises(InputError, match="run is held out and among the training recordings"):
+        investigate(*given[:2], tmp_path / "out", train=path, heldout=path)

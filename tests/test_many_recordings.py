@@ -143,6 +143,8 @@ def test_a_recording_of_the_same_file_may_be_held_out_and_the_same_rows_may_not(
     check_split([first], [second])
     with pytest.raises(InputError, match="is held out and among the training recordings"):
         check_split([first, second], [again])
+    with pytest.raises(InputError, match="is given twice, and would count as two recordings"):
+        check_split([first, second, Recording.read(f"{path}:#1")], [])
 
 
 def test_a_table_in_memory_is_not_told_to_be_a_file(table: pd.DataFrame) -> None:

@@ -26,6 +26,10 @@ def said(capsys: pytest.CaptureFixture[str], *words: object) -> str:
     return " ".join(capsys.readouterr().err.split())
 
 
+def test_what_looks_like_an_emoji_is_said_as_it_was_given(capsys: pytest.CaptureFixture[str]) -> None:
+    assert "a:smile:b" in said(capsys, "show", "a:smile:b")
+
+
 @pytest.mark.parametrize(
     ("words", "meant"),
     [

@@ -1,5 +1,6 @@
 """`cosim.diagnose`: recordings and a card to what the card lacks, and a better card."""
 
+import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,7 +11,7 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.black_box import BlackBox, as_base
 from cosim.diagnosis.closed_loop import Loops
 from cosim.diagnosis.correction_fmu import Correction, motion_of
-from cosim.diagnosis.deliver import FILES, QUICK, as_json, check_out, deliver, deliver_quickly, without_files
+from cosim.diagnosis.deliver import DOCUMENT, FILES, QUICK, as_json, check_out, deliver, deliver_quickly, without_files
 from cosim.diagnosis.diagnose import diagnose as find
 from cosim.diagnosis.entries import Improved
 from cosim.diagnosis.learned.proposal import Proposal, write_proposals
@@ -114,8 +115,8 @@ def diagnose(
         `DiagnosisResult`. Torques are in N.m (N on a linear axis), positions in rad (m), times in s.
 
     Raises:
-        InputError: a recording is held out and among the training recordings, or the card holds what a diagnosis
-            cannot take into account.
+        InputError: a recording is held out and among the training recordings, or given twice; or the card holds what
+            a diagnosis cannot take into account.
         RecordingError, UnitError: as `cosim.read`; or the recordings cannot belong to this card, or are too short.
         CardError: the card is not good.
         WiringError, FmuError: the FMU has no such variables, or cannot be run.
@@ -129,9 +130,31 @@ def diagnose(
         box = BlackBox(Path(fmu), {name: Alias(own) for name, own in (variables or {}).items()})
         given = _beside(box, given, on_progress)
     listeners = _Listeners(on_progress, on_answer)
+    before = _written(folder) if folder and force else {}
     if folder and not quick:
-        return _delivered(given, folder, command, listeners)
-    return _found(given, folder, command, listeners)
+        done = _delivered(given, folder, command, listeners)
+    else:
+        done = _found(given, folder, command, listeners)
+    _forget(before)
+    return done
+
+
+def _written(folder: Path) -> dict[Path, int]:
+    """Files of the diagnosis that a folder holds, and when they were written: those of FMUs it names itself."""
+    try:
+        said = dict(json.loads((folder / DOCUMENT).read_text("utf-8"))["improved"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return {}
+    named = {one for one in said.values() if isinstance(one, str) and Path(one).name == one}
+    paths = [folder / name for name in {*FILES, *named}]
+    return {path: path.stat().st_mtime_ns for path in paths if path.is_file()}
+
+
+def _forget(before: Mapping[Path, int]) -> None:
+    """Remove those that were not written over: beside a new answer they tell of another one."""
+    for path, written in before.items():
+        if path.is_file() and path.stat().st_mtime_ns == written:
+            path.unlink()
 
 
 @dataclass(frozen=True)
@@ -199,9 +222,18 @@ def _delivered(given: _Given, out: Path, command: str, listeners: _Listeners) ->
 
 
 def check_split(train: Sequence[Recording], heldout: Sequence[Recording]) -> None:
-    """Refuse a recording that is fitted and held out (raises InputError)."""
-    known = {recording.identity for recording in train if recording.sha256}
+    """Refuse a recording that is fitted and held out, or given twice (raises InputError)."""
     for one in heldout:
-        if one.identity in known or any(one is other for other in train):
+        if _is_among(one, train):
             text = f"{one.name} is held out and among the training recordings; a proof needs a recording of its own."
             raise InputError(text, culprit=one.name)
+    for several in (train, heldout):
+        for number, one in enumerate(several):
+            if _is_among(one, several[:number]):
+                text = f"{one.name} is given twice, and would count as two recordings; give each recording once."
+                raise InputError(text, culprit=one.name)
+
+
+def _is_among(one: Recording, others: Sequence[Recording]) -> bool:
+    """Whether a recording is one of some: the same object, or the same rows of a file."""
+    return any(one is other or (bool(one.sha256) and one.identity == other.identity) for other in others)

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from cosim.api.diagnose import check_split
 from cosim.api.recordings import Source, read_all
 from cosim.data.recording import Recording
 from cosim.diagnosis.deliver import deliver_quickly
@@ -96,6 +97,7 @@ def investigate(
     """
     settings = Settings(budget, seconds, seed)
     first, second = _read(train, "train"), _read(heldout, "heldout")
+    check_split(first, second)
     ready = given(scenario, card, machine, limits or {}, settings, first, second, fast)
     with Log(Path(out), ready.identity(), force) as log:
         work = Investigation(ready.machine, ready.card, ready.limits, log, settings, on_progress, on_step)

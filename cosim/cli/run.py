@@ -27,7 +27,8 @@ def run(
     scenario: Annotated[
         str,
         typer.Argument(
-            help="A scenario (.toml), an SSP, or the name of a shipped one: sidereal.", autocompletion=scenarios
+            help="A scenario (.toml), an SSP, or a shipped one: sidereal, two_axis.",
+            autocompletion=scenarios,
         ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="Directory for the recording.")],

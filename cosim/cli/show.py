@@ -37,7 +37,7 @@ def show(
     if as_json:
         put_json({**shown.facts, **shown.tables})
         return
-    console = Console(highlight=False, soft_wrap=not Console().is_terminal)
+    console = Console(highlight=False, soft_wrap=not Console().is_terminal, emoji=False)
     for name, value in shown.facts.items():
         console.print(f"{name}: {value}", markup=False)
     for name, table in shown.tables.items():

@@ -13,7 +13,7 @@ from cosim.data.recording import Recording
 from cosim.investigation.story import Answered, Moved, answered_of, moved_of
 from cosim.support.errors import OutputError
 from cosim.support.files import sha256
-from cosim.sweep.journal import RUNS, Journal
+from cosim.sweep.journal import RUNS, Journal, clear
 
 KIND, RECORDINGS, DIAGNOSIS = "investigation", "recordings", "diagnosis"
 STORY, PAGE = "story.json", "story.html"
@@ -69,5 +69,8 @@ class Log:
     def __enter__(self) -> "Log":
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
+        """Let others write; where nothing was done before an error the folder is free for another investigation."""
         self.close()
+        if error and not self._journal.rows:
+            clear(self.folder, MADE[:2])

@@ -67,6 +67,9 @@ class Investigation:
             self.recordings = {"train": [*train], "heldout": [*heldout]}
             return
         lasts = max(min(self.settings.seconds, own.seconds if own else self.settings.seconds), SHORTEST)
+        if self.settings.budget < 2 * lasts:
+            text = f"--budget {self.settings.budget:g}s: the first two motions last {2 * lasts:g} s; give more"
+            raise InputError(f"{text}, or recordings to go on from.", culprit="--budget", value=self.settings.budget)
         room = self._room(lasts, False)
         for role, motion in zip(ROLES, (own or tone(room), multisine(room)), strict=True):
             number = len(self.steps)
