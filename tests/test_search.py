@@ -177,3 +177,11 @@ def test_a_curve_is_found_where_the_refitted_friction_has_taken_its_level_over()
     assert isinstance(found.effect, StribeckEffect)
     assert found.effect.Fs == pytest.approx(2 * LEVEL, rel=0.05)
     assert comparison.problem.error(found.fit) < 0.3 * comparison.problem.error(base)
+
+
+def test_a_phase_is_told_within_a_turn() -> None:
+    comparison, base = compared(lambda q, _: 0.3 * np.cos(11 * q + 1.0))
+    far = replace(base.mount, effects=(Cogging(amplitude=0.3, cycles_per_rev=11.0, phase=1.0 + 200 * np.pi),))
+    ripple = comparison.problem.fit(far, 10).mount.effects[-1]
+    assert isinstance(ripple, Cogging)
+    assert ripple.phase == pytest.approx(1.0, abs=0.05)

@@ -251,6 +251,8 @@ def _origin(found: Diagnosis, provenance: Provenance) -> JsonObject:
 
 
 def _comment(found: Diagnosis) -> str:
+    if any(one.blocks_naming for one in found.sanity):
+        return "The base with its parameters refitted to recordings that are in doubt; settle that first."
     if not found.adds_physics:
         return "The base with its parameters refitted; no physics was added."
     learned = [f"something learned {span}" for span in found.learned.get("range", ())]

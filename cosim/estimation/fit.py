@@ -13,7 +13,7 @@ where the model is right the prior fades with the residual.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import log, sqrt
+from math import log, pi, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -125,7 +125,7 @@ def fit(
         return np.concatenate([slopes, pull.slopes(values, rest, slopes)]) @ own.matrix
 
     found = least_squares(residuals, jacobian, own.of(start), (own.low, own.high), evaluations)
-    values = np.clip(own.matrix @ found, *edges)
+    values = _in_a_turn(free, np.clip(own.matrix @ found, *edges))
     seen = model.whole(own.matrix @ found)
     torque, slopes = _joined(used, seen, unused, lambda rest: stacked(inverse, [pieces[k] for k in rest], values))
     phases = inverse.phases(pieces[0], values)
@@ -192,6 +192,12 @@ def _joined(
     if unused.pieces:
         torque[unused.rows], slopes[unused.rows] = look(unused.pieces)
     return torque, slopes
+
+
+def _in_a_turn(names: Sequence[str], values: Array) -> Array:
+    """Phases between -pi and pi: of a wave that is hardly there a step may be many turns, and was 1e7 of them."""
+    far = np.array([name.endswith(".phase") for name in names], bool) & (np.abs(values) > pi)
+    return np.where(far, np.remainder(values + pi, 2 * pi) - pi, values)
 
 
 def with_values(mount: Mount, names: Sequence[str], values: Array) -> Mount:
