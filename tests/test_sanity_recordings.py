@@ -1,5 +1,6 @@
 """Recordings that are not what they seem are refused or doubted in the right words; right ones are let pass."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -104,6 +105,12 @@ class TestGenerated:
         (one,) = said(card, (first, changed(tau=lambda x: -x)(second), held))
         assert one[1].startswith("train_2: ")
         assert one[0] == "torque_sign"
+
+    def test_of_what_is_no_torque_of_this_motion_it_is_said_how_little_is_explained(self) -> None:
+        noise = np.random.default_rng(3).standard_normal
+        (one,) = said(*generated(), changed(tau=lambda x: noise(len(x)) * np.std(x)))
+        assert re.search(r", and explain \d{1,2}% of it\.", one[1])
+        assert " of it" not in said(*generated(), changed(tau=lambda x: -x))[0][1]
 
     @pytest.mark.parametrize("factor", [0.1, 10.0])
     def test_another_inertia_is_not_called_a_unit(self, factor: float) -> None:

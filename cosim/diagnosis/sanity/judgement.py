@@ -28,6 +28,8 @@ TOLD = 0.03
 """Alternatives less likely than this are not listed ..."""
 MOST_TOLD = 4
 """... and of the others so many at most."""
+MOSTLY = 0.5
+"""Share of the torque's energy below which it is said that inertia and friction explain no more of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,4 +167,4 @@ def _fact(judgement: Judgement) -> str:
     said = f"torque and motion imply an inertia of {found.inertia.value:.3g} {unit} (card: {known.inertia:.3g})"
     if known.coulomb:
         said += f" and a friction of {found.coulomb.value:.3g} {force} (card: {known.coulomb:.3g})"
-    return said
+    return said if found.explained > MOSTLY else f"{said}, and explain {found.explained:.0%} of it"
