@@ -106,9 +106,7 @@ def play(monkeypatch: pytest.MonkeyPatch) -> Play:
         monkeypatch.setattr(rivals, "margin", lambda _, own, other: own.evidence - other.evidence)
         monkeypatch.setattr(rivals, "is_admissible", lambda _, one: not one.effect.id.isupper())
         monkeypatch.setattr(rivals, "misfits_of", lambda *_: misfits or {})
-        monkeypatch.setattr(
-            rivals, "best_of", lambda _, beside, __: next((one for one in beside.tried if one.adds), None)
-        )
+        monkeypatch.setattr(rivals, "best_of", lambda _, beside, __: next(filter(adds, beside.tried), None))
         monkeypatch.setattr(rivals, "is_full", lambda *_: False)
         return examine(Tables(), Found(fitted("b"), fitted("b" + names)))  # type: ignore[arg-type]
 

@@ -170,7 +170,7 @@ def test_kill_9_and_ctrl_c_lose_nothing_that_was_done(
 def test_a_folder_of_another_sweep_is_refused(folder: Path, change: Callable[[Path], object], named: str) -> None:
     run(folder / "sweep.toml")
     change(folder)
-    rule = f"out holds another sweep: its {named} differs from now; give another --out, or --force to start over."
+    rule = f"out holds another sweep: its {named} changed since; give another --out, or --force to start over."
     with pytest.raises(OutputError, match=re.escape(rule)):
         run(folder / "sweep.toml")
     assert run(folder / "sweep.toml", force=True)[0].done == 9
@@ -182,7 +182,7 @@ def test_a_changed_fmu_makes_it_another_sweep(folder: Path, tiny: dict[int, Path
     (folder / "loop.toml").write_text(SCENARIO.replace("{fmu}", "tiny.fmu"))
     run(folder / "sweep.toml")
     path.write_bytes(tiny[2].read_bytes())
-    with pytest.raises(OutputError, match=r"its file of components.plant differs from now"):
+    with pytest.raises(OutputError, match=r"its file of components.plant changed since"):
         run(folder / "sweep.toml")
 
 

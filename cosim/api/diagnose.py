@@ -131,10 +131,8 @@ def diagnose(
         given = _beside(box, given, on_progress)
     listeners = _Listeners(on_progress, on_answer)
     before = _written(folder) if folder and force else {}
-    if folder and not quick:
-        done = _delivered(given, folder, command, listeners)
-    else:
-        done = _found(given, folder, command, listeners)
+    rest = command, listeners
+    done = _delivered(given, folder, *rest) if folder and not quick else _found(given, folder, *rest)
     _forget(before)
     return done
 

@@ -90,9 +90,7 @@ class Journal:
         changed = [name for name in {**before, **identity} if before.get(name) != identity.get(name)]
         if changed:
             rule = "give another --out, or --force to start over"
-            differ = "differs" if len(changed) == 1 and not changed[0].endswith("s") else "differ"
-            which = f"its {' and '.join(changed)} {differ} from now"
-            message = f"{self.folder} holds another {self._kind}: {which}; {rule}."
+            message = f"{self.folder} holds another {self._kind}: its {' and '.join(changed)} changed since; {rule}."
             raise OutputError(message, culprit=str(self.folder), value=changed)
 
     def _read(self) -> None:
