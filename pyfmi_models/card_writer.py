@@ -4,7 +4,7 @@ import json
 from datetime import date, time
 from typing import Any
 
-from pyfmi_models.card import Card
+from pyfmi_models.card import Card, EncoderSection
 from pyfmi_models.effects import Effect
 from pyfmi_models.model import Pair, parameters_of, structure_of
 from pyfmi_models.numbers import Table
@@ -20,7 +20,8 @@ def card_text(card: Card, comment: str = "") -> str:
     lines += _section("friction", {"model": card.friction.key, **_numbers(card.friction)})
     if card.unbalance:
         lines += _section("unbalance", _numbers(card.unbalance))
-    lines += _section("encoder", card.encoder.model_dump())
+    if card.encoder != EncoderSection():  # nothing is known of it
+        lines += _section("encoder", card.encoder.model_dump())
     if card.controller:
         lines += _section("controller", card.controller.model_dump())
     if card.columns:

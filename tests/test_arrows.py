@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from cosim_studies.proof.conduct import TELLS
+
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("cosim", "cosim_studies", "pyfmi_models")
 FILES = {
@@ -110,6 +112,14 @@ def test_physics_and_what_is_heavy_stay_where_they_belong(name: str) -> None:
             assert not belongs(other, "pyfmi_models") or belongs(other, *EXPORT_READS), f"{name} imports {other}"
         elif belongs(name, "pyfmi_models"):
             assert not belongs(other, "pyfmi_models.export"), f"{name} imports {other}: physics does not export itself"
+
+
+def test_nothing_that_decides_asks_what_tells() -> None:
+    """The code that a page of scores is made by leaves out what only tells: no score may come from there."""
+    tells = tuple(path.removesuffix(".py").replace("/", ".") for path in TELLS)
+    deciding = {name for name in FILES if belongs(name, "cosim.diagnosis", "cosim.estimation", "cosim_studies.proof")}
+    asking = {name for name in deciding if not belongs(name, *tells) if any(belongs(one, *tells) for one in ours(name))}
+    assert asking <= {"cosim.diagnosis.deliver", "cosim.diagnosis"}, asking
 
 
 def test_no_file_imports_itself_by_a_detour() -> None:
