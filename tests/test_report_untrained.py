@@ -28,10 +28,10 @@ def test_a_rest_where_training_never_was_is_said_to_lie_there() -> None:
     said = limited(top, top)
     page = " ".join(unexplained(said, Scales.of(said)))
     assert re.search(r"9\d % of the error energy on unseen runs lies at torques outside .* \(3 % of the time\)", page)
-    assert "which training never had (3 % of the time): what acts there" in " ".join(summary(said).split())
+    assert "which the fit never had (3 % of the time): what acts there" in " ".join(summary(said).split())
 
 
 def test_a_rest_where_training_was_too_is_said_to_lie_nowhere() -> None:
     top = float(np.quantile(diagnosis("none").traces[-1].tau, 0.97))
     for known in (limited(top, np.inf), limited(-np.inf, top)):
-        assert "training never had" not in " ".join(unexplained(known, Scales.of(known))) + summary(known)
+        assert "the fit never had" not in " ".join(unexplained(known, Scales.of(known))) + summary(known)

@@ -1,14 +1,19 @@
 """Numbers, units and sentences of the report, and the summary on a terminal."""
 
 import io
+from dataclasses import replace
 
 import pytest
-from report_example import FOUND, diagnosis
+from report_example import FOUND, REST, diagnosis
 from test_report import KINDS, page
 
+from cosim.diagnosis.report import tables
 from cosim.diagnosis.report.figures_proof import relative
+from cosim.diagnosis.report.findings import block
+from cosim.diagnosis.report.lead import improvement
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.tables import limits
+from cosim.diagnosis.report.words import blocks
 from cosim.diagnosis.terminal import summary
 from cosim.plots.quantities import minus, number, raised
 
@@ -55,3 +60,48 @@ def test_terminal_is_bold_only_where_wanted(monkeypatch: pytest.MonkeyPatch) -> 
         print_summary(diagnosis(), out := Terminal())
         assert ("\033[1m" in out.getvalue()) == bold
     assert "\033" not in summary(diagnosis(mount="\033[31mred"))
+
+
+def test_what_rests_hide_is_said_of_clear_motion_and_never_called_clear() -> None:
+    whole = diagnosis("two")
+    assert improvement(whole, Scales.of(whole)).startswith("On unseen runs the error falls from ")
+    hidden = replace(whole, heldout=replace(whole.heldout, confidence_interval=(-0.02, 0.3)))
+    said = improvement(hidden, Scales.of(whole))
+    assert said.startswith("In clear motion the error on unseen runs falls from 0.35 to 0.17")
+    assert "Over all samples, rests included, it does not clearly fall: from" in said
+    worse = replace(hidden, heldout=replace(hidden.heldout, sliding={"before_rms": 0.17, "after_rms": 0.35}))
+    assert improvement(worse, Scales.of(whole)).startswith("On unseen runs the error does not clearly fall: from")
+
+
+def test_a_range_ends_where_the_parameter_does() -> None:
+    speeds = replace(REST[0], effect="stribeck", answer="found", parameters={"Vs": 0.018}, units={"Vs": "rad/s"})
+    wide = replace(speeds, ranges={"Vs": (-0.19, 0.227)})
+    assert tables.numbers(wide).rows == (("Vs", "0.01800", "up to 0.227", "rad/s"),)
+    signed = replace(wide, effect="gravity", parameters={"phase": 0.1}, ranges={"phase": (-0.1, 0.3)}, units={})
+    assert tables.numbers(signed).rows[0][2] == "−0.100 to 0.300"
+
+
+@pytest.mark.parametrize(
+    ("motion", "units"), [("rotary", ["kg·m²", "N·m", "N·m·s/rad"]), ("linear", ["kg", "N", "N·s/m"])]
+)
+def test_numbers_of_the_base_have_units(motion: str, units: list[str]) -> None:
+    base = dict.fromkeys(("axis.inertia", "friction.Fc.positive", "friction.sigma2"), (1.0, 1.0, 1.0))
+    assert [row[-1] for row in tables.parameters(replace(diagnosis("two", motion), base_parameters=base)).rows] == units
+
+
+@pytest.mark.parametrize(
+    ("share", "why"),
+    [
+        ("97.0", "but fits worse where noise is low"),
+        ("90.7", "the detail of what is left decides"),
+        ("80.0", "this 90.9 %"),
+    ],
+)
+def test_a_rival_that_removes_more_is_said_to_fit_worse(share: str, why: str) -> None:
+    close = replace(
+        FOUND[0], ruled_out=(), less_likely=(f"Torque offset: removes {share} % of the error energy, this 90.9 %",)
+    )
+    whole = replace(diagnosis("two"), findings=(close, *REST))
+    said = dict(block(blocks(whole)[0], whole, Scales.of(whole), None).rows)["Less likely"]
+    assert why in said
+    assert ("decides" in said) == (share == "90.7")

@@ -7,10 +7,11 @@ import numpy as np
 
 from cosim.diagnosis.breakdown import bars
 from cosim.diagnosis.entries import Source
+from cosim.diagnosis.report.equations import base_unit, least
 from cosim.diagnosis.report.quantities import Scales
 from cosim.diagnosis.report.words import ANSWERS, limit, lowered, shows_from, sized, unseen_torque
 from cosim.diagnosis.result import Diagnosis, Finding, Part, Trace
-from cosim.plots.quantities import decimals, number, scale_of
+from cosim.plots.quantities import decimals, number, raised, scale_of
 
 
 @dataclass(frozen=True)
@@ -62,9 +63,17 @@ def numbers(finding: Finding) -> Table:
     rows = []
     for name, unit, value in _values(finding):
         error, ends = finding.standard_errors.get(name), finding.ranges.get(name)
-        span = " to ".join(decimals(ends, 3)) if ends else ""
-        rows.append((name, number(value, 4), number(error) if error is not None else "", span, unit))
+        cells = number(value, 4), number(error) if error is not None else "", _span(finding.effect, name, ends)
+        rows.append((name, *cells, raised(unit)))
     return filled(Table(("Parameter", "Value", "Standard error", "95 % range", "Unit"), tuple(rows), (1, 2, 3)))
+
+
+def _span(effect: str, name: str, ends: tuple[float, float] | None) -> str:
+    """Both ends of a range; only the upper one where the lower is none that the parameter may have."""
+    if not ends:
+        return ""
+    low, high = decimals(ends, 3)
+    return f"up to {high}" if ends[0] < least(effect, name) else f"{low} to {high}"
 
 
 def _values(finding: Finding) -> Iterator[tuple[str, str, float]]:
@@ -122,7 +131,7 @@ def spans(diagnosis: Diagnosis) -> Table:
 
 
 def worst(trace: Trace, scales: Scales) -> Table:
-    """List the seconds of a recording with the largest error after."""
+    """List the seconds of a recording with the largest error after, the worst first."""
     edges, before, after = bars(trace)
     order = np.argsort(-np.nan_to_num(after))[:6]
     factor = scales.torque.factor
@@ -130,7 +139,7 @@ def worst(trace: Trace, scales: Scales) -> Table:
         (f"{edges[i]:.0f} to {edges[i + 1]:.0f} s", *decimals((before[i] * factor, after[i] * factor))) for i in order
     )
     unit = scales.torque.unit
-    return Table(("Worst seconds", f"Before [{unit}]", f"After [{unit}]"), rows, (1, 2), "narrow")
+    return Table((f"Worst seconds of {trace.name}", f"Before [{unit}]", f"After [{unit}]"), rows, (1, 2), "narrow")
 
 
 def parameters(diagnosis: Diagnosis) -> Table:
@@ -138,8 +147,10 @@ def parameters(diagnosis: Diagnosis) -> Table:
     rows = []
     for name, (given, refitted, full) in diagnosis.base_parameters.items():
         change = f"{100 * (full / given - 1):+.0f} %".replace("-", "−") if given else ""
-        rows.append((name, number(given, 4), number(refitted, 4), number(full, 4), change))
-    return Table(("Parameter", "As delivered", "Refitted", "With the effects", "Change"), tuple(rows), (1, 2, 3, 4))
+        values = (number(value, 4) for value in (given, refitted, full))
+        rows.append((name, *values, change, raised(base_unit(name, diagnosis.motion))))
+    named = ("Parameter", "As delivered", "Refitted", "With the effects", "Change", "Unit")
+    return filled(Table(named, tuple(rows), (1, 2, 3, 4)))
 
 
 def files(diagnosis: Diagnosis) -> Table:

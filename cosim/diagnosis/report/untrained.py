@@ -47,6 +47,6 @@ def _beyond(values: Array, left: Array, edges: tuple[float, float]) -> tuple[flo
 
 
 def _sentence(energy: float, rows: float, name: str, edges: tuple[float, float], unit: Scale) -> str:
-    where = f"at {name} outside {unit.span(*edges)}, which training never had ({100 * rows:.0f} % of the time)"
+    where = f"at {name} outside {unit.span(*edges)}, which the fit never had ({100 * rows:.0f} % of the time)"
     part = f"{100 * energy:.0f} % of the error energy on unseen runs"
     return f"{part} lies {where}: what acts there alone has no name before it is fitted."
