@@ -171,6 +171,15 @@ def test_a_diagnosis_of_data_frames_answers_in_python_on_a_terminal_and_in_a_not
     assert "Wrote" not in str(answer)
 
 
+@pytest.mark.skipif(not Path("/proc/self").exists(), reason="asks a folder in which no one can make another")
+def test_a_folder_that_cannot_be_made_is_said_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "axis.toml"
+    path.write_text(CARD, "utf-8")
+    monkeypatch.setattr("cosim.api.diagnose.find", lambda *_: pytest.fail("the work began"))
+    with pytest.raises(cosim.CosimError, match="/proc/none/out cannot be made"):
+        cosim.diagnose(recorded(30, 4.0, 1), recorded(30, 4.0, 2), path, "/proc/none/out")
+
+
 @pytest.mark.parametrize("name", ["sidereal", "paper_mount"])
 def test_what_is_shown_is_text_and_a_page(name: str) -> None:
     shown = cosim.show(name)

@@ -21,6 +21,7 @@ from cosim.diagnosis.terminal import summary
 from cosim.fmi.alias import Alias
 from cosim.reading import check_kind
 from cosim.support.errors import InputError
+from cosim.support.files import directory
 from cosim.support.html import table as html_table
 from cosim.support.html import text as html_text
 from cosim.support.plain import JsonObject
@@ -126,6 +127,8 @@ def diagnose(
     if folder:
         check_out(folder, force, QUICK if quick else FILES)
     given = _read(train, heldout, card, columns or {}, units)
+    if folder:
+        directory(folder)  # what cannot be made is said before the work, not after it
     if fmu is not None:
         box = BlackBox(Path(fmu), {name: Alias(own) for name, own in (variables or {}).items()})
         given = _beside(box, given, on_progress)

@@ -8,6 +8,7 @@ from cosim.diagnosis.report.words import Block, blocks, count, lowered, stated, 
 from cosim.diagnosis.result import Diagnosis, HeldOut
 from cosim.plots.quantities import joined
 
+NO_MODEL = "No improved model was written; card.toml is the delivered card with its numbers refitted."
 LED = 3
 """Findings whose statement stands in the lead; of further ones it stands with the finding."""
 
@@ -111,7 +112,7 @@ def _written(diagnosis: Diagnosis) -> str:
     """Say that there is no improved model, where there is none."""
     if diagnosis.learned:
         return "The improved model holds it as a table: see What has no name."
-    return "" if diagnosis.in_model else "No improved model was written."
+    return "" if diagnosis.in_model else NO_MODEL
 
 
 def led(diagnosis: Diagnosis) -> tuple[str, ...]:
@@ -127,7 +128,7 @@ def _nothing(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     proven = [block.title for block in blocks(diagnosis) if block.answer == "not_proven"]
     fits = f"{' and '.join(proven)}: fits better, but not on unseen runs." if proven else ""
     first = f"The refitted simulation matches the machine {near} on runs it never saw ({error} error, {noise} noise)."
-    return [first, fits, "No improved model was written."]
+    return [first, fits, NO_MODEL]
 
 
 def _unknown(diagnosis: Diagnosis, scales: Scales) -> list[str]:
