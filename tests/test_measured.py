@@ -15,6 +15,7 @@ from pyfmi_models.mount import Axis, Mount
 
 sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
 import corrupted
+import judges
 import measured
 import official
 
@@ -120,3 +121,16 @@ def test_a_copy_that_is_refused_crashes_or_never_ends_is_an_answer(monkeypatch: 
     ):
         monkeypatch.setattr(corrupted, "diagnose", stub)
         assert corrupted.asked(machine(), longest) == expected
+
+
+def test_an_interval_holds_the_error_and_narrows_with_what_is_drawn() -> None:
+    draw, told = np.random.default_rng(3), {}
+    for count in (20, 500):
+        blocks = np.column_stack([draw.chisquare(50, count), np.full(count, 50.0)])
+        judge = judges.Judge(lambda *_, blocks=blocks: blocks, 2.0)
+        assert judge(slide(), []) == pytest.approx(2.0, rel=0.1)
+        told[count] = [float(word.strip("[],")) for word in judge.told(slide(), []).split()]
+        error, low, high = told[count]
+        assert low < error < high
+    assert (told[20][2] - told[20][1]) / (told[500][2] - told[500][1]) == pytest.approx(5, rel=0.4)
+    assert judges.Judge(lambda *_: np.ones((4, 2))).told(slide(), []) == "1"

@@ -14,8 +14,12 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, NamedTuple
+
+import numpy as np
 
 import cosim
 from cosim_studies.proof.generator import make_case, write_case
@@ -62,9 +66,8 @@ def measured(case: Case, seed: int) -> dict[str, Any]:
     """Make a case, diagnose it in a process of its own, and return what that took."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        made = make_case(seed, EFFECTS, noise=case.noise, rate_hz=case.rate_hz, duration=case.seconds)
-        write_case(made, folder)
-        del made
+        with ProcessPoolExecutor(1, get_context("spawn")) as apart:  # a child's peak of memory begins at its parent's
+            apart.submit(write, case, seed, folder).result()
         train, held = [str(folder / f"{one}.parquet") for one in RECORDINGS[:2]], str(folder / "heldout.parquet")
         command = [sys.executable, "-m", "cosim", "diagnose", *train, "--heldout", held, "--json"]
         command += ["--card", str(folder / "card.toml"), "--out", str(folder / "out")]
@@ -81,6 +84,11 @@ def measured(case: Case, seed: int) -> dict[str, Any]:
     return {**case._asdict(), "wall": wall, "cpu": cpu, "memory": used.ru_maxrss / 1e3, "verdict": verdict}
 
 
+def write(case: Case, seed: int, folder: Path) -> None:
+    """Make a case and write its recordings and its card into a folder."""
+    write_case(make_case(seed, EFFECTS, noise=case.noise, rate_hz=case.rate_hz, duration=case.seconds), folder)
+
+
 def row(one: dict[str, Any]) -> str:
     """One line of the table."""
     samples = 3 * one["seconds"] * one["rate_hz"] / 1e6
@@ -89,6 +97,17 @@ def row(one: dict[str, Any]) -> str:
         f"| {length} | {one['rate_hz']} | {one['noise']:g} | {samples:.3g} | {one['wall']:.0f} | "
         f"{one['cpu']:.0f} | {one['memory']:.0f} | {' + '.join(one['verdict']) or 'none'} |"
     )
+
+
+def growth(rows: list[dict[str, Any]]) -> str:
+    """How processor time grows with the length: the exponent over all lengths at the slow rate; one is linear."""
+    alike = [one for one in rows if (one["rate_hz"], one["noise"], one["quick"]) == (1000, 1.0, False)]
+    if len(alike) < 2:
+        return ""
+    lengths, seconds = (np.log([one[name] for one in alike]) for name in ("seconds", "cpu"))
+    exponent = np.polyfit(lengths, seconds, 1)[0]
+    spans = f"{alike[0]['seconds']:g} to {alike[-1]['seconds']:g} s at 1 kHz"
+    return f"\nOver {spans} processor time grows with the length to the power of {exponent:.2f} (1: linear).\n"
 
 
 def page(rows: list[dict[str, Any]], seed: int) -> str:
@@ -102,7 +121,7 @@ def page(rows: list[dict[str, Any]], seed: int) -> str:
         "| seconds | Hz | noise | million samples | wall [s] | processor [s] | memory [MB] | verdict |\n"
         "| --- | --- | --- | --- | --- | --- | --- | --- |\n"
     )
-    return head + "\n".join(map(row, rows)) + "\n"
+    return head + "\n".join(map(row, rows)) + "\n" + growth(rows)
 
 
 if __name__ == "__main__":

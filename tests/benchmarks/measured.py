@@ -16,17 +16,15 @@ import pandas as pd
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import Outcome, diagnose
-from cosim.estimation.inverse import Inverse
-from cosim.estimation.prepare import Piece, prepare
 from cosim.reading import read_recordings
 from pyfmi_models.card import parse_card
 from pyfmi_models.mount import Mount
 
 sys.path.append(str(Path(__file__).parent))
+from judges import PER_SPEED, Judge, moving, slow_volts
 from official import position_error
 
-Rows = list[tuple[Piece, np.ndarray]]
-"""Pieces with their torque residual."""
+Score = Judge | Callable[[Mount, Sequence[Recording]], float]
 
 
 @dataclass(frozen=True)
@@ -38,7 +36,7 @@ class Machine:
     card: str
     train: dict[str, pd.DataFrame]
     heldout: dict[str, pd.DataFrame]
-    score: Callable[[Mount, Sequence[Recording]], float]
+    score: Score
     unit: str
     bar: float
     first_look: str
@@ -46,7 +44,7 @@ class Machine:
     units: tuple[str, ...] = ()
     elsewhere: dict[str, dict[str, pd.DataFrame]] = field(default_factory=dict)
     """Further recordings that only judge: what does the model say of them?"""
-    otherwise: dict[str, tuple[Callable[[Mount, Sequence[Recording]], float], str]] = field(default_factory=dict)
+    otherwise: dict[str, tuple[Score, str]] = field(default_factory=dict)
     """Further judges of the held-out recordings, each with its unit."""
     derived: Callable[[Outcome], str] = lambda outcome: ""
     """What its README asks of the answer beside an error."""
@@ -70,7 +68,7 @@ def rows(machine: Machine) -> Iterator[dict[str, Any]]:
     judged += [(name, recordings, machine.score, machine.unit) for name, recordings in others.items()]
     judged += [(name, held, score, unit) for name, (score, unit) in machine.otherwise.items()]
     for name, recordings, score, unit in judged:
-        numbers = {key: f"{score(model.plant(), recordings):.3g}" for key, model in models.items()}
+        numbers = {key: _told(score, model.plant(), recordings) for key, model in models.items()}
         yield {
             "machine": f"{machine.name}{', ' if name else ''}{name}",
             "concealed": machine.concealed if not name else "",
@@ -85,46 +83,17 @@ def rows(machine: Machine) -> Iterator[dict[str, Any]]:
         }
 
 
+def _told(score: Score, mount: Mount, recordings: Sequence[Recording]) -> str:
+    """An error, with its interval where there is one."""
+    return score.told(mount, recordings) if isinstance(score, Judge) else f"{score(mount, recordings):.3g}"
+
+
 def _read(machine: Machine, tables: dict[str, pd.DataFrame], folder: Path) -> list[Recording]:
     paths = [folder / f"{name}.parquet" for name in tables]
     for path, table in zip(paths, tables.values(), strict=True):
         table.to_parquet(path, index=False)
     card = parse_card(machine.card, "card.toml")
     return read_recordings(paths, card.columns, machine.columns, machine.units, card.mount.motion)
-
-
-def residuals(mount: Mount, recordings: Sequence[Recording], cutoff: float) -> Rows:
-    """Measured minus model torque at all rows of each piece, and the pieces."""
-    pieces = prepare(recordings, cutoff).pieces
-    inverse = Inverse(mount, ())
-    return [(piece, piece.tau - inverse.torque(piece, np.zeros(0))[0]) for piece in pieces]
-
-
-def moving(least: float, cutoff: float, scale: float = 1.0) -> Callable[[Mount, Sequence[Recording]], float]:
-    """RMS of the residual while faster than `least`, low-passed at `cutoff` [Hz] on both sides, times a scale."""
-
-    def score(mount: Mount, recordings: Sequence[Recording]) -> float:
-        left = [rest[p.inside & (np.abs(p.v) > least)] for p, rest in residuals(mount, recordings, cutoff)]
-        return scale * float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
-
-    return score
-
-
-def slow_volts(mount: Mount, recordings: Sequence[Recording]) -> float:
-    """RMS in V of the recorded duty, unfiltered, less that of the model's torque along the motion below 8 Hz."""
-    left = []
-    for piece, rest in residuals(mount, recordings, 8.0):
-        run = recordings[piece.recording]
-        raw = rest - piece.tau + np.interp(piece.t, run.t, run["tau"])
-        left.append(raw[piece.inside & (np.abs(piece.v) > 0.08)])
-    return 12.0 / VOLTS * float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
-
-
-def per_speed(mount: Mount, recordings: Sequence[Recording]) -> float:
-    """RMS over recordings of one speed each of the mean residual, in percent of the RMS of the mean torques."""
-    pairs = [(float(rest.mean()), float(p.tau.mean())) for p, rest in residuals(mount, recordings, 30.0)]
-    left, torque = np.array(pairs).T
-    return 100 * float(np.sqrt(np.mean(left**2) / np.mean(torque**2)))
 
 
 def machines(data: Path) -> Iterator[Machine]:
@@ -182,7 +151,7 @@ def screws(folder: Path) -> Iterator[Machine]:
                 card=SCREW,
                 train=train,
                 heldout=held,
-                score=per_speed,
+                score=PER_SPEED,
                 unit="%",
                 bar=1.5 if drive == "lead_screw" else 2.8,
                 first_look=look,
@@ -227,7 +196,7 @@ def servo(folder: Path) -> Iterator[Machine]:
         card=SERVO,
         train=tables((0.535, 1.1682)),
         heldout=tables((0.741, 0.969)),
-        score=slow_volts,
+        score=slow_volts(VOLTS),
         unit="V",
         bar=0.28,
         first_look="0.384 -> 0.270",

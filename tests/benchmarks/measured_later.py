@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pandas as pd
-from measured import Machine, moving
+from judges import moving
+from measured import Machine
 
 from cosim.diagnosis.diagnose import Outcome
 from pyfmi_models.effects import GravityUnbalance

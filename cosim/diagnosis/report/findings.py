@@ -12,6 +12,10 @@ from cosim.diagnosis.report.sheet import Picture
 from cosim.diagnosis.result import Diagnosis, Finding, is_special
 
 NOTHING_YET = "Nothing yet: it did not hold on the run that was not fitted."
+PROBABILITY = (
+    "The probability is its share of the evidence among its rivals, calibrated on simulated telescope mounts and "
+    "machines of six other classes; on machines unlike these it may come true less often."
+)
 ALIKE = 0.5
 """Per cent of the error energy by which two that remove as much may differ."""
 _NATS = re.compile(r"^([^:]+): .*\(([\d,]+ nats) behind\)$").findall
@@ -124,7 +128,7 @@ def do(one: words.Block, diagnosis: Diagnosis) -> str:
 def _numbers(finding: Finding) -> Numbers:
     lines = [words.started(words.closed(finding.evidence))] if finding.evidence else []
     if finding.answer in ("found", "ambiguous"):
-        lines.append("The probability is its share of the evidence among its rivals, calibrated on simulated cases.")
+        lines.append(PROBABILITY)
     behind = [f"{title}, {nats}" for one in (*finding.ruled_out, *finding.less_likely) for title, nats in _NATS(one)]
     lines += [f"Evidence by which rivals are behind: {'; '.join(behind)}."] if behind else []
     limit = words.shows_from(finding)
