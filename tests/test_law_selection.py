@@ -1,11 +1,14 @@
 """Another friction law is proposed where a row of elements rubs, and none where the base's own bristle does."""
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.law_selection import LEAST, proposed_law
+from cosim.diagnosis.law_selection import FOLDS, LEAST, proposed_law
+from cosim.estimation.blocks import Blocks
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.friction import Coulomb, Dahl, FrictionLaw, LuGre, MaxwellSlip
@@ -68,3 +71,31 @@ def test_one_bristle_is_proposed_in_place_of_a_row_of_elements_that_is_none() ->
 
 def test_a_law_without_memory_keeps_its_name_as_its_memory_is_an_effect() -> None:
     assert proposed(Coulomb(Fc=1.0), row_of_elements)["proposed"] == "coulomb"
+
+
+@pytest.mark.parametrize("fold", [0, 3])
+def test_where_one_fold_holds_all_rows_that_count_nothing_is_predicted_and_no_law_proposed(fold: int) -> None:
+    """The others are fitted to no row at all."""
+    this = problem(LuGre(sigma0=100.0, Fc=1.0, sigma1=0.1), row_of_elements)
+    only = np.zeros(len(this.weight))
+    only[np.concatenate(Blocks.of(this.prepared).rows[fold::FOLDS])] = 1.0
+    weighed = replace(this, weight=only)
+    assert proposed_law(weighed, weighed.fit(this.mount, 10)) == {"base": "lugre", "proposed": "lugre", "gain": 0.0}
+
+
+def test_rows_that_do_not_count_in_one_fold_hide_no_row_of_elements_in_the_others() -> None:
+    this = problem(LuGre(sigma0=100.0, Fc=1.0, sigma1=0.1), row_of_elements)
+    rest = np.ones(len(this.weight))
+    rest[np.concatenate(Blocks.of(this.prepared).rows[1::FOLDS])] = 0.0
+    weighed = replace(this, weight=rest)
+    assert proposed_law(weighed, weighed.fit(this.mount, 10))["proposed"] == "maxwell_slip"
+
+
+def test_a_recording_of_one_block_predicts_nothing_of_itself() -> None:
+    t = np.arange(3_000) / 1000
+    q = 0.1 * np.sin(9 * t) * np.exp(-t)
+    prepared = prepare([Recording("short", {"t": t, "tau": row_of_elements(q), "q": q})], 15.0)
+    assert len(Blocks.of(prepared).rows) == 1
+    mount = Mount(name="axis", axis=Axis(inertia=5.0), friction=LuGre(sigma0=100.0, Fc=1.0, sigma1=0.1))
+    this = Problem(mount, prepared, np.ones(len(prepared.recording_of)), 1e-3)
+    assert proposed_law(this, this.fit(mount, 10)) == {"base": "lugre", "proposed": "lugre", "gain": 0.0}
