@@ -3,10 +3,13 @@
 What a limit does at its edges stands in test_decision_at_its_limits.py; here is where the limits themselves lie.
 """
 
+from dataclasses import replace
+
 import pytest
 
 from cosim.diagnosis.decision import Gain, ResidualScores, TermScores, is_left, stands
-from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.policy import POLICY, Policy
+from cosim.diagnosis.search import least
 
 BETWEEN = {
     "moved_prior": (0.05, 0.3),  # friction repeats to 10 to 20 %; .3 gives the same verdicts
@@ -74,6 +77,7 @@ def test_what_nulls_and_machines_with_something_unnamed_showed(
         (Gain(3.5, 0.1, 0.1), 0.1, True),
         (Gain(2.5, 0.1, 0.1), 0.1, False),  # three nats of proof
         (Gain(2.5, 0.6, 0.6), 0.1, True),  # or half of the error
+        (Gain(2.5, 0.4, 0.4), 0.1, False),  # of 19 small ones in 200 nulls one removed half
         (Gain(-103.0, 0.99, 0.99), 0.1, True),  # a true inertia over position
         (Gain(-70.0, 0.74, 0.74), 0.1, True),  # another one
         (Gain(-103.0, 0.6, 0.6), 0.1, False),
@@ -85,3 +89,41 @@ def test_what_nulls_and_machines_with_something_unnamed_showed(
 )
 def test_what_an_effect_must_show_held_out(gain: Gain, share: float, expected: bool) -> None:
     assert stands(gain, share, POLICY) is expected
+
+
+def is_enough(evidence: float, gain: float, policy: Policy = POLICY) -> bool:
+    """Whether the first effect has what it needs in training."""
+    return evidence >= least(policy, 0.0, gain)
+
+
+@pytest.mark.parametrize(
+    ("evidence", "gain", "expected"),
+    [
+        (5.0, 0.3, False),  # the most that nulls have of what removes a fifth and more
+        (10.0, 0.3, True),
+        (10.0, 0.1, False),
+        (12.0, 0.1, False),
+        (18.0, 0.1, True),
+    ],
+)
+def test_what_the_first_effect_must_show_in_training(evidence: float, gain: float, expected: bool) -> None:
+    assert is_enough(evidence, gain) is expected
+
+
+def test_the_constants_that_succeed_two_old_ones_cannot_be_nothing() -> None:
+    """Errors that were planted in them once went unseen.
+
+    LEAST_T, the t value of a gain over blocks, was succeeded by `least_evidence` and `evidence_if_large`; FORETOLD, the
+    share of a recording left out that an effect of little evidence must foretell, by `large_gain` in training and by
+    `least_predicted`, `halved` and `cleared` held out.
+    """
+    by_chance = Gain(0.5, 0.1, 0.1)
+    assert not stands(by_chance, 0.1, POLICY)
+    assert stands(by_chance, 0.1, replace(POLICY, least_predicted=0.02))
+    assert stands(by_chance, 0.1, replace(POLICY, halved=0.02))
+    assert stands(by_chance, 0.1, replace(POLICY, cleared=0.02))
+    assert not is_enough(5.0, 0.1)
+    assert is_enough(5.0, 0.1, replace(POLICY, least_evidence=0.0))
+    assert is_enough(5.0, 0.1, replace(POLICY, large_gain=0.02, evidence_if_large=0.0))
+    assert not is_enough(5.0, 0.3)
+    assert is_enough(5.0, 0.3, replace(POLICY, evidence_if_large=0.0))

@@ -1,6 +1,7 @@
 """What is printed is what is delivered: the written card is read back, and every number of the JSON computed again."""
 
 import json
+import re
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -10,9 +11,11 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.diagnosis.deliver import deliver_quickly
 from cosim.diagnosis.diagnose import _problem, diagnose
-from cosim.diagnosis.protocol import heldout_rms
+from cosim.diagnosis.protocol import Structures, heldout_rms, judge, of_the_best, residuals, traces
+from cosim.diagnosis.regression import black_box_rms
 from cosim.estimation.fit import free_parameters, with_values
-from cosim.estimation.prepare import Band
+from cosim.estimation.prepare import Band, prepare
+from cosim.support.statistics import rms
 from cosim_studies.proof.generator import make_case, to_toml
 from pyfmi_models.card import Card, parse_card, read_card
 from pyfmi_models.model import parameters_of
@@ -31,6 +34,22 @@ class Delivered(NamedTuple):
     held: Recording
     told: dict[str, Any]
     better: Card
+    proposed: Card
+    """What training alone proposed."""
+
+    @property
+    def models(self) -> Structures:
+        """The models that are compared: the base refitted as is printed, the last one as was written."""
+        names = [*self.told["base_parameters"]]
+        values = np.array([self.told["base_parameters"][name][1] for name in names])
+        return Structures(self.card.plant(), with_values(self.card.plant(), names, values), self.better.plant())
+
+    @property
+    def band(self) -> Band:
+        """That of the analysis."""
+        return Band(
+            self.told["heldout"]["clear_motion"]["cutoff_hz"], self.told["heldout"]["clear_motion"]["motion_hz"]
+        )
 
 
 @pytest.fixture(scope="module")
@@ -41,9 +60,10 @@ def delivered(tmp_path_factory: pytest.TempPathFactory) -> Delivered:
         for name, frame in zip(("train_1", "train_2", "heldout"), (*case.train, case.heldout), strict=True)
     ]
     card, out = parse_card(to_toml(case.card), "card.toml"), tmp_path_factory.mktemp("out")
-    deliver_quickly(diagnose(runs[:2], runs[2:], card), runs[:2], runs[2:], card, out, "a test")
+    outcome = diagnose(runs[:2], runs[2:], card)
+    deliver_quickly(outcome, runs[:2], runs[2:], card, out, "a test")
     told = json.loads((out / "diagnosis.json").read_text("utf-8"))
-    return Delivered(card, runs[:2], runs[2], told, read_card(out / "card.toml"))
+    return Delivered(card, runs[:2], runs[2], told, read_card(out / "card.toml"), outcome.proposed)
 
 
 def test_something_was_found_to_speak_of(delivered: Delivered) -> None:
@@ -53,19 +73,68 @@ def test_something_was_found_to_speak_of(delivered: Delivered) -> None:
 def test_the_held_out_errors_are_those_of_the_card_given_refitted_and_written(delivered: Delivered) -> None:
     held, runs = delivered.told["heldout"], [delivered.held]
     band = Band(held["cutoff_hz"], held["motion_hz"])
-    names = [name for name in delivered.told["base_parameters"]]
-    refitted = with_values(
-        delivered.card.plant(), names, np.array([delivered.told["base_parameters"][name][1] for name in names])
-    )
-    cards = {"nominal": delivered.card.plant(), "before": refitted, "after": delivered.better.plant()}
-    for name, plant in cards.items():
+    for name in ("nominal", "before", "after"):
+        plant = getattr(delivered.models, name)
         assert heldout_rms(runs, plant, band) == pytest.approx(held[f"{name}_rms"], rel=ROUNDING), name
+
+
+def test_the_errors_in_clear_motion_are_those_of_the_same_cards(delivered: Delivered) -> None:
+    clear = delivered.told["heldout"]["clear_motion"]
+    prepared = prepare([delivered.held], delivered.band)
+    v, inside = (np.concatenate([getattr(piece, name) for piece in prepared.pieces]) for name in ("v", "inside"))
+    assert clear["least_speed"] == pytest.approx(0.02 * np.abs(v[inside]).max(), rel=ROUNDING)
+    moving = inside & (np.abs(v) > clear["least_speed"])
+    for name in ("before", "after"):
+        left = np.concatenate(residuals(prepared, getattr(delivered.models, name)))[moving]
+        assert rms(left) == pytest.approx(clear[f"{name}_rms"], rel=ROUNDING), name
+
+
+def test_floor_and_range_are_those_of_the_written_card(delivered: Delivered) -> None:
+    held, added = delivered.told["heldout"], {one.id for one in delivered.proposed.effects}
+    again = judge([delivered.held], delivered.models, delivered.band)
+    assert again.floor_rms == pytest.approx(held["floor_rms"], rel=ROUNDING)
+    assert again.floor_rms < again.after_rms
+    gain = held["before_rms"] - held["after_rms"]
+    wide = of_the_best(again.confidence_interval, again.before_rms - again.after_rms, 2 ** len(added))
+    assert held["confidence_interval"] == pytest.approx(wide, abs=ROUNDING * gain)
+    assert held["confidence_interval"][0] < gain < held["confidence_interval"][1]
+
+
+def test_the_error_without_a_veto_is_that_of_what_training_proposed(delivered: Delivered) -> None:
+    held = delivered.told["heldout"]
+    proposed = heldout_rms([delivered.held], delivered.proposed.plant(), Band(held["cutoff_hz"], held["motion_hz"]))
+    assert held["unvetoed_rms"] == pytest.approx(proposed, rel=ROUNDING)
+
+
+def test_the_error_beside_a_black_box_is_one_learned_from_the_same_cards(delivered: Delivered) -> None:
+    again = black_box_rms(traces(delivered.train, [delivered.held], delivered.models))
+    assert again is not None
+    assert delivered.told["heldout"]["black_box_rms"] == pytest.approx(again, rel=CONVERGED)
 
 
 def test_the_origin_of_the_card_says_the_same_errors(delivered: Delivered) -> None:
     held = delivered.told["heldout"]
     evidence = str(delivered.better.origin["evidence"])
     assert f"{held['before_rms']:.4g} refitted, {held['after_rms']:.4g} with" in evidence
+    numbers = [float(one) for one in re.findall(r"\d[\d.e+-]*", evidence)]
+    band = Band(held["cutoff_hz"], held["motion_hz"])
+    again = [heldout_rms([delivered.held], one, band) for one in (delivered.models.before, delivered.models.after)]
+    assert numbers == pytest.approx(again, rel=ROUNDING), "there is no other number in it"
+
+
+def test_the_origin_of_the_card_names_the_same_recordings_version_and_date(delivered: Delivered) -> None:
+    origin, told = delivered.better.origin, delivered.told["provenance"]
+    assert set(origin) == {"version", "date", "card", "recordings", "evidence"}
+    assert [origin["version"], origin["date"]] == [told["version"], told["date"]]
+    assert origin["version"] == delivered.told["version"]
+    assert origin["card"] == told["card"]["name"] == "card.toml"
+    named = [{key: one[key] for key in ("name", "sha256", "role")} for one in told["recordings"]]
+    assert origin["recordings"] == named
+    assert [(one["name"], one["role"]) for one in named] == [
+        ("train_1", "train"),
+        ("train_2", "train"),
+        ("heldout", "heldout"),
+    ]
 
 
 def test_the_parameters_are_those_of_the_written_effects(delivered: Delivered) -> None:

@@ -1,0 +1,74 @@
+"""Friction that grows with a load is asked of a card that states the load, wherever the load changes along the way."""
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.absent import not_found
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.diagnose import _problem
+from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.result import Finding
+from cosim.diagnosis.search import Stage, best_of, refitted
+from cosim.estimation.fit import Fit
+from pyfmi_models.card import Card, parse_card
+from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction
+
+BASE = '[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\nsigma2 = 3.0\n'
+PHASE = 0.2
+
+
+def card(mgl: float) -> Card:
+    """A card that states a load, or none."""
+    return parse_card(BASE + (f"[unbalance]\nmgl = {mgl}\nphase = {PHASE}\n" if mgl else ""), "card.toml")
+
+
+def recorded(mgl: float, rise: float = 0.0, seed: int = 1) -> Recording:
+    """An axis with that load, 1.2 rad either way, and friction that rises by so much per unit of it."""
+    t = np.arange(2000) / 100
+    q = 1.2 * np.sin(0.7 * t + seed) + 0.1 * np.sin(2.3 * t + 1)
+    v = 0.84 * np.cos(0.7 * t + seed) + 0.23 * np.cos(2.3 * t + 1)
+    a = -0.588 * np.sin(0.7 * t + seed) - 0.529 * np.sin(2.3 * t + 1)
+    load, noise = mgl * np.sin(q + PHASE), 0.05 * np.random.default_rng(seed).standard_normal(len(t))
+    tau = 2 * a + (1 + rise * np.abs(load)) * np.sign(v) + 3 * v + load + noise
+    return Recording(f"run_{seed}", {"t": t, "q": q, "tau": tau})
+
+
+def compared(mgl: float, rise: float = 0.0) -> tuple[Comparison, Fit]:
+    problem = _problem([recorded(mgl, rise, seed) for seed in (1, 2)], card(mgl))
+    base = problem.fit(problem.mount, 25)
+    return Comparison.of(problem, base, POLICY), base
+
+
+def answered(mgl: float) -> Finding:
+    """What is said of it where there is none."""
+    findings = not_found(*compared(mgl), [], 0.0)
+    return next(one for one in findings if one.effect == "load_dependent_friction")
+
+
+def test_a_load_that_the_card_states_gives_a_bound_and_half_of_it_one_twice_as_large() -> None:
+    whole, half = (answered(mgl) for mgl in (4.0, 2.0))
+    for one in (whole, half):
+        assert one.answer == "not_seen"
+        assert one.bound is not None
+        assert one.bound.unit == "% of the load"
+        assert one.visible_from == one.bound.value
+    assert whole.visible_from is not None
+    assert 1.0 < whole.visible_from < 6.0
+    assert half.visible_from == pytest.approx(2 * whole.visible_from, rel=0.05)
+
+
+def test_without_a_load_in_the_card_it_is_not_testable_and_is_said_what_to_record() -> None:
+    one = answered(0.0)
+    assert (one.answer, one.evidence) == ("not_testable", "the model holds no load that changes")
+    assert one.action == "record with two different loads"
+
+
+@pytest.mark.parametrize(("rise", "seen"), [(0.06, True), (0.002, False)])
+def test_what_is_above_such_a_bound_is_found_with_its_size_and_far_below_it_is_not(rise: float, seen: bool) -> None:
+    comparison, base = compared(4.0, rise)
+    one = refitted(comparison, base, LoadDependentFriction(coulomb_per_Nm=0.01), 2)
+    best = best_of(comparison, Stage(base, (one,), ()))
+    assert (best is not None) is seen
+    if seen:
+        assert one.effect.coulomb_per_Nm == pytest.approx(rise, rel=0.15)  # type: ignore[attr-defined]

@@ -1,0 +1,108 @@
+"""On one sine a weight is an inertia with the other sign: errors, bounds and sets of a diagnosis know it."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.absent import not_found
+from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.diagnose import _problem
+from cosim.diagnosis.findings import standard_errors
+from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.result import Finding
+from cosim.diagnosis.search import margin, refitted
+from cosim.estimation.blocks import Blocks
+from cosim.estimation.fit import Fit
+from cosim.estimation.problem import Problem
+from pyfmi_models.card import parse_card
+from pyfmi_models.effects import GravityUnbalance
+from pyfmi_models.effects.inertia_variation import InertiaVariation
+
+CARD = parse_card('[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\nsigma2 = 3.0\n', "card.toml")
+INERTIA, SLOW, FAST = 2.0, 1.5, 4.0
+
+
+class Stroke(NamedTuple):
+    """Amplitude [rad] of a sine, and what of it another, faster one has."""
+
+    size: float
+    more: float = 0.0
+
+
+def recorded(stroke: Stroke, mgl: float, seed: int) -> Recording:
+    t = np.arange(3000) / 100
+    tones = [(stroke.size, SLOW), (stroke.more * stroke.size, FAST)]
+    q = sum((size * np.sin(w * t + seed) for size, w in tones), np.zeros_like(t))
+    v = sum(size * w * np.cos(w * t + seed) for size, w in tones)
+    a = sum(-size * w**2 * np.sin(w * t + seed) for size, w in tones)
+    noise = 0.02 * np.random.default_rng(seed).standard_normal(len(t))
+    tau = INERTIA * a + np.sign(v) + 3 * v + mgl * np.sin(q) + noise
+    return Recording(f"run_{seed}", {"t": t, "q": q, "tau": tau})
+
+
+def problem(stroke: Stroke, mgl: float = 1.0) -> Problem:
+    return _problem([recorded(stroke, mgl, seed) for seed in (1, 2)], CARD)
+
+
+def compared(stroke: Stroke, mgl: float = 1.0) -> tuple[Comparison, Fit]:
+    this = problem(stroke, mgl)
+    base = this.fit(this.mount, 25)
+    return Comparison.of(this, base, POLICY), base
+
+
+def errors_of(stroke: Stroke) -> tuple[dict[str, float], dict[str, float]]:
+    """Numbers and standard errors of inertia and weight, fitted together."""
+    this = problem(stroke)
+    found = this.fit(replace(this.mount, effects=(GravityUnbalance(mgl=0.3, phase=0.3),)), 40)
+    return found.parameters(), standard_errors(found, Blocks.of(this.prepared), this.weight)
+
+
+@pytest.mark.parametrize("size", [0.1, 0.3])
+def test_errors_of_inertia_and_weight_are_large_on_one_sine_and_small_on_two(size: float) -> None:
+    (values, errors), (_, fewer) = errors_of(Stroke(size)), errors_of(Stroke(size, 0.15))
+    for name, true in (("axis.inertia", INERTIA), ("gravity_unbalance.mgl", 1.0)):
+        assert errors[name] > 50 * fewer[name]
+        assert abs(values[name] - true) < 1.96 * errors[name]
+    assert errors["friction.Fc"] < 2 * fewer["friction.Fc"], "what is not collinear is told as well"
+
+
+def test_a_weight_and_an_inertia_err_together_in_the_ratio_that_the_sine_has() -> None:
+    errors = errors_of(Stroke(0.1))[1]
+    assert errors["gravity_unbalance.mgl"] == pytest.approx(SLOW**2 * errors["axis.inertia"], rel=0.02)
+
+
+def gravity(stroke: Stroke, mgl: float) -> tuple[Finding, Fit]:
+    """What is said of a weight that the base could take for less inertia."""
+    comparison, base = compared(stroke, mgl)
+    return next(one for one in not_found(comparison, base, [], 0.0) if one.effect == "gravity_unbalance"), base
+
+
+def test_a_weight_that_the_inertia_took_is_not_testable_on_a_short_sine() -> None:
+    one, base = gravity(Stroke(0.1), 1.0)
+    assert base.mount.axis.inertia == pytest.approx(INERTIA - 1.0 / SLOW**2, rel=0.02)
+    assert (one.answer, one.evidence) == ("not_testable", "no size of it would have shown in these recordings")
+    assert one.action == "record at least half a turn, slowly, with stops"
+
+
+def test_the_bound_on_a_longer_sine_is_larger_than_the_weight_that_the_inertia_took() -> None:
+    one, base = gravity(Stroke(0.3), 3.0)
+    assert base.mount.axis.inertia < 0.5 * INERTIA
+    assert one.answer == "not_seen"
+    assert one.visible_from is not None
+    assert one.visible_from > 3.0
+
+
+@pytest.mark.parametrize(("stroke", "together"), [(Stroke(0.8), True), (Stroke(0.8, 0.15), False)])
+def test_a_weight_and_an_inertia_over_position_stand_in_one_set_on_one_sine_only(
+    stroke: Stroke, together: bool
+) -> None:
+    comparison, base = compared(stroke)
+    weight = refitted(comparison, base, GravityUnbalance(mgl=0.5, phase=0.1), 1)
+    varying = refitted(comparison, base, InertiaVariation(relative_amplitude=0.1, cycles_per_rev=1.0, phase=3.0), 1)
+    assert weight.evidence > POLICY.evidence_if_large
+    assert weight.plain_gain > POLICY.large_gain
+    behind = float(margin(comparison, weight, varying))
+    assert behind < POLICY.set_margin if together else behind > POLICY.set_margin
