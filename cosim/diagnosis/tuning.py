@@ -38,8 +38,12 @@ def refound(
     problem: Problem, found: Fit, evidence: Callable[[Fit], float], others: Sequence[Effect], steps: int = 36
 ) -> Fit:
     """The best of a fit and those from other starts: a start is known to an order of magnitude at most."""
-    tried = [problem.fit(replace(found.mount, effects=(*found.mount.effects[:-1], one)), steps) for one in others]
-    return max((found, *tried), key=evidence)
+    return max((found, *(restarted(problem, found, one, steps) for one in others)), key=evidence)
+
+
+def restarted(problem: Problem, found: Fit, start: Effect, steps: int = 36) -> Fit:
+    """A fit with its last effect started elsewhere."""
+    return problem.fit(replace(found.mount, effects=(*found.mount.effects[:-1], start)), steps)
 
 
 def in_cycles(problem: Problem, found: Fit) -> Fit:

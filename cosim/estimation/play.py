@@ -42,7 +42,7 @@ def stepped_torque(couplings: Sequence[Coupling], far: Sequence[float], v: Array
     return np.asarray((passed + np.column_stack([passed[:, 1:], passed[:, -1]])) / 2 - np.outer(far, a))
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=6)
 def far_torques(prepared: Prepared, plays: tuple[tuple[float, float], ...], ratio: float) -> Array:
     """Torque added per far inertia at the kept rows, filtered, for (gap, deceleration by dry friction) each.
 

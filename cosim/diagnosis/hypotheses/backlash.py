@@ -2,14 +2,16 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import islice
 from typing import Any, ClassVar
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
-from cosim.diagnosis.candidates import Candidate, Span, has, of_both_ways
+from cosim.diagnosis.candidates import Candidate, Span, columns_of, has, of_both_ways, span_of
 from cosim.diagnosis.hypotheses.base import Evidence, Hypothesis, Reach, Seen, with_numbers
 from cosim.diagnosis.result import Where
-from cosim.diagnosis.tuning import refound
+from cosim.diagnosis.tuning import refound, restarted
 from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.play import far_torques
 from cosim.estimation.prepare import Array, Prepared
@@ -34,6 +36,9 @@ PROPORTIONAL = ("load_share", "load_friction", "load_viscous")
 """Numbers of a play that its torque is proportional to: the motion of the far side stays."""
 AROUND = (0.5, 1.0, 2.0)
 """Gaps from which a fit goes on, relative to the one that it found."""
+TWO, ALIKE = 2, 0.05
+"""So many ends of fits go on, of those whose gaps differ by more than this share: the better one is not always the one
+from which a step leads on (107 nats that stayed, where 91 became 649)."""
 MOST = 0.7
 """Share of the inertia behind the play from which it goes on too: a play of a half was found as one of a third, at a
 quarter of its evidence, from smaller shares."""
@@ -43,6 +48,13 @@ refitted without a play has long taken over what the far side does: from there n
 plays that were missed this finds all; from .3 of the friction two."""
 BEST = 4
 """Plays on that grid that become candidates."""
+WINDOWS = (0.1, 0.03, 0.0)
+"""Seconds over which play and residual are averaged while grids get finer. A stiff contact that closes a hundredth of a
+second late fits worse than no play, so without it the neighbours of the true play on the grid look like any other."""
+LITTLE = 0.1
+"""Share of the base's viscous friction behind the play, by its own level: the other one that is looked for."""
+FINER = 7
+"""Steps of a finer grid, from one neighbour of the best on the coarser one to the other."""
 
 CONCEALED = 6
 """Gaps that are concealed."""
@@ -60,21 +72,21 @@ class Play(Hypothesis[Backlash]):
     view = "since reversal"
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
-        """The best of the grid."""
+        """The nearest play, and the best of the grid."""
         if has(mount, Backlash):
             return
         law = _law(mount)
         level = max(law["Fc"], law["Fs"])  # a refitted law may put all of it in the break-away level
         ratio = float(f"{law['sigma2'] / level:.1g}") if level else 0.0
         bent = {"load_deflection": float(f"{level / law['sigma0']:.1g}")} if law["sigma0"] and level else {}
-        size = rms(span.prepared.stacked("a"))
-        numbers = [(float(gap) * span.reach, float(slowing) * size) for gap in GAPS for slowing in COASTING]
-        columns = far_torques(span.prepared, tuple(numbers), ratio)
-        for index in np.argsort(_alike(columns, span))[: -BEST - 1 : -1]:
-            gap, slowing = numbers[index]
+        gaps, slowings = GAPS * span.reach, COASTING * rms(span.prepared.stacked("a"))
+        grid = _grid(gaps, slowings)
+        alike = _alike(far_torques(span.prepared, grid, ratio), span)
+        likely = [(*grid[index], ratio) for index in np.argsort(alike)[: -BEST - 1 : -1]]
+        for gap, slowing, drag in [_nearest(span, gaps, slowings, (LITTLE * ratio, ratio)), *likely]:
             far = SHARE * float(mount.axis.inertia)
             middling = Backlash(
-                gap_rad=gap, load_share=SHARE, load_friction=far * slowing, load_viscous=far * slowing * ratio, **bent
+                gap_rad=gap, load_share=SHARE, load_friction=far * slowing, load_viscous=far * slowing * drag, **bent
             )
 
             def start(c: Array, middling: Backlash = middling) -> Effect:
@@ -85,14 +97,27 @@ class Play(Hypothesis[Backlash]):
 
     def tuned(self, problem: Problem, found: Fit, start: Backlash, evidence: Evidence) -> Fit:
         """Go on from gaps around the one that was found (whether a flank is met jumps with the gap), then from more."""
-        found = max((found, _shared(problem, found, evidence)), key=evidence)
+        others = [one for one in self._first(problem, found) if one.gap_rad != start.gap_rad]
+        ends = [found, _shared(problem, found, evidence), *(restarted(problem, found, one) for one in others)]
+        found = max(ends, key=evidence)
         if evidence(found) <= 0:
             return found
-        play: Any = found.mount.effects[-1]
-        around = [replace(play, gap_rad=times * play.gap_rad) for times in AROUND]
-        found = refound(problem, found, evidence, around, 25)
+        for end in _apart(ends, evidence)[:TWO]:
+            play: Any = end.mount.effects[-1]
+            around = [replace(play, gap_rad=times * play.gap_rad) for times in AROUND]
+            found = max(found, refound(problem, end, evidence, around, 25), key=evidence)
         play = found.mount.effects[-1]
         return refound(problem, found, evidence, [replace(play, load_share=MOST)])
+
+    def _first(self, problem: Problem, found: Fit) -> Iterator[Any]:
+        """Where the first two candidates start: the nearest play, and the one that is most alike on the grid."""
+        base = problem.fit(replace(found.mount, effects=found.mount.effects[:-1]), 12)
+        span = span_of(base.mount, problem.prepared, base.residual, np.zeros_like(base.residual))
+        first = list(islice(self.candidates(base.mount, span), 2))
+        columns = columns_of(base.mount, first, problem.prepared, base.values)
+        for candidate, column in zip(first, columns, strict=True):
+            plain = np.column_stack([column, _plain(span)])
+            yield candidate.start(np.asarray(np.linalg.lstsq(plain, span.residual, rcond=None)[0]))
 
     def is_degenerate(self, problem: Problem, effect: Backlash) -> bool:
         """With hardly anything behind it the play is one more bristle of the friction."""
@@ -144,14 +169,58 @@ def _shared(problem: Problem, found: Fit, evidence: Evidence) -> Fit:
     return max(fits, key=evidence)
 
 
+def _apart(ends: Sequence[Fit], evidence: Evidence) -> list[Fit]:
+    """Fits that ended at different gaps, the best first."""
+    found: list[Fit] = []
+    for one in sorted(ends, key=evidence, reverse=True):
+        gap = _gap(one)
+        if all(abs(_gap(other) - gap) > ALIKE * gap for other in found):
+            found.append(one)
+    return found
+
+
+def _gap(fit: Fit) -> float:
+    play: Any = fit.mount.effects[-1]
+    return float(play.gap_rad)
+
+
 def _is_friction(variable: Variable) -> bool:
     """Whether it is a torque of the friction law, or one for a speed or a way."""
     return variable.name.startswith("friction.") and variable.unit.startswith("N")
 
 
-def _alike(columns: Array, span: Span) -> Array:
-    """Share of the residual that each column explains, beyond what inertia and friction may."""
-    v, a = span.v, span.prepared.stacked("a")
-    base = np.column_stack([a, v, np.tanh(v / (0.01 * span.top)), np.ones_like(v)])
+def _grid(gaps: Array, slowings: Array) -> tuple[tuple[float, float], ...]:
+    return tuple((gap, slowing) for gap in gaps.tolist() for slowing in slowings.tolist())
+
+
+def _nearest(span: Span, gaps: Array, slowings: Array, ratios: Sequence[float]) -> tuple[float, float, float]:
+    """Gap, deceleration, viscous over dry friction of the play that looks most like the residual, on finer grids."""
+    for window in WINDOWS:
+        grid = _grid(gaps, slowings)
+        alike = {
+            ratio: _alike(far_torques(span.prepared, grid, ratio), span, window) for ratio in dict.fromkeys(ratios)
+        }
+        ratio = max(alike, key=lambda one: float(alike[one].max()))
+        gap, slowing = grid[int(np.argmax(alike[ratio]))]
+        gaps, slowings, ratios = _around(gaps, gap), _around(slowings, slowing), (ratio,)
+    return gap, slowing, ratio
+
+
+def _around(values: Array, middle: float) -> Array:
+    """From one neighbour of a value on a geometric grid to the other."""
+    step = float(values[1] / values[0])
+    return np.geomspace(middle / step, middle * step, FINER)
+
+
+def _alike(columns: Array, span: Span, window: float = 0.0) -> Array:
+    """Share of the residual that each column explains beyond what inertia and friction may, averaged over a window."""
+    rows = max(1, round(window / float(np.median(np.diff(span.t)))))
+    columns, base, residual = (uniform_filter1d(one, rows, axis=0) for one in (columns, _plain(span), span.residual))
     own = columns - base @ np.linalg.lstsq(base, columns, rcond=None)[0]
-    return np.asarray((own.T @ span.residual) ** 2 / np.maximum((own**2).sum(0), 1e-300))
+    return np.asarray((own.T @ residual) ** 2 / np.maximum((own**2).sum(0), 1e-300))
+
+
+def _plain(span: Span) -> Array:
+    """What inertia and friction may be, at all rows."""
+    v = span.v
+    return np.column_stack([span.prepared.stacked("a"), v, np.tanh(v / (0.01 * span.top)), np.ones_like(v)])
