@@ -41,3 +41,25 @@ def test_the_sign_of_the_torque_tells_of_the_sign_alone() -> None:
             assert evidence.of(RIGHT) == pytest.approx(sure, abs=0.05)
             flipped = evidence.of(replace(RIGHT, torque=-1.0))
             assert flipped < evidence.of(RIGHT) - sign + 0.1
+
+
+def stroke(seed: int) -> Recording:
+    """One stroke of 1.5 s in 20 s of rest, 2 kg m2 with 1.2 N m and 3 N m s/rad."""
+    t, rng = np.arange(2000) / 100, np.random.default_rng(seed)
+    x = np.clip((t - 2) / 1.5, 0, 1)
+    sine, cosine, rate = np.sin(np.pi * x), np.cos(np.pi * x), np.pi / 1.5
+    v, a = 1.2 * rate * sine**3 * cosine, 1.2 * rate**2 * (3 * sine**2 * cosine**2 - sine**4)
+    v, a = (np.where((x > 0) & (x < 1), one, 0.0) for one in (v, a))
+    tau = 2 * a + 1.2 * np.sign(v) + 3 * v + 0.05 * rng.standard_normal(len(t))
+    return Recording(f"stroke_{seed}", {"t": t, "q": 0.3 * sine**4, "tau": tau})
+
+
+def test_of_numbers_that_are_not_told_no_residual_tells_the_sign() -> None:
+    short = Balance([stroke(1), stroke(2)]).solution(1.0)
+    assert abs(short.inertia.value) < 3 * short.inertia.error
+    assert abs(short.sign) < 5
+    t = np.arange(6000) / 100
+    v = 0.5 * np.sin(0.9 * t) + 0.2 * np.sin(3.1 * t)
+    a, q = np.gradient(v, t), np.cumsum(v) / 100
+    long = Balance([Recording("long", {"t": t, "q": q, "tau": 2 * a + 1.2 * np.sign(v) + 3 * v})]).solution(1.0)
+    assert long.sign > 15

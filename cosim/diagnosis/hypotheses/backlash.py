@@ -46,6 +46,10 @@ HALF, SHARED_GAPS = 0.5, np.geomspace(1e-4, 2e-3, 5)
 """Share of the card's friction behind the play, and gaps relative to the motion, from which all is fitted anew. The law
 refitted without a play has long taken over what the far side does: from there no step leads to two halves. Of four
 plays that were missed this finds all; from .3 of the friction two."""
+FEW = 10
+"""Evaluations of each of several starts, of which the best goes on."""
+ROUGH = 6
+"""Evaluations of a fit without the play: what it leaves only tells where to begin."""
 BEST = 4
 """Plays on that grid that become candidates."""
 WINDOWS = (0.1, 0.03, 0.0)
@@ -102,7 +106,7 @@ class Play(Hypothesis[Backlash]):
         found = max(ends, key=evidence)
         if evidence(found) <= 0:
             return found
-        for end in _apart(ends, evidence)[:TWO]:
+        for end in _apart([one for one in ends if evidence(one) > 0], evidence)[:TWO]:
             play: Any = end.mount.effects[-1]
             around = [replace(play, gap_rad=times * play.gap_rad) for times in AROUND]
             found = max(found, refound(problem, end, evidence, around, 25), key=evidence)
@@ -111,7 +115,7 @@ class Play(Hypothesis[Backlash]):
 
     def _first(self, problem: Problem, found: Fit) -> Iterator[Any]:
         """Where the first two candidates start: the nearest play, and the one that is most alike on the grid."""
-        base = problem.fit(replace(found.mount, effects=found.mount.effects[:-1]), 12)
+        base = problem.fit(replace(found.mount, effects=found.mount.effects[:-1]), ROUGH)
         span = span_of(base.mount, problem.prepared, base.residual, np.zeros_like(base.residual))
         first = list(islice(self.candidates(base.mount, span), 2))
         columns = columns_of(base.mount, first, problem.prepared, base.values)
@@ -163,10 +167,10 @@ def _shared(problem: Problem, found: Fit, evidence: Evidence) -> Fit:
         gap_rad=1.0, load_share=SHARE, load_friction=HALF * law["Fc"], load_viscous=HALF * law["sigma2"], **bent
     )
     fits = [
-        problem.fit(replace(halved, effects=(*halved.effects[:-1], replace(behind, gap_rad=gap))), 24)
+        problem.fit(replace(halved, effects=(*halved.effects[:-1], replace(behind, gap_rad=gap))), FEW)
         for gap in (SHARED_GAPS * reach).tolist()
     ]
-    return max(fits, key=evidence)
+    return problem.fit(max(fits, key=evidence).mount, 24)
 
 
 def _apart(ends: Sequence[Fit], evidence: Evidence) -> list[Fit]:

@@ -201,7 +201,9 @@ class Balance:
         error[1] = np.hypot(error[1], OFFSET * number[1]) if self.one_way else error[1]
         inertia, coulomb = (Estimate(float(number[k]), float(error[k])) for k in (0, 1))
         rows, explained = independent(residual), max(0.0, 1 - float(residual @ residual) / float(tau @ tau))
-        sign = 0.5 * rows * explained * self._sign(columns, tau)
+        # Of numbers that are nowhere near told no residual tells the sign.
+        told = 0.5 * float(np.sum((number[:3] / error[:3]) ** 2))
+        sign = float(np.clip(0.5 * rows * explained * self._sign(columns, tau), -told, told))
         return Solution(inertia, coulomb, float(residual @ residual), rows, sign, explained)
 
     def _sign(self, columns: Array, tau: Array) -> float:
