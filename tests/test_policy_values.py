@@ -77,7 +77,9 @@ def test_what_nulls_and_machines_with_something_unnamed_showed(
         (Gain(3.5, 0.1, 0.1), 0.1, True),
         (Gain(2.5, 0.1, 0.1), 0.1, False),  # three nats of proof
         (Gain(2.5, 0.6, 0.6), 0.1, True),  # or half of the error
-        (Gain(2.5, 0.4, 0.4), 0.1, False),  # of 19 small ones in 200 nulls one removed half
+        (Gain(2.5, 0.3, 0.3), 0.1, False),
+        (Gain(0.4, 0.36, 0.52), 0.1, True),  # a true offset; of 15 nulls none more than .24
+        (Gain(-0.4, 0.36, 0.52), 0.1, False),
         (Gain(-103.0, 0.99, 0.99), 0.1, True),  # a true inertia over position
         (Gain(-70.0, 0.74, 0.74), 0.1, True),  # another one
         (Gain(-103.0, 0.6, 0.6), 0.1, False),

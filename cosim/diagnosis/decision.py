@@ -149,6 +149,15 @@ class Gain:
         at_rest = self.at_rest >= policy.cleared and removed >= 0
         return removed >= policy.cleared or at_rest or (removed >= policy.halved and self.nats > -policy.floor)
 
+    def predicts(self, policy: Policy) -> bool:
+        """Whether the likelihood says so, or the plain error energy in both bands and nothing speaks against it.
+
+        What slow nuisances may stand for too (an offset, a change with temperature) gains little likelihood there,
+        whatever it removes.
+        """
+        clear = self.nats >= 0 and min(self.narrow, self.wide) >= policy.third
+        return clear or self.nats >= policy.least_predicted or self.halves(policy)
+
     def matters_alone(self, policy: Policy) -> bool:
         """Whether an effect that is small in training matters held out: it halves the error there, and predicts."""
         return self.halves(policy) and self.nats >= policy.least_predicted
@@ -175,8 +184,7 @@ def stands(gain: Gain, share: float, policy: Policy) -> bool:
     change of what the base leaves: beside a strong effect, a weak one may be what the strong one's equation lacks.
     """
     matters = share >= policy.least_share or gain.nats >= policy.sure_predicted
-    predicts = gain.nats >= policy.least_predicted or gain.halves(policy)
-    return predicts and not gain.raises(policy) and matters
+    return gain.predicts(policy) and not gain.raises(policy) and matters
 
 
 def open_rivals(one: EffectScores, policy: Policy) -> tuple[str, ...]:
