@@ -36,6 +36,8 @@ class Bands:
     """Independent rows of each band, coarsened."""
     count: Array
     """Transformed rows of each band that weighted rows fill."""
+    fast: Any
+    """Whether a transformed row is of fast motion."""
 
     @classmethod
     def of(cls, prepared: Prepared, weight: Array, scale: Array, policy: Policy) -> "Bands":
@@ -44,7 +46,7 @@ class Bands:
         Means of steady recordings have a band of their own: rows at one speed say the same of a friction law, so what
         it misses there is between recordings, not between rows.
         """
-        slices, band, first = [], [], 0
+        slices, band, fast, first = [], [], [], 0
         for piece in prepared.pieces:
             rows = len(piece.kept)
             slices.append(slice(first, first + rows))
@@ -52,14 +54,15 @@ class Bands:
             own = np.where(hertz < prepared.cutoff, 1 + np.searchsorted(policy.bands_hz, hertz, "right"), -1)
             own[:1] = 0 if piece.is_steady else own[:1]
             band.append(own)
+            fast.append(hertz >= policy.fast_hz)
             first += rows
         owner = np.concatenate(band)
         names, index = np.unique(owner[owner >= 0], return_inverse=True)
         owner[owner >= 0] = index
         count = np.bincount(index, minlength=len(names)) * float(np.mean(weight > 0))
         effective = count / (1 + count / policy.coarsening)
-        parts = (np.asarray(one, float) for one in (weight / scale, effective, count))
-        return cls(tuple(slices), owner, *parts)
+        gain, filled = np.asarray(weight / scale, float), np.asarray(count, float)
+        return cls(tuple(slices), owner, gain, np.asarray(effective, float), filled, np.concatenate(fast))
 
     def transform(self, columns: Array) -> Array:
         """Scale and transform columns (rows, n)."""

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
+import numpy.typing as npt
 
 from cosim.diagnosis.bands import Bands, NoiseOverSpeed, noise_over_speed
 from cosim.diagnosis.candidates import Candidate, columns_of
@@ -64,6 +65,8 @@ class Comparison:
     noise: NoiseOverSpeed
     inertia: float
     """Inertia [kg m2, kg] that carries the reading's noise into the torque."""
+    base: tuple[str, ...]
+    """Names of the base's fitted numbers."""
     offered: dict[Fit, "_Offered"] = field(default_factory=dict)
     """What is offered beside a fit that will be screened, until then."""
 
@@ -87,7 +90,7 @@ class Comparison:
         # A base that lacks much may be left with no inertia; then the card knows better what noise there is.
         inertia = max(float(base.mount.axis.inertia), float(problem.mount.axis.inertia))
         floor = bands.least_noise(prepared, inertia, policy)
-        return cls(problem, policy, bands, nuisances, floor, noise, inertia, {base: offered})
+        return cls(problem, policy, bands, nuisances, floor, noise, inertia, base.free, {base: offered})
 
     @cached_property
     def _nuisances(self) -> Array:
@@ -109,8 +112,7 @@ class Comparison:
         return known[aside]
 
     def _marginal(self, found: Fit, aside: Aside) -> Marginal:
-        own = self.bands.transform(np.column_stack([found.residual, found.slopes]))
-        grams, groups = self._joined(own, aside)
+        grams, groups = self._joined(found, self._own(found), aside)
         return marginal(grams, self._free(found, grams), groups, self.bands.count, self.bands.effective, self.floor)
 
     def _free(self, found: Fit, grams: Array) -> Array:
@@ -118,7 +120,21 @@ class Comparison:
         free[: len(found.free)] = trust(found, self.problem.prepared.reach)
         return free
 
-    def _joined(self, own: Array, aside: Aside) -> tuple[Array, list[Group]]:
+    def _own(self, found: Fit) -> Array:
+        """What is left and its slopes, transformed, and the slopes of the base's numbers in fast motion once more.
+
+        A law is one thing to slow motion and another to fast one: where what is slow counts as noise, numbers that fit
+        what is fast cost nothing, and a structure that explains what is slow would be the worse for that.
+        """
+        own = self.bands.transform(np.column_stack([found.residual, found.slopes]))
+        relative = own[:, 1 + self._base(found)] * np.abs(found.values[self._base(found)])
+        return np.column_stack([own, np.where(self.bands.fast[:, None], relative, 0.0)])
+
+    def _base(self, found: Fit) -> npt.NDArray[np.int64]:
+        """Numbers of the fitted ones that the base has too."""
+        return np.array([k for k, name in enumerate(found.free) if name in self.base], dtype=np.int64)
+
+    def _joined(self, found: Fit, own: Array, aside: Aside) -> tuple[Array, list[Group]]:
         """Gram matrices of own columns and the nuisances that stay, and where those are among the columns."""
         groups, kept = self._staying(aside)
         first = own.shape[1]
@@ -128,7 +144,8 @@ class Comparison:
         cross = self.bands.crossed(own, self._nuisances[:, kept])
         grams[:, :first, first:], grams[:, first:, :first] = cross, np.swapaxes(cross, 1, 2)
         grams[:, first:, first:] = self._nuisance_grams[:, kept][:, :, kept]
-        placed, start = [], first - 1
+        fast, start = np.arange(len(found.free), first - 1), first - 1
+        placed = [Group(fast, self.policy.fast_prior)] if fast.size else []
         for group in groups:
             placed.append(Group(np.arange(start, start + len(group.columns)), group.prior))
             start += len(group.columns)
@@ -148,7 +165,7 @@ class Comparison:
 
     def score(self, found: Fit, tried: Sequence[Candidate], groups: Sequence[Array]) -> list[Screened]:
         """Score columns of candidates beside a fitted structure."""
-        own = self.bands.transform(np.column_stack([found.residual, found.slopes]))
+        own = self._own(found)
         plain, bands = _Plain(found, self.problem.weight), self.bands
         torque = rms(self.problem.prepared.stacked("tau"))
         ready: dict[Aside, tuple[Array, list[Group], Array, Marginal]] = {}
@@ -172,7 +189,7 @@ class Comparison:
         return scored
 
     def _ready(self, found: Fit, own: Array, aside: Aside) -> tuple[Array, list[Group], Array, Marginal]:
-        grams, placed = self._joined(own, aside)
+        grams, placed = self._joined(found, own, aside)
         free, bands = self._free(found, grams), self.bands
         return grams, placed, free, marginal(grams, free, placed, bands.count, bands.effective, self.floor)
 
@@ -181,7 +198,7 @@ class Comparison:
 
         Columns have unit RMS in training; the prior of the size is `policy.shape_prior` of the friction level.
         """
-        own = self.bands.transform(np.column_stack([found.residual, found.slopes]))
+        own = self._own(found)
         grams, placed, free, now = self._ready(found, own, NONE)
         bands = self.bands
         level = rms(self.nuisances.level) or float(np.std(self.problem.prepared.stacked("tau")))
@@ -207,7 +224,10 @@ class Comparison:
     def wander(self, found: Fit) -> dict[str, float]:
         """Estimated sizes of the nuisances beside a structure."""
         sizes = self._marginal(found, NONE).sizes
-        return {group.name: float(size) for group, size in zip(self.nuisances.groups, sizes, strict=True)}
+        return {
+            group.name: float(size)
+            for group, size in zip(self.nuisances.groups, sizes[-len(self.nuisances.groups) :], strict=True)
+        }
 
     def _grown(self, grams: Array, own: Array, aside: Aside, added: Array) -> Array:
         kept = self._staying(aside)[1]
