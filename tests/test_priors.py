@@ -45,7 +45,7 @@ def test_two_effects_that_are_one_here_are_not_told_apart_by_their_priors(zero: 
 
 def test_what_a_cable_is_worth_has_nothing_to_do_with_the_encoders_zero() -> None:
     worth = [compared(zero)[0]["cable_wrap"] for zero in (0.0, 0.7)]
-    assert worth[0] == pytest.approx(worth[1], abs=1.0)  # of some 118 nats
+    assert worth[0] == pytest.approx(worth[1], abs=0.1)
 
 
 def test_a_place_may_lie_anywhere_in_the_motion() -> None:

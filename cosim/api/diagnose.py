@@ -130,14 +130,17 @@ def diagnose(
     if folder:
         directory(folder)  # what cannot be made is said before the work, not after it
     if fmu is not None:
-        box = BlackBox(Path(fmu), {name: Alias(own) for name, own in (variables or {}).items()})
-        given = _beside(box, given, on_progress)
+        given = _beside(_black_box(fmu, variables or {}), given, on_progress)
     listeners = _Listeners(on_progress, on_answer)
     before = _written(folder) if folder and force else {}
     rest = command, listeners
     done = _delivered(given, folder, *rest) if folder and not quick else _found(given, folder, *rest)
     _forget(before)
     return done
+
+
+def _black_box(fmu: str | Path, variables: Mapping[str, str]) -> BlackBox:
+    return BlackBox(Path(fmu), {name: Alias(own) for name, own in variables.items()})
 
 
 def _written(folder: Path) -> dict[Path, int]:

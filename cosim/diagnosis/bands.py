@@ -30,14 +30,14 @@ class Bands:
     """Rows of each contiguous piece."""
     band: Any
     """Band of each transformed row."""
+    fast: Any
+    """Whether a transformed row is of fast motion."""
     gain: Array
     """Weight over noise scale at each row."""
     effective: Array
     """Independent rows of each band, coarsened."""
     count: Array
     """Transformed rows of each band that weighted rows fill."""
-    fast: Any
-    """Whether a transformed row is of fast motion."""
 
     @classmethod
     def of(cls, prepared: Prepared, weight: Array, scale: Array, policy: Policy) -> "Bands":
@@ -61,8 +61,8 @@ class Bands:
         owner[owner >= 0] = index
         count = np.bincount(index, minlength=len(names)) * float(np.mean(weight > 0))
         effective = count / (1 + count / policy.coarsening)
-        gain, filled = np.asarray(weight / scale, float), np.asarray(count, float)
-        return cls(tuple(slices), owner, gain, np.asarray(effective, float), filled, np.concatenate(fast))
+        parts = (np.asarray(one, float) for one in (weight / scale, effective, count))
+        return cls(tuple(slices), owner, np.concatenate(fast), *parts)
 
     def transform(self, columns: Array) -> Array:
         """Scale and transform columns (rows, n)."""

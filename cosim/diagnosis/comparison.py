@@ -12,7 +12,6 @@ from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
-import numpy.typing as npt
 
 from cosim.diagnosis.bands import Bands, NoiseOverSpeed, noise_over_speed
 from cosim.diagnosis.candidates import Candidate, columns_of
@@ -127,12 +126,9 @@ class Comparison:
         what is fast cost nothing, and a structure that explains what is slow would be the worse for that.
         """
         own = self.bands.transform(np.column_stack([found.residual, found.slopes]))
-        relative = own[:, 1 + self._base(found)] * np.abs(found.values[self._base(found)])
+        base = np.array([name in self.base for name in found.free], bool)
+        relative = own[:, 1:][:, base] * np.abs(found.values[base])
         return np.column_stack([own, np.where(self.bands.fast[:, None], relative, 0.0)])
-
-    def _base(self, found: Fit) -> npt.NDArray[np.int64]:
-        """Numbers of the fitted ones that the base has too."""
-        return np.array([k for k, name in enumerate(found.free) if name in self.base], dtype=np.int64)
 
     def _joined(self, found: Fit, own: Array, aside: Aside) -> tuple[Array, list[Group]]:
         """Gram matrices of own columns and the nuisances that stay, and where those are among the columns."""
@@ -223,11 +219,8 @@ class Comparison:
 
     def wander(self, found: Fit) -> dict[str, float]:
         """Estimated sizes of the nuisances beside a structure."""
-        sizes = self._marginal(found, NONE).sizes
-        return {
-            group.name: float(size)
-            for group, size in zip(self.nuisances.groups, sizes[-len(self.nuisances.groups) :], strict=True)
-        }
+        groups, sizes = self.nuisances.groups, self._marginal(found, NONE).sizes
+        return {group.name: float(size) for group, size in zip(groups, sizes[-len(groups) :], strict=True)}
 
     def _grown(self, grams: Array, own: Array, aside: Aside, added: Array) -> Array:
         kept = self._staying(aside)[1]

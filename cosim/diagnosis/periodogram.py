@@ -108,13 +108,14 @@ def _spectrum(t: Array, signal: Array, hertz: Array) -> Array:
 
 def _powers(span: Span, signal: Array, numbers: npt.NDArray[np.int64], step: float, ratio: float) -> Array:
     """Power at whole multiples of a step, roughly: band by band, gathered in bins of angle and transformed at once."""
-    powers = np.zeros(len(numbers))
+    # From the lowest angle on: where the encoder has its zero must not move what is gathered in a bin.
+    powers, angle = np.zeros(len(numbers)), span.angle - span.angle.min()
     edges = [0, *np.flatnonzero(np.diff(np.floor(np.log(numbers) / log(BAND)))) + 1, len(numbers)]
     for low, high in pairwise(edges):
         passed = _passed(span, float(numbers[high - 1]) * step, ratio)
         if passed.sum() >= LEAST_ROWS:
             bins = FINE * int(numbers[high - 1])
-            place = np.floor(span.angle[passed] * (step * bins / (2 * pi))).astype(np.int64) % bins
+            place = np.floor(angle[passed] * (step * bins / (2 * pi))).astype(np.int64) % bins
             gathered = np.bincount(place, signal[passed] - signal[passed].mean(), bins)
             powers[low:high] = np.abs(np.fft.rfft(gathered)[numbers[low:high]]) ** 2 / passed.sum()
     return powers

@@ -108,7 +108,9 @@ def _plainly(rivals: tuple[str, ...]) -> str:
 def _plain(rival: str) -> str:
     bare = re.sub(r" \([\d,]+ nats behind\)", "", rival)
     shares = re.findall(r"([\d.]+) ?%", bare)
-    ahead = float(shares[0]) - float(shares[1]) if len(shares) == 2 else -100.0
+    if len(shares) != 2:
+        return bare
+    ahead = float(shares[0]) - float(shares[1])
     if ahead >= ALIKE:
         return f"{bare}, but fits worse where noise is low, or has more to adjust"
     return f"{bare}: the detail of what is left decides" if ahead > -ALIKE else bare
