@@ -129,8 +129,8 @@ def test_an_interval_holds_the_error_and_narrows_with_what_is_drawn() -> None:
         blocks = np.column_stack([draw.chisquare(50, count), np.full(count, 50.0)])
         judge = judges.Judge(lambda *_, blocks=blocks: blocks, 2.0)
         assert judge(slide(), []) == pytest.approx(2.0, rel=0.1)
-        told[count] = [float(word.strip("[],")) for word in judge.told(slide(), []).split()]
-        error, low, high = told[count]
-        assert low < error < high
-    assert (told[20][2] - told[20][1]) / (told[500][2] - told[500][1]) == pytest.approx(5, rel=0.4)
-    assert judges.Judge(lambda *_: np.ones((4, 2))).told(slide(), []) == "1"
+        low, high = (float(word) for word in judge.interval(slide(), []).split(" to "))
+        assert low < judge(slide(), []) < high
+        told[count] = high - low
+    assert told[20] / told[500] == pytest.approx(5, rel=0.4)
+    assert not judges.Judge(lambda *_: np.ones((4, 2))).interval(slide(), [])

@@ -21,7 +21,7 @@ from cosim.diagnosis.terminal import summary
 from cosim.fmi.alias import Alias
 from cosim.reading import check_kind
 from cosim.support.errors import InputError
-from cosim.support.files import directory
+from cosim.support.files import check_directory
 from cosim.support.html import table as html_table
 from cosim.support.html import text as html_text
 from cosim.support.plain import JsonObject
@@ -126,9 +126,8 @@ def diagnose(
     folder = None if out is None else Path(out)
     if folder:
         check_out(folder, force, QUICK if quick else FILES)
+        check_directory(folder)
     given = _read(train, heldout, card, columns or {}, units)
-    if folder:
-        directory(folder)  # what cannot be made is said before the work, not after it
     if fmu is not None:
         given = _beside(_black_box(fmu, variables or {}), given, on_progress)
     listeners = _Listeners(on_progress, on_answer)

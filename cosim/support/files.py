@@ -53,6 +53,18 @@ def directory(path: Path) -> Path:
     return path
 
 
+def check_directory(path: Path) -> None:
+    """Refuse a directory that cannot be made, and leave none.
+
+    Raises:
+        OutputError: as `directory`.
+    """
+    made = [one for one in (path, *path.parents) if not one.exists()]
+    directory(path)
+    for one in made:
+        one.rmdir()
+
+
 def _no_directory(path: Path, why: Path | str) -> OutputError:
     """The refusal of a folder for results: a file has its name, or the system's own reason."""
     reason = f"{why} is {'a file' if why.is_file() else 'no folder'}" if isinstance(why, Path) else why

@@ -36,15 +36,14 @@ class Judge:
         """The error."""
         return self._error(self.blocks(mount, recordings)[None])[0]
 
-    def told(self, mount: Mount, recordings: Sequence[Recording]) -> str:
-        """The error with its interval."""
+    def interval(self, mount: Mount, recordings: Sequence[Recording]) -> str:
+        """95 % of draws of whole blocks; empty where there are few."""
         found = self.blocks(mount, recordings)
-        error = f"{self._error(found[None])[0]:.3g}"
         if len(found) < FEWEST:
-            return error
+            return ""
         drawn = np.random.default_rng(0).integers(len(found), size=(DRAWS, len(found)))
         low, high = np.quantile(self._error(found[drawn]), (0.025, 0.975))
-        return f"{error} [{low:.3g}, {high:.3g}]"
+        return f"{low:.3g} to {high:.3g}"
 
     def _error(self, blocks: Array) -> Array:
         left, weight = np.moveaxis(blocks.sum(axis=1), -1, 0)

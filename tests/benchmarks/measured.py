@@ -68,24 +68,20 @@ def rows(machine: Machine) -> Iterator[dict[str, Any]]:
     judged += [(name, recordings, machine.score, machine.unit) for name, recordings in others.items()]
     judged += [(name, held, score, unit) for name, (score, unit) in machine.otherwise.items()]
     for name, recordings, score, unit in judged:
-        numbers = {key: _told(score, model.plant(), recordings) for key, model in models.items()}
+        numbers = {key: f"{score(model.plant(), recordings):.3g}" for key, model in models.items()}
         yield {
             "machine": f"{machine.name}{', ' if name else ''}{name}",
             "concealed": machine.concealed if not name else "",
             "verdict": " + ".join(found.verdict) or "none" if not name else "",
             "sets": "; ".join(" or ".join(group) for group in found.ambiguous_with) if not name else "",
             **numbers,
+            "95 %": score.interval(outcome.card.plant(), recordings) if isinstance(score, Judge) else "",
             "unit": unit,
             "first look": machine.first_look if not name else "",
             "bar": f"{machine.bar:g}" if not name else "",
             "asked besides": machine.derived(outcome) if not name else "",
             "seconds": f"{found.seconds:.0f}" if not name else "",
         }
-
-
-def _told(score: Score, mount: Mount, recordings: Sequence[Recording]) -> str:
-    """An error, with its interval where there is one."""
-    return score.told(mount, recordings) if isinstance(score, Judge) else f"{score(mount, recordings):.3g}"
 
 
 def _read(machine: Machine, tables: dict[str, pd.DataFrame], folder: Path) -> list[Recording]:
