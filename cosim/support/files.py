@@ -59,7 +59,8 @@ def check_directory(path: Path) -> None:
     Raises:
         OutputError: as `directory`.
     """
-    made = [one for one in (path, *path.parents) if not one.exists()]
+    resolved = path.resolve()
+    made = [one for one in (resolved, *resolved.parents) if not one.exists()]
     directory(path)
     for one in made:
         one.rmdir()

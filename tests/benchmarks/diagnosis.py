@@ -82,8 +82,8 @@ TITLES = {
     "null": "Null: recordings made by exactly the card's physics, its numbers 15 % off",
 }
 NOTES = {
-    "measured": "Held-out RMS by the protocol of each recording's README; `95 %`: of the delivered model, drawing whole "
-    "seconds (of the screws: recordings) with replacement; `first look` is what that README found by "
+    "measured": "Held-out RMS by the protocol of each recording's README; `95 %`: of the delivered model, drawing "
+    "whole seconds (of the screws: recordings) with replacement; `first look` is what that README found by "
     "hand. How each is read stands in tests/benchmarks/measured.py: columns, units, card, what is held out. `refitted` "
     "is the base of the card with its numbers fitted, `names alone` what is delivered "
     "without a learned term, `with what is learned` the delivered model (the same where nothing was learned), `no "
