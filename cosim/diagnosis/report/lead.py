@@ -168,8 +168,9 @@ def improvement(diagnosis: Diagnosis, scales: Scales) -> str:
 
 
 def _moving(held: HeldOut, scales: Scales) -> str:
-    """Say what becomes of the error in clear motion, where it falls: a static law says nothing about rest."""
+    """Say what becomes of the error in clear motion, where it falls visibly: a static law says nothing about rest."""
     before, after = (held.sliding.get(f"{name}_rms", nan) for name in ("before", "after"))
     unit = scales.torque
     falls = f"from {unit.number(before)} to {unit.text(after)}"
-    return f"In clear motion the error on unseen runs falls {falls}." if after < before else ""
+    seen = after < before and unit.number(before) != unit.number(after)
+    return f"In clear motion the error on unseen runs falls {falls}." if seen else ""

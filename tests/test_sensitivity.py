@@ -1,0 +1,54 @@
+"""A replay of a case answers as a diagnosis does, and a constant that is changed changes it."""
+
+import sys
+from dataclasses import fields
+from pathlib import Path
+
+import pytest
+
+from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.policy import POLICY, Policy
+from cosim_studies.proof.generator import make_case, write_given
+from cosim_studies.proof.tool import given
+
+sys.path.append(str(Path(__file__).parent / "benchmarks"))
+
+import sensitivity
+
+
+def test_a_replay_is_a_diagnosis_by_another_policy(tmp_path: Path) -> None:
+    write_given(make_case(3, ["cogging"], duration=30.0), tmp_path)
+    card, train, held = given(str(tmp_path))
+    replay = sensitivity.Replay(train, held, card)
+    assert replay.answer(POLICY) == diagnose(train, [held], card).diagnosis.verdict == ("cogging",)
+    made = len(replay.problem.made)
+    assert replay.answer(POLICY) == ("cogging",)
+    assert len(replay.problem.made) == made, "fits are made once"
+    none = sensitivity.scaled("least_above_noise", 1e9)
+    assert replay.answer(sensitivity.scaled("least_plain_gain", 100.0), "least_plain_gain") != ("cogging",)
+    assert replay.answer(none, "least_above_noise") == ("cogging",), "a ripple need not stand out"
+    assert replay.answer(sensitivity.scaled("coarsening", 1e-4), "coarsening") != ("cogging",)
+
+
+def test_every_constant_is_scaled_and_whole_numbers_stay_whole() -> None:
+    assert {*sensitivity.constants(), "version"} == {one.name for one in fields(Policy)}
+    assert set(sensitivity.constants()) >= sensitivity.OF_EVIDENCE
+    assert sensitivity.scaled("refitted", 0.5).refitted == 4
+    assert sensitivity.scaled("further_evidence", 2.0).further_evidence == (16.0, 150.0)
+    assert sensitivity.scaled("floor", 0.5).floor == pytest.approx(13.0)
+
+
+@pytest.mark.parametrize(
+    ("concealed", "answer", "right"),
+    [
+        ("none", "none", True),
+        ("none", "unknown", False),
+        ("delay", "delay + unknown", True),
+        ("delay", "unknown + delay", False),
+        ("remanence", "unknown + delay", True),
+        ("delay + cogging", "cogging + delay", True),
+        ("delay + cogging", "cogging", False),
+    ],
+)
+def test_answers_are_right_or_not(concealed: str, answer: str, right: bool) -> None:
+    assert sensitivity.is_right({"concealed": concealed, "answer": answer}) is right
