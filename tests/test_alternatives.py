@@ -14,8 +14,9 @@ from cosim.diagnosis.search import CandidateFit
 
 @pytest.fixture(autouse=True)
 def all_are_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Effects that are only their names are never anything else in disguise."""
+    """Effects that are only their names are never anything else in disguise, and their sizes are told."""
     monkeypatch.setattr("cosim.diagnosis.proof.is_degenerate", lambda *_: False)
+    monkeypatch.setattr("cosim.diagnosis.proof.tells", lambda *_: True)
 
 
 class Recorded(Tables):

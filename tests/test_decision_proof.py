@@ -23,8 +23,9 @@ class Named:
 
 @pytest.fixture(autouse=True)
 def all_are_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Effects that are only their names are never anything else in disguise."""
+    """Effects that are only their names are never anything else in disguise, and their sizes are told."""
     monkeypatch.setattr("cosim.diagnosis.proof.is_degenerate", lambda *_: False)
+    monkeypatch.setattr("cosim.diagnosis.proof.tells", lambda *_: True)
 
 
 @dataclass(frozen=True)
@@ -125,6 +126,17 @@ def test_where_nothing_predicts_the_base_stays() -> None:
     assert proof.chosen.mount.names == "b"  # type: ignore[attr-defined]
     assert proof.predicted == {"x": 0.0, "y": 0.0}
     assert [one.effect.id for one in proof.unproven] == ["x", "y"]
+
+
+@pytest.mark.parametrize(("more", "left"), [(7.0, "x"), (29.0, "x"), (31.0, "xy")])
+def test_an_effect_of_which_no_size_is_told_stands_only_if_it_surely_predicts(
+    more: float, left: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosim.diagnosis.proof.tells", lambda problem, chosen, effect: effect.id != "y")
+    proof = proven(Tables({"b": 0.0, "bx": 10.0, "bxy": 10.0 + more, "by": more}), "xy")
+    assert standing(proof) == left
+    assert proof.chosen.mount.names == "b" + left  # type: ignore[attr-defined]
+    assert [one.effect.id for one in proof.unproven] == [name for name in "xy" if name not in left]
 
 
 def test_the_list_ends_where_prediction_is_best_and_one_that_does_not_help_loses_no_later_one() -> None:

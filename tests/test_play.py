@@ -7,6 +7,7 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.hypotheses import hypothesis_of
 from cosim.estimation.play import SEARCHED, far_torques, stepped_torque
 from cosim.estimation.prepare import prepare
 from cosim_studies.proof.generator import make_case, write_case
@@ -77,6 +78,13 @@ def test_a_search_slows_the_far_side_by_dry_and_by_viscous_friction() -> None:
     expected = piece.lowpass(np.interp(piece.t, piece.t[::step], exact))[piece.kept]
     np.testing.assert_allclose(told, expected, atol=1e-12)
     assert np.std(told - far_torques(prepared, ((5e-3, dry),), 0.0)[:, 0]) > 0.05 * np.std(told)
+
+
+@pytest.mark.parametrize(("share", "degenerate"), [(0.08, True), (0.1, False)])
+def test_behind_a_play_is_more_than_a_bristle(share: float, degenerate: bool) -> None:
+    """Four nulls of two generators had up to .077 of the inertia there, a true play was found at .11."""
+    play = Backlash(gap_rad=1e-3, load_share=share, load_friction=0.3)
+    assert hypothesis_of(play).is_degenerate(None, play) is degenerate  # type: ignore[arg-type]
 
 
 def test_a_concealed_play_is_named_with_its_gap(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from cosim.diagnosis.bands import Bands
 from cosim.diagnosis.candidates import columns_of
 from cosim.diagnosis.comparison import NONE, Comparison
 from cosim.diagnosis.discrepancy import discrepancy
+from cosim.diagnosis.findings import tells
 from cosim.diagnosis.harmonics import with_harmonics
 from cosim.diagnosis.hypotheses import hypothesis_of
 from cosim.diagnosis.policy import POLICY
@@ -74,6 +75,15 @@ def test_a_level_wanders_as_a_process_does_that_forgets_itself_in_ten_seconds() 
     constant, *waves = found.columns[0, list(group.columns)]
     w = np.pi * np.arange(1, 5) / np.ptp(prepared.stacked("t"))
     assert (np.array(waves) / constant) ** 2 == pytest.approx(1 / (1 + (10 * w) ** 2), rel=1e-6)
+
+
+@pytest.mark.parametrize(("second_wave", "told"), [(0.2, True), (0.0, False)])
+def test_a_size_is_told_that_stands_out_of_its_error(second_wave: float, told: bool) -> None:
+    problem = problem_of(recorded(20.0, second_wave, noise=0.05), recorded(20.0, second_wave, noise=0.05, seed=2))
+    waves = RIPPLE, replace(RIPPLE, amplitude=0.01, cycles_per_rev=40.0)
+    found = problem.fit(replace(MOUNT, effects=waves), 30)
+    assert tells(problem, found, found.mount.effects[0])
+    assert tells(problem, found, found.mount.effects[1]) is told
 
 
 @cache

@@ -16,6 +16,7 @@ from cosim.diagnosis.search import CandidateFit
 from cosim.estimation.blocks import Blocks, covariance
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
+from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Effect
 from pyfmi_models.model import Variable, parameters_of
 from pyfmi_models.mount import LINEAR_UNITS, Mount
@@ -116,6 +117,12 @@ def is_told(effect: Effect, numbers: Numbers, mount: Mount) -> bool:
     own, known = hypothesis_of(effect), {variable.name: variable for variable in parameters_of(effect)}
     sizes = [name for name in own.sizes or (effect.main.parameter,) if name in numbers.errors]
     return not sizes or any(_excludes(numbers, name, own.none(mount), known[name]) for name in sizes)
+
+
+def tells(problem: Problem, chosen: Fit, effect: Effect) -> bool:
+    """Whether the training recordings tell a size of an effect of a fitted structure."""
+    errors = standard_errors(chosen, Blocks.of(problem.prepared), problem.weight)
+    return is_told(effect, numbers_of(effect, chosen.mount, errors), chosen.mount)
 
 
 def _excludes(numbers: Numbers, name: str, none: float, known: Variable) -> bool:

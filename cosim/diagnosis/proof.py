@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from cosim.diagnosis.admissibility import is_degenerate
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.decision import Gain, stands
+from cosim.diagnosis.findings import tells
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.rivals import AcceptedEffect, Examined
 from cosim.diagnosis.search import is_small
@@ -32,11 +33,11 @@ def prove(comparison: Comparison, examined: Examined, held: Predictive) -> Proof
 
     First the length of the list: effects in order of their evidence, up to where the held-out recordings are predicted
     best; stopping at the first that does not help would lose a later one that does. Then effects are taken out until
-    all that are left stand.
+    all that are left stand, and those of which no size is told, unless they surely predict.
     """
     order = sorted(examined.effects, key=lambda one: -one.own.evidence)
     chosen, some = _longest(comparison, examined, order, held)
-    chosen, standing, gains = _standing(comparison, examined, chosen, some, held)
+    chosen, standing, gains = _told(comparison, examined, chosen, some, held)
     predicted = {one.effect.id: 0.0 for one in order} | {name: gain.nats for name, gain in gains.items()}
     removes = {name: gain.narrow for name, gain in gains.items()}
     return Proof(chosen, tuple(standing), predicted, tuple(one for one in order if one not in standing), removes)
@@ -45,11 +46,23 @@ def prove(comparison: Comparison, examined: Examined, held: Predictive) -> Proof
 def without(comparison: Comparison, examined: Examined, proof: Proof, out: AcceptedEffect, held: Predictive) -> Proof:
     """The proof of what is left where one of the effects that stand is taken out."""
     rest = [one for one in proof.standing if one is not out]
-    chosen, standing, gains = _standing(comparison, examined, _with(comparison.problem, examined, rest), rest, held)
+    chosen, standing, gains = _told(comparison, examined, _with(comparison.problem, examined, rest), rest, held)
     fallen = tuple(one for one in rest if one not in standing)
     predicted = proof.predicted | {name: gain.nats for name, gain in gains.items()}
     removes = {name: gain.narrow for name, gain in gains.items()}
     return Proof(chosen, tuple(standing), predicted, (*proof.unproven, *fallen), removes)
+
+
+def _told(
+    comparison: Comparison, examined: Examined, chosen: Fit, some: Sequence[AcceptedEffect], held: Predictive
+) -> tuple[Fit, list[AcceptedEffect], dict[str, Gain]]:
+    """The effects that stand, but for those of which recordings tell no size, unless they surely predict."""
+    chosen, standing, gains = _standing(comparison, examined, chosen, some, held)
+    told = [one for one in standing if _is_sure(comparison, chosen, one, gains[one.effect.id])]
+    if len(told) == len(standing):
+        return chosen, standing, gains
+    fit, kept, known = _standing(comparison, examined, _with(comparison.problem, examined, told), told, held)
+    return fit, kept, gains | known
 
 
 def _standing(
@@ -83,6 +96,12 @@ def _stands(comparison: Comparison, examined: Examined, chosen: Fit, one: Accept
     if small and not gain.matters_alone(comparison.policy):
         return False
     return stands(gain, _share(comparison.problem, examined.base, one), comparison.policy)
+
+
+def _is_sure(comparison: Comparison, chosen: Fit, one: AcceptedEffect, gain: Gain) -> bool:
+    """Whether an effect surely predicts, or the recordings tell a size of it in the structure that stands."""
+    sure = gain.nats >= comparison.policy.sure_predicted
+    return sure or tells(comparison.problem, chosen, one.within(chosen.mount))
 
 
 def _longest(
