@@ -27,6 +27,7 @@ ROUND = replace(
     sure_beside_unknown=0.875,
     set_margin=3.0,
     least_predicted=4.0,
+    clearly_predicted=8.0,
     sure_predicted=32.0,
     halved=0.5,
     third=0.375,
@@ -74,9 +75,9 @@ def test_a_rival_at_the_margin_of_a_set_is_beaten() -> None:
 @pytest.mark.parametrize(
     ("gain", "share", "expected"),
     [
-        (Gain(4.0, 0.1, 0.1), 0.125, True),
-        (Gain(4.0 - LITTLE, 0.1, 0.1), 0.125, False),
-        (Gain(4.0, 0.1, 0.1), 0.125 - LITTLE, False),
+        (Gain(8.0, 0.1, 0.1), 0.125, True),
+        (Gain(8.0 - LITTLE, 0.1, 0.1), 0.125, False),
+        (Gain(8.0, 0.1, 0.1), 0.125 - LITTLE, False),
         (Gain(32.0, 0.1, 0.1), 0.0, True),
         (Gain(32.0 - LITTLE, 0.1, 0.1), 0.0, False),
         (Gain(-16.0 + LITTLE, 0.5, 0.5), 0.5, True),

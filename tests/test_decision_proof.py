@@ -11,7 +11,15 @@ from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.proof import Proof, prove
 from cosim.diagnosis.rivals import AcceptedEffect, Examined
 
-RULES = replace(POLICY, least_predicted=3.0, sure_predicted=30.0, halved=0.5, most_raised=0.1, least_share=0.02)
+RULES = replace(
+    POLICY,
+    least_predicted=3.0,
+    clearly_predicted=3.0,
+    sure_predicted=30.0,
+    halved=0.5,
+    most_raised=0.1,
+    least_share=0.02,
+)
 
 
 @dataclass(frozen=True)

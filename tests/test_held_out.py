@@ -106,10 +106,10 @@ def test_what_raises_the_held_out_error_does_not_predict() -> None:
 
 
 def test_a_small_effect_beside_a_large_one_must_be_surer_than_one_that_matters() -> None:
-    assert stands(Gain(POLICY.least_predicted + 1, 0.1, 0.1), 2 * POLICY.least_share, POLICY)
-    assert not stands(Gain(POLICY.least_predicted + 1, 0.1, 0.1), POLICY.least_share / 2, POLICY)
+    assert stands(Gain(POLICY.clearly_predicted + 1, 0.1, 0.1), 2 * POLICY.least_share, POLICY)
+    assert not stands(Gain(POLICY.clearly_predicted + 1, 0.1, 0.1), POLICY.least_share / 2, POLICY)
     assert stands(Gain(POLICY.sure_predicted + 1, 0.1, 0.1), POLICY.least_share / 2, POLICY)
-    assert not stands(Gain(POLICY.least_predicted - 1, 0.1, 0.1), 0.9, POLICY)
+    assert not stands(Gain(POLICY.clearly_predicted - 1, 0.1, 0.1), 0.9, POLICY)
 
 
 @pytest.mark.parametrize(("narrow", "wide", "holds"), [(0.34, 0.4, True), (0.4, 0.32, False), (0.32, 0.4, False)])

@@ -150,13 +150,14 @@ class Gain:
         return removed >= policy.cleared or at_rest or (removed >= policy.halved and self.nats > -policy.floor)
 
     def predicts(self, policy: Policy) -> bool:
-        """Whether the likelihood says so, or the plain error energy in both bands and nothing speaks against it.
+        """Whether the likelihood clearly says so, or the plain error energy in both bands and nothing speaks against it.
 
         What slow nuisances may stand for too (an offset, a change with temperature) gains little likelihood there,
-        whatever it removes.
+        whatever it removes. So does a contact at rest, where few rows count.
         """
-        clear = self.nats >= 0 and min(self.narrow, self.wide) >= policy.third
-        return clear or self.nats >= policy.least_predicted or self.halves(policy)
+        seen = self.nats >= 0 and min(self.narrow, self.wide) >= policy.third
+        held = self.nats >= policy.least_predicted and self.at_rest >= policy.halved
+        return seen or held or self.nats >= policy.clearly_predicted or self.halves(policy)
 
     def matters_alone(self, policy: Policy) -> bool:
         """Whether an effect that is small in training matters held out: it halves the error there, and predicts."""
