@@ -150,7 +150,7 @@ class Gain:
         return removed >= policy.cleared or at_rest or (removed >= policy.halved and self.nats > -policy.floor)
 
     def predicts(self, policy: Policy) -> bool:
-        """Whether the likelihood clearly says so, or the plain error energy in both bands and nothing speaks against it.
+        """Whether the likelihood clearly says so, or the plain error in both bands and nothing speaks against it.
 
         What slow nuisances may stand for too (an offset, a change with temperature) gains little likelihood there,
         whatever it removes. So does a contact at rest, where few rows count.

@@ -83,7 +83,7 @@ class Policy:
     row to row, as its likelihood has it. Unit: 1. In 59 sets of two generators that held the truth .4 is the
     likeliest, 4.0 nats before 1; from .2 to .8 within 1.9 nats (results/calibration/sets.md)."""
     least_predicted: float = 3.0
-    """What the held-out recordings must lose without what is small but halves the error, or holds at rest. Unit: nats."""
+    """What held-out recordings must lose without what is small but halves the error, or holds at rest. Unit: nats."""
     clearly_predicted: float = 10.0
     """What they must lose without an effect where the plain error does not tell. Unit: nats, as of what excludes beside
     something unknown. Of 165 names abroad and 40 at home true ones have 9.5 and more, or a third of the plain error;
