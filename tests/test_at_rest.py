@@ -83,9 +83,10 @@ def test_memory_is_got_from_a_contact_and_from_nothing_else() -> None:
 
 
 @pytest.mark.parametrize(
-    ("rise", "settles"), [(0.01, False), (0.015, False), (0.03, True), (0.1, True), (1.01, True), (1.9, True), (2.1, False)]
+    ("rise", "settles"),
+    [(0.01, False), (0.015, False), (0.03, True), (0.1, True), (1.01, True), (1.9, True), (2.1, False)],
 )
-def test_a_contact_settles_by_less_than_twice_its_level_and_by_more_than_that_wanders(rise: float, settles: bool) -> None:
+def test_a_contact_settles_by_less_than_twice_its_level_and_more_than_that_wanders(rise: float, settles: bool) -> None:
     prepared = prepare([recording(1, True)], 30.0)
     problem = Problem(PLAIN, prepared, weights(PLAIN.friction, prepared), 1 / 200)
     effect = DwellBreakaway(torque_per_efold=rise * FC, memory_rad=0.01)

@@ -155,9 +155,10 @@ class Gain:
         What slow nuisances may stand for too (an offset, a change with temperature) gains little likelihood there,
         whatever it removes. So does a contact at rest, where few rows count.
         """
-        seen = self.nats >= 0 and min(self.narrow, self.wide) >= policy.third
-        held = self.nats >= policy.least_predicted and self.at_rest >= policy.halved
-        return seen or held or self.nats >= policy.clearly_predicted or self.halves(policy)
+        removed, said = min(self.narrow, self.wide), self.nats >= policy.least_predicted
+        seen = self.nats >= 0 and removed >= policy.third
+        both = said and (removed >= policy.fifth or self.at_rest >= policy.halved)
+        return seen or both or self.nats >= policy.clearly_predicted or self.halves(policy)
 
     def matters_alone(self, policy: Policy) -> bool:
         """Whether an effect that is small in training matters held out: it halves the error there, and predicts."""

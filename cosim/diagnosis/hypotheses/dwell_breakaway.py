@@ -45,7 +45,7 @@ class Settling(Hypothesis[DwellBreakaway]):
     def is_degenerate(self, problem: Problem, effect: DwellBreakaway) -> bool:
         """What a friction level wanders by, whatever rest was before, is no settling; nor is what no slip renews.
 
-        Nor is a rise beyond twice the friction level. A contact that bends before it slides is not renewed while it bends.
+        Nor is a rise beyond twice the friction level. What bends before it slides is not renewed while it bends.
         """
         level = contact_level(problem.mount)
         bent = level / float(getattr(problem.mount.friction, "sigma0", inf))
