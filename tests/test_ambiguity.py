@@ -19,6 +19,7 @@ from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import (
+    ActuatorLag,
     Delay,
     FrictionAsymmetry,
     GravityUnbalance,
@@ -140,6 +141,14 @@ def test_a_clock_that_the_set_point_does_not_see_late_is_a_drive_whether_it_drif
     assert is_degenerate(late, Delay(delay_ms=5.0))
     assert not is_degenerate(in_time, Delay(delay_ms=5.0))
     assert not is_degenerate(in_time, ClockSkew(offset_ms=-0.5, drift_ppm=100.0))
+
+
+@pytest.mark.parametrize(("ms", "degenerate"), [(0.51, True), (0.57, False), (5.0, False)])
+def test_what_is_half_a_sample_late_is_how_it_was_read(ms: float, degenerate: bool) -> None:
+    """Read at 1 kHz; a value that is held, or stamped at the other end of its row, is half a sample late."""
+    swing = problem(np.sin(np.arange(20_000) / 1000))
+    assert is_degenerate(swing, Delay(delay_ms=ms)) is degenerate
+    assert is_degenerate(swing, ActuatorLag(time_constant_ms=ms)) is degenerate
 
 
 def test_a_spring_that_no_card_may_hold_is_no_answer() -> None:
