@@ -3,15 +3,21 @@
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
+from cosim.diagnosis import search
+from cosim.diagnosis.candidates import Candidate
+from cosim.diagnosis.comparison import Screened
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.dictionary import dictionary
+from cosim.diagnosis.policy import POLICY
 from cosim.estimation.prepare import prepare
 from cosim_studies.proof.generator import make_case, to_toml
 from cosim_studies.proof.outside import SHAPED
 from pyfmi_models.card import parse_card
+from pyfmi_models.effects import ActuatorLag
 
 sys.path.append(str(Path(__file__).parent / "benchmarks"))
 
@@ -32,6 +38,14 @@ def test_a_cogging_that_has_no_name_is_unknown() -> None:
         verdict = diagnose(train, [held], card).diagnosis.verdict
     assert leave_one_out.kind(" + ".join(verdict)) == "unknown"
     assert "cogging" not in verdict
+
+
+def test_what_is_left_out_does_not_come_back_as_a_twin() -> None:
+    lag = ActuatorLag(time_constant_ms=2.0)
+    screened = [Screened(Candidate("actuator_lag", (lag,), (), lambda _: lag), 10.0, 0.5, np.ones(1))]
+    assert {effect.id for effect, _ in search.starts(screened, POLICY)} == {"actuator_lag", "delay"}
+    with leave_one_out.left_out("delay"):
+        assert {effect.id for effect, _ in search.starts(screened, POLICY)} == {"actuator_lag"}
 
 
 def test_the_shapes_that_are_left_out_are_in_the_dictionary() -> None:

@@ -26,8 +26,9 @@ import numpy as np
 from bounds import wilson
 
 from cosim.data.recording import Recording
-from cosim.diagnosis import bounds, comparison, flexible, global_test
+from cosim.diagnosis import bounds, comparison, flexible, global_test, search
 from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.search import Start
 from cosim.support.version import __version__
 from cosim_studies.proof.conduct import code
 from cosim_studies.proof.generator import ANY, FAMILIES, make_case, write_given
@@ -56,6 +57,7 @@ def left_out(effect: str) -> Iterator[None]:
     with ExitStack() as stack:
         for module in (comparison, global_test, bounds):
             stack.enter_context(patch.object(module, "candidates", _less(module.candidates, effect)))
+        stack.enter_context(patch.object(search, "starts", _no_twin(search.starts, effect)))
         stack.enter_context(patch.object(flexible, "dictionary", _fewer(flexible.dictionary, effect)))
         yield
 
@@ -63,6 +65,15 @@ def left_out(effect: str) -> Iterator[None]:
 def _less(candidates: Callable[..., list[Any]], effect: str) -> Callable[..., list[Any]]:
     def others(*args: Any, **names: Any) -> list[Any]:
         return [one for one in candidates(*args, **names) if one.effect != effect]
+
+    return others
+
+
+def _no_twin(starts: Callable[..., list[Start]], effect: str) -> Callable[..., list[Start]]:
+    """What is left out does not come back as the twin of another effect."""
+
+    def others(*args: Any) -> list[Start]:
+        return [start for start in starts(*args) if start[0].id != effect]
 
     return others
 
