@@ -1,6 +1,6 @@
 """What is said of physics that the diagnosis cannot name, or has no shape for: each effect left out of it, once.
 
-    python tests/benchmarks/leave_one_out.py --cases 4 --seed 5 --out OUT
+    python tests/benchmarks/leave_one_out.py --cases 4 --seed 5 --out results/left_out
 
 Fresh cases of the home generator, machines of any class, one effect each. Two questions:
 
