@@ -4,8 +4,8 @@
 
 Fresh cases of the home generator, mixed as `cosim prove` mixes them. Each is diagnosed with the policy as it is, then
 once for each constant at half and at twice its value; pairs and triples of numbers are scaled together. Fits do not
-depend on the policy and are made once. Writes README.md and table.csv (answers as
-the policy is, and those that change).
+depend on the policy and are made once. Writes README.md and table.csv (answers as the policy is, and those that
+change).
 
 One constant is beyond it: `dwell_breakaway` reads the least rise of a dwell from the policy as it is.
 """
@@ -17,7 +17,6 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, fields, replace
-from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -34,7 +33,7 @@ from cosim.diagnosis.rivals import examine
 from cosim.diagnosis.sanity.doubts import doubts, of_base
 from cosim.diagnosis.search import InTurn, search
 from cosim.estimation.fit import Fit
-from cosim.estimation.prepare import prepare
+from cosim.estimation.prepare import Band, Prepared, prepare
 from cosim.estimation.problem import Problem
 from cosim.support.version import __version__
 from cosim_studies.proof.cases import CaseSpec, cases_of
@@ -58,7 +57,8 @@ OF_EVIDENCE = {
     "phase_price",
 }
 """Constants that evidence itself depends on: for these it is computed anew."""
-WITHHELD = ("withheld",)
+WITHHELD = ("unknown",)
+"""What a diagnosis says where something is wrong with the recordings."""
 
 
 @dataclass(frozen=True)
@@ -99,10 +99,11 @@ class Replay:
             *of_base(self.problem, self.base.mount, self.train, self.held),
         )
         self.usual = self._comparison(POLICY)
+        self.ready: dict[Band | float, Prepared] = {}
 
     def answer(self, policy: Policy, changed: str = "") -> tuple[str, ...]:
         """The verdict by a policy of which one constant is `changed`."""
-        with _remembered():
+        with self._remembered():
             comparison = self._comparison(policy) if changed in OF_EVIDENCE else self.usual
             object.__setattr__(comparison, "policy", policy)
             examined = examine(comparison, search(comparison, self.base, InTurn()), InTurn())
@@ -117,36 +118,18 @@ class Replay:
         own = Comparison.of(self.problem, self.base, policy)
         return Screening(**{one.name: getattr(own, one.name) for one in fields(Comparison)})
 
+    @contextmanager
+    def _remembered(self) -> Iterator[None]:
+        """Prepare the held-out recording once for each band, and say nothing of what was not seen."""
+        with ExitStack() as stack:
+            stack.enter_context(patch.object(whole, "prepare", self._prepared))
+            stack.enter_context(patch.object(whole, "not_found", lambda *_: []))
+            yield
 
-@contextmanager
-def _remembered() -> Iterator[None]:
-    """Prepare each recording once, and say nothing of what was not seen."""
-    with ExitStack() as stack:
-        stack.enter_context(patch.object(whole, "prepare", _prepared))
-        stack.enter_context(patch.object(whole, "not_found", lambda *_: []))
-        yield
-
-
-def _prepared(recordings: Sequence[Recording], band: Any) -> Any:
-    return _prepared_once(tuple(map(id, recordings)), band, _Held(recordings))
-
-
-class _Held:
-    """Recordings that are no part of the key."""
-
-    def __init__(self, recordings: Sequence[Recording]) -> None:
-        self.recordings = recordings
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Held)
-
-    def __hash__(self) -> int:
-        return 0
-
-
-@lru_cache(maxsize=4)
-def _prepared_once(_: tuple[int, ...], band: Any, held: _Held) -> Any:
-    return prepare(held.recordings, band)
+    def _prepared(self, recordings: Sequence[Recording], band: Band | float) -> Prepared:
+        if band not in self.ready:
+            self.ready[band] = prepare(recordings, band)
+        return self.ready[band]
 
 
 def constants() -> list[str]:
@@ -188,9 +171,14 @@ def is_right(row: dict[str, Any]) -> bool:
     return said[0] == concealed[0] if len(concealed) == 1 else set(said) == set(concealed)
 
 
+def as_it_is(rows: Sequence[dict[str, Any]]) -> dict[int, dict[str, Any]]:
+    """The rows of the policy as it is, by case."""
+    return {row["case"]: row for row in rows if not row["constant"]}
+
+
 def page(rows: Sequence[dict[str, Any]], options: argparse.Namespace, seconds: float) -> str:
     """The page of results/."""
-    usual = {row["case"]: row for row in rows if not row["constant"]}
+    usual = as_it_is(rows)
     command = f"python tests/benchmarks/sensitivity.py --cases {options.cases} --seed {options.seed}"
     lines = ["# How much depends on each constant of the decision", "", f"    {command} --out {options.out}", ""]
     lines += [
@@ -233,12 +221,9 @@ def main() -> None:
     with (options.out / "table.csv").open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         table.writeheader()
-        table.writerows(row for row in rows if not row["constant"] or row["answer"] != _usual(rows, row))
+        usual = as_it_is(rows)
+        table.writerows(row for row in rows if not row["constant"] or row["answer"] != usual[row["case"]]["answer"])
     (options.out / "README.md").write_text(page(rows, options, time.perf_counter() - begun), "utf-8")
-
-
-def _usual(rows: Sequence[dict[str, Any]], row: dict[str, Any]) -> str:
-    return next(str(one["answer"]) for one in rows if one["case"] == row["case"] and not one["constant"])
 
 
 if __name__ == "__main__":
