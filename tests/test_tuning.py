@@ -11,6 +11,7 @@ from cosim.diagnosis.tuning import in_cycles
 from cosim.estimation.fit import fit, with_values
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
+from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
 from pyfmi_models.effects.inertia_variation import InertiaVariation
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag
 from pyfmi_models.effects.thermal_viscosity import ThermalViscosity
@@ -61,3 +62,25 @@ def test_grease_is_found_to_thin_where_a_drag_had_taken_its_place() -> None:
     found = hypothesis_of(start).tuned(problem, stuck, start, lambda one: -problem.error(one)).parameters()
     assert found["thermal_viscosity.viscous_per_degC"] == pytest.approx(-0.04, rel=0.05)
     assert found["friction.sigma2"] == pytest.approx(3.0, rel=0.05)
+
+
+@pytest.mark.parametrize(("second", "turns"), [(0.6, 6.0), (0.0, 12.0)])
+def test_a_disc_is_found_at_its_own_turns_though_its_error_twice_a_turn_is_larger(second: float, turns: float) -> None:
+    t = np.arange(8000) / 200
+    q, v, a = (0.8 * f for f in (np.sin(t), np.cos(t), -np.sin(t)))
+    once, twice = 6 * q + 0.4, 2 * (6 * q + 0.4)
+    error = 2e-3 * (np.sin(once) + 0.6 * np.sin(twice)) if second else 1.2e-3 * np.sin(twice)
+    noise = 0.01 * np.random.default_rng(2).standard_normal(len(t))
+    read = {"t": t, "tau": 5 * a + 2 * np.sign(v) + 3 * v + noise, "q": q + error}
+    prepared = prepare([Recording("r", read)], 20.0)
+    card = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=3.0))
+    problem = Problem(card, prepared, (np.abs(prepared.stacked("v")) > 0.05).astype(float), 0.005)
+    start = EncoderEccentricity(cycles_per_rev=12.0, amplitude_rad=1e-3, phase=0.8)
+    began = problem.fit(replace(card, effects=(start,)), 12)
+    found = (
+        hypothesis_of(start).tuned(problem, began, start, lambda fit: 1e3 * (1 - problem.error(fit))).mount.effects[-1]
+    )
+    assert isinstance(found, EncoderEccentricity)
+    assert found.cycles_per_rev == turns
+    assert found.second == pytest.approx(second, abs=0.05)
+    assert found.amplitude_rad == pytest.approx(2e-3 if second else 1.2e-3, rel=0.1)

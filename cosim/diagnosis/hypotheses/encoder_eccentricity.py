@@ -3,12 +3,17 @@
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from math import atan2, hypot, pi
-from typing import ClassVar
+from typing import Any, ClassVar
+
+import numpy as np
 
 from cosim.diagnosis.candidates import Candidate, Span, has
-from cosim.diagnosis.hypotheses.base import Hypothesis, Seen, cycles_shown, in_cycles_a_turn, with_cycles
+from cosim.diagnosis.hypotheses.base import Evidence, Hypothesis, Seen, cycles_shown, in_cycles_a_turn, with_cycles
 from cosim.diagnosis.periodogram import peaks
+from cosim.diagnosis.tuning import in_cycles, restarted
+from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
+from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
 from pyfmi_models.mount import Mount
@@ -19,6 +24,8 @@ MOST_CYCLES = 40.0
 MOST_SLOPE = 0.25
 """Error of the reading for a way, relative to it: a disc of radius R off by e errs by e/R of the way, twice that with
 an oval one; a quarter is no disc any more, but a ripple whose torque the reading would have to make. Unit: 1."""
+CLEARLY = 3.0
+"""Nats by which a disc of half the turns must be ahead: by less the simpler of two rivals stands as well."""
 
 
 class Eccentricity(Hypothesis[EncoderEccentricity]):
@@ -42,6 +49,19 @@ class Eccentricity(Hypothesis[EncoderEccentricity]):
             pair = tuple(EncoderEccentricity(cycles_per_rev=cycles, amplitude_rad=0.0, phase=p) for p in (0.0, pi / 2))
             yield Candidate("encoder_eccentricity", pair, ("amplitude_rad",), start)
 
+    def tuned(self, problem: Problem, found: Fit, start: EncoderEccentricity, evidence: Evidence) -> Fit:
+        """Ask a disc of half the turns whether what was found is its error twice a turn.
+
+        The torque of that error is four times as large as that of one once a turn, so a search begins with it, and no
+        step leads from there to half the turns.
+        """
+        found = in_cycles(problem, found)
+        if evidence(found) <= 0:
+            return found
+        starts = halved(problem, found.mount.effects[-1])
+        halves = [in_cycles(problem, restarted(problem, found, one)) for one in starts]
+        return max((found, *(one for one in halves if evidence(one) > evidence(found) + CLEARLY)), key=evidence)
+
     def is_plausible(self, effect: EncoderEccentricity, mount: Mount) -> bool:
         """The reading goes on where the axis does: it errs by less of the way than `MOST_SLOPE`."""
         slope = effect.amplitude_rad * effect.cycles_per_rev * (1 + 2 * abs(effect.second))
@@ -54,3 +74,18 @@ class Eccentricity(Hypothesis[EncoderEccentricity]):
     def looked(self, seen: Seen, mount: Mount) -> str:
         """Between which cycles."""
         return in_cycles_a_turn(seen, mount)
+
+
+def halved(problem: Problem, disc: Any) -> list[EncoderEccentricity]:
+    """Discs of half the turns, that is whole ones of an axis that turns, whose error twice a turn is that of `disc`.
+
+    It is so in the middle of what was visited; the error once a turn starts half as large, either way.
+    """
+    half = disc.cycles_per_rev / 2
+    cycles, around = (half, 2 * pi) if problem.mount.motion == "linear" else (max(1.0, float(round(half))), 1.0)
+    middle = around * float(np.mean(problem.prepared.ranges["q"]))
+    phase = disc.phase / 2 + (half - cycles) * middle
+    return [
+        replace(disc, cycles_per_rev=cycles, amplitude_rad=disc.amplitude_rad / 2, second=2.0, phase=phase + turn)
+        for turn in (0.0, pi)
+    ]
