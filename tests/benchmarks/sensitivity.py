@@ -1,6 +1,6 @@
 """What depends on each constant of the decision: halved and doubled, one at a time, how many answers change?
 
-    python tests/benchmarks/sensitivity.py --cases 20 --seed 5 --out OUT
+    python tests/benchmarks/sensitivity.py --cases 6 --seed 5 --out results/sensitivity
 
 Fresh cases of the home generator, mixed as `cosim prove` mixes them. Each is diagnosed with the policy as it is, then
 once for each constant at half and at twice its value; pairs and triples of numbers are scaled together. Fits do not
