@@ -77,9 +77,8 @@ def test_a_disc_is_found_at_its_own_turns_though_its_error_twice_a_turn_is_large
     problem = Problem(card, prepared, (np.abs(prepared.stacked("v")) > 0.05).astype(float), 0.005)
     start = EncoderEccentricity(cycles_per_rev=12.0, amplitude_rad=1e-3, phase=0.8)
     began = problem.fit(replace(card, effects=(start,)), 12)
-    found = (
-        hypothesis_of(start).tuned(problem, began, start, lambda fit: 1e3 * (1 - problem.error(fit))).mount.effects[-1]
-    )
+    tuned = hypothesis_of(start).tuned(problem, began, start, lambda fit: 1e3 * (1 - problem.error(fit)))
+    found = tuned.mount.effects[-1]
     assert isinstance(found, EncoderEccentricity)
     assert found.cycles_per_rev == turns
     assert found.second == pytest.approx(second, abs=0.05)

@@ -100,7 +100,7 @@ NOTES = {
     "torque that ripples by more, is not named: its rest is larger than 7 % of the friction and is called unknown; "
     "no Stribeck curve is named there, as it should be. The motor hardly turns back, where friction cannot be told "
     "from torque: fewer of the cogging's orders are found than it has, what bends like a contact there may not be "
-    "named, so that `unknown` stands before the cogging, which removes .88 of the error energy (from .9 on it were "
+    "named, so that `unknown` stands before the cogging, which removes .89 of the error energy (from .9 on it were "
     "sure), and with the neighbour motor turned the model is worse than the base, as the README warns. Real "
     "machines leave more than simulated ones: `unknown` beside a name says so. What is learned of the servo lowers the "
     "error of the held-out runs in the tool's own band, and raises it in the rows that its README judges (faster than "

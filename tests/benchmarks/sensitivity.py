@@ -7,7 +7,8 @@ once for each constant at half and at twice its value; pairs and triples of numb
 depend on the policy and are made once. Writes README.md and table.csv (answers as the policy is, and those that
 change).
 
-One constant is beyond it: `dwell_breakaway` reads the least rise of a dwell from the policy as it is.
+Two readers are beyond it: `dwell_breakaway` takes the least rise of a dwell from the policy as it is,
+`encoder_eccentricity` the margin of a disc with half the turns.
 """
 
 import argparse

@@ -10,6 +10,7 @@ import numpy as np
 from cosim.diagnosis.candidates import Candidate, Span, has
 from cosim.diagnosis.hypotheses.base import Evidence, Hypothesis, Seen, cycles_shown, in_cycles_a_turn, with_cycles
 from cosim.diagnosis.periodogram import peaks
+from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.tuning import in_cycles, restarted
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
@@ -24,8 +25,6 @@ MOST_CYCLES = 40.0
 MOST_SLOPE = 0.25
 """Error of the reading for a way, relative to it: a disc of radius R off by e errs by e/R of the way, twice that with
 an oval one; a quarter is no disc any more, but a ripple whose torque the reading would have to make. Unit: 1."""
-CLEARLY = 3.0
-"""Nats by which a disc of half the turns must be ahead: by less the simpler of two rivals stands as well."""
 
 
 class Eccentricity(Hypothesis[EncoderEccentricity]):
@@ -53,14 +52,15 @@ class Eccentricity(Hypothesis[EncoderEccentricity]):
         """Ask a disc of half the turns whether what was found is its error twice a turn.
 
         The torque of that error is four times as large as that of one once a turn, so a search begins with it, and no
-        step leads from there to half the turns.
+        step leads from there to half the turns. It must be ahead by the margin that a rival needs.
         """
-        found = in_cycles(problem, found)
+        found = super().tuned(problem, found, start, evidence)
         if evidence(found) <= 0:
             return found
         starts = halved(problem, found.mount.effects[-1])
         halves = [in_cycles(problem, restarted(problem, found, one)) for one in starts]
-        return max((found, *(one for one in halves if evidence(one) > evidence(found) + CLEARLY)), key=evidence)
+        best = max(halves, key=evidence)
+        return best if evidence(best) > evidence(found) + POLICY.set_margin else found
 
     def is_plausible(self, effect: EncoderEccentricity, mount: Mount) -> bool:
         """The reading goes on where the axis does: it errs by less of the way than `MOST_SLOPE`."""
