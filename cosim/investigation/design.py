@@ -30,7 +30,7 @@ from cosim.estimation.problem import Problem
 from cosim.investigation.families import AT_RANDOM, FAMILIES
 from cosim.investigation.ground import new_ground, visited
 from cosim.investigation.limits import KEPT, Limits
-from cosim.investigation.motions import FADE, Motion, Room
+from cosim.investigation.motions import FADE, JERK, Motion, Room
 from cosim.investigation.questions import Duel
 from pyfmi_models.effects.base import TonalEffect
 
@@ -66,6 +66,8 @@ SPARE, GROWTH = 4.0, 3
 the positions, speeds and accelerations of the recordings it grows by this power of how far beyond: so steeply grows a
 cable that hardens (q^3), and 4 s^3 RMS covers what a drag of v^2 is off the best line through speeds up to v/s. At
 faster reversals it is for an inertia that slow ones told badly, and for what the loop adds there. Unit: 1."""
+RAMP = 20
+"""Rows in which a motion reaches its acceleration, for the torque that it asks for: misses a peak by 3 % at most."""
 SMALLER = ((1.0, 1.0), (0.5, 1.0), (0.25, 1.0), (0.5, 0.5), (0.25, 0.25))
 """Shares of speed and acceleration, and of the way, at which a motion is tried until it leaves no limit. Unit: 1."""
 
@@ -129,7 +131,7 @@ def allowed(
     for share, way in SMALLER:
         motion = family(room.slower(share).nearer(way))
         piece, limit = piece_of(motion, home, known.cutoff, within)
-        limit = limit or limits.torque_left((np.abs(torque_of(ours, piece)) + spare(known, piece, ours.rms)) / KEPT)
+        limit = limit or limits.torque_left(most_torque(motion, home, piece, ours, known) / KEPT)
         if not limit:
             break
     return motion, piece, limit
@@ -155,6 +157,15 @@ def spare(known: Prepared, piece: Piece, rms: float) -> Array:
     pairs = ((piece.q - (low + high) / 2, (high - low) / 2), *((getattr(piece, k), _top(known, k)) for k in "va"))
     beyond = np.maximum(1.0, np.max([np.abs(one) / max(most, 1e-300) for one, most in pairs], axis=0))
     return np.asarray(SPARE * rms * beyond**GROWTH)
+
+
+def most_torque(motion: Motion, home: float, piece: Piece, ours: Fit, known: Prepared) -> Array:
+    """Torque of a motion as it is asked, and what is to be left over: the low-pass takes a third of a move of 50 ms."""
+    rate = RAMP * JERK
+    t: Array = np.arange(0.0, motion.seconds, 1 / rate)
+    q, v, a = motion.sampled(t)
+    asked = Piece(0, t, q + home, v, a, np.zeros_like(t), np.ones(len(t), bool), 1 / rate, rate / 4, 1)
+    return np.asarray(np.abs(torque_of(ours, asked)) + np.interp(t, piece.t, spare(known, piece, ours.rms)))
 
 
 def _top(known: Prepared, name: str) -> float:
