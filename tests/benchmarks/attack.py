@@ -139,7 +139,7 @@ def attack(target: Target, seed: int, place: int, keep: bool = False) -> Found:
             rmtree(folder, ignore_errors=True)
 
 
-def page(found: list[Found], seed: int, planned: int) -> str:
+def page(found: list[Found], seed: int, asked: int) -> str:
     """The table for people."""
     counts = collections.Counter((one.kind, one.end) for one in found)
     total = collections.Counter(one.end for one in found)
@@ -152,9 +152,10 @@ def page(found: list[Found], seed: int, planned: int) -> str:
     lines = [
         "# Spoilt files and numbers against the command line",
         "",
-        f"    python tests/benchmarks/attack.py --seed {seed} --count {planned} --out results/attack",
+        f"    python tests/benchmarks/attack.py --seed {seed} --count {asked} --out results/attack",
         "",
-        f"mount-cosim {__version__}; {len(found):,} mutations of {planned:,} planned, {defects} defects. "
+        f"mount-cosim {__version__}; {len(found):,} mutations (whole ones of each kind, {asked:,} in all asked for), "
+        f"{defects} defects. "
         "What the columns mean stands at the top of `tests/benchmarks/attack.py`; "
         "`defects.json` has what was said in each defect.",
         "",
@@ -197,15 +198,15 @@ def main() -> None:
                 print(f"{one.end} {one.kind} {one.number} ({one.how}): ...{one.said[-300:]}", flush=True)
     finally:
         rmtree(folder, ignore_errors=True)
-    written(found, given.seed, len(found), given.out)
+    written(found, given.seed, given.count, given.out)
 
 
-def written(found: list[Found], seed: int, planned: int, out: Path) -> None:
+def written(found: list[Found], seed: int, asked: int, out: Path) -> None:
     """Write README.md and defects.json."""
     out.mkdir(parents=True, exist_ok=True)
     defects = [vars(one) for one in found if one.end in DEFECTS]
     for name, text in (
-        ("README.md", page(found, seed, planned)),
+        ("README.md", page(found, seed, asked)),
         ("defects.json", json.dumps(defects, indent=1) + "\n"),
     ):
         with replacing(out / name, force=True) as partial:
