@@ -121,11 +121,7 @@ def test_ctrl_c_and_termination_leave_a_complete_file(
     scenario: Path, tmp_path: Path, number: int, code: int, word: str
 ) -> None:
     scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e6"))
-    # A shell's background jobs ignore SIGINT, and so do their children: make it count however the tests started.
-    start = (
-        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from cosim.cli import main; main()"
-    )
-    command = [sys.executable, "-c", start, "run", str(scenario), "--out", str(tmp_path / "out")]
+    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out")]
     with subprocess.Popen(command, env=ENVIRONMENT, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
         until = time.monotonic() + 60
         while time.monotonic() < until and not any(

@@ -182,10 +182,7 @@ def test_a_signal_ends_both_processes_and_leaves_nothing_half_written(
 ) -> None:
     written(scenario, "fail_at = 0.3, status = 12" if hang else "nan_at = 1e9")
     scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e6"))
-    start = (
-        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from cosim.cli import main; main()"
-    )
-    command = [sys.executable, "-c", start, "run", str(scenario), "--out", str(tmp_path / "out")]
+    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out")]
     process = subprocess.Popen(command, env=ENVIRONMENT | {"TMPDIR": str(temporary)}, stderr=subprocess.DEVNULL)
     until = time.monotonic() + 30
     while time.monotonic() < until and not list((tmp_path / "out").glob(".*.partial")):

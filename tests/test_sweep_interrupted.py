@@ -88,12 +88,9 @@ def test_an_identity_that_is_no_json_is_a_sentence(folder: Path) -> None:
 
 @pytest.fixture
 def started(folder: Path) -> Iterator[Callable[[], "subprocess.Popen[str]"]]:
-    """Start a sweep that takes long, in a process that heeds SIGINT however the tests were started."""
+    """Start a sweep that takes long."""
     written(folder, (K, '"plant.k" = { low = 1.0, high = 9.0, count = 100000 }'))
-    begin = (
-        "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); from cosim.cli import main; main()"
-    )
-    command = [sys.executable, "-c", begin, "sweep", "sweep.toml", "--out", "out", "--workers", "2"]
+    command = [sys.executable, "-m", "cosim", "sweep", "sweep.toml", "--out", "out", "--workers", "2"]
     processes = []
 
     def start() -> "subprocess.Popen[str]":
