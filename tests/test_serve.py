@@ -132,7 +132,7 @@ def test_this_machine_alone_is_listened_to_and_a_taken_port_is_a_sentence() -> N
     with listening(0) as first:
         host, port = first.getsockname()
         assert host == "127.0.0.1"
-        first.listen()
+        socket.create_connection((host, port), timeout=10).close()  # the address is told before the server answers
         with pytest.raises(InputError, match=rf"Port {port} cannot be listened to"):
             listening(port)
     with pytest.raises(InputError, match="Port 99999"):
