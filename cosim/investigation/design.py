@@ -131,7 +131,7 @@ def allowed(
     for share, way in SMALLER:
         motion = family(room.slower(share).nearer(way))
         piece, limit = piece_of(motion, home, known.cutoff, within)
-        limit = limit or limits.torque_left(most_torque(motion, home, piece, ours, known) / KEPT)
+        limit = limit or limits.torque_left(torque_asked(motion, home, piece, ours, known) / KEPT)
         if not limit:
             break
     return motion, piece, limit
@@ -159,8 +159,8 @@ def spare(known: Prepared, piece: Piece, rms: float) -> Array:
     return np.asarray(SPARE * rms * beyond**GROWTH)
 
 
-def most_torque(motion: Motion, home: float, piece: Piece, ours: Fit, known: Prepared) -> Array:
-    """Torque of a motion as it is asked, and what is to be left over: the low-pass takes a third of a move of 50 ms."""
+def torque_asked(motion: Motion, home: float, piece: Piece, ours: Fit, known: Prepared) -> Array:
+    """Torque of a motion as it is asked, and what is to be left over: a low-pass takes a quarter of a move of 50 ms."""
     rate = RAMP * JERK
     t: Array = np.arange(0.0, motion.seconds, 1 / rate)
     q, v, a = motion.sampled(t)
