@@ -14,7 +14,7 @@ UNIT_KEY = b"unit"
 
 @dataclass(frozen=True)
 class Columns:
-    """Columns of equal length by name, as a file has them.
+    """Columns by name, as a file has them; of equal length unless they have clocks.
 
     A column is float64; int64 where a double would lose digits; datetime64 or timedelta64 for time stamps; object
     where the file holds text.
@@ -31,6 +31,9 @@ class Columns:
         notes: sentences on what was left out.
         rows: which rows of the file these are, where they are one recording of many: "4,378 to 8,755".
         numbered: the file names no columns; they are called #1, #2 ...
+        clocks: times [s] of the samples of channels by name, where channels have times of their own: those of one
+            clock share the array, no column is the time, and NaN is an invalid sample. Lengths may then differ;
+            `cosim.data.joining` makes a table of them.
     """
 
     values: dict[str, np.ndarray]
@@ -44,3 +47,4 @@ class Columns:
     notes: tuple[str, ...] = ()
     rows: str = ""
     numbered: bool = False
+    clocks: dict[str, np.ndarray] = field(default_factory=dict)

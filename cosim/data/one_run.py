@@ -1,4 +1,7 @@
-"""One recording of a file of many, as it is named: `many.parquet:run=3` by a column, `many.csv:#3` by number."""
+"""The rows of one recording: what a file holds on one time base, and of many recordings the one that is named.
+
+`many.parquet:run=3` names it by a column, `many.csv:#3` by its number.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -8,14 +11,41 @@ import numpy as np
 
 from cosim.data.assign import assign
 from cosim.data.columns import Columns
+from cosim.data.joining import on_one_time
 from cosim.data.limits import listed, short
 from cosim.data.runs import equal, split, starts, text_of
+from cosim.data.spacing import with_time
 from cosim.data.times import read_clock
 from cosim.support.errors import RecordingError
 from cosim.support.numbers import whole
 
 MANY = 1000
 """Values of a column beyond which it is a measurement, and no name of a recording."""
+
+
+def rows_of_one(
+    path: Path,
+    found: Columns,
+    columns: Mapping[str, str],
+    units: Mapping[str, str],
+    layout: Mapping[str, str],
+    required: Sequence[str],
+) -> Columns:
+    """Return what a file holds as a table with one row for each time.
+
+    Args:
+        path: the file, and which recording of it.
+        found: all that the file holds.
+        columns: what the user says of names, as `assign` takes it.
+        units: what the user says of units.
+        layout: what the user says of the layout: `period`, the distance of rows without a time.
+        required: columns that are needed; see `on_one_time`.
+
+    Raises:
+        RecordingError: as `on_one_time`, `with_time` and `one_run`.
+    """
+    found = with_time(on_one_time(path, found, columns, units, required), layout)
+    return one_run(path, found, columns, units)
 
 
 def one_run(path: Path, found: Columns, columns: Mapping[str, str], units: Mapping[str, str]) -> Columns:

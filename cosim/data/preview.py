@@ -8,12 +8,11 @@ from shlex import quote
 from cosim.data.assign import assign
 from cosim.data.columns import Columns
 from cosim.data.formats import read_columns
-from cosim.data.one_run import one_run
+from cosim.data.one_run import rows_of_one
 from cosim.data.questions import PERIOD
 from cosim.data.recording import REQUIRED, Recording
 from cosim.data.runs import named, split
-from cosim.data.spacing import with_time
-from cosim.support.errors import RecordingError, UndecidedError
+from cosim.support.errors import ManyRecordingsError, RecordingError, UndecidedError
 from cosim.support.files import sha256
 
 TRIES = 8
@@ -74,15 +73,16 @@ def preview(path: Path, options: Mapping[str, Mapping[str, str]] | None = None) 
 
 
 def _judged(path: Path, own: str, found: Columns, said: Options, undecided: tuple[str, ...]) -> Preview:
-    timed = one_run(path, with_time(found, said["layout"]), said["columns"], said["units"])
     refused, name = "", named(path)
     required: tuple[str, ...] = REQUIRED
     try:
-        recording = Recording.judged(path, name, timed, own, said["columns"], said["units"], REQUIRED)
-    except UndecidedError:
+        timed = rows_of_one(path, found, said["columns"], said["units"], said["layout"], required)
+        recording = Recording.judged(path, name, timed, own, said["columns"], said["units"], required)
+    except (UndecidedError, ManyRecordingsError):
         raise
     except RecordingError as error:
         refused, required = str(error), ()
-        recording = Recording.judged(path, name, timed, own, said["columns"], said["units"], ())
+        timed = rows_of_one(path, found, said["columns"], said["units"], said["layout"], required)
+        recording = Recording.judged(path, name, timed, own, said["columns"], said["units"], required)
     served = assign(path, timed, said["columns"], said["units"], required)
     return Preview(recording, timed, served.sources, said, undecided, refused)

@@ -18,11 +18,10 @@ from cosim.data.assign import assign
 from cosim.data.checks import check_motion, check_names, check_sampling, check_time, chosen, numbers
 from cosim.data.columns import Columns
 from cosim.data.formats import read_columns
-from cosim.data.one_run import one_run
+from cosim.data.one_run import rows_of_one
 from cosim.data.questions import PERIOD
 from cosim.data.registers import continued
 from cosim.data.runs import named, split
-from cosim.data.spacing import with_time
 from cosim.data.times import read_clock
 from cosim.support.errors import OutputError
 from cosim.support.files import replacing, sha256
@@ -92,7 +91,7 @@ class Recording:
         path, layout = Path(path), dict(layout or {})
         file, _ = split(path)
         found = read_columns(file, {key: text for key, text in layout.items() if key != PERIOD})
-        found = one_run(path, with_time(found, layout), columns or {}, units or {})
+        found = rows_of_one(path, found, columns or {}, units or {}, layout, required)
         return cls.judged(path, named(path), found, sha256(file), columns or {}, units or {}, required)
 
     @classmethod

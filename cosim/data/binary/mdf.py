@@ -1,20 +1,27 @@
-"""MDF4: the channels of a measurement with their units, on one time base.
+"""MDF4: the channels of a measurement with their units, each group with its own times.
+
+Samples that the file marks as invalid are NaN here. A channel that several groups hold is named after its device.
 
 A file may convert a channel by a formula, which asammdf has numexpr evaluate: a text of a stranger as Python. What
 keeps the worst out there was bypassed before (numexpr 564, 2026), so only plain arithmetic reaches it.
 """
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from cosim.data.binary.packages import package, vectors
+import numpy as np
+
+from cosim.data.binary.packages import package
 from cosim.data.columns import Columns
-from cosim.data.limits import check_cells, short
+from cosim.data.limits import check_cells, listed, short
 from cosim.support.errors import RecordingError
 
 ARITHMETIC, LONGEST = frozenset("0123456789.eEXx+-*/(), \t"), 200
 """Signs of numbers, of the channel itself and of four operations, and how many a formula may have."""
+TIME = 1
+"""Kind of a master channel that is a time; others are angles, distances and indices (ASAM MDF 4.2, cn_sync_type)."""
 
 
 def read(path: Path) -> Columns:
@@ -23,12 +30,56 @@ def read(path: Path) -> Columns:
     try:
         _check_formulas(path, mdf)
         check_cells(path, max((one.channel_group.cycles_nr for one in mdf.groups), default=0), len(mdf.channels_db))
-        frame = mdf.to_dataframe(time_from_zero=False)
-        units = {name: str(mdf.get(name).unit or "") for name in frame.columns if name in mdf}
+        return _columns(path, mdf)
     finally:
         mdf.close()
-    values = {"t": frame.index.to_numpy()} | {name: frame[name].to_numpy() for name in frame.columns}
-    return Columns(vectors(path, values), {name: unit for name, unit in units.items() if unit})
+
+
+def _columns(path: Path, mdf: Any) -> Columns:
+    signals = [signal for group in mdf.virtual_groups for signal in _signals(mdf, group)]
+    untimed = tuple(signal.name for signal in signals if (signal.master_metadata or ("", 0))[1] != TIME)
+    signals = [one for one in signals if one.name not in untimed]
+    if untimed and not signals:
+        text = f"{path}: none of its channels has a time: {listed(untimed)}."
+        raise RecordingError(text, culprit=str(path), value="t")
+    names = _names(mdf, signals)
+    values = {name: _valid(one) for name, one in zip(names, signals, strict=True)}
+    units = {name: str(one.unit) for name, one in zip(names, signals, strict=True) if one.unit}
+    clocks = {name: one.timestamps for name, one in zip(names, signals, strict=True)}
+    notes = (f"{path.stem}: channels without a time were left out: {listed(untimed)}.",) if untimed else ()
+    return Columns(values, units, clocks=clocks, notes=notes)
+
+
+def _signals(mdf: Any, group: int) -> Iterator[Any]:
+    """Channels of a group that are numbers, one a sample."""
+    pairs = [(None, own, place) for own, places in mdf.included_channels(group)[group].items() for place in places]
+    signals = mdf.select(pairs, copy_master=False) if pairs else ()
+    yield from (one for one in signals if one.samples.dtype.kind in "fiub" and one.samples.ndim == 1)
+
+
+def _valid(signal: Any) -> np.ndarray:
+    samples = np.asarray(signal.samples, dtype=np.float64)
+    bits = signal.invalidation_bits
+    return samples if bits is None else np.where(np.asarray(bits, bool), np.nan, samples)
+
+
+def _names(mdf: Any, signals: Sequence[Any]) -> list[str]:
+    """Names of channels; of those of one name the name of the device, or the number of the group, stands before it."""
+    often = Counter(one.name for one in signals)
+    devices = [_device(mdf, one) for one in signals]
+    alike = Counter((device, one.name) for device, one in zip(devices, signals, strict=True))
+    told = [
+        device if device and alike[device, one.name] == 1 else f"group {one.group_index + 1}"
+        for device, one in zip(devices, signals, strict=True)
+    ]
+    return [
+        f"{label}.{one.name}" if often[one.name] > 1 else one.name for label, one in zip(told, signals, strict=True)
+    ]
+
+
+def _device(mdf: Any, signal: Any) -> str:
+    group = mdf.groups[signal.group_index].channel_group
+    return str(getattr(group, "acq_name", "") or getattr(signal.source, "name", "") or "")
 
 
 def _check_formulas(path: Path, mdf: Any) -> None:

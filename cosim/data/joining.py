@@ -1,0 +1,312 @@
+"""Channels with times of their own, put on one time base.
+
+A file may hold channels of several devices: each has its own start, end, rate and gaps. `Columns.clocks` holds their
+times; here they become a table.
+
+    base      the times of the slower one of torque and position, as nothing is known between its samples; of equally
+              fast ones those of the position, which is differentiated twice and so must stay as it was read
+    torque    faster than the base: its mean over the interval that is centred at each row, which keeps the impulse;
+              else read between two samples on a straight line
+    position, speed    read between samples on the cubic through four of them; on a line where their steps are uneven
+    set point, whole numbers    the last sample, which holds until the next
+    others    read between two samples on a line
+
+Nothing is extrapolated, and nothing is read across a gap: a step longer than `GAP` times the channel's own period,
+which is the larger of the median and the 90 % quantile of its steps. Rows that torque or position do not reach are left
+out: at the ends the recording begins later or ends earlier, in the middle it has a gap. Samples that are NaN are none.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.data.assign import OURS, assign
+from cosim.data.checks import chosen
+from cosim.data.columns import Columns
+from cosim.data.limits import listed
+from cosim.data.registers import continued
+from cosim.support.errors import RecordingError
+
+Array = npt.NDArray[np.float64]
+GAP = 1.5
+"""A step of a channel longer than this many of its own periods is a gap."""
+USUAL = 0.9
+"""Quantile of its steps that is taken for the period of a channel whose samples come unevenly."""
+EQUAL = 0.9
+"""Ratio of two periods above which channels are equally fast."""
+SAME = 1e-3
+"""Share of a period within which two times are one: the sample is taken as it is."""
+COVERED = 0.75
+"""Share of a row's interval that samples of a mean must cover."""
+EVEN = 0.5
+"""Steps shorter than this share of the period are uneven: a cubic through such samples may leave them far."""
+SPENT = 0.1
+"""Share of the rows that channels other than torque and position may cost; one that would cost more is left out."""
+LEAST = 2
+"""Samples that a channel needs."""
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """The valid samples of a channel: times [s] that grow, and values, of one shape; `invalid` were left out."""
+
+    name: str
+    t: Array
+    x: Array
+    invalid: int = 0
+
+    @cached_property
+    def period(self) -> float:
+        """Usual distance of two samples [s]."""
+        return float(np.median(np.diff(self.t)))
+
+    @cached_property
+    def longest(self) -> float:
+        """The longest step that is no gap [s]."""
+        return GAP * max(self.period, float(np.quantile(np.diff(self.t), USUAL)))
+
+    @property
+    def span(self) -> str:
+        """Rate, start, end and gaps in words."""
+        gaps = int((np.diff(self.t) > self.longest).sum())
+        holes = f", {gaps:,} gap{'s' * (gaps > 1)}" if gaps else ""
+        return f"{1 / self.period:,.6g} Hz, {self.t[0]:.6g} s to {self.t[-1]:.6g} s{holes}"
+
+    def cells(self) -> tuple[Array, Array]:
+        """Start and end of what each sample stands for [s]: up to the middle between two, half a period at a gap."""
+        steps = np.diff(self.t)
+        half = 0.5 * np.where(steps > self.longest, self.period, steps)
+        ends = 0.5 * self.period
+        return self.t - np.concatenate([[ends], half]), self.t + np.concatenate([half, [ends]])
+
+
+@dataclass(frozen=True, eq=False)
+class Read:
+    """A channel at the times of the base: values, whether there is one, and how it was read."""
+
+    channel: Channel
+    values: Array
+    valid: npt.NDArray[np.bool_]
+    how: str
+
+
+def on_one_time(
+    path: Path, found: Columns, columns: Mapping[str, str], units: Mapping[str, str], required: Sequence[str]
+) -> Columns:
+    """Put channels with times of their own on one time base; a table whose columns share their times stays as it is.
+
+    Args:
+        path: the file, for messages.
+        found: columns, and the times of those that have their own.
+        columns: what the user says of names, as `assign` takes it.
+        units: what the user says of units.
+        required: columns that are needed; the base is taken from them.
+
+    Returns:
+        Columns of equal length with the time `t` [s], and a note that says what was read at which times.
+
+    Raises:
+        RecordingError: torque and position have no time in common, or time of a channel does not grow.
+    """
+    if not found.clocks:
+        return found
+    found = _of_one_clock(path, found, columns) if "t" in columns else found
+    channels = {name: one for name in found.clocks if (one := _channel(path, found, name))}
+    if not channels:
+        return replace(found, values={}, clocks={})
+    longest = max(channels.values(), key=lambda one: len(one.t))
+    named = replace(found, values={"t": longest.t} | {name: one.x for name, one in channels.items()}, clocks={})
+    served = assign(path, named, columns, units, required)
+    roles = {theirs: ours for ours, theirs in served.sources.items() if theirs in channels and ours in OURS}
+    needed = [served.sources[ours] for ours in chosen(served.values, tuple(required)) if ours != "t"]
+    channels |= {name: _turned(path, channels[name], served.units) for name, ours in roles.items() if ours == "q"}
+    base = _base([channels[name] for name in needed if name in channels], roles) or longest
+    return _table(path, found, channels, roles, base, needed)
+
+
+def _of_one_clock(path: Path, found: Columns, columns: Mapping[str, str]) -> Columns:
+    """Only the channels that share their times with the column that the user calls the time."""
+    own = found.clocks.get(columns["t"])
+    return found if own is None else replace(found, clocks={k: v for k, v in found.clocks.items() if v is own})
+
+
+def _channel(path: Path, found: Columns, name: str) -> Channel | None:
+    t, x = found.clocks[name].astype(np.float64), found.values[name]
+    if x.dtype.kind not in "fiub":
+        return None
+    x = x.astype(np.float64)
+    valid = np.isfinite(x) & np.isfinite(t)
+    if valid.sum() < LEAST:
+        return None
+    t, x, invalid = t[valid], x[valid], int((~valid).sum())
+    if wrong := np.flatnonzero(np.diff(t) <= 0).tolist():
+        row, how = wrong[0] + 1, "stands still" if t[wrong[0] + 1] == t[wrong[0]] else "runs backwards"
+        text = f'{path}: time of "{name}" {how} at its sample {row + 1:,} ({t[row - 1]:.9g} s to {t[row]:.9g} s).'
+        raise RecordingError(text, culprit=str(path), value=float(t[row]))
+    return Channel(name, t, x, invalid)
+
+
+def _turned(path: Path, channel: Channel, units: Mapping[str, str]) -> Channel:
+    """A position whose turns are counted: between the end of a register and its start nothing can be read."""
+    table, _ = continued(path.stem, {"q": channel.x}, units)
+    return replace(channel, x=table["q"])
+
+
+def _base(needed: Sequence[Channel], roles: Mapping[str, str]) -> Channel | None:
+    """The channel whose times are the rows."""
+    if not needed:
+        return None
+    slowest = max(one.period for one in needed)
+    among = [one for one in needed if one.period >= EQUAL * slowest]
+    first = among[0]
+    together = all(_coincide(first, one) for one in among)
+    positions = [one for one in among if roles.get(one.name) in ("q", "v")]
+    return first if together or not positions else positions[0]
+
+
+def _coincide(one: Channel, other: Channel) -> bool:
+    """Whether two channels were sampled at the same instants wherever both were."""
+    low, high = max(one.t[0], other.t[0]), min(one.t[-1], other.t[-1])
+    inner = one.t[(one.t >= low) & (one.t <= high)]
+    near = other.t[np.clip(np.searchsorted(other.t, inner - SAME * other.period), 0, len(other.t) - 1)]
+    hit = np.abs(near - inner) <= SAME * other.period
+    return bool(hit.mean() > 0.5) if len(inner) else False
+
+
+def _table(
+    path: Path,
+    found: Columns,
+    channels: Mapping[str, Channel],
+    roles: Mapping[str, str],
+    base: Channel,
+    needed: Sequence[str],
+) -> Columns:
+    reads = {name: _read(one, base, roles.get(name, "")) for name, one in channels.items()}
+    rows = np.ones(len(base.t), bool)
+    for name in (one for one in needed if one in reads):
+        rows &= reads[name].valid
+    if not rows.any():
+        _refuse(path, [channels[name] for name in needed if name in channels])
+    kept, rows, costly = _kept(reads, rows, roles, needed)
+    names = {name: "t_original" if name == "t" else name for name in kept}
+    values = {"t": base.t[rows]} | {names[name]: one.values[rows] for name, one in kept.items()}
+    units = {names[name]: text for name, text in found.units.items() if name in kept} | {"t": "s"}
+    left = [name for name in found.values if name not in kept]
+    notes = (*found.notes, *_notes(path, base, kept, rows, left, costly))
+    return replace(found, values=values, units=units, clocks={}, notes=notes)
+
+
+def _kept(
+    reads: Mapping[str, Read], rows: npt.NDArray[np.bool_], roles: Mapping[str, str], needed: Sequence[str]
+) -> tuple[dict[str, Read], npt.NDArray[np.bool_], list[str]]:
+    """Channels that go along, the rows at which all of them are, and the names of those that would cost too many.
+
+    A set point and a temperature may cost rows anywhere, other channels at the ends only.
+    """
+    least, costly = (1 - SPENT) * rows.sum(), []
+    for name in sorted((one for one in reads if one not in needed), key=lambda one: one not in roles):
+        both = rows & reads[name].valid
+        first, last = (int(np.argmax(both)), len(both) - int(np.argmax(both[::-1]))) if both.any() else (0, 0)
+        whole = name in roles or bool(both[first:last].sum() == rows[first:last].sum())
+        if both.sum() >= least and whole:
+            rows = both
+        else:
+            costly.append(name)
+    return {name: one for name, one in reads.items() if name not in costly}, rows, costly
+
+
+def _read(channel: Channel, base: Channel, role: str) -> Read:
+    """Read a channel at the times of the base."""
+    if role == "tau" and channel.period < EQUAL * base.period:
+        mean, covered = _means(channel, base)
+        return Read(channel, mean, covered, "by its mean over each row's interval")
+    right = np.clip(np.searchsorted(channel.t, base.t), 1, len(channel.t) - 1)
+    left = right - 1
+    step = channel.t[right] - channel.t[left]
+    share = (base.t - channel.t[left]) / step
+    near = np.where(share > 0.5, right, left)
+    hit = np.abs(base.t - channel.t[near]) <= SAME * channel.period
+    between = hit | ((share >= 0) & (share <= 1) & (step <= channel.longest))
+    if bool(hit[between].all()):
+        return Read(channel, channel.x[near], hit, "at the same times")
+    at_most = f"samples at most {channel.longest:.3g} s apart"
+    if role == "q_d" or (role == "" and bool(np.all(channel.x == np.rint(channel.x)))):
+        held = np.where(hit, channel.x[near], channel.x[left])
+        return Read(channel, held, between, f"held between {at_most}")
+    line = channel.x[left] + share * (channel.x[right] - channel.x[left])
+    if role in ("q", "v"):
+        line = _cubic(channel, left, share, line)
+    return Read(channel, np.where(hit, channel.x[near], line), between, f"between {at_most}")
+
+
+def _means(channel: Channel, base: Channel) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Mean over the interval of each row, and whether samples cover it; each sample stands for its cell."""
+    starts, ends = channel.cells()
+    edges = np.column_stack([starts, ends]).ravel()
+    lengths = np.column_stack([ends - starts, np.zeros(len(ends))]).ravel()
+    told = np.concatenate([[0.0], np.cumsum(lengths)[:-1]])
+    total = np.concatenate([[0.0], np.cumsum(lengths * np.repeat(channel.x, 2))[:-1]])
+    low, high = base.cells()
+    covered = np.interp(high, edges, told) - np.interp(low, edges, told)
+    sums = np.interp(high, edges, total) - np.interp(low, edges, total)
+    valid = covered >= COVERED * (high - low)
+    return sums / np.where(valid, covered, 1.0), valid
+
+
+def _cubic(channel: Channel, left: npt.NDArray[np.int64], share: Array, line: Array) -> Array:
+    """The cubic through the two samples on either side (Lagrange); the line where steps are uneven, or at an end."""
+    first = np.clip(left - 1, 0, max(len(channel.t) - 4, 0))
+    if len(channel.t) < 4:
+        return line
+    t, x = (np.stack([column[first + k] for k in range(4)]) for column in (channel.t, channel.x))
+    steps = np.diff(t, axis=0)
+    even = ((steps >= EVEN * channel.period) & (steps <= channel.longest)).all(axis=0) & (first == left - 1)
+    at = t[1] + share * (t[2] - t[1])
+    cubic = np.zeros(len(share))
+    for k in range(4):
+        others = [one for one in range(4) if one != k]
+        cubic += x[k] * np.prod([(at - t[one]) / (t[k] - t[one]) for one in others], axis=0)
+    return np.where(even, cubic, line)
+
+
+def _refuse(path: Path, needed: Sequence[Channel]) -> None:
+    spans = " and ".join(f'"{one.name}" ({one.span})' for one in needed)
+    raise RecordingError(
+        f"{path}: {spans} have no times in common; record them at the same time.", culprit=str(path), value=0
+    )
+
+
+def _notes(
+    path: Path,
+    base: Channel,
+    kept: Mapping[str, Read],
+    rows: npt.NDArray[np.bool_],
+    left: Sequence[str],
+    costly: Sequence[str],
+) -> Iterator[str]:
+    """Say what was joined on what, at which rate each channel was sampled, and what was left out."""
+    others = {name: one for name, one in kept.items() if one.channel is not base}
+    if not all(one.valid.all() and np.array_equal(one.channel.t, base.t) for one in others.values()):
+        together: dict[str, list[str]] = {}
+        for name, one in others.items():
+            together.setdefault(f"({one.channel.span}) {one.how}", []).append(name)
+        said = "; ".join(f"{_quoted(names)} {how}" for how, names in together.items())
+        joined = f'channels with times of their own were put on the times of "{base.name}" ({base.span}): {said}.'
+        span = f"{base.t[rows][0]:.6g} s to {base.t[rows][-1]:.6g} s"
+        yield f"{path.stem}: {joined} The rows are those that all of them have, {span}."
+    invalid = {one.channel.name: one.channel.invalid for one in kept.values() if one.channel.invalid}
+    if invalid:
+        counts = ", ".join(f'{count:,} of "{name}"' for name, count in invalid.items())
+        yield f"{path.stem}: invalid samples were left out: {counts}."
+    if costly:
+        yield f"{path.stem}: channels that do not cover these rows were left out: {listed(tuple(costly))}."
+    if empty := [name for name in left if name not in costly]:
+        yield f"{path.stem}: channels without numbers of their own times were left out: {listed(tuple(empty))}."
+
+
+def _quoted(names: Sequence[str]) -> str:
+    return listed(tuple(f'"{name}"' for name in names))
