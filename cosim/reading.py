@@ -8,8 +8,8 @@ from cosim.data.runs import split
 from cosim.support.errors import InputError, UnitError
 from cosim.support.units import unit
 
-LAYOUT = ("separator", "decimal", "header", "encoding", "period")
-"""What `--layout` may say of a text."""
+LAYOUT = ("separator", "decimal", "header", "encoding", "period", "limit")
+"""What `--layout` may say of a text; `limit` holds for any file."""
 TORQUE = {"linear": "N", "rotary": "N.m"}
 SUITED = {"linear": {"q": "m", "v": "m/s"}, "rotary": {"q": "rad", "v": "rad/s"}}
 """Units in which position and speed of an axis are kept."""

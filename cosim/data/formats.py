@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cosim.data.binary import hdf5, matlab, mcap, mdf, parquet, rosbag
 from cosim.data.columns import ORIGIN_KEY, UNIT_KEY, Columns
-from cosim.data.limits import short
+from cosim.data.limits import LIMIT, reading, short
 from cosim.data.text.reader import read_text
 from cosim.support.errors import CosimError, RecordingError
 
@@ -20,7 +20,7 @@ REASON = 200
 
 
 def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns:
-    """Read every column of a file; `layout` is what `--layout` says of a text.
+    """Read every column of a file; `layout` is what `--layout` says of a text, and of limits.
 
     Raises:
         RecordingError: the file is missing, empty, too large, of an unknown kind, or cannot be read.
@@ -32,7 +32,9 @@ def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns
     if reader is None:
         raise RecordingError(f"{path} is of no known kind; known are: {', '.join(_READERS)}.", culprit=str(path))
     try:
-        columns = read_text(path, layout) if reader is read_text else reader(path)
+        with reading(path, (layout or {}).get(LIMIT, "")):
+            stated = {key: text for key, text in (layout or {}).items() if key != LIMIT}
+            columns = read_text(path, stated) if reader is read_text else reader(path)
     except CosimError:
         raise
     except Exception as error:  # every reader has its own exceptions; each means the same to the user

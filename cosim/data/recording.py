@@ -81,8 +81,8 @@ class Recording:
             units: our name to the unit in the file, {"q": "arcsec"}; values become SI. `q_d` is in the unit of `q`
                 unless it is given its own.
             required: columns that must be there, move, and be finite; () for any table with a time.
-            layout: how a text is written, where it is not to be found out: separator, decimal, header, encoding; and
-                `period`, the distance of rows without a time.
+            layout: how a text is written, where it is not to be found out: separator, decimal, header, encoding;
+                `period`, the distance of rows without a time; `limit`, the factor by which limits are raised.
 
         Raises:
             RecordingError: one sentence that names file, column, row and value.

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from cosim.data.columns import Columns
-from cosim.data.limits import check_cells, check_columns, listed
+from cosim.data.limits import check_cells, check_columns, check_time, listed
 
 JOINTS = ("position", "velocity", "effort")
 NANO = 1e-9
@@ -44,6 +44,7 @@ def columns_of(path: Path, messages: Iterable[tuple[str, str, int, Any]]) -> Col
         topic.times.append(_stamp(message) or logged)
         topic.rows.append(dict(_numbers(message, kind)))
         check_cells(path, len(topic.rows), len(topic.rows[-1]) + 1)
+        check_time(path)
     chosen = max(topics.values(), key=lambda topic: topic.tells_an_axis, default=None)
     if chosen is None or not any(chosen.rows):
         return Columns({})

@@ -4,7 +4,7 @@ import codecs
 import gzip
 from pathlib import Path
 
-from cosim.data.limits import check_text
+from cosim.data.limits import check_text, check_time, check_unpacked
 from cosim.support.errors import RecordingError
 
 CHUNK = 1 << 22
@@ -51,7 +51,9 @@ def _unpacked(path: Path) -> bytes:
         while chunk := file.read(CHUNK):
             chunks.append(chunk)
             size += len(chunk)
-            check_text(path, size, path.stat().st_size)
+            check_text(path, size)
+            check_unpacked(path, size)
+            check_time(path)
     return b"".join(chunks)
 
 

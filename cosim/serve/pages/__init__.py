@@ -34,6 +34,7 @@ HINTS = {
     "header": "line of the names, 0 for none",
     "encoding": "utf-8, latin-1",
     "period": "1ms",
+    "limit": "3: three times as much",
 }
 """Examples of what a layout may say."""
 SUFFIXES = ".csv,.gz,.parquet,.mat,.h5,.hdf5,.mf4,.mcap,.db3,.txt,.log,.dat,.tsv,.lvm,.asc,.toml"
