@@ -239,7 +239,7 @@ def test_show_tells_what_a_file_is(
         ("none.csv", None, "none.csv does not exist."),
         ("odd.toml", "a = ", "is not valid TOML"),
         ("odd", "x", "is nothing that can be shown: a recording, FMU, scenario or card."),
-        ("odd.xlsx", "x", "is of no known kind; known are: .csv, "),
+        ("odd.xyz", "x", "is of no known kind, .xyz; known are: .csv, "),
     ],
 )
 def test_show_says_what_it_cannot_show(

@@ -168,7 +168,7 @@ def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
         tmp_path / "none.csv": "does not exist",
         tmp_path: "is not a file",
         empty: "is empty",
-        odd: "is of no known kind; known are: .csv, .csv.gz, .parquet",
+        odd: "is a spreadsheet; save its table as CSV",
         torn: "cannot be read as .parquet",
         header: "holds no samples",
         tmp_path / "e.csv.gz": "cannot be read as .csv.gz",

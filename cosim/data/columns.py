@@ -29,6 +29,7 @@ class Columns:
         roles: columns whose meaning the format fixes, {"q": "POSITION"}; they need no guess.
         lacks: why there is no column of a meaning, {"tau": "a guide log holds no torque"}.
         notes: sentences on what was left out.
+        missing: those of the notes that say that rows were left out: what is left is not evenly spaced.
         rows: which rows of the file these are, where they are one recording of many: "4,378 to 8,755".
         numbered: the file names no columns; they are called #1, #2 ...
         clocks: times [s] of the samples of channels by name, where channels have times of their own: those of one
@@ -45,6 +46,7 @@ class Columns:
     roles: dict[str, str] = field(default_factory=dict)
     lacks: dict[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    missing: tuple[str, ...] = ()
     rows: str = ""
     numbered: bool = False
     clocks: dict[str, np.ndarray] = field(default_factory=dict)

@@ -1,15 +1,16 @@
 """File formats of recordings: bytes to named columns, nothing judged yet.
 
-Text of any layout (also .gz), Parquet, MAT (v5; v7.3 is HDF5), HDF5, MDF4, MCAP and bags of ROS 2. Units come along
-where a file states them; see `Columns`.
+Text of any layout (also .gz), JSON, Parquet, arrays of NumPy, MAT (v5; v7.3 is HDF5), HDF5, MDF4, MCAP and bags of
+ROS 2. Units come along where a file states them; see `Columns`.
 """
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from cosim.data.binary import hdf5, matlab, mcap, mdf, parquet, rosbag
+from cosim.data.binary import hdf5, matlab, mcap, mdf, numpy_files, parquet, rosbag
 from cosim.data.columns import ORIGIN_KEY, UNIT_KEY, Columns
 from cosim.data.limits import LIMIT, reading, short
+from cosim.data.text import json_records
 from cosim.data.text.reader import read_text
 from cosim.support.errors import CosimError, RecordingError
 
@@ -17,6 +18,26 @@ __all__ = ["ORIGIN_KEY", "UNIT_KEY", "Columns", "read_columns", "suffix_of"]
 
 REASON = 200
 """Characters of a reader's own message that are shown."""
+CONVERTED = {
+    ".bag": "a bag of ROS 1; convert it with rosbags-convert (pip install rosbags) to a bag of ROS 2 or MCAP",
+    ".tdms": "a TDMS file of LabVIEW; write it as CSV with npTDMS (tdmsinfo, to_dataframe().to_csv) or DIAdem",
+    ".ulg": "a log of PX4; write its topics as CSV with ulog2csv (pip install pyulog)",
+    ".wpilog": "a log of WPILib; export it as CSV with AdvantageScope",
+    ".hoot": "a log of CTRE Phoenix; convert it with owlet to .wpilog or MCAP, or export CSV with AdvantageScope",
+    ".bbl": "a log of Betaflight; write it as CSV with blackbox_decode",
+    ".bfl": "a log of Betaflight; write it as CSV with blackbox_decode",
+    ".bin": "a binary file, perhaps a log of ArduPilot; write that as CSV with mavlogdump.py --format csv",
+    ".svdx": "a project of TwinCAT Scope; export its channels as CSV in Scope View",
+    ".mdf": "an older MDF file; convert it to MDF4 with asammdf",
+    ".blf": "a log of a CAN bus; decode it with its DBC file to MDF4 or CSV (asammdf)",
+    ".xlsx": "a spreadsheet; save its table as CSV",
+    ".xls": "a spreadsheet; save its table as CSV",
+    ".ods": "a spreadsheet; save its table as CSV",
+    ".pkl": "a pickle, which is a program and is never loaded; save its table as Parquet or CSV",
+    ".pickle": "a pickle, which is a program and is never loaded; save its table as Parquet or CSV",
+    ".zip": "an archive; unpack it and give the recording in it",
+}
+"""What a file of a suffix is that is not read here, and how it becomes one that is."""
 
 
 def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns:
@@ -30,7 +51,7 @@ def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns
     suffix = suffix_of(path)
     reader = _READERS.get(suffix)
     if reader is None:
-        raise RecordingError(f"{path} is of no known kind; known are: {', '.join(_READERS)}.", culprit=str(path))
+        raise RecordingError(f"{path} is {_what_to_do(path, suffix)}", culprit=str(path))
     try:
         with reading(path, (layout or {}).get(LIMIT, "")):
             stated = {key: text for key, text in (layout or {}).items() if key != LIMIT}
@@ -43,6 +64,14 @@ def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns
     if not any(len(values) for values in columns.values.values()):
         raise RecordingError(f"{path} holds no samples.", culprit=str(path))
     return columns
+
+
+def _what_to_do(path: Path, suffix: str) -> str:
+    """Say what a file is that is not read here, and how it becomes one that is."""
+    told = CONVERTED.get(path.suffix.lower())
+    return (
+        f"{told}." if told else f"of no known kind{f', {suffix}' if suffix else ''}; known are: {', '.join(_READERS)}."
+    )
 
 
 def _check_file(path: Path) -> None:
@@ -73,6 +102,13 @@ _READERS: dict[str, Callable[..., Columns]] = {
     ".csv": read_text,
     ".csv.gz": read_text,
     ".parquet": parquet.read,
+    ".json": json_records.read,
+    ".json.gz": json_records.read,
+    ".jsonl": json_records.read,
+    ".jsonl.gz": json_records.read,
+    ".ndjson": json_records.read,
+    ".npz": numpy_files.read,
+    ".npy": numpy_files.read,
     ".mat": matlab.read,
     ".h5": hdf5.read,
     ".hdf5": hdf5.read,

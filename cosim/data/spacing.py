@@ -26,8 +26,8 @@ def with_time(columns: Columns, layout: Mapping[str, str]) -> Columns:
     if not 0 < period < np.inf:
         text = f"--layout period={layout['period']}: it is the time between two rows, for example 1ms or 0.001."
         raise RecordingError(text, culprit="period", value=layout["period"])
-    if columns.notes:
-        text = f"--layout period={layout['period']} needs evenly spaced rows: {' '.join(columns.notes)}"
+    if columns.missing:
+        text = f"--layout period={layout['period']} needs evenly spaced rows: {' '.join(columns.missing)}"
         raise RecordingError(text, culprit="period", value=layout["period"])
     rows = len(next(iter(columns.values.values())))
     values = {"t": np.arange(rows) * period} | {name: column for name, column in columns.values.items() if name != "t"}

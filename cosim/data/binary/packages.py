@@ -1,13 +1,14 @@
 """Packages that only some formats need, and vectors of equal length out of whatever a file holds."""
 
 from collections import Counter
+from collections.abc import Collection
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from cosim.data.limits import check_cells
+from cosim.data.limits import check_cells, listed
 from cosim.support.errors import MissingPackageError
 
 
@@ -45,6 +46,14 @@ def vectors(path: Path, found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         for name, value in kept.items()
         for k in range(value.shape[1])
     }
+
+
+def left_out(path: Path, found: dict[str, np.ndarray], kept: Collection[str]) -> tuple[str, ...]:
+    """Note the arrays of numbers that `vectors` did not keep; a number alone is a setting and needs no note."""
+    numeric = [name for name, value in found.items() if value.dtype.kind in "fiub" and value.size > 1]
+    lost = [name for name in numeric if name not in kept and f"{name}_1" not in kept]
+    shapes = [f"{name} ({' x '.join(map(str, found[name].shape))})" for name in lost]
+    return (f"{path.stem}: arrays of other lengths were left out: {listed(tuple(shapes))}.",) if shapes else ()
 
 
 def _beside(value: np.ndarray) -> np.ndarray:

@@ -7,6 +7,7 @@ from pathlib import Path
 from cosim.data.columns import Columns
 from cosim.data.importers import importer_of
 from cosim.data.limits import check_columns, short
+from cosim.data.text import json_records
 from cosim.data.text.encoding import text_of
 from cosim.data.text.layout import find_layout
 from cosim.data.text.table import table_of
@@ -28,6 +29,8 @@ def read_text(path: Path, stated: Mapping[str, str] | None = None) -> Columns:
         RecordingError: it is no table, or can be read in two ways; the message names the option that decides.
     """
     data, encoding = text_of(path, (stated or {}).get("encoding", ""))
+    if json_records.is_records(data):
+        return json_records.columns_of(path, data)
     _check_first_line(path, data)
     lines = head_of(data)
     importer = importer_of(lines) if not stated else None

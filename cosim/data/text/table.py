@@ -35,6 +35,7 @@ def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
         kept,
         {name: unit for name, unit in units.items() if name in kept},
         notes=again + notes,
+        missing=again + notes,
         numbered=not layout.names,
     )
 
