@@ -89,7 +89,7 @@ def test_arrays_that_do_not_fit_are_refused(tiny: Tiny) -> None:
     ("parameters", "sentence"),
     [
         ({"kp": 1.0}, '"plant.kp" does not exist; what can be set: a, b, k, mode, fail_at, nan_at, status.'),
-        ({"y": 1.0}, '"plant.y" cannot be set before the start; what can be set: a, b, k,'),
+        ({"y": 1.0}, '"plant.y" is calculated by the FMU and cannot be set; what can be set: a, b, k,'),
         ({"k": -1.0}, '"plant.k" is -1; it must lie in 0 .. inf 1.'),
     ],
 )

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
+from functools import cached_property
 from typing import Any
 
 from cosim.fmi.component import Component, Port
@@ -45,20 +46,29 @@ class Aliased:
         self.ports: Mapping[str, Port] = {
             ours.get(name, name): self._port(ours.get(name, name), port) for name, port in component.ports.items()
         }
-        self.feedthrough: Mapping[str, frozenset[str] | None] = {
-            ours.get(output, output): None if inputs is None else frozenset(ours.get(one, one) for one in inputs)
-            for output, inputs in self._feedthrough().items()
-        }
+        self.feedthrough = self._renamed(self._feedthrough())
         self.origin = component.origin | {"variables": {name: alias.name for name, alias in variables.items()}}
 
-    def start(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
+    @cached_property
+    def initial_dependencies(self) -> Mapping[str, frozenset[str] | None]:
+        """What the component says, in our names."""
+        return self._renamed(self._component.initial_dependencies)
+
+    def enter_initialisation(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
         """Start the component with parameters under either name."""
-        self._component.start({self._own(name): value for name, value in parameters.items()}, time)
+        self._component.enter_initialisation({self._own(name): value for name, value in parameters.items()}, time)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
         return getattr(self._component, name)
+
+    def _renamed(self, dependencies: Mapping[str, frozenset[str] | None]) -> Mapping[str, frozenset[str] | None]:
+        ours = self._ours
+        return {
+            ours.get(output, output): None if inputs is None else frozenset(ours.get(one, one) for one in inputs)
+            for output, inputs in dependencies.items()
+        }
 
     def _feedthrough(self) -> Mapping[str, frozenset[str] | None]:
         """What the component says, and of local variables nothing."""

@@ -3,11 +3,14 @@
 Call sequence, once each unless said otherwise:
 
     1. `ports`                      names, references, causality and units, before anything runs
-    2. `start(parameters)`          sets parameters and start values, initialises at t = 0
-    3. `get`, `set`, `step`         in every tick, or their addresses in `functions`, called by the C loop;
+    2. `enter_initialisation(...)`  sets parameters and start values and enters initialisation mode
+    3. `set`, `get`                 of inputs and outputs, as often as the master needs to make them agree at the start;
+                                    `get` of what `initial_dependencies` names only
+    4. `exit_initialisation()`      the component has its state at the start time
+    5. `get`, `set`, `step`         in every tick, or their addresses in `functions`, called by the C loop;
        `save`, `restore`            around steps that are taken back, where `can_get_and_set_state` says that it can
-    4. `failed(status)`             after a call that returned a status above 1; then nothing more is called but close
-    5. `close()`                    frees everything, whatever happened before
+    6. `failed(status)`             after a call that returned a status above 1; then nothing more is called but close
+    7. `close()`                    frees everything, whatever happened before
 
 Statuses are those of FMI: 0 OK, 1 warning, 2 discard, 3 error, 4 fatal; above 1 a component must not be stepped again.
 """
@@ -39,7 +42,8 @@ class Port:
     """A variable of a component as the outside sees it, or an element of an array; `unit` is empty where unknown.
 
     `type` is FMI 3's name of it. `items` are the names of an enumeration's values. An array has a `shape`; each of its
-    elements is a port too, with the array's name as `array` and its place in FMI's order as `element`.
+    elements is a port too, with the array's name as `array` and its place in FMI's order as `element`. `not_settable`
+    says why no parameter or start value can be given to it; it is empty where one can.
     """
 
     name: str
@@ -50,7 +54,7 @@ class Port:
     start: Any = None
     low: float = -inf
     high: float = inf
-    settable: bool = False
+    not_settable: str = "takes no start value"
     type: str = "Float64"
     items: Mapping[int, str] = field(default_factory=dict)
     shape: tuple[int, ...] = ()
@@ -61,6 +65,11 @@ class Port:
     def real(self) -> bool:
         """Whether it is one double, which needs no conversion."""
         return self.type == "Float64" and not self.shape and not self.array
+
+    @property
+    def settable(self) -> bool:
+        """Whether a parameter or start value can be given to it."""
+        return not self.not_settable
 
     @property
     def variable(self) -> str:
@@ -100,6 +109,22 @@ class Component(Protocol):
         """The inputs that each output follows at once, without a step; None where nothing is said about it."""
 
     @property
+    def initial_dependencies(self) -> Mapping[str, frozenset[str] | None]:
+        """The inputs that each variable that can be read in initialisation mode follows there; None: it may be all."""
+
+    @property
+    def event_at_start(self) -> bool:
+        """Whether an event is due after initialisation; with what it changes it belongs to the first step."""
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What its description says that cannot be right, as sentences; it runs all the same."""
+
+    @property
+    def own_step(self) -> float:
+        """The length of its own steps in s, of which each of the master's should be a multiple; 0 where it has none."""
+
+    @property
     def can_get_and_set_state(self) -> bool:
         """Whether `save` and `restore` work."""
 
@@ -111,8 +136,19 @@ class Component(Protocol):
     def functions(self) -> Functions | None:
         """Addresses for the compiled loop; None for a component that only Python can step."""
 
-    def start(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
-        """Set parameters and start values by name and initialise at `time`; may be called again for another run."""
+    def enter_initialisation(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
+        """Set parameters and start values by name for a start at `time` [s]; may be called again for another run."""
+
+    def exit_initialisation(self) -> None:
+        """End initialisation mode."""
+
+    def derivatives(self, outputs: np.ndarray, inputs: np.ndarray) -> np.ndarray | None:
+        """Return d outputs / d inputs in initialisation mode, shape (outputs, inputs); None where it gives none.
+
+        Args:
+            outputs: value references, uint32.
+            inputs: the same.
+        """
 
     def set(self, references: np.ndarray, values: np.ndarray) -> int:
         """Set real inputs; references uint32, values float64, shape (n,)."""

@@ -2,6 +2,7 @@
 
 import zipfile
 from collections.abc import Callable
+from math import inf
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -84,6 +85,44 @@ def feedthrough_of(description: Any) -> dict[str, frozenset[str] | None]:
     return found
 
 
+def initial_dependencies_of(description: Any) -> dict[str, frozenset[str] | None]:
+    """List the inputs that each variable follows in initialisation mode; None where it may follow all of them.
+
+    Only what FMI lets a master read there is listed: in FMI 2 outputs and initial unknowns, in FMI 3 every variable.
+    What starts exactly at its start value follows nothing.
+    """
+    readable = [
+        one for one in description.modelVariables if one.causality == "output" or description.fmiVersion[0] > "2"
+    ]
+    found: dict[str, frozenset[str] | None] = {
+        one.name: frozenset() if one.initial == "exact" else None for one in readable
+    }
+    for unknown in description.initialUnknowns:
+        known = unknown.dependencies
+        inputs = None if known is None else frozenset(one.name for one in known if one.causality == "input")
+        found[unknown.variable.name] = inputs
+    aliases = {alias.name: one.name for one in description.modelVariables for alias in one.aliases or ()}
+    return found | {alias: found[name] for alias, name in aliases.items() if name in found}
+
+
+def own_step_of(description: Any, name: str) -> float:
+    """Return the length of an FMU's own steps in s; 0 where it has none, or takes steps of any length.
+
+    FMI 3 states it. In FMI 2 it is the step of the default experiment of an FMU that takes steps of one length only.
+    """
+    own, experiment = getattr(description, name), description.defaultExperiment
+    if name != "coSimulation":
+        return 0.0
+    stated = own.fixedInternalStepSize
+    if description.fmiVersion[0] == "2" and not own.canHandleVariableCommunicationStepSize:
+        stated = experiment.stepSize if experiment else None
+    try:
+        length = float(stated or 0.0)
+    except ValueError:
+        return 0.0
+    return length if 0 < length < inf else 0.0
+
+
 def check_binary(path: Path, description: Any, identifier: str) -> None:
     """Refuse an FMU that has no binary for this platform.
 
@@ -105,6 +144,16 @@ def check_binary(path: Path, description: Any, identifier: str) -> None:
         has = ", ".join(have) or "none"
         message = f"{path} has no {folder} binary; it has {has}. Export it again for this platform."
         raise FmuError(message, culprit=str(path), value=folder, choices=tuple(have))
+
+
+def provides_derivatives(path: Path, description: Any, name: str) -> bool:
+    """Say whether an interface of an FMU gives directional derivatives; FMPy does not read it of FMI 3."""
+    if description.fmiVersion[0] == "2":
+        return bool(getattr(description, name).providesDirectionalDerivative)
+    element = name[0].upper() + name[1:]
+    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+        found = next((one for _, one in ElementTree.iterparse(file, ("start",)) if one.tag == element), None)
+    return found is not None and found.get("providesDirectionalDerivatives") in ("true", "1")
 
 
 def _names(path: Path) -> list[str]:

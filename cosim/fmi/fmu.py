@@ -5,9 +5,10 @@ FMI 2.0 and 3.0, co-simulation. Unpacked files live in a temporary directory tha
 
 import ctypes
 from collections import deque
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +21,15 @@ from cosim.fmi.description import (
     describe,
     feedthrough_of,
     first_line,
+    initial_dependencies_of,
     origin_of,
     own_interface,
+    own_step_of,
+    provides_derivatives,
 )
 from cosim.fmi.listeners import callbacks2, registered, same_directory
 from cosim.fmi.settings import STRUCTURAL, Setting, settings_of, sizes_of, tell
+from cosim.fmi.sound import doubts_of
 from cosim.fmi.variables import ports_of
 from cosim.support.activity import doing
 from cosim.support.archive import unpack
@@ -56,6 +61,8 @@ class FmuComponent:
 
     interface = "coSimulation"
     """The element of the model description that must be there."""
+    event_at_start = False
+    """Whether an event is due once initialisation is over."""
 
     def __init__(
         self, path: Path | str, name: str = "", description: Any = None, tolerance: float | None = None
@@ -84,7 +91,7 @@ class FmuComponent:
             raise
 
     def configure(self, parameters: Mapping[str, Any]) -> None:
-        """Give arrays the size that structural parameters among these ask for; others are left for `start`.
+        """Give arrays the size that structural parameters among these ask for; others wait for initialisation.
 
         Raises:
             FmuError: a value is none of the parameter's.
@@ -94,7 +101,14 @@ class FmuComponent:
             self._sizes, self.ports = sizes, ports_of(self._description, sizes)
 
     def start(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
-        """Set parameters and start values by name and initialise at `time` [s]; a second call starts all over again.
+        """Initialise alone, with inputs at their start values; errors as of `enter_initialisation`."""
+        self.enter_initialisation(parameters, time)
+        self.exit_initialisation()
+
+    def enter_initialisation(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
+        """Set parameters and start values by name for a start at `time` [s]; a second call starts all over again.
+
+        Inputs are set once the FMU is in initialisation mode, everything else before (FMI 2.0.5, 4.2.4; 3.0.2, 2.3.3).
 
         Raises:
             FmuError: a name is unknown or not settable, a value breaks its bounds, or the FMU refuses.
@@ -102,32 +116,62 @@ class FmuComponent:
         if self._worst == FATAL:
             raise FmuError(f"{self.name} ({self.path}) failed for good and cannot start again; open it anew.")
         self.configure(parameters)
-        with doing(self.name, "initialised"):
-            self._initialise(settings_of(self.ports, self.name, parameters), time)
-
-    def _initialise(self, settings: Sequence[Setting], time: float) -> None:
-        """Set parameters and go through initialisation."""
-        structural = [one for one in settings if one.port.causality == STRUCTURAL]
-        try:
+        settings = settings_of(self.ports, self.name, parameters)
+        with self._starting():
             if self._started:
                 self._fmu.reset()
                 self._worst = OK
-            if structural:
-                self._fmu.enterConfigurationMode()
-                tell(self._fmu, self._version, structural)
-                self._fmu.exitConfigurationMode()
-            tell(self._fmu, self._version, [one for one in settings if one not in structural])
-            if self._version == 2:
-                self._fmu.setupExperiment(tolerance=self._tolerance, startTime=time)
-            self._started = True
-            told = {} if self._version == 2 else {"tolerance": self._tolerance, "startTime": time}
-            self._fmu.enterInitializationMode(**told)
+            self._enter_initialisation(settings, time)
+
+    def _enter_initialisation(self, settings: Sequence[Setting], time: float) -> None:
+        structural = [one for one in settings if one.port.causality == STRUCTURAL]
+        inputs = [one for one in settings if one.port.causality == "input"]
+        if structural:
+            self._fmu.enterConfigurationMode()
+            tell(self._fmu, self._version, structural)
+            self._fmu.exitConfigurationMode()
+        tell(self._fmu, self._version, [one for one in settings if one not in structural and one not in inputs])
+        if self._version == 2:
+            self._fmu.setupExperiment(tolerance=self._tolerance, startTime=time)
+        self._started = True
+        experiment = {} if self._version == 2 else {"tolerance": self._tolerance, "startTime": time}
+        self._fmu.enterInitializationMode(**experiment)
+        tell(self._fmu, self._version, inputs)
+
+    def exit_initialisation(self) -> None:
+        """End initialisation mode.
+
+        Raises:
+            FmuError: the FMU refuses.
+        """
+        with self._starting():
             self._fmu.exitInitializationMode()
+
+    @contextmanager
+    def _starting(self) -> Iterator[None]:
+        """Turn what an FMU refuses on its way through initialisation into a sentence."""
+        try:
+            with doing(self.name, "initialised"):
+                yield
         except CosimError:
             raise
         except Exception as error:
             self.failed(getattr(error, "status", 0))
             raise FmuError(f"{self.name} ({self.path}) does not start: {self._reason(error)}.") from error
+
+    def derivatives(self, outputs: np.ndarray, inputs: np.ndarray) -> np.ndarray | None:
+        """Return d outputs / d inputs, shape (outputs, inputs), of scalar reals; None where the FMU gives none."""
+        if not self._gives_derivatives:
+            return None
+        columns = []
+        for one in inputs.tolist():
+            try:
+                columns.append(self._fmu.getDirectionalDerivative(outputs.tolist(), [one], [1.0]))
+            except Exception as error:  # a master can do without
+                self.failed(getattr(error, "status", 0))
+                self._gives_derivatives = False
+                return None
+        return np.array(columns, dtype=np.float64).T
 
     def set(self, references: np.ndarray, values: np.ndarray) -> int:
         """Set real inputs; references uint32, values float64, shape (n,), contiguous."""
@@ -195,6 +239,25 @@ class FmuComponent:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    @cached_property
+    def initial_dependencies(self) -> Mapping[str, frozenset[str] | None]:
+        """The inputs that each variable that can be read in initialisation mode follows there; None: it may be all."""
+        return initial_dependencies_of(self._description)
+
+    @cached_property
+    def doubts(self) -> tuple[str, ...]:
+        """What its description says that cannot be right, as sentences."""
+        return doubts_of(self._description)
+
+    @cached_property
+    def own_step(self) -> float:
+        """The length of the FMU's own steps in s; 0 where it has none."""
+        return own_step_of(self._description, self.interface)
+
+    @cached_property
+    def _gives_derivatives(self) -> bool:
+        return provides_derivatives(self.path, self._description, self.interface)
 
     @property
     def can_get_and_set_state(self) -> bool:

@@ -39,13 +39,15 @@ class FunctionComponent:
 
     Args:
         function: called once a step, or a class whose instance is (see above).
-        inputs: units by name; every input starts at 0.
+        inputs: units by name; an input starts at 0 unless the parameters give it a value.
         outputs: units by name; every output is 0 until the first step has ended.
         name: what the component is called in messages.
         origin: what a recording shall say about where it comes from.
     """
 
-    can_get_and_set_state, can_vary_step = False, True
+    can_get_and_set_state, can_vary_step, event_at_start = False, True, False
+    own_step = 0.0
+    doubts: tuple[str, ...] = ()
 
     def __init__(
         self,
@@ -62,6 +64,7 @@ class FunctionComponent:
         ports = [Port(one, number, causality, unit, start=0.0) for number, (one, unit, causality) in enumerate(listed)]
         self.ports: Mapping[str, Port] = {port.name: port for port in ports}
         self.feedthrough: Mapping[str, frozenset[str] | None] = dict.fromkeys(outputs, frozenset())
+        self.initial_dependencies = self.feedthrough
         self._function, self._inputs, self._outputs = function, tuple(inputs), tuple(outputs)
         self._call: Callable[..., Any] = function
         self._values = np.zeros(len(listed))
@@ -70,17 +73,31 @@ class FunctionComponent:
         addresses = [ctypes.cast(one, ctypes.c_void_p).value or 0 for one in self._kept]
         self.functions: Functions | None = Functions(2, 0, *addresses)
 
-    def start(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
-        """Begin anew with these parameters; the time is told at each step.
+    def enter_initialisation(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
+        """Begin anew with these parameters and start values of inputs; each step is given the time.
 
         Raises:
             WiringError: the function does not take them, or the class cannot be made.
         """
         with doing(self.name, "initialised"):
-            self._start(parameters)
+            self._start_inputs({name: value for name, value in parameters.items() if name in self._inputs})
+            self._make({name: value for name, value in parameters.items() if name not in self._inputs})
 
-    def _start(self, parameters: Mapping[str, Any]) -> None:
+    def exit_initialisation(self) -> None:
+        """Do nothing: outputs are 0 until the first step has ended."""
+
+    def derivatives(self, outputs: np.ndarray, inputs: np.ndarray) -> None:
+        """Return nothing: outputs follow no input before the first step."""
+
+    def _start_inputs(self, values: Mapping[str, Any]) -> None:
         self._values[:] = 0.0
+        for name, value in values.items():
+            if isinstance(value, bool) or not isinstance(value, int | float | np.number):
+                message = f'"{self.name}.{name}" is {value!r}; it must be a number, or an output of a signal.'
+                raise WiringError(message, culprit=f"{self.name}.{name}", value=value)
+            self._values[self.ports[name].reference] = value
+
+    def _make(self, parameters: Mapping[str, Any]) -> None:
         given = dict.fromkeys(self._inputs, 0.0)
         is_class = inspect.isclass(self._function)
         try:

@@ -85,11 +85,15 @@ class ScheduledComponent(FmuComponent):
         """Steps of any length."""
         return True
 
-    def start(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
-        """Set parameters and start values by name and initialise at `time`; clocks count from there."""
-        super().start(parameters, time)
+    def enter_initialisation(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
+        """Set parameters and start values by name for a start at `time` [s]; clocks count from there."""
+        super().enter_initialisation(parameters, time)
         self._zero, self._due = time, []
         self._ticked = dict.fromkeys(self._ticked, 0.0)
+
+    def exit_initialisation(self) -> None:
+        """End initialisation mode and ask the clocks for their intervals."""
+        super().exit_initialisation()
         for clock in self._clocks.values():
             interval, shift = self._timing(clock)
             self._clocks[clock.reference] = clock = Ticking(**{**vars(clock), "interval": interval, "shift": shift})

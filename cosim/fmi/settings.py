@@ -70,7 +70,7 @@ def _settable(ports: Mapping[str, Port], name: str, key: str, value: Any) -> Por
     listed: Sequence[str] = choices
     if len(choices) > _MOST_NAMED:
         listed = get_close_matches(key, choices, 10, 0.3) or choices[:_MOST_NAMED]
-    what = "cannot be set before the start" if port else "does not exist"
+    what = f"{port.not_settable} and cannot be set" if port else "does not exist"
     more = f" and {len(choices) - len(listed)} more" if len(listed) < len(choices) else ""
     message = f'"{name}.{key}" {what}; what can be set: {", ".join(listed)}{more}.'
     raise FmuError(message, culprit=f"{name}.{key}", value=value, choices=choices)

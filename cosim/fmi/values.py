@@ -57,7 +57,7 @@ def _element(port: Port, value: Any, who: str) -> Any:
         raise _error(who, value, "it must be a number, or an output of a signal")
     if isinstance(number, int) and abs(number) > LARGEST_FLOAT64:
         raise _error(who, value, "that is beyond a Float64")
-    if not port.low <= number <= port.high:
+    if port.low <= port.high and not port.low <= number <= port.high:  # limits that contradict each other are a doubt
         unit = f" {port.unit}" if port.unit else ""
         raise _error(who, value, f"it must lie in {port.low:g} .. {port.high:g}{unit}")
     return _float(port, number, who) if port.type in FLOATS else _integer(port, number, who)

@@ -10,6 +10,7 @@ from math import inf, prod
 from typing import Any
 
 from cosim.fmi.component import Port
+from cosim.fmi.sound import inherited
 from cosim.fmi.types import FLOATS, OF_FMI2, elements, indexed
 from cosim.support.units import BASE, in_base_units
 
@@ -51,12 +52,9 @@ def _size(dimension: Any, sizes: Mapping[str, int]) -> int:
 
 
 def _port(variable: Any, name: str, own_units: Mapping[str, str], shape: tuple[int, ...]) -> Port:
-    declared = variable.declaredType
-    inherited = {key: getattr(variable, key) or (declared and getattr(declared, key)) for key in ("unit", "min", "max")}
-    given = variable.causality in ("parameter", "input", "structuralParameter")
-    exact = given or variable.initial in ("exact", "approx")
+    stated = {key: inherited(variable, key) for key in ("unit", "min", "max")}
     kind = OF_FMI2.get(variable.type, variable.type)
-    unit = inherited["unit"] or ""
+    unit = stated["unit"] or ""
     return Port(
         name=name,
         reference=variable.valueReference,
@@ -64,13 +62,28 @@ def _port(variable: Any, name: str, own_units: Mapping[str, str], shape: tuple[i
         unit=own_units.get(unit, unit) if kind in FLOATS else "",
         description=variable.description or "",
         start=_start(variable.start, kind, bool(shape)),
-        low=-inf if inherited["min"] is None else float(inherited["min"]),
-        high=inf if inherited["max"] is None else float(inherited["max"]),
-        settable=exact and variable.start is not None and variable.variability != "constant" and kind != "Clock",
+        low=-inf if stated["min"] is None else float(stated["min"]),
+        high=inf if stated["max"] is None else float(stated["max"]),
+        not_settable=_not_settable(variable, kind),
         type=kind,
-        items=_items(declared) if kind == "Enumeration" else {},
+        items=_items(variable.declaredType) if kind == "Enumeration" else {},
         shape=shape,
     )
+
+
+def _not_settable(variable: Any, kind: str) -> str:
+    """Say why FMI lets nobody set a variable at the start; empty where it can be set.
+
+    A start value that the description leaves out, as some do, forbids nothing.
+    """
+    if variable.variability == "constant":
+        return "is a constant"
+    if variable.causality == "independent":
+        return "is the time"
+    if kind == "Clock":
+        return "is a clock"
+    given = variable.causality in ("parameter", "input", "structuralParameter")
+    return "" if given or variable.initial in ("exact", "approx") else "is calculated by the FMU"
 
 
 def _items(declared: Any) -> dict[int, str]:

@@ -85,6 +85,7 @@ class ExchangeComponent(FmuComponent):
     """
 
     interface = "modelExchange"
+    event_at_start = True
 
     def __init__(self, path: Path | str, name: str = "", description: Any = None) -> None:
         found = library()
@@ -94,11 +95,16 @@ class ExchangeComponent(FmuComponent):
         self._library = found
         super().__init__(path, name, description)
 
-    def start(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
-        """Set parameters and start values by name and initialise at `time`; a second call starts all over again."""
-        super().start(parameters, time)
+    def enter_initialisation(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
+        """Set parameters and start values by name for a start at `time` [s]; a second call starts all over again."""
+        self._exchange.in_event, self._exchange.has_next, self._exchange.proposed = 1, 0, 0.0
+        super().enter_initialisation(parameters, time)
         if self._sizes:
             self._make_room()
+
+    def exit_initialisation(self) -> None:
+        """End initialisation mode and ask for the nominals of the states."""
+        super().exit_initialisation()
         count = self._exchange.states
         if count:
             nominals = ctypes.cast(self._exchange.nominals, POINTER(c_double))
@@ -110,7 +116,6 @@ class ExchangeComponent(FmuComponent):
                 raise FmuError(f"{self.name} ({self.path}) does not start: {reason}.") from error
             given = self._arrays_kept["nominals"]
             given[~((given > 0) & np.isfinite(given))] = 1.0  # FMI wants them above 0 and takes 1 where nothing is said
-        self._exchange.in_event, self._exchange.has_next, self._exchange.proposed = 1, 0, 0.0
 
     def messages(self) -> tuple[str, ...]:
         """What the FMU said last, or why its solver failed."""

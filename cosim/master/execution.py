@@ -7,13 +7,12 @@ from time import perf_counter
 
 import numpy as np
 
-from cosim.data.signals import Stream
 from cosim.data.writer import MemoryWriter
-from cosim.fmi.component import DISCARD, FATAL, NOT_EXACT, POOL_FULL, STATUSES, TERMINATED, Component
+from cosim.fmi.component import DISCARD, TERMINATED
+from cosim.master.access import refusal, tell_failed
+from cosim.master.given import Given
 from cosim.master.loop import CompiledLoop, InterpretedLoop, slow_because
-from cosim.master.planning import make_streams
 from cosim.master.result import Statistics
-from cosim.support.errors import SignalError, StepError
 from cosim.support.interrupts import uninterrupted
 from cosim.system.plan import Column, Plan
 from cosim.system.wiring import Wiring
@@ -32,6 +31,7 @@ class Execution:
 
     wiring: Wiring
     plan: Plan
+    doubts: Sequence[str]
     loop: CompiledLoop | InterpretedLoop
     writer: MemoryWriter
     ticks: int
@@ -73,6 +73,7 @@ class Execution:
     def _notes(self) -> list[str]:
         notes = [f"{self.ended}."] if self.ended else []
         notes += self.wiring.doubts()
+        notes += self.doubts
         for effort in self.loop.efforts:
             if effort.at_limit:
                 some = f"{effort.at_limit:,} of {effort.rounds:,} pieces of steps"
@@ -95,48 +96,18 @@ class Execution:
         self.writer.origin |= {"complete": True} | ({"ended": self.ended} if self.ended else {})
 
     def _run_chunks(self) -> None:
-        with np.errstate(all="ignore"):  # as in `_given`
-            streams = make_streams(self.wiring, self.plan.step)
-        self.loop.start()
-        self._check()
+        signals = Given(self.wiring, self.plan)
         for chunk in chunks(self.ticks):
             if self.ended:
                 return
-            given = self._given(streams, chunk)
+            given = signals.at(chunk)
             with uninterrupted():
                 self._write(self.loop.run(len(chunk), given))
             self._check()
             if self.on_progress:
                 self.on_progress(self.loop.tick, self.ticks)
         if self.last and not self.ended:  # where a row falls due at stop
-            self.loop.finish(self._given(streams, np.array([self.ticks])))
-
-    def _given(self, streams: Sequence[Stream], chunk: np.ndarray) -> np.ndarray:
-        """Return what the signals give in these ticks, shape (signals, ticks)."""
-        with np.errstate(all="ignore"):  # what is no number any more is told below, with its name and its time
-            columns = [self._computed(number, stream, chunk) for number, stream in enumerate(streams)]
-        given = np.concatenate(columns) if columns else np.empty((0, len(chunk)))
-        self._check_given(given, int(chunk[0]))
-        return given
-
-    def _computed(self, number: int, stream: Stream, chunk: np.ndarray) -> np.ndarray:
-        """Return what a signal gives in these ticks."""
-        try:
-            return stream(chunk)
-        except ArithmeticError as error:
-            name = list(self.wiring.sources())[number]
-            message = f'The signal "{name}" cannot be computed: its numbers lead beyond what arithmetic has.'
-            raise SignalError(message, culprit=name) from error
-
-    def _check_given(self, given: np.ndarray, first: int) -> None:
-        """Refuse signals that are no numbers before a component meets them."""
-        if np.isfinite(given).all():
-            return
-        row, column = np.argwhere(~np.isfinite(given))[0]
-        names = [f"{name}.{output}" for name, one in self.wiring.sources().items() for output in one.outputs]
-        when = f"at tick {first + column:,} ({self.plan.start + (first + column) * self.plan.step:.9g} s)"
-        message = f'The signal "{names[row]}" is {given[row, column]} {when}; it must be a finite number.'
-        raise SignalError(message, culprit=names[row], value=float(given[row, column]))
+            self.loop.finish(signals.at(np.array([self.ticks])))
 
     def _write(self, rows: np.ndarray) -> None:
         first, count = self.writer.rows, rows.shape[1]
@@ -163,23 +134,8 @@ class Execution:
         if failure.status == TERMINATED or (failure.status == DISCARD and getattr(component, "terminated", bool)()):
             self.ended = f"{name} asked to end the simulation {when}"
             return
-        self._tell_failed(component, failure.status)
-        inputs = self.plan.inputs(failure.part)
-        what = STATUSES.get(failure.status, f"returned status {failure.status}")
-        shown = getattr(component, "shown", lambda _, value: f"{value:.9g}")
-        last = ", ".join(f"{key} = {shown(key, value)}" for key, value in inputs.items()) or "none"
-        ours = failure.status in (NOT_EXACT, POOL_FULL)
-        said = "".join(f": {text}" if ours else f'; it said "{text}"' for text in component.messages()[-1:])
-        raise StepError(
-            f"{name} {what} {when}{said}; its last inputs: {last}.", component=name, tick=failure.tick, inputs=inputs
-        )
-
-    def _tell_failed(self, component: Component, status: int) -> None:
-        """Let components know which calls are still allowed; FATAL counts for all instances of one FMU."""
-        same = component.origin.get("sha256")
-        for other in (part.component for part in self.plan.parts):
-            if other is component or (status == FATAL and same and other.origin.get("sha256") == same):
-                other.failed(status)
+        tell_failed(self.plan, component, failure.status)
+        raise refusal(self.plan, failure, component, when)
 
 
 def chunks(ticks: int) -> Iterator[np.ndarray]:

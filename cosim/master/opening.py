@@ -42,7 +42,7 @@ def wiring_of(stack: ExitStack, system: System) -> Wiring:
 
 
 def started(wiring: Wiring, system: System, plan: Plan) -> Settings:
-    """Start the components with their parameters and start values, and return those."""
+    """Bring the components into initialisation mode with their parameters and start values, and return those."""
     for name in system.parameters:
         if name not in wiring.components:
             have = tuple(wiring.components)
@@ -53,7 +53,7 @@ def started(wiring: Wiring, system: System, plan: Plan) -> Settings:
         for name in wiring.components
     }
     for name, component in wiring.components.items():
-        component.start(settings[name], **({"time": plan.start} if plan.start else {}))
+        component.enter_initialisation(settings[name], plan.start)
     return settings
 
 

@@ -18,7 +18,7 @@ from cosim.system.conversions import exact, table_of
 from cosim.system.faults import broken
 from cosim.system.plan import Column, Link, Part, Plan
 from cosim.system.ports import PortRef
-from cosim.system.schedule import backward, order_of, planned_stages
+from cosim.system.schedule import order_of, planned_stages
 from cosim.system.wire import Record, Wire
 from cosim.system.wiring import Wiring
 
@@ -149,9 +149,9 @@ def _part(bus: _Bus, name: str, places: Places, step: float) -> Part:
         input=places[inputs[0]] if inputs else 0,
         output=places[outputs[0]] if outputs else 0,
         input_names=tuple(PortRef(full).port for full in inputs),
+        output_names=tuple(PortRef(full).port for full in outputs),
         links=tuple(_link(wiring, wire, places, step) for wire in wiring.wires if wire.target.owner == name),
         every=wiring.every.get(name, 1),
-        direct=any(component.feedthrough.values()),
     )
 
 
@@ -165,7 +165,7 @@ def _link(wiring: Wiring, wire: Wire, places: Places, step: float) -> Link:
         gain=gain * wire.gain,
         offset=gain * wire.offset + offset,
         quantum=gain * wire.quantum,
-        breaks_loop=wire.breaks_loop or wire.target in backward(wiring.algorithm, wiring.wires, wiring.components),
+        breaks_loop=wire.breaks_loop,
         faults=tuple(fault.of_wire(step, places.get(f"fault {n}.value", -1)) for n, fault in faults.items()),
         table=table_of(wire, wiring.port(wire.source), cast(Port, wiring.port(wire.target))),
     )

@@ -137,6 +137,13 @@ class TypedComponent:
             raise AttributeError(name)
         return getattr(self.component, name)
 
+    def narrowed(self, places: Sequence[int], inputs: bool) -> "TypedComponent | FmuComponent":
+        """Return the component with only these of its inputs, or of its outputs, by their places among those here."""
+        uses = [(self.inputs if inputs else self.outputs)[place] for place in places]
+        if not needs_types(uses):
+            return self.component
+        return TypedComponent(self.component, uses if inputs else (), () if inputs else uses, self.pool)
+
     def set(self, references: np.ndarray, values: np.ndarray) -> int:
         """Set inputs from their values on the bus."""
         return int(_SET(self.functions.set)(self.functions.instance, None, len(values), values.ctypes.data))

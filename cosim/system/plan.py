@@ -30,7 +30,7 @@ class Link:
     """A wire: bus[target] = quantise(gain * bus[source] + offset) + bus[noise]; -1 and 0 mean no noise, no quantum.
 
     `table` holds pairs: where the result is the first of one, the target gets the second.
-    `breaks_loop`: where outputs meet their inputs before the first tick, it is followed once only.
+    `breaks_loop`: where values at the start depend on each other in a ring, it is followed once only.
     """
 
     source: int
@@ -49,7 +49,6 @@ class Part:
     """A component and the places of its values: inputs from `input`, outputs from `output` on.
 
     `links` feed it. It steps every `every` ticks: inputs are taken at the first of them, outputs shown after the last.
-    `direct`: outputs may follow inputs at once, so before the first tick they are read again with the inputs of it.
     """
 
     name: str
@@ -59,9 +58,9 @@ class Part:
     input: int
     output: int
     input_names: tuple[str, ...] = ()
+    output_names: tuple[str, ...] = ()
     links: tuple[Link, ...] = ()
     every: int = 1
-    direct: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """What an algorithm makes of a wiring: the stages of a tick, what each wire delays, and loops that it cannot solve."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 from math import lcm
@@ -171,15 +171,6 @@ def _bond(bond: tuple[str, str], inside: Sequence[Wire], components: Mapping[str
         )
         raise WiringError(message, culprit=one, value=units)
     return found[0]
-
-
-def backward(algorithm: Algorithm, wires: Sequence[Wire], components: Collection[str]) -> set[str]:
-    """Return the targets of wires that point back between components that are taken over the tick together."""
-    stages = algorithm.stages(tuple(components))
-    members, order = coupled_of(stages), order_of(stages)
-    inner = [(wire.source.owner, wire.target.owner, wire.target) for wire in wires]
-    inner = [one for one in inner if one[0] in members and one[1] in members]
-    return {target for source, owner, target in inner if order.index(source) >= order.index(owner)}
 
 
 def check_loops(algorithm: Algorithm, wires: Sequence[Wire], components: Mapping[str, Component]) -> tuple[str, ...]:

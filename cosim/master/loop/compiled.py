@@ -27,7 +27,6 @@ def load(path: str) -> ctypes.CDLL:
     declare(
         library,
         c_int64,
-        loop_start=[POINTER(CLoop)],
         loop_run=[POINTER(CLoop), c_int64, c_void_p, c_void_p, c_int64],
         loop_flush=[POINTER(CLoop), c_void_p, c_int64],
     )
@@ -98,11 +97,6 @@ class CompiledLoop:
         columns = self._loop.column[: self._loop.columns]
         return [value for column in columns for value in (column.value, column.sample)]
 
-    def start(self) -> None:
-        """Read all outputs before the first tick."""
-        self._library.loop_start(self._loop)
-        self._rest()
-
     def run(self, ticks: int, signals: np.ndarray) -> np.ndarray:
         """Run ticks with signals of shape (signals, ticks); returns rows of shape (columns, rows)."""
         rows = np.empty((len(self.plan.columns), ticks // self.plan.decimation + 2))
@@ -132,9 +126,7 @@ def _part(part: Part, wire: int, bus: np.ndarray) -> CPart:
     assert isinstance(functions, Functions)  # the factory chose this loop because all offer them
     references = (part.input_references, part.output_references)
     places = (_address(bus, part.input), _address(bus, part.output))
-    return as_part(
-        functions, references, *places, wire=wire, wires=len(part.links), every=part.every, direct=part.direct
-    )
+    return as_part(functions, references, *places, wire=wire, wires=len(part.links), every=part.every)
 
 
 def _wire(link: Link) -> CWire:
@@ -148,7 +140,6 @@ def _wire(link: Link) -> CWire:
         offset=link.offset,
         quantum=link.quantum,
         faults=len(faults),
-        breaks_loop=link.breaks_loop,
         fault=_array(CFault, faults),
     )
 

@@ -10,7 +10,7 @@ import numpy as np
 from cosim.fmi.component import OK, WARNING
 from cosim.master.loop.coupling import Balancing, Coupled, Iterating
 from cosim.master.loop.part import Parts
-from cosim.system.plan import Effort, Failure, Gather, Iterate, Part, Plan, PlannedStage, Step
+from cosim.system.plan import Effort, Gather, Iterate, Part, Plan, PlannedStage, Step
 
 
 class InterpretedLoop(Parts):
@@ -38,24 +38,14 @@ class InterpretedLoop(Parts):
         """What columns hold that is not written yet."""
         return [*self._value, *self._sample]
 
-    def start(self) -> None:
-        """Read all outputs before the first tick."""
-        for index in range(len(self.plan.parts)):
-            status = self.get(index)
-            if status > WARNING:
-                self.failure = Failure(index, 0, status)
-                return
-        self._seen.status = 0
-
     def run(self, ticks: int, signals: np.ndarray) -> np.ndarray:
         """Run ticks with signals of shape (signals, ticks); returns rows of shape (columns, rows)."""
         rows: list[list[float]] = []
         bus, plan = self.plan.bus, self.plan
         for k in range(ticks):
             bus[plan.signal : plan.signal + plan.signals] = signals[:, k]
-            failed = self.tick == 0 and self._settle()
             self._note(late=False)
-            failed = failed or any(take() for take in self._stages)
+            failed = any(take() for take in self._stages)
             self._note(late=True)
             self._record(rows)
             if failed:
@@ -97,19 +87,6 @@ class InterpretedLoop(Parts):
             for link in part.links:
                 self.plan.bus[link.target] = self.carry(link)
         return False
-
-    def _settle(self) -> bool:
-        direct = [index for index, part in enumerate(self.plan.parts) if part.direct]
-        return any(self._meet(index, again > 0) for again in range(len(direct)) for index in direct)
-
-    def _meet(self, index: int, again: bool) -> bool:
-        for link in self.plan.parts[index].links:
-            if not (again and link.breaks_loop):
-                self.plan.bus[link.target] = self.carry(link)
-        status = max(self.set(index), self.get(index))
-        if status > WARNING:
-            self.failure = Failure(index, 0, status)
-        return status > WARNING
 
     def _advance(self, index: int) -> bool:
         part = self.enter(index)

@@ -5,6 +5,8 @@ Does what part.c does, bit for bit; see there for the meaning of each function.
 
 from math import floor, isfinite
 
+import numpy as np
+
 from cosim.fmi.component import NOT_FINITE, OK, WARNING
 from cosim.master.loop.structures import CLoop
 from cosim.support.activity import board
@@ -23,20 +25,7 @@ class Parts:
 
     def carry(self, link: Link) -> float:
         """Return what a wire gives now."""
-        bus = self.plan.bus
-        value = link.gain * float(bus[link.source]) + link.offset
-        if link.quantum > 0.0:
-            value = link.quantum * float(floor(value / link.quantum + 0.5))
-        value = value if link.noise < 0 else value + float(bus[link.noise])
-        value = next((target for source, target in link.table if source == value), value)
-        for number, fault in enumerate(link.faults):
-            if fault.first <= self.tick < fault.last:
-                if fault.freeze:
-                    value = self._frozen.setdefault((link.target, number), value)
-                else:
-                    value = fault.gain * value + fault.offset
-                    value = value if fault.noise < 0 else value + float(bus[fault.noise])
-        return value
+        return carried(self.plan.bus, link, self.tick, self._frozen)
 
     def enter(self, index: int) -> Part:
         """Return a part whose functions will be called now, and note it where another process can read it."""
@@ -69,3 +58,20 @@ class Parts:
         if status > WARNING:
             self.failure = Failure(index, self.tick if since is None else since, status)
         return status > WARNING
+
+
+def carried(bus: np.ndarray, link: Link, tick: int, frozen: dict[tuple[int, int], float]) -> float:
+    """Return what a wire gives at a tick; `frozen` remembers what its faults hold."""
+    value = link.gain * float(bus[link.source]) + link.offset
+    if link.quantum > 0.0:
+        value = link.quantum * float(floor(value / link.quantum + 0.5))
+    value = value if link.noise < 0 else value + float(bus[link.noise])
+    value = next((target for source, target in link.table if source == value), value)
+    for number, fault in enumerate(link.faults):
+        if fault.first <= tick < fault.last:
+            if fault.freeze:
+                value = frozen.setdefault((link.target, number), value)
+            else:
+                value = fault.gain * value + fault.offset
+                value = value if fault.noise < 0 else value + float(bus[fault.noise])
+    return value
