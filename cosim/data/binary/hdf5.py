@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from cosim.data.binary.packages import is_table, package, vectors
+from cosim.data.binary.packages import is_table, left_out, opaque, package, vectors
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, check_columns
 
+INTERNAL, HANDLE = "#", "MATLAB_object_decode"
+"""First sign of the groups in which MATLAB keeps its objects, and the attribute of what leads to one."""
 UNITS = ("unit", "units")
 """Attributes of a dataset in which tools write its unit."""
 
@@ -23,8 +25,12 @@ def read(path: Path) -> Columns:
         names = {whole: whole.split("/")[-1] if often[whole.split("/")[-1]] == 1 else whole for whole in items}
         found = {names[whole]: np.squeeze(item[()]) for whole, item in items.items()}
         units = {names[whole]: _unit(item) for whole, item in items.items()}
+        objects = any(name.startswith(INTERNAL) for name in file)
     values = vectors(path, found)
-    return Columns(values, {name: unit for name, unit in units.items() if unit and name in values})
+    if objects and not values:
+        raise opaque(path)
+    stated = {name: unit for name, unit in units.items() if unit and name in values}
+    return Columns(values, stated, notes=left_out(path, found, values))
 
 
 def _vectors(path: Path, file: Any) -> dict[str, Any]:
@@ -33,6 +39,8 @@ def _vectors(path: Path, file: Any) -> dict[str, Any]:
 
     def visit(name: str, item: Any) -> None:
         numeric = getattr(item, "dtype", None) is not None and item.dtype.kind in "fiub" and item.shape is not None
+        if name.startswith(INTERNAL) or HANDLE in item.attrs:
+            return
         if numeric and (sum(length > 1 for length in item.shape) <= 1 or is_table(item.shape)):
             items[name] = item
             check_columns(path, len(items))

@@ -1,26 +1,44 @@
 """MAT files: version 5 and older by SciPy, 7.3 as HDF5. Fields of a struct are columns."""
 
+import warnings
 from math import prod
 from pathlib import Path
 
-import numpy as np
-
 from cosim.data.binary import hdf5
-from cosim.data.binary.packages import vectors
+from cosim.data.binary.matlab_structs import arrays_of
+from cosim.data.binary.packages import left_out, opaque, vectors
 from cosim.data.columns import Columns
-from cosim.data.limits import check_cells
+from cosim.data.limits import check_cells, listed
 
 
 def read(path: Path) -> Columns:
-    """Read a MAT file."""
+    """Read a MAT file.
+
+    Raises:
+        RecordingError: it holds no arrays of numbers, or more than a file of its size may.
+    """
     with path.open("rb") as file:
         if b"MATLAB 7.3" in file.read(128):
             return hdf5.read(path)
-    from scipy.io import loadmat, whosmat
+    from scipy.io import loadmat
 
-    check_cells(path, sum(prod(shape) for _, shape, _ in whosmat(path)), 1)
-    found: dict[str, np.ndarray] = {}
-    for name, value in loadmat(path, squeeze_me=True, simplify_cells=True).items():
-        fields = value.items() if isinstance(value, dict) else [(name, value)]
-        found |= {key: np.asarray(item) for key, item in fields if not name.startswith("__")}
-    return Columns(vectors(path, found))
+    check_cells(path, _claimed(path), 1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # objects without a name, which are told below
+        found = arrays_of(loadmat(path, squeeze_me=True, simplify_cells=True))
+    values = vectors(path, found.arrays)
+    if found.objects and not values:
+        raise opaque(path)
+    notes = (f"{path.stem}: objects that only MATLAB can open were left out: {listed(tuple(found.objects))}.",)
+    units = {name: text for name, text in found.units.items() if name in values}
+    return Columns(values, units, notes=(notes if found.objects else ()) + left_out(path, found.arrays, values))
+
+
+def _claimed(path: Path) -> int:
+    """Return how many numbers the variables of a file claim to hold; SciPy cannot list those beside an object."""
+    from scipy.io import whosmat
+
+    try:
+        return sum(prod(shape) for _, shape, _ in whosmat(path))
+    except TypeError:
+        return 0

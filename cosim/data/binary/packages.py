@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cosim.data.limits import check_cells, listed
-from cosim.support.errors import MissingPackageError
+from cosim.support.errors import MissingPackageError, RecordingError
 
 
 def package(name: str, extra: str, path: Path) -> Any:
@@ -54,6 +54,15 @@ def left_out(path: Path, found: dict[str, np.ndarray], kept: Collection[str]) ->
     lost = [name for name in numeric if name not in kept and f"{name}_1" not in kept]
     shapes = [f"{name} ({' x '.join(map(str, found[name].shape))})" for name in lost]
     return (f"{path.stem}: arrays of other lengths were left out: {listed(tuple(shapes))}.",) if shapes else ()
+
+
+def opaque(path: Path) -> RecordingError:
+    """Refuse a MAT file that holds nothing but objects."""
+    text = (
+        f"{path} holds MATLAB objects (a table, timeseries or Dataset of Simulink), which only MATLAB can open. There, "
+        "save their numbers: writetable, or vectors t, q, tau with save"
+    )
+    return RecordingError(f"{text}.", culprit=str(path))
 
 
 def _beside(value: np.ndarray) -> np.ndarray:

@@ -1,6 +1,10 @@
-"""Parquet: columns with units in the metadata of their fields, and an origin in that of the file."""
+"""Parquet: columns with units in the metadata of their fields, and an origin in that of the file.
+
+Columns of structs and of lists of one length, as data sets of robots have them, are columns each: `state.1`, `state.2`.
+"""
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +22,45 @@ def read(path: Path) -> Columns:
         table, metadata = file.read(), file.metadata.metadata or {}
     default_memory_pool().release_unused()  # what was unpacked on the way: a fifth of large recordings
     units = {field.name: (field.metadata or {}).get(UNIT_KEY, b"").decode("utf-8", "replace") for field in table.schema}
-    values = {name: as_array(table[name]) for name in table.column_names if not name.startswith("__index_level_")}
+    columns = [(name, table[name]) for name in table.column_names if not name.startswith("__index_level_")]
+    leaves = dict(leaf for name, column in columns for leaf in _leaves(path, name, column))
+    check_cells(path, table.num_rows, len(leaves))
+    values = {name: as_array(column) for name, column in leaves.items()}
     origin = _origin(metadata.get(ORIGIN_KEY, b"{}"))
     notes = () if isinstance(origin, dict) else (f"{path.stem}: its origin was left out, as it is no table of facts.",)
     stated = {name: unit for name, unit in units.items() if unit}
     return Columns(values, stated, origin if isinstance(origin, dict) else {}, notes=notes)
+
+
+def _leaves(path: Path, name: str, column: Any) -> Iterator[tuple[str, Any]]:
+    """Walk through a column to its numbers: fields of structs by name, lists of one length by number from 1."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    kind = column.type
+    if pa.types.is_struct(kind):
+        for place, member in enumerate(kind):
+            yield from _leaves(path, f"{name}.{member.name}", pc.struct_field(column, [place]))
+    elif width := _width(column):
+        check_cells(path, len(column), width)
+        for place in range(width):
+            yield from _leaves(path, f"{name}.{place + 1}", pc.list_element(column, place))
+    else:
+        yield name, column
+
+
+def _width(column: Any) -> int:
+    """Return how many values each list of a column holds; 0 if it holds no lists, or lists of several lengths."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    kind = column.type
+    if pa.types.is_fixed_size_list(kind):
+        return 0 if column.null_count else int(kind.list_size)
+    if column.null_count or not (pa.types.is_list(kind) or pa.types.is_large_list(kind)) or not len(column):
+        return 0
+    lengths = pc.min_max(pc.list_value_length(column))
+    return int(lengths["min"].as_py()) if lengths["min"] == lengths["max"] else 0
 
 
 def _origin(text: bytes) -> Any:
