@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from cosim.data import held
 from cosim.data.arrays import as_columns, sha256_of
 from cosim.data.assign import assign
 from cosim.data.checks import check_motion, check_names, check_sampling, check_time, chosen, numbers
@@ -141,6 +142,7 @@ class Recording:
         check_motion(path, table, chosen(values, required))
         if required:
             check_sampling(path, table["t"])
+            joined = (*joined, *held.notes(name, table))
         rows: JsonObject = {"rows": found.rows} if found.rows else {}
         origin = found.origin | {"file": {"name": path.name, "sha256": sha256} | rows}
         origin |= {"start": found.start or clock.start} if found.start or clock.start else {}

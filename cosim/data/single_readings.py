@@ -35,6 +35,8 @@ STEPS = 3.0
 """Limit in steps of the encoder: what its rounding alone can do is one."""
 RATIO = 4.0
 """A kink that is put on the curve through its neighbours leaves half of its distance as bends, a false reading none."""
+ROUNDING = 1e-9
+"""Share of the range of a column below which a change is one of its rounding in the file."""
 ABSURD = 3.0
 """Limit of a torque, in sizes that 99.5 % of all its rows keep to: a command's kick is real and may be large."""
 AT_AN_END = 10.0
@@ -79,12 +81,18 @@ def cleaned(recording: Recording) -> Recording:
 def false_runs(recording: Recording, name: str) -> list[Run]:
     """Find the runs of false readings in a column; none where there are too many to be single."""
     values = recording[name]
-    limit = _absurd(values) if name == "tau" else _limits(values, resolution(values))
+    limit = _absurd(values) if name == "tau" else _limits(values, max(resolution(values), _least_change(values)))
     suspects = np.flatnonzero(_bends(values) > limit / (2 if name == "tau" else 1))
     if not len(suspects) or len(suspects) > max(3 * LONGEST, 3 * MOST * len(values)):
         return []
     runs = list(_runs(values, limit, suspects))
     return runs if sum(len(run.values) for run in runs) <= max(LONGEST, MOST * len(values)) else []
+
+
+def _least_change(values: Array) -> float:
+    """Smallest change between two rows: a count of an encoder that hardly ever counts, else next to nothing."""
+    changes = np.abs(np.diff(values))
+    return float(np.min(changes, where=changes > ROUNDING * float(np.ptp(values)), initial=np.inf))
 
 
 def _bends(values: Array) -> Array:

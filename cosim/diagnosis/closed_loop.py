@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
-from cosim.data.single_readings import cleaned
 from cosim.diagnosis.protocol import CUTOFF
 from cosim.estimation.filters import lowpass
 from cosim.estimation.prepare import Array
@@ -105,7 +105,7 @@ class Loops:
 
     def __init__(self, card: Card, recordings: Sequence[Recording]) -> None:
         able = card.controller is not None and all({"q", "q_d"} <= set(one.columns) for one in recordings)
-        self._card, self._recordings = card, tuple(map(cleaned, recordings)) if able else ()
+        self._card, self._recordings = card, tuple(map(as_analysed, recordings)) if able else ()
         self._begun: dict[str, tuple[Mount, Future[list[Recording]]]] = {}
 
     def __enter__(self) -> "Loops":

@@ -4,8 +4,8 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
-from cosim.data.single_readings import cleaned
 from cosim.diagnosis.absent import not_found
 from cosim.diagnosis.alternatives import prove_sets
 from cosim.diagnosis.band import in_band
@@ -109,7 +109,7 @@ def diagnose(
         RecordingError: the recordings cannot belong to this card (units), or are too short.
     """
     started = time.perf_counter()
-    given, train, heldout = (*train, *heldout), [*map(cleaned, train)], [*map(cleaned, heldout)]
+    given, train, heldout = (*train, *heldout), [*map(as_analysed, train)], [*map(as_analysed, heldout)]
     check_effects(card.plant())
     check_recordings(train, heldout)
     sanity = (*doubts(train, heldout, card), *single_readings(given, (*train, *heldout)))

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal
 
+from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
-from cosim.data.single_readings import cleaned
 from cosim.diagnosis.band import in_band
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.result import Diagnosis, Finding, is_special
@@ -63,7 +63,7 @@ class Duel:
 
 def problem_of(train: Sequence[Recording], card: Card) -> Problem:
     """What fits of the training recordings share, in the band of the diagnosis."""
-    good, mount = [*map(cleaned, train)], card.plant()
+    good, mount = [*map(as_analysed, train)], card.plant()
     prepared = in_band(good, mount)
     return Problem(mount, prepared, weights(mount.friction, prepared), max(one.sample_time for one in good))
 

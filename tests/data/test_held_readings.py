@@ -1,0 +1,139 @@
+"""Readings that are repeated because a device is slower than the logger: noticed, and analysed at their own rate."""
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from cosim.data.held import held_columns, notes, rows_held
+from cosim.data.own_rate import at_own_rate
+from cosim.data.recording import Recording
+from cosim.diagnosis.diagnose import diagnose
+from pyfmi_models.card import parse_card
+
+Array = npt.NDArray[np.float64]
+LINES = ((0.11, 0.3), (0.27, 0.12), (0.63, 0.036))
+CARD = '[mount]\ninertia = 30.0\n[friction]\nmodel = "coulomb"\nFc = 2.5\nsigma2 = 30.0\n'
+
+
+def axis(seed: int, seconds: float = 30.0, rate: float = 1000.0) -> Recording:
+    """An axis with Coulomb and viscous friction on a multisine, as the card says; torque 0.02 N m of noise."""
+    random = np.random.default_rng(seed)
+    t, phases = np.arange(int(seconds * rate)) / rate, random.uniform(0, 6, len(LINES))
+    q, v, a = (
+        sum(
+            (
+                size * (2 * np.pi * f) ** k * np.sin(2 * np.pi * f * t + p + k * np.pi / 2)
+                for (f, size), p in zip(LINES, phases, strict=True)
+            ),
+            0 * t,
+        )
+        for k in range(3)
+    )
+    tau = 30 * a + 2.5 * np.tanh(v / 1e-3) + 30 * v + random.normal(0, 0.02, len(t))
+    return Recording(f"run{seed}", {"t": t, "tau": tau, "q": q + random.normal(0, 1e-7, len(t)), "q_d": q})
+
+
+def held(values: Array, rows: float, first: int = 0) -> Array:
+    """The same values, new every so many rows from the first of them on."""
+    k = np.arange(len(values)) - first
+    return np.asarray(values[np.maximum(np.ceil(np.floor(k / rows + 1e-9) * rows - 1e-9) + first, 0).astype(int)])
+
+
+def with_held(recording: Recording, **rows: tuple[float, int]) -> Recording:
+    return replace(recording, table=recording.table | {n: held(recording[n], *one) for n, one in rows.items()})
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    rows=st.sampled_from([2, 2.5, 3, 5, 7.5, 10, 20, 33.3, 100]),
+    first=st.integers(0, 19),
+    count=st.sampled_from([0, 1e-4]),
+)
+def test_a_held_column_is_noticed_with_its_interval(rows: float, first: int, count: float) -> None:
+    q = axis(1)["q"]
+    q = count * np.round(q / count) if count else q
+    assert rows_held(held(q, rows, first)) == pytest.approx(rows, rel=0.01)
+
+
+def test_a_reading_that_comes_late_now_and_then_is_held_all_the_same() -> None:
+    random, q = np.random.default_rng(4), axis(1)["q"]
+    new = np.maximum.accumulate(np.arange(0, len(q), 20) + random.integers(-2, 4, len(q) // 20))
+    rows = np.searchsorted(new, np.arange(len(q)), "right") - 1
+    assert rows_held(q[np.maximum(new[np.maximum(rows, 0)], 0)]) == pytest.approx(20, rel=0.02)
+
+
+@pytest.mark.parametrize("step", [1e-5, 1e-4, 1e-3, 1e-2])
+def test_a_coarse_encoder_is_not_held(step: float) -> None:
+    q = axis(1)["q"]
+    assert rows_held(step * np.round(q / step)) == 1
+    assert rows_held(step * np.round((q + np.random.default_rng(5).normal(0, step, len(q))) / step)) == 1
+    assert rows_held(step * np.round(0.0729 * np.arange(30_000) / 1000 / step)) == 1
+
+
+def test_a_set_point_with_corners_and_a_torque_in_steps_are_not_held() -> None:
+    t = np.arange(30_000) / 1000
+    levels = np.repeat(np.random.default_rng(6).normal(size=40), 750)
+    table = {"t": t, "tau": levels, "q": axis(1)["q"], "q_d": np.sign(np.sin(2 * np.pi * 0.25 * t))}
+    assert held_columns(table) == {}
+
+
+def test_reading_says_what_is_held_and_for_how_long() -> None:
+    whole = with_held(axis(1), tau=(20, 0), q=(10, 3))
+    said = Recording.of(whole.table, "run").notes
+    assert said == notes("run", whole.table)
+    assert said[0].startswith("run: tau is new every 20 ms, while rows come every 1 ms")
+    assert said[1].startswith("run: q is new every 10 ms")
+    assert Recording.of(axis(1).table, "run").notes == ()
+
+
+def test_a_recording_that_holds_nothing_is_returned_as_it_is() -> None:
+    assert at_own_rate(one := axis(1)) is one
+
+
+def test_its_own_rate_has_the_new_readings_themselves_and_the_mean_torque_between() -> None:
+    whole = axis(1)
+    slow = at_own_rate(with_held(whole, q=(10, 3)))
+    assert slow.sample_time == pytest.approx(0.01)
+    rows = np.rint(slow.t * 1000).astype(int)
+    assert np.all(rows % 10 == 3)
+    np.testing.assert_array_equal(slow["q"], whole["q"][rows])
+    middle = rows[5] + np.arange(-4, 5)
+    expected = (whole["tau"][middle].sum() + (whole["tau"][rows[5] - 5] + whole["tau"][rows[5] + 5]) / 2) / 10
+    assert slow["tau"][5] == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_slow_torque_is_taken_when_it_is_new_and_not_half_an_interval_late() -> None:
+    whole = axis(1)
+    slow = at_own_rate(with_held(whole, tau=(20, 7), q=(10, 0)))
+    rows = np.rint(slow.t * 1000).astype(int)
+    np.testing.assert_array_equal(slow["tau"], whole["tau"][rows])
+    np.testing.assert_allclose(slow["q"], whole["q"][rows], atol=3e-6)
+
+
+def test_gaps_stay_gaps_at_their_own_rate() -> None:
+    whole = with_held(axis(1), tau=(20, 0))
+    kept = (whole.t < 10) | (whole.t > 12.5)
+    slow = at_own_rate(replace(whole, table={name: column[kept] for name, column in whole.table.items()}))
+    (gap,) = slow.gaps
+    assert gap.start == pytest.approx(10, abs=0.03)
+    assert gap.end == pytest.approx(12.5, abs=0.03)
+
+
+def test_readings_that_stay_the_same_at_rest_are_readings_all_the_same() -> None:
+    one = axis(1)
+    rest = (one.t > 10) & (one.t < 15)
+    q = held(np.where(rest, 0.1, one["q"]), 10)
+    slow = at_own_rate(replace(one, table=one.table | {"q": q}))
+    assert len(slow) == pytest.approx(3000, abs=2)
+
+
+@pytest.mark.parametrize("rows", [{"tau": (20.0, 0)}, {"q": (10.0, 0)}])
+def test_nothing_is_named_because_readings_are_held(rows: dict[str, tuple[float, int]]) -> None:
+    runs = [with_held(axis(seed, 12.0), **rows) for seed in (1, 2)]
+    found = diagnose(runs[:1], runs[1:], parse_card(CARD, "card.toml")).diagnosis
+    assert found.verdict == ()
+    assert "encoder_step" not in [one.finding for one in found.sanity]
