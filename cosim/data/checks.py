@@ -11,7 +11,7 @@ import numpy as np
 
 from cosim.data.limits import LARGEST, listed, short
 from cosim.data.questions import coarse_time, untimed
-from cosim.data.runs import many, split
+from cosim.data.runs import many, mixed, split, text_of
 from cosim.support.errors import RecordingError
 
 SLOWEST = 10.0
@@ -110,17 +110,28 @@ def check_time(path: Path, t: np.ndarray, minimum: int, values: Mapping[str, np.
         message = f"{path} has {len(t)} row{'s' * (len(t) != 1)}; at least {minimum} are needed."
         raise RecordingError(message, culprit=str(path), value=len(t))
     wrong = np.flatnonzero(np.diff(t) <= 0)
-    if len(wrong):
-        row, before, after = wrong[0] + 2, t[wrong[0]], t[wrong[0] + 1]
-        how = "runs backwards" if after < before else "stands still"
-        span = f"({before:.9g} s to {after:.9g} s)"
-        message = f"{path}: time {how} at row {row:,} {span}."
-        if after < before and split(path)[0].is_file():
+    if not len(wrong):
+        return
+    row, before, after = int(wrong[0]) + 2, float(t[wrong[0]]), float(t[wrong[0] + 1])
+    if after < before:
+        message = f"{path}: time runs backwards at row {row:,} ({before:.9g} s to {after:.9g} s)."
+        if split(path)[0].is_file():
             raise many(path, values, t, message)
-        standing = float(np.mean(np.diff(t) == 0))
-        if after == before and standing > COARSE:
-            raise coarse_time(path, message, t)
-        raise RecordingError(f"{message} Split the file there.", culprit=str(path), value=float(after))
+        raise RecordingError(f"{message} Split the file there.", culprit=str(path), value=after)
+    message = f"{path}: time stands still at row {row:,} ({before:.9g} s to {after:.9g} s)"
+    if (apart := mixed(path, values, t)) and split(path)[0].is_file():
+        raise RecordingError(f"{message}: {apart}", culprit=str(path), value=after)
+    if float(np.mean(np.diff(t) == 0)) > COARSE:
+        raise coarse_time(path, f"{message}.", t)
+    raise RecordingError(f"{message}{_differing(values, row)}.", culprit=str(path), value=after)
+
+
+def _differing(values: Mapping[str, np.ndarray], row: int) -> str:
+    """Say how a row (from 1) differs from the one before it."""
+    pairs = [(name, *column[row - 2 : row].tolist()) for name, column in values.items()]
+    name, one, other = next(((name, one, other) for name, one, other in reversed(pairs) if one != other), ("", 0, 0))
+    told = f' and its rows differ: "{short(name)}" is {text_of(one)} and {text_of(other)}' if name else ""
+    return f"{told}. Leave one of the two out"
 
 
 def check_motion(path: Path, table: dict[str, np.ndarray], needed: tuple[str, ...]) -> None:

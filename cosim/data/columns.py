@@ -32,6 +32,7 @@ class Columns:
         missing: those of the notes that say that rows were left out: what is left is not evenly spaced.
         rows: which rows of the file these are, where they are one recording of many: "4,378 to 8,755".
         numbered: the file names no columns; they are called #1, #2 ...
+        restarts: rows (from 0) before which the names of the columns stand again: a logger that was started anew.
         clocks: times [s] of the samples of channels by name, where channels have times of their own: those of one
             clock share the array, no column is the time, and NaN is an invalid sample. Lengths may then differ;
             `cosim.data.joining` makes a table of them.
@@ -49,4 +50,5 @@ class Columns:
     missing: tuple[str, ...] = ()
     rows: str = ""
     numbered: bool = False
+    restarts: tuple[int, ...] = ()
     clocks: dict[str, np.ndarray] = field(default_factory=dict)

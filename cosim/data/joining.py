@@ -27,7 +27,8 @@ import numpy.typing as npt
 from cosim.data.assign import OURS, assign
 from cosim.data.checks import chosen
 from cosim.data.columns import Columns
-from cosim.data.limits import listed
+from cosim.data.limits import listed, short
+from cosim.data.order import order_of
 from cosim.data.registers import continued
 from cosim.support.errors import RecordingError
 
@@ -52,12 +53,21 @@ LEAST = 2
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """The valid samples of a channel: times [s] that grow, and values, of one shape; `invalid` were left out."""
+    """The valid samples of a channel: times [s] and values, of one shape.
+
+    `invalid` samples were left out, `done` says in words how the others were put in order.
+    """
 
     name: str
     t: Array
     x: Array
     invalid: int = 0
+    done: tuple[str, ...] = ()
+
+    @property
+    def grows(self) -> bool:
+        """Whether each sample is later than the one before it."""
+        return bool((np.diff(self.t) > 0).all())
 
     @cached_property
     def period(self) -> float:
@@ -114,8 +124,10 @@ def on_one_time(
     """
     if not found.clocks:
         return found
-    found = _of_one_clock(path, found, columns) if "t" in columns else found
-    channels = {name: one for name in found.clocks if (one := _channel(path, found, name))}
+    found = _of_one_clock(found, columns["t"]) if "t" in columns else found
+    if (table := _as_table(found)) is not None:
+        return table
+    channels = {name: one for name in found.clocks if (one := _channel(found, name))}
     if not channels:
         return replace(found, values={}, clocks={})
     longest = max(channels.values(), key=lambda one: len(one.t))
@@ -123,18 +135,32 @@ def on_one_time(
     served = assign(path, named, columns, units, required)
     roles = {theirs: ours for ours, theirs in served.sources.items() if theirs in channels and ours in OURS}
     needed = [served.sources[ours] for ours in chosen(served.values, tuple(required)) if ours != "t"]
+    for name in needed:
+        _check_times(path, channels[name])
+    channels = {name: one for name, one in channels.items() if one.grows}
+    roles = {name: ours for name, ours in roles.items() if name in channels}
     channels |= {name: _turned(path, channels[name], served.units) for name, ours in roles.items() if ours == "q"}
-    base = _base([channels[name] for name in needed if name in channels], roles) or longest
+    base = _base([channels[name] for name in needed], roles) or max(channels.values(), key=lambda one: len(one.t))
     return _table(path, found, channels, roles, base, needed)
 
 
-def _of_one_clock(path: Path, found: Columns, columns: Mapping[str, str]) -> Columns:
+def _of_one_clock(found: Columns, name: str) -> Columns:
     """Only the channels that share their times with the column that the user calls the time."""
-    own = found.clocks.get(columns["t"])
+    own = found.clocks.get(name)
     return found if own is None else replace(found, clocks={k: v for k, v in found.clocks.items() if v is own})
 
 
-def _channel(path: Path, found: Columns, name: str) -> Channel | None:
+def _as_table(found: Columns) -> Columns | None:
+    """Channels as a table, if they share one clock and all of their samples are valid."""
+    first, *others = found.clocks.values()
+    columns = [found.values[name] for name in found.clocks]
+    if any(one is not first for one in others) or not all(bool(np.isfinite(one).all()) for one in columns):
+        return None
+    values = {"t": first} | {name: found.values[name] for name in found.clocks if name != "t"}
+    return replace(found, values=values, units=found.units | {"t": "s"}, clocks={})
+
+
+def _channel(found: Columns, name: str) -> Channel | None:
     t, x = found.clocks[name].astype(np.float64), found.values[name]
     if x.dtype.kind not in "fiub":
         return None
@@ -142,12 +168,19 @@ def _channel(path: Path, found: Columns, name: str) -> Channel | None:
     valid = np.isfinite(x) & np.isfinite(t)
     if valid.sum() < LEAST:
         return None
-    t, x, invalid = t[valid], x[valid], int((~valid).sum())
-    if wrong := np.flatnonzero(np.diff(t) <= 0).tolist():
-        row, how = wrong[0] + 1, "stands still" if t[wrong[0] + 1] == t[wrong[0]] else "runs backwards"
-        text = f'{path}: time of "{name}" {how} at its sample {row + 1:,} ({t[row - 1]:.9g} s to {t[row]:.9g} s).'
-        raise RecordingError(text, culprit=str(path), value=float(t[row]))
-    return Channel(name, t, x, invalid)
+    ordered = order_of(t[valid], {name: x[valid]})
+    return Channel(name, ordered.t, x[valid][ordered.rows], int((~valid).sum()), ordered.done)
+
+
+def _check_times(path: Path, channel: Channel) -> None:
+    """Refuse a channel whose time does not grow."""
+    if not channel.grows:
+        row = int(np.flatnonzero(np.diff(channel.t) <= 0)[0])
+        before, after = float(channel.t[row]), float(channel.t[row + 1])
+        how = "stands still and values differ" if after == before else "runs backwards"
+        where = f"at its sample {row + 2:,} ({before:.9g} s to {after:.9g} s)"
+        text = f'{path}: the time of "{short(channel.name)}" {how} {where}. Split the file there.'
+        raise RecordingError(text, culprit=str(path), value=after)
 
 
 def _turned(path: Path, channel: Channel, units: Mapping[str, str]) -> Channel:
@@ -298,6 +331,11 @@ def _notes(
         joined = f'channels with times of their own were put on the times of "{base.name}" ({base.span}): {said}.'
         span = f"{base.t[rows][0]:.6g} s to {base.t[rows][-1]:.6g} s"
         yield f"{path.stem}: {joined} The rows are those that all of them have, {span}."
+    ordered: dict[str, list[str]] = {}
+    for name, one in kept.items():
+        for text in one.channel.done:
+            ordered.setdefault(text.format(time="time"), []).append(name)
+    yield from (f"{path.stem}: {_quoted(names)}: {text}" for text, names in ordered.items())
     invalid = {one.channel.name: one.channel.invalid for one in kept.values() if one.channel.invalid}
     if invalid:
         counts = ", ".join(f'{count:,} of "{name}"' for name, count in invalid.items())

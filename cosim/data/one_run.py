@@ -13,6 +13,7 @@ from cosim.data.assign import assign
 from cosim.data.columns import Columns
 from cosim.data.joining import on_one_time
 from cosim.data.limits import listed, short
+from cosim.data.order import in_order
 from cosim.data.runs import equal, split, starts, text_of
 from cosim.data.spacing import with_time
 from cosim.data.times import read_clock
@@ -31,7 +32,7 @@ def rows_of_one(
     layout: Mapping[str, str],
     required: Sequence[str],
 ) -> Columns:
-    """Return what a file holds as a table with one row for each time.
+    """Return what a file holds as a table with one row for each time, and of many recordings the one that is named.
 
     Args:
         path: the file, and which recording of it.
@@ -44,8 +45,20 @@ def rows_of_one(
     Raises:
         RecordingError: as `on_one_time`, `with_time` and `one_run`.
     """
+    return one_run(path, timed(path, found, columns, units, layout, required), columns, units)
+
+
+def timed(
+    path: Path,
+    found: Columns,
+    columns: Mapping[str, str],
+    units: Mapping[str, str],
+    layout: Mapping[str, str],
+    required: Sequence[str],
+) -> Columns:
+    """Return all rows of a table or file, as `rows_of_one` does of one recording of it."""
     found = with_time(on_one_time(path, found, columns, units, required), layout)
-    return one_run(path, found, columns, units)
+    return in_order(path, found, columns, units, required)
 
 
 def one_run(path: Path, found: Columns, columns: Mapping[str, str], units: Mapping[str, str]) -> Columns:

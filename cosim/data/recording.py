@@ -19,7 +19,7 @@ from cosim.data.assign import assign
 from cosim.data.checks import check_motion, check_names, check_sampling, check_time, chosen, numbers
 from cosim.data.columns import Columns
 from cosim.data.formats import read_columns
-from cosim.data.one_run import rows_of_one
+from cosim.data.one_run import rows_of_one, timed
 from cosim.data.questions import PERIOD
 from cosim.data.registers import continued
 from cosim.data.runs import named, split
@@ -111,7 +111,8 @@ class Recording:
             UnitError: a unit is unknown.
         """
         values = as_columns(name, table)
-        return cls.judged(Path(name), name, Columns(values), sha256_of(values), columns or {}, units or {}, required)
+        found = timed(Path(name), Columns(values), columns or {}, units or {}, {}, required)
+        return cls.judged(Path(name), name, found, sha256_of(values), columns or {}, units or {}, required)
 
     @classmethod
     def judged(

@@ -7,11 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim.data.limits import NAME
+from cosim.data.limits import NAME, short
 from cosim.support.errors import ManyRecordingsError
 
 TOLD_BY = 4
 """Columns that may tell recordings apart together; where it takes more, their numbers are shorter."""
+MIXED = 20
+"""Recordings whose rows may be mixed in one table: axes of a machine."""
 TYPED = re.compile(r"[^=,:#/\\\x00-\x1f]+=[^,/\\\x00-\x1f]+")
 """What can be typed behind a file's name, and is no part of a path."""
 SAME = 1e-6
@@ -70,6 +72,27 @@ def taken(path: Path, runs: Sequence[Run]) -> str:
     first = runs[0].which
     by_name = f"{path.name}{joint}{first}, or by number, " if first != "#1" and len(first) <= NAME else ""
     return f"{by_name}{path.name}{joint}#1 to #{len(runs)}"
+
+
+def mixed(path: Path, values: Mapping[str, np.ndarray], t: np.ndarray) -> str:
+    """Say which column tells recordings apart whose rows are mixed, and how one is taken; empty if none does."""
+    for name, column in values.items():
+        parts = [np.flatnonzero(column == kind) for kind in _kinds(column)]
+        which = [f"{name}={text_of(column[rows[0]])}" for rows in parts]
+        grow = all(len(rows) > 1 and bool((np.diff(t[rows]) > 0).all()) for rows in parts)
+        if len(parts) > 1 and grow and all(map(TYPED.fullmatch, which)):
+            joint = "," if ":" in path.name else ":"
+            told = f'rows of {len(parts)} recordings are mixed, and "{short(name)}" tells them apart'
+            return f"{told}; take one, {path.name}{joint}{which[0]} to {which[-1]}."
+    return ""
+
+
+def _kinds(column: np.ndarray) -> list[object]:
+    """Values of a column that may be the name of a recording; none where it has many."""
+    if column.dtype.kind not in "iufbO" or len(set(column[: 10 * MIXED].tolist())) > MIXED:
+        return []
+    kinds = list(dict.fromkeys(column.tolist()))
+    return kinds if len(kinds) <= MIXED else []
 
 
 def text_of(value: object) -> str:

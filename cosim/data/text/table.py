@@ -25,7 +25,7 @@ NOTHING = (
 
 def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
     """Parse the body of a text whose layout is known."""
-    body, again = _without_header(path, _body(data, layout), _head(data, layout))
+    body, restarts, again = _without_header(path, _body(data, layout), _head(data, layout))
     check_cells(path, body.count(b"\n"), layout.count)
     table, notes = _parsed(path, body, layout)
     names, units = _names(layout)
@@ -37,6 +37,7 @@ def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
         notes=again + notes,
         missing=again + notes,
         numbered=not layout.names,
+        restarts=restarts,
     )
 
 
@@ -52,16 +53,20 @@ def _head(data: bytes, layout: Layout) -> tuple[bytes, ...]:
     return tuple(written[-(1 + bool(layout.units)) :]) if layout.names else ()
 
 
-def _without_header(path: Path, body: bytes, head: Sequence[bytes]) -> tuple[bytes, tuple[str, ...]]:
-    """Leave out the names of the columns where they stand again among the samples: a logger that was started anew."""
+def _without_header(path: Path, body: bytes, head: Sequence[bytes]) -> tuple[bytes, tuple[int, ...], tuple[str, ...]]:
+    """Leave out the names of the columns where they stand again among the samples: a logger that was started anew.
+
+    Returns the body without them, the rows (from 0) before which they stood, and a note.
+    """
     if not any(line in body for line in head):
-        return body, ()
-    lines = body.split(b"\n")
+        return body, (), ()
+    lines = [line for line in body.split(b"\n") if line.strip()]
     kept = [line for line in lines if line.strip() not in head]
-    again = next((row for row, line in enumerate(lines, 1) if line.strip() in head), 0)
-    told = f"the names of the columns stand again at row {again:,}"
-    note = f"{path.stem}: {told}; such lines were left out ({len(lines) - len(kept):,})."
-    return b"\n".join(kept), ((note,) if again else ())
+    at = [row for row, line in enumerate(lines) if line.strip() in head]
+    restarts = tuple(row - before for before, row in enumerate(at))
+    told = f"the names of the columns stand again at row {at[0] + 1:,}" if at else ""
+    note = f"{path.stem}: {told}; such lines were left out ({len(at):,})."
+    return b"\n".join(kept), restarts, ((note,) if at else ())
 
 
 def grouped(column: np.ndarray, decimal: str) -> np.ndarray:
