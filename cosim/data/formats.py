@@ -1,13 +1,13 @@
 """File formats of recordings: bytes to named columns, nothing judged yet.
 
 Text of any layout (also .gz), JSON, Parquet, arrays of NumPy, MAT (v5; v7.3 is HDF5), HDF5, MDF4, MCAP and bags of
-ROS 2. Units come along where a file states them; see `Columns`.
+ROS 1 and 2. Units come along where a file states them; see `Columns`.
 """
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
-from cosim.data.binary import hdf5, matlab, mcap, mdf, numpy_files, parquet, rosbag
+from cosim.data.binary import hdf5, matlab, mcap, mdf, numpy_files, parquet, ros1, rosbag
 from cosim.data.columns import ORIGIN_KEY, UNIT_KEY, Columns
 from cosim.data.limits import LIMIT, reading, short
 from cosim.data.text import json_records
@@ -19,7 +19,6 @@ __all__ = ["ORIGIN_KEY", "UNIT_KEY", "Columns", "read_columns", "suffix_of"]
 REASON = 200
 """Characters of a reader's own message that are shown."""
 CONVERTED = {
-    ".bag": "a bag of ROS 1; convert it with rosbags-convert (pip install rosbags) to a bag of ROS 2 or MCAP",
     ".tdms": "a TDMS file of LabVIEW; write it as CSV with npTDMS (tdmsinfo, to_dataframe().to_csv) or DIAdem",
     ".ulg": "a log of PX4; write its topics as CSV with ulog2csv (pip install pyulog)",
     ".wpilog": "a log of WPILib; export it as CSV with AdvantageScope",
@@ -115,6 +114,7 @@ _READERS: dict[str, Callable[..., Columns]] = {
     ".mf4": mdf.read,
     ".mcap": mcap.read,
     ".db3": rosbag.read,
+    ".bag": ros1.read,
     ".txt": read_text,
     ".txt.gz": read_text,
     ".tsv": read_text,

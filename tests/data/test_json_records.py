@@ -125,7 +125,7 @@ def test_a_text_that_would_fill_the_memory_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("run.bag", "a bag of ROS 1; convert it with rosbags-convert"),
+        ("run.wpilog", "export it as CSV with AdvantageScope"),
         ("run.tdms", "a TDMS file of LabVIEW; write it as CSV"),
         ("run.ulg", "ulog2csv"),
         ("run.xlsx", "a spreadsheet; save its table as CSV"),

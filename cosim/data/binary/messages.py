@@ -1,4 +1,4 @@
-"""Messages of ROS 2 as columns: the topic that tells of an axis, one row a message.
+"""Messages of ROS as columns: the topic that tells of an axis, one row a message.
 
 A `sensor_msgs/msg/JointState` gives `joint.position`, `joint.velocity` and `joint.effort` of every joint; of any other
 message every number becomes a column, named by its path in the message. Time is the stamp in the header, or else when
@@ -36,8 +36,8 @@ class Topic:
         return self.kind.endswith("JointState"), sum(map(len, self.rows[:1])) * len(self.rows)
 
 
-def columns_of(path: Path, messages: Iterable[tuple[str, str, int, Any]]) -> Columns:
-    """Make columns of messages, each (topic, type, time it was logged in ns, decoded message)."""
+def columns_of(path: Path, messages: Iterable[tuple[str, str, int, Any]], release: str = "ROS 2") -> Columns:
+    """Make columns of messages, each (topic, type, time it was logged in ns, decoded message); `release` wrote them."""
     topics: dict[str, Topic] = {}
     for name, kind, logged, message in messages:
         topic = topics.setdefault(name, Topic(name, kind))
@@ -50,17 +50,17 @@ def columns_of(path: Path, messages: Iterable[tuple[str, str, int, Any]]) -> Col
         return Columns({})
     others = tuple(sorted(set(topics) - {chosen.name}))
     notes = (f"{path.stem}: of its topics {chosen.name} was read; left out: {listed(others)}.",) if others else ()
-    return _table(path, chosen, notes)
+    return _table(path, chosen, notes, release)
 
 
-def _table(path: Path, topic: Topic, notes: tuple[str, ...]) -> Columns:
+def _table(path: Path, topic: Topic, notes: tuple[str, ...], release: str) -> Columns:
     names = dict.fromkeys(name for row in topic.rows for name in row)
     check_columns(path, len(names))
     times = np.array(topic.times, dtype=np.int64)
     table = {"t": (times - times[0]) * NANO}
     table |= {name: np.array([row.get(name, np.nan) for row in topic.rows]) for name in names}
     start = str(np.datetime64(int(times[0]) // 1_000_000, "ms")) if times[0] > 10**18 else ""
-    return Columns(table, {"t": "s"}, format=f"ROS 2 {topic.kind.split('/')[-1]}", start=start, notes=notes)
+    return Columns(table, {"t": "s"}, format=f"{release} {topic.kind.split('/')[-1]}", start=start, notes=notes)
 
 
 def _stamp(message: Any) -> int:

@@ -4,7 +4,8 @@
 
     joint.0.motor-pos-fb +1.25000000000000 pid.0.output -0.31000000000000
 
-Source: `write_log_file` in src/hal/utils/scope_files.c of LinuxCNC.
+Machinekit writes `nSec` for `ns`, and `(null)` for a channel that records nothing.
+Source: `write_log_file` in src/hal/utils/scope_files.c of LinuxCNC, and of Machinekit.
 """
 
 import re
@@ -17,7 +18,9 @@ from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, short
 from cosim.support.errors import RecordingError
 
-PERIOD = re.compile(r"Sampling period is ([0-9]{1,12}) ns")
+PERIOD = re.compile(r"Sampling period is ([0-9]{1,12}) n(?:s|Sec)\b")
+UNUSED = "(null)"
+"""Name of a channel without a pin."""
 
 
 def recognises(lines: Sequence[str]) -> bool:
@@ -40,6 +43,6 @@ def read(path: Path, data: bytes, lines: Sequence[str]) -> Columns:
         text = f"{path}: row {torn:,} does not name the pins of the first row: {short(' '.join(whole[torn - 1]))!r}."
         raise RecordingError(text, culprit=str(path), value=torn)
     values = np.array([row[1::2] for row in whole], dtype=np.float64)
-    table = {label: values[:, place] for place, label in enumerate(labels)}
+    table = {label: values[:, place] for place, label in enumerate(labels) if label != UNUSED}
     time = {"t": np.arange(len(values)) * period} if period else {}
     return Columns(time | table, dict.fromkeys(time, "s"), format="LinuxCNC halscope")
