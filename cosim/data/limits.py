@@ -102,13 +102,11 @@ def check_columns(path: Path, count: int) -> None:
 def check_cells(path: Path, rows: int, columns: int) -> None:
     """Refuse a table that is too wide, or of more numbers than its file may unpack to (RecordingError)."""
     check_columns(path, columns)
-    most = allowance(path).unpacked / NUMBER
-    if rows * columns > most:
-        text = (
-            f"{path} holds {rows:,} rows of {columns:,} columns; of a file of its size at most {most:,.0f} numbers are "
-            "read. Cut it in pieces"
-        )
-        raise _refusal(path, text, rows * columns, rows * columns / most)
+    most, held = allowance(path).unpacked / NUMBER, rows * columns
+    if held > most:
+        what = f"{rows:,} rows of {columns:,} columns" if columns != 1 else f"{rows:,} numbers"
+        text = f"{path} holds {what}; of a file of its size at most {most:,.0f} numbers are read. Cut it in pieces"
+        raise _refusal(path, text, held, held / most)
 
 
 def check_unpacked(path: Path, size: float, what: str = "") -> None:
