@@ -106,7 +106,7 @@ def test_angles_as_other_tools_write_them_are_known(text: str, radians: float) -
         ("[ms]", "time", "ms"),
         ("X1 Lageistwert/mm", "X1 Lageistwert", "mm"),
         ("/axis/position/rad", "/axis/position/rad", ""),
-        ("[V]", "[V]", ""),
+        ("[V]", "[V]", "V"),
     ],
 )
 def test_units_stand_alone_or_behind_a_stroke(header: str, name: str, text: str) -> None:

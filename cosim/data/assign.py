@@ -6,7 +6,7 @@ note, and what can be read in two ways is refused with the option that decides.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,8 +15,9 @@ from cosim.data import questions
 from cosim.data.checks import renamed, renamed_units
 from cosim.data.columns import Columns
 from cosim.data.limits import short
-from cosim.data.roles import counts, guess
-from cosim.data.text.names import bracketed, is_unit, spelled, suffixed_unit
+from cosim.data.roles import counts, guess, suits
+from cosim.data.text.names import bracketed, unit_of_name
+from cosim.data.text.unit_words import contradict, is_unit, spelled
 from cosim.support.errors import RecordingError
 from cosim.support.numbers import whole
 
@@ -56,31 +57,59 @@ def assign(
         RecordingError: a name is not there, or a meaning is ambiguous; the message names the option that decides.
     """
     stated = {ours: numbered(theirs, found) for ours, theirs in columns.items()}
-    values, had = renamed(path, found.values, stated), renamed_units(found.units, stated)
+    named = {name: units_stated(found, name) for name in found.values}
+    values, had = renamed(path, found.values, stated), renamed_units(named, stated)
     roles = _missing(path, found, values, had, [*stated], required, units)
     sources = {**{ours: theirs for ours, theirs in stated.items()}, **roles}
     values = renamed(path, values, roles)
-    had = renamed_units(had, roles)
-    suffixes = {ours: suffixed_unit(theirs) for ours, theirs in sources.items() if ours not in had and ours in OURS}
-    had |= {ours: text for ours, text in suffixes.items() if text}
     given = {name: spelled(text) for name, text in units.items()}
-    for ours in [name for name in values if name in OURS and name not in units]:
-        theirs = sources.get(ours, ours)
-        text = had.get(ours) or bracketed(theirs)
-        if text and not _known(text):
-            raise questions.unknown_unit(path, ours, theirs, text)
-    had = {name: text for name, text in had.items() if _known(text)}
-    share = (had | given).get("tau", "")
-    if share in SHARES:
-        raise questions.share(path, sources.get("tau", "tau"), share)
-    if "q" in roles and "q" not in given and counts(roles["q"], had.get("q", "")):
-        raise questions.counted(path, roles["q"])
+    had = renamed_units({name: text for name, text in found.units.items() if is_known(text)}, stated | roles)
+    for ours in [name for name in values if name in OURS and name not in given]:
+        text = _unit_of(path, found, ours, sources.get(ours, ours))
+        had |= {ours: text} if text else {}
+    for ours in [name for name in ("tau", "q", "v") if name in values]:
+        _check_scaled(path, ours, sources.get(ours, ours), (had | given).get(ours, ""), ours in given, ours in roles)
     return Assigned(
         values, had | given, {name: sources.get(name, name) for name in values}, _notes(path, roles, had | given)
     )
 
 
-def _known(text: str) -> bool:
+def units_stated(found: Columns, name: str, role: str = "") -> str:
+    """Return the unit that a file states for a column, beside it or in its name; empty where it states none."""
+    beside = found.units.get(name, "")
+    return beside if is_known(beside) else unit_of_name(name, role) or beside
+
+
+def _unit_of(path: Path, found: Columns, ours: str, theirs: str) -> str:
+    """Return the unit of one of our columns as the file states it.
+
+    Raises:
+        UndecidedError: it is not known, or two places of the file state different ones.
+    """
+    beside, named = found.units.get(theirs, ""), unit_of_name(theirs, ours)
+    both = found.contradictions.get(theirs) or (named, beside)
+    if all(map(is_known, both)) and both[0] != "1" != both[1] and contradict(*both):
+        raise questions.two_units(path, found, ours, theirs, both)
+    text = units_stated(found, theirs, ours) or bracketed(theirs)
+    if text and not is_known(text):
+        raise questions.unknown_unit(path, ours, theirs, text)
+    return text
+
+
+def _check_scaled(path: Path, ours: str, theirs: str, text: str, given: bool, guessed: bool) -> None:
+    """Ask how much one unit of a column is that says it only together with a number of the machine's."""
+    if ours == "tau" and text in SHARES:
+        raise questions.share(path, theirs, text)
+    if given:
+        return
+    if ours != "tau" and (guessed or text) and counts(theirs, text):
+        raise questions.counted(path, ours, theirs)
+    if guessed and not suits(ours, text):
+        raise questions.scaled(path, ours, theirs, text)
+
+
+def is_known(text: str) -> bool:
+    """Whether a text is a unit that is known, or says that there is none."""
     return text == "1" or is_unit(text)
 
 
@@ -123,10 +152,13 @@ def _one(
         if found.roles.get(role) in free:
             return role, found.roles[role]
         told = guess(role, free, units)
+        if role == "t" and len(told.among) > 1:
+            growing = tuple(name for name in told.among if questions.grows(found.values[name]))
+            told = replace(told, among=growing or told.among)
         if told.name or (told.current and len(told.among) == 1 and role in given):
             return role, told.among[0]
         if told.among and role not in OPTIONAL:
-            raise questions.current(path, told) if told.current else questions.ambiguous(path, told)
+            raise questions.current(path, told) if told.current else questions.ambiguous(path, found, told)
     if rule in found.lacks:
         raise RecordingError(f"{path} cannot serve here: {found.lacks[rule]}.", culprit=str(path), value=rule)
     return names[0], ""

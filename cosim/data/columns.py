@@ -36,6 +36,8 @@ class Columns:
         clocks: times [s] of the samples of channels by name, where channels have times of their own: those of one
             clock share the array, no column is the time, and NaN is an invalid sample. Lengths may then differ;
             `cosim.data.joining` makes a table of them.
+        contradictions: units that two places of the file state differently, by the name of the column.
+        header: the line above the samples of a text whose names do not fit its columns, which are numbered then.
     """
 
     values: dict[str, np.ndarray]
@@ -52,3 +54,5 @@ class Columns:
     numbered: bool = False
     restarts: tuple[int, ...] = ()
     clocks: dict[str, np.ndarray] = field(default_factory=dict)
+    contradictions: dict[str, tuple[str, str]] = field(default_factory=dict)
+    header: str = ""

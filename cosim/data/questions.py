@@ -9,16 +9,33 @@ import numpy as np
 from cosim.data.columns import Columns
 from cosim.data.limits import listed, short
 from cosim.data.roles import Guess
+from cosim.data.text.names import unit_of_name
 from cosim.support.errors import UndecidedError
 
+READ_COLUMNS, READ_ROWS = 6, 3
+"""Columns and rows that a question shows as they were read."""
 PERIOD = "period"
 """Key of `--layout` for rows without a time: their distance, `1ms`."""
 
 
-def ambiguous(path: Path, told: Guess) -> UndecidedError:
+def first_rows(values: Mapping[str, np.ndarray], names: Sequence[str] = ()) -> str:
+    """Return the first rows of columns as they were read, for a question: `t 0, 0.001, 0.002; tau 1.2, 1.3, 1.4`."""
+    chosen = [*(names or values)][:READ_COLUMNS]
+    texts = (f"{short(name)} {', '.join(_cell(one) for one in values[name][:READ_ROWS])}" for name in chosen)
+    return f"First rows as read: {'; '.join(texts)}."
+
+
+def _cell(value: object) -> str:
+    return f"{value:.7g}" if isinstance(value, float | np.floating) else short(str(value))
+
+
+def ambiguous(path: Path, found: Columns, told: Guess) -> UndecidedError:
     """Ask which of several columns it is."""
     option = f"--columns {quote(f'{told.role}={told.among[0]}')}"
-    text = f"{path}: {told.role} may be any of {listed(told.among)}; say which, for example {option}."
+    text = (
+        f"{path}: {told.role} may be any of {listed(told.among)}; say which, for example {option}. "
+        f"{first_rows(found.values, told.among)}"
+    )
     deciding = {"columns": {told.role: told.among[0]}}
     return UndecidedError(text, decided_by=deciding, culprit=str(path), value=told.role, choices=told.among)
 
@@ -45,13 +62,36 @@ def share(path: Path, name: str, stated: str) -> UndecidedError:
     )
 
 
-def counted(path: Path, name: str) -> UndecidedError:
+def counted(path: Path, role: str, name: str) -> UndecidedError:
     """Ask how large a count of an encoder is."""
+    per_second = "/s" if role == "v" else ""
     text = (
-        f'{path}: "{short(name)}" is in counts; say how large one is, for example --units "q=0.0055 deg" where a turn '
+        f'{path}: "{short(name)}" is in counts{per_second}; say how large one is, for example --units '
+        f'"{role}=0.0055 deg{per_second}" where a turn has 65,536 of them.'
     )
-    deciding = {"units": {"q": "1 rad"}}
-    return UndecidedError(f"{text}has 65,536 of them.", decided_by=deciding, culprit=str(path), value=name)
+    deciding = {"units": {role: f"1 rad{per_second}"}}
+    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=name)
+
+
+def scaled(path: Path, role: str, name: str, text: str) -> UndecidedError:
+    """Ask how much one unit of a sensor is, as of a position that is in volts."""
+    one = {"tau": "0.5 N.m", "q": "0.1 rad", "v": "0.1 rad/s"}[role]
+    sentence = (
+        f'{path}: "{short(name)}" is in {text}; say how much one {text} is, for example --units "{role}={one}", or '
+        f"which other column is {role} with --columns."
+    )
+    deciding = {"units": {role: f"1 {one.split()[1]}"}}
+    return UndecidedError(sentence, decided_by=deciding, culprit=str(path), value=text)
+
+
+def two_units(path: Path, found: Columns, role: str, name: str, both: Sequence[str]) -> UndecidedError:
+    """Ask which of two units a column is in that a file states for it, in its name and beside it."""
+    text = (
+        f'{path} states two units for "{short(name)}", {both[0]} and {both[1]}; say which it is in, --units '
+        f"{quote(f'{role}={both[0]}')} or --units {quote(f'{role}={both[1]}')}. {first_rows(found.values, [name])}"
+    )
+    deciding = {"units": {role: both[0]}}
+    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=name, choices=tuple(both))
 
 
 EXAMPLES = {"t": "ms", "tau": "mN.m", "q": "deg", "v": "deg/s", "q_d": "deg", "temperature": "degC"}
@@ -68,7 +108,7 @@ def unknown_unit(path: Path, role: str, name: str, text: str) -> UndecidedError:
 
 def unnamed(path: Path, found: Columns, lacking: Sequence[str]) -> UndecidedError:
     """Ask for the names of columns without any; the first that grows is offered as time."""
-    growing = next((name for name, column in found.values.items() if _grows(column)), "")
+    growing = next((name for name, column in found.values.items() if grows(column)), "")
     rest = [name for name, column in found.values.items() if name != growing and _is_measured(column)]
     ours = [rule.split("|")[0] for rule in lacking if rule != "t" or growing]
     columns = dict(zip(ours, [growing, *rest] if "t" in ours else rest, strict=False))
@@ -76,7 +116,11 @@ def unnamed(path: Path, found: Columns, lacking: Sequence[str]) -> UndecidedErro
     layout = {} if growing or "t" not in lacking else {PERIOD: "1ms"}
     options = [f"--columns {pairs}"] if pairs else []
     options += [f"--layout {key}={value}" for key, value in layout.items()]
-    text = f"{path} does not name its {len(found.values)} columns; say which is which, for example {' '.join(options)}."
+    has = f'has names that do not fit its {len(found.values)} columns, "{short(found.header)}"' if found.header else ""
+    text = (
+        f"{path} {has or f'does not name its {len(found.values)} columns'}; say which is which, for example "
+        f"{' '.join(options)}. {first_rows(found.values)}"
+    )
     names, deciding = tuple(found.values), {"columns": columns, "layout": layout}
     return UndecidedError(text, decided_by=deciding, culprit=str(path), value=len(names), choices=names)
 
@@ -122,9 +166,12 @@ def coarse_time(path: Path, message: str, t: np.ndarray) -> UndecidedError:
 
 def untimed(path: Path, values: Mapping[str, np.ndarray], message: str) -> UndecidedError:
     """Ask which column is the time, or how far apart the rows are; `message` says what there is."""
-    growing = next((name for name, column in values.items() if name and _grows(column)), "")
-    deciding = {"columns": {"t": growing}} if growing else {"layout": {PERIOD: "1ms"}}
-    text = f"{message} or, if its rows are evenly spaced, say --layout {PERIOD}=1ms."
+    growing = next((name for name, column in values.items() if name and grows(column)), "")
+    unit = unit_of_name(growing, "t")
+    deciding: dict[str, dict[str, str]] = {"columns": {"t": growing}} if growing else {"layout": {PERIOD: "1ms"}}
+    deciding |= {"units": {"t": unit}} if unit else {}
+    example = f" (for example --columns t={growing}{f' --units t={unit}' if unit else ''})" if growing else ""
+    text = f"{message}{example} or, if its rows are evenly spaced, say --layout {PERIOD}=1ms. {first_rows(values)}"
     return UndecidedError(text, decided_by=deciding, culprit=str(path), value="t", choices=tuple(values))
 
 
@@ -133,7 +180,8 @@ def _is_measured(column: np.ndarray) -> bool:
     return column.dtype.kind in "iub" or (column.dtype.kind == "f" and not bool(np.isnan(column).all()))
 
 
-def _grows(column: np.ndarray) -> bool:
+def grows(column: np.ndarray) -> bool:
+    """Whether a column grows from row to row, as a time does."""
     if column.dtype == object or len(column) < 2:
         return column.dtype.kind in "mM"
     return bool(np.all(np.diff(column.astype(np.float64)) > 0)) if column.dtype.kind in "if" else True

@@ -10,15 +10,25 @@ temperature  temperature
 
 import re
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from cosim.data.text.names import is_unit, spelled
+from cosim.data.text.names import words_of
+from cosim.data.text.unit_words import is_unit, spelled
 from cosim.support.units import unit
 
 Names = tuple[str, ...]
 COUNTED = ("count", "counts", "ticks", "increments", "inc")
 """Words that say that a position is in counts of an encoder."""
 
+SUITED: dict[str, Names] = {
+    "t": ("s",),
+    "tau": ("N.m", "N", "A", "1"),
+    "q": ("rad", "m", "1"),
+    "v": ("rad/s", "m/s", "1/s"),
+    "q_d": ("rad", "m", "1"),
+    "temperature": ("degC",),
+}
+"""What the unit of a column may become in SI; a current, counts and shares become it with a number of the machine's."""
 STEMS: dict[str, Names] = {
     "time": ("timestamp", "zeit", "uhrzeit", "epoch"),
     "torque": ("torque", "moment", "effort", "kraft", "force"),
@@ -26,8 +36,27 @@ STEMS: dict[str, Names] = {
     "position": ("position", "winkel", "angle", "encoder", "lage", "theta"),
     "speed": ("velocity", "speed", "drehzahl", "geschwindigkeit", "omega"),
     "temperature": ("temperatur",),
+    "voltage": ("voltage", "spannung", "volt", "flux", "psi"),
+    "acceleration": ("accel", "beschleunigung"),
     "asked": ("soll", "setpoint", "command", "reference", "desired", "target", "demand"),
-    "wrong": ("error", "fehler", "abweichung", "deviation", "schlepp", "following", "residual", "limit", "grenz"),
+    "wrong": (
+        "error",
+        "fehler",
+        "abweichung",
+        "deviation",
+        "schlepp",
+        "following",
+        "residual",
+        "limit",
+        "grenz",
+        "status",
+        "enable",
+        "valid",
+        "ready",
+        "alarm",
+        "inpos",
+        "gain",
+    ),
     "measured": ("actual", "meas", "feedback", "istwert", "estimate"),
 }
 """Parts of names in small letters, wherever they stand."""
@@ -36,13 +65,22 @@ WORDS: dict[str, Names] = {
     "torque": ("tau", "trq", "tq"),
     "current": ("iq", "isq", "i"),
     "position": ("q", "pos", "enc", "phi", *COUNTED),
-    "speed": ("v", "vel", "velo", "n", "qd", "dq", "w"),
+    "speed": ("v", "vel", "velo", "n", "qd", "dq", "w", "rpm", "dps", "rps", "spd"),
     "temperature": ("temp", "temperature"),
+    "voltage": ("uq", "ud", "vq", "vd", "vbus", "udc"),
+    "acceleration": ("acc", "ddq", "qdd"),
     "asked": ("set", "setp", "sp", "cmd", "ref", "des", "d", "input", "ziel"),
-    "wrong": ("err", "diff", "lag", "delta", "max", "min"),
+    "wrong": ("err", "diff", "lag", "delta", "max", "min", "mode", "flag", "state", "ok"),
     "measured": ("act", "ist", "fb", "fbk", "real", "enc", "encoder", "est"),
 }
 """Whole words of names in small letters."""
+OF_WINDINGS = re.compile(r"(?:^|[_.\s])(?:[a-z]|psi|duty|pwm)[_.\s-]?q(?:$|[_.\s])|\bq[-_ ]?axis\b", re.IGNORECASE)
+"""A current, voltage or flux of the q axis of a motor's windings: `i_q`, `Vq`, `q-axis current`; no position."""
+OF_FLUX = re.compile(
+    r"(?:^|[_.\s])(?:i[_.\s-]?s?d|(?:motor[_.\s-])?current[_.\s-]?d|d[_.\s-]?(?:axis[_.\s-]?)?current)(?:$|[_.\s])",
+    re.IGNORECASE,
+)
+"""A current of the d axis, which makes flux and no torque."""
 QUANTITIES = ("time", "torque", "current", "position", "speed", "temperature")
 """Kinds that the last part of a path tells alone: `pos_vel_mapper.pos_rel` is a position."""
 
@@ -62,18 +100,32 @@ class Guess:
 
 
 def guess(role: str, names: Collection[str], units: Mapping[str, str]) -> Guess:
-    """Guess which of the columns serves as `role`."""
-    return _GUESSES[role]([name for name in names if name], units)
+    """Guess which of the columns serves as `role`.
+
+    Where some of the columns that are named for it are in a unit that becomes ours, the others are none of it.
+    """
+    named = _GUESSES[role]([name for name in names if name], units)
+    return replace(named, among=tuple(name for name in named.among if suits(role, units.get(name, ""))) or named.among)
+
+
+def suits(role: str, text: str) -> bool:
+    """Whether a unit is none that is known, or becomes one of those of a column of ours."""
+    return not is_unit(text) or unit(spelled(text)).si in SUITED[role]
+
+
+def is_named(name: str, *kinds: str) -> bool:
+    """Whether a name tells a quantity, or one of these kinds of it."""
+    return any(_is(name, kind) for kind in kinds or QUANTITIES)
+
+
+def is_speed(name: str) -> bool:
+    """Whether a column is named as a speed that was measured."""
+    return _is(name, *_SPEED)
 
 
 def counts(name: str, stated: str) -> bool:
     """Whether a position is in counts of an encoder."""
     return stated in ("count", "counts") or (not stated and any(word in COUNTED for word in words_of(name)))
-
-
-def words_of(name: str) -> Names:
-    """Cut a name into words in small letters: `MAIN.fActPos_2` becomes main, f, act, pos, 2."""
-    return tuple(word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-zäöüß]+|\d+", name))
 
 
 def _is(name: str, *kinds: str) -> bool:
@@ -89,12 +141,22 @@ def _is_one(name: str, kind: str) -> bool:
 
 def _told(name: str, kind: str) -> bool:
     words, whole = words_of(name), "".join(words_of(name))
+    if kind == "current" and (any(one in whole for one in _NOUNS) or any(word in _NOUN_WORDS for word in words)):
+        return False  # `current_position` is where it is now
+    if kind == "position" and OF_WINDINGS.search(name):
+        return False
     return any(word in WORDS[kind] for word in words) or any(stem in whole for stem in STEMS[kind])
 
 
 def _of_unit(names: Collection[str], units: Mapping[str, str], *wanted: str) -> Names:
-    stated = {name: spelled(units[name]) for name in names if name in units}
+    stated = {name: spelled(units[name]) for name in names if units.get(name)}
     return tuple(name for name, text in stated.items() if is_unit(text) and unit(text).si in wanted)
+
+
+_NOUNS = tuple(stem for kind in ("position", "speed", "torque") for stem in STEMS[kind])
+_NOUN_WORDS = ("pos", "vel", "velo", "spd", "rpm", "trq", "tau", "temp", "temperature")
+_SPEED = ("speed", "!asked", "!wrong", "!current", "!voltage", "!torque", "!acceleration")
+_POSITION = ("position", "!wrong", "!speed", "!torque", "!current", "!voltage", "!acceleration", "!temperature")
 
 
 def _time(names: Collection[str], units: Mapping[str, str]) -> Guess:
@@ -107,9 +169,9 @@ def _time(names: Collection[str], units: Mapping[str, str]) -> Guess:
 
 
 def _torque(names: Collection[str], units: Mapping[str, str]) -> Guess:
-    named = tuple(name for name in names if _is(name, "torque", "!wrong"))
+    named = tuple(name for name in names if _is(name, "torque", "!wrong", "!temperature"))
     asked = tuple(name for name in named if _is(name, "asked"))
-    current = tuple(name for name in names if _is(name, "current", "!wrong", "!position", "!speed"))
+    current = tuple(name for name in names if _is(name, "current", "!wrong", "!speed") and not OF_FLUX.search(name))
     for among in (asked, named, _of_unit(names, units, "N.m", "N")):
         if among:
             return Guess("tau", among)
@@ -117,18 +179,19 @@ def _torque(names: Collection[str], units: Mapping[str, str]) -> Guess:
 
 
 def _position(names: Collection[str], units: Mapping[str, str]) -> Guess:
-    named = tuple(name for name in names if _is(name, "position", "!asked", "!wrong", "!speed", "!torque"))
-    plain = [name for name in names if not _is(name, "asked") and not _is(name, "wrong")]
-    return Guess("q", _first(named, "measured") or _of_unit(plain, units, "rad"))
+    named = tuple(name for name in names if _is(name, *_POSITION, "!asked"))
+    plain = [name for name in names if _is(name, "!asked", "!wrong")]
+    return Guess("q", _first(named, "measured") or _of_unit(plain, units, "rad", "m"))
 
 
 def _set_point(names: Collection[str], units: Mapping[str, str]) -> Guess:
-    return Guess("q_d", tuple(name for name in names if _is(name, "position", "asked", "!wrong", "!speed", "!torque")))
+    return Guess("q_d", tuple(name for name in names if _is(name, *_POSITION, "asked")))
 
 
 def _speed(names: Collection[str], units: Mapping[str, str]) -> Guess:
-    named = tuple(name for name in names if _is(name, "speed", "!asked", "!wrong"))
-    return Guess("v", _first(named, "measured") or _of_unit(names, units, "rad/s"))
+    named = tuple(name for name in names if is_speed(name) and name != "V" and suits("v", units.get(name, "")))
+    plain = [name for name in names if _is(name, "!asked", "!wrong")]
+    return Guess("v", _first(named, "measured") or _of_unit(plain, units, "rad/s", "m/s"))
 
 
 def _temperature(names: Collection[str], units: Mapping[str, str]) -> Guess:

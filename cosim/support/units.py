@@ -71,7 +71,7 @@ _SPELLINGS = {"µ": "u", "μ": "u", "·": ".", "**": "", "*": ".", "²": "2", "�
 _ENCLOSED = re.compile(r"\[([^\[\]]*)\]$")
 _BRACKETS = re.compile(r"/\(([^()]*)\)")
 _NUMBER = re.compile(r"(\d\S*) +(?=[A-Za-z%])")
-_FACTOR = re.compile(r"([A-Za-z%]+|1)(-?\d+)?$")
+_FACTOR = re.compile(r"([A-Za-z%]+|1(?!\d))(-?\d+)?$")
 
 
 @dataclass(frozen=True)

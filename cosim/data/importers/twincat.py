@@ -17,8 +17,8 @@ import numpy as np
 from cosim.data.columns import Columns
 from cosim.data.limits import listed
 from cosim.data.text.layout import Layout
-from cosim.data.text.names import is_unit, spelled
 from cosim.data.text.table import table_of
+from cosim.data.text.unit_words import is_unit, spelled
 from cosim.support.errors import RecordingError
 
 SEPARATORS = ("\t", ";", ",")

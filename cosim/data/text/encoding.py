@@ -2,6 +2,7 @@
 
 import codecs
 import gzip
+import re
 from pathlib import Path
 
 from cosim.data.limits import check_text, check_time, check_unpacked
@@ -35,9 +36,14 @@ def text_of(path: Path, encoding: str = "") -> tuple[bytes, str]:
     if name != "utf-8":
         data = _decoded(path, data, name).encode()
     _check_nul(path, data)
-    if b"\r" in data[:HEAD] and b"\n" not in data[:HEAD]:
-        data = data.replace(b"\r", b"\n")
-    return data, name
+    return _lines(data), name
+
+
+def _lines(data: bytes) -> bytes:
+    """End lines with a line feed where some end with a carriage return alone, or with two of them."""
+    if b"\r" not in data or data.count(b"\r") == data.count(b"\r\n"):
+        return data
+    return re.sub(rb"\r+\n|\r", b"\n", data)
 
 
 def _plain(path: Path) -> bytes:

@@ -5,7 +5,6 @@ The first such line is the first sample; the line of words above it names the co
 between. What is above that is a preamble.
 """
 
-import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +13,8 @@ from pathlib import Path
 
 from cosim.data.limits import short
 from cosim.data.text.fields import is_value, split
-from cosim.data.text.names import is_unit
+from cosim.data.text.header import LABEL, header_of, is_row_of_units, words_of_line
+from cosim.data.text.unit_words import is_unit
 from cosim.support.errors import RecordingError
 from cosim.support.numbers import whole
 
@@ -32,14 +32,10 @@ DIALECTS = (
     (" ", ","),
     (",", ","),
 )
-REMARKS = "Comment"
-"""Name of a last column that LabVIEW writes where no row has a comment."""
-COMMENTS = ("#", "%", "//")
-CLOCK_FORMAT = re.compile(r"(?:[hHmMsSdDyYfF]+[:./ -])+[hHmMsSdDyYfF]+")
-"""How a row of units says what a time stamp looks like: hh:mm:ss."""
-LABEL = re.compile(r"^(y_|vertical )?units?(_label)?\b|^einheit(en)?\b")
 WINDOW = 6
 """Lines of which all but one are samples where the samples begin; a preamble may hold a line or two like them."""
+SAMPLES = 50
+"""Samples that tell what columns hold: whether one numbers the rows, and which grows."""
 NAMED = 1.5
 """Advantage of a dialect in which a line of as many words names the columns."""
 
@@ -56,6 +52,12 @@ class Layout:
     units: tuple[str, ...] = ()
     labels: tuple[str, ...] = ()
     """Units, column by column, that a line of the preamble gives: LabVIEW's Y_Unit_Label, an oscilloscope's units."""
+    line: str = ""
+    """The line above the samples where its names do not fit the columns."""
+    sample: str = ""
+    """The first row, where it stands in one line with the names."""
+    torn: bool = False
+    """Whether names and first row are one line that cannot be parted: the row is left out."""
 
     def __str__(self) -> str:
         separator = next(name for name, sign in SEPARATORS.items() if sign == self.separator)
@@ -120,17 +122,19 @@ def _judged(lines: Sequence[str], separator: str, decimal: str, header: str) -> 
     if header == "0":
         return score, Layout(separator, decimal, count, first)
     if header:
-        return score, _stated(rows, Layout(separator, decimal, count, first), header)
-    names, units = _above(lines, rows, first, separator, count)
-    labels = () if units else _labels(rows[:first])
-    return score * (NAMED if names else 1.0), Layout(separator, decimal, count, first, names, units, labels)
+        return score, _stated(lines, rows, Layout(separator, decimal, count, first), header)
+    found = header_of(lines[:first], _samples(rows, first, count), separator, count)
+    labels = () if found.units else _labels(rows[:first], count)
+    layout = Layout(separator, decimal, count, first, found.names, found.units, labels)
+    layout = replace(layout, line=found.line, sample=found.sample, torn=found.torn)
+    return score * (NAMED if found.names else 1.0), layout
 
 
-def _labels(preamble: Sequence[list[str]]) -> tuple[str, ...]:
-    """Return the last line of a preamble that begins with a word of units and holds one, as it stands."""
+def _labels(preamble: Sequence[list[str]], count: int) -> tuple[str, ...]:
+    """Return the last line of a preamble that begins with a word of units and holds one, column by column."""
     for row in reversed(preamble):
         if row and LABEL.search(row[0].lower()) and any(is_unit(field) for field in row[1:]):
-            return ("", *row[1:])
+            return tuple(row[1:]) if len(row) == count + 1 else ("", *row[1:])
     return ()
 
 
@@ -149,54 +153,30 @@ def _first(rows: Sequence[list[str]], values: Sequence[list[bool]], body: Sequen
 
 def _below_names(lines: Sequence[str], rows: Sequence[list[str]], first: int, separator: str, count: int) -> int:
     """Return the first sample where a preamble ends with lines of as many numbers: the line of names is below them."""
-    if any(_above(lines, rows, first, separator, count)):
+    body = _samples(rows, first, count)
+    if header_of(lines[:first], body, separator, count).names:
         return first
     written = [index for index in range(first, len(rows)) if any(rows[index])][:WINDOW]
-    named = (after for index, after in pairwise(written) if _words(lines[index], rows[index], separator, count))
-    return next(named, first)
+    pairs = pairwise(written)
+    return next((after for index, after in pairs if header_of([lines[index]], body, separator, count).names), first)
 
 
-def _above(
-    lines: Sequence[str], rows: Sequence[list[str]], first: int, separator: str, count: int
-) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return names and units of the columns as the lines above the first sample state them."""
-    over = [index for index in range(first) if any(one.isalnum() for one in lines[index])][-2:]
-    words = [_words(lines[index], rows[index], separator, count) for index in over]
-    if not words or not words[-1]:
-        return (), ()
-    if len(words) == 2 and words[0] and is_row_of_units(words[1]):
-        return words[0], words[1]
-    return words[-1], ()
+def _samples(rows: Sequence[list[str]], first: int, count: int) -> list[list[str]]:
+    """Return the fields of some samples."""
+    return [row for row in rows[first:] if len(row) == count][:SAMPLES]
 
 
-def _words(line: str, row: Sequence[str], separator: str, count: int) -> tuple[str, ...]:
-    """Return the fields of a line that may name `count` columns; a sign of a comment before them is taken off."""
-    sign = next((sign for sign in COMMENTS if line.lstrip().startswith(sign)), "")
-    fields = split(line.lstrip().removeprefix(sign), separator) if sign else list(row)
-    if len(fields) == count + 1 and fields[-1] in ("", REMARKS):
-        fields = fields[:-1]
-    if len(fields) == count - 1:
-        fields = [*fields, ""]
-    fits = len(fields) == count and not any(is_value(field, ".") for field in fields)
-    return tuple(fields) if fits and sum(map(bool, fields)) * 2 >= count else ()
-
-
-def is_row_of_units(fields: Sequence[str]) -> bool:
-    """Whether every field is a unit or says that there is none, and one is a unit."""
-    bare = [field.strip("[]() ") for field in fields]
-    bare = ["" if CLOCK_FORMAT.fullmatch(field) else field for field in bare]
-    return any(map(is_unit, bare)) and all(
-        not field or field in ("-", "--", "1", "none") or is_unit(field) for field in bare
-    )
-
-
-def _stated(rows: Sequence[list[str]], found: Layout, header: str) -> Layout:
+def _stated(lines: Sequence[str], rows: Sequence[list[str]], found: Layout, header: str) -> Layout:
     """Lay out with the line of names as stated, counted from 1."""
     line = whole(header)
     if line is None or line > len(rows):
         text = f"--layout header={short(header)}: it is the line of the names, from 1 to {len(rows)}, or 0 for none."
         raise RecordingError(text, culprit="header", value=header)
-    names = tuple((rows[line - 1] + [""] * found.count)[: found.count])
+    names = words_of_line(lines[line - 1], _samples(rows, found.first, found.count), found.separator, found.count)
+    if not names:
+        have = f'line {line}, "{short(lines[line - 1])}", does not name {found.count} columns one by one'
+        text = f"--layout header={line}: {have}; with header=0 they are called #1, #2 ... in --columns."
+        raise RecordingError(text, culprit="header", value=header)
     has_units = line < len(rows) and len(rows[line]) == found.count and is_row_of_units(rows[line])
     first = max(found.first, line + has_units)
     return replace(found, first=first, names=names, units=tuple(rows[line]) if has_units else ())
@@ -206,7 +186,7 @@ def _check_decimal_commas(path: Path, lines: Sequence[str], layout: Layout) -> N
     """Refuse a table whose commas may be decimal signs or separators: its rows have twice the fields of its header."""
     above = [split(line, ",") for line in lines[: layout.first]]
     names = next((row for row in reversed(above) if len(row) > 1 and not any(is_value(one, ".") for one in row)), [])
-    if names and layout.count > len(names):
+    if names and layout.count >= 2 * len(names) - 1 > 1:
         text = (
             f"{path} has {len(names)} names of columns and {layout.count} fields in a row: its commas are separators "
             "and decimal signs alike, which no option can part. Export it with semicolons or tabs."

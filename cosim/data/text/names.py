@@ -1,89 +1,40 @@
-"""Names of columns and the units in them: `q [deg]`, `tau (Nm)`, `M / Nm`, `Torque_mNm`."""
+"""Names of columns and the units in them: `q [deg]`, `tau (Nm)`, `M / Nm`, `Torque_mNm`, `timeMs`, `ms`."""
 
 import re
-from functools import lru_cache
 
-from cosim.support.errors import UnitError
+from cosim.data.text.unit_words import is_unit, spelled
 from cosim.support.units import unit
 
-WORDS = {
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sek": "s", "sekunden": "s",
-    "msec": "ms", "msecs": "ms", "millisecond": "ms", "milliseconds": "ms", "millis": "ms",
-    "usec": "us", "usecs": "us", "microsecond": "us", "microseconds": "us", "micros": "us",
-    "nsec": "ns", "nanosecond": "ns", "nanoseconds": "ns", "nanosec": "ns",
-    "degree": "deg", "degrees": "deg", "grad": "deg", "gon": "0.9 deg", "mdeg": "0.001 deg",
-    "radian": "rad", "radians": "rad",
-    "\N{PRIME}": "arcmin", "'": "arcmin", "\N{DOUBLE PRIME}": "arcsec", '"': "arcsec",
-    "arc-sec": "arcsec", "arcsecond": "arcsec", "arcseconds": "arcsec", "arc-min": "arcmin", "arcminutes": "arcmin",
-    "revs": "rev", "revolution": "rev", "revolutions": "rev", "turns": "turn", "rotations": "rev",
-    "rps": "rev/s", "r/min": "rpm",
-    "n-m": "N.m", "nm": "N.m", "mnm": "mN.m", "n m": "N.m", "newton": "N", "newtons": "N",
-    "newton-meter": "N.m", "newton-metre": "N.m", "newtonmeter": "N.m", "mnewtonmeter": "mN.m", "newton-mm": "mN.m",
-    "amp": "A", "amps": "A", "ampere": "A", "volt": "V", "volts": "V", "celsius": "degC", "degc": "degC", "c": "degC",
-    "percent": "%", "permille": "0.1 %", "\N{PER MILLE SIGN}": "0.1 %",
-    "inc": "count", "incs": "count", "increments": "count", "ticks": "count", "pulses": "count",
-    "hz": "Hz", "day": "24 h", "days": "24 h", "inch": "2.54 cm", "inches": "2.54 cm",
-}  # fmt: skip
-"""Units as tools write them in words, in small letters, and how they are written here."""
-OUNCE, POUND, KILOPOND = 0.27801385095, 4.4482216153, 9.80665
-"""Forces of the units that weigh [N]: ounce, pound and kilogram on Earth."""
-FOOT, INCH, CENTIMETRE = 0.3048, 0.0254, 0.01
-"""Lengths of levers [m]."""
-WEIGHED = {
-    "oz-in": OUNCE * INCH, "ozf-in": OUNCE * INCH, "in-oz": OUNCE * INCH,
-    "lb-ft": POUND * FOOT, "lbf-ft": POUND * FOOT, "ft-lb": POUND * FOOT, "ft-lbf": POUND * FOOT,
-    "lb-in": POUND * INCH, "lbf-in": POUND * INCH, "in-lb": POUND * INCH, "in-lbf": POUND * INCH,
-    "kgf-cm": KILOPOND * CENTIMETRE, "kg-cm": KILOPOND * CENTIMETRE, "kgf-m": KILOPOND,
-}  # fmt: skip
-"""Torques of units that weigh [N.m]; the sign between may be a point, a blank, a star or none."""
-TURNS = {"1/min": "rpm", "u/min": "rpm", "rev/min": "rpm", "min-1": "rpm", "min^-1": "rpm"}
-"""Speeds of shafts: turns a minute, though no turn is written."""
 CLOCKS = {"millis": "ms", "micros": "us", "nanos": "ns", "seconds": "s"}
 """What microcontrollers call their clocks."""
-BRACKETED = re.compile(r"(.*?)\s*[\[(]([^\[\]()]*(?:\([^()]*\))?[^\[\]()]*)[\])]\s*")
-ALONE = re.compile(r"[\[(](\w+)[\])]|in (\w+)")
+BRACKETED = re.compile(r"(.*?)[\s_]*[\[({<]([^\[\](){}<>]*(?:\([^()]*\))?[^\[\](){}<>]*)[\])}>](?:\s*\.?:?\d+)?\s*")
+"""A name with brackets behind it, and the number that a spreadsheet or pandas adds to the second of a name."""
+ALONE = re.compile(r"[\[(]([^\[\]()]+)[\])]|in (\w+)")
 """A unit that names a column alone, as oscilloscopes do: `[s]`, `in s`."""
 SECONDS = ("s", "ms", "us", "ns")
+TIME = (0, 0, 1, 0, 0)
+"""Dimension of a time."""
 SLASHED = re.compile(r"([^/]*[^/\s])/([^/\s]+)")
 """A unit behind a stroke without blanks, `Lageistwert/mm`; a path has more strokes, or begins with one."""
-DIVIDED = re.compile(r"(.+?)(?:\s+/\s+|\s+in\s+|,\s*)(\S+)")
-SUFFIXED = re.compile(r"(.+?)_([A-Za-z%]+(?:_(?:s|s2))?)")
+DIVIDED = re.compile(r"(.+?)(?:\s+/\s+|\s+in\s+|\s*[,:|]\s*)(\S+)")
+QUOTIENT = re.compile(r"(.+?)[_.\s]([A-Za-z°]+/[A-Za-z]+2?)")
+"""A quotient at the end of a name, `speed_deg/s`."""
+PARTS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-zäöüßµμ]+|[A-Z]+|\d+|[%°]")
+ENDINGS = re.compile(
+    r"(?:.*?)[a-zäöü0-9)_.\s-]((?:[mkunµ]?N\.?m+)|(?:[mkunµ]?N[.·*]m)|rad/s|deg/s|°/s|°|1/min|min-1|U/min|mA|mN)"
+)
+"""Units that stand at the end of a name without a sign between, `torqueNm`, or hold a sign that parts words."""
+LONGEST = 3
+"""Words of the longest unit at the end of a name: `vel_deg_per_s`."""
+LETTERS = {"t": ("s",), "tau": ("N",), "v": (), "q": (), "q_d": (), "temperature": ("C", "F", "K")}
+"""Units of one letter that may end the name of a column of ours: `q_m` may be the position of a motor."""
+ONE_LETTER = {"C": "degC", "F": "degF", "K": "K"}
+"""Temperatures by their letter."""
 
 
-@lru_cache(maxsize=4096)
-def spelled(text: str) -> str:
-    """Return a unit as it is written here, or the text itself where it is no unit that is known."""
-    text = text.strip()
-    if text.lower() in TURNS:
-        return TURNS[text.lower()]
-    if text == "Grad":  # the German degree, not 1e9 rad
-        return WORDS["grad"]
-    if weight := _weighed(text.lower()):
-        return weight
-    shouted = text.lower() if text.isupper() else ""
-    for one in (text, WORDS.get(text.lower(), ""), text.replace("_", "/"), shouted):
-        if one and _is_known(one):
-            return one
-    return text
-
-
-def _weighed(text: str) -> str:
-    """Return a torque as weight times lever in N.m: `oz-in`, `lbf.ft`, `kgf cm`; empty where it is none."""
-    bare = re.sub(r"[-.*·⋅ ]", "", text)
-    return next((f"{size:.10g} N.m" for name, size in WEIGHED.items() if name.replace("-", "") == bare), "")
-
-
-def is_unit(text: str) -> bool:
-    """Whether a text is a unit that is known, however it is spelled."""
-    return bool(text) and not text.isdigit() and _is_known(spelled(text))
-
-
-def _is_known(text: str) -> bool:
-    try:
-        unit(text)
-    except UnitError:
-        return False
-    return True
+def words_of(name: str) -> tuple[str, ...]:
+    """Cut a name into words in small letters: `MAIN.fActPos_2` becomes main, f, act, pos, 2."""
+    return tuple(word.lower() for word in re.findall(r"[A-Z]+(?![a-z])|[A-Z]?[a-zäöüß]+|\d+", name))
 
 
 def split_unit(header: str) -> tuple[str, str]:
@@ -92,13 +43,14 @@ def split_unit(header: str) -> tuple[str, str]:
     What stands in square brackets is always a unit, unless it is a number (`effort[0]`); elsewhere only what is one.
     """
     header = header.strip()
-    if (alone := ALONE.fullmatch(header)) and spelled(alone[1] or alone[2]) in SECONDS:
-        return "time", spelled(alone[1] or alone[2])
+    if (alone := ALONE.fullmatch(header)) and is_unit(alone[1] or alone[2]):
+        text = spelled(alone[1] or alone[2])
+        return ("time" if text in SECONDS else header), text
     if found := BRACKETED.fullmatch(header):
         name, text = found[1].strip(), found[2].strip()
         if name and (is_unit(text) or (header.endswith("]") and not text.isdigit())):
             return name, spelled(text)
-    for pattern in (DIVIDED, SLASHED):
+    for pattern in (DIVIDED, QUOTIENT, SLASHED):
         if (found := pattern.fullmatch(header)) and is_unit(found[2]):
             return found[1].strip(), spelled(found[2])
     return header, ""
@@ -111,13 +63,57 @@ def bracketed(name: str) -> str:
     return "" if text.removeprefix("#").isdigit() else text
 
 
-def suffixed_unit(name: str) -> str:
+def unit_of_name(name: str, role: str = "") -> str:
+    """Return the unit that a name of a column states, wherever it stands in it; empty where it states none.
+
+    Args:
+        name: the name as the file has it.
+        role: which of our columns it is, which decides what a single letter means and that `ms` anywhere in the name
+            of a time is its unit; empty for any other column.
+    """
+    whole = split_unit(name)[1]
+    text = whole if is_unit(whole) else suffixed_unit(name, role)
+    return text or (_of_time(name) if role == "t" else "")
+
+
+def suffixed_unit(name: str, role: str = "") -> str:
     """Return the unit that a name ends with, `Torque_mNm`, `pos_deg`, `vel_rad_s`; empty where it ends with none.
 
     A single letter is no unit here but `s` and `N`: `q_m` may be the position of a motor.
     """
     if name.lower() in CLOCKS:
         return CLOCKS[name.lower()]
-    found = SUFFIXED.fullmatch(name)
-    text = found[2] if found else ""
-    return spelled(text) if (len(text) > 1 or text in ("s", "N")) and is_unit(text) else ""
+    if (found := ENDINGS.fullmatch(name)) and is_unit(found[1]):
+        return spelled(found[1])
+    parts = PARTS.findall(name)
+    for count in range(min(LONGEST, len(parts)), 0, -1):
+        text = _joined(parts[-count:])
+        if text and is_unit(text) and _is_certain(text, len(parts) == count, role):
+            return ONE_LETTER.get(text) or spelled(text)
+    return ""
+
+
+def _joined(parts: list[str]) -> str:
+    """Return words as the unit that they are together: `rad`, `s` are rad/s; `N`, `m` are N.m."""
+    parts = [part.lower() if part[1:].islower() and part != "Nm" else part for part in parts]
+    if len(parts) == 1:
+        return parts[0]
+    if len(parts) == 3:
+        return f"{parts[0]}/{parts[2]}" if parts[1].lower() in ("per", "p") else ""
+    first, second = parts
+    if second in ("s", "S", "sec", "min", "s2"):
+        return f"{first}/{second.lower()}"
+    return f"{first}{second}" if first in ("N", "mN", "kN") and second in ("m", "mm", "cm") else ""
+
+
+def _is_certain(text: str, alone: bool, role: str) -> bool:
+    """Whether the end of a name is a unit, and no other word of the field."""
+    if len(text) == 1:
+        return text in LETTERS.get(role, ("s", "N")) or (role == "" and alone)
+    return role in ("", "t") or alone or unit(spelled(text)).dimension != TIME
+
+
+def _of_time(name: str) -> str:
+    """Return the unit of time that is one of the words of a name, `ms_since_start`; empty where it is not one."""
+    units = {spelled(word) for word in words_of(name) if is_unit(word) and unit(spelled(word)).dimension == TIME}
+    return units.pop() if len(units) == 1 else ""

@@ -8,6 +8,7 @@ from cosim.data.columns import Columns
 from cosim.data.importers import importer_of
 from cosim.data.limits import check_columns, short
 from cosim.data.text import json_records
+from cosim.data.text.cleaning import without_brackets
 from cosim.data.text.encoding import text_of
 from cosim.data.text.layout import find_layout
 from cosim.data.text.table import table_of
@@ -36,6 +37,8 @@ def read_text(path: Path, stated: Mapping[str, str] | None = None) -> Columns:
     importer = importer_of(lines) if not stated else None
     if importer:
         return importer(path, data, lines)
+    data = without_brackets(data, lines)
+    lines = head_of(data)
     layout = find_layout(path, lines, stated or {})
     if layout is None:
         return _nothing(path, lines)

@@ -12,10 +12,15 @@ from pyarrow import csv
 
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, short
+from cosim.data.text.cleaning import without_comments
+from cosim.data.text.header import CLOCK_FORMAT, NO_UNIT
 from cosim.data.text.layout import Layout
-from cosim.data.text.names import is_unit, spelled, split_unit
+from cosim.data.text.names import split_unit
+from cosim.data.text.unit_words import contradict, is_unit, spelled
 from cosim.support.errors import RecordingError
 
+MANY_SHORT = 0.02
+"""Share of rows that lack the last column beyond which it is one that is not always written."""
 NOTHING = (
     "", "#N/A", "#N/A N/A", "#NA", "-1.#IND", "-1.#QNAN", "-NaN", "-nan", "1.#IND", "1.#QNAN", "N/A", "NA", "NULL",
     "NaN", "n/a", "nan", "null", "-", "--", "---", "n.a.", "#NV", "#VALUE!", "#DIV/0!", "NaN(ind)", "-nan(ind)", "None",
@@ -25,10 +30,12 @@ NOTHING = (
 
 def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
     """Parse the body of a text whose layout is known."""
-    body, restarts, again = _without_header(path, _body(data, layout), _head(data, layout))
+    body, commented = _body(path, data, layout)
+    body, restarts, again = _without_header(path, body, _head(data, layout))
+    again = commented + again
     check_cells(path, body.count(b"\n"), layout.count)
     table, notes = _parsed(path, body, layout)
-    names, units = _names(layout)
+    names, units, contradictions = _names(layout)
     pairs = zip(names, table.columns, strict=True)
     kept = {name: grouped(as_array(column), layout.decimal) for name, column in pairs if name or _holds(column)}
     return Columns(
@@ -38,6 +45,8 @@ def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
         missing=again + notes,
         numbered=not layout.names,
         restarts=restarts,
+        contradictions=contradictions,
+        header=layout.line,
     )
 
 
@@ -85,19 +94,24 @@ def grouped(column: np.ndarray, decimal: str) -> np.ndarray:
     return np.array([float(text.replace(sign, "").replace(decimal, ".")) for text in texts])
 
 
-def _body(data: bytes, layout: Layout) -> bytes:
-    """Return the text from the first sample on, its runs of blanks as tabs."""
+def _body(path: Path, data: bytes, layout: Layout) -> tuple[bytes, tuple[str, ...]]:
+    """Return the samples as text, runs of blanks as tabs, without comments; and notes on what was left out."""
     start = 0
     for _ in range(layout.first):
         start = data.find(b"\n", start) + 1
-    body = data[start:] if start else data
-    if layout.separator != " ":
-        return body
-    return b"\n".join(b"\t".join(line.split()) for line in body.split(b"\n"))
+    body, notes = without_comments(path, data[start:] if start else data)
+    if layout.torn:
+        notes = (*notes, f"{path.stem}: the first row was left out; names and first value stand in it as one word.")
+    if layout.separator == " ":
+        body = b"\n".join(b"\t".join(line.split()) for line in body.split(b"\n"))
+    return layout.sample.encode() + b"\n" + body if layout.sample else body, notes
 
 
 def _parsed(path: Path, body: bytes, layout: Layout) -> tuple[Any, tuple[str, ...]]:
-    """Parse rows; what is no row is left out with a note if it is a comment or ends the file, and refused elsewhere."""
+    """Parse rows; what is no row is left out with a note if it is a comment or ends the file, and refused elsewhere.
+
+    Rows that end before the last column are read as far as they go where that column is missing in many of them.
+    """
     odd: list[Any] = []
     try:
         return _read(body, layout, None), ()
@@ -112,12 +126,34 @@ def _parsed(path: Path, body: bytes, layout: Layout) -> tuple[Any, tuple[str, ..
         return "skip"
 
     table = _read(body, layout, skip)
-    torn = next((row for row in odd if row.number <= len(table) and not _is_remark(row.text)), None)
+    samples = [row for row in odd if not _is_remark(row.text)]
+    if _lacks_its_last(samples, len(table), layout):
+        return _filled(path, body, layout, len(samples))
+    torn = next((row for row in samples if row.number <= len(table)), None)
     if torn is not None:
         text = f"{path}: row {torn.number:,} has {torn.actual_columns} fields where the others have {layout.count}: "
         raise RecordingError(f"{text}{short(torn.text)!r}.", culprit=str(path), value=torn.actual_columns)
     lines = f"{len(odd)} lines that are no samples were" if len(odd) > 1 else "one line that is no sample was"
     return table, (f"{path.stem}: {lines} left out, such as {short(odd[-1].text)!r}.",)
+
+
+def _lacks_its_last(samples: Sequence[Any], rows: int, layout: Layout) -> bool:
+    """Whether many rows have all columns but the last: a few such rows are torn, and no value in them is certain."""
+    short_by_one = all(row.actual_columns == layout.count - 1 for row in samples)
+    return layout.count > 2 and short_by_one and len(samples) > MANY_SHORT * (rows + len(samples))
+
+
+def _filled(path: Path, body: bytes, layout: Layout, missing: int) -> tuple[Any, tuple[str, ...]]:
+    """Parse rows of which many end before the last column; nothing is read there."""
+    sign = b"\t" if layout.separator == " " else layout.separator.encode()
+    lines = [line.rstrip(b"\r") for line in body.split(b"\n") if line.strip()]
+    whole = [line + sign if line.count(sign) == layout.count - 2 else line for line in lines]
+    table, notes = _parsed(path, b"\n".join(whole), layout)
+    name = layout.names[-1] if layout.names else f"#{layout.count}"
+    return table, (
+        *notes,
+        f'{path.stem}: {missing:,} rows end before the last column, "{short(name)}"; it is empty there.',
+    )
 
 
 def _check_utf8(path: Path, body: bytes) -> None:
@@ -151,24 +187,35 @@ def _read(body: bytes, layout: Layout, odd: Any) -> Any:
     )
 
 
-def _names(layout: Layout) -> tuple[list[str], dict[str, str]]:
-    """Return the name of each column and the units that names and a row of units state.
+Contradictions = dict[str, tuple[str, str]]
+
+
+def _names(layout: Layout) -> tuple[list[str], dict[str, str], Contradictions]:
+    """Return the name of each column, the units that names and a row of units state, and where these contradict.
 
     Columns that differ by their unit alone keep it in their name; those of one name have their number there.
     """
     if not layout.names:
         numbered = [f"#{number + 1}" for number in range(layout.count)]
-        return numbered, _known(numbered, layout.labels)
-    parted = [split_unit(name) for name in layout.names]
-    names = _distinct([name for name, _ in parted], [name.strip() for name in layout.names])
-    units = {name: unit for name, (_, unit) in zip(names, parted, strict=True) if unit}
-    return names, _known(names, layout.labels) | _known(names, layout.units) | units
+        return numbered, _stated(numbered, layout.labels), {}
+    whole = [name.strip().strip("'").strip() for name in layout.names]
+    parted = [split_unit(name) for name in whole]
+    names = _distinct([name for name, _ in parted], whole)
+    named = {name: unit for name, (_, unit) in zip(names, parted, strict=True) if unit}
+    rows = _stated(names, layout.labels) | _stated(names, layout.units)
+    twice = {name: (unit, rows[name]) for name, unit in named.items() if name in rows}
+    contradictions = {name: both for name, both in twice.items() if all(map(is_unit, both)) and contradict(*both)}
+    return names, rows | named, contradictions
 
 
-def _known(names: Sequence[str], texts: Sequence[str]) -> dict[str, str]:
-    """Return those of the texts that are units, by the names of their columns."""
-    rows = {name: spelled(text.strip("[]() ")) for name, text in zip(names, texts, strict=False)}
-    return {name: text for name, text in rows.items() if is_unit(text)}
+def _stated(names: Sequence[str], texts: Sequence[str]) -> dict[str, str]:
+    """Return units by the names of their columns; one that is not known is kept, so that it is asked for."""
+    rows = {name: text.strip("[]() ") for name, text in zip(names, texts, strict=False)}
+    return {name: spelled(text) for name, text in rows.items() if text.lower() not in NO_UNIT and not _is_clock(text)}
+
+
+def _is_clock(text: str) -> bool:
+    return CLOCK_FORMAT.fullmatch(text) is not None
 
 
 def _distinct(bare: Sequence[str], whole: Sequence[str]) -> list[str]:
