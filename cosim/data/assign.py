@@ -17,7 +17,7 @@ from cosim.data.columns import Columns
 from cosim.data.limits import short
 from cosim.data.roles import counts, guess, suits
 from cosim.data.text.names import bracketed, unit_of_name
-from cosim.data.text.unit_words import contradict, is_unit, spelled
+from cosim.data.text.unit_words import contradict, is_known, spelled
 from cosim.support.errors import RecordingError
 from cosim.support.numbers import whole
 
@@ -106,11 +106,6 @@ def _check_scaled(path: Path, ours: str, theirs: str, text: str, given: bool, gu
         raise questions.counted(path, ours, theirs)
     if guessed and not suits(ours, text):
         raise questions.scaled(path, ours, theirs, text)
-
-
-def is_known(text: str) -> bool:
-    """Whether a text is a unit that is known, or says that there is none."""
-    return text == "1" or is_unit(text)
 
 
 def numbered(name: str, found: Columns) -> str:

@@ -167,10 +167,10 @@ def coarse_time(path: Path, message: str, t: np.ndarray) -> UndecidedError:
 def untimed(path: Path, values: Mapping[str, np.ndarray], message: str) -> UndecidedError:
     """Ask which column is the time, or how far apart the rows are; `message` says what there is."""
     growing = next((name for name, column in values.items() if name and grows(column)), "")
-    unit = unit_of_name(growing, "t")
+    unit, typed = unit_of_name(growing, "t"), f"--columns {quote(f't={growing}')}"
     deciding: dict[str, dict[str, str]] = {"columns": {"t": growing}} if growing else {"layout": {PERIOD: "1ms"}}
     deciding |= {"units": {"t": unit}} if unit else {}
-    example = f" (for example --columns t={growing}{f' --units t={unit}' if unit else ''})" if growing else ""
+    example = f" (for example {typed}{f' --units t={unit}' if unit else ''})" if growing else ""
     text = f"{message}{example} or, if its rows are evenly spaced, say --layout {PERIOD}=1ms. {first_rows(values)}"
     return UndecidedError(text, decided_by=deciding, culprit=str(path), value="t", choices=tuple(values))
 

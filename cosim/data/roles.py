@@ -67,7 +67,7 @@ WORDS: dict[str, Names] = {
     "position": ("q", "pos", "enc", "phi", *COUNTED),
     "speed": ("v", "vel", "velo", "n", "qd", "dq", "w", "rpm", "dps", "rps", "spd"),
     "temperature": ("temp", "temperature"),
-    "voltage": ("uq", "ud", "vq", "vd", "vbus", "udc"),
+    "voltage": ("uq", "ud", "vq", "vd", "vbus", "udc", "bat", "batt", "battery", "supply", "vin", "vout", "vcc", "vdd"),
     "acceleration": ("acc", "ddq", "qdd"),
     "asked": ("set", "setp", "sp", "cmd", "ref", "des", "d", "input", "ziel"),
     "wrong": ("err", "diff", "lag", "delta", "max", "min", "mode", "flag", "state", "ok"),
@@ -76,6 +76,8 @@ WORDS: dict[str, Names] = {
 """Whole words of names in small letters."""
 OF_WINDINGS = re.compile(r"(?:^|[_.\s])(?:[a-z]|psi|duty|pwm)[_.\s-]?q(?:$|[_.\s])|\bq[-_ ]?axis\b", re.IGNORECASE)
 """A current, voltage or flux of the q axis of a motor's windings: `i_q`, `Vq`, `q-axis current`; no position."""
+VOLTS = re.compile(r"(?:^|[^A-Za-z])V(?:$|[^A-Za-z])")
+"""A capital V is volts, and no speed."""
 OF_FLUX = re.compile(
     r"(?:^|[_.\s])(?:i[_.\s-]?s?d|(?:motor[_.\s-])?current[_.\s-]?d|d[_.\s-]?(?:axis[_.\s-]?)?current)(?:$|[_.\s])",
     re.IGNORECASE,
@@ -145,6 +147,8 @@ def _told(name: str, kind: str) -> bool:
         return False  # `current_position` is where it is now
     if kind == "position" and OF_WINDINGS.search(name):
         return False
+    if kind == "speed" and VOLTS.search(name):
+        words = tuple(word for word in words if word != "v")
     return any(word in WORDS[kind] for word in words) or any(stem in whole for stem in STEMS[kind])
 
 
@@ -189,7 +193,7 @@ def _set_point(names: Collection[str], units: Mapping[str, str]) -> Guess:
 
 
 def _speed(names: Collection[str], units: Mapping[str, str]) -> Guess:
-    named = tuple(name for name in names if is_speed(name) and name != "V" and suits("v", units.get(name, "")))
+    named = tuple(name for name in names if is_speed(name) and suits("v", units.get(name, "")))
     plain = [name for name in names if _is(name, "!asked", "!wrong")]
     return Guess("v", _first(named, "measured") or _of_unit(plain, units, "rad/s", "m/s"))
 

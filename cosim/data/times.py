@@ -1,8 +1,8 @@
 """Columns of time, however they count: time stamps, seconds since 1970, ms or us, checked against their sampling.
 
 A servo is sampled at 10 Hz to 50 kHz, and a recording of it lasts 2 s at least. So a column without a unit that steps
-by one second or more counts something smaller than seconds; where two units fit, or it steps by less than 20 us as the
-days of a spreadsheet do, it is refused and `--units t=...` decides.
+by one second or more counts something smaller than seconds; where two units fit, where it steps by a tenth of a second
+to one, or by less than 20 us as the days of a spreadsheet do, it is refused and `--units t=...` decides.
 """
 
 import re
@@ -114,8 +114,11 @@ def _of_sampling(path: Path, column: np.ndarray, name: str) -> str:
     step = float(np.median(steps)) if len(steps) else 0.0
     if step > 0 and float(np.max(steps)) < 1 / FASTEST:
         raise questions.too_fast(path, name, step)
-    if step < 1:
+    if step <= 1 / SLOWEST:
         return ""
+    if step < 1:
+        said = f"{1 / step:.4g} Hz in s and {1 / (step * SECONDS['ms']):.4g} Hz in ms"
+        raise questions.rates(path, name, step, ("ms", "s"), said)
     if name.startswith("#"):
         raise questions.counting(path, name, step)
     span = float(np.nanmax(values) - np.nanmin(values))

@@ -66,12 +66,12 @@ def header_of(above: Sequence[str], body: Sequence[Sequence[str]], separator: st
         count: how many fields a sample has.
     """
     written = [line for line in above if any(sign.isalnum() for sign in line)][-LINES:]
-    lines = [words_of_line(line, body, separator, count) for line in written]
-    fitting = []
+    lines = [words_of_line(line, body, separator, count) or _headings(line, separator, count) for line in written]
+    fitting: list[tuple[str, ...]] = []
     for words in reversed(lines):
         if words and LABEL.search(words[0].lower()):
             continue
-        if not words:
+        if not words or (not fitting and not _are_names(words)):
             break
         fitting.append(words)
     if fitting:
@@ -124,14 +124,27 @@ def words_of_line(line: str, body: Sequence[Sequence[str]], separator: str, coun
     sign = next((sign for sign in COMMENTS if line.lstrip().startswith(sign)), "")
     bare = line.strip().lstrip(sign[0]) if sign else line
     for fields in _parted(bare, separator, count):
-        if len(fields) == count + 1 and fields[-1] in ("", REMARKS):
+        if len(fields) == count + 1 and fields[-1] == REMARKS:
+            fields = fields[:-1]
+        while len(fields) > count and not fields[-1]:
             fields = fields[:-1]
         if len(fields) == count - 1:
             fields = _aligned(fields, body)
-        fits = len(fields) == count and not any(is_value(field, ".") for field in fields)
-        if fits and sum(map(bool, fields)) * 2 >= count:
+        if len(fields) == count and not any(is_value(field, ".") for field in fields) and _are_names(fields):
             return tuple(fields)
     return ()
+
+
+def _are_names(fields: Sequence[str]) -> bool:
+    """Whether half of the fields at least hold something."""
+    return sum(map(bool, fields)) * 2 >= len(fields)
+
+
+def _headings(line: str, separator: str, count: int) -> tuple[str, ...]:
+    """Return the fields of a line that heads groups of columns, the name of a group above its first column."""
+    fields = split(line, separator)
+    fits = len(fields) == count and sum(map(bool, fields)) > 1 and not any(is_value(field, ".") for field in fields)
+    return tuple(fields) if fits else ()
 
 
 def _parted(line: str, separator: str, count: int) -> list[list[str]]:

@@ -34,6 +34,8 @@ DIALECTS = (
 )
 WINDOW = 6
 """Lines of which all but one are samples where the samples begin; a preamble may hold a line or two like them."""
+MANY_SHORT = 0.02
+"""Share of rows that lack the last column beyond which it is one that is not always written."""
 SAMPLES = 50
 """Samples that tell what columns hold: whether one numbers the rows, and which grows."""
 NAMED = 1.5
@@ -114,7 +116,10 @@ def _judged(lines: Sequence[str], separator: str, decimal: str, header: str) -> 
     if not sizes:
         return 0.0, None
     count = max(sizes, key=lambda size: (sizes[size] * size, size))
-    body = [index for index, row in enumerate(rows) if len(row) == count and any(values[index])]
+    least = count
+    if sizes[count + 1] > MANY_SHORT * sum(sizes.values()):  # more rows lack the last column than have it
+        count += 1
+    body = [index for index, row in enumerate(rows) if least <= len(row) <= count and any(values[index])]
     score = sum(sum(values[index]) ** 2 / max(1, sum(map(bool, rows[index]))) for index in body)
     first = _first(rows, values, body)
     if not header:
@@ -140,7 +145,8 @@ def _labels(preamble: Sequence[list[str]], count: int) -> tuple[str, ...]:
 
 def _first(rows: Sequence[list[str]], values: Sequence[list[bool]], body: Sequence[int]) -> int:
     """Return the first line that has values where most lines have them, and is followed by such lines."""
-    usual = [sum(values[index][place] for index in body) > len(body) / 2 for place in range(len(values[body[0]]))]
+    width = min(len(values[index]) for index in body)
+    usual = [sum(values[index][place] for index in body) > len(body) / 2 for place in range(width)]
     places = [place for place, often in enumerate(usual) if often]
     full = {index for index in body if sum(values[index][place] for place in places) > len(places) / 2}
     written = [index for index, row in enumerate(rows) if any(row)]

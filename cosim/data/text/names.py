@@ -26,7 +26,7 @@ ENDINGS = re.compile(
 """Units that stand at the end of a name without a sign between, `torqueNm`, or hold a sign that parts words."""
 LONGEST = 3
 """Words of the longest unit at the end of a name: `vel_deg_per_s`."""
-LETTERS = {"t": ("s",), "tau": ("N",), "v": (), "q": (), "q_d": (), "temperature": ("C", "F", "K")}
+LETTERS = {"t": ("s",), "tau": ("N", "V"), "v": ("V",), "q": ("V",), "q_d": ("V",), "temperature": ("C", "F", "K")}
 """Units of one letter that may end the name of a column of ours: `q_m` may be the position of a motor."""
 ONE_LETTER = {"C": "degC", "F": "degF", "K": "K"}
 """Temperatures by their letter."""
@@ -79,7 +79,7 @@ def unit_of_name(name: str, role: str = "") -> str:
 def suffixed_unit(name: str, role: str = "") -> str:
     """Return the unit that a name ends with, `Torque_mNm`, `pos_deg`, `vel_rad_s`; empty where it ends with none.
 
-    A single letter is no unit here but `s` and `N`: `q_m` may be the position of a motor.
+    A single letter is no unit here but `s`, `N` and `V`: `q_m` may be the position of a motor.
     """
     if name.lower() in CLOCKS:
         return CLOCKS[name.lower()]
@@ -109,7 +109,7 @@ def _joined(parts: list[str]) -> str:
 def _is_certain(text: str, alone: bool, role: str) -> bool:
     """Whether the end of a name is a unit, and no other word of the field."""
     if len(text) == 1:
-        return text in LETTERS.get(role, ("s", "N")) or (role == "" and alone)
+        return text in LETTERS.get(role, ("s", "N", "V")) or (role == "" and alone)
     return role in ("", "t") or alone or unit(spelled(text)).dimension != TIME
 
 

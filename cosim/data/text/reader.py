@@ -7,8 +7,8 @@ from pathlib import Path
 from cosim.data.columns import Columns
 from cosim.data.importers import importer_of
 from cosim.data.limits import check_columns, short
-from cosim.data.text import json_records
-from cosim.data.text.cleaning import without_brackets
+from cosim.data.text import json_records, transposed
+from cosim.data.text.cleaning import without_brackets, without_remarks
 from cosim.data.text.encoding import text_of
 from cosim.data.text.layout import find_layout
 from cosim.data.text.table import table_of
@@ -32,12 +32,14 @@ def read_text(path: Path, stated: Mapping[str, str] | None = None) -> Columns:
     data, encoding = text_of(path, (stated or {}).get("encoding", ""))
     if json_records.is_records(data):
         return json_records.columns_of(path, data)
+    if turned := transposed.read(path, data):
+        return turned
     _check_first_line(path, data)
     lines = head_of(data)
     importer = importer_of(lines) if not stated else None
     if importer:
         return importer(path, data, lines)
-    data = without_brackets(data, lines)
+    data = without_brackets(without_remarks(data), lines)
     lines = head_of(data)
     layout = find_layout(path, lines, stated or {})
     if layout is None:

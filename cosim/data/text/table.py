@@ -14,13 +14,11 @@ from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, short
 from cosim.data.text.cleaning import without_comments
 from cosim.data.text.header import CLOCK_FORMAT, NO_UNIT
-from cosim.data.text.layout import Layout
+from cosim.data.text.layout import MANY_SHORT, Layout
 from cosim.data.text.names import split_unit
 from cosim.data.text.unit_words import contradict, is_unit, spelled
 from cosim.support.errors import RecordingError
 
-MANY_SHORT = 0.02
-"""Share of rows that lack the last column beyond which it is one that is not always written."""
 NOTHING = (
     "", "#N/A", "#N/A N/A", "#NA", "-1.#IND", "-1.#QNAN", "-NaN", "-nan", "1.#IND", "1.#QNAN", "N/A", "NA", "NULL",
     "NaN", "n/a", "nan", "null", "-", "--", "---", "n.a.", "#NV", "#VALUE!", "#DIV/0!", "NaN(ind)", "-nan(ind)", "None",
@@ -35,7 +33,7 @@ def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
     again = commented + again
     check_cells(path, body.count(b"\n"), layout.count)
     table, notes = _parsed(path, body, layout)
-    names, units, contradictions = _names(layout)
+    names, units, contradictions = names_of(layout)
     pairs = zip(names, table.columns, strict=True)
     kept = {name: grouped(as_array(column), layout.decimal) for name, column in pairs if name or _holds(column)}
     return Columns(
@@ -190,7 +188,7 @@ def _read(body: bytes, layout: Layout, odd: Any) -> Any:
 Contradictions = dict[str, tuple[str, str]]
 
 
-def _names(layout: Layout) -> tuple[list[str], dict[str, str], Contradictions]:
+def names_of(layout: Layout) -> tuple[list[str], dict[str, str], Contradictions]:
     """Return the name of each column, the units that names and a row of units state, and where these contradict.
 
     Columns that differ by their unit alone keep it in their name; those of one name have their number there.

@@ -128,6 +128,11 @@ def is_unit(text: str) -> bool:
     return any(sign.isalpha() or sign in NO_LETTERS for sign in text) and _is_known(spelled(text))
 
 
+def is_known(text: str) -> bool:
+    """Whether a text is a unit that is known, or says that there is none."""
+    return text == "1" or is_unit(text)
+
+
 def _is_known(text: str) -> bool:
     try:
         unit(text)
