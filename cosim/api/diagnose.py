@@ -6,7 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+import pandas as pd
+
 from cosim.api.recordings import Source, read_all
+from cosim.api.why import frame
 from cosim.data.recording import Recording
 from cosim.diagnosis.black_box import BlackBox, as_base
 from cosim.diagnosis.closed_loop import Loops
@@ -49,6 +52,11 @@ class DiagnosisResult:
     def findings(self) -> tuple[Finding, ...]:
         """All effects that were looked for, each with its answer, size, 95 % range and sentences."""
         return self.diagnosis.findings
+
+    @property
+    def ledger(self) -> pd.DataFrame:
+        """Every structure that was fitted, a row each: evidence, held-out gain, and the rule that refuses it."""
+        return frame(self.diagnosis.ledger)
 
     def as_json(self) -> JsonObject:
         """Return everything as plain data, as diagnosis.json holds it."""

@@ -38,6 +38,7 @@ VERBS = (
     "run",
     "identify",
     "diagnose",
+    "why",
     "investigate",
     "prove",
     "paper",

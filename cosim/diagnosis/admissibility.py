@@ -1,9 +1,11 @@
 """Is a fitted effect what its name says, or another one in disguise?"""
 
+from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
 
+from cosim.diagnosis.answer.ledger import Rule, at_least
 from cosim.diagnosis.hypotheses import hypothesis_of
 from cosim.diagnosis.tuning import at_bound
 from cosim.estimation.fit import Fit
@@ -39,13 +41,15 @@ class Fitted(Protocol):
         ...
 
 
-def is_admissible(problem: Problem, one: Fitted) -> bool:
-    """Whether an effect is what its name says, and can be told from this motion."""
-    mount, effect = one.fit.mount, one.effect
+def name_rules(problem: Problem, one: Fitted) -> Iterator[Rule]:
+    """Rules of whether an effect is what its name says, and can be identified from this motion."""
+    mount, effect, prepared = one.fit.mount, one.effect, problem.prepared
     own = hypothesis_of(effect)
-    if not (own.is_plausible(effect, mount) and own.shows(effect, mount, problem.prepared)):
-        return False
-    return not is_degenerate(problem, effect) and not needs_turns(effect, mount, problem.prepared)
+    yield Rule("its numbers are those of such an effect", own.is_plausible(effect, mount))
+    yield Rule("the motion separates it from another friction law", own.shows(effect, mount, prepared))
+    yield Rule("no number at its bound, and no other effect in disguise", not is_degenerate(problem, effect))
+    needed, longest = hypothesis_of(effect).way_back(effect, mount), longest_way_back(prepared)
+    yield at_least("way back of the motion", longest, needed, "m" if mount.motion == "linear" else "rad")
 
 
 def is_degenerate(problem: Problem, effect: Effect) -> bool:
@@ -56,13 +60,13 @@ def is_degenerate(problem: Problem, effect: Effect) -> bool:
     return own.is_degenerate(problem, effect)
 
 
-def needs_turns(effect: Effect, mount: Mount, prepared: Prepared) -> bool:
-    """Whether a fitted effect of friction needs motion to turn back further than it ever did.
+def longest_way_back(prepared: Prepared) -> float:
+    """Longest way that the motion turns back, over all pieces [rad, m].
 
-    Friction resists, so only motion that turns tells its level; where it goes one way a level is free to be anything.
+    Friction resists, so only motion that turns back tells its level; where it goes one way a level is free to be
+    anything.
     """
-    needed = hypothesis_of(effect).way_back(effect, mount)
-    return needed > max(_way_back(piece.q[piece.inside]) for piece in prepared.pieces)
+    return max(_way_back(piece.q[piece.inside]) for piece in prepared.pieces)
 
 
 def _way_back(q: Array) -> float:

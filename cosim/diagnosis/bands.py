@@ -11,9 +11,10 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.fft import dct
+from scipy.fft import dct, idct
 
 from cosim.diagnosis.policy import Policy
+from cosim.estimation.blocks import Blocks
 from cosim.estimation.prepare import Array, Prepared
 from cosim.support.statistics import rms
 
@@ -68,6 +69,19 @@ class Bands:
         """Scale and transform columns (rows, n)."""
         scaled = columns * self.gain[:, None]
         return np.concatenate([dct(scaled[part], axis=0, norm="ortho") for part in self.slices])
+
+    def energy_by_block(self, transformed: Array, noise: Array, blocks: Blocks) -> Array:
+        """Energy of one transformed column in each block of time, in nats: half its square over the noise, coarsened.
+
+        Args:
+            transformed: the column (rows,), as `transform` makes it.
+            noise: noise variance of each band.
+            blocks: of the rows before they were transformed.
+        """
+        weight = np.append(self.effective / np.maximum(self.count, 1e-300) / noise, 0.0)  # the last: above all bands
+        scaled = transformed * np.sqrt(weight[self.band])
+        over_time = np.concatenate([idct(scaled[part], norm="ortho") for part in self.slices])
+        return np.array([float(over_time[rows] @ over_time[rows]) / 2 for rows in blocks.rows])
 
     def least_noise(self, prepared: Prepared, inertia: float, policy: Policy) -> Array:
         """Least noise variance of each band: the accuracy of any model of this torque, and the reading's noise."""

@@ -5,7 +5,7 @@ nuisances; only their torques and tangents differ.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 from typing import NamedTuple
@@ -13,6 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from cosim.diagnosis.answer.ledger import Gain, Key, Ledger, Rule, Trial, error_of_sum
 from cosim.diagnosis.bands import Bands, NoiseOverSpeed, noise_over_speed
 from cosim.diagnosis.candidates import Candidate, columns_of
 from cosim.diagnosis.discrepancy import Discrepancy, Shapes, discrepancy
@@ -20,6 +21,8 @@ from cosim.diagnosis.hypotheses import candidates, named
 from cosim.diagnosis.marginal import Group, Marginal, marginal
 from cosim.diagnosis.policy import Policy
 from cosim.diagnosis.priors import trust
+from cosim.diagnosis.structure import Structure, key_of, structure_of
+from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import Fit
 from cosim.estimation.least_squares import projected
 from cosim.estimation.prepare import Array
@@ -68,6 +71,11 @@ class Comparison:
     """Names of the base's fitted numbers."""
     offered: dict[Fit, "_Offered"] = field(default_factory=dict)
     """What is offered beside a fit that will be screened, until then."""
+    refitted: Fit | None = None
+    """The refitted base, on which gains are told."""
+    ledger: Ledger = field(default_factory=Ledger)
+    fitted: dict[Key, Structure] = field(default_factory=dict)
+    """Structures of the ledger, as far as held-out recordings must know them."""
 
     @classmethod
     def of(cls, problem: Problem, base: Fit, policy: Policy) -> "Comparison":
@@ -89,7 +97,7 @@ class Comparison:
         # A base that lacks much may be left with no inertia; then the card knows better what noise there is.
         inertia = max(float(base.mount.axis.inertia), float(problem.mount.axis.inertia))
         floor = bands.least_noise(prepared, inertia, policy)
-        return cls(problem, policy, bands, nuisances, floor, noise, inertia, base.free, {base: offered})
+        return cls(problem, policy, bands, nuisances, floor, noise, inertia, base.free, {base: offered}, base)
 
     @cached_property
     def _nuisances(self) -> Array:
@@ -113,6 +121,42 @@ class Comparison:
     def _marginal(self, found: Fit, aside: Aside) -> Marginal:
         grams, groups = self._joined(found, self._own(found), aside)
         return marginal(grams, self._free(found, grams), groups, self.bands.count, self.bands.effective, self.floor)
+
+    def enter(self, effect: str, found: Fit, share: float) -> None:
+        """Enter a structure into the ledger, looked at for one of its effects that removes this share of the energy."""
+        key = key_of(effect, found)
+        self.ledger.add(key, lambda: replace(self.trial_of(found), effect=effect, share=share))
+        if key not in self.fitted:
+            self.fitted[key] = structure_of(self.problem, found)
+
+    def trial_of(self, found: Fit) -> Trial:
+        """A structure and what it gains in training, looked at for no effect."""
+        added = tuple(one.id for one in found.mount.effects[len(self.problem.mount.effects) :])
+        return Trial(added, "", found.parameters(), self.gain(found), blocks=self._by_block(found))
+
+    def judge(self, effect: str, found: Fit, rules: Sequence[Rule]) -> None:
+        """Enter the rules that were asked of an effect in a structure."""
+        self.ledger.judge(key_of(effect, found), rules)
+
+    def gain(self, found: Fit) -> Gain:
+        """What a structure gains on the refitted base [nats], and its standard error over blocks of time."""
+        assert self.refitted is not None
+        nats = self.evidence(found) - self.evidence(self.refitted)
+        return Gain(nats, error_of_sum(self._by_block(self.refitted) - self._by_block(found)))
+
+    @cached_property
+    def _blocks_known(self) -> WeakKeyDictionary[Fit, Array]:
+        return WeakKeyDictionary()
+
+    def _by_block(self, found: Fit) -> Array:
+        """What a structure leaves in each block of time, in nats, once tangents and nuisances are taken out."""
+        if found not in self._blocks_known:
+            own, weighed = self._own(found), self._marginal(found, NONE)
+            first = own.shape[1] - 1
+            left = own[:, 0] - own[:, 1:] @ weighed.beta[:first] - self._nuisances @ weighed.beta[first:]
+            blocks = Blocks.of(self.problem.prepared)
+            self._blocks_known[found] = self.bands.energy_by_block(left, weighed.noise, blocks)
+        return self._blocks_known[found]
 
     def _free(self, found: Fit, grams: Array) -> Array:
         free = np.ones(grams.shape[1] - 1)

@@ -1,9 +1,10 @@
 """The decision, from scores alone: what is named, what stays open, whether something unknown is left. No data here."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp
 
+from cosim.diagnosis.answer.ledger import Rule, all_pass
 from cosim.diagnosis.calibration import calibrated
 from cosim.diagnosis.policy import Policy
 
@@ -179,14 +180,24 @@ class Gain:
         return max(self.narrow, self.wide) < 0 or min(self.narrow, self.wide) < -policy.most_raised
 
 
-def stands(gain: Gain, share: float, policy: Policy) -> bool:
-    """Whether an effect stands on the held-out recordings.
+def held_out_rules(gain: Gain, share: float, policy: Policy) -> Iterator[Rule]:
+    """Rules by which an effect stands on the held-out recordings.
 
     It predicts (or halves the plain error), it does not raise the plain error there, and what it explains is no small
     change of what the base leaves: beside a strong effect, a weak one may be what the strong one's equation lacks.
     """
-    matters = share >= policy.least_share or gain.nats >= policy.sure_predicted
-    return gain.predicts(policy) and not gain.raises(policy) and matters
+    nats, limit = gain.nats, policy.clearly_predicted
+    removed = f"removes {100 * gain.narrow:.0f} and {100 * gain.wide:.0f} % of the error energy in two bands"
+    yield Rule("predicts held-out recordings", gain.predicts(policy), nats, limit, "nats", removed)
+    lowest = min(gain.narrow, gain.wide)
+    yield Rule("does not raise the held-out error", not gain.raises(policy), lowest, -policy.most_raised)
+    matters = share >= policy.least_share or nats >= policy.sure_predicted
+    yield Rule("share of what the base leaves", matters, share, policy.least_share)
+
+
+def stands(gain: Gain, share: float, policy: Policy) -> bool:
+    """Whether an effect stands on the held-out recordings."""
+    return all_pass(held_out_rules(gain, share, policy))
 
 
 def open_rivals(one: EffectScores, policy: Policy) -> tuple[str, ...]:
@@ -197,11 +208,24 @@ def open_rivals(one: EffectScores, policy: Policy) -> tuple[str, ...]:
 
 def is_left(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> bool:
     """Whether something is left that is no misfit of a friction law, nor of the equations of what is named."""
-    large = residual.share > policy.large_residual or residual.share_there > policy.large_residual_there
-    large = large or residual.share_beside > policy.large_residual_beside or bool(residual.in_place)
+    return any(rule.outcome for rule in rest_rules(effects, residual, policy))
+
+
+def rest_rules(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Iterator[Rule]:
+    """Rules of which one is enough to say that something without a name is left."""
+    shares = (
+        ("slow error in training relative to friction", residual.share, policy.large_residual),
+        ("slow error held out relative to friction", residual.share_there, policy.large_residual_there),
+        ("the same beside friction-law error", residual.share_beside, policy.large_residual_beside),
+    )
+    for name, value, limit in shares:
+        yield Rule(name, value > limit, value, limit)
+    yield Rule("another cause explains more than a name", bool(residual.in_place), note=", ".join(residual.in_place))
     doubtful = doubted(effects, residual, policy)
     least = least_left([one for one in effects if one.effect not in doubtful], policy)
-    return large or any(_is_no_misfit(one, least, policy) for one in residual.terms)
+    for term in residual.terms:
+        outcome, limit = _is_no_misfit(term, least, policy), max(least, _floor_of(term, policy))
+        yield Rule(f"error follows {term.name}", outcome, term.evidence, limit, "nats")
 
 
 def least_left(named: Sequence[EffectScores], policy: Policy) -> float:

@@ -148,6 +148,7 @@ def as_json(found: Diagnosis) -> JsonObject:
         "policy": found.policy,
         "loop_bias": found.loop_bias,
         "base_parameters": {name: list(values) for name, values in found.base_parameters.items()},
+        "ledger": [trial.as_json() for trial in found.ledger],
         "improved": found.improved,
         "provenance": found.provenance,
         "seconds": found.seconds,

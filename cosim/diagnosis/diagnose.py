@@ -9,9 +9,10 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.absent import not_found
 from cosim.diagnosis.alternatives import prove_sets
 from cosim.diagnosis.band import in_band
+from cosim.diagnosis.bookkeeping import enter_answer, finished
 from cosim.diagnosis.breakdown import parts
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import Decision, beside_rest, decide, least_left
+from cosim.diagnosis.decision import Decision, ResidualScores, beside_rest, decide, least_left, rest_rules
 from cosim.diagnosis.delivered import standing
 from cosim.diagnosis.denied import beyond_denial, without_denied
 from cosim.diagnosis.entries import NotLearnedEntry
@@ -71,6 +72,7 @@ class Answer:
     decision: Decision
     held: Predictive
     found: Nameless
+    rest: ResidualScores
 
     @property
     def proof(self) -> Proof:
@@ -177,7 +179,12 @@ def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Record
     found = nameless(comparison, examined, proof, held)
     residual = residual_scores(comparison, found, held)
     return Answer(
-        comparison, examined.base, decide(effect_scores(found.proof), residual, comparison.policy), held, found
+        comparison,
+        examined.base,
+        decide(effect_scores(found.proof), residual, comparison.policy),
+        held,
+        found,
+        residual,
     )
 
 
@@ -189,6 +196,8 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
     signals = traces(train, heldout, models)
     found = _findings(answer, signals)
     bias = loop_bias(prepared, answer.chosen, problem.weight)
+    rest = rest_rules(effect_scores(answer.proof), answer.rest, answer.comparison.policy)
+    enter_answer(answer.comparison, answer.chosen, found, tuple(rest), decision.is_unknown)
     return Diagnosis(
         verdict=_verdict(found, decision),
         findings=tuple(found),
@@ -205,6 +214,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         friction_law=proposed_law(problem, answer.chosen),
         loop_bias=bias.as_json() if bias else {},
         base_parameters=models.base_parameters(),
+        ledger=finished(answer.comparison, answer.held, answer.chosen),
     )
 
 

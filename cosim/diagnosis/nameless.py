@@ -16,6 +16,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import inf, log
 
+from cosim.diagnosis.answer.ledger import Rule
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.dictionary import OF_LAW
 from cosim.diagnosis.hypotheses import hypothesis_of
@@ -80,7 +81,11 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
         own = _worth(_grams(comparison, found.proof.chosen, known), range(len(known)))
         challenges = [_challenge(comparison, found, one, own, offered) for one in found.proof.standing]
         worst = max(challenges, key=lambda one: one.lead)
-        if worst.lead < least or not _holds(comparison, found, worst, held):
+        leads = worst.lead >= least and _holds(comparison, found, worst, held)
+        name, chosen = worst.effect.effect.id, found.proof.chosen
+        rule = Rule(f"not explained better by {worst.term.name}", not leads, worst.lead, least, "nats")
+        comparison.judge(name, chosen, [rule])
+        if not leads:
             break
         left = without(comparison, examined, found.proof, worst.effect, held)
         found = Nameless(left, (*found.taken, (worst.effect, worst.term)))

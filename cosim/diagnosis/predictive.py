@@ -11,6 +11,8 @@ are common to a model with an effect and without it, and far larger than many an
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -21,7 +23,8 @@ from cosim.diagnosis.discrepancy import Discrepancy, Shapes, discrepancy
 from cosim.diagnosis.marginal import Group, marginal
 from cosim.diagnosis.policy import Policy
 from cosim.diagnosis.protocol import is_noise, residuals
-from cosim.estimation.blocks import Blocks, covariance
+from cosim.diagnosis.structure import Structure, structure_of
+from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
@@ -38,6 +41,13 @@ POINTS = 500
 """Frequencies at which noise is added up."""
 LEAST_BEYOND = 0.1
 """Share of an energy that is never put down to noise."""
+
+
+class Weighed(NamedTuple):
+    """Log-likelihood of a structure on held-out recordings, and what it leaves in each block of time, both in nats."""
+
+    log_likelihood: float
+    by_block: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,34 +96,43 @@ class Predictive:
         left = zip(residuals(self.prepared, mount), self.prepared.pieces, strict=True)
         return np.concatenate([one[piece.kept] for one, piece in left])
 
-    def slopes(self, found: Fit) -> Array:
+    def slopes(self, found: Fit | Structure) -> Array:
         """Derivatives of the needed torque by the fitted numbers of a structure, at the kept rows."""
         return stacked(Inverse(found.mount, found.free), self.prepared.pieces, found.values)[1]
 
     def predicted(self, found: Fit) -> float:
         """Log-likelihood of a structure fitted to training, what that leaves open of its effects integrated out."""
-        own = [k for k, name in enumerate(found.free) if name not in self.base]
-        return self.log_likelihood(self.residual(found.mount), self.left_open(found, own))
+        if found not in self._predicted:
+            self._predicted[found] = self.weighed(structure_of(self.training, found)).log_likelihood
+        return self._predicted[found]
 
-    def left_open(self, found: Fit, which: Sequence[int]) -> Array:
+    @cached_property
+    def _predicted(self) -> WeakKeyDictionary[Fit, float]:
+        return WeakKeyDictionary()
+
+    def weighed(self, found: Structure) -> "Weighed":
+        """Log-likelihood of a structure, what training leaves open of its effects integrated out, and its blocks."""
+        own = [k for k, name in enumerate(found.free) if name not in self.base]
+        return self._weighed(self.residual(found.mount), self.left_open(found, own))
+
+    def left_open(self, found: Structure, which: Sequence[int]) -> Array:
         """Torque of what training leaves open of some fitted numbers: columns (rows, n) of amounts of one error."""
-        weight = self.training.weight
-        slopes, blocks = found.slopes * weight[:, None], Blocks.of(self.training.prepared)
-        spread = covariance(slopes, found.residual * weight, blocks)[np.ix_(which, which)]
-        size, axes = np.linalg.eigh(spread / np.outer(scale := _sizes(spread), scale))
-        return np.asarray(self.slopes(found)[:, which] @ (scale[:, None] * axes * np.sqrt(np.maximum(size, 0))))
+        return np.asarray(self.slopes(found)[:, which] @ found.directions(which))
 
     def moved(self, found: Fit) -> Array:
         """Torque of all that may be otherwise there: what training leaves open, and the base's numbers themselves."""
         base = next((group for group in self.nuisances.groups if group.name == BASE), None)
         own = self.nuisances.columns[:, base.columns] * base.prior if base else np.empty((len(self.weight), 0))
-        return np.column_stack([self.left_open(found, range(len(found.free))), own])
+        return np.column_stack([self.left_open(structure_of(self.training, found), range(len(found.free))), own])
 
     def log_likelihood(self, residual: Array, open_: Array | None = None) -> float:
         """Log-likelihood of a residual at the kept rows, nuisances integrated out.
 
         `open_` are columns (rows, n) of which a standard normal amount may be in it.
         """
+        return self._weighed(residual, open_).log_likelihood
+
+    def _weighed(self, residual: Array, open_: Array | None) -> "Weighed":
         columns = residual[:, None] if open_ is None else np.column_stack([residual, open_])
         target = self.bands.transform(columns)
         cross = self.bands.crossed(target, self._nuisances)
@@ -127,7 +146,10 @@ class Predictive:
         first = columns.shape[1] - 1
         groups = [Group(first + np.array(group.columns), group.prior) for group in self.nuisances.groups]
         free = np.ones(grams.shape[1] - 1)
-        return marginal(grams, free, groups, self.bands.count, self.bands.effective, self.floor).log_likelihood
+        found = marginal(grams, free, groups, self.bands.count, self.bands.effective, self.floor)
+        left = target[:, 0] - target[:, 1:] @ found.beta[:first] - self._nuisances @ found.beta[first:]
+        by_block = self.bands.energy_by_block(left, found.noise, Blocks.of(self.prepared))
+        return Weighed(found.log_likelihood, by_block)
 
     def plain_gains(self, without: Mount, mount: Mount) -> tuple[float, float]:
         """Share of the plain residual energy that a model removes, in the bands of the analysis and of the protocol.
@@ -166,11 +188,6 @@ class Predictive:
     @cached_property
     def _nuisance_grams(self) -> Array:
         return self.bands.grams(self._nuisances)
-
-
-def _sizes(spread: Array) -> Array:
-    """Standard deviations of a covariance."""
-    return np.asarray(np.sqrt(np.maximum(np.diag(spread), 1e-300)))
 
 
 def _moved(others: Discrepancy, base: Fit, prepared: Prepared, policy: Policy) -> Discrepancy:

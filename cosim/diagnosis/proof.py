@@ -1,11 +1,12 @@
 """Proof: what each effect is worth on recordings that nothing was fitted to, in the same nats as the evidence."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from cosim.diagnosis.admissibility import is_degenerate
+from cosim.diagnosis.answer.ledger import Rule, all_pass, at_least, until_refused
 from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import Gain, stands
+from cosim.diagnosis.decision import Gain, held_out_rules
 from cosim.diagnosis.findings import tells
 from cosim.diagnosis.predictive import Predictive
 from cosim.diagnosis.rivals import AcceptedEffect, Examined
@@ -90,18 +91,33 @@ def _standing(
 
 def _stands(comparison: Comparison, examined: Examined, chosen: Fit, one: AcceptedEffect, gain: Gain) -> bool:
     """Whether an effect stands on the held-out recordings, and is still what its name says in the structure there."""
-    if is_degenerate(comparison.problem, one.within(chosen.mount)):
-        return False
-    small = len(examined.effects) == 1 and is_small(one.own, comparison.policy)
-    if small and not gain.matters_alone(comparison.policy):
-        return False
-    return stands(gain, _share(comparison.problem, examined.base, one), comparison.policy)
+    rules = until_refused(_validation(comparison, examined, chosen, one, gain))
+    comparison.enter(one.effect.id, chosen, one.own.plain_gain)
+    comparison.judge(one.effect.id, chosen, rules)
+    return all_pass(rules)
+
+
+def _validation(
+    comparison: Comparison, examined: Examined, chosen: Fit, one: AcceptedEffect, gain: Gain
+) -> Iterator[Rule]:
+    """Rules by which held-out recordings confirm an effect."""
+    policy = comparison.policy
+    within = not is_degenerate(comparison.problem, one.within(chosen.mount))
+    yield Rule("no number at its bound, and no other effect in disguise", within)
+    if len(examined.effects) == 1 and is_small(one.own, policy):
+        share = min(gain.narrow, gain.wide)
+        yield Rule("a small effect halves the held-out error", gain.matters_alone(policy), share, policy.halved)
+    yield from held_out_rules(gain, _share(comparison.problem, examined.base, one), policy)
 
 
 def _is_sure(comparison: Comparison, chosen: Fit, one: AcceptedEffect, gain: Gain) -> bool:
     """Whether an effect surely predicts, or the recordings tell a size of it in the structure that stands."""
-    sure = gain.nats >= comparison.policy.sure_predicted
-    return sure or tells(comparison.problem, chosen, one.within(chosen.mount))
+    sure = at_least("evidence on held-out recordings", gain.nats, comparison.policy.sure_predicted, "nats")
+    if sure.outcome:
+        return True
+    told = Rule("its size differs from none", tells(comparison.problem, chosen, one.within(chosen.mount)))
+    comparison.judge(one.effect.id, chosen, [told])
+    return told.outcome
 
 
 def _longest(

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.diagnosis import policy
+from cosim.diagnosis.answer.ledger import Trial
 from cosim.diagnosis.entries import (
     BiasEntry,
     Improved,
@@ -204,6 +205,8 @@ class Diagnosis:
     loop_bias: BiasEntry = field(default_factory=BiasEntry)
     base_parameters: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     """Per base parameter: as delivered, refitted, with the missing physics."""
+    ledger: tuple[Trial, ...] = ()
+    """Every structure that was fitted, with the rules by which it was judged."""
     provenance: Provenance = field(default_factory=Provenance)
     improved: Improved = field(default_factory=Improved)
     files: tuple[str, ...] = ("report.html",)

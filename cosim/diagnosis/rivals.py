@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from cosim.diagnosis.answer.ledger import Rule, all_pass, at_least, until_refused
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.instrumental_variable import Misfits, excludes, misfits_of, settled
 from cosim.diagnosis.policy import Policy
@@ -12,8 +13,8 @@ from cosim.diagnosis.search import (
     InTurn,
     Search,
     Stage,
+    admission,
     best_of,
-    is_admissible,
     is_full,
     is_small,
     margin,
@@ -144,7 +145,8 @@ def _challenged(
     rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
     beside = _beside(comparison, problem.fit(replace(chosen.mount, effects=rest), 45), known, refits)
     own = weighed(comparison, chosen, beside.current, effect=group[0])
-    rivals = [one for one in beside.tried if one.effect.id != group[0].id and is_admissible(comparison, one)]
+    others = [one for one in beside.tried if one.effect.id != group[0].id]
+    rivals = [one for one in others if _is_admissible(comparison, one)]
     best: dict[str, CandidateFit] = {}
     for rival in rivals:
         if rival.effect.id not in best or rival.evidence > best[rival.effect.id].evidence:
@@ -152,7 +154,38 @@ def _challenged(
     misfits = misfits_of(problem.prepared, chosen.mount, group[0])
     margins = {rival.effect.id: margin(comparison, own, rival) for rival in best.values()}
     ranked = sorted(best.values(), key=lambda rival: margins[rival.effect.id])
-    return AcceptedEffect(group, own, beside.current, tuple(ranked), margins, misfits)
+    found = AcceptedEffect(group, own, beside.current, tuple(ranked), margins, misfits)
+    _enter(comparison, found)
+    return found
+
+
+def _is_admissible(comparison: Comparison, one: CandidateFit) -> bool:
+    rules = until_refused(admission(comparison, one))
+    comparison.judge(one.effect.id, one.fit, rules)
+    return all_pass(rules)
+
+
+def _enter(comparison: Comparison, found: AcceptedEffect) -> None:
+    """Enter an effect that was challenged into the ledger: what it is worth beside the others, and each rival."""
+    name, own, policy = found.effect.id, found.own, comparison.policy
+    comparison.enter(name, own.fit, own.plain_gain)
+    kept = at_least("evidence beside the other effects", own.evidence, policy.keep_evidence, "nats")
+    comparison.judge(name, own.fit, [kept, *(_ahead(found, rival, policy) for rival in found.rivals)])
+    for rival in found.rivals:
+        comparison.enter(rival.effect.id, rival.fit, rival.plain_gain)
+        behind = found.margin(rival)
+        rule = Rule(
+            f"less than the margin of a set behind {name}",
+            behind < policy.set_margin,
+            behind,
+            policy.set_margin,
+            "nats",
+        )
+        comparison.judge(rival.effect.id, rival.fit, [rule])
+
+
+def _ahead(found: AcceptedEffect, rival: CandidateFit, policy: Policy) -> Rule:
+    return at_least(f"ahead of {rival.effect.id}", found.margin(rival), policy.set_margin, "nats")
 
 
 def _names(found: Fit) -> tuple[str, ...]:

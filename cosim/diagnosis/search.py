@@ -4,12 +4,12 @@ In every stage each form of an effect is screened by two statistics - the eviden
 plain energy - and the best forms by either are refitted. Nothing is dropped because something else was rejected.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import inf, log
 
-from cosim.diagnosis.admissibility import away_from_turns, gets_memory, in_time, removed_at_rest
-from cosim.diagnosis.admissibility import is_admissible as is_what_it_says
+from cosim.diagnosis.admissibility import away_from_turns, gets_memory, in_time, name_rules, removed_at_rest
+from cosim.diagnosis.answer.ledger import Rule, all_pass, at_least, until_refused
 from cosim.diagnosis.asked import is_asked_for
 from cosim.diagnosis.base_moved import owed_to_base
 from cosim.diagnosis.comparison import Comparison, Screened, aside_for
@@ -95,6 +95,8 @@ def stage(comparison: Comparison, current: Fit, refits: InTurn = IN_TURN) -> Sta
     """Screen all candidates beside a structure and refit the best forms."""
     screened = comparison.screen(current)
     fits = refits(comparison, current, starts(screened, comparison.policy))
+    for one in fits:
+        comparison.enter(one.effect.id, one.fit, one.plain_gain)
     return Stage(current, tuple(sorted(fits, key=lambda one: -one.evidence)), tuple(screened))
 
 
@@ -196,22 +198,48 @@ def best_of(comparison: Comparison, now: Stage, largest: float = 0.0) -> Candida
     A small one is taken if it is the only thing there is: then the held-out recordings must show that it matters.
     """
     policy = comparison.policy
-    enough = [one for one in now.tried if one.evidence >= least(policy, largest, one.plain_gain)]
-    fit = [one for one in enough if is_admissible(comparison, one)]
-    best = _told(comparison, [one for one in fit if not is_minor(one, policy)])
-    if best or largest:
-        return best
-    return _told(comparison, [one for one in fit if not is_common(one, policy)])
+    asked = {id(one): until_refused(_search_rules(comparison, one, largest)) for one in now.tried}
+    for one in now.tried:
+        comparison.judge(one.effect.id, one.fit, asked[id(one)])
+    fit = [one for one in now.tried if all_pass(asked[id(one)])]
+    best = _demanded(comparison, [one for one in fit if not is_minor(one, policy)])
+    if best is None and not largest:
+        best = _demanded(comparison, [one for one in fit if not is_common(one, policy)])
+    for one in fit:
+        comparison.judge(one.effect.id, one.fit, list(_choice(one, best, policy)))
+    return best
 
 
-def _told(comparison: Comparison, fit: Sequence[CandidateFit]) -> CandidateFit | None:
+def _choice(one: CandidateFit, best: CandidateFit | None, policy: Policy) -> Iterator[Rule]:
+    """Rules by which one of several that pass is taken first."""
+    if one is not best and is_minor(one, policy):
+        name = "more than what friction laws lack of any machine" if is_common(one, policy) else "not a small effect"
+        yield Rule(
+            name, False, one.evidence, policy.least_bent if is_common(one, policy) else policy.small_evidence, "nats"
+        )
+    elif best:
+        yield Rule("most evidence at its step of the search", one is best, one.evidence, best.evidence, "nats")
+
+
+def _search_rules(comparison: Comparison, one: CandidateFit, largest: float) -> Iterator[Rule]:
+    """Rules by which the search takes an effect, beside others of which the largest has so much evidence."""
+    policy = comparison.policy
+    yield at_least("evidence", one.evidence, least(policy, largest, one.plain_gain), "nats")
+    yield from admission(comparison, one)
+
+
+def _demanded(comparison: Comparison, fit: Sequence[CandidateFit]) -> CandidateFit | None:
     """The best of some candidates that the set point does not exclude; between delay and lag it decides."""
     misfits = {id(one): misfits_of(comparison.problem.prepared, one.fit.mount, one.effect) for one in fit}
-    told = [one for one in fit if is_told(misfits[id(one)], one)]
-    if not told:
+    timed = [one for one in fit if misfits[id(one)]]
+    rules = {id(one): Rule("the set point demands it", is_told(misfits[id(one)], one)) for one in timed}
+    for one in timed:
+        comparison.judge(one.effect.id, one.fit, [rules[id(one)]])
+    demanded = [one for one in fit if id(one) not in rules or rules[id(one)].outcome]
+    if not demanded:
         return None
-    best = first_of(comparison, told)
-    return settled(misfits[id(best)], best, told)
+    best = first_of(comparison, demanded)
+    return settled(misfits[id(best)], best, demanded)
 
 
 def first_of(comparison: Comparison, several: Sequence[CandidateFit]) -> CandidateFit:
@@ -245,15 +273,25 @@ def is_common(one: CandidateFit, policy: Policy) -> bool:
     return hypothesis_of(one.effect).is_common_misfit and one.evidence < policy.least_bent
 
 
+def admission(comparison: Comparison, one: CandidateFit) -> Iterator[Rule]:
+    """Rules of whether an effect is large enough to matter, means what its name says, and shows in this motion."""
+    policy, problem, own = comparison.policy, comparison.problem, hypothesis_of(one.effect)
+    yield at_least("share of the error energy", one.plain_gain, policy.least_plain_gain)
+    if own.must_stand_out:
+        yield at_least("energy relative to the reading's noise", one.above_noise, policy.least_above_noise)
+    if own.is_timing:
+        yield at_least("share that it removes away from reversals", one.away, policy.least_away)
+    if one.at_rest < 1.0:
+        yield at_least("share of the error at rest", one.at_rest, policy.halved)
+    yield from name_rules(problem, one)
+    yield Rule("the model explains the changes of the torque", in_time(problem, one))
+    if own.must_stand_out:
+        yield Rule("the set point demands it", is_asked_for(comparison, one.fit, one.effect))
+
+
 def is_admissible(comparison: Comparison, one: CandidateFit) -> bool:
-    """Whether an effect is large enough to matter, means what its name says, and can be told from this motion."""
-    policy, problem = comparison.policy, comparison.problem
-    loud = one.plain_gain >= policy.least_plain_gain and one.above_noise >= policy.least_above_noise
-    if not loud or one.away < policy.least_away or one.at_rest < policy.halved:
-        return False
-    if not is_what_it_says(problem, one) or not in_time(problem, one):
-        return False
-    return not hypothesis_of(one.effect).must_stand_out or is_asked_for(comparison, one.fit, one.effect)
+    """Whether every rule of admission lets an effect pass."""
+    return all_pass(admission(comparison, one))
 
 
 def is_full(best: CandidateFit, comparison: Comparison) -> bool:
