@@ -67,6 +67,11 @@ class Tables:
     mount = Structure((Named("b"),))
     prepared = None
 
+    def enter(self, *_: object) -> None:
+        """Nothing is written into a ledger here."""
+
+    judge = enter
+
     @property
     def problem(self) -> "Tables":
         return self
@@ -104,7 +109,7 @@ def play(monkeypatch: pytest.MonkeyPatch) -> Play:
         monkeypatch.setattr(rivals, "stage", stage)
         monkeypatch.setattr(rivals, "weighed", weighed)
         monkeypatch.setattr(rivals, "margin", lambda _, own, other: own.evidence - other.evidence)
-        monkeypatch.setattr(rivals, "is_admissible", lambda _, one: not one.effect.id.isupper())
+        monkeypatch.setattr(rivals, "_is_admissible", lambda _, one: not one.effect.id.isupper())
         monkeypatch.setattr(rivals, "misfits_of", lambda *_: misfits or {})
         monkeypatch.setattr(rivals, "best_of", lambda _, beside, __: next(filter(adds, beside.tried), None))
         monkeypatch.setattr(rivals, "is_full", lambda *_: False)

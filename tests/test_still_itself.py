@@ -6,9 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cosim.diagnosis.answer.ledger import all_pass
 from cosim.diagnosis.decision import Gain
 from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.proof import _stands
+from cosim.diagnosis.proof import _validation
 from cosim.diagnosis.rivals import AcceptedEffect
 from pyfmi_models.effects import Cogging, Effect
 from pyfmi_models.effects.compliance import Compliance
@@ -37,7 +38,7 @@ def test_a_spring_that_is_refitted_to_spring_no_more_falls(damping: float, stand
     one, problem = accepted(spring(0.1)), SimpleNamespace(weight=np.ones(4), mount=left(1.0).mount)
     comparison: Any = SimpleNamespace(problem=problem, policy=POLICY)
     examined: Any = SimpleNamespace(effects=(one,), base=left(1.0))
-    assert _stands(comparison, examined, left(0.1, spring(damping)), one, SURE) is stands
+    assert all_pass(_validation(comparison, examined, left(0.1, spring(damping)), one, SURE)) is stands
 
 
 def test_of_a_ripple_the_strongest_wave_is_looked_at_and_none_of_the_cards_own() -> None:

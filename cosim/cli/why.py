@@ -71,9 +71,7 @@ def _rules(trial: "Trial") -> Table:
     from cosim.diagnosis.answer.why import label
 
     held = f", held out {_with_error(trial.heldout.nats, trial.heldout.error)}" if trial.heldout else ""
-    head = (
-        f"{' + '.join(trial.effects) or 'refitted base'}: {_with_error(trial.train.nats, trial.train.error)} nats{held}"
-    )
+    head = f"{label(trial.effects)}: {_with_error(trial.train.nats, trial.train.error)} nats{held}"
     table = Table(title=f"\n{head}", title_justify="left", box=None, pad_edge=False)
     for name in ("rule", "value", "limit", "outcome", "note"):
         table.add_column(name, justify="right" if name in ("value", "limit") else "left", overflow="fold")
