@@ -158,6 +158,7 @@ class V:
     initial: str = ""
     more: str = ""
     size: int = 0
+    variability: str = ""
 
 
 U, Y = V("u", 0, "input", start="0"), V("y", 1)
@@ -235,7 +236,7 @@ def described(
         interface: the element of its interface.
         flags: attributes of that.
         variables: in the place of its own.
-        experiment: an element `DefaultExperiment`.
+        experiment: an element before the variables.
     """
     own = variables or VARIABLES[model]
     token = "guid" if version == 2 else "instantiationToken"
@@ -265,11 +266,12 @@ def described(
 
 def _variable(one: V, version: int, index: Mapping[str, int]) -> str:
     changing = "continuous" if one.type.startswith("Float") else "discrete"
-    variability = "fixed" if one.causality == "parameter" else changing
+    fixed = one.causality in ("parameter", "structuralParameter")
+    variability = one.variability or ("fixed" if fixed else changing)
     said = {"name": one.name, "valueReference": one.reference, "causality": one.causality, "variability": variability}
     said |= {"initial": one.initial} if one.initial else {}
     common = " ".join(f'{key}="{value}"' for key, value in said.items())
-    start = f'start="{one.start}"' if one.causality != "output" and (one.start or one.type == "String") else ""
+    start = f'start="{one.start}"' if one.start or (one.type == "String" and one.causality == "input") else ""
     more = f'{one.more} derivative="{index["x"]}"' if one.name == "der(x)" else one.more
     if version == 2:
         return f"<ScalarVariable {common}><{OF_FMI2.get(one.type, one.type)} {start} {more}/></ScalarVariable>"

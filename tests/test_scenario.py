@@ -142,7 +142,7 @@ def test_the_reference_of_the_paper_is_shipped() -> None:
         (
             "stop = 0.5",
             "stop = 0.5\nstp = 1",
-            'loop.toml: "stp" is no key of a scenario; keys there are: name, description, step,',
+            'loop.toml: "stp" is no key of a scenario; keys there are: name, description, notes,',
         ),
         (
             'fmu = "tiny3.fmu"',

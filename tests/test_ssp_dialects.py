@@ -169,7 +169,7 @@ def test_systems_that_hold_themselves_are_refused(read) -> None:
 def test_a_component_without_a_source_gives_nothing_and_that_is_said(read) -> None:
     planned = component("later").replace('source="resources/tiny%202.fmu"', "")
     scenario = read(system(component("one", FOLLOWS) + planned, wire("later.y", "one.a")))
-    assert 'The component "later" has no source' in scenario.description
+    assert 'The component "later" has no source' in scenario.notes[0]
     assert not scenario.wires
 
 
@@ -217,7 +217,7 @@ def test_the_step_of_omsimulator_counts_and_a_stop_between_steps_is_cut(read) ->
     inside = system(component("one")).replace("</ssd:System>", said + "</ssd:System>")
     scenario = read(inside, experiment='<ssd:DefaultExperiment stopTime="0.01"/>')
     assert (scenario.step, scenario.ticks) == (0.003, 3)
-    assert "Its stop of 0.01 s is no whole number of steps; the run ends at 0.009 s." in scenario.description
+    assert scenario.notes == ("Its stop of 0.01 s is no whole number of steps; the run ends at 0.009 s.",)
 
 
 @pytest.mark.parametrize(("stop", "step"), [("1e300", "1e-14"), ("1e11", "1e-9"), ("1e308", "1e-308"), ("1e-300", "1")])

@@ -129,8 +129,8 @@ def test_a_connection_written_from_its_end_is_understood(read) -> None:
 
 def test_parameters_that_no_fmu_has_and_what_is_assumed_are_told(read) -> None:
     scenario = read(system(component("one", values(real("kk", 1)))), experiment="")
-    assert "Not set, because their FMUs do not have them: one.kk" in scenario.description
-    assert "It says no stop and step, which is assumed" in scenario.description
+    assert "Not set, because their FMUs do not have them: one.kk." in scenario.notes
+    assert "It says no stop and step, which is assumed." in scenario.notes
     assert (scenario.stop, scenario.ticks) == (1.0, 1000)
 
 

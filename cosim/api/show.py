@@ -14,6 +14,7 @@ from cosim.support.html import facts as html_facts
 from cosim.support.html import table as html_table
 from cosim.support.html import text as html_text
 from cosim.support.plain import Json
+from cosim.system.variant import ssp_of
 
 Facts = Mapping[str, Json]
 Row = Mapping[str, Json]
@@ -73,7 +74,7 @@ def show(
     """
     if isinstance(source, Recording):
         return _of_recording(source, picture, force)
-    if Path(source).suffix in NO_RECORDINGS:
+    if Path(source).suffix in NO_RECORDINGS or ssp_of(source)[0] is not None:
         facts, tables = describe(str(source))
         return Shown(facts, tables, tuple(drawing(str(source))) if WIRES in tables else ())
     options = {"columns": columns or {}, "units": units or {}, "layout": layout or {}}
@@ -105,7 +106,7 @@ def describe(file: str) -> tuple[Facts, Tables]:
     path = Path(file)
     if path.suffix == ".fmu":
         return _fmu(path)
-    if path.suffix in (".ssp", ".ssd"):
+    if ssp_of(file)[0] is not None:
         return _scenario(file)
     return _toml(file)
 
@@ -148,6 +149,7 @@ def _of_text(recording: Recording, name: str) -> Row:
 
 def _fmu(path: Path) -> tuple[Facts, Tables]:
     from cosim.fmi.description import describe as read
+    from cosim.fmi.sound import doubts_of
     from cosim.fmi.variables import ports_of
 
     description = read(path)
@@ -160,6 +162,7 @@ def _fmu(path: Path) -> tuple[Facts, Tables]:
         "kinds": ", ".join(name for name, kind in kinds.items() if kind is not None),
         "made by": description.generationTool or "?",
     }
+    facts |= {f"note {number}": f"{doubt}." for number, doubt in enumerate(doubts_of(description), 1)}
     order = ("input", "output", "parameter", "structuralParameter", "calculatedParameter", "local", "independent")
     ports = sorted(ports_of(description).values(), key=lambda port: order.index(port.causality))
     variables = [
@@ -222,7 +225,7 @@ def _scenario(file: str) -> tuple[Facts, Tables]:
         "stop": f"{scenario.stop:g} s ({scenario.ticks:,} steps)",
         "algorithm": in_short(scenario),
         "rows": "every step" if scenario.decimation == 1 else f"one in {scenario.decimation:,} steps",
-    }
+    } | {f"note {number}": note for number, note in enumerate(scenario.notes, 1)}
     components = [
         {"component": name, "from": origin(one), "steps every": f"{scenario.every.get(name, 1) * scenario.step:g} s"}
         for name, one in scenario.components.items()

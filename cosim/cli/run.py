@@ -55,11 +55,12 @@ def run(
     from cosim.models.cache import with_fmus
     from cosim.support.files import check_free
     from cosim.system.scenario import read_scenario
+    from cosim.system.variant import ssp_of
 
     wanted, files = read_scenario(scenario, outside), files_of(out, page)
     for one in files.values():
         check_free(one, force)
-    if Path(scenario).suffix in (".ssp", ".ssd"):
+    if ssp_of(scenario)[0] is not None and wanted.description:
         say(wanted.description)
     ready = with_fmus(wanted, say)
     command = command_of("run", [scenario], {"--out": out, "--interpreted": interpreted, "--outside": outside})

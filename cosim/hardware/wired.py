@@ -3,11 +3,9 @@
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from cosim.fmi.description import describe
 from cosim.fmi.fmu import FmuComponent
 from cosim.hardware.structures import INPUTS
 from cosim.master.exchange import open_fmu
@@ -130,8 +128,7 @@ def _check_controller(scenario: Scenario, name: str, component: FmuComponent, in
 
 def period_of(component: FmuComponent) -> float:
     """Return the sample time that an FMU states in s; 0 where it states none."""
-    stated: Any = getattr(describe(component.path).coSimulation, "fixedInternalStepSize", None)
-    return float(stated or 0.0)
+    return component.own_step
 
 
 def _setpoints(wiring: Wiring, fed: Sequence[Wire], scenario: Scenario) -> np.ndarray:

@@ -31,7 +31,7 @@ class Execution:
 
     wiring: Wiring
     plan: Plan
-    doubts: Sequence[str]
+    remarks: Sequence[str]
     loop: CompiledLoop | InterpretedLoop
     writer: MemoryWriter
     ticks: int
@@ -73,7 +73,7 @@ class Execution:
     def _notes(self) -> list[str]:
         notes = [f"{self.ended}."] if self.ended else []
         notes += self.wiring.doubts()
-        notes += self.doubts
+        notes += self.remarks
         for effort in self.loop.efforts:
             if effort.at_limit:
                 some = f"{effort.at_limit:,} of {effort.rounds:,} pieces of steps"

@@ -14,6 +14,7 @@ from cosim.master.execution import Execution, Progress
 from cosim.master.given import Given
 from cosim.master.initialisation import initialise
 from cosim.master.loop import make_loop
+from cosim.master.notes import notes_of
 from cosim.master.opening import started, wiring_of
 from cosim.master.output import check_room, kept, origin_of, writer_of
 from cosim.master.planning import make_plan
@@ -56,12 +57,13 @@ def simulate(system: System, options: Options = PLAIN) -> RunResult:
         wiring = wiring_of(stack, system)
         plan = make_plan(wiring, system.step, system.decimation, system.start)
         settings = started(wiring, system, plan)
-        doubts = initialise(plan, settings, Given(wiring, plan).at(np.zeros(1, dtype=np.int64))[:, 0])
+        notes = [*system.notes, *notes_of(wiring, plan, settings)]
+        notes += initialise(plan, settings, Given(wiring, plan).at(np.zeros(1, dtype=np.int64))[:, 0])
         origin = origin_of(wiring, settings, plan)
         told = {"scenario": system.text, "command": options.command} if system.text else {}
         writer = writer_of(wiring, plan, {**origin, **told}, options.path, options.force)
         loop = make_loop(plan, options.compiled)
-        work = Execution(wiring, plan, doubts, loop, writer, system.ticks, options.on_progress, system.ends_on_a_row)
+        work = Execution(wiring, plan, notes, loop, writer, system.ticks, options.on_progress, system.ends_on_a_row)
         work.execute()
     recording = kept(writer, system.name) if options.path is None else None
     files = {} if options.path is None else {"recording": options.path}

@@ -1,6 +1,7 @@
 """Scenarios: a TOML file that names components, wires, inputs, the step and what to record.
 
-    name, step [s], stop [s]; start [s] where components and recording shall not begin at 0 (signals and faults do)
+    name, description, notes = [...] that a run repeats
+    step [s], stop [s]; start [s] where components and recording shall not begin at 0 (signals and faults do)
     [algorithm]         kind = "jacobi" | "gauss-seidel" | "iterated" | "energy" and its options, see `algorithm`
     [components.NAME]   fmu = "file.fmu", or card = "CARD" with part = "plant" | "controller"; parameters = { NAME =
                         number, or "signal.output": its value at the start };
@@ -38,6 +39,7 @@ from cosim.system.faults import Fault
 from cosim.system.sections import ComponentSection, File, RecordingSection, keys
 from cosim.system.system import Fmu, Function, Source, System
 from cosim.system.ticks import every_of, whole
+from cosim.system.variant import ssp_of
 from cosim.system.wire import Record, Wire
 
 
@@ -61,6 +63,7 @@ class Scenario:
     faults: tuple[Fault, ...] = ()
     start: float = 0.0
     last: bool = False
+    notes: tuple[str, ...] = ()
 
     @property
     def stop(self) -> float:
@@ -90,6 +93,7 @@ class Scenario:
             last=self.last,
             name=self.name,
             text=self.text,
+            notes=self.notes,
         )
 
     def _source(self, name: str, component: ComponentSection) -> Source:
@@ -111,7 +115,8 @@ def read_scenario(source: str | Path, outside: bool = False) -> Scenario:
     """Read a scenario from a file or by the name of a shipped one.
 
     Args:
-        source: a .toml file, an .ssp archive, the .ssd of one that lies unpacked, or a name.
+        source: a .toml file, an .ssp archive, the .ssd of one that lies unpacked, or a name; `FILE.ssp#VARIANT.ssd` is
+            another system of an archive.
         outside: whether sources of an SSP may lead out of it, to files beside it.
 
     Raises:
@@ -121,10 +126,11 @@ def read_scenario(source: str | Path, outside: bool = False) -> Scenario:
     shipped = files("cosim") / "scenarios" / f"{source}.toml"
     if not path.exists() and shipped.is_file():
         return parse_scenario(shipped.read_text("utf-8"), str(source), Path())
-    if path.suffix in (".ssp", ".ssd"):
+    archive, variant = ssp_of(source)
+    if archive is not None:
         from cosim.system.ssp import read_ssp  # most runs need no XML
 
-        return parse_scenario(read_ssp(path, outside), str(source), Path())
+        return parse_scenario(read_ssp(archive, outside, variant), str(source), Path())
     if path.suffix != ".toml" or not path.is_file():
         choices = shipped_scenarios()
         rule = f"a scenario is a .toml or .ssp file or one of: {', '.join(choices)}."
@@ -167,6 +173,7 @@ def parse_scenario(text: str, path: str, directory: Path) -> Scenario:
         faults=tuple(raw.faults),
         start=raw.start,
         last=raw.record.last,
+        notes=tuple(raw.notes),
     )
 
 

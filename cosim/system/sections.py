@@ -78,6 +78,7 @@ class File(_Section):
 
     name: str = ""
     description: str = ""
+    notes: list[str] = []
     step: Step = 1e-4
     stop: Seconds
     start: float = Field(default=0.0, ge=0.0, le=LONGEST)

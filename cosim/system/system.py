@@ -64,6 +64,7 @@ class System:
         last: also record the sample at the end, where nothing is stepped any more.
         name: what the recording is called.
         text: the scenario that means it; the recording keeps it.
+        notes: what a run shall say of where it comes from, as sentences.
     """
 
     components: Mapping[str, Source]
@@ -82,6 +83,7 @@ class System:
     last: bool = False
     name: str = "run"
     text: str = ""
+    notes: Sequence[str] = ()
 
     @property
     def ends_on_a_row(self) -> bool:

@@ -5,7 +5,8 @@ transformations, signal dictionaries, parameter bindings with values and mapping
 experiment. Units are converted before a transformation acts. Parameters of an outer system win over those of an inner
 one, a later binding over an earlier one. Inputs of the whole system stay at their start values. All outputs that have a
 connector are recorded. The step is that of an annotation (Open Simulation Platform, OMSimulator), or the smallest that
-an FMU proposes. A `SystemStructure.ssd` in a folder is read as the archive that it would be.
+an FMU proposes. An SSD in a folder is read as the archive that it would be. Where an archive has several SSDs at its
+root, `FILE.ssp#VARIANT.ssd` chooses one.
 
 Reference: System Structure and Parameterization 2.0, Modelica Association 2024.
 """
@@ -19,19 +20,20 @@ from cosim.system.ssp.scenario import scenario_of
 from cosim.system.ssp.structure import Structure
 
 
-def read_ssp(path: Path, outside: bool = False) -> str:
+def read_ssp(path: Path, outside: bool = False, variant: str = "") -> str:
     """Return the scenario that an SSP means, as the text of a scenario file.
 
     Args:
-        path: the archive, or the `SystemStructure.ssd` of one that lies unpacked.
+        path: the archive, or an SSD of one that lies unpacked.
         outside: sources may lead out of the archive, to files beside it.
+        variant: the file or the name of another SSD at the root of the archive than its SystemStructure.ssd.
 
     Raises:
         ScenarioError: one sentence with the archive, what breaks a rule, and the choices.
         FmuError: one of its FMUs cannot run here.
     """
     archive = Folder(path, outside) if path.suffix == ".ssd" else Archive(path, outside)
-    structure = read_structure(archive)
+    structure = read_structure(archive, variant)
     return scenario_of(structure, _unpacked(structure))
 
 

@@ -14,6 +14,8 @@ from cosim.support.archive import DAMAGED, contents
 from cosim.support.errors import ScenarioError
 from cosim.support.files import cache_home, replacing, sha256
 
+MAIN = "SystemStructure.ssd"
+"""The file of the system that is meant where no other is chosen."""
 LARGEST = 2**30
 """Bytes of a member at most: more is a mistake or an attack."""
 _OUTSIDE = (".fmu", ".ssp", ".ssd", ".ssv", ".ssm", ".ssb")
@@ -46,6 +48,13 @@ class Archive:
         if not path.exists():
             raise ScenarioError(f"{path} does not exist.", culprit=str(path))
         self.members = {posixpath.normpath(one.filename): one for one in contents(path, self.error)}
+
+    main = MAIN
+    """The file of the system that is run where no other is chosen."""
+
+    def roots(self) -> list[str]:
+        """List the SSDs at the root of the archive, each a system of its own."""
+        return sorted(one for one in self.members if one.endswith(".ssd") and "/" not in one)
 
     def error(self, what: str, *choices: str) -> ScenarioError:
         """Make the error that says what is wrong with this archive."""

@@ -14,8 +14,13 @@ class Folder(Archive):
 
     def __init__(self, ssd: Path, outside: bool = False) -> None:
         self.path, self.base, self.outside, self.name = ssd, ssd.parent, outside, str(ssd)
+        self.main = ssd.name
         if not ssd.is_file():
             raise self.error("it does not exist")
+
+    def roots(self) -> list[str]:
+        """List the SSDs of the folder."""
+        return sorted(one.name for one in self.base.glob("*.ssd"))
 
     def read(self, source: str) -> bytes:
         """Return a file of the folder, named by a relative URI."""

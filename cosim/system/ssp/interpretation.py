@@ -19,7 +19,7 @@ from cosim.support.errors import FmuError, UnitError
 from cosim.support.numbers import COUNT
 from cosim.support.units import unit
 from cosim.system.ssp.archive import child, children
-from cosim.system.ssp.parameters import Setting, Values, given, settings_of
+from cosim.system.ssp.parameters import Bound, Setting, Values, bound_by, given, settings_of
 from cosim.system.ssp.structure import End, Link, Path, Structure, name_of
 from cosim.system.ssp.transformation import Effect
 
@@ -52,10 +52,15 @@ class Interpretation:
         return {path: self._ports(path, one) for path, one in self.descriptions.items()}
 
     @cached_property
+    def bound(self) -> Bound:
+        """What parameter bindings say."""
+        return bound_by(self.structure)
+
+    @cached_property
     def outside(self) -> dict[End, Setting]:
         """What connectors of systems are given."""
         systems = [path for path, node in self.structure.nodes.items() if not node.source]
-        found = {path: settings_of(self.structure, path) for path in systems}
+        found = {path: settings_of(self.bound, path) for path in systems}
         return {
             (path, name): one
             for path, settings in found.items()
@@ -87,15 +92,43 @@ class Interpretation:
         cut = "" if end == stop else f"Its stop of {stop:g} s is no whole number of steps; the run ends at {end:g} s."
         return start, end, step, " ".join(filter(None, (said, cut)))
 
-    def parameters(self, path: Path) -> tuple[dict[str, Values], list[str]]:
-        """Return the values for the variables of a component in its units, and the names that it does not have."""
-        ports, settings = self.ports[path], self._settings(path)
-        strange = [name_of((path, name)) for name in settings if name not in ports]
-        file = self.structure.nodes[path].file
-        known = {name: one for name, one in settings.items() if name in ports}
-        return {
-            name: one.arriving(file, name_of((path, name)), ports[name].unit) for name, one in known.items()
-        }, strange
+    def parameters(self, path: Path) -> dict[str, Values]:
+        """Return the values for the variables of a component in its units."""
+        ports, file = self.ports[path], self.structure.nodes[path].file
+        known = {name: one for name, one in self._settings(path).items() if name in ports}
+        return {name: one.arriving(file, name_of((path, name)), ports[name].unit) for name, one in known.items()}
+
+    def unknown(self) -> tuple[list[str], list[str]]:
+        """Return full names to which values are bound: those that their FMU lacks, and those of no element at all."""
+        settings = {path: self._settings(path) for path in self.structure.components}
+        lacking = [(path, name) for path, given in settings.items() for name in given if name not in self.ports[path]]
+        nowhere = [
+            (holder, name)
+            for holder, said in self.bound.items()
+            for name in dict.fromkeys(name for name, _ in said)
+            if not any(self._takes(end) for end in self._meant(holder, name))
+        ]
+        return [name_of(end) for end in lacking], [name_of(end) for end in nowhere]
+
+    def _takes(self, end: End) -> bool:
+        """Say whether an element is an FMU, which answers for its own names, or has a connector of this name."""
+        return end[0] in self.ports or end[1] in self.structure.nodes[end[0]].connectors
+
+    def _meant(self, holder: Path, name: str) -> Iterator[End]:
+        """Yield what a name can mean, as seen from an element: a variable of it or of one inside it."""
+        parts = name.split(".")
+        for depth in range(len(parts)):
+            for path in self._dotted.get(".".join((*holder, *parts[:depth])), ()):
+                if path[: len(holder)] == holder:
+                    yield path, ".".join(parts[depth:])
+
+    @cached_property
+    def _dotted(self) -> dict[str, list[Path]]:
+        """The elements by their names with dots between."""
+        found: dict[str, list[Path]] = {}
+        for path in self.structure.nodes:
+            found.setdefault(".".join(path), []).append(path)
+        return found
 
     def wires(self) -> Iterator[dict[str, Any]]:
         """Write the chains of links that lead from FMU to FMU as connections."""
@@ -190,7 +223,7 @@ class Interpretation:
 
     def _settings(self, path: Path) -> dict[str, Setting]:
         """Collect what a component is given by its bindings and by connectors of systems that are wired to it."""
-        settings = settings_of(self.structure, path)
+        settings = settings_of(self.bound, path)
         for name in self.structure.nodes[path].connectors:
             for chain in self.structure.chains((path, name)):
                 brought = given(self.structure, chain, self.outside)

@@ -43,18 +43,30 @@ class Setting:
         return effect.apply(self.value)
 
 
-def settings_of(structure: Structure, path: Path) -> dict[str, Setting]:
-    """Collect what the bindings of an element and of the systems around it say of its variables, by name.
+Bound = Mapping[Path, list[tuple[str, Setting]]]
+"""What the bindings of each element say, by its path: names as they are seen from there, the strongest last."""
 
-    What a set says of others is left out.
-    """
+
+def bound_by(structure: Structure) -> Bound:
+    """Read all parameter bindings."""
+    return {
+        path: [
+            said
+            for holder, file in node.bindings
+            for binding in children(holder, "ssd:ParameterBindings", "ssd:ParameterBinding")
+            for said in _binding(structure, file, binding)
+        ]
+        for path, node in structure.nodes.items()
+    }
+
+
+def settings_of(bound: Bound, path: Path) -> dict[str, Setting]:
+    """Collect what the bindings of an element and of the systems around it say of its variables, by name."""
     found: dict[str, Setting] = {}
     for depth in range(len(path), -1, -1):
         below = "".join(f"{name}." for name in path[depth:])
-        for holder, file in structure.nodes[path[:depth]].bindings:
-            for binding in children(holder, "ssd:ParameterBindings", "ssd:ParameterBinding"):
-                values = _binding(file, binding)
-                found |= {name.removeprefix(below): one for name, one in values if name.startswith(below)}
+        said = bound.get(path[:depth], [])
+        found |= {name.removeprefix(below): one for name, one in said if name.startswith(below)}
     return found
 
 
@@ -79,19 +91,27 @@ def _carried(structure: Structure, setting: Setting, chain: tuple[Link, ...]) ->
     return Setting(value, unit, chain[-1].transformation)
 
 
-def _binding(file: SspFile, binding: Element) -> Iterator[tuple[str, Setting]]:
+def _binding(structure: Structure, file: SspFile, binding: Element) -> Iterator[tuple[str, Setting]]:
     values = _content(file, binding, "ssd:ParameterValues", "ssv:ParameterSet")
-    mapping, prefix = child(binding, "ssd:ParameterMapping"), binding.get("prefix", "")
-    entries = None if mapping is None else list(children(_mapping(file, mapping), "ssm:MappingEntry"))
-    units = file.units | units_of(file.archive, values, "ssv:Units")
-    for parameter in children(values, "ssv:Parameters", "ssv:Parameter"):
-        name, setting = prefix + parameter.get("name", ""), _setting(file, parameter, units)
-        if entries is None:
-            yield name, setting
-        for entry in entries or ():
-            if entry.get("source") == name:
-                target = entry.get("target", "")
-                yield target, Setting(setting.value, setting.unit, transformation_of(file, entry, target))
+    prefix, units = binding.get("prefix", ""), file.units | units_of(file.archive, values, "ssv:Units")
+    parameters = children(values, "ssv:Parameters", "ssv:Parameter")
+    named = {prefix + one.get("name", ""): _setting(file, one, units) for one in parameters}
+    mapping = child(binding, "ssd:ParameterMapping")
+    if mapping is None:
+        yield from named.items()
+        return
+    targets: dict[str, str] = {}
+    for entry in children(_mapping(file, mapping), "ssm:MappingEntry"):
+        source, target = entry.get("source", ""), entry.get("target", "")
+        if target in targets:
+            raise file.error(f'a parameter mapping has two sources of "{target}", "{targets[target]}" and "{source}"')
+        targets[target] = source
+        if source in named:
+            one = named[source]
+            yield target, Setting(one.value, one.unit, transformation_of(file, entry, target))
+        else:
+            have = ", ".join(named) or "nothing"
+            structure.notes.append(f'"{target}" is not set: its mapping names "{source}", and the set holds {have}.')
 
 
 def _content(file: SspFile, holder: Element, inline: str, tag: str) -> Element:

@@ -3,7 +3,8 @@
 import posixpath
 from xml.etree.ElementTree import Element
 
-from cosim.system.ssp.archive import Archive, child, children, tagged
+from cosim.support.errors import ScenarioError
+from cosim.system.ssp.archive import MAIN, Archive, child, children, tagged
 from cosim.system.ssp.ssp_file import SspFile
 from cosim.system.ssp.structure import (
     GIVES,
@@ -26,21 +27,51 @@ MOST = 10_000
 """Elements at most: systems that use each other twice at each level have a million after twenty."""
 _SYSTEM, _COMPONENT = tagged("ssd:System"), tagged("ssd:Component")
 _REFERENCE = tagged("ssd:SignalDictionaryReference")
-_MAIN = "SystemStructure.ssd"
 
 
-def read_structure(archive: Archive) -> Structure:
+def read_structure(archive: Archive, variant: str = "") -> Structure:
     """Read the structure of an SSP.
+
+    Args:
+        archive: of the SSP.
+        variant: the file or the name of another SSD at its root; its SystemStructure.ssd where not given.
 
     Raises:
         ScenarioError: it breaks a rule of SSP, or has what is not read here.
     """
-    file = _opened(archive, _MAIN)
+    file = _opened(archive, _variant(archive, variant) if variant else archive.main)
     structure = Structure(file)
+    structure.notes.extend([] if variant else _others(archive))
     _add_system(structure, _system(file), file, ())
     if not structure.components:
         raise archive.error("it has no component that is an FMU" if len(structure.nodes) > 1 else "it has no component")
     return structure
+
+
+def _variant(archive: Archive, variant: str) -> str:
+    """Return the file of the SSD that has this name, or is this file."""
+    files = archive.roots()
+    found = [one for one in files if one == variant] or [one for one in files if _name(archive, one) == variant]
+    if len(found) != 1:
+        what = f'"{variant}" is the name of {len(found)} of its SSDs' if found else f'it has no SSD "{variant}"'
+        raise archive.error(what, *files)
+    return found[0]
+
+
+def _others(archive: Archive) -> list[str]:
+    """Say which other SSDs there are, and how each is chosen."""
+    others = [one for one in archive.roots() if one != archive.main]
+    chosen = ", ".join(f"{archive.path.name}#{one} ({_name(archive, one)})" for one in others)
+    return (
+        [f"It holds more than one system, of which {archive.main} is run; the others are: {chosen}."] if others else []
+    )
+
+
+def _name(archive: Archive, source: str) -> str:
+    try:
+        return archive.xml(source, "ssd:SystemStructureDescription").get("name") or "without a name"
+    except ScenarioError:  # it is not the one that is run
+        return "unreadable"
 
 
 def _opened(archive: Archive, source: str) -> SspFile:
@@ -53,7 +84,7 @@ def _opened(archive: Archive, source: str) -> SspFile:
 def _system(file: SspFile) -> Element:
     system = child(file.root, "ssd:System")
     if system is None:
-        raise file.error("SystemStructure.ssd has no ssd:System")
+        raise file.error("its SSD has no ssd:System")
     return system
 
 
@@ -108,7 +139,7 @@ def _inner(file: SspFile, kind: str, source: str) -> SspFile:
     if kind == SSD:
         return _opened(file.archive, file.path(source))
     inner, _, variant = source.partition("#")
-    return _opened(file.archive.nested(file.path(inner)), variant or _MAIN)
+    return _opened(file.archive.nested(file.path(inner)), variant or MAIN)
 
 
 def _add_dictionaries(structure: Structure, system: Element, file: SspFile, path: Path) -> None:

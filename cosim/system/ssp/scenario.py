@@ -15,18 +15,23 @@ def scenario_of(structure: Structure, files: Mapping[Path, File]) -> str:
     """Write the scenario; `files` are the FMUs by their element."""
     interpretation = Interpretation(structure, files)
     start, stop, step, assumed = interpretation.experiment()
-    parameters = {path: interpretation.parameters(path) for path in structure.components}
-    strange = [name for _, names in parameters.values() for name in names]
     described = structure.nodes[()].element.get("description", "").rstrip(".")
-    said = [f"{described}." if described else "", assumed, *structure.notes]
-    said += [f"Not set, because their FMUs do not have them: {', '.join(strange)}."] if strange else []
-    head = {"name": structure.file.root.get("name") or "system", "description": " ".join(filter(None, said))}
+    head: dict[str, Any] = {
+        "name": structure.file.root.get("name") or "system",
+        "description": f"{described}." if described else "",
+    }
+    parameters = {path: interpretation.parameters(path) for path in structure.components}
+    lacking, nowhere = interpretation.unknown()
+    said = [*filter(None, [assumed]), *structure.notes]
+    said += [f"Not set, because their FMUs do not have them: {', '.join(lacking)}."] if lacking else []
+    said += [f"Not set, because no element has these names: {', '.join(nowhere)}."] if nowhere else []
+    head |= {"notes": said} if said else {}
     lines = _table("", head | ({"start": start} if start else {}) | {"step": step, "stop": stop})
     for path, node in structure.components.items():
         name = _text(interpretation.names[path])
         interface = _INTERFACES.get(node.element.get("implementation", ""), {})
         lines += _table(f"[components.{name}]", {"fmu": str(files[path])} | interface)
-        lines += _table(f"[components.{name}.parameters]", parameters[path][0])
+        lines += _table(f"[components.{name}.parameters]", parameters[path])
         for variable, stated in interpretation.units(path).items():
             lines += _table(f"[components.{name}.variables.{_text(variable)}]", {"name": variable, "unit": stated})
     for wire in interpretation.wires():
