@@ -29,7 +29,7 @@ from cosim.data.checks import chosen
 from cosim.data.columns import Columns
 from cosim.data.limits import listed, short
 from cosim.data.order import order_of
-from cosim.data.registers import continued
+from cosim.data.registers import register_of
 from cosim.support.errors import RecordingError
 
 Array = npt.NDArray[np.float64]
@@ -139,7 +139,9 @@ def on_one_time(
         _check_times(path, channels[name])
     channels = {name: one for name, one in channels.items() if one.grows}
     roles = {name: ours for name, ours in roles.items() if name in channels}
-    channels |= {name: _turned(path, channels[name], served.units) for name, ours in roles.items() if ours == "q"}
+    channels |= {
+        name: _turned(channels[name], served.units.get("q", "")) for name, ours in roles.items() if ours == "q"
+    }
     base = _base([channels[name] for name in needed], roles) or max(channels.values(), key=lambda one: len(one.t))
     return _table(path, found, channels, roles, base, needed)
 
@@ -183,10 +185,12 @@ def _check_times(path: Path, channel: Channel) -> None:
         raise RecordingError(text, culprit=str(path), value=after)
 
 
-def _turned(path: Path, channel: Channel, units: Mapping[str, str]) -> Channel:
+def _turned(channel: Channel, stated: str) -> Channel:
     """A position whose turns are counted: between the end of a register and its start nothing can be read."""
-    table, _ = continued(path.stem, {"q": channel.x}, units)
-    return replace(channel, x=table["q"])
+    found = register_of(channel.x, stated, channel.t)
+    if found is None:
+        return channel
+    return replace(channel, x=channel.x + found.length * found.turns, done=(*channel.done, str(found)))
 
 
 def _base(needed: Sequence[Channel], roles: Mapping[str, str]) -> Channel | None:

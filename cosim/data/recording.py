@@ -21,7 +21,7 @@ from cosim.data.columns import Columns
 from cosim.data.formats import read_columns
 from cosim.data.one_run import rows_of_one, timed
 from cosim.data.questions import PERIOD
-from cosim.data.registers import continued
+from cosim.data.registers import at_an_end, continued
 from cosim.data.runs import named, split
 from cosim.data.times import read_clock
 from cosim.support.errors import OutputError
@@ -137,6 +137,7 @@ class Recording:
         numeric = {key: column for key, column in values.items() if key not in told}
         table, notes = numbers(path, numeric, ("t", *chosen(values, required)))
         table, joined = continued(path.stem, table, stated)
+        end, stays = at_an_end(table["q"], stated.get("q", "")) if "q" in table else (0.0, np.empty((0, 2), int))
         si = {column: unit(text) for column, text in stated.items() if column in table}
         table = {key: si[key].to_si(column) if key in si else column for key, column in table.items()}
         check_time(path, table["t"], MINIMUM_ROWS if required else 2, found.values)
@@ -147,8 +148,12 @@ class Recording:
         rows: JsonObject = {"rows": found.rows} if found.rows else {}
         origin = found.origin | {"file": {"name": path.name, "sha256": sha256} | rows}
         origin |= {"start": found.start or clock.start} if found.start or clock.start else {}
+        masked = tuple((float(table["t"][first]), float(table["t"][last - 1])) for first, last in stays.tolist())
+        if masked:
+            said = f'"q" stays at {end:.6g}, the end of what the drive sends, in {int(np.diff(stays).sum()):,} rows'
+            joined = (*joined, f"{path.stem}: {said} from row {stays[0, 0] + 1:,} on; nothing is judged there.")
         notes = (*found.notes, *served.notes, *clock.notes, *notes, *joined)
-        return cls(name, table, {"t": "s"} | {key: one.si for key, one in si.items()}, origin, notes, others)
+        return cls(name, table, {"t": "s"} | {key: one.si for key, one in si.items()}, origin, notes, others, masked)
 
     def write(self, path: Path | str, force: bool = False) -> Path:
         """Write .parquet (with units and origin), .csv or .csv.gz; the file is complete or absent.
