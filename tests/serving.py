@@ -1,7 +1,9 @@
 """Help for the tests of the page: a desk, a client that has the token, recordings and a card."""
 
 import atexit
+import http.client
 import os
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -14,12 +16,15 @@ import pytest
 import serve_work
 
 pytest.importorskip("starlette", reason="the extra [serve] is not installed")
+pytest.importorskip("uvicorn", reason="the extra [serve] is not installed")
+import uvicorn
 from starlette.testclient import TestClient
 
 from cosim.serve.app import make_app
 from cosim.serve.desk import Desk
 from cosim.serve.job import Job
 from cosim.serve.reader import Reader
+from cosim.serve.server import configured, listening
 from cosim.serve.uploads import Limits
 
 TOKEN, PORT = "right", 8000
@@ -107,6 +112,37 @@ def desk_at(home: Path, work: Callable[..., Any], limits: Limits | None = None) 
         yield desk
     finally:
         desk.queue.close()
+
+
+@contextmanager
+def listened(desk: Desk) -> Iterator[int]:
+    """The port of a real server of a desk, in a thread of this process."""
+    listener = listening(0)
+    port = int(listener.getsockname()[1])
+    server = uvicorn.Server(configured(desk, TOKEN, port))
+    thread = threading.Thread(target=server.run, args=([listener],))
+    thread.start()
+    try:
+        yield port
+    finally:
+        server.should_exit = True
+        thread.join()
+        listener.close()
+
+
+def asked(port: int, method: str, path: str, body: bytes = b"", seconds: float = 60.0) -> tuple[int, bytes]:
+    """The status and body of an answer to who has the token."""
+    client = http.client.HTTPConnection("127.0.0.1", port, timeout=seconds)
+    client.request(method, path, body, headers_to(port))
+    answer = client.getresponse()
+    text = answer.read()
+    client.close()
+    return answer.status, text
+
+
+def headers_to(port: int) -> dict[str, str]:
+    """What the page's own requests say of themselves."""
+    return {"Cookie": f"cosim-{port}={TOKEN}", "Origin": f"http://127.0.0.1:{port}"}
 
 
 @pytest.fixture(autouse=True)

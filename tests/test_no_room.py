@@ -16,8 +16,8 @@ from test_cli_run import ENVIRONMENT, cache, call, scenario
 from tiny_fmu import tiny
 
 import cosim.support.cell
-from cosim.cli import surroundings
 from cosim.data.recording import Recording
+from cosim.support.system_errors import surroundings
 
 __all__ = ["cache", "scenario", "tiny"]
 

@@ -3,7 +3,6 @@
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,13 +13,9 @@ import pytest
 import serve_work
 from browsing import DESK, PATIENCE, PHONE, axe_script, browser, dropped, opened, processor, violations
 from mortal import mortal
-from serving import CARD, HERE, READER, TOKEN, _path, recording, until  # skips without the extra [serve]
+from serving import CARD, HERE, TOKEN, _path, desk_at, listened, recording, until  # skips without the extra [serve]
 
-from cosim.serve.app import make_app
 from cosim.serve.desk import Desk
-from cosim.serve.server import listening
-
-uvicorn = pytest.importorskip("uvicorn", reason="the extra [serve] is not installed")
 
 __all__ = ["_path", "browser"]
 Page = Any
@@ -35,19 +30,8 @@ TOUCH = 44
 @contextmanager
 def serving(home: Path, work: Any) -> Iterator[tuple[Desk, str]]:
     """A server in this process whose diagnosis is replaced."""
-    desk = Desk(home, work=work, reader=READER)
-    listener = listening(0)
-    port = listener.getsockname()[1]
-    server = uvicorn.Server(uvicorn.Config(make_app(desk, TOKEN, port), log_level="warning"))
-    thread = threading.Thread(target=server.run, args=([listener],))
-    thread.start()
-    try:
+    with desk_at(home, work) as desk, listened(desk) as port:
         yield desk, f"http://127.0.0.1:{port}/?token={TOKEN}"
-    finally:
-        server.should_exit = True
-        thread.join()
-        listener.close()
-        desk.queue.close()
 
 
 @pytest.fixture

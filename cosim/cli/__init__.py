@@ -22,6 +22,7 @@ import typer
 
 from cosim.support.errors import CosimError, InputError
 from cosim.support.interrupts import Terminated, end_well, is_interrupted, is_terminated
+from cosim.support.system_errors import surroundings
 from cosim.support.terminal import abandon_stdout, finish_stdout, keep_stdout, put, say
 from cosim.support.version import __version__
 from pyfmi_models.errors import ModelError
@@ -30,8 +31,6 @@ SEVERAL = ("--columns", "--units", "--layout", "--variables", "--limits")
 """Options that may be followed by several name=value pairs."""
 INTERRUPTED, TERMINATED = 130, 143
 """Exit codes."""
-LONGEST = 300
-"""Characters of a name, or of a reason of the system, in a message."""
 VERBS = (
     "demo",
     "export",
@@ -193,17 +192,6 @@ def check_finite(options: Mapping[str, object]) -> None:
         if isinstance(value, float) and not isfinite(value):
             option = f"--{name.replace('_', '-')}"
             raise InputError(f"{option} {value}: it must be a finite number.", culprit=option, value=value)
-
-
-def surroundings(error: OSError | MemoryError) -> str:
-    """Say what the system refused: a full disk, a folder that is read-only, a name that is too long."""
-    if isinstance(error, MemoryError):
-        return "There is not enough memory for this."
-    reason = error.strerror or " ".join(str(error).split()) or type(error).__name__
-    if len(reason) > LONGEST:
-        reason = f"{reason[:LONGEST]}..."
-    place = f"{str(error.filename)[:LONGEST]}: " if error.filename else ""
-    return f"{place}{reason[0].lower()}{reason[1:].rstrip('.')}."
 
 
 def _version(wanted: bool) -> None:

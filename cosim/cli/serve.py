@@ -18,17 +18,22 @@ def serve(
 ) -> None:
     """Open a page on this machine: drop recordings and a card, get the report. Nothing is uploaded anywhere."""
     try:
+        from cosim.serve.door import show
+        from cosim.serve.folder import open_to
         from cosim.serve.server import serve as run
-        from cosim.serve.server import show
     except ModuleNotFoundError as error:
         text = f"cosim serve needs the package {error.name}: pip install 'mount-cosim[serve]'"
         raise MissingPackageError(text) from error
     from platformdirs import user_data_path
 
-    def ready(address: str) -> None:
+    home = data or user_data_path("mount-cosim") / "serve"
+
+    def ready(address: str, file: Path | None) -> None:
         put(address)
         say("This address holds the key to the page: keep it to yourself. Ctrl-C ends it.")
-        if browser:
-            show(address)
+        if others := open_to(home):
+            say(f"{home} can be entered by {others}, and stays so; each diagnosis in it is closed to them.")
+        if browser and file is not None:
+            show(file)
 
-    run(data or user_data_path("mount-cosim") / "serve", port, ready)
+    run(home, port, ready)

@@ -53,8 +53,7 @@ def write(desk: Desk, name: str, form: Form) -> str:
 
 def start(desk: Desk, name: str, form: Form) -> str:
     """Diagnose (InputError: something is missing)."""
-    if missing := desk.start(name):
-        raise InputError(" ".join(missing))
+    desk.start(name)
     return f"/jobs/{name}"
 
 
@@ -75,6 +74,8 @@ def remove(desk: Desk, name: str, form: Form) -> str:
     return "/"
 
 
+LOOKING = ("correct", "accept", "card", "write")
+"""Actions that look at files, which takes long."""
 ACTIONS: dict[str, Action] = {
     one.__name__: one for one in (correct, role, accept, drop, card, write, start, cancel, again, remove)
 }

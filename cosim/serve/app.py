@@ -11,10 +11,15 @@
 Answers to forms are pages, so everything but the upload works without the script.
 """
 
+import errno
+from collections.abc import Callable
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
+from typing import ParamSpec, TypeVar
 from urllib.parse import parse_qsl
 
+from anyio import CapacityLimiter, to_thread
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
@@ -23,17 +28,27 @@ from starlette.requests import ClientDisconnect, Request
 from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.routing import Route
 
-from cosim.serve.actions import ACTIONS, Form
+from cosim.serve.actions import ACTIONS, LOOKING, Form
+from cosim.serve.arrivals import receive
 from cosim.serve.desk import Desk
-from cosim.serve.guard import REPORT_POLICY, Guard
-from cosim.serve.pages import home_page, job_page
-from cosim.serve.store import UnknownJobError
-from cosim.serve.uploads import check_size, receive
+from cosim.serve.folder import plain_files
+from cosim.serve.guard import REPORT_POLICY, SAFE, Guard
+from cosim.serve.pages import home_page, job_page, unreadable_page
+from cosim.serve.store import UnknownJobError, UnreadableJobError
+from cosim.serve.uploads import ADVICE, check_size, safe_name
 from cosim.support.errors import CosimError
 from cosim.support.numbers import whole
+from cosim.support.system_errors import surroundings
 
 CARD_SUFFIX = ".toml"
 REPORT = "report.html"
+NO_ROOM = 507
+"""Status of what the system refuses to keep (RFC 4918: insufficient storage)."""
+FULL = (errno.ENOSPC, errno.EDQUOT)
+THREADS = 12
+"""Requests that look at files at a time; anyio has 40 threads for everything else."""
+P = ParamSpec("P")
+T = TypeVar("T")
 ASSETS = {"page.css": "text/css", "page.js": "text/javascript", "icon.svg": "image/svg+xml"}
 
 
@@ -49,7 +64,14 @@ def make_app(desk: Desk, token: str, port: int) -> Starlette:
         Route("/jobs/{id}/{action}", there.act, methods=["POST"]),
         *(Route(f"/{name}", there.asset) for name in ASSETS),
     ]
-    failures = {UnknownJobError: _unknown, HTTPException: _failed, ClientDisconnect: _left}
+    failures = {
+        UnknownJobError: _unknown,
+        UnreadableJobError: _unreadable,
+        HTTPException: _failed,
+        ClientDisconnect: _left,
+        OSError: there.refused,
+        Exception: _broken,
+    }
     guard = Middleware(Guard, token=token, port=port)
     return Starlette(routes=routes, middleware=[guard], exception_handlers=failures)
 
@@ -59,6 +81,7 @@ class Addresses:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
+        self._threads: CapacityLimiter | None = None
 
     def home(self, request: Request) -> Response:
         """Show where to drop recordings, and all jobs."""
@@ -77,18 +100,25 @@ class Addresses:
         name, given = request.path_params["id"], request.query_params.get("name", "")
         try:
             if given.lower().endswith(CARD_SUFFIX):
-                text = (await self._body(request, given, self._desk.limits.card)).decode("utf-8")
-                await run_in_threadpool(self._desk.give_card, name, text, given)
+                called = safe_name(given, self._desk.limits.name)
+                text = (await self._body(request, called, self._desk.limits.card)).decode("utf-8")
+                await self._looked(self._desk.give_card, name, text, called)
             else:
-                path, most = self._desk.place(name, given)
-                stated = request.headers.get("content-length", "")
-                size = await receive(request.stream(), whole(stated) or 0, path, most)
-                await run_in_threadpool(self._desk.received, name, path, size)
+                await self._recording(request, name, given)
         except UnicodeDecodeError:
-            return JSONResponse({"problem": f"{given} is not a card: it is not UTF-8 text."}, 400)
+            return JSONResponse({"problem": f"{called} is not a card: it is not UTF-8 text."}, 400)
         except CosimError as error:
             return JSONResponse({"problem": str(error)}, 400)
+        except OSError as error:
+            return JSONResponse({"problem": not_kept(error)}, NO_ROOM)
         return JSONResponse({}, 201)
+
+    async def _recording(self, request: Request, name: str, given: str) -> None:
+        """Take a recording; what a sender states of its size is reserved before it comes."""
+        stated = whole(request.headers.get("content-length", "")) or 0
+        with self._desk.arriving(name, given, stated) as arrival:
+            size = await receive(request.stream(), arrival, self._desk.grow)
+            await self._looked(self._desk.received, arrival, size)
 
     async def act(self, request: Request) -> Response:
         """Do what a form asks for, and lead to where it shows."""
@@ -99,27 +129,50 @@ class Addresses:
         try:
             body = await self._body(request, "The form", self._desk.limits.form)
             form = dict(parse_qsl(body.decode("utf-8", "replace")))
-            target = await run_in_threadpool(action, self._desk, name, form)
-        except (CosimError, KeyError) as error:
-            said = str(error) if isinstance(error, CosimError) else "This recording is not there any more."
-            return await run_in_threadpool(job_page, self._desk, self._desk.store.get(name), said, form)
-        return RedirectResponse(target, 303)
+            done = self._looked if action.__name__ in LOOKING else run_in_threadpool
+            return RedirectResponse(await done(action, self._desk, name, form), 303)
+        except UnreadableJobError:
+            raise
+        except CosimError as error:
+            said, status = str(error), 400
+        except KeyError:
+            said, status = "This recording is not there any more.", 400
+        except OSError as error:
+            said, status = not_kept(error), NO_ROOM
+        return await run_in_threadpool(self._again, name, said, form, status)
+
+    def _again(self, name: str, said: str, form: Form, status: int) -> Response:
+        """Show a job with why a form was refused."""
+        return job_page(self._desk, self._desk.store.get(name), said, form, status)
 
     def result(self, request: Request) -> Response:
         """Give a file that the diagnosis wrote: the report as a page, others to be kept."""
-        folder, name = self._desk.store.result(request.path_params["id"]), request.path_params["name"]
-        there = {one.name: one for one in folder.iterdir()} if folder.is_dir() else {}
-        if name not in there:
+        name = request.path_params["name"]
+        path = plain_files(self._desk.store.result(request.path_params["id"])).get(name)
+        if path is None:
             raise UnknownJobError(name)
         if name == REPORT:
-            return FileResponse(there[name], headers={"content-security-policy": REPORT_POLICY})
-        return FileResponse(there[name], filename=name, media_type="application/octet-stream")
+            return FileResponse(path, headers={"content-security-policy": REPORT_POLICY})
+        return FileResponse(path, filename=name, media_type="application/octet-stream")
+
+    def refused(self, request: Request, error: Exception) -> Response:
+        """Say on the first page what the system refused."""
+        assert isinstance(error, OSError)
+        try:
+            return home_page(self._desk, not_kept(error), NO_ROOM)
+        except OSError:  # the folder of the jobs cannot be read either
+            return PlainTextResponse(not_kept(error), NO_ROOM)
 
     def asset(self, request: Request) -> Response:
         """Give the style sheet or the script."""
         name = Path(request.url.path).name
         text = (files("cosim.serve") / "pages" / name).read_text("utf-8")
         return Response(text, media_type=ASSETS[name])
+
+    async def _looked(self, work: Callable[P, T], *given: P.args, **named: P.kwargs) -> T:
+        """Do what looks at files, which may take long, in one of a few threads: those that draw pages stay free."""
+        self._threads = self._threads or CapacityLimiter(THREADS)
+        return await to_thread.run_sync(partial(work, *given, **named), limiter=self._threads)
 
     async def _body(self, request: Request, what: str, most: int) -> bytes:
         """Return a small body (InputError: it is none)."""
@@ -134,6 +187,11 @@ def _unknown(request: Request, error: Exception) -> Response:
     return PlainTextResponse("There is no such diagnosis, or it has no such file.", 404)
 
 
+def _unreadable(request: Request, error: Exception) -> Response:
+    assert isinstance(error, UnreadableJobError)
+    return unreadable_page(error, 200 if request.method in SAFE else 400)
+
+
 def _failed(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
     return PlainTextResponse(error.detail, error.status_code, headers=error.headers)
@@ -141,3 +199,13 @@ def _failed(request: Request, error: Exception) -> Response:
 
 def _left(request: Request, error: Exception) -> Response:
     return PlainTextResponse("The upload was broken off.", 400)
+
+
+def _broken(request: Request, error: Exception) -> Response:
+    return PlainTextResponse("This failed, by a defect of cosim; the terminal of cosim serve says where.", 500)
+
+
+def not_kept(error: OSError) -> str:
+    """Say that the system refused to keep something, without the name of a file that the user has never seen."""
+    text = f"This could not be kept: {surroundings(OSError(error.errno, error.strerror or str(error)))}"
+    return f"{text} Nothing was changed; {ADVICE}." if error.errno in FULL else text

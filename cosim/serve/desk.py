@@ -1,35 +1,35 @@
-"""What can be done with jobs: files dropped, seen and corrected, a card given, diagnosed, cancelled, removed."""
+"""What can be done with jobs: files dropped, seen and corrected, a card given, diagnosed, cancelled, removed.
 
-from collections.abc import Callable, Mapping
-from contextlib import suppress
+Looking at a file takes seconds, so nothing is locked meanwhile. What was seen is kept afterwards under the lock of the
+jobs, and only if the job can still be changed: what goes on at once does not mix, and no job changes that was started.
+"""
+
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import replace
-from hashlib import sha256
 from pathlib import Path
 
 from cosim.reading import LAYOUT
+from cosim.serve.arrivals import Arrival, Arrivals
+from cosim.serve.folder import read_plain
 from cosim.serve.job import ROLES, Job, Options, Role, Upload, role_of
 from cosim.serve.looks import shipped_card
 from cosim.serve.queue import Queue
 from cosim.serve.reader import Reader
-from cosim.serve.store import Store
-from cosim.serve.uploads import Limits, safe_name
+from cosim.serve.store import RECORDINGS, Store
+from cosim.serve.uploads import Limits
+from cosim.serve.views import CARD_VIEW, no_view, view_key
 from cosim.serve.work import diagnose_order
 from cosim.support.errors import InputError
-from cosim.support.files import replacing
 from cosim.support.plain import Parsed
 
 OURS = ("t", "tau", "q", "v", "q_d", "temperature")
 """Columns that can be corrected."""
-CARD_VIEW = "card"
-"""Key of the view of a card."""
-NOTHING_SEEN: Parsed = {
-    **{"problem": "", "refused": "", "said": ""},
-    **{"undecided": [], "columns": [], "names": [], "notes": []},
-    **{"facts": {}, "sources": {}, "options": {}},
-}
-"""What is told of a file or a card as long as it was not looked at."""
 LONGEST = 200
-"""Characters of an answer in a form."""
+"""Characters of an answer in a form, or of it in a message."""
+Seen = tuple[Upload, Parsed]
+"""A recording, and what it was seen to hold."""
 
 
 class Desk:
@@ -51,6 +51,8 @@ class Desk:
     ) -> None:
         self.limits, self.reader = limits or Limits(), reader or Reader()
         self.store = Store(home)
+        self.store.tidy()
+        self._arrivals = Arrivals(self.limits)
         self.queue = Queue(self.store, work)
 
     def close(self) -> None:
@@ -60,114 +62,156 @@ class Desk:
 
     def draft(self, name: str) -> Job:
         """Return a job that can be changed (InputError, UnknownJobError)."""
-        job = self.store.get(name)
-        if job.state != "draft":
-            raise InputError(f"This diagnosis is {job.state}; it cannot be changed now.", culprit=name)
-        return job
+        return _open(self.store.get(name))
 
-    def place(self, name: str, given: str) -> tuple[Path, int]:
-        """Return where a recording of this name goes, and how many bytes it may have (InputError)."""
-        job, file = self.draft(name), safe_name(given, self.limits.name)
-        if any(one.file == file for one in job.uploads):
-            raise InputError(f"There is a recording {file} already; remove it first, or rename this one.", culprit=file)
-        if len(job.uploads) >= self.limits.files:
-            raise InputError(f"A diagnosis takes at most {self.limits.files} recordings.", culprit=file)
-        left = self.limits.job - sum(one.size for one in job.uploads)
-        return self.store.recording(job, file), min(self.limits.file, left)
+    # Recordings
 
-    def received(self, name: str, path: Path, size: int) -> None:
-        """Add a recording that has been written, and look at it."""
-        one = Upload(name=path.name, size=size, role=role_of(path.name))
-        self.store.change(name, lambda job: replace(job, uploads=(*job.uploads, one)))
-        self.look(name, one.name)
+    @contextmanager
+    def arriving(self, name: str, given: str, stated: int) -> Iterator[Arrival]:
+        """Reserve a place for a recording of `stated` bytes (0: not stated) while the block lasts (InputError)."""
+        with self.store.lock:
+            arrival = self._arrivals.begin(self.draft(name), self.store.folder(name), given, stated)
+        try:
+            yield arrival
+        finally:
+            with self.store.lock:
+                self._arrivals.end(arrival)
+            shutil.rmtree(arrival.path.parent, ignore_errors=True)
 
-    def look(self, name: str, file: str) -> None:
-        """Look at a recording as it is to be read now."""
-        job = self.store.get(name)
-        one = job.upload(file)
-        columns = self.store.view(name, CARD_VIEW).get("columns", {}) | one.options.get("columns", {})
-        seen = self.reader.look(str(self.store.recording(job, file)), one.options | {"columns": columns})
-        self.store.put_view(name, view_key(file), seen)
-        if parts := seen.get("parts", {}):
-            self._spread(name, one, parts)
+    def grow(self, arrival: Arrival, size: int) -> None:
+        """Reserve more bytes for a recording on its way (InputError: there may be no more)."""
+        with self.store.lock:
+            self._arrivals.grow(self.draft(arrival.job), arrival, size)
 
-    def _spread(self, name: str, whole: Upload, parts: Mapping[str, float]) -> None:
-        """Put the recordings of a file of many in its place, left out until somebody says what each is for."""
-        job = self.store.get(name)
-        room = self.limits.files - len(job.uploads) + 1
-        if len(parts) > room:
-            text = f"{whole.name} holds {len(parts):,} recordings; here is room for {room}."
-            text += " cosim diagnose takes any of them."
-            self.store.put_view(name, view_key(whole.name), {"problem": text})
-            return
-        made = tuple(
-            replace(whole, name=f"{whole.name}:{which}", size=round(share * whole.size), role="out")
-            for which, share in parts.items()
-        )
-        others = [one for one in job.uploads if one.name != whole.name]
-        self.store.put(name, uploads=(*others, *made))
-        for one in made:
-            self.look(name, one.name)
+    def received(self, arrival: Arrival, size: int) -> None:
+        """Look at a recording that has come, and add it (InputError: its job was started meanwhile)."""
+        one = Upload(name=arrival.file, size=size, role=role_of(arrival.file))
+        seen = self._seen(arrival.path.parent, one, self._renamed(arrival.job))
+        with self.store.lock:
+            job = self.draft(arrival.job)
+            self._arrivals.end(arrival)
+            place = arrival.path.replace(self.store.recording(job, arrival.file))
+            try:
+                self._keep(replace(job, uploads=(*job.uploads, one)), {one.name: seen})
+            except BaseException:
+                place.unlink(missing_ok=True)
+                raise
 
     def correct(self, name: str, file: str, form: Mapping[str, str]) -> None:
         """Take what a form says of a recording: role; columns, units, layout of its file (InputError, KeyError)."""
-        self.draft(name).upload(file)
         options: Options = {"columns": {}, "units": {}, "layout": {}}
         for key, names in (("columns", OURS), ("units", OURS), ("layout", LAYOUT)):
             for ours in names:
                 value = form.get(f"{key}.{ours}", "").strip()[:LONGEST]
                 if value:
                     options[key][ours] = value
-        self.store.put_upload(name, file, role=_role(form.get("role", "train")))
+        self.set_role(name, file, form.get("role", "train"))
         self._read_so(name, file, options)
 
-    def _read_so(self, name: str, file: str, options: Options) -> None:
-        """Read a recording, and all others of its file, with these options."""
-        job = self.store.get(name)
-        for one in job.uploads:
-            if one.file == job.upload(file).file:
-                self.store.put_upload(name, one.name, options=options)
-                self.look(name, one.name)
+    def accept(self, name: str, file: str) -> None:
+        """Take the example with which an open question of a recording was answered to look at it (KeyError)."""
+        self.draft(name).upload(file)
+        self._read_so(name, file, self.store.view(name, view_key(file))["options"])
 
     def set_role(self, name: str, file: str, role: str) -> None:
         """Say what a recording is for (InputError, KeyError)."""
-        self.draft(name).upload(file)
-        self.store.put_upload(name, file, role=_role(role))
+        chosen = _role(role)
 
-    def accept(self, name: str, file: str) -> None:
-        """Take the example with which an open question of a recording was answered to look at it."""
-        self.draft(name).upload(file)
-        options = self.store.view(name, view_key(file)).get("options", {})
-        self._read_so(name, file, options)
+        def changed(job: Job) -> Job:
+            _open(job).upload(file)
+            return replace(job, uploads=tuple(replace(u, role=chosen) if u.name == file else u for u in job.uploads))
+
+        self.store.change(name, changed)
 
     def drop(self, name: str, file: str) -> None:
-        """Remove a recording from a draft."""
-        job = self.draft(name)
-        own = job.upload(file).file
-        kept = self.store.change(
-            name, lambda one: replace(one, uploads=tuple(u for u in one.uploads if u.name != file))
-        )
-        if not any(one.file == own for one in kept.uploads):
-            self.store.recording(job, own).unlink(missing_ok=True)
+        """Remove a recording from a draft (InputError, KeyError)."""
+        with self.store.lock:
+            job = self.draft(name)
+            own = job.upload(file).file
+            kept = self.store.keep(replace(job, uploads=tuple(one for one in job.uploads if one.name != file)))
+            if not any(one.file == own for one in kept.uploads):
+                self.store.recording(job, own).unlink(missing_ok=True)
+
+    def _read_so(self, name: str, file: str, options: Options) -> None:
+        """Read a recording, and all others of its file, with these options (InputError, KeyError)."""
+        job, renamed = self.draft(name), self._renamed(name)
+        folder, own = self.store.folder(name) / RECORDINGS, job.upload(file).file
+        found = {
+            one.name: self._seen(folder, replace(one, options=options), renamed)
+            for one in job.uploads
+            if one.file == own
+        }
+        with self.store.lock:
+            self.draft(name).upload(file)
+            self._keep(self.draft(name), found)
+
+    def _renamed(self, name: str) -> dict[str, str]:
+        """Columns that the card of a job renames."""
+        columns: dict[str, str] = self.card_view(self.store.get(name))["columns"]
+        return columns
+
+    def _seen(self, folder: Path, one: Upload, renamed: Mapping[str, str]) -> list[Seen]:
+        """Look at a recording; of a file of many at each, left out until somebody says what it is for."""
+        options: Options = one.options | {"columns": {**renamed, **one.options.get("columns", {})}}
+        seen = self.reader.look(str(folder / one.name), options)
+        parts: Mapping[str, float] = seen.get("parts", {})
+        if not parts or len(parts) > self.limits.files:
+            return [(one, seen)]
+        made = [
+            replace(one, name=f"{one.name}:{which}", size=round(share * one.size), role="out")
+            for which, share in parts.items()
+        ]
+        return [(part, self.reader.look(str(folder / part.name), options)) for part in made]
+
+    def _keep(
+        self, job: Job, found: Mapping[str, Sequence[Seen]], card_view: Parsed | None = None, card: str | None = None
+    ) -> None:
+        """Keep a job with recordings as they were seen, each by the name that it had before, and its card."""
+        uploads = list[Upload]()
+        views = {} if card_view is None else {CARD_VIEW: card_view}
+        room = self.limits.files - len(self._arrivals.of(job.id)) - len(job.uploads) + 1
+        for one in job.uploads:
+            fitting = _fitting(one, found.get(one.name, ()), room)
+            uploads += [new for new, _ in fitting] or [one]
+            views |= {view_key(new.name): seen for new, seen in fitting}
+        self.store.keep(replace(job, uploads=tuple(uploads)), views, card)
+
+    def views(self, job: Job) -> dict[str, Parsed]:
+        """Return what the recordings were seen to hold, by name."""
+        return {one.name: self.store.view(job.id, view_key(one.name)) for one in job.uploads}
+
+    # The card
 
     def give_card(self, name: str, text: str, called: str) -> None:
         """Take a card; one that is not good is kept too, with its problem."""
         job = self.draft(name)
         if len(text.encode("utf-8", "replace")) > self.limits.card:
             raise InputError(f"{called} is too large for a card: at most {self.limits.card:,} bytes.", culprit=called)
-        with replacing(self.store.card(job), True) as partial:
-            partial.write_text(text.replace("\r\n", "\n"), "utf-8")
         seen = self.reader.card(text, called)
-        before = self.store.view(name, CARD_VIEW).get("columns", {})
-        self.store.put_view(name, CARD_VIEW, seen)
-        self.store.put(name, card=called, machine=seen.get("facts", {}).get("machine", ""))
-        if seen.get("columns", {}) != before:
-            for one in job.uploads:
-                self.look(name, one.name)
+        renamed: Mapping[str, str] = seen.get("columns", {})
+        found = dict[str, list[Seen]]()
+        if renamed != self._renamed(name):
+            folder = self.store.folder(name) / RECORDINGS
+            found = {one.name: self._seen(folder, one, renamed) for one in job.uploads}
+        with self.store.lock:
+            job = replace(self.draft(name), card=called, machine=seen.get("facts", {}).get("machine", ""))
+            self._keep(job, found, seen, text.replace("\r\n", "\n"))
 
     def give_shipped(self, name: str, card: str) -> None:
         """Take a card that comes with the package (InputError)."""
         self.give_card(name, shipped_card(card), f"{card}.toml")
+
+    def card_text(self, job: Job) -> str:
+        """Return the text of the card."""
+        with suppress(OSError, ValueError):
+            return read_plain(self.store.card(job), self.limits.card).decode("utf-8")
+        return ""
+
+    def card_view(self, job: Job) -> Parsed:
+        """Return what the card says."""
+        return self.store.view(job.id, CARD_VIEW) if job.card else no_view(CARD_VIEW)
+
+    # The diagnosis
 
     def lacking(self, job: Job) -> list[str]:
         """Say what is missing before a job can be diagnosed."""
@@ -177,59 +221,68 @@ class Desk:
                 told.append(f"Choose at least one recording {what}.")
         for one in job.uploads:
             seen = self.store.view(job.id, view_key(one.name))
-            if one.role != "out" and (seen.get("problem") or seen.get("refused")):
+            if one.role != "out" and (seen["problem"] or seen["refused"]):
                 told.append(f"{one.name} cannot be used as it is read now; correct it, or leave it out.")
-            elif one.role != "out" and seen.get("undecided"):
+            elif one.role != "out" and seen["undecided"]:
                 told.append(f"{one.name} can be read in more than one way; answer its question.")
         if not job.card:
             told.append("Give a model card.")
-        elif self.store.view(job.id, CARD_VIEW).get("problem"):
+        elif self.card_view(job)["problem"]:
             told.append("Correct the model card.")
         return told
 
-    def start(self, name: str) -> list[str]:
-        """Diagnose, or say what is missing."""
-        job = self.draft(name)
-        missing = self.lacking(job)
-        if not missing:
-            self.queue.submit(name)
-        return missing
+    def start(self, name: str) -> None:
+        """Diagnose; what is still on its way is not taken any more (InputError: something is missing)."""
+
+        def checked(job: Job) -> Job:
+            if missing := self.lacking(_open(job)):
+                raise InputError(" ".join(missing), culprit=name)
+            return job
+
+        self.queue.submit(name, checked)
+        self._give_up(name, "The diagnosis was started before this file had come: it is not part of it.")
 
     def again(self, name: str) -> Job:
         """Return a draft like this job: itself if nothing was found, else a copy."""
+
+        def opened(job: Job) -> Job:
+            is_open = job.live or job.state in ("draft", "done")
+            return job if is_open else replace(job, state="draft", problem="")
+
         job = self.store.get(name)
-        if job.live or job.state == "draft":
-            return job
-        return self.store.copy(job) if job.state == "done" else self.store.put(name, state="draft", problem="")
+        return self.store.copy(job) if job.state == "done" else self.store.change(name, opened)
 
     def remove(self, name: str) -> None:
         """Remove a job, its files and its process (UnknownJobError)."""
-        self.store.get(name)
+        self.store.folder(name)
         self.queue.cancel(name)
+        self._give_up(name, "The diagnosis was removed before this file had come.")
         self.store.remove(name)
 
-    def card_text(self, job: Job) -> str:
-        """Return the text of the card."""
-        with suppress(OSError, UnicodeDecodeError):
-            return self.store.card(job).read_text("utf-8")
-        return ""
-
-    def views(self, job: Job) -> dict[str, Parsed]:
-        """Return what the recordings were seen to hold, by name."""
-        return {one.name: NOTHING_SEEN | self.store.view(job.id, view_key(one.name)) for one in job.uploads}
-
-    def card_view(self, job: Job) -> Parsed:
-        """Return what the card says."""
-        return NOTHING_SEEN | (self.store.view(job.id, CARD_VIEW) if job.card else {})
+    def _give_up(self, name: str, reason: str) -> None:
+        with self.store.lock:
+            self._arrivals.refuse(name, reason)
 
 
-def view_key(file: str) -> str:
-    """Return the name under which the view of a file is kept."""
-    return sha256(file.encode()).hexdigest()[:16]
+def _open(job: Job) -> Job:
+    """Return a job that can be changed (InputError: it cannot)."""
+    if job.state != "draft":
+        raise InputError(f"This diagnosis is {job.state}; it cannot be changed now.", culprit=job.id)
+    return job
+
+
+def _fitting(one: Upload, seen: Sequence[Seen], room: int) -> Sequence[Seen]:
+    """What comes in the place of a recording: itself as it was read, or all of its file, if there is room."""
+    number = max(len(seen), *(len(view.get("parts", {})) for _, view in seen), 0)
+    if number > room:
+        text = f"{one.name} holds {number:,} recordings; here is room for {room}. cosim diagnose takes any of them."
+        return [(one, {"problem": text})]
+    return [(replace(one, options=new.options) if new.name == one.name else new, view) for new, view in seen]
 
 
 def _role(text: str) -> Role:
     found = next((one for one in ROLES if one == text), None)
     if found is None:
-        raise InputError(f'"{text}" is nothing that a recording is for: {", ".join(ROLES)}.', culprit=text)
+        given = f"{text[:LONGEST]}..." if len(text) > LONGEST else text
+        raise InputError(f'"{given}" is nothing that a recording is for: {", ".join(ROLES)}.', culprit=given)
     return found

@@ -13,7 +13,7 @@ from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import PlainTextResponse, RedirectResponse
+from starlette.responses import HTMLResponse, PlainTextResponse, RedirectResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 POLICY = (
@@ -37,6 +37,10 @@ HEADERS = {
 }
 REMEMBERED = 30 * 86_400
 """Seconds that a browser keeps the cookie, also when it is killed; the token itself ends with the server."""
+ENTRANCE = (
+    '<!doctype html><html lang="en"><head><meta charset="utf-8"><meta http-equiv="refresh" content="0; url=/">'
+    '<title>cosim</title></head><body><p><a href="/">To the page</a></p></body></html>'
+)
 SAFE = ("GET", "HEAD")
 
 
@@ -72,7 +76,7 @@ class Guard:
             return PlainTextResponse("This page answers to 127.0.0.1 alone.", 421)
         given = parse_qs(scope["query_string"].decode("latin-1")).get("token", [""])[0]
         if scope["path"] == "/" and self._is_token(given):
-            return self._welcome()
+            return self._welcome(headers.get("sec-fetch-site", "none"))
         if not self._is_token(self._remembered(headers)):
             text = "This page needs its token: open the address that cosim serve printed in the terminal."
             return PlainTextResponse(text, 403)
@@ -87,9 +91,15 @@ class Guard:
             return PlainTextResponse("This request comes from another page.", 403)
         return None
 
-    def _welcome(self) -> ASGIApp:
-        """Turn the token into a cookie and take it out of the address."""
-        answer = RedirectResponse("/", 303)
+    def _welcome(self, site: str) -> ASGIApp:
+        """Turn the token into a cookie and take it out of the address.
+
+        Who comes from elsewhere, as from the file that the browser was opened with, is led on by a page of ours: a
+        browser does not give the cookie to what is led on from there.
+        """
+        answer: Response = RedirectResponse("/", 303)
+        if site in ("cross-site", "same-site"):
+            answer = HTMLResponse(ENTRANCE)
         answer.set_cookie(self._cookie, self._token, max_age=REMEMBERED, httponly=True, samesite="strict")
         return answer
 

@@ -4,23 +4,25 @@ A job that is cancelled leaves no process and no result. What was running when t
 waited goes on when the next one begins.
 """
 
-import shutil
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from threading import Condition, Thread
 from typing import Any
 
-from cosim.serve.job import Job
-from cosim.serve.store import Store, UnknownJobError
+from cosim.serve.job import Answer, Job, State, answer_of
+from cosim.serve.store import Store, UnknownJobError, UnreadableJobError
 from cosim.serve.work import job_order
 from cosim.support.cell import Cell, LostError
 from cosim.support.errors import CosimError
 from cosim.support.plain import Parsed
+from cosim.support.system_errors import surroundings
 
 KEPT = 200
 """Steps of a diagnosis that are remembered; one has some tens."""
+LONGEST = 2000
+"""Characters of the reason for which a diagnosis failed."""
 
 
 @dataclass
@@ -29,7 +31,7 @@ class Progress:
 
     id: str = ""
     steps: list[str] = field(default_factory=list)
-    answer: Parsed = field(default_factory=dict)
+    answer: Answer | None = None
 
 
 class Queue:
@@ -50,10 +52,14 @@ class Queue:
         self._thread = Thread(target=self._work, name="queue", daemon=True)
         self._thread.start()
 
-    def submit(self, name: str) -> None:
-        """Put a job at the end of the queue."""
+    def submit(self, name: str, checked: Callable[[Job], Job] = lambda job: job) -> None:
+        """Put a job at the end of the queue; `checked` refuses one that is not to be diagnosed."""
+
+        def queued(job: Job) -> Job:
+            return replace(checked(job), state="queued", problem="", answer=Answer(), seconds=0.0)
+
         with self._changed:
-            self._store.put(name, state="queued", problem="", answer={}, seconds=0.0)
+            self._store.change(name, queued)
             self._waiting.append(name)
             self._changed.notify_all()
 
@@ -62,10 +68,12 @@ class Queue:
         with self._changed:
             if name in self._waiting:
                 self._waiting.remove(name)
-                self._store.put(name, state="cancelled")
             elif self.progress.id == name:
                 self._cancelled = True
                 self._changed.wait_for(lambda: self.progress.id != name)
+            with suppress(UnreadableJobError):
+                if self._store.get(name).live:
+                    self._store.settle(name, state="cancelled")
 
     def before(self, name: str) -> int:
         """Return how many jobs come before this one."""
@@ -90,8 +98,8 @@ class Queue:
             if job.state == "queued":
                 self._waiting.append(job.id)
             elif job.state == "running":
-                shutil.rmtree(self._store.result(job.id), ignore_errors=True)
-                self._store.put(job.id, state="interrupted")
+                self._store.clear_result(job.id)
+                self._store.settle(job.id, state="interrupted")
 
     def _work(self) -> None:
         while True:
@@ -100,41 +108,37 @@ class Queue:
                 if self._closed:
                     return
                 self.progress, self._cancelled = Progress(self._waiting.pop(0)), False
-            with suppress(UnknownJobError):  # it was removed
+            with suppress(UnknownJobError, UnreadableJobError):  # it was removed, or damaged
                 self._run(self.progress.id)
             with self._changed:
                 self.progress = Progress()
                 self._changed.notify_all()
 
     def _run(self, name: str) -> None:
-        job = self._store.put(name, state="running", begun=time.time())
-        began, values = time.monotonic(), Parsed()
-        out = self._store.result(name)
-        shutil.rmtree(out, ignore_errors=True)
+        job = self._store.settle(name, state="running", begun=time.time())
+        began = time.monotonic()
+        self._store.clear_result(name)
         try:
-            values = {"state": "done", "answer": self._diagnosed(job)}
-        except LostError as error:
-            values = {"state": self._lost(), "problem": f"The diagnosis ended before its answer. {error}"}
-        except (CosimError, KeyboardInterrupt) as error:
-            values = {"state": self._lost(), "problem": str(error)}
-        except Exception as error:  # the disk is full, for example: the next job must have its turn
-            values = {"state": self._lost(), "problem": f"{type(error).__name__}: {error}"}
+            state, answer, problem = "done", self._diagnosed(job), ""
+        except Exception as error:  # a defect, for example: the next job must have its turn
+            state, answer, problem = self._lost(), Answer(), _told_of(error)
+        except KeyboardInterrupt as error:
+            state, answer, problem = self._lost(), Answer(), str(error)
         finally:
             self._cell.close()
-        if values["state"] != "done":
-            shutil.rmtree(out, ignore_errors=True)
-        values |= {"problem": ""} if values["state"] in ("cancelled", "interrupted") else {}
-        self._store.put(name, seconds=time.monotonic() - began, **values)
+        if state != "done":
+            self._store.clear_result(name)
+        problem = "" if state in ("cancelled", "interrupted") else problem[:LONGEST]
+        self._store.settle(name, seconds=time.monotonic() - began, state=state, answer=answer, problem=problem)
 
-    def _diagnosed(self, job: Job) -> Parsed:
+    def _diagnosed(self, job: Job) -> Answer:
         recordings = self._store.folder(job.id) / "recordings"
         order = job_order(job, recordings, self._store.card(job), self._store.result(job.id))
-        answer: Parsed = self._cell.call(self._function, order, on_message=self._told, overdue=self._given_up)
-        return answer
+        return answer_of(self._cell.call(self._function, order, on_message=self._told, overdue=self._given_up))
 
     def _told(self, kind: str, content: Any) -> None:
         if kind == "answer":
-            self.progress.answer = content
+            self.progress.answer = answer_of(content)
         else:
             self.progress.steps = [*self.progress.steps, str(content)][-KEPT:]
 
@@ -142,5 +146,14 @@ class Queue:
         """Say why the process is ended."""
         return "it was cancelled" if self._cancelled else "the server ends" if self._closed else ""
 
-    def _lost(self) -> str:
+    def _lost(self) -> State:
         return "cancelled" if self._cancelled else "interrupted" if self._closed else "failed"
+
+
+def _told_of(error: Exception) -> str:
+    """Say why a diagnosis has failed."""
+    if isinstance(error, LostError):
+        return f"The diagnosis ended before its answer. {error}"
+    if isinstance(error, OSError | MemoryError):
+        return f"The diagnosis ended before its answer: {surroundings(error)}"
+    return str(error) if isinstance(error, CosimError) else f"{type(error).__name__}: {error}"

@@ -8,6 +8,7 @@ from cosim.serve import looks
 from cosim.serve.job import Options
 from cosim.support.cell import Cell, LostError
 from cosim.support.plain import Parsed
+from cosim.support.system_errors import surroundings
 
 LONGEST = 120.0
 """Seconds that looking at a file may take; 1 GB of text takes some 60 s."""
@@ -20,7 +21,7 @@ class Reader:
         self._cell, self._lock = Cell(), Lock()
 
     def look(self, path: str, options: Options) -> Parsed:
-        """Tell what a recording holds, or its problem."""
+        """Tell what a recording holds, or its problem (OSError: the system refuses to look)."""
         return self._call(looks.look, path, options)
 
     def card(self, text: str, name: str) -> Parsed:
@@ -47,3 +48,5 @@ class Reader:
                 return told
             except (LostError, KeyboardInterrupt) as error:
                 return {"problem": f"This file could not be read; the process that read it is gone. {error}"}
+            except MemoryError as error:
+                return {"problem": f"This file could not be read. {surroundings(error)}"}

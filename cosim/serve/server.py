@@ -2,14 +2,16 @@
 
 import secrets
 import socket
-import webbrowser
 from collections.abc import Callable
 from pathlib import Path
 
 import uvicorn
 
 from cosim.serve.app import make_app
+from cosim.serve.connection import MOST, Connection
 from cosim.serve.desk import Desk
+from cosim.serve.door import door
+from cosim.serve.folder import CLOSED
 from cosim.support.errors import InputError
 from cosim.support.lock import claimed
 
@@ -18,36 +20,48 @@ TOKEN = 24
 """Bytes of a token."""
 
 
-def serve(home: Path, port: int, ready: Callable[[str], None]) -> None:
+def serve(home: Path, port: int, ready: Callable[[str, Path | None], None]) -> None:
     """Answer until this process is asked to end.
 
     Args:
-        home: folder of the jobs; one server at a time works there.
+        home: folder of the jobs; one server at a time works there. One that is there keeps its mode; one that is made
+            is closed to others.
         port: where to listen; 0 for one that is free.
-        ready: told the address, with its token, once it is listened to.
+        ready: told the address, with its token, once it is listened to, and a file that leads there, if there is one.
 
     Raises:
         InputError: the port is taken, or may not be used.
         OutputError: another server works in this folder.
     """
+    is_new = not home.exists()
     with claimed(home, "cosim serve"), listening(port) as listener:
+        if is_new:
+            home.chmod(CLOSED)
         number = listener.getsockname()[1]
         token = secrets.token_urlsafe(TOKEN)
+        address = f"http://{HOST}:{number}/?token={token}"
         desk = Desk(home)
         try:
             desk.reader.warm()
-            ready(f"http://{HOST}:{number}/?token={token}")
-            config = uvicorn.Config(
-                make_app(desk, token, number),
-                log_level="warning",
-                access_log=False,
-                server_header=False,
-                timeout_graceful_shutdown=2,
-                ws="none",
-            )
-            uvicorn.Server(config).run([listener])
+            with door(home, address) as file:
+                ready(address, file)
+                uvicorn.Server(configured(desk, token, number)).run([listener])
         finally:
             desk.close()
+
+
+def configured(desk: Desk, token: str, port: int) -> uvicorn.Config:
+    """Return how uvicorn is run: a connection must get on, and what a client does wrong is not said in the terminal."""
+    return uvicorn.Config(
+        make_app(desk, token, port),
+        http=Connection,
+        backlog=MOST // 2,  # so many are taken in at once
+        log_level="error",
+        access_log=False,
+        server_header=False,
+        timeout_graceful_shutdown=2,
+        ws="none",
+    )
 
 
 def listening(port: int) -> socket.socket:
@@ -63,8 +77,3 @@ def listening(port: int) -> socket.socket:
         text = f"Port {port} cannot be listened to: {reason}. Leave out --port for one that is free."
         raise InputError(text, culprit="--port", value=port) from error
     return listener
-
-
-def show(address: str) -> None:
-    """Open an address in the user's browser, if there is one."""
-    webbrowser.open(address)

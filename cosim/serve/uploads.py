@@ -1,17 +1,19 @@
 """What is dropped: a name that is only a name, and no more bytes than there may be."""
 
 import re
-from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.support.errors import InputError
-from cosim.support.files import check_room, in_bytes, replacing
+from cosim.support.files import check_room, in_bytes
 
 CONTROL = re.compile(r"[\x00-\x1f\x7f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 """Characters that steer a terminal, or turn the direction of writing."""
 FORBIDDEN = re.compile(r'[<>:"|?*]')
 """Characters that some file system does not take."""
+
+ADVICE = "remove older diagnoses, or use a disk with more room"
+"""What is to be done where the disk is full."""
 
 
 @dataclass(frozen=True)
@@ -46,20 +48,9 @@ def safe_name(given: str, longest: int) -> str:
     return name if len(name) <= longest else stem[: max(1, longest - len(suffixes))] + suffixes[-longest + 1 :]
 
 
-async def receive(chunks: AsyncIterator[bytes], stated: int, path: Path, most: int) -> int:
-    """Write what comes into a file and return its size; one that is too large leaves nothing (InputError).
-
-    `stated` is the size that the sender promises, 0 if it does not.
-    """
-    check_size(path.name, stated, most)
-    check_room(path, stated, "remove older diagnoses, or use a disk with more room")
-    size = 0
-    with replacing(path) as partial, partial.open("wb") as file:
-        async for chunk in chunks:
-            size += len(chunk)
-            check_size(path.name, size, most)
-            file.write(chunk)
-    return size
+def check_disk(path: Path, size: int) -> None:
+    """Refuse a file that the disk has no room for (OutputError)."""
+    check_room(path, size, ADVICE)
 
 
 def check_size(name: str, size: int, most: int) -> None:

@@ -5,12 +5,15 @@ import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 
 from cosim.support.errors import OutputError
 
 _PARTIALS: set[Path] = set()
 """What this process may have half written."""
+_NUMBERS = count(1)
+"""No two files that grow have one name, also where threads write to one path."""
 
 
 def sha256(path: Path) -> str:
@@ -120,7 +123,7 @@ def replacing(path: Path, force: bool = False) -> Iterator[Path]:
 
 def partial_of(path: Path) -> Path:
     """Make the directory of a file to be written and return the path beside it under which it grows."""
-    partial = directory(path.parent) / f".{path.name}.{os.getpid()}.partial"
+    partial = directory(path.parent) / f".{path.name}.{next(_NUMBERS)}.{os.getpid()}.partial"
     _PARTIALS.add(partial)
     return partial
 

@@ -12,8 +12,10 @@ from starlette.responses import HTMLResponse, Response
 
 from cosim.reading import LAYOUT
 from cosim.serve.desk import OURS, Desk
+from cosim.serve.folder import plain_files
 from cosim.serve.form import FIELDS, FRICTIONS, MOTIONS
 from cosim.serve.job import Job
+from cosim.serve.store import UnreadableJobError
 from cosim.support.files import in_bytes
 from cosim.support.plain import Parsed
 
@@ -51,7 +53,6 @@ Fc = 2.5               # N m
 sigma2 = 30.0          # N m s/rad
 """
 """What a card that is to be written begins with."""
-NO_ANSWER: Parsed = {"heading": "", "findings": [], "check": [], "verdict": []}
 FILES = (
     ("report.html", "Report", "one page, alone"),
     ("card.toml", "Model card", "the better one"),
@@ -62,32 +63,47 @@ FILES = (
 """What a diagnosis writes, beside FMUs."""
 
 
-def home_page(desk: Desk, problem: str = "") -> Response:
+def home_page(desk: Desk, problem: str = "", status: int = 200) -> Response:
     """Show where to drop recordings, and what was diagnosed."""
-    return _page("home.html.j2", title="Diagnose an axis", problem=problem, jobs=history(desk), suffixes=SUFFIXES)
+    values = {"title": "Diagnose an axis", "problem": problem, "jobs": history(desk), "suffixes": SUFFIXES}
+    return _page("home.html.j2", status, **values)
 
 
-def job_page(desk: Desk, job: Job, problem: str = "", given: Mapping[str, str] | None = None) -> Response:
+def job_page(
+    desk: Desk, job: Job, problem: str = "", given: Mapping[str, str] | None = None, status: int = 200
+) -> Response:
     """Show a job as far as it is; `problem` is why something was refused, `given` the form that was."""
     values = _draft(desk, job) | {"given": defaultdict(str, given or {})} if job.state == "draft" else _begun(desk, job)
-    name = job.machine or (job.uploads[0].name if job.uploads else "New diagnosis")
     template = "draft.html.j2" if job.state == "draft" else "begun.html.j2"
-    return _page(template, status=400 if problem else 200, title=name, job=job, problem=problem, **values)
+    return _page(template, status, title=job.called, job=job, problem=problem, **values)
+
+
+def unreadable_page(error: UnreadableJobError, status: int) -> Response:
+    """Say why a job cannot be read, and offer to remove it."""
+    return _page("unreadable.html.j2", status, title="Unreadable diagnosis", id=error.id, problem=str(error))
 
 
 def history(desk: Desk) -> list[dict[str, str]]:
-    """Return what was diagnosed, one row a job, the newest first."""
-    return [
-        {
-            "id": job.id,
-            "when": job.made[:16].replace("T", " "),
-            "name": job.machine or (job.uploads[0].name if job.uploads else "New diagnosis"),
-            "files": f"{len(job.uploads)} recording{'' if len(job.uploads) == 1 else 's'}",
-            "state": STATES[job.state],
-            "told": job.answer.get("heading", "") if job.state == "done" else job.problem,
-        }
-        for job in desk.store.all()
-    ]
+    """Return what was diagnosed, one row a job, the newest first; of one that cannot be read why."""
+    return [_unreadable(one) if isinstance(one, UnreadableJobError) else _row(one) for one in desk.store.each()]
+
+
+def _row(job: Job) -> dict[str, str]:
+    return {
+        "id": job.id,
+        "when": f"{job.made[:16].replace('T', ' ')} UTC",
+        "name": job.called,
+        "files": f"{len(job.uploads)} recording{'' if len(job.uploads) == 1 else 's'}",
+        "state": STATES[job.state],
+        "told": job.answer.heading if job.state == "done" else job.problem,
+    }
+
+
+def _unreadable(error: UnreadableJobError) -> dict[str, str]:
+    day, clock = error.id.split("-")[:2]
+    when = f"{day[:4]}-{day[4:6]}-{day[6:]} {clock[:2]}:{clock[2:4]} UTC"
+    row = {"id": error.id, "when": when, "name": "Unreadable diagnosis", "files": "nothing of it is changed"}
+    return row | {"state": "not readable", "told": str(error)}
 
 
 def _draft(desk: Desk, job: Job) -> Parsed:
@@ -112,25 +128,24 @@ def _draft(desk: Desk, job: Job) -> Parsed:
 
 def _begun(desk: Desk, job: Job) -> Parsed:
     progress = desk.queue.progress
-    own = progress.id == job.id
+    own, results = progress.id == job.id, list(_results(desk, job))
     return {
         "live": job.live,
         "waiting": desk.queue.before(job.id) if job.state == "queued" else 0,
         "steps": progress.steps if own else [],
-        "answer": NO_ANSWER | ((progress.answer if own else {}) or job.answer),
-        "elapsed": round(time.time() - job.begun) if job.state == "running" else round(job.seconds),
-        "files": list(_results(desk, job)),
+        "answer": (own and progress.answer) or job.answer,
+        "elapsed": round(max(time.time() - job.begun, 0.0) if job.state == "running" else job.seconds),
+        "files": results,
+        "has_report": any(one["name"] == FILES[0][0] for one in results),
         "state": STATES[job.state],
     }
 
 
 def _results(desk: Desk, job: Job) -> Iterator[dict[str, str]]:
     """Yield the files of a result that can be downloaded, the improved FMUs among them."""
-    folder = desk.store.result(job.id)
-    if job.state != "done" or not folder.is_dir():
-        return
+    there = plain_files(desk.store.result(job.id)).values() if job.state == "done" else ()
     told = {name: (title, text) for name, title, text in FILES}
-    for path in sorted(folder.iterdir(), key=lambda one: ([*told, one.name].index(one.name), one.name)):
+    for path in sorted(there, key=lambda one: ([*told, one.name].index(one.name), one.name)):
         kind = "FMI 2" if "fmi2" in path.stem else "FMI 3"
         title, text = told.get(
             path.name, (f"FMU, {kind}", "the better model as an FMU") if path.suffix == ".fmu" else ("", "")
