@@ -29,10 +29,10 @@ def serve(
     home = data or user_data_path("mount-cosim") / "serve"
 
     def ready(address: str, file: Path | None) -> None:
-        put(address)
-        say("This address holds the key to the page: keep it to yourself. Ctrl-C ends it.")
         if others := open_to(home):
             say(f"{home} can be entered by {others}, and stays so; each diagnosis in it is closed to them.")
+        put(address)
+        say("This address holds the key to the page: keep it to yourself. Ctrl-C ends it.")
         if browser and file is not None:
             show(file)
 

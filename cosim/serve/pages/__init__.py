@@ -102,7 +102,7 @@ def _row(job: Job) -> dict[str, str]:
 def _unreadable(error: UnreadableJobError) -> dict[str, str]:
     day, clock = error.id.split("-")[:2]
     when = f"{day[:4]}-{day[4:6]}-{day[6:]} {clock[:2]}:{clock[2:4]} UTC"
-    row = {"id": error.id, "when": when, "name": "Unreadable diagnosis", "files": "nothing of it is changed"}
+    row = {"id": error.id, "when": when, "name": "Unreadable diagnosis", "files": "its files are as they were"}
     return row | {"state": "not readable", "told": str(error)}
 
 
