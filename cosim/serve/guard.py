@@ -39,7 +39,8 @@ REMEMBERED = 30 * 86_400
 """Seconds that a browser keeps the cookie, also when it is killed; the token itself ends with the server."""
 ENTRANCE = (
     '<!doctype html><html lang="en"><head><meta charset="utf-8"><meta http-equiv="refresh" content="0; url=/">'
-    '<link rel="icon" href="/icon.svg" type="image/svg+xml"><title>cosim</title></head><body><p><a href="/">To the page</a></p></body></html>'
+    '<link rel="icon" href="/icon.svg" type="image/svg+xml"><title>cosim</title></head>'
+    '<body><p><a href="/">To the page</a></p></body></html>'
 )
 SAFE = ("GET", "HEAD")
 
