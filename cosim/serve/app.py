@@ -11,15 +11,16 @@
 Answers to forms are pages, so everything but the upload works without the script.
 """
 
+import asyncio
 import errno
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 from urllib.parse import parse_qsl
 
-from anyio import CapacityLimiter, to_thread
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
@@ -81,7 +82,7 @@ class Addresses:
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
-        self._threads: CapacityLimiter | None = None
+        self._threads = ThreadPoolExecutor(THREADS, "looks")
 
     def home(self, request: Request) -> Response:
         """Show where to drop recordings, and all jobs."""
@@ -171,8 +172,7 @@ class Addresses:
 
     async def _looked(self, work: Callable[P, T], *given: P.args, **named: P.kwargs) -> T:
         """Do what looks at files, which may take long, in one of a few threads: those that draw pages stay free."""
-        self._threads = self._threads or CapacityLimiter(THREADS)
-        return await to_thread.run_sync(partial(work, *given, **named), limiter=self._threads)
+        return await asyncio.get_running_loop().run_in_executor(self._threads, partial(work, *given, **named))
 
     async def _body(self, request: Request, what: str, most: int) -> bytes:
         """Return a small body (InputError: it is none)."""

@@ -7,7 +7,6 @@ nothing, or a request that never ends, keep the page from everybody else.
 import asyncio
 from typing import Any
 
-import h11
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 HEAD = 10.0
@@ -76,7 +75,7 @@ class Connection(H11Protocol):
         """End the connection if it is over a time limit."""
         waited = self.loop.time() - self._since
         is_late = waited > STALLED
-        if self.conn.their_state is h11.SEND_BODY and not self.flow.read_paused:
+        if self.cycle is not None and self.cycle.more_body and not self.flow.read_paused:
             is_over = is_late and self._came < LEAST
         elif self.flow.write_paused:
             is_over = is_late

@@ -18,7 +18,7 @@ class Reader:
     """Looks at files in a process of its own, which stays for the next one."""
 
     def __init__(self) -> None:
-        self._cell, self._lock = Cell(), Lock()
+        self._cell, self._lock, self._closed = Cell(), Lock(), False
 
     def look(self, path: str, options: Options) -> Parsed:
         """Tell what a recording holds, or its problem (OSError: the system refuses to look)."""
@@ -38,11 +38,14 @@ class Reader:
         return self._cell.pid
 
     def close(self) -> None:
-        """End the process."""
+        """End the process; nothing is looked at any more."""
+        self._closed = True
         self._cell.close()
 
     def _call(self, function: Callable[..., Parsed], *arguments: Any) -> dict[str, Any]:
         with self._lock:
+            if self._closed:
+                return {"problem": "This file was not looked at: the server has ended."}
             try:
                 told: Parsed = self._cell.call(function, *arguments, timeout=LONGEST)
                 return told
