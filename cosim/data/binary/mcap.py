@@ -21,5 +21,11 @@ def read(path: Path) -> Columns:
 def _messages(path: Path, reader: Any, decoder: Any) -> Iterator[tuple[str, str, int, Any]]:
     with path.open("rb") as file:
         opened = reader.make_reader(file, decoder_factories=[decoder.DecoderFactory()])
+        publishers: dict[str, list[int]] = {}
         for schema, channel, message, decoded in opened.iter_decoded_messages():
-            yield channel.topic, schema.name if schema else "", message.log_time, decoded
+            known = publishers.setdefault(channel.topic, [channel.id])
+            if channel.id not in known:
+                known.append(channel.id)
+            number = known.index(channel.id) + 1
+            topic = f"{channel.topic} (#{number})" if number > 1 else channel.topic
+            yield topic, schema.name if schema else "", message.log_time, decoded

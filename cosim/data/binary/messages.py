@@ -1,13 +1,18 @@
-"""Messages of ROS as columns: the topic that tells of an axis, one row a message.
+"""Messages of ROS as columns: each topic that is read has its own times.
 
 A `sensor_msgs/msg/JointState` gives `joint.position`, `joint.velocity` and `joint.effort` of every joint; of any other
-message every number becomes a column, named by its path in the message. Time is the stamp in the header, or else when
-the message was logged.
+message every number becomes a column, named by its path in the message. The topic that tells of an axis is read: joint
+states first, else the one with most numbers. Where it has no torque or no motion the other topics are read too, their
+columns named after them: `/torque_command.data`. Publishers of one topic are told apart by the joints they name, by the
+frame in their header, or by their number.
+
+Time is the stamp in the header, and 0 is a stamp where time counts from 0; without a stamp it is when the message was
+logged.
 Source: common_interfaces, sensor_msgs/msg/JointState: position in rad or m, velocity in rad/s or m/s, effort
 in N.m or N.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,18 +21,26 @@ import numpy as np
 
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, check_columns, check_time, listed
+from cosim.data.roles import guess
 
 JOINTS = ("position", "velocity", "effort")
 NANO = 1e-9
+WIDE, LEAST = 100, 2
+"""Numbers of a message, beyond which it is an image or a cloud and no signal beside others; and messages of a topic."""
+DATES = 10**18
+"""Stamps [ns] from which on they are dates (2001): among them 0 says that none was set."""
+APART = 60 * 10**9
+"""Stamps that are so far [ns] from the time of the log are of another clock: a simulation's."""
 
 
 @dataclass
 class Topic:
-    """Messages of one topic so far: times in ns, and one row of numbers each."""
+    """Messages of one publisher of a topic: stamps, -1 for none, and times of the log in ns, and one row of numbers."""
 
     name: str
     kind: str
-    times: list[int] = field(default_factory=list)
+    stamps: list[int] = field(default_factory=list)
+    logged: list[int] = field(default_factory=list)
     rows: list[dict[str, float]] = field(default_factory=list)
 
     @property
@@ -35,38 +48,75 @@ class Topic:
         """Rank among topics: joint states first, then the one with most numbers."""
         return self.kind.endswith("JointState"), sum(map(len, self.rows[:1])) * len(self.rows)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Its columns."""
+        return tuple(dict.fromkeys(name for row in self.rows for name in row))
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it tells of torque and of motion."""
+        return all(any(guess(role, self.names, {}).among for role in roles) for roles in (("tau",), ("q", "v")))
+
+    def times(self) -> np.ndarray:
+        """Times of its messages in ns, shape (rows,)."""
+        stamps, logged = np.array(self.stamps, dtype=np.int64), np.array(self.logged, dtype=np.int64)
+        unset = (stamps < 0) | ((stamps == 0) & ((stamps <= 0).all() or stamps[stamps > 0].min() >= DATES))
+        return np.where(unset, logged, stamps)
+
 
 def columns_of(path: Path, messages: Iterable[tuple[str, str, int, Any]], release: str = "ROS 2") -> Columns:
     """Make columns of messages, each (topic, type, time it was logged in ns, decoded message); `release` wrote them."""
-    topics: dict[str, Topic] = {}
+    topics: dict[tuple[str, str], Topic] = {}
     for name, kind, logged, message in messages:
-        topic = topics.setdefault(name, Topic(name, kind))
-        topic.times.append(_stamp(message) or logged)
+        header = getattr(message, "header", None)
+        frame = str(getattr(header, "frame_id", ""))
+        if (name, frame) not in topics:
+            again = any(other == name for other, _ in topics)
+            topics[name, frame] = Topic(f"{name} ({frame})" if again else name, kind)
+        topic = topics[name, frame]
+        topic.stamps.append(_stamp(header))
+        topic.logged.append(logged)
         topic.rows.append(dict(_numbers(message, kind)))
         check_cells(path, len(topic.rows), len(topic.rows[-1]) + 1)
         check_time(path)
     chosen = max(topics.values(), key=lambda topic: topic.tells_an_axis, default=None)
     if chosen is None or not any(chosen.rows):
         return Columns({})
-    others = tuple(sorted(set(topics) - {chosen.name}))
-    notes = (f"{path.stem}: of its topics {chosen.name} was read; left out: {listed(others)}.",) if others else ()
-    return _table(path, chosen, notes, release)
+    others = [one for one in topics.values() if one is not chosen]
+    beside = [one for one in others if len(one.rows) >= LEAST and 0 < len(one.names) <= WIDE]
+    return _joined(path, [chosen, *(() if chosen.is_whole else beside)], others, release)
 
 
-def _table(path: Path, topic: Topic, notes: tuple[str, ...], release: str) -> Columns:
-    names = dict.fromkeys(name for row in topic.rows for name in row)
-    check_columns(path, len(names))
-    times = np.array(topic.times, dtype=np.int64)
-    table = {"t": (times - times[0]) * NANO}
-    table |= {name: np.array([row.get(name, np.nan) for row in topic.rows]) for name in names}
-    start = str(np.datetime64(int(times[0]) // 1_000_000, "ms")) if times[0] > 10**18 else ""
-    return Columns(table, {"t": "s"}, format=f"{release} {topic.kind.split('/')[-1]}", start=start, notes=notes)
+def _joined(path: Path, topics: Sequence[Topic], others: Sequence[Topic], release: str) -> Columns:
+    """Columns of topics, the first of which is the one that tells of an axis."""
+    check_columns(path, sum(len(one.names) for one in topics))
+    times = [one.times() for one in topics]
+    if any(abs(int(t[0]) - one.logged[0]) > APART for t, one in zip(times, topics, strict=True)) and len(topics) > 1:
+        own = [bool((t == one.logged).all()) for t, one in zip(times, topics, strict=True)]
+        times = [np.array(one.logged, dtype=np.int64) for one in topics] if any(own) else times
+    first = min(int(one[0]) for one in times)
+    values: dict[str, np.ndarray] = {}
+    clocks: dict[str, np.ndarray] = {}
+    for topic, stamps in zip(topics, times, strict=True):
+        clock = (stamps - first) * NANO
+        for name in topic.names:
+            told = np.array([name in row for row in topic.rows])
+            whole = name if topic is topics[0] else f"{topic.name}.{name}"
+            values[whole] = np.array([row[name] for row in topic.rows if name in row])
+            clocks[whole] = clock if told.all() else clock[told]
+    left = tuple(sorted(one.name for one in others if one not in topics))
+    read = " and ".join(one.name for one in topics)
+    notes = (f"{path.stem}: of its topics {read} was read; left out: {listed(left)}.",) if left else ()
+    start = str(np.datetime64(first // 1_000_000, "ms")) if first > DATES else ""
+    kind = topics[0].kind.split("/")[-1]
+    return Columns(values, format=f"{release} {kind}", start=start, notes=notes, clocks=clocks)
 
 
-def _stamp(message: Any) -> int:
-    """Return the stamp of a message in ns, 0 where it has none."""
-    stamp = getattr(getattr(message, "header", None), "stamp", None)
-    return int(stamp.sec) * 10**9 + int(stamp.nanosec) if stamp is not None else 0
+def _stamp(header: Any) -> int:
+    """Return the stamp of a header in ns, -1 where there is none."""
+    stamp = getattr(header, "stamp", None)
+    return int(stamp.sec) * 10**9 + int(stamp.nanosec) if stamp is not None else -1
 
 
 def _numbers(message: Any, kind: str) -> Iterator[tuple[str, float]]:
