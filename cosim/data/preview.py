@@ -12,6 +12,7 @@ from cosim.data.one_run import rows_of_one
 from cosim.data.questions import PERIOD
 from cosim.data.recording import REQUIRED, Recording
 from cosim.data.runs import named, split
+from cosim.data.speeds import with_speed
 from cosim.support.errors import ManyRecordingsError, RecordingError, UndecidedError
 from cosim.support.files import sha256
 
@@ -85,4 +86,5 @@ def _judged(path: Path, own: str, found: Columns, said: Options, undecided: tupl
         timed = rows_of_one(path, found, said["columns"], said["units"], said["layout"], required)
         recording = Recording.judged(path, name, timed, own, said["columns"], said["units"], required)
     served = assign(path, timed, said["columns"], said["units"], required)
+    served = with_speed(path, timed, served, said["units"]) if required else served
     return Preview(recording, timed, served.sources, said, undecided, refused)

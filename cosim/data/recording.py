@@ -23,6 +23,7 @@ from cosim.data.one_run import rows_of_one, timed
 from cosim.data.questions import PERIOD
 from cosim.data.registers import at_an_end, continued
 from cosim.data.runs import named, split
+from cosim.data.speeds import with_speed
 from cosim.data.times import read_clock
 from cosim.support.errors import OutputError
 from cosim.support.files import replacing, sha256
@@ -127,6 +128,7 @@ class Recording:
     ) -> "Recording":
         """Judge columns that were read, as `read` does; `path` is what messages call them, `sha256` their hash."""
         served = assign(path, found, columns, units, required)
+        served = with_speed(path, found, served, units) if required else served
         values, stated = served.values, served.units
         stated |= {"q_d": stated["q"]} if "q" in stated and "q_d" in values and "q_d" not in stated else {}
         check_names(path, values, required, stated)

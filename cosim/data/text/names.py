@@ -43,6 +43,8 @@ def split_unit(header: str) -> tuple[str, str]:
     What stands in square brackets is always a unit, unless it is a number (`effort[0]`); elsewhere only what is one.
     """
     header = header.strip()
+    if "/" in header and is_unit(header):
+        return header, spelled(header)
     if (alone := ALONE.fullmatch(header)) and is_unit(alone[1] or alone[2]):
         text = spelled(alone[1] or alone[2])
         return ("time" if text in SECONDS else header), text
