@@ -34,6 +34,8 @@ NEAR = 0.025
 """Relative error within which k is a ratio of units: rev/s and a sixth, which is degrees beside rpm, differ by 5 %."""
 REPEATS = 0.98
 """Share of a torque or current that the torque explains where it is the torque again, as a diagnosis takes it."""
+KEPT = "_original"
+"""End of the name of a column whose own name was given to another: it is kept, as was promised."""
 POSITIONS = {"rad": ("deg", "rev", "mrad", "0.001 deg", "arcsec", "arcmin", "urad"), "m": ("mm", "um")}
 """Units in which positions are recorded, by what they become."""
 SPEEDS = {
@@ -80,7 +82,8 @@ def with_speed(path: Path, found: Columns, served: Assigned, given: Mapping[str,
         best = max(speeds, key=lambda one: _rank(found, one), default=None)
         served = _chosen(path, found, served, given, best) if best else served
     again = tuple(one.name for one in speeds if one.name in served.values and one.name != "v")
-    again += tuple(name for name in served.values if name not in (*OURS, *again) and _is_torque_again(served, name))
+    others = [name for name in served.values if name not in (*OURS, *again) and not name.endswith(KEPT)]
+    again += tuple(name for name in others if _is_torque_again(served, name))
     if not again:
         return served
     said = "repeat the speed or the torque in another unit and are no causes"
