@@ -22,6 +22,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from cosim.fmi.guard import Guard
+
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
 NOT_FINITE, TERMINATED, NOT_AGREED, NOT_EXACT, POOL_FULL, EARLY = range(100, 106)
 STATUSES = {
@@ -82,6 +84,7 @@ class Functions:
     """Addresses that the compiled loop calls: set, get and step of reals in FMI `version` 2 or 3.
 
     `save` and `restore` are those of the FMU's state, 0 where it cannot be taken back; `state` is where it is kept.
+    `altered` is where the loop notes what a call changed that it must not (`cosim.fmi.guard`), 0 for nowhere.
     """
 
     version: int
@@ -92,6 +95,7 @@ class Functions:
     save: int = 0
     restore: int = 0
     state: int = 0
+    altered: int = 0
 
 
 class Component(Protocol):
@@ -99,6 +103,10 @@ class Component(Protocol):
 
     name: str
     origin: dict[str, Any]
+
+    @property
+    def guard(self) -> Guard:
+        """What puts back what the component changes in this process, and says it."""
 
     @property
     def ports(self) -> Mapping[str, Port]:

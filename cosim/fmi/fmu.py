@@ -27,6 +27,7 @@ from cosim.fmi.description import (
     own_step_of,
     provides_derivatives,
 )
+from cosim.fmi.guard import Guard
 from cosim.fmi.listeners import callbacks2, registered, same_directory
 from cosim.fmi.settings import STRUCTURAL, Setting, settings_of, sizes_of, tell
 from cosim.fmi.sound import doubts_of
@@ -80,9 +81,11 @@ class FmuComponent:
         self._started = False
         self._worst = OK
         self._state = ctypes.c_void_p()
+        self.guard = Guard()
+        """Puts back what the FMU changes in this process."""
         self._directory = Scratch()
         try:
-            with doing(self.name, "loaded"):
+            with self._foreign("loaded"):
                 self._fmu = self._instantiate()
             self.functions: Functions | None = self._functions()
             self._set, self._get, self._step = self._callables()
@@ -151,7 +154,7 @@ class FmuComponent:
     def _starting(self) -> Iterator[None]:
         """Turn what an FMU refuses on its way through initialisation into a sentence."""
         try:
-            with doing(self.name, "initialised"):
+            with self._foreign("initialised"):
                 yield
         except CosimError:
             raise
@@ -175,25 +178,25 @@ class FmuComponent:
 
     def set(self, references: np.ndarray, values: np.ndarray) -> int:
         """Set real inputs; references uint32, values float64, shape (n,), contiguous."""
-        return int(self._set(*self._arrays(references, values)))
+        return self.guard.after(int(self._set(*self._arrays(references, values))))
 
     def get(self, references: np.ndarray, values: np.ndarray) -> int:
         """Write the values of real variables into `values`."""
-        return int(self._get(*self._arrays(references, values)))
+        return self.guard.after(int(self._get(*self._arrays(references, values))))
 
     def step(self, time: float, size: float, final: bool = True) -> int:
         """Go from `time` to `time + size`, both in s; `final` False: the step may be taken back."""
-        return int(self._step(time, size, final))
+        return self.guard.after(int(self._step(time, size, final)))
 
     def save(self) -> int:
         """Keep the state as it is now, in the place of the one kept before."""
         assert self.functions is not None
-        return int(_SAVE(self.functions.save)(self._fmu.component, ctypes.addressof(self._state)))
+        return self.guard.after(_SAVE(self.functions.save)(self._fmu.component, ctypes.addressof(self._state)))
 
     def restore(self) -> int:
         """Go back to the state kept."""
         assert self.functions is not None
-        return int(_SAVE(self.functions.restore)(self._fmu.component, self._state.value))
+        return self.guard.after(_SAVE(self.functions.restore)(self._fmu.component, self._state.value))
 
     def messages(self) -> tuple[str, ...]:
         """What the FMU said last, newest at the end."""
@@ -208,7 +211,8 @@ class FmuComponent:
         if self._version != 2 or self.interface != "coSimulation":
             return False
         try:
-            return bool(self._fmu.getBooleanStatus(_TERMINATED))
+            with self.guard.kept():
+                return bool(self._fmu.getBooleanStatus(_TERMINATED))
         except Exception:  # an FMU without asynchronous steps need not know
             return False
 
@@ -216,8 +220,9 @@ class FmuComponent:
         """Free instance, library and unpacked files as far as FMI allows it; may be called twice."""
         fmu, self._fmu = self._fmu, None
         if fmu is not None and self._worst != FATAL:
-            with doing(self.name, "closed"):
+            with self._foreign("closed"):
                 self._free(fmu)
+        self.guard.release()
         self._directory.cleanup()
 
     def _free(self, fmu: Any) -> None:
@@ -226,7 +231,19 @@ class FmuComponent:
             if self._worst < ERROR:
                 fmu.terminate()
         with suppress(Exception):
-            fmu.freeInstance()
+            self._unload(fmu)
+
+    def _unload(self, fmu: Any) -> None:
+        """Free the instance and its library, unless threads still run in it: without their code they would crash."""
+        getattr(fmu, f"fmi{self._version}FreeInstance")(fmu.component)
+        if not self.guard.left_threads():
+            fmu.freeLibrary()
+
+    @contextmanager
+    def _foreign(self, what: str) -> Iterator[None]:
+        """Enter the FMU's code, for what can be said in a word: "loaded"."""
+        with doing(self.name, what), self.guard.kept():
+            yield
 
     def _forget(self, fmu: Any) -> None:
         """Free the state kept."""
@@ -307,10 +324,17 @@ class FmuComponent:
                     unzipDirectory=self._directory.name,
                     instanceName=instance,
                 )
+            self._watch(fmu)
             self._begin(fmu)
         except Exception as error:
             raise FmuError(f"{self.path} cannot be instantiated: {self._reason(error)}.") from error
         return fmu
+
+    def _watch(self, fmu: Any) -> None:
+        """Put the arithmetic back behind each call that Python makes of the FMU's functions."""
+        for name in dir(fmu):
+            if name.startswith(f"fmi{self._version}") and callable(call := getattr(fmu, name)):
+                setattr(fmu, name, self.guard.watched(call))
 
     def _begin(self, fmu: Any) -> None:
         if self._version == 2:
@@ -333,7 +357,7 @@ class FmuComponent:
         addresses = [ctypes.cast(getattr(self._fmu.dll, kind + name), ctypes.c_void_p).value or 0 for name in names]
         instance = self._fmu.component
         functions = Functions(self._version, getattr(instance, "value", instance), *addresses)
-        return replace(functions, state=ctypes.addressof(self._state))
+        return replace(functions, state=ctypes.addressof(self._state), altered=self.guard.address)
 
     def _callables(self) -> tuple[Any, Any, Any]:
         functions: Any = self.functions

@@ -24,6 +24,7 @@ import numpy as np
 
 from cosim.fmi.component import ERROR, OK, Functions, Port
 from cosim.fmi.description import first_line
+from cosim.fmi.guard import Guard
 from cosim.support.activity import doing
 from cosim.support.errors import ScenarioError, WiringError
 from cosim.support.files import sha256
@@ -43,6 +44,7 @@ class FunctionComponent:
         outputs: units by name; every output is 0 until the first step has ended.
         name: what the component is called in messages.
         origin: what a recording shall say about where it comes from.
+        guard: of the code that made the function.
     """
 
     can_get_and_set_state, can_vary_step, event_at_start = False, True, False
@@ -56,8 +58,10 @@ class FunctionComponent:
         outputs: Mapping[str, str],
         name: str = "",
         origin: Mapping[str, Any] | None = None,
+        guard: Guard | None = None,
     ) -> None:
         self.name = name or function.__name__
+        self.guard = guard or Guard()
         self.origin: dict[str, Any] = {"function": function.__name__, **(origin or {})}
         kinds = [("input", inputs), ("output", outputs)]
         listed = [(one, unit, causality) for causality, units in kinds for one, unit in units.items()]
@@ -70,8 +74,8 @@ class FunctionComponent:
         self._values = np.zeros(len(listed))
         self._messages: deque[str] = deque(maxlen=5)
         self._kept = (_VALUES(self._set_raw), _VALUES(self._get_raw), _STEP(self._step_raw))
-        addresses = [ctypes.cast(one, ctypes.c_void_p).value or 0 for one in self._kept]
-        self.functions: Functions | None = Functions(2, 0, *addresses)
+        set_, get, step = [ctypes.cast(one, ctypes.c_void_p).value or 0 for one in self._kept]
+        self.functions: Functions | None = Functions(2, 0, set_, get, step, altered=self.guard.address)
 
     def enter_initialisation(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
         """Begin anew with these parameters and start values of inputs; each step is given the time.
@@ -79,7 +83,7 @@ class FunctionComponent:
         Raises:
             WiringError: the function does not take them, or the class cannot be made.
         """
-        with doing(self.name, "initialised"):
+        with doing(self.name, "initialised"), self.guard.kept():
             self._start_inputs({name: value for name, value in parameters.items() if name in self._inputs})
             self._make({name: value for name, value in parameters.items() if name not in self._inputs})
 
@@ -131,8 +135,8 @@ class FunctionComponent:
             self._values[count:] = self._listed(self._call(time, **inputs))
         except BaseException as error:  # whatever a user's function raises, SystemExit too, ends the run in its words
             self._messages.append(f"{type(error).__name__}: {first_line(error)}")
-            return ERROR
-        return OK
+            return self.guard.after(ERROR)
+        return self.guard.after(OK)
 
     def save(self) -> int:
         """Refuse: what a function remembers cannot be kept."""
@@ -172,7 +176,7 @@ class FunctionComponent:
         return self.step(time, size)
 
 
-def load_function(source: str, where: str) -> tuple[Callable[..., Any], dict[str, Any]]:
+def load_function(source: str, where: str, guard: Guard) -> tuple[Callable[..., Any], dict[str, Any]]:
     """Return the function that `file.py:name` means, and its origin; `where` it stands, for messages.
 
     Raises:
@@ -183,7 +187,7 @@ def load_function(source: str, where: str) -> tuple[Callable[..., Any], dict[str
     if not Path(file).is_file():
         raise ScenarioError(f'{where}: the file does not exist; write "file.py:function".', culprit=source)
     try:
-        with doing(Path(file).name, "loaded"):
+        with doing(Path(file).name, "loaded"), guard.kept():
             found = runpy.run_path(file)
     except (Exception, SystemExit) as error:  # the user's file may raise anything
         message = f"{where}: the file cannot be run: {type(error).__name__}: {first_line(error)}."

@@ -156,7 +156,8 @@ class ScheduledComponent(FmuComponent):
             interval, shift = clock.interval, clock.shift
         else:
             shifts = (ctypes.c_double * 1)()
-            self._fmu.getShiftDecimal(self._reference(clock.reference), shifts)
+            with self._foreign("initialised"):
+                self._fmu.getShiftDecimal(self._reference(clock.reference), shifts)
             interval, shift = self._interval(clock.reference)[0], float(shifts[0])
         if clock.kind in _PERIODIC and not 0 < interval < inf:
             message = f'{self.name} ({self.path}): its clock "{clock.name}" has no interval above 0 s.'

@@ -28,7 +28,7 @@ static void advance(Drive *drive)
     if (status <= FMI_WARNING) {
         status = worse(status, get_outputs(plant));
     }
-    drive->failed = finite_outputs(plant, status) > FMI_WARNING;
+    drive->failed = leave(plant, status) > FMI_WARNING;
     drive->tick++;
     if (fabs(plant->output[0] - before) > drive->speed * drive->step && drive->state > SWITCH_ON_DISABLED) {
         drive->overspeeds += drive->state != FAULT;

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.fmi.function import load_function
+from cosim.fmi.guard import Guard
 from cosim.hardware.structures import CAdapter, CFeedback, COrder
 from cosim.support.errors import HardwareError
 from cosim.support.plain import JsonObject
@@ -132,7 +133,7 @@ def load_adapter(source: str, step: float) -> PythonAdapter:
     Raises:
         HardwareError: there is no such class, or it is no adapter.
     """
-    kind, _ = load_function(source, "adapter")
+    kind, _ = load_function(source, "adapter", Guard())
     if not (isinstance(kind, type) and issubclass(kind, PythonAdapter)):
         raise HardwareError(f"{source} is no PythonAdapter (cosim.hardware.python_adapter).", culprit=source)
     return kind(step)

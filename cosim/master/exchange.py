@@ -69,6 +69,7 @@ class _Exchange(Structure):
         ("in_event", c_int64),
         ("result", c_int64),
         ("culprit", c_int64),
+        ("altered", c_void_p),
     ]
 
 
@@ -109,7 +110,8 @@ class ExchangeComponent(FmuComponent):
         if count:
             nominals = ctypes.cast(self._exchange.nominals, POINTER(c_double))
             try:
-                self._fmu.getNominalsOfContinuousStates(nominals, count)
+                with self._foreign("initialised"):
+                    self._fmu.getNominalsOfContinuousStates(nominals, count)
             except Exception as error:
                 self.failed(getattr(error, "status", 0))
                 reason = f"it gives no nominals of its {count:,} states: {self._reason(error)}"
@@ -147,11 +149,11 @@ class ExchangeComponent(FmuComponent):
     def _functions(self) -> Functions:
         self._exchange = self._made()
         self._make_room()
-        addresses = (
-            ctypes.cast(getattr(self._library, f"exchange_{name}"), c_void_p).value or 0
+        addresses = {
+            name: ctypes.cast(getattr(self._library, f"exchange_{name}"), c_void_p).value or 0
             for name in ("set", "get", "step")
-        )
-        return Functions(2, ctypes.addressof(self._exchange), *addresses)
+        }
+        return Functions(2, ctypes.addressof(self._exchange), **addresses, altered=self.guard.address)
 
     def _made(self) -> _Exchange:
         """Fill the structure of exchange.c; its arrays live as long as the component."""
@@ -165,6 +167,7 @@ class ExchangeComponent(FmuComponent):
             version=self._version,
             instance=getattr(instance, "value", instance),
             tolerance=float(experiment.tolerance) if experiment and experiment.tolerance else TOLERANCE,
+            altered=self.guard.address,
             **{name: self._address(call) for name, call in calls.items()},
         )
 

@@ -8,7 +8,8 @@ from time import perf_counter
 import numpy as np
 
 from cosim.data.writer import MemoryWriter
-from cosim.fmi.component import DISCARD, TERMINATED
+from cosim.fmi.component import DISCARD, TERMINATED, Component
+from cosim.fmi.guard import Guard
 from cosim.master.access import refusal, tell_failed
 from cosim.master.given import Given
 from cosim.master.loop import CompiledLoop, InterpretedLoop, slow_because
@@ -36,6 +37,7 @@ class Execution:
     writer: MemoryWriter
     ticks: int
     on_progress: Progress | None
+    guard: Guard
     last: bool = False
     seconds: float = 0.0
     ended: str = ""
@@ -84,7 +86,15 @@ class Execution:
                 notes.append(f"{part.name} is a Python function: each of its steps costs microseconds.")
         if self.loop.kind != "compiled":
             notes.append(f"{slow_because(self.plan)}: the loop ran in Python.")
-        return notes
+        return [*notes, *self._changes()]
+
+    def _changes(self) -> list[str]:
+        """Say which component changed what in this process; after a chunk it may have been any of them."""
+        named = {part.name: part.component for part in self.plan.parts}
+        said = [(f"{name} ({_source(one)})", one.guard) for name, one in named.items()]
+        if len(said) > 1:
+            said.append((f"One of the components ({', '.join(named)}) that were started and stepped", self.guard))
+        return [f"{who} {note}." for who, guard in said for note in guard.notes()]
 
     def _stream(self) -> None:
         self.writer.origin["complete"] = False
@@ -102,7 +112,9 @@ class Execution:
                 return
             given = signals.at(chunk)
             with uninterrupted():
-                self._write(self.loop.run(len(chunk), given))
+                with self.guard.kept():
+                    rows = self.loop.run(len(chunk), given)
+                self._write(rows)
             self._check()
             if self.on_progress:
                 self.on_progress(self.loop.tick, self.ticks)
@@ -136,6 +148,16 @@ class Execution:
             return
         tell_failed(self.plan, component, failure.status)
         raise refusal(self.plan, failure, component, when)
+
+
+def guard_of(plan: Plan) -> Guard:
+    """Return what watches over all components of a plan together: that of the only one, or another."""
+    return plan.parts[0].component.guard if len(plan.parts) == 1 else Guard()
+
+
+def _source(component: Component) -> str:
+    """Return the file that a component is from, or its function."""
+    return str(component.origin.get("file") or component.origin.get("function") or "no file")
 
 
 def chunks(ticks: int) -> Iterator[np.ndarray]:

@@ -8,14 +8,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from signal import Signals
 from time import monotonic
+from typing import Any
 
 from cosim.master.loop.structures import CLoop
 from cosim.master.result import RunResult, Statistics
-from cosim.master.simulate import Options, run
+from cosim.master.simulate import Options, Progress, run
 from cosim.support.activity import Board
 from cosim.support.cell import Cell, LostError
 from cosim.support.child import tell
-from cosim.support.errors import LostComponentError
+from cosim.support.errors import CosimError, LostComponentError
 from cosim.support.files import forget_partials
 from cosim.system.scenario import Scenario
 
@@ -44,8 +45,11 @@ def run_isolated(
         call_timeout: seconds that one call of a component may take.
         keep: file descriptors that the process inherits.
 
+    Returns:
+        the result; where a component does not come back when it is closed, with a note: the recording is complete then.
+
     Raises:
-        LostComponentError: a component ended, crashed or blocked the process; nothing is recorded.
+        LostComponentError: a component ended, crashed or blocked the process while it ran; nothing is recorded.
     """
     assert options.path is not None  # what is only in its memory ends with a process
     cell = Cell(quiet=False, keep=keep)
@@ -53,15 +57,19 @@ def run_isolated(
     watch = Watch(cell.board(), scenario.step, call_timeout)
     pid = cell.pid
     try:
-        told = options.on_progress or _ignore
-        statistics = cell.call(
-            _work, scenario, replace(options, on_progress=None), on_message=told, overdue=watch.overdue
-        )
+        heard = _Heard(options.on_progress)
+        plain = replace(options, on_progress=None)
+        statistics = cell.call(_work, scenario, plain, on_message=heard, overdue=watch.overdue)
     except KeyboardInterrupt:
         cell.finish(Watch(cell.board(), scenario.step, GRACE).overdue)
         raise
     except LostError as loss:
-        raise watch.error(loss, scenario) from loss
+        if heard.error is not None:
+            raise heard.error from loss
+        if heard.statistics is None:
+            raise watch.error(loss, scenario) from loss
+        note = f"{watch.sentence(loss, scenario)} The recording is complete."
+        statistics = {**heard.statistics, "notes": [*heard.statistics["notes"], note]}
     finally:
         cell.close()
         forget_partials(pid, options.path.parent)
@@ -70,11 +78,22 @@ def run_isolated(
 
 def _work(scenario: Scenario, options: Options) -> Statistics:
     """Run here, where a crash may happen."""
-    return run(scenario, replace(options, on_progress=tell)).statistics
+    return run(scenario, replace(options, on_progress=tell, on_recorded=tell)).statistics
 
 
-def _ignore(done: int, of: int) -> None:
-    pass
+@dataclass
+class _Heard:
+    """What the process told before its answer: how far it is, then how the run went, before components are closed."""
+
+    on_progress: Progress | None
+    statistics: Statistics | None = None
+    error: CosimError | None = None
+
+    def __call__(self, first: Any, second: Any) -> None:
+        if not isinstance(first, int):
+            self.statistics, self.error = first, second
+        elif self.on_progress:
+            self.on_progress(first, second)
 
 
 @dataclass(frozen=True)
@@ -117,6 +136,11 @@ class Watch:
         return "a call did not return" if now - self._since > self._limit else ""
 
     def error(self, loss: LostError, scenario: Scenario) -> LostComponentError:
+        """Return what became of the process as an error."""
+        message = f"{self.sentence(loss, scenario)} Nothing was recorded."
+        return LostComponentError(message, component=Call.of(self._board).component, reason=str(loss))
+
+    def sentence(self, loss: LostError, scenario: Scenario) -> str:
         """Say in a sentence what became of the process."""
         call = Call.of(self._board)
         section = scenario.components.get(call.component)
@@ -125,10 +149,8 @@ class Watch:
         when = f" at tick {call.tick:,} ({call.tick * self._step:.9g} s)" if call.what == "stepped" else ""
         where = f" while it was {call.what}{when}" if call.component else ""
         if loss.status == "timeout":
-            message = f"{who} did not return within {self._limit:g} s{where}; --call-timeout lets it take longer."
-        else:
-            message = f"{who} {_end(loss.code)}{where}; a component must return from its calls."
-        return LostComponentError(f"{message} Nothing was recorded.", component=call.component, reason=str(loss))
+            return f"{who} did not return within {self._limit:g} s{where}; --call-timeout lets it take longer."
+        return f"{who} {_end(loss.code)}{where}; a component must return from its calls."
 
 
 def _end(code: int) -> str:

@@ -11,6 +11,7 @@ from cosim.data.signals import Samples, Signal, check_frequency
 from cosim.fmi.alias import Aliased
 from cosim.fmi.component import Component
 from cosim.fmi.function import FunctionComponent, load_function
+from cosim.fmi.guard import Guard
 from cosim.master.exchange import open_fmu
 from cosim.support.errors import WiringError
 from cosim.system.arrays import each_record, each_wire
@@ -72,8 +73,9 @@ def _opened(stack: ExitStack, name: str, source: Source, system: System) -> Comp
 
 def _made(stack: ExitStack, name: str, source: Source) -> Component:
     if isinstance(source, Function):
-        function, origin = load_function(source.source, source.where)
-        return FunctionComponent(function, source.inputs, source.outputs, name, origin)
+        guard = Guard()
+        function, origin = load_function(source.source, source.where, guard)
+        return FunctionComponent(function, source.inputs, source.outputs, name, origin, guard)
     if isinstance(source, Path | str):
         return stack.enter_context(open_fmu(source, name))
     return stack.enter_context(open_fmu(source.path, name, source.interface)) if isinstance(source, Fmu) else source

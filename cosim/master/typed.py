@@ -86,6 +86,7 @@ class _Typed(Structure):
         ("culprit", c_int64),
         ("wrong", c_double),
         ("start", c_double),
+        ("altered", c_void_p),
     ]
 
 
@@ -130,7 +131,9 @@ class TypedComponent:
         addresses = {name: ctypes.cast(call, c_void_p).value or 0 for name, call in self._calls.items()}
         if not inner.save:
             addresses |= {"save": 0, "restore": 0}
-        self.functions = Functions(2, ctypes.addressof(self._typed), **addresses, state=inner.state)
+        self.functions = Functions(
+            2, ctypes.addressof(self._typed), **addresses, state=inner.state, altered=inner.altered
+        )
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -204,6 +207,7 @@ class TypedComponent:
             pool=self.pool.address if self.pool else 0,
             culprit=_NOBODY,
             start=self.begin,
+            altered=inner.altered,
         )
 
     def _variables(self, uses: Sequence[Use], access: str) -> list[_Variable]:

@@ -1,7 +1,7 @@
 """The process of a cell: `python -m cosim.support.child BOARD PARENT`, calls on stdin, answers on stdout, both pickled.
 
-What an FMU prints goes to stderr, so that it cannot get between the answers. Ctrl-C is the parent's business; SIGTERM
-ends a call as Ctrl-C would. A process whose parent is gone ends too.
+What an FMU prints goes to stderr, so that it cannot get between the answers; where it reads, there is nothing. Ctrl-C
+is the parent's business; SIGTERM ends a call as Ctrl-C would. A process whose parent is gone ends too.
 """
 
 import os
@@ -37,10 +37,14 @@ def main() -> None:
     answers = os.fdopen(os.dup(sys.stdout.fileno()), "wb")
     _ANSWERS.append(answers)
     os.dup2(sys.stderr.fileno(), sys.stdout.fileno())
+    calls = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, sys.stdin.fileno())  # an FMU that reads finds nothing there, and takes no call away
+    os.close(nothing)
     try:
         # The parent has no more calls, or is gone, perhaps in the middle of one.
         with suppress(EOFError, KeyboardInterrupt, BrokenPipeError, pickle.UnpicklingError):
-            _listen(int(sys.argv[2]))
+            _listen(calls, int(sys.argv[2]))
     except KeyboardInterrupt:
         pass  # it came on the way out
     for number in ENDING:
@@ -48,10 +52,10 @@ def main() -> None:
     _remove_folder()
 
 
-def _listen(parent: int) -> None:
+def _listen(calls: IO[bytes], parent: int) -> None:
     Thread(target=_mind_parent, args=(parent,), daemon=True).start()
     while True:
-        function, arguments = pickle.load(sys.stdin.buffer)
+        function, arguments = pickle.load(calls)
         _put("answer", _answer(function, arguments))
 
 

@@ -60,7 +60,7 @@ static int read_at_end(const Loop *loop, const Stage *stage, const Part *part)
             *target(loop, &stage->inner[i]) = stage->inner[i].held;
         }
     }
-    return finite_outputs(part, status);
+    return leave(part, status);
 }
 
 static int judge(Loop *loop, int64_t part, int status)
@@ -72,7 +72,7 @@ static int judge(Loop *loop, int64_t part, int status)
 static int save_all(Loop *loop, const Stage *stage)
 {
     for (int64_t i = stage->part; i < stage->part + stage->parts; i++) {
-        if (judge(loop, i, enter(loop, i)->save(loop->part[i].instance, loop->part[i].state))) {
+        if (judge(loop, i, save_state(enter(loop, i)))) {
             return 1;
         }
     }
@@ -82,7 +82,7 @@ static int save_all(Loop *loop, const Stage *stage)
 static int restore_all(Loop *loop, const Stage *stage)
 {
     for (int64_t i = stage->part; i < stage->part + stage->parts; i++) {
-        if (judge(loop, i, enter(loop, i)->restore(loop->part[i].instance, *loop->part[i].state))) {
+        if (judge(loop, i, restore_state(enter(loop, i)))) {
             return 1;
         }
     }
@@ -180,7 +180,7 @@ static int piece(Loop *loop, Stage *stage, double time, double size)
         const Part *part = enter(loop, i);
         int status = step_held(loop, stage, part, time, size, true);
         if (status <= FMI_WARNING) {
-            status = finite_outputs(part, worse(status, get_outputs(part)));
+            status = leave(part, worse(status, get_outputs(part)));
         }
         if (judge(loop, i, status)) {
             return 1;

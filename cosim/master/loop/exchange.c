@@ -5,6 +5,7 @@
  * step are met exactly; one at its end belongs to the next step, whose inputs it sees. A state event is where an indicator
  * changes sign within a stretch of integration; its time is bisected. Steps that end with a discontinuity of outputs
  * leave the FMU in continuous-time mode. Nothing is allocated here. */
+#include "foreign.h"
 #include "rodas4.h"
 
 #include <math.h>
@@ -59,14 +60,32 @@ typedef struct {
     double next, proposed; /* time of the next time event; step size of the solver */
     int64_t has_next, in_event;
     int64_t result, culprit; /* of the solver, when it failed */
+    int64_t *altered;        /* what calls of the FMU changed that they must not, see foreign.h */
 } Exchange;
 
 static int worse(int one, int other) { return one > other ? one : other; }
 
+/* Calls of the FMU: the solver computes between them, and in the standard environment. */
+static int set_time(const Exchange *e, double time) { return after(e->altered, e->set_time(e->instance, time)); }
+static int set_states(const Exchange *e, const double *x) {
+    return after(e->altered, e->set_states(e->instance, x, (size_t)e->states));
+}
+static int get_states(const Exchange *e) {
+    return after(e->altered, e->get_states(e->instance, e->x, (size_t)e->states));
+}
+static int get_rates(const Exchange *e, double *found) {
+    return after(e->altered, e->rates(e->instance, found, (size_t)e->states));
+}
+static int indicators(const Exchange *e, double *found) {
+    return after(e->altered, e->indicators(e->instance, found, (size_t)e->indicated));
+}
+static int enter_event(const Exchange *e) { return after(e->altered, e->enter_event(e->instance)); }
+static int enter_continuous(const Exchange *e) { return after(e->altered, e->enter_continuous(e->instance)); }
+
 static int rates(void *context, double time, const double *x, double *found) {
     Exchange *e = context;
-    int status = worse(e->set_time(e->instance, time), e->set_states(e->instance, x, (size_t)e->states));
-    return status > WARNING || e->rates(e->instance, found, (size_t)e->states) > WARNING;
+    int status = worse(set_time(e, time), set_states(e, x));
+    return status > WARNING || get_rates(e, found) > WARNING;
 }
 
 static double shift(double value, double nominal) { return 1.5e-8 * fmax(fabs(value), 0.01 * nominal); }
@@ -94,14 +113,15 @@ static int update(Exchange *e, bool *again, bool *terminate) {
     bool nominals, values, has_next;
     if (e->version == 2) {
         Event2 event = {0};
-        int status = ((Update2 *)e->update)(e->instance, &event);
+        int status = after(e->altered, ((Update2 *)e->update)(e->instance, &event));
         *again = event.newly;
         *terminate = event.terminate;
         e->has_next = event.has_next;
         e->next = event.next;
         return status;
     }
-    int status = ((Update3 *)e->update)(e->instance, again, terminate, &nominals, &values, &has_next, &e->next);
+    int status = after(e->altered, ((Update3 *)e->update)(e->instance, again, terminate, &nominals, &values, &has_next,
+                                                          &e->next));
     e->has_next = has_next;
     return status;
 }
@@ -109,16 +129,15 @@ static int update(Exchange *e, bool *again, bool *terminate) {
 /* Handles what is due now, and goes on in continuous-time mode with the states that it left. */
 static int handle_event(Exchange *e) {
     bool again = true, terminate = false;
-    int status = e->in_event ? OK : e->enter_event(e->instance);
+    int status = e->in_event ? OK : enter_event(e);
     for (int i = 0; i < MOST_UPDATES && again && status <= WARNING; i++)
         status = worse(status, update(e, &again, &terminate));
     if (status <= WARNING && terminate) return TERMINATED;
     if (status <= WARNING && again) return FAILED;
-    if (status <= WARNING) status = worse(status, e->enter_continuous(e->instance));
+    if (status <= WARNING) status = worse(status, enter_continuous(e));
     if (status <= WARNING) e->in_event = 0;
-    if (status <= WARNING && e->states) status = worse(status, e->get_states(e->instance, e->x, (size_t)e->states));
-    if (status <= WARNING && e->indicated)
-        status = worse(status, e->indicators(e->instance, e->before, (size_t)e->indicated));
+    if (status <= WARNING && e->states) status = worse(status, get_states(e));
+    if (status <= WARNING && e->indicated) status = worse(status, indicators(e, e->before));
     return status;
 }
 
@@ -140,9 +159,9 @@ static int integrate(Exchange *e, double start, double end, double proposed) {
         e->culprit = culprit;
         if (e->result != SOLVED) return FAILED;
     }
-    status = e->set_time(e->instance, end);
-    if (e->states) status = worse(status, e->set_states(e->instance, e->x, (size_t)e->states));
-    if (e->indicated) status = worse(status, e->indicators(e->instance, e->after, (size_t)e->indicated));
+    status = set_time(e, end);
+    if (e->states) status = worse(status, set_states(e, e->x));
+    if (e->indicated) status = worse(status, indicators(e, e->after));
     return status;
 }
 
@@ -154,6 +173,7 @@ static int completed(Exchange *e, bool *event) {
         status = ((Completed2 *)e->completed)(e->instance, 1, &wanted2, &terminate2);
     else
         status = ((Completed3 *)e->completed)(e->instance, true, &wanted, &terminate);
+    after(e->altered, status);
     *event = *event || wanted || wanted2;
     return status <= WARNING && (terminate || terminate2) ? TERMINATED : status;
 }
@@ -179,22 +199,24 @@ static int stretch(Exchange *e, double *time, double stop, bool *event) {
 }
 
 EXPORT int exchange_set(Exchange *e, const uint32_t *references, size_t count, const double *values) {
-    int status = e->in_event ? OK : e->enter_event(e->instance);
+    int status = e->in_event ? OK : enter_event(e);
     if (status > WARNING) return status;
     e->in_event = 1;
-    if (e->version == 2) return worse(status, ((Set2 *)e->set)(e->instance, references, count, values));
-    return worse(status, ((Set3 *)e->set)(e->instance, references, count, values, count));
+    int set = e->version == 2 ? ((Set2 *)e->set)(e->instance, references, count, values)
+                              : ((Set3 *)e->set)(e->instance, references, count, values, count);
+    return worse(status, after(e->altered, set));
 }
 
 EXPORT int exchange_get(Exchange *e, const uint32_t *references, size_t count, double *values) {
-    if (e->version == 2) return ((Get2 *)e->get)(e->instance, references, count, values);
-    return ((Get3 *)e->get)(e->instance, references, count, values, count);
+    int status = e->version == 2 ? ((Get2 *)e->get)(e->instance, references, count, values)
+                                 : ((Get3 *)e->get)(e->instance, references, count, values, count);
+    return after(e->altered, status);
 }
 
 EXPORT int exchange_step(Exchange *e, double time, double size, int final) {
     (void)final;
     double end = time + size, margin = 1e-6 * size;
-    int status = e->in_event ? OK : e->set_time(e->instance, time); /* in event mode some refuse it; time stands there */
+    int status = e->in_event ? OK : set_time(e, time); /* in event mode some refuse it; time stands there */
     bool event = e->in_event || (e->has_next && e->next <= time + margin);
     for (int events = 0; status <= WARNING; events++) {
         if (event) status = worse(status, handle_event(e));

@@ -8,6 +8,8 @@
  * Nothing is allocated here. */
 #include "loop.h"
 
+#include "foreign.h"
+
 static bool begins(const Part *part, int64_t tick)
 {
     return part->every == 1 || tick % part->every == 0;
@@ -39,7 +41,7 @@ static int advance(const Loop *loop, const Part *part)
     if (status <= FMI_WARNING) {
         status = worse(status, get_outputs(part));
     }
-    return finite_outputs(part, status);
+    return leave(part, status);
 }
 
 static int step_all(Loop *loop, const Stage *stage)
@@ -140,14 +142,16 @@ EXPORT int64_t loop_layout(void)
 /* Reads all outputs once, before the first tick. */
 EXPORT int64_t loop_start(Loop *loop)
 {
-    for (int64_t i = 0; i < loop->parts; i++) {
-        int status = get_outputs(enter(loop, i));
+    Environment before = begin_standard();
+    int status = 0;
+    for (int64_t i = 0; i < loop->parts && status <= FMI_WARNING; i++) {
+        status = get_outputs(enter(loop, i));
         if (status > FMI_WARNING) {
             fail(loop, i, status, 0);
-            return 0;
         }
     }
-    return 1;
+    end_standard(before);
+    return status <= FMI_WARNING;
 }
 
 /* Before the first tick, outputs that follow inputs at once are brought to the inputs of that tick, as often as it may
@@ -181,6 +185,7 @@ static int settle(Loop *loop)
  * recorded column. Returns the number of rows written; `failed` and `status` tell whether it got to the end. */
 EXPORT int64_t loop_run(Loop *loop, int64_t ticks, const double *signals, double *rows, int64_t capacity)
 {
+    Environment before = begin_standard();
     int64_t written = 0;
     for (int64_t k = 0; k < ticks; k++) {
         for (int64_t i = 0; i < loop->signals; i++) {
@@ -194,10 +199,11 @@ EXPORT int64_t loop_run(Loop *loop, int64_t ticks, const double *signals, double
         note(loop, 1);
         written += record(loop, rows + written, capacity);
         if (failed) {
-            return written;
+            break;
         }
         loop->tick++;
     }
+    end_standard(before);
     return written;
 }
 
@@ -208,6 +214,7 @@ EXPORT void loop_finish(Loop *loop, const double *signals)
     if (loop->tick % loop->decimation) {
         return;
     }
+    Environment before = begin_standard();
     for (int64_t i = 0; i < loop->signals; i++) {
         loop->signal[i] = signals[i];
     }
@@ -220,6 +227,7 @@ EXPORT void loop_finish(Loop *loop, const double *signals)
         loop->column[i].sample = loop->column[i].value;
     }
     loop->sampled = 1;
+    end_standard(before);
 }
 
 /* Ends a row whose window was cut short by the end of the run; its means are those of what there was. */
@@ -228,6 +236,8 @@ EXPORT int64_t loop_flush(Loop *loop, double *rows, int64_t capacity)
     if (!loop->sampled) {
         return 0;
     }
+    Environment before = begin_standard();
     emit(loop, rows, capacity);
+    end_standard(before);
     return 1;
 }

@@ -34,6 +34,7 @@ typedef struct {
     int64_t every;          /* ticks of a step; inputs are taken at its first tick, outputs shown after its last */
     int64_t direct;         /* whether outputs may follow inputs at once */
     void **state;           /* where the component keeps what was saved */
+    int64_t *altered;       /* where it keeps what its calls changed that they must not, see foreign.h; NULL: nowhere */
 } Part;
 
 /* y = gain x + offset + bus[noise] in the ticks from `first` to before `last`; or the value of the first of them
@@ -102,10 +103,12 @@ double carry(const Loop *loop, const Wire *wire);
 int set_inputs(const Part *part);
 int get_outputs(const Part *part);
 int do_step(const Part *part, double time, double size, bool final);
+int save_state(const Part *part);
+int restore_state(const Part *part);
 int worse(int one, int other);
-int finite_outputs(const Part *part, int status);
 int fail(Loop *loop, int64_t part, int status, int64_t since);
 const Part *enter(Loop *loop, int64_t part);
+int leave(const Part *part, int status);
 
 /* coupling.c: both take the components of a stage over one tick and return 0, or what `fail` returned. */
 int iterate(Loop *loop, Stage *stage);

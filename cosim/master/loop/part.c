@@ -1,5 +1,6 @@
 /* One component and the wires that feed it: what loop.c takes in turn and coupling.c takes together.
  * A wire gives  y = quantise(gain * x + offset) + noise, then what faults make of it. part.py does the same in Python. */
+#include "foreign.h"
 #include "loop.h"
 
 #include <math.h>
@@ -60,10 +61,11 @@ int set_inputs(const Part *part)
         return 0;
     }
     if (part->version == 2) {
-        return ((Set2 *)part->set)(part->instance, part->input_references, (size_t)part->inputs, part->input);
+        return after(part->altered, ((Set2 *)part->set)(part->instance, part->input_references, (size_t)part->inputs,
+                                                       part->input));
     }
-    return ((Set3 *)part->set)(part->instance, part->input_references, (size_t)part->inputs, part->input,
-                               (size_t)part->inputs);
+    return after(part->altered, ((Set3 *)part->set)(part->instance, part->input_references, (size_t)part->inputs,
+                                                   part->input, (size_t)part->inputs));
 }
 
 int get_outputs(const Part *part)
@@ -72,25 +74,37 @@ int get_outputs(const Part *part)
         return 0;
     }
     if (part->version == 2) {
-        return ((Get2 *)part->get)(part->instance, part->output_references, (size_t)part->outputs, part->output);
+        return after(part->altered, ((Get2 *)part->get)(part->instance, part->output_references,
+                                                       (size_t)part->outputs, part->output));
     }
-    return ((Get3 *)part->get)(part->instance, part->output_references, (size_t)part->outputs, part->output,
-                               (size_t)part->outputs);
+    return after(part->altered, ((Get3 *)part->get)(part->instance, part->output_references, (size_t)part->outputs,
+                                                   part->output, (size_t)part->outputs));
 }
 
 /* `final`: the component will not be taken back to before this step. */
 int do_step(const Part *part, double time, double size, bool final)
 {
     if (part->version == 2) {
-        return ((Step2 *)part->step)(part->instance, time, size, final);
+        return after(part->altered, ((Step2 *)part->step)(part->instance, time, size, final));
     }
     bool event = false, terminate = false, early = false;
     double last = time;
-    int status = ((Step3 *)part->step)(part->instance, time, size, final, &event, &terminate, &early, &last);
+    int status = after(part->altered, ((Step3 *)part->step)(part->instance, time, size, final, &event, &terminate,
+                                                            &early, &last));
     if (status <= FMI_WARNING && terminate) {
         return TERMINATED;
     }
     return status <= FMI_WARNING && early ? EARLY : status; /* it was told that it must not */
+}
+
+int save_state(const Part *part)
+{
+    return after(part->altered, part->save(part->instance, part->state));
+}
+
+int restore_state(const Part *part)
+{
+    return after(part->altered, part->restore(part->instance, *part->state));
 }
 
 int worse(int one, int other)
@@ -98,8 +112,10 @@ int worse(int one, int other)
     return one > other ? one : other;
 }
 
-int finite_outputs(const Part *part, int status)
+/* Ends the calls of a component that `enter` returned: its arithmetic is put right, and its outputs must be finite. */
+int leave(const Part *part, int status)
 {
+    after_all(part->altered);
     for (int64_t i = 0; status <= FMI_WARNING && i < part->outputs; i++) {
         if (!isfinite(part->output[i])) {
             status = NOT_FINITE;

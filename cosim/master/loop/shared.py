@@ -49,5 +49,6 @@ def part(
         input=input_,
         output=output,
         state=functions.state,
+        altered=functions.altered,
         **more,
     )

@@ -25,6 +25,7 @@ class CPart(Structure):
         ("every", c_int64),
         ("direct", c_int64),
         ("state", c_void_p),
+        ("altered", c_void_p),
     ]
 
 

@@ -5,6 +5,7 @@
  * the variables of other types and arrays, each with its values side by side. Nothing is rounded unless a wire asks for
  * it (`cast`): a value that its variable cannot hold is NOT_EXACT, and `culprit` and `wrong` tell which.
  * For a model-exchange FMU the inner functions are those of exchange.c, which must be called before others are set. */
+#include "foreign.h"
 #include "loop.h"
 #include "pool.h"
 
@@ -47,6 +48,7 @@ typedef struct {
     Pool *pool;
     int64_t begun, culprit; /* culprit: place among the values of the part, inputs from 0, outputs from -1 downwards */
     double wrong, start; /* `start`: of the run, added to the loop's time */
+    int64_t *altered;    /* what calls of the FMU changed that they must not, see foreign.h */
 } Typed;
 
 static const double LEAST[] = {[I8] = -128, [I16] = -32768, [I32] = -2147483648.0, [I64] = -9223372036854775808.0,
@@ -153,24 +155,26 @@ static int call_set(const Typed *t, const Variable *v)
 {
     uint32_t reference = (uint32_t)v->reference;
     if (v->kind == BYTES) {
-        return ((SetBytes *)v->access)(t->instance, &reference, 1, v->length, v->content, (size_t)v->size);
+        return after(t->altered, ((SetBytes *)v->access)(t->instance, &reference, 1, v->length, v->content,
+                                                         (size_t)v->size));
     }
     if (t->version == 2) {
-        return ((Set2 *)v->access)(t->instance, &reference, 1, v->content);
+        return after(t->altered, ((Set2 *)v->access)(t->instance, &reference, 1, v->content));
     }
-    return ((Set3 *)v->access)(t->instance, &reference, 1, v->content, (size_t)v->size);
+    return after(t->altered, ((Set3 *)v->access)(t->instance, &reference, 1, v->content, (size_t)v->size));
 }
 
 static int call_get(const Typed *t, const Variable *v, void (*access)(void))
 {
     uint32_t reference = (uint32_t)v->reference;
     if (v->kind == BYTES) {
-        return ((GetBytes *)access)(t->instance, &reference, 1, v->length, v->content, (size_t)v->size);
+        return after(t->altered, ((GetBytes *)access)(t->instance, &reference, 1, v->length, v->content,
+                                                      (size_t)v->size));
     }
     if (t->version == 2) {
-        return ((Get2 *)access)(t->instance, &reference, 1, v->content);
+        return after(t->altered, ((Get2 *)access)(t->instance, &reference, 1, v->content));
     }
-    return ((Get3 *)access)(t->instance, &reference, 1, v->content, (size_t)v->size);
+    return after(t->altered, ((Get3 *)access)(t->instance, &reference, 1, v->content, (size_t)v->size));
 }
 
 /* Arrays that are fed in part begin with what the FMU has in their other elements. */
@@ -193,7 +197,7 @@ EXPORT int typed_set(Typed *t, const uint32_t *references, size_t count, const d
     int status = t->begun ? 0 : begin(t);
     if (status <= FMI_WARNING) {
         Part inner = {.version = t->inner_version, .instance = t->inner, .set = t->set, .inputs = t->plain_inputs,
-                      .input_references = t->plain_input, .input = (double *)values};
+                      .input_references = t->plain_input, .input = (double *)values, .altered = t->altered};
         bool must = t->inner != t->instance; /* exchange.c goes to event mode before anything is set */
         status = must && t->plain_inputs == 0 ? ((Set2 *)t->set)(t->inner, t->plain_input, 0, values)
                                               : worse(status, set_inputs(&inner));
@@ -217,7 +221,7 @@ EXPORT int typed_get(Typed *t, const uint32_t *references, size_t count, double 
     (void)references;
     (void)count;
     Part inner = {.version = t->inner_version, .instance = t->inner, .get = t->get, .outputs = t->plain_outputs,
-                  .output_references = t->plain_output, .output = values};
+                  .output_references = t->plain_output, .output = values, .altered = t->altered};
     int status = get_outputs(&inner);
     for (int64_t i = 0; i < t->outputs && status <= FMI_WARNING; i++) {
         const Variable *v = &t->output[i];
@@ -239,7 +243,7 @@ EXPORT int typed_get(Typed *t, const uint32_t *references, size_t count, double 
 
 EXPORT int typed_step(Typed *t, double time, double size, int final)
 {
-    Part inner = {.version = t->inner_version, .instance = t->inner, .step = t->step};
+    Part inner = {.version = t->inner_version, .instance = t->inner, .step = t->step, .altered = t->altered};
     return do_step(&inner, t->start + time, size, final);
 }
 

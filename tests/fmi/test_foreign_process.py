@@ -1,0 +1,263 @@
+"""Foreign code leaves the process as it found it: what it changed is put back, and named."""
+
+import json
+import os
+import platform
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pyarrow.parquet import read_table
+from rude_fmu import DEEDS, STAGES, rude_fmu
+from test_cli_run import ENVIRONMENT, call
+from tiny_fmu import tiny
+
+import cosim
+from cosim.data.recording import Recording
+
+__all__ = ["tiny"]
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what the FMU of the test changes is there on Linux")
+PROBE = Path(__file__).parents[1] / "rude_probe.py"
+NAMES = {
+    "directory": "the working directory",
+    "umask": "the umask",
+    "locale": "the locale",
+    "environment": "the environment variables KIND, RUDE",
+    "ignore": "the handlers of SIGPIPE, SIGTERM",
+    "alarm": "the alarm timer",
+    "block": "the blocked signals",
+    "close": "the standard output and the standard error",
+    "redirect": "the standard output",
+    "limit": "the limit of open files",
+    "upward": "the rounding mode",
+}
+ON_X86 = {
+    "flush": "the flush of subnormal numbers to zero",
+    "traps": "the traps of floating-point errors",
+    "precision": "the floating-point precision",
+}
+if platform.machine() == "x86_64":
+    NAMES |= ON_X86
+if len(os.sched_getaffinity(0)) > 1:
+    NAMES["cores"] = "the cores of the thread"
+ONE = """
+name = "one"
+step = 1e-3
+stop = 0.003
+[components.a]
+fmu = "{fmu}"
+{more}
+[record]
+signals = {{ y = "a.third" }}
+"""
+TWO = """
+name = "two"
+step = 1e-3
+stop = 0.2
+[components.other]
+fmu = "{tiny}"
+parameters = {{ k = 0.1 }}
+[components.rude]
+fmu = "{fmu}"
+{more}
+[[connections]]
+from = "rude.{output}"
+to = "other.a"
+gain = 0.7
+[record]
+signals = {{ y = "other.y", wire = "other.a" }}
+"""
+TYPED = """
+[[connections]]
+from = "rude.shown"
+to = "rude.flag"
+"""
+FED = """
+[[connections]]
+from = "other.y"
+to = "rude.a"
+"""
+RING = (
+    FED
+    + """
+[algorithm]
+kind = "iterated"
+components = ["other", "rude"]
+"""
+)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("rude")
+
+
+def scenario_of(path: Path, text: str) -> Path:
+    path.write_text(text)
+    return path
+
+
+def probed(*scenarios: Path) -> list[dict[str, Any]]:
+    """Run scenarios one after the other in one process without isolation."""
+    done = subprocess.run(
+        [sys.executable, PROBE, *scenarios],
+        env=ENVIRONMENT | {"KIND": "own"},
+        cwd=scenarios[0].parent,
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    found: list[dict[str, Any]] = json.loads(done.stdout)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("version", "stage"),
+    [
+        *((2, stage) for stage in ("load", "instantiate", "setup", "initialise", "step", "terminate", "free")),
+        (3, "step"),
+    ],
+)
+def test_what_an_fmu_changes_in_the_process_is_put_back_and_named(folder: Path, version: int, stage: str) -> None:
+    deeds = [name for name in NAMES if stage != "load" or name in ("upward", "flush")]
+    scenarios = []
+    for deed in deeds:
+        fmu = rude_fmu(folder, version, deed, stage)
+        scenarios.append(scenario_of(folder / f"{deed}_{stage}_{version}.toml", ONE.format(fmu=fmu, more="")))
+    for deed, answer in zip(deeds, probed(*scenarios), strict=True):
+        assert answer["changed"] == []
+        assert answer["notes"] == [
+            f"a (rude_{version}_CoSimulation_{deed}_{stage}.fmu) changed {NAMES[deed]}; restored."
+        ]
+
+
+def test_a_handler_that_a_runtime_may_need_stays_until_its_fmu_is_closed(folder: Path) -> None:
+    fmu = rude_fmu(folder, 2, "handle", "initialise")
+    (answer,) = probed(scenario_of(folder / "handle.toml", ONE.format(fmu=fmu, more="")))
+    assert answer["changed"] == []
+    assert answer["notes"] == [f"a ({fmu.name}) handles SIGUSR1 itself until it is closed; then restored."]
+
+
+def test_where_one_of_several_changed_something_in_the_loop_all_are_named(folder: Path, tiny: dict[int, Path]) -> None:
+    fmu = rude_fmu(folder, 2, "umask", "step")
+    (answer,) = probed(scenario_of(folder / "several.toml", TWO.format(fmu=fmu, tiny=tiny[2], output="third", more="")))
+    assert answer["changed"] == []
+    said = "One of the components (other, rude) that were started and stepped changed the umask; restored."
+    assert answer["notes"] == [said]
+
+
+CALLS = [
+    ("CoSimulation", 2, "step", "third", ""),
+    ("CoSimulation", 2, "set", "third", FED),
+    ("CoSimulation", 2, "get", "third", ""),
+    ("CoSimulation", 3, "step", "third", ""),
+    ("CoSimulation", 3, "get", "third", ""),
+    ("CoSimulation", 2, "get", "shown", TYPED),
+    ("CoSimulation", 2, "save", "third", RING),
+    ("ModelExchange", 2, "rates", "x", ""),
+]
+ARITHMETIC = ["upward", *(["flush"] if platform.machine() == "x86_64" else [])]
+
+
+@pytest.mark.parametrize("deed", ARITHMETIC)
+@pytest.mark.parametrize(
+    ("kind", "version", "stage", "output", "more"), CALLS, ids=["-".join(map(str, one[:4])) for one in CALLS]
+)
+@pytest.mark.parametrize("compiled", [True, False])
+def test_arithmetic_that_an_fmu_changes_in_its_calls_changes_no_bit_of_others(
+    folder: Path,
+    tiny: dict[int, Path],
+    deed: str,
+    kind: str,
+    version: int,
+    stage: str,
+    output: str,
+    more: str,
+    compiled: bool,
+) -> None:
+    rows = {}
+    for what in ("nothing", deed):
+        text = TWO.format(fmu=rude_fmu(folder, version, what, stage, kind), tiny=tiny[2], output=output, more=more)
+        done = cosim.run(scenario_of(folder / "two.toml", text), compiled=compiled)
+        rows[what] = done.recording
+    for name in rows["nothing"]:
+        np.testing.assert_array_equal(rows[deed][name], rows["nothing"][name])
+    assert any(NAMES[deed] in note and "rude" in note for note in done.statistics["notes"])
+    assert 1.0 + 2.0**-53 == 1.0  # and this process rounds to nearest
+    assert 5e-324 * 1.0 > 0.0
+
+
+@pytest.mark.parametrize("deed", ["hang", "exit", "crash"])
+@pytest.mark.parametrize("stage", ["terminate", "free"])
+def test_an_fmu_that_does_not_come_back_when_it_is_closed_costs_a_note_and_no_row(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], deed: str, stage: str
+) -> None:
+    fmu = rude_fmu(folder, 2, deed, stage)
+    scenario = scenario_of(tmp_path / "late.toml", ONE.format(fmu=fmu, more=""))
+    assert call("run", scenario, "--out", tmp_path / "out", "--call-timeout", 0.5) == 0
+    recording = Recording.read(tmp_path / "out" / "recording.parquet", required=())
+    assert (len(recording), recording.origin["complete"]) == (3, True)
+    (note,) = json.loads((tmp_path / "out" / "run.json").read_text())["notes"]
+    assert note.startswith(f"a ({fmu}) ")
+    assert "while it was closed" in note
+    assert note.endswith("The recording is complete.")
+    assert note in capsys.readouterr().err
+
+
+def test_rows_before_a_failure_are_kept_though_the_fmu_does_not_come_back_when_it_is_closed(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    fmu = rude_fmu(folder, 2, "hang", "free")
+    more = f"parameters = {{ deed = {DEEDS.index('fail')}, stage = {STAGES.index('step')} }}"
+    scenario = scenario_of(tmp_path / "late.toml", ONE.format(fmu=fmu, more=more))
+    assert call("run", scenario, "--out", tmp_path / "out", "--call-timeout", 0.5) == 2
+    said = capsys.readouterr().err
+    assert "a returned an error at tick 0 (0 s)" in said
+    assert f"what was recorded until then is in {tmp_path / 'out' / 'recording.parquet'}" in said
+    assert read_table(tmp_path / "out" / "recording.parquet").num_rows == 1
+
+
+@pytest.mark.parametrize("option", ["--isolate", "--no-isolate"])
+def test_an_fmu_that_leaves_a_thread_keeps_its_library(folder: Path, tmp_path: Path, option: str) -> None:
+    fmu = rude_fmu(folder, 2, "thread", "initialise")
+    scenario = scenario_of(tmp_path / "thread.toml", ONE.format(fmu=fmu, more=""))
+    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out"), option]
+    done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert f"a ({fmu.name}) left 1 thread running; its library stays loaded." in done.stderr
+    assert len(Recording.read(tmp_path / "out" / "recording.parquet", required=())) == 3
+
+
+def test_an_isolated_fmu_that_reads_its_standard_input_finds_nothing(folder: Path, tmp_path: Path) -> None:
+    fmu = rude_fmu(folder, 2, "read", "step")
+    scenario = scenario_of(tmp_path / "read.toml", ONE.format(fmu=fmu, more=""))
+    assert call("run", scenario, "--out", tmp_path / "out", "--call-timeout", 5) == 0
+    assert len(Recording.read(tmp_path / "out" / "recording.parquet", required=())) == 3
+
+
+def test_a_function_that_changes_the_process_is_named_too(tmp_path: Path) -> None:
+    (tmp_path / "moves.py").write_text("import os\ndef moves(t):\n    os.chdir('/')\n    return {'y': t}\n")
+    text = ONE.replace('fmu = "{fmu}"', 'python = "moves.py:moves"\ninputs = {{}}\noutputs = {{ y = "s" }}')
+    scenario = scenario_of(tmp_path / "function.toml", text.replace("a.third", "a.y").format(more=""))
+    (answer,) = probed(scenario)
+    assert answer["changed"] == []
+    assert "a (moves.py:moves) changed the working directory; restored." in answer["notes"]
+
+
+@pytest.mark.parametrize("option", ["--isolate", "--no-isolate"])
+def test_a_recording_lies_where_out_says_though_an_fmu_changes_the_working_directory(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, option: str
+) -> None:
+    for stage in ("setup", "step", "free"):
+        fmu = rude_fmu(folder, 2, "directory", stage)
+        scenario_of(tmp_path / "moves.toml", ONE.format(fmu=fmu, more=""))
+        monkeypatch.chdir(tmp_path)
+        assert call("run", "moves.toml", "--out", stage, option) == 0
+        made = sorted(str(one.relative_to(tmp_path)) for one in (tmp_path / stage).iterdir())
+        assert made == [f"{stage}/{name}" for name in ("recording.parquet", "run.html", "run.json")]
