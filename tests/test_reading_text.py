@@ -98,7 +98,8 @@ def test_a_table_is_read_as_it_was_meant(tmp_path: Path, how: str) -> None:
 def test_a_set_point_is_found_where_names_have_to_be_read(tmp_path: Path) -> None:
     recording = Recording.read(written(tmp_path / "run.csv", READ["names that say command and actual"][0]))
     np.testing.assert_allclose(recording["q_d"], 2 * Q, atol=1e-8)
-    (note,) = recording.notes
+    note, repeated = recording.notes
+    assert repeated.endswith("were left out: torque_act.")
     assert 'tau = "torque_cmd", q = "pos_act", q_d = "pos_cmd"; --columns says it otherwise.' in note
 
 

@@ -10,7 +10,9 @@ from pathlib import Path
 from cosim.data.binary import hdf5, matlab, mcap, mdf, numpy_files, parquet, ros1, rosbag
 from cosim.data.columns import ORIGIN_KEY, UNIT_KEY, Columns
 from cosim.data.limits import LIMIT, reading, short
+from cosim.data.long_form import in_columns
 from cosim.data.text import json_records
+from cosim.data.text.own_times import parted
 from cosim.data.text.reader import read_text
 from cosim.support.errors import CosimError, RecordingError
 
@@ -55,6 +57,7 @@ def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns
         with reading(path, (layout or {}).get(LIMIT, "")):
             stated = {key: text for key, text in (layout or {}).items() if key != LIMIT}
             columns = read_text(path, stated) if reader is read_text else reader(path)
+            columns = in_columns(path, parted(path, columns))
     except CosimError:
         raise
     except Exception as error:  # every reader has its own exceptions; each means the same to the user

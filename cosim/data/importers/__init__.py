@@ -4,11 +4,11 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from cosim.data.columns import Columns
-from cosim.data.importers import halscope, phd2, twincat
+from cosim.data.importers import epics, halscope, phd2, twincat
 
 Importer = Callable[[Path, bytes, Sequence[str]], Columns]
 """From the path, the whole text and its first lines to columns."""
-IMPORTERS = (twincat, halscope, phd2)
+IMPORTERS = (twincat, halscope, phd2, epics)
 
 
 def importer_of(lines: Sequence[str]) -> Importer | None:

@@ -13,7 +13,7 @@ from pyarrow import csv
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, short
 from cosim.data.text.cleaning import without_comments
-from cosim.data.text.header import CLOCK_FORMAT, NO_UNIT
+from cosim.data.text.header import CLOCK_FORMAT, LABEL, NO_UNIT
 from cosim.data.text.layout import MANY_SHORT, Layout
 from cosim.data.text.names import split_unit
 from cosim.data.text.unit_words import contradict, is_unit, spelled
@@ -209,7 +209,8 @@ def names_of(layout: Layout) -> tuple[list[str], dict[str, str], Contradictions]
 def _stated(names: Sequence[str], texts: Sequence[str]) -> dict[str, str]:
     """Return units by the names of their columns; one that is not known is kept, so that it is asked for."""
     rows = {name: text.strip("[]() ") for name, text in zip(names, texts, strict=False)}
-    return {name: spelled(text) for name, text in rows.items() if text.lower() not in NO_UNIT and not _is_clock(text)}
+    said = {name: text for name, text in rows.items() if text.lower() not in NO_UNIT and not LABEL.search(text.lower())}
+    return {name: spelled(text) for name, text in said.items() if not _is_clock(text)}
 
 
 def _is_clock(text: str) -> bool:

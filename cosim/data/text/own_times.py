@@ -1,0 +1,88 @@
+"""Tables whose channels have times of their own: several columns of time, each in front of the channels it belongs to.
+
+    Time [s]; Torque; Time [s]; Position        NI and LabVIEW; also Time 1, Torque, Time 2, Position
+
+A column of time begins a group, which may end before the others do. Where all of them are alike, they are one time.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from cosim.data.assign import units_stated
+from cosim.data.columns import Columns
+from cosim.data.roles import is_named
+from cosim.data.times import read_clock
+from cosim.support.errors import RecordingError, UndecidedError
+from cosim.support.units import unit
+
+NUMBER = re.compile(r"\s*\(#\d+\)$")
+"""What tells apart columns of one name."""
+AXES = ("x", "x_value", "channel name", "relative time")
+"""Names that tools give to the times of a channel, in small letters; any other name says that it is a time."""
+
+
+def parted(path: Path, found: Columns) -> Columns:
+    """Return a table with its channels on clocks of their own, if several columns of it are times; else as it is.
+
+    Raises:
+        RecordingError: what the times count is not stated and cannot be known.
+    """
+    names = [*found.values]
+    starts = [place for place, name in enumerate(names) if _is_time(found, name)]
+    groups = list(pairwise([*starts, len(names)]))
+    if found.clocks or len(starts) < 2 or starts[0] or any(end - start < 2 for start, end in groups):
+        return found
+    times = [found.values[names[start]] for start in starts]
+    if all(np.array_equal(times[0], other, equal_nan=True) for other in times[1:]):
+        return _of_one_time(found, names, starts)
+    values: dict[str, np.ndarray] = {}
+    clocks: dict[str, np.ndarray] = {}
+    for start, end in groups:
+        clock = seconds(path, found, names[start])
+        there = np.isfinite(clock)
+        for name in names[start + 1 : end]:
+            values[name], clocks[name] = found.values[name][there], clock[there]
+    units = {name: text for name, text in found.units.items() if name in values}
+    return replace(found, values=values, units=units, clocks=clocks)
+
+
+def _of_one_time(found: Columns, names: Sequence[str], starts: Sequence[int]) -> Columns:
+    """Keep the first of several columns of time that are alike, under the name that it has without its number."""
+    others = {names[start] for start in starts[1:]}
+    bare = {names[starts[0]]: NUMBER.sub("", names[starts[0]])}
+    values = {bare.get(name, name): column for name, column in found.values.items() if name not in others}
+    units = {bare.get(name, name): text for name, text in found.units.items() if name not in others}
+    return replace(found, values=values, units=units)
+
+
+def _is_time(found: Columns, name: str) -> bool:
+    """Whether a column is named as a time and grows as far as it goes."""
+    column, bare = found.values[name], NUMBER.sub("", name)
+    named = bare.lower() in AXES or is_named(bare, "time")
+    if not named or column.dtype.kind not in "fi":
+        return False
+    valid = column[np.isfinite(column)]
+    return len(valid) > 1 and bool(np.all(np.diff(valid) > 0))
+
+
+def seconds(path: Path, found: Columns, name: str) -> np.ndarray:
+    """Return a column of time in seconds; NaN where it has ended.
+
+    Raises:
+        RecordingError: what it counts is not stated and cannot be known from its rate.
+    """
+    column = found.values[name]
+    try:
+        clock = read_clock(path, column, NUMBER.sub("", name), units_stated(found, name, "t"), servo=True)
+    except UndecidedError as error:
+        text = f"{error} Of a file whose channels have times of their own, write the unit into the name: Time [ms]."
+        raise RecordingError(text, culprit=str(path), value=name) from error
+    if clock.values.dtype == object:
+        text = f'{path}: column "{name}" holds no times: {str(column[0])[:40]!r}.'
+        raise RecordingError(text, culprit=str(path), value=name)
+    return np.asarray(clock.values * (unit(clock.unit).factor if clock.unit else 1.0), dtype=np.float64)
