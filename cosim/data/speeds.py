@@ -74,7 +74,9 @@ def with_speed(path: Path, found: Columns, served: Assigned, given: Mapping[str,
     Raises:
         UndecidedError: the speed says that a stated unit of time, position or speed is wrong.
     """
-    if not ("q" in served.values and _is_numeric(served.values["q"]) and len(served.values["q"]) >= LEAST):
+    if "t" not in served.values or not (
+        "q" in served.values and _is_numeric(served.values["q"]) and len(served.values["q"]) >= LEAST
+    ):
         return served
     named = [name for name in served.values if name == "v" or (name not in OURS and _may_be_speed(found, name))]
     speeds = [one for name in named if (one := _speed(path, found, served, name)) and one.is_own]

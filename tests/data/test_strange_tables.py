@@ -67,6 +67,12 @@ READ = {
     "thousandths of a degree": ("t,torque,position [0.001°]\n" + rows(LONG, TAUL, 1e3 * DEG * QL), S),
     "mN.m behind a blank": ("t,torque mNm,position rad\n" + rows(LONG, 1e3 * TAUL, QL), S),
     "mN.m in a second row": ("t,tau,q\ns,mN·m,mrad\n" + rows(LONG, 1e3 * TAUL, 1e3 * QL), S),
+    "thousandths whose unit has a capital": ("t,tau,pos_mDeg\n" + rows(LONG, TAUL, 1e3 * DEG * QL), S),
+    "thousandths of German degrees": (
+        "Zeit (sek.);Drehmoment (mNm);Winkel (mGrad)\n" + rows(LONG, 1e3 * TAUL, 1e3 * DEG * QL, separator=";"),
+        S,
+    ),
+    "a position beside its slope": ("time,effort,theta1,theta1_dot\n" + rows(*S, VL), S),
     "microradians": ("t,tau,angle_urad\n" + rows(LONG, TAUL, 1e6 * QL), S),
     # names
     "names with blanks, parted by two": ("time   motor torque   encoder position\n" + rows(*S, separator=" "), S),
@@ -181,6 +187,15 @@ ASKED = {
     "a q-axis current and no position": (
         "t,torque,Iq,Vq,psi_q\n" + rows(LONG, TAUL, QL, QL, QL),
         "has no column q or v; it has: t, tau, Iq, Vq, psi_q. Name it with --columns q=...",
+    ),
+    "a unit that is not known in brackets behind one that is": (
+        "t,tau,Winkel (kGrad)\n" + rows(*S),
+        '"kGrad" of column "Winkel (kGrad)" is no unit known here',
+    ),
+    "no time": (
+        "%timestep (500Hz),torque,position,velocity\n" + rows(np.arange(1500.0), TAUL, QL, VL),
+        "has no column t; it has: timestep, tau, q, velocity. Name it with --columns t=... (for example --columns "
+        "t=timestep)",
     ),
     "counts in a second row": (
         "t,tau,q\ns,Nm,inc\n" + rows(LONG, TAUL, np.rint(1e4 * QL)),

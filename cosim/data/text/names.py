@@ -24,6 +24,8 @@ ENDINGS = re.compile(
     r"(?:.*?)[a-zäöü0-9)_.\s-]((?:[mkunµ]?N\.?m+)|(?:[mkunµ]?N[.·*]m)|rad/s|deg/s|°/s|°|1/min|min-1|U/min|mA|mN)"
 )
 """Units that stand at the end of a name without a sign between, `torqueNm`, or hold a sign that parts words."""
+PREFIXES = ("m", "u", "n", "k", "µ")
+"""Prefixes that may be glued to a unit which begins with a capital."""
 LONGEST = 3
 """Words of the longest unit at the end of a name: `vel_deg_per_s`."""
 LETTERS = {"t": ("s",), "tau": ("N", "V"), "v": ("V",), "q": ("V",), "q_d": ("V",), "temperature": ("C", "F", "K")}
@@ -74,6 +76,10 @@ def unit_of_name(name: str, role: str = "") -> str:
             of a time is its unit; empty for any other column.
     """
     whole = split_unit(name)[1]
+    if not is_unit(whole) and (enclosed := bracketed(name)) and not is_unit(enclosed):
+        return (
+            _of_time(name) if role == "t" else ""
+        )  # what stands in brackets and is not known is asked for: `Winkel (kGrad)` is not in degrees
     text = whole if is_unit(whole) else suffixed_unit(name, role)
     return text or (_of_time(name) if role == "t" else "")
 
@@ -88,6 +94,9 @@ def suffixed_unit(name: str, role: str = "") -> str:
     if (found := ENDINGS.fullmatch(name)) and is_unit(found[1]):
         return spelled(found[1])
     parts = PARTS.findall(name)
+    if len(parts) > 1 and parts[-2] in PREFIXES and name.endswith(parts[-2] + parts[-1]):
+        text = f"{parts[-2]}{parts[-1].lower()}"  # `pos_mDeg`: thousandths, not degrees
+        return spelled(text) if is_unit(text) else ""
     for count in range(min(LONGEST, len(parts)), 0, -1):
         text = _joined(parts[-count:])
         if text and is_unit(text) and _is_certain(text, len(parts) == count, role):

@@ -19,7 +19,7 @@ WORDS = {
     "minute": "min", "minutes": "min", "hour": "h", "hours": "h", "hrs": "h",
     "degree": "deg", "degrees": "deg", "degs": "deg", "grad": "deg", "gon": "0.9 deg",
     "mdeg": "0.001 deg", "millideg": "0.001 deg", "millidegree": "0.001 deg", "millidegrees": "0.001 deg",
-    "udeg": "1e-06 deg",
+    "udeg": "1e-06 deg", "mgrad": "0.001 deg", "milligrad": "0.001 deg",
     "radian": "rad", "radians": "rad", "rads": "rad", "milliradian": "mrad", "milliradians": "mrad",
     "microrad": "urad", "microradian": "urad", "microradians": "urad",
     "\N{PRIME}": "arcmin", "'": "arcmin", "\N{DOUBLE PRIME}": "arcsec", '"': "arcsec",
@@ -76,7 +76,7 @@ NUMBERED = re.compile(r"(?:10(-\d+)|1/(10+)(?= ?[^\d\s])|([\d.]+(?:[eE][+-]?\d+)
 def spelled(text: str) -> str:
     """Return a unit as it is written here, or the text itself where it is no unit that is known."""
     text = text.strip()
-    plain = text
+    plain = text.rstrip(".") or text
     for sign, other in SIGNS.items():
         plain = plain.replace(sign, other)
     return _spelled(INVERSE.sub(r"\1/s", plain.replace("^", ""))) or text
