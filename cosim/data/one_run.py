@@ -16,6 +16,7 @@ from cosim.data.limits import listed, short
 from cosim.data.order import in_order
 from cosim.data.runs import equal, split, starts, text_of
 from cosim.data.spacing import with_time
+from cosim.data.sparse import filled
 from cosim.data.times import read_clock
 from cosim.support.errors import RecordingError
 from cosim.support.numbers import whole
@@ -58,7 +59,7 @@ def timed(
 ) -> Columns:
     """Return all rows of a table or file, as `rows_of_one` does of one recording of it."""
     found = with_time(on_one_time(path, found, columns, units, required), layout)
-    return in_order(path, found, columns, units, required)
+    return in_order(path, filled(path, found, columns, units, required), columns, units, required)
 
 
 def one_run(path: Path, found: Columns, columns: Mapping[str, str], units: Mapping[str, str]) -> Columns:

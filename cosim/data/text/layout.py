@@ -38,6 +38,8 @@ MANY_SHORT = 0.02
 """Share of rows that lack the last column beyond which it is one that is not always written."""
 SAMPLES = 50
 """Samples that tell what columns hold: whether one numbers the rows, and which grows."""
+FILLED = 0.75
+"""Share of the fullest column's values from which on a column tells samples: a row may hold some channels only."""
 NAMED = 1.5
 """Advantage of a dialect in which a line of as many words names the columns."""
 
@@ -146,8 +148,8 @@ def _labels(preamble: Sequence[list[str]], count: int) -> tuple[str, ...]:
 def _first(rows: Sequence[list[str]], values: Sequence[list[bool]], body: Sequence[int]) -> int:
     """Return the first line that has values where most lines have them, and is followed by such lines."""
     width = min(len(values[index]) for index in body)
-    usual = [sum(values[index][place] for index in body) > len(body) / 2 for place in range(width)]
-    places = [place for place, often in enumerate(usual) if often]
+    often = [sum(values[index][place] for index in body) for place in range(width)]
+    places = [place for place, count in enumerate(often) if count > FILLED * max(often)]
     full = {index for index in body if sum(values[index][place] for place in places) > len(places) / 2}
     written = [index for index, row in enumerate(rows) if any(row)]
     for start, index in enumerate(written):
