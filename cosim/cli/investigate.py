@@ -1,6 +1,7 @@
 """`cosim investigate`: record, diagnose, and run the motions that decide what is open, until one answer is left."""
 
 import re
+from math import inf
 from pathlib import Path
 from typing import Annotated
 
@@ -75,6 +76,6 @@ def seconds_of(text: str) -> float:
     """
     found = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(s|min|h)?", text.strip())
     value = float(found[1]) * {"s": 1, "min": 60, "h": 3600}[found[2] or "s"] if found else 0.0
-    if value <= 0:
+    if not 0 < value < inf:
         raise InputError(f"--budget {text}: it is a time above 0, as 300s or 5min.", culprit="--budget", value=text)
     return value

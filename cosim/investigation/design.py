@@ -33,6 +33,7 @@ from cosim.investigation.limits import KEPT, Limits
 from cosim.investigation.motions import FADE, JERK, Motion, Room
 from cosim.investigation.questions import Duel
 from pyfmi_models.effects.base import TonalEffect
+from pyfmi_models.mount import Mount
 
 ENOUGH = 10.0
 """Nats at which a question counts as settled: more for one is not worth less for another (odds of 20 000)."""
@@ -161,11 +162,21 @@ def spare(known: Prepared, piece: Piece, rms: float) -> Array:
 
 def torque_asked(motion: Motion, home: float, piece: Piece, ours: Fit, known: Prepared) -> Array:
     """Torque of a motion as it is asked, and what is to be left over: a low-pass takes a quarter of a move of 50 ms."""
+    asked = _as_asked(motion, home)
+    return np.asarray(np.abs(torque_of(ours, asked)) + np.interp(asked.t, piece.t, spare(known, piece, ours.rms)))
+
+
+def torque_predicted(motion: Motion, home: float, mount: Mount) -> Array:
+    """Torque of a motion as it is asked, by a card alone, as long as nothing was recorded."""
+    return _of_mount(mount, _as_asked(motion, home))
+
+
+def _as_asked(motion: Motion, home: float) -> Piece:
+    """A motion without a low-pass, in steps that show its ramps."""
     rate = RAMP * JERK
     t: Array = np.arange(0.0, motion.seconds, 1 / rate)
     q, v, a = motion.sampled(t)
-    asked = Piece(0, t, q + home, v, a, np.zeros_like(t), np.ones(len(t), bool), 1 / rate, rate / 4, 1)
-    return np.asarray(np.abs(torque_of(ours, asked)) + np.interp(t, piece.t, spare(known, piece, ours.rms)))
+    return Piece(0, t, q + home, v, a, np.zeros_like(t), np.ones(len(t), bool), 1 / rate, rate / 4, 1)
 
 
 def _top(known: Prepared, name: str) -> float:
@@ -211,7 +222,11 @@ def piece_of(motion: Motion, home: float, cutoff: float, limits: Limits) -> tupl
 
 def torque_of(fit: Fit, piece: Piece) -> Array:
     """Torque that a fitted structure needs for a motion; what shakes the axis in any phase."""
-    mount, tones = fit.mount, [one for one in fit.mount.effects if isinstance(one, TonalEffect)]
+    return _of_mount(fit.mount, piece)
+
+
+def _of_mount(mount: Mount, piece: Piece) -> Array:
+    tones = [one for one in mount.effects if isinstance(one, TonalEffect)]
     still = replace(mount, effects=tuple(one for one in mount.effects if not isinstance(one, TonalEffect)))
     torque = Inverse(still, ()).torque(piece, np.zeros(0))[0]
     for hertz, size in (one.wave() for one in tones):
@@ -270,4 +285,7 @@ def _noise(residual: Array) -> float:
     return max(power * correlation, 1e-300)
 
 
-__all__ = ["Plan", "Rated", "Refusal", "allowed", "beside_random", "best", "piece_of", "plans", "torque_of"]
+__all__ = [
+    *("Plan", "Rated", "Refusal", "allowed", "beside_random", "best", "piece_of", "plans", "torque_of"),
+    "torque_predicted",
+]

@@ -6,7 +6,7 @@ have without an investigation. rad, rad/s, rad/s2, N m (m, N on a linear axis), 
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from math import ceil, floor, log10
+from math import ceil, floor, isfinite, log10
 
 import numpy as np
 
@@ -21,6 +21,10 @@ SLACK = 1e-9
 """Relative excess that is rounding. Unit: 1."""
 SMOOTH_HZ = 30.0
 """Cutoff in front of the speed that is judged in a recording [Hz], as in the proof's protocol."""
+SMALLEST, LARGEST = 1e-12, 1e12
+"""What a limit that is given may be, in SI: no axis is beyond, and numbers far beyond overflow."""
+TONAL = 0.01
+"""Share of the energy of an acceleration that lies above a frequency, or in a band, before it counts. Unit: 1."""
 NAMES = ("position", "speed", "acceleration", "torque", "frequency", "forbidden")
 
 
@@ -39,13 +43,19 @@ class Limits:
     """Band [Hz] in which no tone may lie, such as about a resonance; from 0 to 0 there is none."""
 
     @classmethod
-    def visited(cls, motion: tuple[Array, Array, Array], torque: float, bandwidth: float | None) -> "Limits":
-        """What a set point (position, speed, acceleration) asks for; `bandwidth` of its loop [Hz], if it is known."""
+    def visited(
+        cls, motion: tuple[Array, Array, Array], torque: float, bandwidth: float | None, frequency: float = 0.0
+    ) -> "Limits":
+        """What a set point (position, speed, acceleration) asks for.
+
+        `bandwidth` of its loop [Hz], if it is known; `frequency` of the set point itself [Hz], by `frequency_of`.
+        """
         q, v, a = motion
         speed, acceleration = (float(np.abs(one).max()) / KEPT for one in (v, a))
         middle, half = (q.max() + q.min()) / 2, (q.max() - q.min()) / 2 / KEPT
         own = acceleration / (2 * np.pi * max(speed, 1e-300))
-        return cls(float(middle - half), float(middle + half), speed, acceleration, torque, bandwidth or 10 * own)
+        highest = max(bandwidth or 10 * own, frequency / KEPT)
+        return cls(float(middle - half), float(middle + half), speed, acceleration, torque, highest)
 
     def with_given(self, given: Mapping[str, str]) -> "Limits":
         """The same with numbers in the place of some: {"position": "-0.5:0.5", "speed": "0.2", "forbidden": "12:15"}.
@@ -72,6 +82,17 @@ class Limits:
         moving = (_high("speed", self.speed, np.abs(v)), _high("acceleration", self.acceleration, np.abs(a)))
         return next(filter(None, (*within, *moving)), "")
 
+    def left_by_tones(self, v: Array, a: Array, dt: float) -> str:
+        """Whether a motion that was not designed is faster than tones may be, or has one in the forbidden band."""
+        fastest = frequency_of(v, a, dt)
+        if fastest > self.frequency * (1 + SLACK):
+            return f"frequency {fastest:.4g} beyond {self.frequency:.4g}"
+        hertz, energy = _spectrum(a, dt)
+        inside = (hertz >= self.forbidden_from) & (hertz <= self.forbidden_to) & (self.forbidden_to > 0)
+        if energy[inside].sum() > TONAL * energy.sum():
+            return f"forbidden band of {self.forbidden_from:g} to {self.forbidden_to:g} Hz, in which a part of it lies"
+        return ""
+
     def left_in(self, recording: Recording) -> str:
         """The first limit that a recorded motion has left, in words; "" where it has left none."""
         tau, q, speed = recording["tau"], recording["q"], np.abs(_speed(recording))
@@ -81,8 +102,12 @@ class Limits:
     def that_allow(self, recording: Recording) -> str:
         """Limits that allow what was recorded, as `--limits` takes them, in two digits: "speed=0.25 torque=12"."""
         most = {"speed": np.abs(_speed(recording)).max(), "torque": np.abs(recording["tau"]).max()}
+        return self.allowing(recording["q"], most)
+
+    def allowing(self, q: Array, most: Mapping[str, float]) -> str:
+        """Limits that allow positions, and the most of what is limited otherwise by name, as `--limits` takes them."""
         found = [f"{name}={_up(value / KEPT):g}" for name, value in most.items() if value > getattr(self, name)]
-        low, high = float(recording["q"].min()), float(recording["q"].max())
+        low, high = float(q.min()), float(q.max())
         if low < self.low or high > self.high:
             middle, half = (low + high) / 2, (high - low) / 2 / KEPT
             found.append(f"position={-_up(half - middle):g}:{_up(half + middle):g}")
@@ -120,17 +145,42 @@ def _low(name: str, limit: float, values: Array) -> str:
     return f"{name} {least:.4g} beyond {limit:.4g}" if least < limit - SLACK * abs(limit) else ""
 
 
+def frequency_of(v: Array, a: Array, dt: float) -> float:
+    """The frequency of a motion [Hz]: of a tone its own, of other motions where nearly all of its acceleration ends.
+
+    That of the sine with its top speed and acceleration, or the one above which a hundredth of the energy of the
+    acceleration lies, less what the length of the motion blurs it by.
+    """
+    top = float(np.abs(a).max()) / (2 * np.pi * max(float(np.abs(v).max()), 1e-300))
+    hertz, energy = _spectrum(a, dt)
+    total = np.cumsum(energy)
+    ends = float(hertz[np.searchsorted(total, (1 - TONAL) * total[-1])]) if total[-1] > 0 else 0.0
+    return max(top, ends - 1.5 / (dt * len(a)))
+
+
+def _spectrum(a: Array, dt: float) -> tuple[Array, Array]:
+    """Frequencies [Hz] and the energy of an acceleration at each, between a rise and a fall."""
+    return np.fft.rfftfreq(len(a), dt), np.abs(np.fft.rfft(a * np.hanning(len(a)))) ** 2
+
+
 def _numbers(name: str, text: str) -> dict[str, float]:
     rule = "a limit is position=LOW:HIGH, forbidden=FROM:TO (Hz), or a number above 0 for " + ", ".join(NAMES[1:-1])
     try:
-        if name in ("position", "forbidden"):
-            low, high = (float(one) for one in text.split(":"))
-            if name == "position" and low < high:
+        numbers = [float(one) for one in str(text).split(":")]
+        if not all(map(isfinite, numbers)):
+            rule = f"a limit is a finite number, from {SMALLEST:g} to {LARGEST:g}"
+        elif name in ("position", "forbidden"):
+            low, high = numbers
+            if low < high and not (high - low >= SMALLEST and max(abs(low), abs(high)) <= LARGEST):
+                rule = f"its ends are at most {LARGEST:g} and at least {SMALLEST:g} apart"
+            elif name == "position" and low < high:
                 return {"low": low, "high": high}
-            if name == "forbidden" and 0 < low < high:
+            elif name == "forbidden" and 0 < low < high:
                 return {"forbidden_from": low, "forbidden_to": high}
-        elif name in NAMES and float(text) > 0:
-            return {name: float(text)}
+        elif name in NAMES and len(numbers) == 1 and numbers[0] > 0:
+            if SMALLEST <= numbers[0] <= LARGEST:
+                return {name: numbers[0]}
+            rule = f"a limit is a finite number, from {SMALLEST:g} to {LARGEST:g}"
     except ValueError:
         pass
     raise InputError(f"--limits {name}={text}: {rule}.", culprit=name, value=text, choices=NAMES)

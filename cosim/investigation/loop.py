@@ -9,15 +9,28 @@ from dataclasses import dataclass, field, replace
 from time import perf_counter
 from typing import Literal
 
+import numpy as np
+
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.diagnose import diagnose as find
 from cosim.diagnosis.result import Diagnosis
 from cosim.estimation.fit import Fit
 from cosim.estimation.problem import Problem
-from cosim.investigation.design import Plan, Rated, allowed, beside_random, best, pieces_of, plans, shown_by_motion
+from cosim.investigation.design import (
+    SMALLER,
+    Plan,
+    Rated,
+    allowed,
+    beside_random,
+    best,
+    pieces_of,
+    plans,
+    shown_by_motion,
+    torque_predicted,
+)
 from cosim.investigation.families import FAMILIES, multisine, tone
-from cosim.investigation.limits import Limits
+from cosim.investigation.limits import Limits, frequency_of
 from cosim.investigation.log import Log
 from cosim.investigation.machine import Machine
 from cosim.investigation.motions import Motion, Room, room_of
@@ -27,6 +40,8 @@ from cosim.support.errors import InputError
 from pyfmi_models.card import Card
 from pyfmi_models.effects import CATALOGUE
 
+ROUNDING = 1e-6
+"""Seconds by which sums of times may differ."""
 SHORTEST = 8.0
 """Seconds that a motion must last, or it is not worth starting: the diagnosis leaves 3.5 s of a recording out."""
 ROLES: tuple[Literal["train", "heldout"], ...] = ("train", "heldout")
@@ -67,16 +82,46 @@ class Investigation:
             self.recordings = {"train": [*train], "heldout": [*heldout]}
             return
         lasts = max(min(self.settings.seconds, own.seconds if own else self.settings.seconds), SHORTEST)
-        if self.settings.budget < 2 * lasts:
-            text = f"--budget {self.settings.budget:g}s: the first two motions last {2 * lasts:g} s; give more"
-            raise InputError(f"{text}, or recordings to go on from.", culprit="--budget", value=self.settings.budget)
         room = self._room(lasts, False)
-        for role, motion in zip(ROLES, (own or tone(room), multisine(room)), strict=True):
+        if own and (left := self._would_leave(own, False)):
+            raise InputError(f"The first motion, {own.title}, would leave a limit: {left}", culprit=left)
+        motions = own or self._first(tone, room), self._first(multisine, room)
+        needed = sum(motion.seconds for motion in motions)
+        if self.settings.budget < needed - ROUNDING:
+            text = f"--budget {self.settings.budget:g}s: the first two motions last {needed:g} s"
+            text += f", {own.seconds:g} s of them {own.title}" if own else ""
+            rule = "give more, or recordings to go on from"
+            raise InputError(f"{text}; {rule}.", culprit="--budget", value=self.settings.budget)
+        for role, motion in zip(ROLES, motions, strict=True):
             number = len(self.steps)
             known = self.log.moved(number)
             left = self.add(known, self.log.read(known), False) if known else self.run(motion, number, role)
             if left:
                 raise InputError(self._refusal(motion, left, motion is own), culprit=left)
+
+    def _first(self, family: Callable[[Room], Motion], room: Room) -> Motion:
+        """The largest motion of a family that leaves no limit by what the card says (InputError: there is none)."""
+        for share, way in SMALLER:
+            motion = family(room.slower(share).nearer(way))
+            left = self._would_leave(motion, True)
+            if not left:
+                return motion
+        raise InputError(f"Even a small first motion, {motion.title}, would leave a limit: {left}", culprit=left)
+
+    def _would_leave(self, motion: Motion, is_designed: bool) -> str:
+        """The limit that a motion would leave, by itself or with the torque that the card says, and what allows it."""
+        limits, dt = self.limits, min(0.002, motion.seconds / 64)
+        q, v, a = motion.sampled(np.arange(0.0, motion.seconds, dt))
+        q = q + self.machine.home
+        torque = np.abs(torque_predicted(motion, self.machine.home, self.card.plant()))
+        tones = "" if is_designed else limits.left_by_tones(v, a, dt)
+        left = limits.left_by(q, v, a) or tones or limits.torque_left(torque)
+        if not left:
+            return ""
+        most = {"speed": np.abs(v).max(), "acceleration": np.abs(a).max(), "torque": torque.max()}
+        most |= {} if is_designed else {"frequency": frequency_of(v, a, dt)}
+        allowing = limits.allowing(q, most)
+        return f"{left}; --limits {allowing} would allow it." if allowing else f"{left}; give another set point."
 
     def _refusal(self, motion: Motion, left: str, is_own: bool) -> str:
         """Say that a first recording has left a limit, and of the scenario's own motion which option lets it run."""
@@ -206,7 +251,14 @@ class Investigation:
         return None
 
     def run(self, motion: Motion, number: int, role: Literal["train", "heldout"], plan: Plan | None = None) -> str:
-        """Run a motion, of a plan or the first ones, and keep its recording; the limit that it left."""
+        """Run a motion, of a plan or the first ones, and keep its recording; the limit that it left.
+
+        Raises:
+            InputError: it would pass the budget.
+        """
+        if self._spent() + motion.seconds > self.settings.budget + ROUNDING:
+            text = f"{motion.title} of {motion.seconds:g} s would pass the budget of {self.settings.budget:g} s."
+            raise InputError(text[0].upper() + text[1:], culprit="--budget", value=self.settings.budget)
         path = self.log.path(number, motion.family)
         self.on_progress(f"moving: {motion.title}")
         recording = self.machine.record(motion, number, path)

@@ -22,6 +22,8 @@ JERK = 20.0
 """Jerk, as accelerations a second [1/s]: a move reaches its acceleration in 50 ms."""
 BELOW = 0.95
 """A tone that would lie in the forbidden band lies at this share of its lower end: one that swells is a little wide."""
+SUDDEN = 1e-3
+"""Seconds in which full speed is reached at least: more acceleration than that is not used."""
 FADE = 1.5
 """Seconds in which tones swell and fade, and rests at both ends of a programme [s]."""
 
@@ -195,4 +197,5 @@ def room_of(limits: Limits, home: float, seconds: float, seed: int, turned: bool
     first, second = ends if turned else ends[::-1]
     usable = KEPT * limits.frequency
     band = limits.forbidden_from, limits.forbidden_to
-    return Room(first, second, KEPT * limits.speed, KEPT * limits.acceleration, usable, seconds, seed, band)
+    acceleration = min(KEPT * limits.acceleration, KEPT * limits.speed / SUDDEN)
+    return Room(first, second, KEPT * limits.speed, acceleration, usable, seconds, seed, band)

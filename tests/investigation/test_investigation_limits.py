@@ -1,0 +1,113 @@
+"""Limits and budget of an investigation hold before anything moves, for a scenario's own motion and on a drive."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from investigations import CABLE, on_a_drive, written
+
+from cosim.api.investigate import investigate
+from cosim.cli.investigate import seconds_of
+from cosim.hardware.machine import read_machine
+from cosim.investigation.families import FAMILIES
+from cosim.investigation.limits import LARGEST, SMALLEST, Limits, frequency_of
+from cosim.investigation.motions import room_of
+from cosim.support.errors import InputError
+
+ABSURD = ("inf", "-inf", "nan", "1e308", "1e-300", "1e999", "-1", "0", "", "1:2:3", "x")
+
+
+@pytest.mark.parametrize("name", ["speed", "acceleration", "torque", "frequency"])
+@pytest.mark.parametrize("text", ABSURD)
+def test_a_limit_is_a_finite_number_that_an_axis_can_have(tmp_path: Path, name: str, text: str) -> None:
+    given = written(tmp_path)
+    with pytest.raises(InputError, match=rf"--limits {name}={text}: (a limit is|its ends)"):
+        investigate(*given[:2], tmp_path / "out", limits={name: text})
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("text", ["-inf:inf", "-1:inf", "nan:1", "0:1e-300", "-1e308:1e308", "1", ":"])
+@pytest.mark.parametrize("name", ["position", "forbidden"])
+def test_so_are_both_ends_of_a_range(tmp_path: Path, name: str, text: str) -> None:
+    with pytest.raises(InputError, match=rf"--limits {name}={text}: "):
+        investigate(*written(tmp_path)[:2], tmp_path / "out", limits={name: text})
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("limits", "said"),
+    [
+        ({"position": "-0.05:0.05"}, r"position 0\.3 beyond 0\.05; --limits position=-0\.34:0\.34 would allow it"),
+        ({"speed": "0.1"}, r"speed 0\.\d+ beyond 0\.1; --limits speed="),
+        ({"acceleration": "0.05"}, r"acceleration \d\.\d+ beyond 0\.05; --limits acceleration="),
+        ({"torque": "1.5"}, r"torque \d+\.\d+ beyond 1\.5; --limits torque="),
+        ({"frequency": "0.2"}, r"frequency 0\.\d+ beyond 0\.2; --limits frequency="),
+        ({"forbidden": "0.2:0.3"}, r"forbidden band of 0\.2 to 0\.3 Hz, in which a part of it lies"),
+    ],
+)
+def test_the_own_motion_of_a_scenario_is_asked_for_every_limit_before_it_runs(
+    tmp_path: Path, limits: dict[str, str], said: str
+) -> None:
+    given, out = written(tmp_path, CABLE), tmp_path / "out"
+    with pytest.raises(InputError, match=f"The first motion, the set point of axis, would leave a limit: {said}"):
+        investigate(*given[:2], out, machine=given[2], limits=limits, seconds=10)
+    assert not [*out.rglob("*.parquet")]
+
+
+def test_a_tone_that_no_motion_is_long_enough_for_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"frequency=1e-09: a motion of 15 s has no tone below 0\.0741 Hz"):
+        investigate(*written(tmp_path)[:2], tmp_path / "out", limits={"frequency": "1e-9"})
+
+
+def test_the_own_motion_counts_in_the_budget_for_as_long_as_it_lasts(tmp_path: Path) -> None:
+    given, out = written(tmp_path), tmp_path / "out"
+    with pytest.raises(InputError, match=r"the first two motions last 20 s, 12 s of them the set point of axis"):
+        investigate(*given[:2], out, budget=17, seconds=8)
+    assert not [*out.rglob("*.parquet")]
+
+
+@pytest.mark.parametrize("budget", [float("inf"), float("nan"), 0.0, -1.0])
+def test_a_budget_is_a_finite_time(tmp_path: Path, budget: float) -> None:
+    with pytest.raises(InputError, match="it is a time above 0"):
+        investigate(*written(tmp_path)[:2], tmp_path / "out", budget=budget)
+    with pytest.raises(InputError, match="it is a time above 0"):
+        seconds_of("9" * 400)
+
+
+@pytest.mark.parametrize("seconds", [7.9, float("nan"), float("inf"), 1e9, -8.0])
+def test_a_motion_lasts_neither_too_short_nor_for_ever(tmp_path: Path, seconds: float) -> None:
+    with pytest.raises(InputError, match="a motion lasts from 8 to 3600 s"):
+        investigate(*written(tmp_path)[:2], tmp_path / "out", seconds=seconds)
+
+
+def test_a_first_motion_on_a_drive_is_asked_for_the_torque_that_the_card_says(tmp_path: Path) -> None:
+    given, out = on_a_drive(tmp_path, CABLE), tmp_path / "out"
+    limits = {"position": "-0.35:0.35", "torque": "1.5"}
+    with pytest.raises(InputError, match=r"Even a small first motion, a sine of .*, would leave a limit: torque"):
+        investigate(*given, out, machine=read_machine("simulated"), fast=True, seconds=10, limits=limits)
+    assert not [*out.rglob("*.box")]
+
+
+def test_every_family_stays_finite_in_time_and_in_limits_however_absurd_these_are() -> None:
+    dice = np.random.default_rng(3)
+    for _ in range(12):
+        speed, acceleration, far = 10 ** dice.uniform(np.log10(SMALLEST), np.log10(LARGEST), 3)
+        limits = Limits(
+            -far * dice.random(), far * dice.random(), speed, acceleration, 1.0, 10 ** dice.uniform(-0.5, 2)
+        )
+        room = room_of(limits, 0.0, 10.0, 1, False)
+        for family in FAMILIES:
+            motion = family(room)
+            moved = motion.sampled(np.arange(0, motion.seconds, 0.01))
+            assert np.isfinite(moved).all()
+            assert limits.left_by(*moved) == ""
+            assert motion.seconds <= 10.0 + 1e-6
+
+
+@pytest.mark.parametrize("hertz", [0.25, 1.0, 5.0])
+def test_the_frequency_of_a_tone_is_its_own_and_of_two_the_higher_one(hertz: float) -> None:
+    t = np.arange(0, 12, 1e-3)
+    w = 2 * np.pi * np.array([[0.25], [hertz]])
+    sizes = np.array([[1.0], [0.3]])
+    v, a = (sizes * np.cos(w * t)).sum(0), (-sizes * w * np.sin(w * t)).sum(0)
+    assert frequency_of(v, a, 1e-3) == pytest.approx(hertz, rel=0.1)
