@@ -160,7 +160,8 @@ def frequency_of(v: Array, a: Array, dt: float) -> float:
 
 def _spectrum(a: Array, dt: float) -> tuple[Array, Array]:
     """Frequencies [Hz] and the energy of an acceleration at each, between a rise and a fall."""
-    return np.fft.rfftfreq(len(a), dt), np.abs(np.fft.rfft(a * np.hanning(len(a)))) ** 2
+    energy = np.abs(np.fft.rfft(a * np.hanning(len(a)))) ** 2
+    return np.arange(len(energy)) / (dt * len(a)), np.asarray(energy, float)
 
 
 def _numbers(name: str, text: str) -> dict[str, float]:
