@@ -11,7 +11,7 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.data.writer import StreamWriter
-from cosim.support.errors import InputError, MissingPackageError, OutputError, RecordingError, UnitError
+from cosim.support.errors import InputError, OutputError, RecordingError, UnitError
 from cosim.support.units import conversion, unit
 
 ROWS = 200
@@ -177,16 +177,6 @@ def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
         with pytest.raises(RecordingError, match=re.escape(sentence)) as caught:
             Recording.read(path)
         assert str(path) in str(caught.value)
-
-
-@pytest.mark.parametrize(("name", "package"), [("run.h5", "h5py"), ("run.mf4", "asammdf")])
-def test_a_format_whose_package_is_missing_says_how_to_get_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, package: str
-) -> None:
-    monkeypatch.setitem(__import__("sys").modules, package, None)
-    (tmp_path / name).write_text("x")
-    with pytest.raises(MissingPackageError, match=rf"needs the package {package} to be read: pip install 'mount-cosim"):
-        Recording.read(tmp_path / name)
 
 
 def test_nothing_is_overwritten_or_left_half_written(tmp_path: Path) -> None:

@@ -5,21 +5,20 @@ ROS 1 and 2. Units come along where a file states them; see `Columns`.
 """
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
-from cosim.data.binary import hdf5, matlab, mcap, mdf, numpy_files, parquet, ros1, rosbag
+from cosim.data.binary import apart, hdf5, matlab, mcap, mdf, numpy_files, parquet, ros1, rosbag
 from cosim.data.columns import ORIGIN_KEY, UNIT_KEY, Columns
-from cosim.data.limits import LIMIT, reading, short
+from cosim.data.limits import LIMIT, allowed_by, short, within
 from cosim.data.long_form import in_columns
 from cosim.data.text import json_records
 from cosim.data.text.own_times import parted
 from cosim.data.text.reader import read_text
-from cosim.support.errors import CosimError, RecordingError
+from cosim.support.errors import RecordingError
 
 __all__ = ["ORIGIN_KEY", "UNIT_KEY", "Columns", "read_columns", "suffix_of"]
 
-REASON = 200
-"""Characters of a reader's own message that are shown."""
 CONVERTED = {
     ".tdms": "a TDMS file of LabVIEW; write it as CSV with npTDMS (tdmsinfo, to_dataframe().to_csv) or DIAdem",
     ".ulg": "a log of PX4; write its topics as CSV with ulog2csv (pip install pyulog)",
@@ -53,16 +52,15 @@ def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns
     reader = _READERS.get(suffix)
     if reader is None:
         raise RecordingError(f"{path} is {_what_to_do(path, suffix)}", culprit=str(path))
-    try:
-        with reading(path, (layout or {}).get(LIMIT, "")):
-            stated = {key: text for key, text in (layout or {}).items() if key != LIMIT}
-            columns = read_text(path, stated) if reader is read_text else reader(path)
-            columns = in_columns(path, parted(path, columns))
-    except CosimError:
-        raise
-    except Exception as error:  # every reader has its own exceptions; each means the same to the user
-        reason = str(error).splitlines()[0].rstrip(".")[:REASON] if str(error).strip() else type(error).__name__
-        raise RecordingError(f"{path} cannot be read as {suffix}: {reason}.", culprit=str(path)) from error
+    stated = {key: text for key, text in (layout or {}).items() if key != LIMIT}
+    here = partial(read_text, stated=stated) if reader is read_text else reader
+
+    def read(path: Path) -> Columns:
+        columns = apart.read_apart(path, suffix, reader) if reader in _APART else here(path)
+        return in_columns(path, parted(path, columns))
+
+    with within(allowed_by(path, (layout or {}).get(LIMIT, ""))):
+        columns = apart.explained(path, suffix, read)
     if not any(len(values) for values in columns.values.values()):
         raise RecordingError(f"{path} holds no samples.", culprit=str(path))
     return columns
@@ -126,3 +124,5 @@ _READERS: dict[str, Callable[..., Columns]] = {
     ".asc": read_text,
     ".lvm": read_text,
 }
+_APART = (hdf5.read, matlab.read, mdf.read, mcap.read, ros1.read, rosbag.read)
+"""Those by libraries that may crash or hang on a damaged file."""

@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from time import thread_time
 
@@ -44,33 +44,44 @@ LARGEST = 1e30
 
 @dataclass(frozen=True)
 class Allowance:
-    """What reading one file may cost: `raised` is what `--layout limit` says, `began` the processor time [s] then."""
+    """What reading one file may cost.
+
+    Args:
+        size: bytes of the file.
+        raised: the factor that `--layout limit` says.
+        unpacked: bytes that it may unpack to.
+        seconds: time of this thread's processor that it may take.
+        began: that time when reading began [s].
+    """
 
     size: int
-    raised: int = 1
+    raised: int
+    unpacked: float
+    seconds: float
     began: float = field(default_factory=thread_time)
 
-    @property
-    def unpacked(self) -> float:
-        """Bytes that it may unpack to."""
-        return self.raised * min(UNPACKED * self._share, MOST)
-
-    @property
-    def seconds(self) -> float:
-        """Seconds of this thread's processor."""
-        return self.raised * SECONDS * self._share
-
-    @property
-    def _share(self) -> float:
-        return max(1.0, self.size / ORDINARY)
+    @classmethod
+    def of(cls, size: int, raised: int = 1) -> "Allowance":
+        """Return what a file of a size may cost."""
+        share = max(1.0, size / ORDINARY)
+        return cls(size, raised, raised * min(UNPACKED * share, MOST), raised * SECONDS * share)
 
 
 _CURRENT: ContextVar[Allowance | None] = ContextVar("allowance", default=None)
 
 
 @contextmanager
-def reading(path: Path, raised: str = "") -> Iterator[None]:
-    """Let the checks below hold for a file that is read within the block; `raised` is what `--layout limit` says.
+def within(allowed: Allowance) -> Iterator[None]:
+    """Let the checks below hold for a file that is read within the block, from now on."""
+    token = _CURRENT.set(replace(allowed, began=thread_time()))
+    try:
+        yield
+    finally:
+        _CURRENT.reset(token)
+
+
+def allowed_by(path: Path, raised: str = "") -> Allowance:
+    """Return what a file may cost; `raised` is what `--layout limit` says.
 
     Raises:
         RecordingError: `raised` is no whole number from 1 to 1000.
@@ -79,16 +90,12 @@ def reading(path: Path, raised: str = "") -> Iterator[None]:
     if not 1 <= factor <= RAISED:
         text = f"--layout {LIMIT}={short(raised)}: it is the factor by which limits are raised, from 1 to {RAISED:,}."
         raise RecordingError(text, culprit=LIMIT, value=raised)
-    token = _CURRENT.set(Allowance(path.stat().st_size, factor))
-    try:
-        yield
-    finally:
-        _CURRENT.reset(token)
+    return Allowance.of(path.stat().st_size, factor)
 
 
 def allowance(path: Path) -> Allowance:
-    """Return what the file that is being read may cost; outside of `reading`, what any file of its size may."""
-    return _CURRENT.get() or Allowance(path.stat().st_size if path.exists() else 0)
+    """Return what the file that is being read may cost; outside of `within`, what any file of its size may."""
+    return _CURRENT.get() or Allowance.of(path.stat().st_size if path.exists() else 0)
 
 
 def check_columns(path: Path, count: int) -> None:
@@ -131,10 +138,22 @@ def check_text(path: Path, size: int) -> None:
 
 def check_time(path: Path) -> None:
     """Refuse a file that took too much of a processor so far; called between two pieces of work (RecordingError)."""
-    allowed = allowance(path)
-    if is_late(allowed):
-        text = f"{path} took more than {allowed.seconds:.3g} s of a processor to read; none of its size needs that"
-        raise _refusal(path, text, allowed.seconds, 3)
+    if is_late(allowance(path)):
+        raise over_time(path)
+
+
+def over_time(path: Path) -> RecordingError:
+    """The refusal of a file that takes too much of a processor."""
+    most = allowance(path).seconds
+    text = f"{path} took more than {most:.3g} s of a processor to read; none of its size needs that"
+    return _refusal(path, text, most, 3)
+
+
+def over_memory(path: Path) -> RecordingError:
+    """The refusal of a file whose reader ran out of the memory that it may take."""
+    most = allowance(path).unpacked
+    text = f"{path} takes more memory to read than what unpacks to {in_bytes(most)} does; none of its size needs that"
+    return _refusal(path, text, most, 2)
 
 
 def is_late(allowed: Allowance) -> bool:

@@ -112,6 +112,7 @@ def cost(name: str, path: Path, command: list[str]) -> Cost:
 def _reading(path: Path, out: IO[str]) -> int:
     """Read a file in a fork; returns the number of its process."""
     import cosim
+    from cosim.data.binary import apart
     from cosim.support.errors import CosimError
 
     process = os.fork()
@@ -127,6 +128,7 @@ def _reading(path: Path, out: IO[str]) -> int:
             traceback.print_exc(file=out)
         finally:
             out.flush()
+            apart.close()
             os._exit(code)
     return process
 

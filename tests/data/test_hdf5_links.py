@@ -94,7 +94,7 @@ def test_chunks_that_are_what_they_say_are_read(tmp_path: Path, options: dict[st
 
 
 def test_large_chunks_are_unpacked_for_trial_and_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from cosim.data.binary import hdf5_chunks
+    from cosim.data.binary import hdf5, hdf5_chunks
 
     monkeypatch.setattr(hdf5_chunks, "HARMLESS", 1000)
     monkeypatch.setattr(hdf5_chunks, "CELLS", 64)
@@ -102,7 +102,7 @@ def test_large_chunks_are_unpacked_for_trial_and_read(tmp_path: Path, monkeypatc
         with h5py.File(tmp_path / "run.h5", "w") as file:
             for name, values in {"t": T, "tau": np.cos(T), "q": np.sin(T)}.items():
                 file.create_dataset(name, data=values, chunks=(100,), **options)
-        assert np.array_equal(Recording.read(tmp_path / "run.h5").table["q"], np.sin(T))
+        assert np.array_equal(hdf5.read(tmp_path / "run.h5").values["q"], np.sin(T))
 
 
 def test_a_unit_that_is_no_text_states_none(tmp_path: Path) -> None:

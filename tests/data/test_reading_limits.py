@@ -30,7 +30,7 @@ def test_too_many_numbers_are_refused_and_the_named_factor_lets_them_in(
 
 
 def test_the_limit_grows_with_the_size_of_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
-    small, large, huge = (limits.Allowance(size) for size in (1000, 3 * limits.ORDINARY, 10**12))
+    small, large, huge = (limits.Allowance.of(size) for size in (1000, 3 * limits.ORDINARY, 10**12))
     assert small.unpacked == limits.UNPACKED
     assert large.unpacked == 3 * limits.UNPACKED
     assert huge.unpacked == limits.MOST
