@@ -1,6 +1,7 @@
 """`cosim show`: any file of this project on one screen."""
 
-from collections.abc import Iterable, Mapping
+import sys
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -11,6 +12,9 @@ from rich.table import Table
 from cosim.cli.complete import anything
 from cosim.support.plain import Json
 from cosim.support.terminal import put_json
+
+LONG = 500
+"""Rows of a table that is drawn at most; a longer one is written plainly."""
 
 
 def show(
@@ -43,8 +47,17 @@ def show(
     for name, table in shown.tables.items():
         if name == WIRES:
             console.print("\n".join(["", *shown.drawing, ""]), markup=False, soft_wrap=True)
+        elif len(table) > LONG:
+            sys.stdout.write(_plain(name, table) + "\n")
         else:
             console.print(_table(name, table))
+
+
+def _plain(title: str, rows: Sequence[Mapping[str, Json]]) -> str:
+    """Write a long table as text: the library that draws short ones takes .7 ms a row."""
+    columns = [[name, *(str(row[name]) for row in rows)] for name in rows[0]]
+    form = "  ".join(f"{{:<{max(map(len, column))}}}" for column in columns)
+    return "\n".join([title, *(form.format(*cells).rstrip() for cells in zip(*columns, strict=True))])
 
 
 def _table(title: str, rows: Iterable[Mapping[str, Json]]) -> Table:

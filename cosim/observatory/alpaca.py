@@ -155,6 +155,12 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = REQUEST
     wbufsize = -1  # an answer is one packet; in two, the second one waits for the client's acknowledgement
 
+    def handle_expect_100(self) -> bool:
+        """Tell a client at once to go on that waits for it before it sends a body."""
+        goes_on = super().handle_expect_100()
+        self.wfile.flush()
+        return goes_on
+
     def do_GET(self) -> None:
         if self.headers.get("Content-Length", "0") != "0" or self.headers.get("Transfer-Encoding"):
             self.close_connection = True  # what follows is no request

@@ -95,7 +95,7 @@ class Telescope:
     @property
     def right_ascension(self) -> float:
         """Right ascension [h] of where the encoders point."""
-        return self.pointing.place[0] * HOURS
+        return _hours(self.pointing.place[0])
 
     @property
     def declination(self) -> float:
@@ -105,7 +105,7 @@ class Telescope:
     @property
     def sidereal_time(self) -> float:
         """Local sidereal time [h]."""
-        return self.pointing.sidereal_time * HOURS
+        return _hours(self.pointing.sidereal_time)
 
     @property
     def utc_date(self) -> str:
@@ -163,7 +163,7 @@ class Telescope:
 
     @target_right_ascension.setter
     def target_right_ascension(self, wanted: float) -> None:
-        self._target["TargetRightAscension"] = _within("TargetRightAscension", wanted, 0.0, 24.0)
+        self._target["TargetRightAscension"] = _within("TargetRightAscension", wanted, 0.0, 24.0) % 24.0
 
     @property
     def target_declination(self) -> float:
@@ -177,7 +177,7 @@ class Telescope:
     def slew_to_coordinates_async(self, right_ascension: float, declination: float) -> None:
         """Go to a star and follow it; returns at once."""
         star = {
-            "TargetRightAscension": _within("TargetRightAscension", right_ascension, 0.0, 24.0),
+            "TargetRightAscension": _within("TargetRightAscension", right_ascension, 0.0, 24.0) % 24.0,
             "TargetDeclination": _within("TargetDeclination", declination, -90.0, 90.0),
         }
         self.pointing.slew_to_star(right_ascension / HOURS, radians(declination))
@@ -226,6 +226,11 @@ class Telescope:
         if name not in self._target:
             raise DeviceError(VALUE_NOT_SET, f"{name} has not been set.")
         return self._target[name]
+
+
+def _hours(angle: float) -> float:
+    """Write an angle from 0 to 2 pi [rad] in hours from 0 to before 24: what rounds to 24 h is 0 h."""
+    return angle * HOURS % 24.0
 
 
 def _within(name: str, value: float, low: float, high: float) -> float:

@@ -1,5 +1,6 @@
 """Who does the runs: processes of this machine, or those of a Dask cluster; to the sweep both are the same."""
 
+import re
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
@@ -20,6 +21,8 @@ MOST = 1024
 """Processes on this machine at most: more are a slip of the finger, and no machine's memory holds them."""
 PATIENCE = 10.0
 """Seconds that a scheduler may take to answer."""
+ADDRESS = re.compile(r"(?:[a-z][a-z0-9+]*://)?(?:\[[0-9a-fA-F:]+\]|[^\s:/\[\]]+):[0-9]{1,5}(?:/\S*)?|inproc://\S+")
+"""Of a scheduler: host and port, with or without its protocol."""
 _OWN = threading.local()
 _CELLS: list[Cell] = []
 """The cells of all threads, so that they can be closed from one."""
@@ -148,6 +151,9 @@ def _remote(portable: PortableJob, number: int, point: Point) -> Row:
 
 
 def _client(address: str) -> Any:
+    if not ADDRESS.fullmatch(address):
+        message = f"--cluster {address} is no address of a Dask scheduler; write it as tcp://host:8786."
+        raise SweepError(message, culprit=address)
     try:
         from dask.distributed import Client
     except ImportError as error:

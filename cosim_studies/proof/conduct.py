@@ -93,6 +93,7 @@ def conduct(
         result = stack.enter_context(_written(out, journal, runner.seals, facts))
         rows = stack.enter_context(closing(_played(runner, rest, workers or cores())))
         for done, row in enumerate(rows, benchmark.cases - len(rest) + 1):
+            runner.seals.write_answer(row)
             journal.append(row)
             on_progress(done, benchmark.cases, _last(row))
     return result
@@ -147,6 +148,7 @@ def _written(out: Path, journal: Journal, seals: Seals, facts: Parsed) -> Iterat
         rows: list[Row] = [row for number, row in sorted(journal.rows.items()) if number < facts["cases"]]
         if rows:
             seals.check(rows)
+            seals.check_answers(rows)
             result |= proof(rows, facts)
             write(out, result)
 

@@ -3,7 +3,7 @@
     seal = SHA-256(salt, newline, truth as JSON with sorted keys and no spaces), the salt 16 bytes in hexadecimal
 
 Without the salt the few possible truths could be tried; it is drawn from the seed of the benchmark, so that the same
-command gives the same seals.
+command gives the same seals. A row is sealed when its case was answered, and compared before it is scored.
 """
 
 import hashlib
@@ -36,6 +36,12 @@ def seal(truth: Mapping[str, Any], salt: str) -> str:
     return hashlib.sha256(f"{salt}\n{canonical(truth)}".encode()).hexdigest()
 
 
+def seal_of_row(row: Row) -> str:
+    """SHA-256 of a row as it is read from its file, hexadecimal; there is nothing to guess, so no salt."""
+    text = json.dumps(json.loads(json.dumps(row)), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
 class Seals:
     """The file of seals, `seals.jsonl`, a line a case; one that stands there is never changed."""
 
@@ -45,7 +51,8 @@ class Seals:
         whole = [json.loads(line) for line in lines if line.endswith("\n")]
         if len(whole) < len(lines):  # a line cut short by a kill
             path.write_text("".join(lines[: len(whole)]), "utf-8")
-        self.known: dict[int, str] = {line["run"]: line["seal"] for line in whole}
+        self.known: dict[int, str] = {line["run"]: line["seal"] for line in whole if "seal" in line}
+        self._answers: dict[int, str] = {line["run"]: line["answer"] for line in whole if "answer" in line}
 
     def write(self, number: int, sealed: str) -> None:
         """Write the seal of a case before its tool runs.
@@ -61,6 +68,27 @@ class Seals:
         if self.known[number] != sealed:
             rule = "the generator has changed since; start over with --force"
             raise ProofError(f"Case {number} was sealed before with another truth: {rule}.", culprit=str(self._path))
+
+    def write_answer(self, row: Row) -> None:
+        """Seal the row of a case that was answered; a case that is answered again is sealed again."""
+        sealed = seal_of_row(row)
+        with self._lock, uninterrupted():
+            self._answers[row["run"]] = sealed
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(json.dumps({"run": row["run"], "answer": sealed}) + "\n")
+
+    def check_answers(self, rows: Iterable[Row]) -> None:
+        """Compare every row with its seal.
+
+        Raises:
+            ProofError: a row is not the one that was sealed when its case was answered.
+        """
+        for row in rows:
+            sealed = self._answers.get(row["run"])
+            if seal_of_row(row) != sealed:
+                found = "has no seal" if sealed is None else "is not the answer that was sealed"
+                rule = "remove its line from runs.jsonl and the case is answered again, or start over with --force"
+                raise ProofError(f"Case {row['run']}: its answer {found}; {rule}.", culprit=str(self._path))
 
     def check(self, rows: Iterable[Row]) -> None:
         """Open every truth and compare it with its seal.
