@@ -221,9 +221,9 @@ def test_a_guide_log_has_no_torque_and_says_what_it_can(capsys: pytest.CaptureFi
     assert "4 frames in which the star was lost were left out" in told
 
 
-def test_channels_of_another_sample_time_are_left_out_and_said_so() -> None:
+def test_channels_of_another_sample_time_are_joined_by_time_and_said_so() -> None:
     recording = Recording.read(SAMPLES / "twincat_scope_all_times.csv")
-    assert "channels with sample times of their own were left out: MotorTemp." in " ".join(recording.notes)
+    assert '"MotorTemp" (20 Hz, 0 s to 0.75 s) between samples' in " ".join(recording.notes)
     assert recording.origin["start"].startswith("2024-03-01T22:13:04")
 
 

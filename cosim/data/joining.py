@@ -11,9 +11,11 @@ times; here they become a table.
     set point, whole numbers    the last sample, which holds until the next
     others    read between two samples on a line
 
-Nothing is extrapolated, and nothing is read across a gap: a step longer than `GAP` times the channel's own period,
-which is the larger of the median and the 90 % quantile of its steps. Rows that torque or position do not reach are left
-out: at the ends the recording begins later or ends earlier, in the middle it has a gap. Samples that are NaN are none.
+Torque and position are never extrapolated; the first and last samples of other channels hold for one of their own
+periods, so that a slow one costs no rows. Nothing is read across a gap: a step longer than `GAP` times the channel's
+own period, which is the larger of the median and the 90 % quantile of its steps. Rows that torque or position do not
+reach are left out: at the ends the recording begins later or ends earlier, in the middle it has a gap. Samples that are
+NaN are none.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -222,7 +224,7 @@ def _table(
     base: Channel,
     needed: Sequence[str],
 ) -> Columns:
-    reads = {name: _read(one, base, roles.get(name, "")) for name, one in channels.items()}
+    reads = {name: _read(one, base, roles.get(name, ""), name in needed) for name, one in channels.items()}
     rows = np.ones(len(base.t), bool)
     for name in (one for one in needed if one in reads):
         rows &= reads[name].valid
@@ -256,7 +258,7 @@ def _kept(
     return {name: one for name, one in reads.items() if name not in costly}, rows, costly
 
 
-def _read(channel: Channel, base: Channel, role: str) -> Read:
+def _read(channel: Channel, base: Channel, role: str, needed: bool) -> Read:
     """Read a channel at the times of the base."""
     if role == "tau" and channel.period < EQUAL * base.period:
         mean, covered = _means(channel, base)
@@ -267,17 +269,19 @@ def _read(channel: Channel, base: Channel, role: str) -> Read:
     share = (base.t - channel.t[left]) / step
     near = np.where(share > 0.5, right, left)
     hit = np.abs(base.t - channel.t[near]) <= SAME * channel.period
-    between = hit | ((share >= 0) & (share <= 1) & (step <= channel.longest))
+    outside = np.maximum(channel.t[0] - base.t, base.t - channel.t[-1])
+    at_ends = (outside > 0) & (outside <= (0.0 if needed else channel.period))
+    between = hit | at_ends | ((share >= 0) & (share <= 1) & (step <= channel.longest))
     if bool(hit[between].all()):
         return Read(channel, channel.x[near], hit, "at the same times")
     at_most = f"samples at most {channel.longest:.3g} s apart"
     if role == "q_d" or (role == "" and bool(np.all(channel.x == np.rint(channel.x)))):
-        held = np.where(hit, channel.x[near], channel.x[left])
+        held = np.where(hit | at_ends, channel.x[near], channel.x[left])
         return Read(channel, held, between, f"held between {at_most}")
     line = channel.x[left] + share * (channel.x[right] - channel.x[left])
     if role in ("q", "v"):
         line = _cubic(channel, left, share, line)
-    return Read(channel, np.where(hit, channel.x[near], line), between, f"between {at_most}")
+    return Read(channel, np.where(hit | at_ends, channel.x[near], line), between, f"between {at_most}")
 
 
 def _means(channel: Channel, base: Channel) -> tuple[Array, npt.NDArray[np.bool_]]:

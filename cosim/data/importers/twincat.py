@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 
 from cosim.data.columns import Columns
-from cosim.data.limits import listed
 from cosim.data.text.layout import Layout
 from cosim.data.text.table import table_of
 from cosim.data.text.unit_words import is_unit, spelled
@@ -32,6 +31,8 @@ KEYS: tuple[str, ...] = (
 STARTS = ("Starttime of export", "StartRecord")
 TICKS = re.compile(r"[0-9]{1,18}")
 """A file time, up to the year 4769."""
+TICKED = 1e16
+"""Times above this are file times: in ms they would be 300,000 years."""
 TICK, EPOCH = 1e-7, 11_644_473_600
 """A tick of Windows' file time [s], and the start of 1970 in it [s]."""
 
@@ -43,14 +44,14 @@ def recognises(lines: Sequence[str]) -> bool:
 
 
 def read(path: Path, data: bytes, lines: Sequence[str]) -> Columns:
-    """Read an export of TwinCAT Scope; channels of another sample time than most are left out with a note."""
+    """Read an export of TwinCAT Scope; the channels behind each time column have its times."""
     separator = _separator(lines)
     facts, keys, first = _head(lines, separator)
     names, times = _channels(path, keys)
     columns = _values(path, data, separator, first, len(names))
-    table, notes = _joined(path, _groups(columns, names, times))
-    units = {name: text for name, text in zip(names, _units(keys, names), strict=True) if text and name in table}
-    return Columns(table, {"t": "s"} | units, format="TwinCAT Scope", start=_start(facts), notes=notes)
+    values, clocks = _channels_of(_groups(columns, names, times))
+    units = {name: text for name, text in zip(names, _units(keys, names), strict=True) if text and name in values}
+    return Columns(values, units, format="TwinCAT Scope", start=_start(facts), clocks=clocks)
 
 
 def _values(path: Path, data: bytes, separator: str, first: int, count: int) -> list[np.ndarray]:
@@ -104,32 +105,28 @@ def _groups(
     columns: Sequence[np.ndarray], names: Sequence[str], times: Sequence[int]
 ) -> list[tuple[np.ndarray, dict[str, np.ndarray]]]:
     """Return the time of each group of channels in s, and its channels; a group may end before the others."""
+    clocks = [columns[start].astype(np.float64) for start in times]
+    there = [~np.isnan(clock) for clock in clocks]
+    first = min((float(clock[rows][0]) for clock, rows in zip(clocks, there, strict=True) if rows.any()), default=0.0)
+    is_ticks = first > TICKED
     groups = []
-    for start, end in zip(times, [*times[1:], len(names)], strict=True):
-        clock = columns[start].astype(np.float64)
-        there = ~np.isnan(clock)
-        ticks = columns[start][there]
-        seconds = (ticks - ticks[:1]) * TICK if len(ticks) and ticks[0] > 1e16 else ticks * 1e-3
-        groups.append((seconds, {names[place]: columns[place][there] for place in range(start + 1, end)}))
+    for start, end, clock, rows in zip(times, [*times[1:], len(names)], clocks, there, strict=True):
+        seconds = (clock[rows] - first) * TICK if is_ticks else clock[rows] * 1e-3
+        groups.append((seconds, {names[place]: columns[place][rows] for place in range(start + 1, end)}))
     return groups
 
 
-def _joined(
-    path: Path, groups: Sequence[tuple[np.ndarray, dict[str, np.ndarray]]]
-) -> tuple[dict[str, np.ndarray], tuple[str, ...]]:
-    """Join the groups that were sampled at the same instants as most channels."""
-    counts = [sum(len(other) for seconds, other in groups if np.array_equal(seconds, clock)) for clock, _ in groups]
-    clock = groups[counts.index(max(counts))][0]
-    table: dict[str, np.ndarray] = {"t": clock}
-    left: list[str] = []
+def _channels_of(
+    groups: Sequence[tuple[np.ndarray, dict[str, np.ndarray]]],
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Return the channels and the times of each; groups of equal times share them."""
+    values: dict[str, np.ndarray] = {}
+    clocks: dict[str, np.ndarray] = {}
     for seconds, channels in groups:
-        if np.array_equal(seconds, clock):
-            table |= channels
-        else:
-            left += channels
-    if not left:
-        return table, ()
-    return table, (f"{path.stem}: channels with sample times of their own were left out: {listed(tuple(left))}.",)
+        clock = next((one for one in clocks.values() if np.array_equal(one, seconds)), seconds)
+        values |= channels
+        clocks |= dict.fromkeys(channels, clock)
+    return values, clocks
 
 
 def _units(keys: dict[str, list[str]], names: Sequence[str]) -> list[str]:
