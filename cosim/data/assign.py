@@ -127,9 +127,9 @@ def _missing(
 ) -> dict[str, str]:
     """Return the file's names of those of our columns that are missing."""
     lacking = [rule for rule in ("t", *required) if not any(name in values for name in rule.split("|"))]
-    if lacking and found.numbered:
-        raise questions.unnamed(path, found, lacking)
     free = [name for name in values if name not in taken and name not in OURS]
+    if lacking and found.numbered and len(free) >= len([rule for rule in lacking if rule != "t"]):
+        raise questions.unnamed(path, found, lacking, free)
     roles: dict[str, str] = {}
     beside = (OPTIONAL if lacking else ALWAYS) if required else ()
     for rule in [*lacking, *(name for name in beside if name not in values)]:

@@ -106,10 +106,10 @@ def unknown_unit(path: Path, role: str, name: str, text: str) -> UndecidedError:
     return UndecidedError(f"{told}--units {role}={option}.", decided_by=deciding, culprit=str(path), value=text)
 
 
-def unnamed(path: Path, found: Columns, lacking: Sequence[str]) -> UndecidedError:
-    """Ask for the names of columns without any; the first that grows is offered as time."""
-    growing = next((name for name, column in found.values.items() if grows(column)), "")
-    rest = [name for name, column in found.values.items() if name != growing and _is_measured(column)]
+def unnamed(path: Path, found: Columns, lacking: Sequence[str], free: Sequence[str]) -> UndecidedError:
+    """Ask for the names of columns without any, of those that are `free`; the first that grows is offered as time."""
+    growing = next((name for name in free if grows(found.values[name])), "") if "t" in lacking else ""
+    rest = [name for name in free if name != growing and _is_measured(found.values[name])]
     ours = [rule.split("|")[0] for rule in lacking if rule != "t" or growing]
     columns = dict(zip(ours, [growing, *rest] if "t" in ours else rest, strict=False))
     pairs = " ".join(f"{our}={theirs}" for our, theirs in columns.items())

@@ -235,3 +235,18 @@ def test_a_first_row_that_is_one_word_with_the_names_is_left_out_with_a_note(tmp
     read = as_read(tmp_path, "t,tau,q" + rows(*S))
     np.testing.assert_allclose(read["q"], QL[1:], atol=1e-8)
     assert "the first row was left out; names and first value stand in it as one word." in read.notes[0]
+
+
+def test_a_column_that_was_given_is_not_proposed_again(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(rows(*S, 7 * QL))
+    with pytest.raises(RecordingError, match=r"for example --columns tau=#3\. First rows as read"):
+        Recording.read(path, {"t": "#1", "q": "#2"})
+
+
+def test_a_file_without_names_and_without_a_torque_is_shown_as_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text(rows(LONG, QL))
+    shown = preview(path, {"columns": {"t": "#1", "q": "#2"}})
+    assert "has no column tau" in shown.refused
+    assert shown.recording.columns == ("t", "q")
