@@ -98,9 +98,11 @@ def test_a_table_is_read_as_it_was_meant(tmp_path: Path, how: str) -> None:
 def test_a_set_point_is_found_where_names_have_to_be_read(tmp_path: Path) -> None:
     recording = Recording.read(written(tmp_path / "run.csv", READ["names that say command and actual"][0]))
     np.testing.assert_allclose(recording["q_d"], 2 * Q, atol=1e-8)
-    note, repeated = recording.notes
-    assert repeated.endswith("were left out: torque_act.")
+    said = " ".join(recording.notes)
+    assert 'tau = "torque_cmd", q = "pos_act", q_d = "pos_cmd"' in said
+    assert 'no unit is stated for "torque_cmd" (tau in N.m or N), "pos_act" (q in rad or m)' in said
     assert 'tau = "torque_cmd", q = "pos_act", q_d = "pos_cmd"; --columns says it otherwise.' in note
+    assert 'no unit is stated for "torque_cmd" (tau in N.m or N), "pos_act" (q in rad or m)' in unit
 
 
 def test_where_our_own_names_stand_only_a_set_point_of_another_name_is_read(tmp_path: Path) -> None:

@@ -83,6 +83,8 @@ def _judged(path: Path, own: str, found: Columns, said: Options, undecided: tupl
         raise
     except RecordingError as error:
         refused, required = str(error), ()
+        there = {"t", *found.values, *said["columns"]}  # a table has our names only where they are given
+        said = said | {"units": {ours: text for ours, text in said["units"].items() if ours in there}}
         timed = rows_of_one(path, found, said["columns"], said["units"], said["layout"], required)
         recording = Recording.judged(path, name, timed, own, said["columns"], said["units"], required)
     served = assign(path, timed, said["columns"], said["units"], required)

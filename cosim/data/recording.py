@@ -16,6 +16,7 @@ import numpy.typing as npt
 from cosim.data import held
 from cosim.data.arrays import as_columns, sha256_of
 from cosim.data.assign import assign
+from cosim.data.assumed import assumed
 from cosim.data.checks import check_motion, check_names, check_sampling, check_time, chosen, numbers
 from cosim.data.columns import Columns
 from cosim.data.formats import read_columns
@@ -154,7 +155,8 @@ class Recording:
         if masked:
             said = f'"q" stays at {end:.6g}, the end of what the drive sends, in {int(np.diff(stays).sum()):,} rows'
             joined = (*joined, f"{path.stem}: {said} from row {stays[0, 0] + 1:,} on; nothing is judged there.")
-        notes = (*found.notes, *served.notes, *clock.notes, *notes, *joined)
+        silent = assumed(path, table, served.sources, stated)
+        notes = (*found.notes, *served.notes, *silent, *clock.notes, *notes, *joined)
         return cls(name, table, {"t": "s"} | {key: one.si for key, one in si.items()}, origin, notes, others, masked)
 
     def write(self, path: Path | str, force: bool = False) -> Path:

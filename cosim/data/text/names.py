@@ -81,6 +81,8 @@ def unit_of_name(name: str, role: str = "") -> str:
             _of_time(name) if role == "t" else ""
         )  # what stands in brackets and is not known is asked for: `Winkel (kGrad)` is not in degrees
     text = whole if is_unit(whole) else suffixed_unit(name, role)
+    if role == "tau" and text == "nm":
+        return "N.m"  # in small letters as the rest of such names; a torque is in no nanometres
     return text or (_of_time(name) if role == "t" else "")
 
 

@@ -1,0 +1,75 @@
+"""Units that nothing states are assumed aloud; files without names, torque or motion show what was named."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.data.preview import preview
+from cosim.data.recording import Recording
+
+T = np.arange(300) * 4e-3
+Q = 90 * np.sin(3 * T)
+TAU = np.cos(5 * T)
+RUN = "no unit is stated for "
+
+
+def written(path: Path, header: str, *columns: np.ndarray, separator: str = ",") -> Path:
+    lines = [separator.join(f"{value:.9g}" for value in row) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join(([header] if header else []) + lines) + "\n")
+    return path
+
+
+def test_columns_without_a_unit_are_said_to_be_taken_in_si_units(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.csv", "time,joint_effort,joint_position", T, TAU, Q)
+    note = next(note for note in Recording.read(path).notes if RUN in note)
+    assert '"joint_effort" (tau in N.m or N), "joint_position" (q in rad or m)' in note
+    assert note.endswith("say which, for example --units tau=mN.m q=deg.")
+    seen = Recording.read(path, units={"tau": "mN.m", "q": "deg"})
+    np.testing.assert_allclose(seen["q"], np.deg2rad(Q), atol=1e-6)
+    assert not any(RUN in note for note in seen.notes)
+
+
+@pytest.mark.parametrize(
+    ("header", "columns"),
+    [
+        ("t,tau,q", {}),
+        ("time,torque_Nm,position_deg", {}),
+        ("time [s],M [Nm],angle [deg]", {"tau": "M"}),
+    ],
+)
+def test_stated_units_and_our_own_names_need_no_note(tmp_path: Path, header: str, columns: dict[str, str]) -> None:
+    seen = Recording.read(written(tmp_path / "run.csv", header, T, TAU, Q), columns)
+    assert not any(RUN in note for note in seen.notes)
+
+
+def test_a_column_that_the_user_names_without_its_unit_is_noted_too(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.csv", "", T, TAU, Q)
+    seen = Recording.read(path, {"t": "#1", "tau": "#2", "q": "#3"})
+    assert [RUN in note for note in seen.notes] == [True]
+
+
+def test_a_file_without_names_and_without_a_torque_is_shown_with_what_was_named(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.csv", "", Q, 2 * Q, 3 * Q)
+    seen = preview(path, {"columns": {"q": "#1"}, "layout": {"period": "4ms"}})
+    np.testing.assert_allclose(seen.recording["q"], Q, atol=1e-6)
+    assert "tau=#2" in seen.undecided[0]  # never the column that was named
+
+
+def test_a_file_without_names_that_has_too_few_columns_is_a_table(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.csv", "", T, Q)
+    seen = preview(path, {"columns": {"t": "#1", "q": "#2"}})
+    assert "has no column tau" in seen.refused
+    np.testing.assert_allclose(seen.recording["q"], Q, atol=1e-6)
+
+
+def test_a_torque_without_a_motion_is_shown_as_a_table(tmp_path: Path) -> None:
+    seen = preview(written(tmp_path / "run.csv", "timestamp_s,torque_V", T, TAU))
+    assert "has no column q or v" in seen.refused
+    assert "torque_V" in seen.recording
+
+
+def test_a_torque_in_nm_in_small_letters_is_in_newton_metres(tmp_path: Path) -> None:
+    seen = Recording.read(written(tmp_path / "run.csv", "time_s,torque_nm,position_rad", T, TAU, Q))
+    np.testing.assert_allclose(seen["tau"], TAU, atol=1e-6)
+    assert seen.units["tau"] == "N.m"
