@@ -9,7 +9,8 @@ import pytest
 from motions import Array, Motion
 
 from cosim.diagnosis import admissibility
-from cosim.diagnosis.admissibility import in_time, is_admissible, is_degenerate, needs_turns
+from cosim.diagnosis.admissibility import in_time, is_degenerate, name_rules, needs_turns
+from cosim.diagnosis.answer.ledger import all_pass
 
 
 class Hypothesis:
@@ -88,9 +89,9 @@ def test_an_effect_is_admissible_if_nothing_speaks_against_it(
 ) -> None:
     asked(monkeypatch, **said)
     problem: Any = SimpleNamespace(prepared=to_and_fro(0.3))
-    one: Any = SimpleNamespace(effect=effect, fit=SimpleNamespace(mount=None))
+    one: Any = SimpleNamespace(effect=effect, fit=SimpleNamespace(mount=SimpleNamespace(motion="rotary")))
     assert is_degenerate(problem, effect) is degenerate  # type: ignore[arg-type]
-    assert is_admissible(problem, one) is admissible
+    assert all_pass(name_rules(problem, one)) is admissible
 
 
 def timed(residual: Array, torque: Array, **more: Any) -> bool:

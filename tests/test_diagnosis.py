@@ -192,7 +192,6 @@ class TestCommand:
         [
             ("tau", lambda x: np.where(np.arange(len(x)) == 5, np.nan, x), "tau"),
             ("q", lambda x: np.zeros_like(x), "q"),
-            ("t", lambda x: x[::-1], "backwards"),
             ("q", np.degrees, "--units q=deg"),
         ],
     )

@@ -43,9 +43,13 @@ def answered(command: list[str], case: NetCase, folder: Path) -> Answer:
     done = subprocess.run(words, capture_output=True, text=True, env=os.environ | one_thread, check=False)
     if done.returncode:
         return {"verdict": ["refused"], "words": done.stderr.strip().splitlines()[-1][-200:], "seconds": 0.0}
-    kept = of_document(json.loads(done.stdout))
-    kept["card"] = dict(_numbers(tomllib.loads((folder / "out" / "card.toml").read_text("utf-8"))))
-    return kept | {"seconds": round(time.perf_counter() - begun, 1)}
+    return of_folder(folder / "out") | {"seconds": round(time.perf_counter() - begun, 1)}
+
+
+def of_folder(out: Path) -> Answer:
+    """What the net keeps of a diagnosis that was written into a folder."""
+    kept = of_document(json.loads((out / "diagnosis.json").read_text("utf-8")))
+    return kept | {"card": dict(_numbers(tomllib.loads((out / "card.toml").read_text("utf-8"))))}
 
 
 def of_document(document: dict[str, Any]) -> Answer:

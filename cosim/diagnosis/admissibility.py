@@ -60,6 +60,11 @@ def is_degenerate(problem: Problem, effect: Effect) -> bool:
     return own.is_degenerate(problem, effect)
 
 
+def needs_turns(effect: Effect, mount: Mount, prepared: Prepared) -> bool:
+    """Whether a fitted effect of friction needs motion to turn back further than it ever did."""
+    return hypothesis_of(effect).way_back(effect, mount) > longest_way_back(prepared)
+
+
 def longest_way_back(prepared: Prepared) -> float:
     """Longest way that the motion turns back, over all pieces [rad, m].
 

@@ -10,7 +10,7 @@ from math import pi
 
 import numpy as np
 
-from cosim.diagnosis.admissibility import is_degenerate, longest_way_back
+from cosim.diagnosis.admissibility import is_degenerate, needs_turns
 from cosim.diagnosis.candidates import Candidate, Span, columns_of
 from cosim.diagnosis.hypotheses import HYPOTHESES, hypothesis_of
 from cosim.estimation.prepare import Array, Prepared
@@ -61,12 +61,11 @@ class Member:
 
 def members(problem: Problem, mount: Mount, span: Span, tried: Sequence[Candidate], values: Array) -> list[Member]:
     """Make the members of all effects that the search tries."""
-    longest = longest_way_back(problem.prepared)
     chosen = [
         member
         for one in HYPOTHESES
         for member in one.concealed(mount, span, [c for c in tried if isinstance(c.instances[0], one.forms)])
-        if hypothesis_of(member.instances[0]).way_back(member.instances[0], mount) <= longest
+        if not needs_turns(member.instances[0], mount, problem.prepared)
     ]
     even = [one for one in chosen if not hypothesis_of(one.instances[0]).has_own_phase]
     columns = columns_of(mount, even, problem.prepared, values)

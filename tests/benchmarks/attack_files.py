@@ -3,8 +3,8 @@
     python tests/benchmarks/attack_files.py [--seed 1] [--only hdf5] [--cosim COSIM] [--json]
 
 Each maker writes one small file from a seed; `FILES` has them by name. Every file of up to 50 MB must end in an answer
-or a sentence within 20 s and 1 GB; those of `FOREIGN` try to read other files and must be refused. The attack bench
-(attack.py) draws from them, and tests/data/test_crafted_files.py reads a sample.
+or a sentence within 20 s and 1 GB; those of `FOREIGN` try to read other files and must be refused.
+tests/data/test_crafted_files.py reads a sample of them.
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """Public logs of many tools, and what `cosim show` makes of them: read rightly, asked, refused or misread.
 
-    python tests/benchmarks/public_logs.py --logs FOLDER --truth results/reading/truth.tsv --out results/reading
+    python tests/benchmarks/public_logs.py --logs FOLDER --truth tests/benchmarks/public_logs.tsv --out results/reading
 
 The logs are not stored here: the truth table names repository and path of each. It says what a log holds by its
 repository's documents and code, read with other tools: duration [s] and range of torque, position and speed in SI
@@ -282,7 +282,7 @@ def page(truths: Sequence[Mapping[str, str]], scores: Sequence[Score], before: M
     lines = [
         "# Public logs",
         "",
-        "    python tests/benchmarks/public_logs.py --logs FOLDER --truth results/reading/truth.tsv "
+        "    python tests/benchmarks/public_logs.py --logs FOLDER --truth tests/benchmarks/public_logs.tsv "
         "--before BEFORE.json --out results/reading",
         "",
         f"mount-cosim {__version__}. {len(scores)} logs of {tools} tools from public repositories, found by search;",

@@ -29,6 +29,13 @@ def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, cosim.Dia
     return folder / "out", found
 
 
+def why(*words: str) -> None:
+    """Run `cosim why`, which ends with 0."""
+    with pytest.raises(SystemExit) as ended:
+        main(["why", *words])
+    assert not ended.value.code
+
+
 def rows(folder: Path) -> list[dict[str, Any]]:
     return list(json.loads((folder / "diagnosis.json").read_text("utf-8"))["ledger"])
 
@@ -71,7 +78,7 @@ def test_the_ledger_is_a_data_frame(diagnosed: tuple[Path, Any]) -> None:
 def test_why_ranks_structures_and_gives_a_sentence_for_every_effect(
     diagnosed: tuple[Path, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    main(["why", str(diagnosed[0])])
+    why(str(diagnosed[0]))
     said = capsys.readouterr().out
     assert "cogging: detected" in said
     assert BASE in said
@@ -82,10 +89,10 @@ def test_why_ranks_structures_and_gives_a_sentence_for_every_effect(
 
 
 def test_why_prints_every_rule_of_one_effect(diagnosed: tuple[Path, Any], capsys: pytest.CaptureFixture[str]) -> None:
-    main(["why", str(diagnosed[0] / "diagnosis.json"), "cogging"])
+    why(str(diagnosed[0] / "diagnosis.json"), "cogging")
     said = capsys.readouterr().out
     assert "predicts held-out recordings" in said
-    main(["why", str(diagnosed[0]), "cogging", "--json"])
+    why(str(diagnosed[0]), "cogging", "--json")
     printed = json.loads(capsys.readouterr().out)
     assert {one["effect"] for one in printed} == {"cogging"}
 
