@@ -1,5 +1,6 @@
 """The page in a real browser: dropped files to the report, by mouse, on a phone's width, by keyboard, read aloud."""
 
+import json
 import signal
 import subprocess
 import sys
@@ -19,8 +20,9 @@ from cosim.serve.desk import Desk
 
 __all__ = ["_path", "browser"]
 Page = Any
-FIRST = 30.0
-"""Seconds of processor in which the first answer for the demo's files must be there."""
+FIRST = 3.0
+"""Processor until the first answer for the demo's files, in units of the time that the diagnosis itself takes: it works
+in two processes, and what the page adds is small. A ratio of one run: computers differ, and so do their busy hours."""
 LARGEST = 1_000_000
 """Bytes of a report."""
 TOUCH = 44
@@ -105,7 +107,7 @@ def test_the_demo_is_diagnosed_from_the_drop_to_the_report_through_reload_and_a_
             assert sum(name.endswith(".fmu") for name in names) == 2
         (report,) = (tmp_path / "data").rglob("report.html")
         assert report.stat().st_size <= LARGEST
-        assert spent <= FIRST
+        assert spent <= FIRST * json.loads((report.parent / "diagnosis.json").read_text("utf-8"))["seconds"]
     finally:
         server.send_signal(signal.SIGTERM)
         server.wait(20)

@@ -158,17 +158,23 @@ def _as_table(found: Columns) -> Columns | None:
     """Channels as a table, if they share one clock and all of their samples are valid."""
     first, *others = found.clocks.values()
     columns = [found.values[name] for name in found.clocks]
-    if any(one is not first for one in others) or not all(bool(np.isfinite(one).all()) for one in columns):
+    if any(one is not first for one in others) or not all(
+        _is_numeric(one) and np.isfinite(one).all() for one in columns
+    ):
         return None
     values = {"t": first} | {name: found.values[name] for name in found.clocks if name != "t"}
     return replace(found, values=values, units=found.units | {"t": "s"}, clocks={})
 
 
+def _is_numeric(column: np.ndarray) -> bool:
+    return column.dtype.kind in "fiub"
+
+
 def _channel(found: Columns, name: str) -> Channel | None:
-    t, x = found.clocks[name].astype(np.float64), found.values[name]
-    if x.dtype.kind not in "fiub":
+    t, x = found.clocks[name], found.values[name]
+    if not (_is_numeric(t) and _is_numeric(x)):
         return None
-    x = x.astype(np.float64)
+    t, x = t.astype(np.float64), x.astype(np.float64)
     valid = np.isfinite(x) & np.isfinite(t)
     if valid.sum() < LEAST:
         return None
