@@ -177,3 +177,10 @@ def test_mdf_groups_of_two_devices_are_joined_and_bits_of_invalidity_count(tmp_p
     np.testing.assert_array_equal(recording.t, T[(T >= 1) & ~bad])
     np.testing.assert_array_equal(recording["q"], position(recording.t))
     assert any('put on the times of "Torque"' in note for note in recording.notes)
+
+
+def test_a_channel_that_holds_a_text_is_left_out_and_the_others_are_joined() -> None:
+    words = np.array(["bad" if k == 7 else 0.0 for k in range(len(T))], dtype=object)
+    found = on_one_time(PATH, channels(tau=(T, torque(T)), q=(T, position(T)), word=(T, words)), {}, {}, REQUIRED)
+    assert {"tau", "q"} <= set(found.values)
+    assert "word" not in found.values
