@@ -9,10 +9,11 @@ from scipy.signal import lfilter
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.admissibility import away_from_turns
+from cosim.diagnosis.answer.ledger import all_pass
 from cosim.diagnosis.asked import is_asked_for
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import is_admissible, weighed
+from cosim.diagnosis.search import admission, weighed
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Delay
@@ -118,5 +119,5 @@ def test_what_is_late_about_turns_alone_is_not_named() -> None:
     one = weighed(comparison, found, base)
     assert one.evidence > POLICY.least_evidence
     assert one.away < POLICY.least_away
-    assert not is_admissible(comparison, one)
-    assert is_admissible(comparison, replace(one, away=1.0))
+    assert not all_pass(admission(comparison, one))
+    assert all_pass(admission(comparison, replace(one, away=1.0)))

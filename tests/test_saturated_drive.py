@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.answer.ledger import all_pass
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import CandidateFit, is_admissible, refitted, starts
+from cosim.diagnosis.search import CandidateFit, admission, refitted, starts
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
@@ -57,7 +58,7 @@ def found(comparison: Comparison, base: Fit) -> CandidateFit:
 def test_a_knee_that_one_recording_alone_reaches_is_tried_and_is_real(knee: float) -> None:
     comparison, base = saturated(knee, (0.5, 1.2))
     one = found(comparison, base)
-    assert is_admissible(comparison, one)
+    assert all_pass(admission(comparison, one))
     assert one.evidence > POLICY.least_evidence
     assert isinstance(one.effect, TorqueSaturation)
     assert one.effect.knee_torque == pytest.approx(knee, rel=0.03)

@@ -289,11 +289,6 @@ def admission(comparison: Comparison, one: CandidateFit) -> Iterator[Rule]:
         yield Rule("the set point demands it", is_asked_for(comparison, one.fit, one.effect))
 
 
-def is_admissible(comparison: Comparison, one: CandidateFit) -> bool:
-    """Whether every rule of admission lets an effect pass."""
-    return all_pass(admission(comparison, one))
-
-
 def is_full(best: CandidateFit, comparison: Comparison) -> bool:
     """Whether a structure with this effect has more than may be named."""
     added = best.fit.mount.effects[len(comparison.problem.mount.effects) :]

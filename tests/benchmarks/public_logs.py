@@ -1,6 +1,6 @@
 """Public logs of many tools, and what `cosim show` makes of them: read rightly, asked, refused or misread.
 
-    python tests/benchmarks/public_logs.py --logs FOLDER --truth tests/benchmarks/public_logs.tsv --out results/reading
+    python tests/benchmarks/public_logs.py --logs FOLDER --truth tests/benchmarks/public_logs.tsv --out PAGE
 
 The logs are not stored here: the truth table names repository and path of each. It says what a log holds by its
 repository's documents and code, read with other tools: duration [s] and range of torque, position and speed in SI
@@ -283,11 +283,11 @@ def page(truths: Sequence[Mapping[str, str]], scores: Sequence[Score], before: M
         "# Public logs",
         "",
         "    python tests/benchmarks/public_logs.py --logs FOLDER --truth tests/benchmarks/public_logs.tsv "
-        "--before BEFORE.json --out results/reading",
+        "--before BEFORE.json --out PAGE",
         "",
         f"mount-cosim {__version__}. {len(scores)} logs of {tools} tools from public repositories, found by search;",
         "they are not stored here, [logs.tsv](logs.tsv) names repository and path of each, what it holds, and both",
-        "outcomes. [truth.tsv](truth.tsv) is what they hold by their repositories' documents and code, read with other",
+        "outcomes. tests/benchmarks/public_logs.tsv is what they hold by their repositories' documents and code, read with other",
         "tools: ranges in SI units, and the answers that an owner can give. Only what is asked is answered. "
         "*Before* is commit 2ad1e55.",
         "",
