@@ -5,10 +5,11 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.admissibility import gets_memory, is_degenerate, removed_at_rest
+from cosim.diagnosis.answer.ledger import all_pass
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.policy import POLICY
 from cosim.diagnosis.predictive import Predictive
-from cosim.diagnosis.search import is_admissible, refitted
+from cosim.diagnosis.search import admission, refitted
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
@@ -53,7 +54,7 @@ def test_a_contact_that_bends_is_told_by_what_it_holds_at_rest() -> None:
         whole, base = comparison(bends)
         found = refitted(whole, base, Presliding(sigma0=SIGMA0), 1)
         assert (found.at_rest > POLICY.halved) is bends
-        assert is_admissible(whole, found) is bends
+        assert all_pass(admission(whole, found)) is bends
 
 
 def test_held_out_too() -> None:

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.answer.ledger import all_pass
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.diagnose import _problem
 from cosim.diagnosis.findings import is_told, numbers_of, standard_errors
 from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import CandidateFit, is_admissible, margin, refitted
+from cosim.diagnosis.search import CandidateFit, admission, margin, refitted
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import prepare
@@ -71,7 +72,7 @@ def test_of_the_three_only_the_one_that_is_there_is_admissible_and_near(
     near = {
         rival
         for rival, one in this.fits.items()
-        if is_admissible(this.comparison, one) and margin(this.comparison, own, one) < POLICY.set_margin
+        if all_pass(admission(this.comparison, one)) and margin(this.comparison, own, one) < POLICY.set_margin
     }
     assert near == {name}
 
@@ -84,7 +85,7 @@ def test_a_play_without_a_gap_is_the_contact_that_bends_in_all_but_its_name_and_
     assert contact.evidence - play.evidence > 100, "each with what laws lack at stops beside the play alone"
     assert margin(this.comparison, contact, play) < 10, "and none of it beside either"
     assert play.effect.gap_rad < 1e-4  # type: ignore[attr-defined]
-    assert not is_admissible(this.comparison, play)
+    assert not all_pass(admission(this.comparison, play))
 
 
 def test_the_range_of_the_one_that_is_there_holds_its_size_and_that_of_an_imitator_tells_none() -> None:

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.answer.ledger import all_pass
 from cosim.diagnosis.comparison import Comparison
 from cosim.diagnosis.diagnose import _problem
 from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import is_admissible, refitted
+from cosim.diagnosis.search import admission, refitted
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import prepare
@@ -63,4 +64,4 @@ def test_from_there_a_fit_ends_at_the_truth(play: Backlash) -> None:
     assert found.effect.gap_rad == pytest.approx(play.gap_rad, rel=0.01)
     assert found.effect.load_share == pytest.approx(play.load_share, rel=0.05)
     assert found.evidence > 1000
-    assert is_admissible(comparison, found)
+    assert all_pass(admission(comparison, found))

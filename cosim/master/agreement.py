@@ -20,6 +20,7 @@ from cosim.master.loop.part import carried
 from cosim.master.start_graph import Arrival
 from cosim.support.errors import StepError, WiringError
 from cosim.system.plan import Plan
+from cosim.system.ports import PortRef
 
 TOLERANCE = {"Float64": 1e-9, "Float32": 1e-6}
 """Relative to the value, or to the first that the wire brought; of single precision some units in the last place."""
@@ -53,7 +54,7 @@ def arrive(plan: Plan, arrival: Arrival) -> None:
     """
     value = carried(plan.bus, arrival.link, 0, {})
     if not isfinite(value):
-        name = arrival.given.partition(".")[0]
+        name = PortRef(arrival.given).owner
         says = (
             f"{name} gave an output that is not a finite number at tick 0 ({plan.start:.9g} s), in initialisation mode"
         )

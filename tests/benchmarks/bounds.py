@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.answer.ledger import all_pass
 from cosim.diagnosis.bounds import SeenFrom, bounds
 from cosim.diagnosis.candidates import columns_of, span_of
 from cosim.diagnosis.comparison import Comparison
@@ -29,7 +30,7 @@ from cosim.diagnosis.diagnose import _problem
 from cosim.diagnosis.hidden import Member, members
 from cosim.diagnosis.hypotheses import candidates, hypothesis_of
 from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import is_admissible, is_minor, least, refitted
+from cosim.diagnosis.search import admission, is_minor, least, refitted
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import prepare
@@ -96,7 +97,7 @@ def looked_for(comparison: Comparison, base: Fit, name: str) -> bool:
     for one in (one for one in scored if id(one) in best):
         fit = refitted(comparison, base, one.candidate.start(one.coefficients), len(tried))
         enough = fit.evidence >= least(POLICY, 0.0, fit.plain_gain) and not is_minor(fit, POLICY)
-        if enough and is_admissible(comparison, fit):
+        if enough and all_pass(admission(comparison, fit)):
             return True
     return False
 
