@@ -1,10 +1,11 @@
 /* The stepping loop. At tick k, t = k * step:
  *   1. the signals of the tick are put on the bus;
- *   2. outputs and signals are noted for the recording (at tick 0 after outputs have met their inputs, see settle);
+ *   2. outputs and signals are noted for the recording;
  *   3. the stages of the tick are taken: wires carry  y = quantise(gain * x + offset) + noise  to inputs, components step;
  *   4. the row is recorded: outputs at t_k and the inputs that act from t_k to t_(k+1).
  * A component that steps every n ticks takes its inputs at ticks 0, n, 2n, ... and is stepped at the end of the last
- * tick before the next of them, so nobody sees its outputs early. interpreted.py does the same in Python, bit for bit.
+ * tick before the next of them, so nobody sees its outputs early. What the bus holds before tick 0 is written by
+ * initialisation.py. interpreted.py does the same in Python, bit for bit.
  * Nothing is allocated here. */
 #include "loop.h"
 
@@ -139,48 +140,6 @@ EXPORT int64_t loop_layout(void)
                      13 * sizeof(Inner) + 17 * sizeof(Bond) + 19 * sizeof(Fault));
 }
 
-/* Reads all outputs once, before the first tick. */
-EXPORT int64_t loop_start(Loop *loop)
-{
-    Environment before = begin_standard();
-    int status = 0;
-    for (int64_t i = 0; i < loop->parts && status <= FMI_WARNING; i++) {
-        status = get_outputs(enter(loop, i));
-        if (status > FMI_WARNING) {
-            fail(loop, i, status, 0);
-        }
-    }
-    end_standard(before);
-    return status <= FMI_WARNING;
-}
-
-/* Before the first tick, outputs that follow inputs at once are brought to the inputs of that tick, as often as it may
- * take to get through a chain of such components; a wire that breaks a loop is followed once. */
-static int settle(Loop *loop)
-{
-    int64_t rounds = 0;
-    for (int64_t i = 0; i < loop->parts; i++) {
-        rounds += loop->part[i].direct;
-    }
-    for (int64_t round = 0; round < rounds; round++) {
-        for (int64_t i = 0; i < loop->parts; i++) {
-            const Part *part = enter(loop, i);
-            if (part->direct) {
-                for (int64_t j = part->wire; j < part->wire + part->wires; j++) {
-                    if (round == 0 || !loop->wire[j].breaks_loop) {
-                        loop->bus[loop->wire[j].target] = carry(loop, &loop->wire[j]);
-                    }
-                }
-                int status = worse(set_inputs(part), get_outputs(part));
-                if (status > FMI_WARNING) {
-                    return fail(loop, i, status, 0);
-                }
-            }
-        }
-    }
-    return 0;
-}
-
 /* Runs `ticks` ticks. `signals` holds one column of `ticks` values for each signal, `rows` one of `capacity` for each
  * recorded column. Returns the number of rows written; `failed` and `status` tell whether it got to the end. */
 EXPORT int64_t loop_run(Loop *loop, int64_t ticks, const double *signals, double *rows, int64_t capacity)
@@ -191,7 +150,7 @@ EXPORT int64_t loop_run(Loop *loop, int64_t ticks, const double *signals, double
         for (int64_t i = 0; i < loop->signals; i++) {
             loop->signal[i] = signals[i * ticks + k];
         }
-        int failed = loop->tick == 0 ? settle(loop) : 0;
+        int failed = 0;
         note(loop, 0);
         for (int64_t i = 0; i < loop->stages && !failed; i++) {
             failed = take(loop, &loop->stage[i]);

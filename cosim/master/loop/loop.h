@@ -32,7 +32,6 @@ typedef struct {
     double *input, *output; /* their places on the bus */
     int64_t wire, wires;    /* those that feed it, one after the other */
     int64_t every;          /* ticks of a step; inputs are taken at its first tick, outputs shown after its last */
-    int64_t direct;         /* whether outputs may follow inputs at once */
     void **state;           /* where the component keeps what was saved */
     int64_t *altered;       /* where it keeps what its calls changed that they must not, see foreign.h; NULL: nowhere */
 } Part;
@@ -50,7 +49,7 @@ typedef struct {
 typedef struct {
     int64_t source, target, noise; /* places on the bus; noise < 0: none */
     double gain, offset, quantum;  /* quantum 0: not quantised */
-    int64_t faults, breaks_loop;
+    int64_t faults;
     Fault *fault;
 } Wire;
 

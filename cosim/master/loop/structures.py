@@ -23,7 +23,6 @@ class CPart(Structure):
         ("wire", c_int64),
         ("wires", c_int64),
         ("every", c_int64),
-        ("direct", c_int64),
         ("state", c_void_p),
         ("altered", c_void_p),
     ]
@@ -55,7 +54,6 @@ class CWire(Structure):
         ("offset", c_double),
         ("quantum", c_double),
         ("faults", c_int64),
-        ("breaks_loop", c_int64),
         ("fault", POINTER(CFault)),
     ]
 
