@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.closed_loop import LoopError, Loops
-from cosim.diagnosis.deliver import deliver
+from cosim.delivery.closed_loop import LoopError, Loops
+from cosim.delivery.deliver import deliver
+from cosim.diagnosis.answer.result import Diagnosis
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.result import Diagnosis
 from cosim.support.cell import Cell
 from cosim.support.files import directory
 from cosim_studies.proof.demo import demo_case

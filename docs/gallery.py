@@ -15,15 +15,15 @@ from effect_examples import EXAMPLES, LAW, mount
 from literature import LITERATURE
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.breakdown import Samples
-from cosim.diagnosis.hypotheses import TRIED
-from cosim.diagnosis.report.figures_dynamic import effect as draw
-from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.result import Finding
+from cosim.diagnosis.answer.result import Finding
+from cosim.diagnosis.effects import TRIED
+from cosim.diagnosis.measure.breakdown import Samples
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Piece, prepare
 from cosim.plots.quantities import ANGLE, TORQUE, TURNING
 from cosim.plots.style import STYLE
+from cosim.report.figures_dynamic import effect as draw
+from cosim.report.quantities import Scales
 from pyfmi_models.effects import CATALOGUE, Effect
 from pyfmi_models.friction import LuGre
 from pyfmi_models.model import parameters_of

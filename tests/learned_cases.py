@@ -6,11 +6,11 @@ import numpy as np
 from test_unknown import FC, Array, Extra, night
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.learned.learn import Learned, learn
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.predictive import Predictive
-from cosim.diagnosis.protocol import CUTOFF
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.measure.protocol import CUTOFF
+from cosim.diagnosis.terms.learn import Learned, learn
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem

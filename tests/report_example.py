@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from cosim.diagnosis.breakdown import parts
-from cosim.diagnosis.result import Diagnosis, Finding, HeldOut, Region, Trace, Where
+from cosim.diagnosis.answer.result import Diagnosis, Finding, HeldOut, Region, Trace, Where
+from cosim.diagnosis.measure.breakdown import parts
 
 RATE, SECONDS = 1000, 60
 FLOOR = 0.16

@@ -6,17 +6,17 @@ import numpy as np
 import pytest
 from test_decision_proof import RULES, Named, Tables, structure
 
-from cosim.diagnosis.alternatives import prove_sets
-from cosim.diagnosis.proof import Proof
-from cosim.diagnosis.rivals import AcceptedEffect, Examined
-from cosim.diagnosis.search import CandidateFit
+from cosim.diagnosis.search.alternatives import prove_sets
+from cosim.diagnosis.search.proof import Proof
+from cosim.diagnosis.search.rivals import AcceptedEffect, Examined
+from cosim.diagnosis.search.stages import CandidateFit
 
 
 @pytest.fixture(autouse=True)
 def all_are_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
     """Effects that are only their names are never anything else in disguise, and their sizes are told."""
-    monkeypatch.setattr("cosim.diagnosis.proof.is_degenerate", lambda *_: False)
-    monkeypatch.setattr("cosim.diagnosis.proof.tells", lambda *_: True)
+    monkeypatch.setattr("cosim.diagnosis.search.proof.is_degenerate", lambda *_: False)
+    monkeypatch.setattr("cosim.diagnosis.search.proof.tells", lambda *_: True)
 
 
 class Recorded(Tables):

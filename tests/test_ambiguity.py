@@ -8,13 +8,21 @@ import numpy.typing as npt
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.absent import not_found
-from cosim.diagnosis.admissibility import in_time, is_degenerate
-from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import EffectScores, ResidualScores, TermScores, decide, doubted, least_left, open_rivals
-from cosim.diagnosis.hypotheses import hypothesis_of
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import CandidateFit
+from cosim.diagnosis.decide.decision import (
+    EffectScores,
+    ResidualScores,
+    TermScores,
+    decide,
+    doubted,
+    least_left,
+    open_rivals,
+)
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.measure.absent import not_found
+from cosim.diagnosis.search.admissibility import in_time, is_degenerate
+from cosim.diagnosis.search.stages import CandidateFit
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem

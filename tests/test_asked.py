@@ -8,14 +8,14 @@ import pytest
 from scipy.signal import lfilter
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.admissibility import away_from_turns
 from cosim.diagnosis.answer.ledger import all_pass
-from cosim.diagnosis.asked import is_asked_for
-from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import admission, weighed
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.commanded import is_asked_for
+from cosim.diagnosis.search.stages import admission, weighed
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
+from cosim.estimation.residuals import away_from_turns
 from pyfmi_models.effects import Delay
 from pyfmi_models.effects.compliance import LoadSideCompliance
 from pyfmi_models.friction import Coulomb

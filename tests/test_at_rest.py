@@ -4,15 +4,16 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.admissibility import gets_memory, is_degenerate, removed_at_rest
 from cosim.diagnosis.answer.ledger import all_pass
-from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.predictive import Predictive
-from cosim.diagnosis.search import admission, refitted
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.search.admissibility import is_degenerate
+from cosim.diagnosis.search.stages import admission, refitted
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
+from cosim.estimation.residuals import gets_memory, removed_at_rest
 from cosim.estimation.row_weights import weights
 from pyfmi_models.effects import TorqueOffset
 from pyfmi_models.effects.dwell_breakaway import DwellBreakaway

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.band import LEAST_PREDICTED, NOISE_LIMIT, in_band, predicted
-from cosim.diagnosis.candidates import span_of
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.hypotheses.encoder_eccentricity import Eccentricity
-from cosim.diagnosis.periodogram import peaks
+from cosim.diagnosis.effects.candidates import span_of
+from cosim.diagnosis.effects.encoder_eccentricity import Eccentricity
+from cosim.diagnosis.effects.periodogram import peaks
+from cosim.diagnosis.evidence.band import LEAST_PREDICTED, NOISE_LIMIT, in_band, predicted
 from cosim.estimation.prepare import choose_cutoff, prepare
 from pyfmi_models.card import parse_card
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity

@@ -10,10 +10,10 @@ from simulating import simulate
 
 from cosim.data.recording import Recording
 from cosim.data.signals import Multisine
+from cosim.delivery.correction_fmu import Correction
 from cosim.diagnosis.black_box import Base, BlackBox, as_base
-from cosim.diagnosis.correction_fmu import Correction
-from cosim.diagnosis.protocol import residuals
 from cosim.estimation.prepare import prepare
+from cosim.estimation.residuals import residuals
 from cosim.fmi.alias import Alias
 from cosim.master.simulate import run
 from cosim.support.errors import InputError, WiringError

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.absent import _absent
-from cosim.diagnosis.bounds import SeenFrom
-from cosim.diagnosis.candidates import span_of
-from cosim.diagnosis.hypotheses import candidates, hypothesis_of
-from cosim.diagnosis.hypotheses.base import Seen
+from cosim.diagnosis.effects import candidates, hypothesis_of
+from cosim.diagnosis.effects.base import Seen
+from cosim.diagnosis.effects.candidates import span_of
+from cosim.diagnosis.measure.absent import _absent
+from cosim.diagnosis.measure.bounds import SeenFrom
 from cosim.estimation.prepare import Prepared, prepare
 from pyfmi_models.effects import Cogging, Effect, PeriodicFriction
 from pyfmi_models.effects.compliance import Compliance, LoadSideCompliance

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.diagnosis.bounds import SeenFrom
-from cosim.diagnosis.bounds import tested as seen_from
-from cosim.diagnosis.candidates import columns_of
-from cosim.diagnosis.concealment import Concealment, Hidden
-from cosim.diagnosis.hypotheses import candidates
+from cosim.diagnosis.effects import candidates
+from cosim.diagnosis.effects.candidates import columns_of
+from cosim.diagnosis.measure.bounds import SeenFrom
+from cosim.diagnosis.measure.bounds import tested as seen_from
+from cosim.diagnosis.measure.concealment import Concealment, Hidden
 from cosim.estimation.inverse import Inverse, stacked
 
 sys.path.append(str(Path(__file__).parent / "benchmarks"))

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from motions import RATE, Array, Motion
 
-from cosim.diagnosis.bursts import ABOVE, burst_share
-from cosim.diagnosis.decision import IN_BURSTS, EffectScores, ResidualScores, decide
-from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.decide.decision import IN_BURSTS, EffectScores, ResidualScores, decide
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.bursts import ABOVE, burst_share
 
 SECONDS = 40
 T = np.arange(SECONDS * RATE) / RATE

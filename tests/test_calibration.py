@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from benchmarks import calibration as benchmark
 
-from cosim.diagnosis.calibration import OFFSET, SLOPE, calibrated
+from cosim.diagnosis.decide.calibration import OFFSET, SLOPE, calibrated
 
 BENCHMARK = Path(benchmark.__file__)
 RESULTS = Path(__file__).parents[1] / "results"

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.answer.result import Diagnosis
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.hypotheses import hypothesis_of
-from cosim.diagnosis.result import Diagnosis
+from cosim.diagnosis.effects import hypothesis_of
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.card import Card, parse_card

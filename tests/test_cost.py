@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from cosim.diagnosis import regression
-from cosim.diagnosis.closed_loop import Loops
-from cosim.diagnosis.regression import kernel
+from cosim.delivery.closed_loop import Loops
+from cosim.diagnosis.measure import regression
+from cosim.diagnosis.measure.regression import kernel
 from cosim.estimation.filters import lowpass
 from cosim.estimation.fit import fit
 from cosim.estimation.inverse import Inverse, stacked

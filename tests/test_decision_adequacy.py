@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from motions import RATE, TORQUE, Array, Motion
 
-from cosim.diagnosis.adequacy import over_time, share_left, share_there
+from cosim.diagnosis.evidence.adequacy import over_time, share_left, share_there
 
 
 def comparing(motion: Motion, level: float | Array, weight: Array | None = None) -> Any:

@@ -5,8 +5,8 @@ from math import exp
 
 import pytest
 
-from cosim.diagnosis.calibration import calibrated
-from cosim.diagnosis.decision import (
+from cosim.diagnosis.decide.calibration import calibrated
+from cosim.diagnosis.decide.decision import (
     Decision,
     EffectScores,
     Gain,
@@ -20,7 +20,7 @@ from cosim.diagnosis.decision import (
     open_rivals,
     stands,
 )
-from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.decide.policy import POLICY
 
 ROUND = replace(
     POLICY,

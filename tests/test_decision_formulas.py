@@ -8,10 +8,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from cosim.diagnosis import adequacy
-from cosim.diagnosis.adequacy import _beside, _cells, _hats, _lasting, _rms, _slow
-from cosim.diagnosis.admissibility import _way_back, away_from_turns, removed_at_rest
-from cosim.diagnosis.marginal import Group, _size, marginal
+from cosim.diagnosis.evidence import adequacy
+from cosim.diagnosis.evidence.adequacy import _beside, _cells, _hats, _lasting, _rms, _slow
+from cosim.diagnosis.evidence.marginal import Group, _size, marginal
+from cosim.diagnosis.search.admissibility import _way_back
+from cosim.estimation.residuals import away_from_turns, removed_at_rest
 
 Array = npt.NDArray[np.float64]
 CELL, RATE = 0.25, 40
@@ -129,7 +130,7 @@ def test_where_a_fiftieth_of_the_energy_goes_it_is_asked_where(
 ) -> None:
     """Of a hundred rows the last half are about turns; all is removed there."""
     far = np.repeat([1.0, 0.0], 50)
-    monkeypatch.setattr("cosim.diagnosis.admissibility.far_from_turns", lambda _: far)
+    monkeypatch.setattr("cosim.diagnosis.search.admissibility.far_from_turns", lambda _: far)
     problem: Any = SimpleNamespace(prepared=None)
     without, left = np.ones(100), np.ones(100)
     left[50:] = math.sqrt(1 - 2 * removed)

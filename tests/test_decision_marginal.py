@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from cosim.diagnosis.marginal import Group, Marginal, marginal
+from cosim.diagnosis.evidence.marginal import Group, Marginal, marginal
 
 Array = npt.NDArray[np.float64]
 DICE = np.random.default_rng(18)

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.proof import Proof, prove
-from cosim.diagnosis.rivals import AcceptedEffect, Examined
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.search.proof import Proof, prove
+from cosim.diagnosis.search.rivals import AcceptedEffect, Examined
 
 RULES = replace(
     POLICY,
@@ -32,8 +32,8 @@ class Named:
 @pytest.fixture(autouse=True)
 def all_are_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
     """Effects that are only their names are never anything else in disguise, and their sizes are told."""
-    monkeypatch.setattr("cosim.diagnosis.proof.is_degenerate", lambda *_: False)
-    monkeypatch.setattr("cosim.diagnosis.proof.tells", lambda *_: True)
+    monkeypatch.setattr("cosim.diagnosis.search.proof.is_degenerate", lambda *_: False)
+    monkeypatch.setattr("cosim.diagnosis.search.proof.tells", lambda *_: True)
 
 
 @dataclass(frozen=True)
@@ -145,7 +145,7 @@ def test_where_nothing_predicts_the_base_stays() -> None:
 def test_an_effect_of_which_no_size_is_told_stands_only_if_it_surely_predicts(
     more: float, left: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("cosim.diagnosis.proof.tells", lambda problem, chosen, effect: effect.id != "y")
+    monkeypatch.setattr("cosim.diagnosis.search.proof.tells", lambda problem, chosen, effect: effect.id != "y")
     proof = proven(Tables({"b": 0.0, "bx": 10.0, "bxy": 10.0 + more, "by": more}), "xy")
     assert standing(proof) == left
     assert proof.chosen.mount.names == "b" + left  # type: ignore[attr-defined]

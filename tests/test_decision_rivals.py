@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from cosim.diagnosis import rivals
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.rivals import AcceptedEffect, Examined, examine, explains, grouped, margins
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.search.rivals import AcceptedEffect, Examined, examine, explains, grouped, margins
+from cosim.diagnosis.search.stages import rivals
 
 RULES = replace(POLICY, set_margin=3.0, keep_evidence=8.0)
 

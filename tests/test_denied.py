@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.denied import beyond_denial, without_denied
+from cosim.diagnosis.answer.doubt_entry import Sanity
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.sanity.entry import Sanity
+from cosim.diagnosis.trust.denied import beyond_denial, without_denied
 from pyfmi_models.card import parse_card
 from pyfmi_models.effects import Delay, Effect, TorqueOffset
 from pyfmi_models.effects.clock_skew import ClockSkew

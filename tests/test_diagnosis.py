@@ -17,7 +17,7 @@ from test_prepare import recorded, wander
 from cosim.cli import main
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.protocol import Structures, judge, traces
+from cosim.diagnosis.measure.protocol import Structures, judge, traces
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.prepare import Band, prepare
 from cosim.support.errors import InputError

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.discrepancy import WAVES, Discrepancy, discrepancy
-from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.discrepancy import WAVES, Discrepancy, discrepancy
 from cosim.estimation.prepare import Prepared, prepare
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from effect_examples import FORMS
 
-from cosim.diagnosis.hypotheses import TRIED
+from cosim.diagnosis.effects import TRIED
 from pyfmi_models.effects import CATALOGUE
 
 DOCS = Path(__file__).parents[1] / "docs"

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from effect_examples import EXAMPLES, evaluate, mount, simulate
 
-from cosim.diagnosis.hypotheses import TRIED
-from cosim.diagnosis.sanity.admission import check_effects
+from cosim.diagnosis.effects import TRIED
+from cosim.diagnosis.trust.admission import check_effects
 from cosim.support.errors import InputError
 from pyfmi_models.card import parse_card
 from pyfmi_models.effects import CATALOGUE, GravityUnbalance, LocalFriction

@@ -5,7 +5,7 @@ from math import log
 import pytest
 from effect_examples import EXAMPLES
 
-from cosim.diagnosis.findings import between
+from cosim.diagnosis.measure.findings import between
 from pyfmi_models.effects import FORMS, Effect
 from pyfmi_models.effects.shares import higher, percent
 

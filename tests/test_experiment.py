@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.experiment import best, motions, scenario, told
+from cosim.diagnosis.measure.experiment import best, motions, scenario, told
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.system.scenario import read_scenario
 from pyfmi_models.card import read_card

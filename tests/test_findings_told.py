@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from cosim.diagnosis.findings import Numbers, is_told, numbers_of
-from cosim.diagnosis.hypotheses import hypothesis_of
-from cosim.diagnosis.tuning import at_bound
+from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.effects.tuning import at_bound
+from cosim.diagnosis.search.sizes import Numbers, is_told, numbers_of
 from pyfmi_models.effects import Cogging, Delay, Effect, FrictionAsymmetry, StribeckEffect, TorqueOffset
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.model import parameters_of

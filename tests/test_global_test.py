@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
-from cosim.diagnosis.global_test import GlobalTest, Scores, _groups, global_test
-from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.global_test import GlobalTest, Scores, _groups, global_test
 from cosim_studies.proof.generator import make_case, write_case
 from cosim_studies.proof.tool import given
 

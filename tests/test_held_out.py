@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import Gain, stands
+from cosim.diagnosis.decide.decision import Gain, stands
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.predictive import Predictive
-from cosim.diagnosis.protocol import of_the_best
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.measure.protocol import of_the_best
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from cosim_studies.proof.generator import make_case, write_case

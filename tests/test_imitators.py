@@ -9,11 +9,11 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.ledger import all_pass
-from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
-from cosim.diagnosis.findings import is_told, numbers_of, standard_errors
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import CandidateFit, admission, margin, refitted
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.sizes import is_told, numbers_of, standard_errors
+from cosim.diagnosis.search.stages import CandidateFit, admission, margin, refitted
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import prepare

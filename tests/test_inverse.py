@@ -7,7 +7,7 @@ import pytest
 from effect_examples import EXAMPLES
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.sanity.admission import is_held
+from cosim.diagnosis.trust.admission import is_held
 from cosim.estimation.identify.machine import Machine
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Prepared, prepare

@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.law_selection import FOLDS, LEAST, proposed_law
+from cosim.diagnosis.measure.law_selection import FOLDS, LEAST, proposed_law
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem

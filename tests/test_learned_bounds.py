@@ -7,11 +7,11 @@ import pytest
 from learned_cases import MOUNT, droop, learned, parts, wanders, warm_place
 from test_unknown import Array, Extra, iron
 
-from cosim.diagnosis.learned.candidate_terms import candidate_terms, resolved
-from cosim.diagnosis.learned.grams import columns_of, with_terms
-from cosim.diagnosis.learned.learn import _judged
-from cosim.diagnosis.learned.select import LEAST_EVIDENCE, paths
-from cosim.diagnosis.predictive import Predictive
+from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.terms.candidate_terms import candidate_terms, resolved
+from cosim.diagnosis.terms.grams import columns_of, with_terms
+from cosim.diagnosis.terms.learn import _judged
+from cosim.diagnosis.terms.select import LEAST_EVIDENCE, paths
 from cosim.estimation.inverse import Inverse, stacked
 from pyfmi_models.effects.learned import LearnedFriction, LearnedViscous
 from pyfmi_models.effects.learned_drive import LearnedDrive, LearnedGain

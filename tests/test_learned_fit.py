@@ -9,13 +9,14 @@ import pytest
 from learned_cases import droop, learned, parts, recording, wanders, warm_place
 from test_unknown import FC, Array, Extra, iron, kick
 
-from cosim.diagnosis.deliver import as_json, deliver_quickly
+from cosim.delivery.deliver import as_json, deliver_quickly
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.learned.learn import SURE, learn
-from cosim.diagnosis.learned.select import begun, paths
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.predictive import Predictive
-from cosim.diagnosis.protocol import CUTOFF
+from cosim.delivery.proposal import Proposal
+from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.measure.protocol import CUTOFF
+from cosim.diagnosis.terms.learn import SURE, learn
+from cosim.diagnosis.terms.select import begun, paths
 from cosim.estimation.prepare import prepare
 from pyfmi_models.card import parse_card, read_card
 
@@ -181,7 +182,8 @@ def test_a_diagnosis_says_unknown_delivers_the_term_and_its_card_holds_it(tmp_pa
     assert back.effects == outcome.card.effects
     assert "something learned over position" in (tmp_path / "card.toml").read_text("utf-8")
     assert json.loads((tmp_path / "diagnosis.json").read_text("utf-8"))["improved"]["card"] == "card.toml"
-    (proposal,) = outcome.proposals
+    ((formula, statement),) = outcome.formulas
+    proposal = Proposal(formula, statement)
     assert proposal.id == "proposed_friction_over_position_and_temperature"
     assert said["formula"][0]["equation"] in proposal.text()
 

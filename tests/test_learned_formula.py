@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cosim.diagnosis.learned.agreement import Unseen, proposed
-from cosim.diagnosis.learned.forms import FORMS
-from cosim.diagnosis.learned.formula import Formula, Rows, Shape
-from cosim.diagnosis.learned.partial import Partial
-from cosim.diagnosis.learned.spelled import Spelled
+from cosim.diagnosis.terms.agreement import Unseen, proposed
+from cosim.diagnosis.terms.forms import FORMS
+from cosim.diagnosis.terms.formula import Formula, Rows, Shape
+from cosim.diagnosis.terms.partial import Partial
+from cosim.diagnosis.terms.spelled import Spelled
 from cosim.estimation.blocks import Blocks
 from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal

@@ -17,11 +17,11 @@ from test_learned_formula import POSITION, WARM, found
 from test_report_learned import TOLD
 
 import pyfmi_models
-from cosim.diagnosis.learned.forms import FADE, FORMS
-from cosim.diagnosis.learned.formula import Formula, Shape
-from cosim.diagnosis.learned.proposal import Proposal, write_proposals
-from cosim.diagnosis.learned.spelled import Spelled
-from cosim.diagnosis.terminal import proposed
+from cosim.delivery.proposal import Proposal, write_proposals
+from cosim.diagnosis.terms.forms import FADE, FORMS
+from cosim.diagnosis.terms.formula import Formula, Shape
+from cosim.diagnosis.terms.spelled import Spelled
+from cosim.report.terminal import proposed
 from cosim.support.errors import OutputError
 from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque, LearnedViscous
 from pyfmi_models.effects.learned_drive import LearnedDrive, LearnedGain

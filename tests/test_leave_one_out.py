@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis import search
-from cosim.diagnosis.candidates import Candidate
-from cosim.diagnosis.comparison import Screened
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.dictionary import dictionary
-from cosim.diagnosis.policy import POLICY
+from cosim.diagnosis.effects.candidates import Candidate
+from cosim.diagnosis.evidence.comparison import Screened
+from cosim.diagnosis.search.stages import stages as search
+from cosim.diagnosis.terms.dictionary import dictionary
 from cosim.estimation.prepare import prepare
 from cosim_studies.proof.generator import make_case, to_toml
 from cosim_studies.proof.outside import SHAPED

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.absent import not_found
-from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.answer.result import Finding
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.result import Finding
-from cosim.diagnosis.search import Stage, best_of, refitted
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.measure.absent import not_found
+from cosim.diagnosis.search.stages import Stage, best_of, refitted
 from cosim.estimation.fit import Fit
 from pyfmi_models.card import Card, parse_card
 from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction

@@ -15,9 +15,9 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigvals
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.admissibility import is_degenerate
-from cosim.diagnosis.candidates import columns_of
-from cosim.diagnosis.hypotheses import candidates
+from cosim.diagnosis.effects import candidates
+from cosim.diagnosis.effects.candidates import columns_of
+from cosim.diagnosis.search.admissibility import is_degenerate
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.estimation.problem import Problem

@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from cosim.diagnosis.locate import regions
-from cosim.diagnosis.result import Region, Trace
+from cosim.diagnosis.answer.result import Region, Trace
+from cosim.diagnosis.measure.locate import regions
 
 Array = np.ndarray
 

@@ -7,9 +7,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.breakdown import samples
-from cosim.diagnosis.missing_torque import write_missing_torque
-from cosim.diagnosis.protocol import Structures, traces
+from cosim.delivery.missing_torque import write_missing_torque
+from cosim.diagnosis.measure.breakdown import samples
+from cosim.diagnosis.measure.protocol import Structures, traces
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 

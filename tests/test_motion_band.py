@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.band import in_band
 from cosim.diagnosis.diagnose import _problem
+from cosim.diagnosis.evidence.band import in_band
 from cosim.estimation.prepare import Band, choose_cutoff, prepare
 from pyfmi_models.card import Card, parse_card
 

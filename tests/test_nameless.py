@@ -9,12 +9,12 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis import diagnose as whole
-from cosim.diagnosis.decision import ResidualScores, decide, followed
-from cosim.diagnosis.hypotheses import HYPOTHESES, hypothesis_of
-from cosim.diagnosis.learned.candidate_terms import candidate_terms
-from cosim.diagnosis.nameless import Nameless, _challenge, _Offered, nameless
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.result import Diagnosis
+from cosim.diagnosis.answer.result import Diagnosis
+from cosim.diagnosis.decide.decision import ResidualScores, decide, followed
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.effects import HYPOTHESES, hypothesis_of
+from cosim.diagnosis.search.nameless import Nameless, _challenge, _Offered, nameless
+from cosim.diagnosis.terms.candidate_terms import candidate_terms
 from cosim.estimation.prepare import prepare
 from cosim_studies.proof.generator import ANY, make_case, write_given
 from cosim_studies.proof.tool import given

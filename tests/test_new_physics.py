@@ -14,7 +14,7 @@ from fmpy import simulate_fmu
 
 import cosim
 import pyfmi_models
-from cosim.diagnosis.hypotheses import TRIED
+from cosim.diagnosis.effects import TRIED
 from pyfmi_models.effects import CATALOGUE, FORMS
 
 ROOT = Path(__file__).parents[1]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.hypotheses import candidates
+from cosim.diagnosis.effects import candidates
 from cosim.estimation.prepare import Prepared, prepare
 from pyfmi_models.effects import Effect, FrictionAsymmetry, TorqueOffset
 from pyfmi_models.friction import Coulomb, FrictionLaw, LuGre

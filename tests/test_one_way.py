@@ -7,11 +7,11 @@ import numpy.typing as npt
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.admissibility import needs_turns
-from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.hypotheses import hypothesis_of
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import refitted
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.admissibility import needs_turns
+from cosim.diagnosis.search.stages import refitted
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Cogging, Effect, LocalFriction, PeriodicFriction, TorqueOffset

@@ -17,9 +17,9 @@ from test_cli_run import call, scenario
 from tiny_fmu import tiny
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.report import render
 from cosim.investigation.page import write_page
 from cosim.investigation.story import Answered, Moved, Story
+from cosim.report import render
 from pyfmi_models.card import read_card
 from pyfmi_models.export.codegen import generate
 from pyfmi_models.export.documentation import documentation

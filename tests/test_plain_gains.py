@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import Gain, stands
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.predictive import Predictive
+from cosim.diagnosis.decide.decision import Gain, stands
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Cogging, Effect, TorqueOffset

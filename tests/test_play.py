@@ -7,7 +7,7 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.hypotheses import hypothesis_of
+from cosim.diagnosis.effects import hypothesis_of
 from cosim.estimation.play import SEARCHED, far_torques, stepped_torque
 from cosim.estimation.prepare import prepare
 from cosim_studies.proof.generator import make_case, write_case

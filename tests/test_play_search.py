@@ -8,10 +8,10 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.ledger import all_pass
-from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import admission, refitted
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.stages import admission, refitted
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import prepare

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.bands import Bands
-from cosim.diagnosis.candidates import columns_of
-from cosim.diagnosis.comparison import NONE, Comparison
-from cosim.diagnosis.discrepancy import discrepancy
-from cosim.diagnosis.findings import tells
-from cosim.diagnosis.harmonics import with_harmonics
-from cosim.diagnosis.hypotheses import hypothesis_of
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import is_full
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.effects.candidates import columns_of
+from cosim.diagnosis.evidence.bands import Bands
+from cosim.diagnosis.evidence.comparison import NONE, Comparison
+from cosim.diagnosis.evidence.discrepancy import discrepancy
+from cosim.diagnosis.search.harmonics import with_harmonics
+from cosim.diagnosis.search.sizes import tells
+from cosim.diagnosis.search.stages import is_full
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Cogging

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import pytest
 
-from cosim.diagnosis.decision import Gain, ResidualScores, TermScores, is_left, stands
-from cosim.diagnosis.policy import POLICY, Policy
-from cosim.diagnosis.search import least
+from cosim.diagnosis.decide.decision import Gain, ResidualScores, TermScores, is_left, stands
+from cosim.diagnosis.decide.policy import POLICY, Policy
+from cosim.diagnosis.search.stages import least
 
 BETWEEN = {
     "moved_prior": (0.05, 0.3),  # friction repeats to 10 to 20 %; .3 gives the same verdicts

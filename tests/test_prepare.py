@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.sanity.admission import check_recordings
-from cosim.diagnosis.sanity.judgement import judged
-from cosim.diagnosis.sanity.likelihood import Reference
+from cosim.diagnosis.trust.admission import check_recordings
+from cosim.diagnosis.trust.judgement import judged
+from cosim.diagnosis.trust.likelihood import Reference
 from cosim.estimation.filters import derivative, lowpass
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import choose_cutoff, noise_of, prepare, quality

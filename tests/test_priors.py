@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.priors import trust
-from cosim.diagnosis.search import margin, stage
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.stages import margin, stage
 from cosim.estimation.prepare import prepare
+from cosim.estimation.priors import trust
 from cosim.estimation.problem import Problem
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount

@@ -13,7 +13,7 @@ import pytest
 import cosim
 import cosim_studies
 import pyfmi_models
-from cosim.diagnosis.hypotheses import TRIED
+from cosim.diagnosis.effects import TRIED
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import CATALOGUE
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.closed_loop import LoopError, Loops
-from cosim.diagnosis.loop_bias import loop_bias
-from cosim.diagnosis.regression import black_box_rms
-from cosim.diagnosis.result import Trace
+from cosim.delivery.closed_loop import LoopError, Loops
+from cosim.diagnosis.answer.result import Trace
+from cosim.diagnosis.measure.loop_bias import loop_bias
+from cosim.diagnosis.measure.regression import black_box_rms
 from cosim.estimation.prepare import Prepared, choose_cutoff, prepare
 from cosim.estimation.problem import Problem
 from cosim_studies.proof.generator import make_case, write_case
@@ -119,7 +119,7 @@ def test_a_black_box_learns_what_is_smooth_and_leaves_the_noise() -> None:
 def test_the_improved_files_say_all_three(tmp_path: Path, case: tuple[Card, list[Recording], Recording, float]) -> None:
     import json
 
-    from cosim.diagnosis.deliver import deliver
+    from cosim.delivery.deliver import deliver
     from cosim.diagnosis.diagnose import diagnose
 
     card, train, held, _ = case

@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.deliver import deliver_quickly
+from cosim.delivery.deliver import deliver_quickly
 from cosim.diagnosis.diagnose import _problem, diagnose
-from cosim.diagnosis.protocol import Structures, heldout_rms, judge, of_the_best, residuals, traces
-from cosim.diagnosis.regression import black_box_rms
+from cosim.diagnosis.measure.protocol import Structures, heldout_rms, judge, of_the_best, traces
+from cosim.diagnosis.measure.regression import black_box_rms
 from cosim.estimation.fit import free_parameters, with_values
 from cosim.estimation.prepare import Band, prepare
+from cosim.estimation.residuals import residuals
 from cosim.support.statistics import rms
 from cosim_studies.proof.generator import make_case, to_toml
 from pyfmi_models.card import Card, parse_card, read_card

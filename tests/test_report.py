@@ -17,14 +17,14 @@ import numpy as np
 import pytest
 from report_example import FOUND, REST, RIVALS, diagnosis
 
-from cosim.diagnosis.breakdown import part, samples
-from cosim.diagnosis.hypotheses import TRIED
-from cosim.diagnosis.report import lead, render, words, write_report
-from cosim.diagnosis.report.explorer import payload
-from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.tables import numbers
-from cosim.diagnosis.terminal import summary
+from cosim.diagnosis.effects import TRIED
+from cosim.diagnosis.measure.breakdown import part, samples
 from cosim.plots.style import thin
+from cosim.report import lead, render, words, write_report
+from cosim.report.explorer import payload
+from cosim.report.quantities import Scales
+from cosim.report.tables import numbers
+from cosim.report.terminal import summary
 
 
 @cache
@@ -135,8 +135,8 @@ def test_report_is_reproducible_and_quick(tmp_path: Path) -> None:
 def test_every_effect_has_a_figure(effect: str) -> None:
     import matplotlib
 
-    from cosim.diagnosis.report.figures_dynamic import effect as draw
     from cosim.plots.style import STYLE
+    from cosim.report.figures_dynamic import effect as draw
 
     finding = replace(FOUND[0], effect=effect, parameters={"delay_ms": 3.0, "cycles_per_rev": 24.0})
     with matplotlib.rc_context(STYLE):
@@ -217,7 +217,7 @@ def test_an_experiment_that_noise_would_hide_is_said_to_need_more_motion(differe
 
 
 def test_importing_the_report_does_not_load_matplotlib() -> None:
-    code = "import cosim.diagnosis.report, cosim.diagnosis.terminal, sys; sys.exit('matplotlib' in sys.modules)"
+    code = "import cosim.report, cosim.report.terminal, sys; sys.exit('matplotlib' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
 
 

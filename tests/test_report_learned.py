@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from report_example import diagnosis
 
-from cosim.diagnosis.report import render
-from cosim.diagnosis.report.learned import nameless
-from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.result import Diagnosis
-from cosim.diagnosis.terminal import summary
+from cosim.diagnosis.answer.result import Diagnosis
+from cosim.report import render
+from cosim.report.learned import nameless
+from cosim.report.quantities import Scales
+from cosim.report.terminal import summary
 
 AT, BY = np.linspace(-1, 1, 24), [18.0, 22.0, 26.0]
 DATA = {"at": AT.tolist(), "value": [None, *(0.3 * AT[1:] ** 2)], "band": [0.02] * 24}

@@ -5,11 +5,11 @@ from dataclasses import replace
 import pytest
 from report_example import FOUND, REST, RIVALS, diagnosis
 
-from cosim.diagnosis.findings import answered
-from cosim.diagnosis.report import lead, words
-from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.result import Diagnosis, Finding
-from cosim.diagnosis.terminal import summary
+from cosim.diagnosis.answer.result import Diagnosis, Finding
+from cosim.diagnosis.measure.findings import answered
+from cosim.report import lead, words
+from cosim.report.quantities import Scales
+from cosim.report.terminal import summary
 from cosim.serve.work import in_words
 from pyfmi_models.effects import Cogging
 

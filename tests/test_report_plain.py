@@ -6,12 +6,12 @@ from dataclasses import replace
 from report_example import FOUND, REST, RIVALS, diagnosis
 from test_report_truth import drawn, text_of
 
-from cosim.diagnosis.deliver import without_files
-from cosim.diagnosis.report import render, words
-from cosim.diagnosis.report.motion import motion
-from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.tables import limits
-from cosim.diagnosis.terminal import summary
+from cosim.delivery.deliver import without_files
+from cosim.report import render, words
+from cosim.report.motion import motion
+from cosim.report.quantities import Scales
+from cosim.report.tables import limits
+from cosim.report.terminal import summary
 
 
 def test_how_far_a_rival_is_behind_in_evidence_stands_among_the_numbers() -> None:

@@ -10,22 +10,23 @@ import numpy as np
 import pytest
 from report_example import FOUND, REST, RIVALS, diagnosis
 
-from cosim.diagnosis.advice import advice
-from cosim.diagnosis.breakdown import samples
-from cosim.diagnosis.deliver import as_json, chosen_of_sets
-from cosim.diagnosis.findings import Numbers, visible_from
-from cosim.diagnosis.report import lead, render, words
-from cosim.diagnosis.report.figures_dynamic import effect as draw
-from cosim.diagnosis.report.figures_proof import looked_for
-from cosim.diagnosis.report.figures_time import recording
-from cosim.diagnosis.report.findings import block, do, where
-from cosim.diagnosis.report.page import identity, unexplained
-from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.sheet import Picture
-from cosim.diagnosis.report.tables import looked, proof
-from cosim.diagnosis.result import Diagnosis, Finding, Where
-from cosim.diagnosis.terminal import summary
+from cosim.delivery.deliver import as_json, chosen_of_sets
+from cosim.diagnosis.answer.result import Diagnosis, Finding, Where
+from cosim.diagnosis.measure.advice import advice
+from cosim.diagnosis.measure.breakdown import samples
+from cosim.diagnosis.measure.findings import visible_from
+from cosim.diagnosis.search.sizes import Numbers
 from cosim.plots.style import STYLE
+from cosim.report import lead, render, words
+from cosim.report.figures_dynamic import effect as draw
+from cosim.report.figures_proof import looked_for
+from cosim.report.figures_time import recording
+from cosim.report.findings import block, do, where
+from cosim.report.page import identity, unexplained
+from cosim.report.quantities import Scales
+from cosim.report.sheet import Picture
+from cosim.report.tables import looked, proof
+from cosim.report.terminal import summary
 from pyfmi_models.effects import CATALOGUE
 from pyfmi_models.effects.friction_asymmetry import FrictionAsymmetry
 
@@ -247,7 +248,7 @@ def test_what_the_first_screen_says_is_not_said_again() -> None:
 
 
 def test_doubts_about_the_recordings_stand_before_the_answer() -> None:
-    from cosim.diagnosis.sanity.entry import Sanity
+    from cosim.diagnosis.answer.doubt_entry import Sanity
 
     doubt = Sanity(finding="torque_sign", statement="The torque drives the axis backwards.")
     html = render(replace(diagnosis("two"), sanity=(doubt,)))

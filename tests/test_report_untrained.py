@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 from report_example import diagnosis
 
-from cosim.diagnosis.report.page import unexplained
-from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.result import Diagnosis
-from cosim.diagnosis.terminal import summary
+from cosim.diagnosis.answer.result import Diagnosis
+from cosim.report.page import unexplained
+from cosim.report.quantities import Scales
+from cosim.report.terminal import summary
 
 
 def limited(limit: float, trained: float) -> Diagnosis:

@@ -7,15 +7,15 @@ import pytest
 from report_example import FOUND, REST, diagnosis
 from test_report import KINDS, page
 
-from cosim.diagnosis.report import tables
-from cosim.diagnosis.report.figures_proof import relative
-from cosim.diagnosis.report.findings import block
-from cosim.diagnosis.report.lead import improvement
-from cosim.diagnosis.report.quantities import Scales
-from cosim.diagnosis.report.tables import limits
-from cosim.diagnosis.report.words import blocks
-from cosim.diagnosis.terminal import summary
 from cosim.plots.quantities import minus, number, raised
+from cosim.report import tables
+from cosim.report.figures_proof import relative
+from cosim.report.findings import block
+from cosim.report.lead import improvement
+from cosim.report.quantities import Scales
+from cosim.report.tables import limits
+from cosim.report.terminal import summary
+from cosim.report.words import blocks
 
 
 def test_where_nothing_is_missing_no_effect_is_left_out_of_the_first_screen_and_no_gain_is_claimed() -> None:
@@ -47,7 +47,7 @@ def test_terminal_summary_fits_80_columns(kind: str, motion: str) -> None:
 
 
 def test_terminal_is_bold_only_where_wanted(monkeypatch: pytest.MonkeyPatch) -> None:
-    from cosim.diagnosis.terminal import print_summary
+    from cosim.report.terminal import print_summary
 
     class Terminal(io.StringIO):
         def isatty(self) -> bool:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.hypotheses import hypothesis_of
+from cosim.diagnosis.effects import hypothesis_of
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.estimation.row_weights import remembers, weights
 from cosim.estimation.visible import least_way

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.sanity.balance import Balance
-from cosim.diagnosis.sanity.explanations import RIGHT
-from cosim.diagnosis.sanity.judgement import Judgement
-from cosim.diagnosis.sanity.likelihood import Reference
+from cosim.diagnosis.trust.balance import Balance
+from cosim.diagnosis.trust.explanations import RIGHT
+from cosim.diagnosis.trust.judgement import Judgement
+from cosim.diagnosis.trust.likelihood import Reference
 
 
 def waving(share: float, order: float = 0.5) -> Recording:

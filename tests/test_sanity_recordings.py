@@ -10,12 +10,12 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
-from cosim.diagnosis.sanity.balance import Balance
-from cosim.diagnosis.sanity.clocks import ClockOffset, clock_offset, clocks
-from cosim.diagnosis.sanity.doubts import doubts
-from cosim.diagnosis.sanity.judgement import Judgement, _groups, judged
-from cosim.diagnosis.sanity.likelihood import Reference
-from cosim.diagnosis.sanity.other_machine import other_machine
+from cosim.diagnosis.trust.balance import Balance
+from cosim.diagnosis.trust.clocks import ClockOffset, clock_offset, clocks
+from cosim.diagnosis.trust.doubts import doubts
+from cosim.diagnosis.trust.judgement import Judgement, _groups, judged
+from cosim.diagnosis.trust.likelihood import Reference
+from cosim.diagnosis.trust.other_machine import other_machine
 from cosim.support.errors import RecordingError
 from cosim_studies.proof.generator import make_case, to_toml
 from pyfmi_models.card import Card, parse_card

@@ -5,9 +5,9 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.ledger import all_pass
-from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import CandidateFit, admission, refitted, starts
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.stages import CandidateFit, admission, refitted, starts
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.base_moved import owed_to_base
-from cosim.diagnosis.comparison import NONE, Comparison
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import (
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.comparison import NONE, Comparison
+from cosim.diagnosis.search.base_moved import owed_to_base
+from cosim.diagnosis.search.stages import (
     CandidateFit,
     best_of,
     is_hopeful,

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from cosim.diagnosis.decide.policy import POLICY, Policy
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.policy import POLICY, Policy
 from cosim_studies.proof.generator import make_case, write_given
 from cosim_studies.proof.tool import given
 

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from test_search import compared
 
-from cosim.diagnosis import side_by_side
-from cosim.diagnosis.search import CandidateFit, InTurn, starts
-from cosim.diagnosis.side_by_side import SideBySide
+from cosim.diagnosis.search.side_by_side import SideBySide
+from cosim.diagnosis.search.stages import CandidateFit, InTurn, side_by_side, starts
 from cosim.support.cell import Cell, LostError
 from pyfmi_models.effects.backlash import Backlash
 

@@ -8,8 +8,8 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.data.resolution import resolution
 from cosim.data.single_readings import cleaned
-from cosim.diagnosis.protocol import heldout_rms
-from cosim.diagnosis.sanity.doubts import single_readings
+from cosim.diagnosis.measure.protocol import heldout_rms
+from cosim.diagnosis.trust.doubts import single_readings
 from cosim.estimation.prepare import prepare
 from cosim_studies.proof.generator import make_case
 from pyfmi_models.card import parse_card

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.absent import not_found
-from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.answer.result import Finding
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
-from cosim.diagnosis.findings import standard_errors
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.result import Finding
-from cosim.diagnosis.search import margin, refitted
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.measure.absent import not_found
+from cosim.diagnosis.search.sizes import standard_errors
+from cosim.diagnosis.search.stages import margin, refitted
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import Fit
 from cosim.estimation.problem import Problem

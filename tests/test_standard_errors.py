@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.findings import Z95, standard_errors
+from cosim.diagnosis.search.sizes import Z95, standard_errors
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from cosim.diagnosis.answer.ledger import all_pass
-from cosim.diagnosis.decision import Gain
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.proof import _validation
-from cosim.diagnosis.rivals import AcceptedEffect
+from cosim.diagnosis.decide.decision import Gain
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.search.proof import _validation
+from cosim.diagnosis.search.rivals import AcceptedEffect
 from pyfmi_models.effects import Cogging, Effect
 from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.friction import Coulomb

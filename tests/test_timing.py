@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.instrumental_variable import DECISIVE, misfits_of
-from cosim.diagnosis.timing_attribution import attributed, reading_lag
+from cosim.diagnosis.effects.timing_attribution import attributed, reading_lag
+from cosim.diagnosis.search.instrumental_variable import DECISIVE, misfits_of
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Prepared, prepare
 from pyfmi_models.effects import ActuatorLag, Delay

@@ -8,9 +8,9 @@ import pytest
 from test_inverse import recorded
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.candidates import span_of
 from cosim.diagnosis.diagnose import Outcome, diagnose
-from cosim.diagnosis.periodogram import tones
+from cosim.diagnosis.effects.candidates import span_of
+from cosim.diagnosis.effects.periodogram import tones
 from cosim.estimation.filters import gain, lowpass
 from cosim.estimation.fit import fit
 from cosim.estimation.inverse import Inverse

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.hypotheses import hypothesis_of
-from cosim.diagnosis.tuning import in_cycles
+from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.effects.tuning import in_cycles
 from cosim.estimation.fit import fit, with_values
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.policy import POLICY, Policy
-from cosim.diagnosis.search import refitted
+from cosim.diagnosis.decide.policy import POLICY, Policy
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.stages import refitted
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import GravityUnbalance

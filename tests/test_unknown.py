@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.adequacy import over_time, share_beside, share_left, share_there
-from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import Decision, ResidualScores, decide
-from cosim.diagnosis.flagged import Residual, flagged, loud_states, noise_at
-from cosim.diagnosis.flexible import flexible_terms
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.predictive import Predictive
+from cosim.diagnosis.decide.decision import Decision, ResidualScores, decide
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.adequacy import over_time, share_beside, share_left, share_there
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.measure.flagged import Residual, flagged, loud_states, noise_at
+from cosim.diagnosis.terms.flexible import flexible_terms
 from cosim.estimation.discrepancy_basis import last_reversal
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.estimation.problem import Problem

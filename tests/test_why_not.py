@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.hypotheses import TRIED, named
-from cosim.diagnosis.hypotheses.base import HELD, NO_FRICTION, NO_POSITION, UNSEEN
+from cosim.diagnosis.effects import TRIED, named
+from cosim.diagnosis.effects.base import HELD, NO_FRICTION, NO_POSITION, UNSEEN
 from cosim.estimation.prepare import Prepared, prepare
 from pyfmi_models.effects import CATALOGUE, FrictionAsymmetry, GravityUnbalance
 from pyfmi_models.friction import Coulomb, Frictionless, LuGre

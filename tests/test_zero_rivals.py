@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis import rivals
-from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import EffectScores, open_rivals
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.rivals import AcceptedEffect, examine, explains, margins
-from cosim.diagnosis.search import CandidateFit, Search, Stage, weighed
+from cosim.diagnosis.decide.decision import EffectScores, open_rivals
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.rivals import AcceptedEffect, examine, explains, margins
+from cosim.diagnosis.search.stages import CandidateFit, Search, Stage, rivals, weighed
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem

@@ -11,18 +11,19 @@ import pandas as pd
 from cosim.api.recordings import Source, read_all
 from cosim.api.why import frame
 from cosim.data.recording import Recording
+from cosim.delivery.closed_loop import Loops
+from cosim.delivery.correction_fmu import Correction, motion_of
+from cosim.delivery.deliver import DOCUMENT, FILES, QUICK, as_json, check_out, deliver, deliver_quickly, without_files
+from cosim.delivery.proposal import Proposal, write_proposals
+from cosim.diagnosis.answer.entries import Improved
+from cosim.diagnosis.answer.result import Diagnosis, Finding
 from cosim.diagnosis.black_box import BlackBox, as_base
-from cosim.diagnosis.closed_loop import Loops
-from cosim.diagnosis.correction_fmu import Correction, motion_of
-from cosim.diagnosis.deliver import DOCUMENT, FILES, QUICK, as_json, check_out, deliver, deliver_quickly, without_files
+from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.diagnose import diagnose as find
-from cosim.diagnosis.entries import Improved
-from cosim.diagnosis.learned.proposal import Proposal, write_proposals
-from cosim.diagnosis.result import Diagnosis, Finding
-from cosim.diagnosis.side_by_side import side_by_side
-from cosim.diagnosis.terminal import summary
+from cosim.diagnosis.search.side_by_side import side_by_side
 from cosim.fmi.alias import Alias
 from cosim.reading import check_kind
+from cosim.report.terminal import summary
 from cosim.support.errors import InputError
 from cosim.support.files import check_directory
 from cosim.support.html import table as html_table
@@ -216,7 +217,7 @@ def _found(given: _Given, out: Path | None, command: str, listeners: _Listeners)
     done = without_files(outcome.diagnosis)
     if out:
         done = deliver_quickly(outcome, given.train, given.heldout, given.card, out, command, given.base)
-    return DiagnosisResult(done, outcome.card, outcome.refitted, outcome.proposals)
+    return _result(done, outcome)
 
 
 def _delivered(given: _Given, out: Path, command: str, listeners: _Listeners) -> DiagnosisResult:
@@ -229,7 +230,12 @@ def _delivered(given: _Given, out: Path, command: str, listeners: _Listeners) ->
         done = deliver(
             outcome, train, heldout, card, out, command, loops, listeners.on_progress, given.more, given.base
         )
-    return DiagnosisResult(done, outcome.card, outcome.refitted, outcome.proposals)
+    return _result(done, outcome)
+
+
+def _result(done: Diagnosis, outcome: Outcome) -> DiagnosisResult:
+    proposals = tuple(Proposal(formula, statement) for formula, statement in outcome.formulas)
+    return DiagnosisResult(done, outcome.card, outcome.refitted, proposals)
 
 
 def check_split(train: Sequence[Recording], heldout: Sequence[Recording]) -> None:

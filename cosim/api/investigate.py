@@ -8,8 +8,8 @@ from pathlib import Path
 from cosim.api.diagnose import check_split
 from cosim.api.recordings import Source, read_all
 from cosim.data.recording import Recording
-from cosim.diagnosis.deliver import deliver_quickly
-from cosim.diagnosis.result import Diagnosis
+from cosim.delivery.deliver import deliver_quickly
+from cosim.diagnosis.answer.result import Diagnosis
 from cosim.hardware.machine import Machine as Hardware
 from cosim.investigation.log import DIAGNOSIS, PAGE, STORY, Log
 from cosim.investigation.loop import Investigation, Settings

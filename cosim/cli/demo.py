@@ -20,7 +20,7 @@ def demo(
     ] = False,
 ) -> None:
     """Export, co-simulate, meet a recording with concealed physics, find it, prove it, write the better FMU."""
-    from cosim.diagnosis.terminal import summary
+    from cosim.report.terminal import summary
     from cosim.support.files import check_free
     from cosim_studies.demo import TABLE, run_demo
 

@@ -43,7 +43,7 @@ def diagnose(
 ) -> None:
     """Say which physics a card lacks, and prove it on a recording that was never fitted."""
     from cosim.api.diagnose import diagnose as find
-    from cosim.diagnosis.terminal import proposed, summary
+    from cosim.report.terminal import proposed, summary
     from pyfmi_models.card import read_card
 
     keep_freed_memory()
@@ -77,8 +77,8 @@ def diagnose(
 
 def _check_folders(out: Path, propose: Path | None, quick: bool, force: bool) -> None:
     """Refuse at once what could not be written at the end (raises OutputError)."""
-    from cosim.diagnosis.deliver import FILES, QUICK, check_out
-    from cosim.diagnosis.learned.proposal import check_folder
+    from cosim.delivery.deliver import FILES, QUICK, check_out
+    from cosim.delivery.proposal import check_folder
 
     check_out(out, force, QUICK if quick else FILES)
     if propose:

@@ -6,37 +6,38 @@ from dataclasses import dataclass, replace
 
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
-from cosim.diagnosis.absent import not_found
-from cosim.diagnosis.alternatives import prove_sets
-from cosim.diagnosis.band import in_band
-from cosim.diagnosis.bookkeeping import enter_answer, finished
-from cosim.diagnosis.breakdown import parts
-from cosim.diagnosis.comparison import Comparison
-from cosim.diagnosis.decision import Decision, ResidualScores, beside_rest, decide, least_left, rest_rules
-from cosim.diagnosis.delivered import standing
-from cosim.diagnosis.denied import beyond_denial, without_denied
-from cosim.diagnosis.entries import NotLearnedEntry
-from cosim.diagnosis.experiment import Experiment, best, told
-from cosim.diagnosis.findings import accepted, rival_finding, standard_errors, taken_finding
-from cosim.diagnosis.global_test import global_test
-from cosim.diagnosis.law_selection import proposed_law
-from cosim.diagnosis.learned.learn import NOTHING_TRIED, Learned, learn
-from cosim.diagnosis.learned.proposal import Proposal
-from cosim.diagnosis.locate import regions
-from cosim.diagnosis.loop_bias import loop_bias
-from cosim.diagnosis.nameless import Nameless, nameless
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.predictive import Predictive
-from cosim.diagnosis.proof import Proof
-from cosim.diagnosis.protocol import CUTOFF, Structures, heldout_rms, judge, judged_band, of_the_best, traces
-from cosim.diagnosis.regression import black_box_rms
-from cosim.diagnosis.result import Diagnosis, Finding, Trace
-from cosim.diagnosis.rivals import Examined, examine
-from cosim.diagnosis.sanity.admission import check_effects, check_recordings
-from cosim.diagnosis.sanity.doubts import doubts, of_base, single_readings
-from cosim.diagnosis.scores import effect_scores, residual_scores
-from cosim.diagnosis.search import InTurn, search
-from cosim.diagnosis.withheld import without_names
+from cosim.diagnosis.terms.spelled import Spelled
+from cosim.diagnosis.answer.entries import NotLearnedEntry
+from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
+from cosim.diagnosis.decide.decision import Decision, ResidualScores, beside_rest, decide, least_left, rest_rules
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.band import in_band
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.measure.absent import not_found
+from cosim.diagnosis.measure.breakdown import parts
+from cosim.diagnosis.measure.experiment import Experiment, best, told
+from cosim.diagnosis.measure.findings import accepted, rival_finding, taken_finding
+from cosim.diagnosis.measure.law_selection import proposed_law
+from cosim.diagnosis.measure.locate import regions
+from cosim.diagnosis.measure.loop_bias import loop_bias
+from cosim.diagnosis.measure.protocol import CUTOFF, Structures, heldout_rms, judge, judged_band, of_the_best, traces
+from cosim.diagnosis.measure.regression import black_box_rms
+from cosim.diagnosis.measure.withheld import without_names
+from cosim.diagnosis.search.alternatives import prove_sets
+from cosim.diagnosis.search.bookkeeping import enter_answer, finished
+from cosim.diagnosis.search.delivered import standing
+from cosim.diagnosis.search.global_test import global_test
+from cosim.diagnosis.search.nameless import Nameless, nameless
+from cosim.diagnosis.search.proof import Proof
+from cosim.diagnosis.search.rivals import Examined, examine
+from cosim.diagnosis.search.scores import effect_scores, residual_scores
+from cosim.diagnosis.search.sizes import standard_errors
+from cosim.diagnosis.search.stages import InTurn, search
+from cosim.diagnosis.terms.learn import NOTHING_TRIED, Learned, learn
+from cosim.diagnosis.trust.admission import check_effects, check_recordings
+from cosim.diagnosis.trust.denied import beyond_denial, without_denied
+from cosim.diagnosis.trust.doubts import doubts, of_base, single_readings
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Band, prepare, quality
@@ -59,8 +60,8 @@ class Outcome:
     refitted: Card
     named: Card
     experiment: Experiment | None = None
-    proposals: tuple[Proposal, ...] = ()
-    """Effect files to review, of formulas that are as good as what was learned."""
+    formulas: tuple[tuple[Spelled, str], ...] = ()
+    """Formulas that are as good as what was learned, each with what is said of it: effects for a person to review."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,7 @@ def diagnose(
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,
     )
-    return Outcome(diagnosis, delivered, first, refitted, named, experiment, learned.proposals() if learned else ())
+    return Outcome(diagnosis, delivered, first, refitted, named, experiment, learned.stated() if learned else ())
 
 
 def _refused(refitted: Card, withheld: Diagnosis) -> Outcome:

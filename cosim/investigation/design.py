@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cosim.diagnosis.candidates import contact_level
-from cosim.diagnosis.hypotheses import candidates
+from cosim.diagnosis.effects import candidates
+from cosim.diagnosis.effects.candidates import contact_level
 from cosim.estimation.filters import lowpass
 from cosim.estimation.fit import Fit, free_parameters
 from cosim.estimation.inverse import Inverse

@@ -12,9 +12,9 @@ from typing import Literal
 import numpy as np
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.answer.result import Diagnosis
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.diagnose import diagnose as find
-from cosim.diagnosis.result import Diagnosis
 from cosim.estimation.fit import Fit
 from cosim.estimation.problem import Problem
 from cosim.investigation.design import (

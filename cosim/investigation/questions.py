@@ -10,9 +10,9 @@ from typing import Any, Literal
 
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
-from cosim.diagnosis.band import in_band
+from cosim.diagnosis.answer.result import Diagnosis, Finding, is_special
 from cosim.diagnosis.diagnose import Outcome
-from cosim.diagnosis.result import Diagnosis, Finding, is_special
+from cosim.diagnosis.evidence.band import in_band
 from cosim.estimation.fit import Fit
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import weights

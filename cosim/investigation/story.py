@@ -4,9 +4,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Literal
 
-from cosim.diagnosis.report.words import lowered
-from cosim.diagnosis.result import Diagnosis
+from cosim.diagnosis.answer.result import Diagnosis
 from cosim.investigation.questions import Question
+from cosim.report.words import lowered
 from cosim.support.plain import JsonObject, Parsed
 from pyfmi_models.effects import CATALOGUE
 

@@ -90,8 +90,8 @@ def command(order: Order) -> str:
 
 def in_words(found: Any) -> Parsed:
     """Return the verdict as a heading and one row for each effect that has something to say."""
-    from cosim.diagnosis.report.lead import heading
-    from cosim.diagnosis.report.words import ANSWERS, sized, stated
+    from cosim.report.lead import heading
+    from cosim.report.words import ANSWERS, sized, stated
 
     rows = [
         {

@@ -23,8 +23,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from cosim.diagnosis.regression import EVERY, Model, features, kernel
-from cosim.diagnosis.result import Trace
+from cosim.diagnosis.answer.result import Trace
+from cosim.diagnosis.measure.regression import EVERY, Model, features, kernel
 from cosim.support.errors import MissingPackageError
 from cosim.support.plain import Parsed
 from cosim.support.statistics import rms

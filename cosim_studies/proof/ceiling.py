@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.band import in_band
-from cosim.diagnosis.protocol import heldout_rms
+from cosim.diagnosis.evidence.band import in_band
+from cosim.diagnosis.measure.protocol import heldout_rms
 from cosim.estimation.fit import fit
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.row_weights import described_rows

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import sleep
 
-from cosim.diagnosis.calibration import OFFSET, SLOPE
+from cosim.diagnosis.decide.calibration import OFFSET, SLOPE
 from cosim.support.cell import cores
 from cosim.support.errors import ProofError
 from cosim.support.plain import Parsed
@@ -29,7 +29,7 @@ LEAST_SECONDS = 10.0
 """Shorter recordings hold less than a soft start and a swing."""
 ROOMS = ("cosim/diagnosis", "cosim_studies/proof", "cosim/estimation", "pyfmi_models")
 """Where the code lies that decides the scores."""
-TELLS = ("cosim/diagnosis/report", "cosim/diagnosis/terminal.py")
+TELLS = ("cosim/report",)
 """What tells an answer that was given; nothing in it decides, so a better sentence does not age a page of scores."""
 
 

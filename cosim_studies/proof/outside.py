@@ -1,7 +1,7 @@
 """Effects that no listed name explains: the right answer about them is "unknown", with what it depends on.
 
-Each of these depends on something for which the diagnosis has general shapes (`cosim/diagnosis/dictionary.py`): its
-authors and those of the shapes are the same. `beyond.py` holds effects for which it has none.
+Each of these depends on something for which the diagnosis has general shapes (`cosim/diagnosis/terms/dictionary.py`):
+its authors and those of the shapes are the same. `beyond.py` holds effects for which it has none.
 """
 
 from dataclasses import replace

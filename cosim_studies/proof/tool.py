@@ -7,9 +7,9 @@ from math import pi
 from pathlib import Path
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.deliver import as_json
+from cosim.delivery.deliver import as_json
+from cosim.diagnosis.answer.result import Diagnosis
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.result import Diagnosis
 from cosim.reading import read_recordings
 from cosim.support.plain import JsonObject, Parsed
 from cosim_studies.proof.baselines import compared

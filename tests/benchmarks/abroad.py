@@ -157,7 +157,7 @@ def cases_of(folder: Path) -> Iterator[Path]:
 
 def answer(case: Path, out: Path) -> str:
     """Diagnose one case as a user's script would; a traceback is an answer too."""
-    from cosim.diagnosis.deliver import as_json
+    from cosim.delivery.deliver import as_json
     from cosim.diagnosis.diagnose import diagnose
     from cosim.reading import read_recordings
     from pyfmi_models.card import read_card

@@ -23,14 +23,14 @@ import numpy as np
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.ledger import all_pass
-from cosim.diagnosis.bounds import SeenFrom, bounds
-from cosim.diagnosis.candidates import columns_of, span_of
-from cosim.diagnosis.comparison import Comparison
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
-from cosim.diagnosis.hidden import Member, members
-from cosim.diagnosis.hypotheses import candidates, hypothesis_of
-from cosim.diagnosis.policy import POLICY
-from cosim.diagnosis.search import admission, is_minor, least, refitted
+from cosim.diagnosis.effects import candidates, hypothesis_of
+from cosim.diagnosis.effects.candidates import columns_of, span_of
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.measure.bounds import SeenFrom, bounds
+from cosim.diagnosis.measure.hidden import Member, members
+from cosim.diagnosis.search.stages import admission, is_minor, least, refitted
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import prepare

@@ -1,4 +1,4 @@
-"""Fit the curve of `cosim/diagnosis/calibration.py` to decks that were played with known truth.
+"""Fit the curve of `cosim/diagnosis/decide/calibration.py` to decks that were played with known truth.
 
 python tests/benchmarks/calibration.py DECK/proof.json ... --played 0 1 --out results/calibration
 
@@ -18,7 +18,7 @@ import numpy.typing as npt
 from scipy.optimize import minimize
 
 import cosim
-from cosim.diagnosis.calibration import OFFSET, SLOPE, calibrated, log_odds
+from cosim.diagnosis.decide.calibration import OFFSET, SLOPE, calibrated, log_odds
 from cosim_studies.proof.marks import probabilities
 from cosim_studies.proof.score import bins, calibration_error_of
 

@@ -15,7 +15,7 @@ from typing import Any
 from calibration import Pairs, fitted
 
 import cosim
-from cosim.diagnosis.calibration import calibrated
+from cosim.diagnosis.decide.calibration import calibrated
 from cosim_studies.proof.intervals import Estimate, bootstrap
 from cosim_studies.proof.score import calibration_error_of
 

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 from calibration import share_of
 
-from cosim.diagnosis.calibration import LIKELY
+from cosim.diagnosis.decide.calibration import LIKELY
 from cosim.support.version import __version__
 from cosim_studies.proof.score import share
 

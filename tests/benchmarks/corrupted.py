@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 from measured import Machine, _read, machines
 
-from cosim.diagnosis.deliver import as_json
+from cosim.delivery.deliver import as_json
 from cosim.diagnosis.diagnose import diagnose
 from cosim.support.errors import CosimError
 from cosim.support.files import replacing

@@ -22,7 +22,7 @@ import numpy as np
 
 import cosim
 from cosim.data.recording import Recording
-from cosim.diagnosis.closed_loop import close_loop
+from cosim.delivery.closed_loop import close_loop
 from cosim.diagnosis.diagnose import diagnose
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.export import export_fmu

@@ -26,9 +26,9 @@ sys.path.append(str(Path(__file__).parent))
 from learned_terms_page import VARIABLES  # noqa: E402
 
 from cosim.data.recording import Recording  # noqa: E402
+from cosim.diagnosis.answer.result import Trace  # noqa: E402
 from cosim.diagnosis.diagnose import Outcome, diagnose  # noqa: E402
-from cosim.diagnosis.protocol import Structures, traces  # noqa: E402
-from cosim.diagnosis.result import Trace  # noqa: E402
+from cosim.diagnosis.measure.protocol import Structures, traces  # noqa: E402
 from cosim.support.files import replacing  # noqa: E402
 from cosim.support.statistics import rms  # noqa: E402
 from cosim.support.version import __version__  # noqa: E402

@@ -29,7 +29,7 @@ from learned_terms_page import write  # noqa: E402
 
 from cosim.data.recording import Recording  # noqa: E402
 from cosim.diagnosis.diagnose import Outcome, diagnose  # noqa: E402
-from cosim.diagnosis.protocol import heldout_rms  # noqa: E402
+from cosim.diagnosis.measure.protocol import heldout_rms  # noqa: E402
 from cosim.estimation.fit import fit  # noqa: E402
 from cosim.estimation.prepare import choose_cutoff, prepare  # noqa: E402
 from cosim.estimation.row_weights import weights  # noqa: E402

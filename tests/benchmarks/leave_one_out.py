@@ -26,9 +26,12 @@ import numpy as np
 from bounds import wilson
 
 from cosim.data.recording import Recording
-from cosim.diagnosis import bounds, comparison, flexible, global_test, search
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.search import Start
+from cosim.diagnosis.evidence import comparison
+from cosim.diagnosis.measure import bounds
+from cosim.diagnosis.search.stages import Start, global_test
+from cosim.diagnosis.search.stages import stages as search
+from cosim.diagnosis.terms import flexible
 from cosim.support.version import __version__
 from cosim_studies.proof.conduct import code
 from cosim_studies.proof.generator import ANY, FAMILIES, make_case, write_given
@@ -44,7 +47,7 @@ SHAPES = {
     "rubbing": ("friction level over time since the start",),
     "thermal_tilt": ("position and temperature",),
 }
-"""Terms of `cosim/diagnosis/dictionary.py` that say what an effect outside the list follows."""
+"""Terms of `cosim/diagnosis/terms/dictionary.py` that say what an effect outside the list follows."""
 SIZES = (0.45, 1.0)
 """Of an effect: what is concealed well enough to be found, mostly."""
 EVERY = [*SHAPED, *FAMILIES]

@@ -26,13 +26,13 @@ from unittest.mock import patch
 from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
 from cosim.diagnosis import diagnose as whole
-from cosim.diagnosis.comparison import Comparison, Screened
-from cosim.diagnosis.denied import without_denied
-from cosim.diagnosis.policy import POLICY, Policy
-from cosim.diagnosis.protocol import Structures, traces
-from cosim.diagnosis.rivals import examine
-from cosim.diagnosis.sanity.doubts import doubts, of_base
-from cosim.diagnosis.search import InTurn, search
+from cosim.diagnosis.decide.policy import POLICY, Policy
+from cosim.diagnosis.evidence.comparison import Comparison, Screened
+from cosim.diagnosis.measure.protocol import Structures, traces
+from cosim.diagnosis.search.rivals import examine
+from cosim.diagnosis.search.stages import InTurn, search
+from cosim.diagnosis.trust.denied import without_denied
+from cosim.diagnosis.trust.doubts import doubts, of_base
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Band, Prepared, prepare
 from cosim.estimation.problem import Problem
@@ -186,8 +186,8 @@ def page(rows: Sequence[dict[str, Any]], options: argparse.Namespace, seconds: f
         f"mount-cosim {__version__}, code {code()[:16]}, seed {options.seed}: {len(usual)} cases of the home "
         f"generator, {seconds / 60:.0f} minutes. As the policy is, {sum(map(is_right, usual.values()))} answers are "
         "right: nothing where nothing is concealed, `unknown` first, the name first, all names of several. Each "
-        "constant of `cosim/diagnosis/policy.py` at half and at twice its value: answers that become another, and how "
-        "many are right then. Cases in [table.csv](table.csv). No number on this page was written by hand.",
+        "constant of `cosim/diagnosis/decide/policy.py` at half and at twice its value: answers that become another, and "
+        "how many are right then. Cases in [table.csv](table.csv). No number on this page was written by hand.",
         "",
         "| constant | value | others at half | right | others at twice | right |",
         "|---|---|---|---|---|---|",

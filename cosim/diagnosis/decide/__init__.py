@@ -1,0 +1,1 @@
+"""The decision, from scores alone: no arrays, no recordings."""

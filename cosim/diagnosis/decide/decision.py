@@ -1,0 +1,283 @@
+"""The decision, from scores alone: what is named, what stays open, whether something unknown is left. No data here."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import exp
+
+from cosim.diagnosis.answer.ledger import Rule, all_pass
+from cosim.diagnosis.decide.calibration import calibrated
+from cosim.diagnosis.decide.policy import Policy
+
+IN_BURSTS = "time, in bursts"
+"""What the rest is said to go with where it comes now and then."""
+
+
+@dataclass(frozen=True)
+class EffectScores:
+    """Scores of an effect that stands after the proof. Nats."""
+
+    effect: str
+    evidence: float
+    """Beside the other effects, in training."""
+    margins: Mapping[str, float]
+    """By how much it is better than each rival."""
+    explains: Mapping[str, float]
+    """Share of the residual energy that the effect, or a rival in its place, removes."""
+    predicted: float = 0.0
+    """What the held-out recordings lose without it ..."""
+    removes: float = 0.0
+    """... and the share of their residual energy that it removes."""
+
+    def with_margins_of(self, share: float) -> "EffectScores":
+        """The same with so much of each margin."""
+        return replace(self, margins={name: share * margin for name, margin in self.margins.items()})
+
+
+@dataclass(frozen=True)
+class TermScores:
+    """Scores of a flexible term, a smooth shape of a recorded quantity, beside the structure that stands."""
+
+    name: str
+    evidence: float
+    predicted: float
+    share: float
+    """Share of the held-out residual energy that it predicts."""
+    away: float = 1.0
+    """Share of the training residual energy that it removes which it removes away from turns."""
+    plain: float = 1.0
+    """Share of the training residual energy that it removes."""
+
+
+@dataclass(frozen=True)
+class ResidualScores:
+    """What is left: its slow part relative to friction, in training and held out, and what it follows."""
+
+    share: float
+    share_there: float
+    terms: Sequence[TermScores] = ()
+    over_time: str = "time"
+    share_beside: float = 0.0
+    """The same beside what friction laws cannot agree on."""
+    in_place: tuple[str, ...] = ()
+    """Quantities of which a term explains more than a name did that was taken out for it."""
+    in_bursts: float = 0.0
+    """Share of its energy that comes in bursts."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """The answer."""
+
+    sets: Mapping[str, tuple[str, ...]]
+    """For each named effect the rivals that these recordings cannot exclude."""
+    probabilities: Mapping[str, Mapping[str, float]]
+    """For each named effect the probabilities of the members of its set."""
+    is_unknown: bool
+    depends_on: tuple[str, ...]
+    doubtful: tuple[str, ...] = ()
+    """Names that help, and may yet imitate what is unknown."""
+
+    def with_rest(self, follows: tuple[str, ...], doubtful: tuple[str, ...], policy: Policy) -> "Decision":
+        """The same where something is left without a name, that follows quantities; names may imitate it."""
+        if self.is_unknown:
+            return self
+        told = {
+            name: {one: policy.true_beside_unknown * value for one, value in members.items()}
+            if name in doubtful
+            else members
+            for name, members in self.probabilities.items()
+        }
+        return Decision(self.sets, told, True, follows, doubtful)
+
+
+def decide(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Decision:
+    """Decide what is named, what stays open and whether something without a name is left."""
+    if is_left(effects, residual, policy):
+        return beside_rest(effects, followed(residual, policy), policy)
+    named = _named(effects, policy)
+    # What comes in bursts is no part of what a name says, and no name imitates it.
+    return named.with_rest((IN_BURSTS,), (), policy) if residual.in_bursts > policy.large_in_bursts else named
+
+
+def beside_rest(effects: Sequence[EffectScores], follows: tuple[str, ...], policy: Policy) -> Decision:
+    """The answer where something without a name is left, that follows quantities: margins count for less there."""
+    told = [one.with_margins_of(policy.margin_beside_unknown) for one in effects]
+    return _named(told, policy).with_rest(follows, beside_unknown(effects, policy), policy)
+
+
+def _named(effects: Sequence[EffectScores], policy: Policy) -> Decision:
+    sets = {one.effect: open_rivals(one, policy) for one in effects}
+    return Decision(sets, {one.effect: _probabilities(one, sets[one.effect], policy) for one in effects}, False, ())
+
+
+def beside_unknown(effects: Sequence[EffectScores], policy: Policy) -> tuple[str, ...]:
+    """Names that leave too much to be sure where that has no name: a part of one cause may look like them."""
+    removed = {one.effect: max(one.explains[one.effect], one.removes) for one in effects}
+    return tuple(name for name, share in removed.items() if share < policy.sure_beside_unknown)
+
+
+def doubted(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
+    """Names that may be no more than imitations: what is left beside them is not much less than what they explain."""
+    left = max((one.evidence for one in residual.terms), default=0.0)
+    if left < policy.floor:
+        return ()
+    weak = [one for one in effects if one.explains[one.effect] < policy.imitation_share]
+    return tuple(one.effect for one in weak if left > policy.imitation * one.evidence)
+
+
+@dataclass(frozen=True)
+class Gain:
+    """What held-out recordings gain by an effect: nats, and shares of the plain residual energy in two bands.
+
+    The bands are those of the analysis and of the protocol, the wider one last: fast effects show in the wider one, and
+    in either a few rows of noise may hide what the other shows.
+    """
+
+    nats: float
+    narrow: float
+    wide: float
+    at_rest: float = 0.0
+    """Share at rest, where it says something and the model without it nothing; else 0."""
+
+    def halves(self, policy: Policy) -> bool:
+        """Whether the plain error energy is halved in both bands, and the likelihood does not clearly speak against it.
+
+        What is slow is free to wander in the likelihood, so that an effect of it may gain nothing there. Where next to
+        nothing is left, the likelihood is not asked: it judges the few parts in a hundred that the equation misses. Nor
+        is it where that is so at rest, whose rows hardly count in it.
+        """
+        removed = min(self.narrow, self.wide)
+        at_rest = self.at_rest >= policy.cleared and removed >= 0
+        return removed >= policy.cleared or at_rest or (removed >= policy.halved and self.nats > -policy.floor)
+
+    def predicts(self, policy: Policy) -> bool:
+        """Whether the likelihood clearly says so, or the plain error in both bands and nothing speaks against it.
+
+        What slow nuisances may stand for too (an offset, a change with temperature) gains little likelihood there,
+        whatever it removes. So does a contact at rest, where few rows count.
+        """
+        removed, said = min(self.narrow, self.wide), self.nats >= policy.least_predicted
+        seen = self.nats >= 0 and removed >= policy.third
+        both = said and (removed >= policy.fifth or self.at_rest >= policy.halved)
+        return seen or both or self.nats >= policy.clearly_predicted or self.halves(policy)
+
+    def matters_alone(self, policy: Policy) -> bool:
+        """Whether an effect that is small in training matters held out: it halves the error there, and predicts."""
+        return self.halves(policy) and self.nats >= policy.least_predicted
+
+    def raises(self, policy: Policy) -> bool:
+        """Whether the plain error is raised, in both bands or by much in one.
+
+        What surely predicts and halves the error in the wider band may raise it in the narrower one: a bristle at rest
+        creeps with each vibration that a filter leaves, the less of them the more a model keeps of a wrong torque. So
+        may what halves the error at rest, of which the model without it says nothing: what it costs elsewhere is
+        judged by the likelihood.
+        """
+        if self.wide >= policy.halved and self.nats >= policy.sure_predicted:
+            return False
+        if self.at_rest >= policy.halved and self.nats >= policy.least_predicted:
+            return min(self.narrow, self.wide) < -policy.most_raised_beside_rest
+        return max(self.narrow, self.wide) < 0 or min(self.narrow, self.wide) < -policy.most_raised
+
+
+def held_out_rules(gain: Gain, share: float, policy: Policy) -> Iterator[Rule]:
+    """Rules by which an effect stands on the held-out recordings.
+
+    It predicts (or halves the plain error), it does not raise the plain error there, and what it explains is no small
+    change of what the base leaves: beside a strong effect, a weak one may be what the strong one's equation lacks.
+    """
+    nats, limit = gain.nats, policy.clearly_predicted
+    removed = f"removes {100 * gain.narrow:.0f} and {100 * gain.wide:.0f} % of the error energy in two bands"
+    yield Rule("predicts held-out recordings", gain.predicts(policy), nats, limit, "nats", removed)
+    lowest = min(gain.narrow, gain.wide)
+    yield Rule("does not raise the held-out error", not gain.raises(policy), lowest, -policy.most_raised)
+    matters = share >= policy.least_share or nats >= policy.sure_predicted
+    yield Rule("share of what the base leaves", matters, share, policy.least_share)
+
+
+def stands(gain: Gain, share: float, policy: Policy) -> bool:
+    """Whether an effect stands on the held-out recordings."""
+    return all_pass(held_out_rules(gain, share, policy))
+
+
+def open_rivals(one: EffectScores, policy: Policy) -> tuple[str, ...]:
+    """Rivals that are not beaten by the margin of a set, closest first."""
+    near = [name for name, margin in one.margins.items() if margin < policy.set_margin]
+    return tuple(sorted(near, key=lambda name: one.margins[name]))
+
+
+def is_left(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> bool:
+    """Whether something is left that is no misfit of a friction law, nor of the equations of what is named."""
+    return any(rule.outcome for rule in rest_rules(effects, residual, policy))
+
+
+def rest_rules(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Iterator[Rule]:
+    """Rules of which one is enough to say that something without a name is left."""
+    shares = (
+        ("slow error in training relative to friction", residual.share, policy.large_residual),
+        ("slow error held out relative to friction", residual.share_there, policy.large_residual_there),
+        ("the same beside friction-law error", residual.share_beside, policy.large_residual_beside),
+    )
+    for name, value, limit in shares:
+        yield Rule(name, value > limit, value, limit)
+    yield Rule("another cause explains more than a name", bool(residual.in_place), note=", ".join(residual.in_place))
+    doubtful = doubted(effects, residual, policy)
+    least = least_left([one for one in effects if one.effect not in doubtful], policy)
+    for term in residual.terms:
+        outcome, limit = _is_no_misfit(term, least, policy), max(least, _floor_of(term, policy))
+        yield Rule(f"error follows {term.name}", outcome, term.evidence, limit, "nats")
+
+
+def least_left(named: Sequence[EffectScores], policy: Policy) -> float:
+    """Evidence [nats] below which what is left may be no more than what the equations of the names lack."""
+    return policy.imitation * max((one.evidence for one in named), default=0.0)
+
+
+def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:
+    """Whether what the residual follows is more than a friction law's misfit: sure, or held out as well as trained.
+
+    What it removes about turns alone is what laws lack there, and what it hardly removes is about nothing that matters.
+    """
+    if term.away < policy.least_away_unnamed or max(term.plain, term.share) < policy.least_plain_gain:
+        return False
+    return term.evidence >= max(least, _floor_of(term, policy))
+
+
+def _floor_of(term: TermScores, policy: Policy) -> float:
+    """Evidence that a term must have: the less, the more the held-out recordings agree."""
+    if term.share >= policy.follows:
+        return policy.least_followed
+    if term.share < -policy.contradicted or term.predicted < -policy.denied * term.evidence:
+        return policy.sure_floor
+    if term.share < policy.supported:
+        return policy.floor_alone
+    agreed = (term.share - policy.supported) / (policy.follows - policy.supported)
+    return policy.floor + agreed * (policy.least_followed - policy.floor)
+
+
+def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
+    """Quantities that the residual follows elsewhere, the best first; where there is none, how it goes over time."""
+    if residual.in_place:
+        return residual.in_place
+    best = max((one.share for one in residual.terms), default=0.0)
+    least = max(policy.follows, policy.beside * best)
+    ranked = sorted(residual.terms, key=lambda one: -one.share)
+    return tuple(one.name for one in ranked if one.share > least) or (residual.over_time,)
+
+
+def _probabilities(one: EffectScores, members: Sequence[str], policy: Policy) -> dict[str, float]:
+    """Posterior shares of an effect, its rivals and "none" (equal priors), times what each explains, calibrated."""
+    odds = {one.effect: 0.0, **{name: -margin for name, margin in one.margins.items()}}
+    top = max(odds.values())
+    weights = {name: exp(value - top) for name, value in odds.items()}
+    total = sum(weights.values()) + exp(-min(one.evidence, 700.0) - top)
+    shares = _within_set({name: weights[name] / total for name in (one.effect, *members)}, policy)
+    told = {name: calibrated(share * one.explains[name]) for name, share in shares.items()}
+    return {name: value / max(1.0, sum(told.values())) for name, value in told.items()}
+
+
+def _within_set(shares: Mapping[str, float], policy: Policy) -> dict[str, float]:
+    """What members of a set share, by the part of their margins that counts there: shares ~ exp(-part x margin)."""
+    told = {name: share**policy.margin_within_set for name, share in shares.items()}
+    scale = sum(shares.values()) / max(sum(told.values()), 1e-300)
+    return {name: scale * value for name, value in told.items()}

@@ -1,0 +1,246 @@
+"""The contract of a hypothesis: an effect as a question to recordings, and all that a diagnosis must know to ask it.
+
+The physics is in `pyfmi_models/effects`: equation, parameters with units and bounds, what the effect is called. Here
+stands, one file an effect, what only a diagnosis asks. In the order in which it is asked:
+
+    candidates(mount, span)        what is worth trying, given what the recordings visit
+    twins(effect)                  effects that must be tried where this one is
+    tuned(problem, found, ...)     what its grid knows only roughly, fitted
+    multiple(effect, k)            a further wave of a ripple
+    is_plausible(effect, mount)    whether the fitted effect is what its name says
+    shows(effect, mount, prepared) whether the motion tells it from another law of friction
+    is_degenerate(problem, effect) whether fitted numbers are another effect's, or none's
+    way_back(effect, mount)        how far motion must turn back to show it
+    where(effect, reach)           where it acts, within what was visited
+    concealed(mount, span, tried)  what is concealed in recordings to test how small it may be and still be seen
+    looked(seen, mount)            for what the bound that this gives holds
+    is_settled(mount)              whether no recording can test it: the model has it, or the axis cannot have it
+    why_not(mount, prepared)       why these recordings cannot test it, in one reason
+
+Hypotheses are stateless; a new one is a new file in this folder, and nothing else is edited.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import replace
+from math import pi
+from typing import Any, ClassVar, Generic, Literal, NamedTuple, TypeVar
+
+import numpy as np
+
+from cosim.diagnosis.answer.result import Where
+from cosim.diagnosis.effects.candidates import Candidate, Span
+from cosim.diagnosis.effects.tuning import in_cycles, revived
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import Prepared
+from cosim.estimation.problem import Problem
+from pyfmi_models.effects import Effect
+from pyfmi_models.mount import Mount
+
+Form = TypeVar("Form", bound=Effect)
+Evidence = Callable[[Fit], float]
+View = Literal[
+    "position",
+    "one pitch",
+    "slow and fast",
+    "keep turning",
+    "since reversal",
+    "rest before a start",
+    "time",
+    "spectrum",
+    "phase",
+    "clock",
+    "load",
+]
+"""Views of recordings that a report can draw, each before and after."""
+
+
+class Reach(NamedTuple):
+    """What the recordings visited: lowest and highest position [rad, m], highest speed."""
+
+    low: float
+    high: float
+    top: float
+
+
+class Seen(NamedTuple):
+    """From which size on an effect would have been found, for which members of its kind, in which band [Hz]."""
+
+    size: float
+    low: float
+    high: float
+    cutoff: float
+
+
+class Hypothesis(Generic[Form]):
+    """One effect, in one of its forms or in several, that recordings are asked for."""
+
+    forms: ClassVar[tuple[type[Effect], ...]]
+    """Classes of effects that this hypothesis proposes."""
+    rank: ClassVar[float] = 1e3
+    """Place among all hypotheses: friction, loads, drive and clock, mechanics, sensor; a new one comes last."""
+    needs_position: ClassVar[bool] = True
+    imitated_by: ClassVar[str] = ""
+    """Nuisance that is this effect in another form: beside it the effect would be explained away."""
+    tables: ClassVar[tuple[str, ...]] = ()
+    """Terms that may be learned which are this effect in another form: where one is better, the name is still right."""
+    is_common_misfit: ClassVar[bool] = False
+    """Whether laws of friction lack the like of it so often that it needs the evidence `policy.least_bent`."""
+    finds_its_way: ClassVar[bool] = False
+    """Whether a refit gets from any member of the grid to the best one; then only one is refitted."""
+    must_stand_out: ClassVar[bool] = False
+    """Whether it must remove more energy than the noise of the reading holds, and be asked for by the set point."""
+    is_timing: ClassVar[bool] = False
+    """Whether it is told by changes of the torque alone."""
+    has_own_phase: ClassVar[bool] = False
+    """Whether its phase is another in each recording."""
+    view: ClassVar[View] = "position"
+    easiest: ClassVar[int] = 0
+    """Where the main number says where the effect sets in: whether less (-1) or more (1) of it is easier to find."""
+    member: ClassVar[str] = ""
+    """The parameter by which what is concealed differs: cycles, a frequency, a width."""
+    sizes: ClassVar[tuple[str, ...]] = ()
+    """Parameters of which one must differ from none, where that is not the main number alone."""
+    caveat: ClassVar[str] = ""
+    """What must be said beside the evidence."""
+
+    def candidates(self, mount: Mount, span: Span) -> Iterable[Candidate]:
+        """What is worth trying; nothing where the mount has it already or it cannot be seen."""
+        raise TypeError(f"{type(self).__name__} has no candidates")
+
+    def twins(self, effect: Form) -> list[Effect]:
+        """Effects alike at first order, to be tried whatever a linear score says of them."""
+        return []
+
+    def tuned(self, problem: Problem, found: Fit, start: Form, evidence: Evidence) -> Fit:
+        """Fit what the grid knows only roughly of the effect that was added last, from `start`.
+
+        Of fits from several starts the one with most evidence is taken: the least residual may be about very few rows.
+        `evidence` of a fit is in nats above the structure without the effect.
+        """
+        found = revived(problem, found, start) if start.place == "Friction" else found
+        return in_cycles(problem, found) if getattr(found.mount.effects[-1], "cycles_per_rev", 0.0) > 0 else found
+
+    def multiple(self, ripple: Form, k: int) -> Candidate | None:
+        """Candidate for k times the cycles of a ripple; None where the effect is none."""
+        return None
+
+    def is_degenerate(self, problem: Problem, effect: Form) -> bool:
+        """Whether a fitted effect is really something else: a time-stamp convention, a level, an unbalance, a drift."""
+        return False
+
+    def is_plausible(self, effect: Form, mount: Mount) -> bool:
+        """Whether a fitted effect, in the fitted mount that holds it, is what its name says."""
+        return True
+
+    def shows(self, effect: Form, mount: Mount, prepared: Prepared) -> bool:
+        """Whether the recorded motion shows what tells the fitted effect from another law of friction."""
+        return True
+
+    def way_back(self, effect: Form, mount: Mount) -> float:
+        """How far motion must turn back to show the fitted effect [rad, m]."""
+        return 0.0
+
+    def late(self, problem: Problem, effect: Form) -> float | None:
+        """Seconds by which the effect makes the torque late against the reading; None if it is not late."""
+        return None
+
+    def where(self, effect: Form, reach: Reach) -> Where:
+        """Where a fitted effect acts, within what was visited."""
+        return EVERYWHERE
+
+    def further(self, waves: Sequence[Form]) -> str:
+        """A sentence on the further waves of a ripple."""
+        return ""
+
+    def card_note(self, first: str) -> str:
+        """What the improved card must say beside the effect; `first` names the first recording."""
+        return ""
+
+    def none(self, mount: Mount) -> float:
+        """The main number at which there is no effect."""
+        return 0.0
+
+    def least(self, sample_time: float) -> float:
+        """The main number below which the effect is not named, whatever its evidence."""
+        return 0.0
+
+    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
+        """Members of the kind all over its range; they are concealed to test how small the effect may be."""
+        return tried
+
+    def looked(self, seen: Seen, mount: Mount) -> str:
+        """For what a bound holds, if not for all of the effect, and what cannot be tested."""
+        return ""
+
+    def is_settled(self, mount: Mount) -> bool:
+        """Whether no recording can test the effect: the model has it already, or the axis cannot have it."""
+        return any(isinstance(effect, self.forms) for effect in mount.effects)
+
+    def why_not(self, mount: Mount, prepared: Prepared) -> str:
+        """Why these recordings cannot test the effect: one reason. What to record is the effect's own to say."""
+        if self.is_settled(mount):
+            return HELD
+        if mount.friction.key == "none" and any(form.place == "Friction" for form in self.forms):
+            return NO_FRICTION
+        return NO_POSITION if self.needs_position and not prepared.has_position else UNSEEN
+
+
+EVERYWHERE = Where(axis="everywhere", description="everywhere", regions=())
+QUICK_CHANGES = Where(axis="frequency", description="wherever the torque changes quickly", regions=())
+HELD = "the model has it already"
+NO_FRICTION = "the card says that there is no friction"
+NO_POSITION = "no position was recorded"
+UNSEEN = "no size of it would have shown in these recordings"
+RESTLESS = "a friction law that says nothing about rest cannot tell it from"
+"""Reasons why an effect cannot be tested; the last one goes on with the effect that was found."""
+
+
+def visited(reach: Reach) -> Where:
+    """All positions that were visited."""
+    return Where(axis="position", description="everywhere that was visited", regions=((reach.low, reach.high),))
+
+
+def turn(mount: Mount) -> float:
+    """What cycles count in: a turn [rad] of a rotary axis, a metre of a linear one."""
+    return 1.0 if mount.motion == "linear" else 2 * pi
+
+
+WAVES, LEAST_STROKE, PASSED = 4, 1.5, 0.8
+"""Numbers of cycles that are concealed, from so many over the visited positions to what the filter passes of them at
+the median speed: this share of the cutoff."""
+
+
+def cycles_shown(mount: Mount, span: Span, lowest: float, highest: float = math.inf) -> list[float]:
+    """Cycles a turn (a metre) between what a stroke holds and what the band passes."""
+    speed = np.abs(span.v)
+    moving = speed[speed > 0.02 * span.top]
+    passed = PASSED * span.cutoff * turn(mount) / max(float(np.median(moving)) if len(moving) else 0.0, 1e-300)
+    low = max(LEAST_STROKE * turn(mount) / max(span.reach, 1e-300), lowest if mount.motion == "rotary" else 0.0)
+    high = min(passed, highest)
+    return np.geomspace(low, high, WAVES).tolist() if high > low else []
+
+
+def with_cycles(tried: Sequence[Candidate], cycles: Sequence[float]) -> Iterator[Candidate]:
+    """The first candidate of a ripple with other numbers of cycles."""
+    for first in tried[:1]:
+        for one in cycles:
+            yield with_numbers(first, cycles_per_rev=one)
+
+
+def with_numbers(one: Candidate, **numbers: float) -> Candidate:
+    """A candidate with other nonlinear numbers."""
+    change: Any = replace
+    return replace(one, instances=tuple(change(instance, **numbers) for instance in one.instances))
+
+
+def of_that_size(one: Candidate, **numbers: float) -> Candidate:
+    """A candidate whose column is all that the effect changes with these numbers, not its derivative at none of it."""
+    return replace(with_numbers(one, **numbers), linear=())
+
+
+def in_cycles_a_turn(seen: Seen, mount: Mount) -> str:
+    """Between which cycles a bound holds."""
+    per = "a metre" if mount.motion == "linear" else "a turn"
+    low, high = (f"{one:.3g}" if one < 1000 else f"{one:.0f}" for one in (seen.low, seen.high))
+    return f"at {low if low == high else f'{low} to {high}'} cycles {per}; not testable above"

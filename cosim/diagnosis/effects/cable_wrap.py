@@ -1,0 +1,59 @@
+"""A cable that winds up."""
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+import numpy as np
+
+from cosim.diagnosis.effects.base import Evidence, Hypothesis
+from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.tuning import freed
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import Array
+from cosim.estimation.problem import Problem
+from pyfmi_models.effects import Effect
+from pyfmi_models.effects.cable_wrap import CableWrap
+from pyfmi_models.mount import Mount
+
+BESIDE = 1.0
+"""A cable whose home lies further beside the visited positions than this share of their range is an offset: of its
+energy its change over the range has less than about 1 - `TIE`."""
+
+
+class Cable(Hypothesis[CableWrap]):
+    """A spring, even or hardening."""
+
+    forms = (CableWrap,)
+    tables = ("position", "position over the turn")
+    rank: ClassVar[float] = 13
+
+    def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
+        """A spring whose home is where its torque vanishes: two homes span them all."""
+        if has(mount, CableWrap):
+            return
+        homes = [float(home) for home in np.quantile(span.q, [0.1, 0.9])]
+        for hardening in (0.0, 4.0 / span.reach**2):
+
+            def start(c: Array, hardening: float = hardening) -> Effect:
+                stiffness = float(c[0] + c[1])
+                home = float(c @ homes) / stiffness if stiffness > 0 else float(np.mean(homes))
+                home = float(np.clip(home, *_beside(span)))
+                return CableWrap(stiffness=max(stiffness, 1e-9), home=home, hardening=hardening)
+
+            pair = tuple(CableWrap(stiffness=0.0, home=home, hardening=hardening) for home in homes)
+            yield Candidate("cable_wrap", pair, ("stiffness",), start)
+
+    def tuned(self, problem: Problem, found: Fit, start: CableWrap, evidence: Evidence) -> Fit:
+        """Fit how it hardens."""
+        return problem.fit(freed(problem, found, "hardening").mount, 12)
+
+    def is_degenerate(self, problem: Problem, effect: CableWrap) -> bool:
+        """Far from its home it is an offset."""
+        low, high = problem.prepared.ranges["q"]
+        room = BESIDE * (high - low)
+        return not low - room <= float(effect.home) <= high + room
+
+
+def _beside(span: Span) -> tuple[float, float]:
+    """Positions visited, and as much again on either side."""
+    return float(span.q.min()) - span.reach, float(span.q.max()) + span.reach

@@ -1,0 +1,91 @@
+"""An encoder disc off its centre."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from math import atan2, hypot, pi
+from typing import Any, ClassVar
+
+import numpy as np
+
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.effects.base import Evidence, Hypothesis, Seen, cycles_shown, in_cycles_a_turn, with_cycles
+from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.periodogram import peaks
+from cosim.diagnosis.effects.tuning import in_cycles, restarted
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import Array
+from cosim.estimation.problem import Problem
+from pyfmi_models.effects import Effect
+from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
+from pyfmi_models.mount import Mount
+
+MOST_CYCLES = 40.0
+"""Cycles a turn up to which a false reading is concealed."""
+
+MOST_SLOPE = 0.25
+"""Error of the reading for a way, relative to it: a disc of radius R off by e errs by e/R of the way, twice that with
+an oval one; a quarter is no disc any more, but a ripple whose torque the reading would have to make. Unit: 1."""
+
+
+class Eccentricity(Hypothesis[EncoderEccentricity]):
+    """A false reading once a turn of the disc."""
+
+    forms = (EncoderEccentricity,)
+    member: ClassVar[str] = "cycles_per_rev"
+    rank: ClassVar[float] = 22
+    view = "slow and fast"
+
+    def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
+        """Cycles over angle of what grows with the square of the speed."""
+        if has(mount, EncoderEccentricity):
+            return
+        fast = replace(span, residual=span.residual * (span.v / span.top) ** 2)
+        for cycles in peaks(fast, fast.residual):
+
+            def start(c: Array, cycles: float = cycles) -> Effect:
+                return EncoderEccentricity(cycles_per_rev=cycles, amplitude_rad=hypot(*c), phase=atan2(c[1], c[0]))
+
+            pair = tuple(EncoderEccentricity(cycles_per_rev=cycles, amplitude_rad=0.0, phase=p) for p in (0.0, pi / 2))
+            yield Candidate("encoder_eccentricity", pair, ("amplitude_rad",), start)
+
+    def tuned(self, problem: Problem, found: Fit, start: EncoderEccentricity, evidence: Evidence) -> Fit:
+        """Ask a disc of half the turns whether what was found is its error twice a turn.
+
+        The torque of that error is four times as large as that of one once a turn, so a search begins with it, and no
+        step leads from there to half the turns. It must be ahead by the margin that a rival needs.
+        """
+        found = super().tuned(problem, found, start, evidence)
+        if evidence(found) <= 0:
+            return found
+        starts = halved(problem, found.mount.effects[-1])
+        halves = [in_cycles(problem, restarted(problem, found, one)) for one in starts]
+        best = max(halves, key=evidence)
+        return best if evidence(best) > evidence(found) + POLICY.set_margin else found
+
+    def is_plausible(self, effect: EncoderEccentricity, mount: Mount) -> bool:
+        """The reading goes on where the axis does: it errs by less of the way than `MOST_SLOPE`."""
+        slope = effect.amplitude_rad * effect.cycles_per_rev * (1 + 2 * abs(effect.second))
+        return bool(slope < MOST_SLOPE)
+
+    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
+        """Few cycles: bearing and disc make no more."""
+        return with_cycles(tried, cycles_shown(mount, span, 1.0, MOST_CYCLES))
+
+    def looked(self, seen: Seen, mount: Mount) -> str:
+        """Between which cycles."""
+        return in_cycles_a_turn(seen, mount)
+
+
+def halved(problem: Problem, disc: Any) -> list[EncoderEccentricity]:
+    """Discs of half the turns, that is whole ones of an axis that turns, whose error twice a turn is that of `disc`.
+
+    It is so in the middle of what was visited; the error once a turn starts half as large, either way.
+    """
+    half = disc.cycles_per_rev / 2
+    cycles, around = (half, 2 * pi) if problem.mount.motion == "linear" else (max(1.0, float(round(half))), 1.0)
+    middle = around * float(np.mean(problem.prepared.ranges["q"]))
+    phase = disc.phase / 2 + (half - cycles) * middle
+    return [
+        replace(disc, cycles_per_rev=cycles, amplitude_rad=disc.amplitude_rad / 2, second=2.0, phase=phase + turn)
+        for turn in (0.0, pi)
+    ]

@@ -1,0 +1,57 @@
+"""Friction that differs between the two directions."""
+
+from collections.abc import Iterator
+from typing import ClassVar
+
+import numpy as np
+
+from cosim.diagnosis.answer.result import Where
+from cosim.diagnosis.effects.base import RESTLESS, Hypothesis, Reach
+from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.estimation.prepare import Array, Prepared
+from pyfmi_models.effects import Effect, FrictionAsymmetry, TorqueOffset
+from pyfmi_models.mount import Mount
+
+
+class Asymmetry(Hypothesis[FrictionAsymmetry]):
+    """Level and viscous friction at once."""
+
+    forms = (FrictionAsymmetry,)
+    sizes: ClassVar[tuple[str, ...]] = ("level_asymmetry", "viscous_asymmetry")
+    rank: ClassVar[float] = 2
+    needs_position: ClassVar[bool] = False
+    view = "keep turning"
+
+    def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
+        """Both directions alike, their two differences as columns; beside an offset only where rest tells them apart.
+
+        Levels of two directions and an offset are two numbers of an axis that moves: with all three, one direction may
+        lose its friction altogether, and whatever the other has is explained by a name that it is not.
+        """
+        if has(mount, FrictionAsymmetry) or mount.friction.key == "none" or _is_alike(mount):
+            return
+        linear = ("level_asymmetry", "viscous_asymmetry")
+        neutral = FrictionAsymmetry(level_asymmetry=0.0, viscous_asymmetry=0.0)
+
+        def start(c: Array) -> Effect:
+            a, b = (float(np.clip(x, -0.9, 0.9)) for x in c)
+            return FrictionAsymmetry(level_asymmetry=a, viscous_asymmetry=b)
+
+        yield Candidate("friction_asymmetry", (neutral,), linear, start)
+
+    def where(self, effect: FrictionAsymmetry, reach: Reach) -> Where:
+        """Both directions."""
+        return Where(axis="direction", description="both directions, differently", regions=((-1, -1), (1, 1)))
+
+    def why_not(self, mount: Mount, prepared: Prepared) -> str:
+        """A law that says nothing of rest cannot tell it from an offset."""
+        if _is_alike(mount) and not has(mount, FrictionAsymmetry):
+            return f"{RESTLESS} the torque offset that was found"
+        if prepared.ranges["v"][0] >= 0 or prepared.ranges["v"][1] <= 0:
+            return "these recordings hold no reversals"
+        return super().why_not(mount, prepared)
+
+
+def _is_alike(mount: Mount) -> bool:
+    """Whether a constant torque is there already, and friction of two directions no more than that."""
+    return not mount.friction.states() and has(mount, TorqueOffset)

@@ -1,0 +1,117 @@
+"""Friction that depends on where the axis is: periodic, or a rough spot."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from math import atan2, hypot, pi
+from typing import ClassVar
+
+import numpy as np
+
+from cosim.diagnosis.answer.result import Where
+from cosim.diagnosis.effects.base import (
+    Hypothesis,
+    Reach,
+    Seen,
+    cycles_shown,
+    in_cycles_a_turn,
+    turn,
+    visited,
+    with_cycles,
+)
+from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.periodogram import peaks
+from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.visible import bend, least_way
+from pyfmi_models.effects import Effect, LocalFriction, PeriodicFriction
+from pyfmi_models.mount import Mount
+
+LEAST_CYCLES = 1.5
+"""Cycles a turn from which a ripple is concealed."""
+
+
+class FrictionRipple(Hypothesis[PeriodicFriction]):
+    """Friction that rises and falls so many times a turn."""
+
+    forms = (PeriodicFriction,)
+    tables = ("friction level over position",)
+    member: ClassVar[str] = "cycles_per_rev"
+    rank: ClassVar[float] = 3
+    view = "one pitch"
+
+    def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
+        """Strongest cycles of what changes its sign with the speed."""
+        if mount.friction.key == "none":
+            return
+        for cycles in peaks(span, span.residual * np.sign(span.v), lowest=0.3):
+            yield _wave(cycles)
+
+    def multiple(self, ripple: PeriodicFriction, k: int) -> Candidate | None:
+        """So many times the cycles."""
+        return _wave(k * float(ripple.cycles_per_rev)) if ripple.cycles_per_rev > 0 else None
+
+    def way_back(self, effect: PeriodicFriction, mount: Mount) -> float:
+        """Half a wave: where motion goes one way, friction over position is a torque over position."""
+        return turn(mount) / (2 * float(effect.cycles_per_rev)) if effect.cycles_per_rev > 0 else 0.0
+
+    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
+        """All that a stroke holds and the band passes."""
+        return with_cycles(tried, cycles_shown(mount, span, LEAST_CYCLES))
+
+    def looked(self, seen: Seen, mount: Mount) -> str:
+        """Between which cycles."""
+        return in_cycles_a_turn(seen, mount)
+
+    def where(self, effect: PeriodicFriction, reach: Reach) -> Where:
+        """At all positions."""
+        return visited(reach)
+
+    def is_settled(self, mount: Mount) -> bool:
+        """Never: there may be further waves."""
+        return False
+
+
+class RoughSpot(Hypothesis[LocalFriction]):
+    """Friction that is off around one place."""
+
+    forms = (LocalFriction,)
+    tables = ("friction level over position",)
+    rank: ClassVar[float] = 4
+
+    def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
+        """Two widths, places all over the range."""
+        if mount.friction.key == "none" or has(mount, LocalFriction):
+            return
+        low, high = np.quantile(span.q, [0.01, 0.99])
+        for share in (0.03, 0.08):
+            width = share * (high - low)
+            for center in np.arange(low + width, high - width / 2, 1.7 * width):
+                spot = LocalFriction(q_center=float(center), width=float(width), relative_amplitude=0.0)
+
+                def start(c: Array, spot: LocalFriction = spot) -> Effect:
+                    return replace(spot, relative_amplitude=float(np.clip(c[0], -0.9, 15)))
+
+                yield Candidate("position_friction", (spot,), ("relative_amplitude",), start)
+
+    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
+        """None: where a spot is, is one of too many places; the bound is that of a ripple."""
+        return ()
+
+    def shows(self, effect: LocalFriction, mount: Mount, prepared: Prepared) -> bool:
+        """A spot that the contact bends across, or that no recording resolves, is a place where the axis rested."""
+        return float(effect.width) >= max(bend(mount.friction), least_way(prepared))
+
+    def where(self, effect: LocalFriction, reach: Reach) -> Where:
+        """Two widths to each side of its centre."""
+        span = (effect.q_center - 2 * effect.width, effect.q_center + 2 * effect.width)
+        return Where(axis="position", description=f"around {effect.q_center:.4g}", regions=(span,))
+
+
+def _wave(cycles: float) -> Candidate:
+    """Friction with so many cycles a turn."""
+
+    def start(c: Array) -> Effect:
+        size = min(hypot(*c), 0.9)
+        return PeriodicFriction(cycles_per_rev=cycles, relative_amplitude=size, phase=atan2(-c[1], c[0]))
+
+    pair = tuple(PeriodicFriction(cycles_per_rev=cycles, relative_amplitude=0.0, phase=p) for p in (0.0, -pi / 2))
+    return Candidate("position_friction", pair, ("relative_amplitude",), start)

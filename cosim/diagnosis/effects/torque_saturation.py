@@ -1,0 +1,54 @@
+"""What a drive withholds."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from cosim.diagnosis.answer.result import Where
+from cosim.diagnosis.effects.base import QUICK_CHANGES, Hypothesis, Reach, Seen, of_that_size
+from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.estimation.prepare import Array
+from pyfmi_models.effects import Effect
+from pyfmi_models.effects.torque_saturation import TorqueSaturation
+from pyfmi_models.mount import Mount
+
+HALF = 0.5
+"""Slope past the knee of a middling one."""
+
+
+class Saturation(Hypothesis[TorqueSaturation]):
+    """Less torque above a knee."""
+
+    forms = (TorqueSaturation,)
+    tables = ("torque",)
+    easiest: ClassVar[int] = -1
+    rank: ClassVar[float] = 15
+    needs_position: ClassVar[bool] = False
+    view = "load"
+
+    def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
+        """Knees below the highest torques that were asked for."""
+        if has(mount, TorqueSaturation):
+            return
+        for share in (0.8, 0.9, 0.96, 0.985):
+            knee = float(np.quantile(np.abs(span.tau), share))
+            if knee > 0:
+
+                def start(c: Array, knee: float = knee) -> Effect:
+                    return TorqueSaturation(knee_torque=knee, slope=float(np.clip(1 + c[0], 0.02, 0.98)))
+
+                full = TorqueSaturation(knee_torque=knee, slope=1.0)
+                yield Candidate("torque_saturation", (full,), ("slope",), start)
+
+    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
+        """Half of what is asked for past each knee."""
+        return [of_that_size(one, slope=HALF) for one in tried]
+
+    def looked(self, seen: Seen, mount: Mount) -> str:
+        """Lower knees, past which half of what is asked for comes."""
+        return f"with a knee below {seen.high:.3g} {'N' if mount.motion == 'linear' else 'N·m'}"
+
+    def where(self, effect: TorqueSaturation, reach: Reach) -> Where:
+        """Where much is asked for."""
+        return QUICK_CHANGES

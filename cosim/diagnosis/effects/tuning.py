@@ -1,0 +1,79 @@
+"""Fit what the grid of a candidate knows only roughly: the tools that hypotheses use."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from cosim.estimation.fit import Fit, with_values
+from cosim.estimation.priors import is_linear
+from cosim.estimation.problem import Problem
+from pyfmi_models.effects import Effect
+from pyfmi_models.model import parameters_of
+
+LEAST_GAIN = 0.01
+"""A whole number of cycles is taken if the residual grows by less than this share, a free shape if it falls by more."""
+DEAD = 0.1
+"""Share of the card's number below which a friction parameter is tried at the card's number again."""
+
+
+def revived(problem: Problem, found: Fit, start: Effect) -> Fit:
+    """Fit again from the card's friction what died while another effect stood in for it, if that fits better.
+
+    Where a friction is nothing, its change with temperature or direction is nothing too, and no step leads away.
+    """
+    card = {variable.name: variable.start for variable in problem.mount.parameters()}
+    law, numbers = found.mount.friction, found.parameters()
+    levels = {name: value for name, value in numbers.items() if name in card and is_linear(law, name)}
+    dead = [name for name, value in levels.items() if abs(value) < DEAD * abs(card[name])]
+    if not dead:
+        return found
+    again = replace(found.mount, effects=(*found.mount.effects[:-1], start))
+    other = problem.fit(with_values(again, dead, np.array([card[name] for name in dead])), 36)
+    return min((found, other), key=problem.error)
+
+
+def refound(
+    problem: Problem, found: Fit, evidence: Callable[[Fit], float], others: Sequence[Effect], steps: int = 36
+) -> Fit:
+    """The best of a fit and those from other starts: a start is known to an order of magnitude at most."""
+    return max((found, *(restarted(problem, found, one, steps) for one in others)), key=evidence)
+
+
+def restarted(problem: Problem, found: Fit, start: Effect, steps: int = 36) -> Fit:
+    """A fit with its last effect started elsewhere."""
+    return problem.fit(replace(found.mount, effects=(*found.mount.effects[:-1], start)), steps)
+
+
+def in_cycles(problem: Problem, found: Fit) -> Fit:
+    """Fit the cycles of a ripple; slots, teeth and rolling elements come in whole numbers: one that fits is taken.
+
+    A metre knows no whole numbers.
+    """
+    free = freed(problem, found, "cycles_per_rev")
+    best = min((found, free), key=problem.error)
+    ripple: Any = best.mount.effects[-1]
+    whole = [] if problem.mount.motion == "linear" else [max(1.0, float(round(ripple.cycles_per_rev)))]
+    for cycles in (*whole, ripple.cycles_per_rev):
+        effects = (*best.mount.effects[:-1], replace(ripple, cycles_per_rev=cycles))
+        settled = problem.fit(replace(best.mount, effects=effects), 24)
+        if problem.error(settled) < problem.error(best) * (1 + LEAST_GAIN):
+            return settled
+    return found
+
+
+def freed(problem: Problem, found: Fit, name: str) -> Fit:
+    """Fit again with a number that a fit leaves as it is otherwise."""
+    return problem.fit(found.mount, 30, (name,))
+
+
+def at_bound(effect: Effect, sizes: Sequence[str] = ()) -> bool:
+    """Whether a parameter of an effect is at an end of its range; of several `sizes` all that are not nothing.
+
+    A range from 0 on ends at nothing, which is no bound: there an effect is small.
+    """
+    variables = parameters_of(effect)
+    ends = {one.name: one.start >= one.high or (one.low < 0 and one.start <= one.low) for one in variables}
+    own = [ends.pop(one.name) for one in variables if one.name in sizes and one.start]
+    return any(ends.values()) or (bool(own) and all(own))

@@ -1,0 +1,76 @@
+"""What shakes an axis now and then: energy of what a structure leaves that lasts for seconds, far above the usual.
+
+    share = sum of max(l - ABOVE u, 0) / sum of e,    l = min(e, the larger neighbour's e),    u = median of e
+    ln e = ln(variance of the rest) less a quadratic in ln(speed) and ln(acceleration), RMS of each
+
+in windows of a second of clear motion. Noise of any colour has the same e in each, and what a law lacks goes with the
+motion; a single window that stands out is a jolt, and counts nothing.
+"""
+
+import numpy as np
+
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import Array, Piece
+from cosim.estimation.row_weights import far_from_turns
+
+SECONDS = 1.0
+"""Length of a window [s] ..."""
+PERIODS = 8.0
+"""... and at least so many periods of the cutoff: an energy of fewer rows says little. Unit: 1."""
+LEAST_ROWS = 8
+"""Rows in clear motion that a window must hold, and at least half of its own."""
+LEAST_WINDOWS = 20
+"""Windows that tell what is usual in which motion."""
+ABOVE = 3.0
+"""Times the usual energy from which a window stands out; noise of 16 independent rows has 2.1 in one of a hundred."""
+NONE = 1e-6
+"""Mean square of a speed, relative to the largest, and of an acceleration, relative to reaching that within a window,
+below which it is none. Unit: 1."""
+TINY = 1e-300
+
+
+def burst_share(comparison: Comparison, found: Fit) -> float:
+    """Share of the energy of the training residual that comes in bursts; 0 where too little was recorded to tell."""
+    prepared, parts = comparison.problem.prepared, []
+    clear = (comparison.problem.weight * far_from_turns(prepared) > 0).astype(float)
+    rest = found.residual / comparison.noise.at(prepared.stacked("v"))
+    seconds = max(SECONDS, PERIODS / prepared.cutoff)
+    for piece, rows in zip(prepared.pieces, comparison.bands.slices, strict=True):
+        parts += [_windows(piece, rest[rows], clear[rows], seconds), np.full((1, 3), np.nan)]
+    windows = np.concatenate(parts)
+    known = np.isfinite(windows).all(1)
+    if known.sum() < LEAST_WINDOWS:
+        return 0.0
+    energy = np.full(len(windows), np.nan)
+    least = NONE * float(windows[known, 1].max()) * np.array([0.0, 1.0, seconds**-2]) + TINY
+    energy[known] = _beside_motion(np.log(np.maximum(windows[known], least)))
+    above = np.maximum(_lasting(energy)[known] - ABOVE * np.median(energy[known]), 0.0)
+    return float(above.sum() / energy[known].sum())
+
+
+def _windows(piece: Piece, rest: Array, clear: Array, seconds: float) -> Array:
+    """Variance of the rest, mean squares of speed and acceleration: (windows, 3); not a number where hardly clear."""
+    t, v = piece.t[piece.kept], piece.v[piece.kept]
+    if len(t) < LEAST_ROWS:
+        return np.full((1, 3), np.nan)
+    window = np.floor((t - t[0]) / seconds).astype(np.int64)
+    rows, count = np.bincount(window), np.bincount(window, clear)
+    enough, count = count >= np.maximum(LEAST_ROWS, rows / 2), np.maximum(count, 1.0)
+    columns = (rest, rest**2, v**2, np.gradient(v, t) ** 2)
+    mean, square, speed, acceleration = (np.bincount(window, clear * one) / count for one in columns)
+    return np.where(enough[:, None], np.column_stack([square - mean**2, speed, acceleration]), np.nan)
+
+
+def _beside_motion(logs: Array) -> Array:
+    """Energies relative to what a quadratic in the logarithms of speed and acceleration foretells."""
+    speed, acceleration = ((one - one.mean()) / (one.std() + TINY) for one in logs[:, 1:].T)
+    shapes = (speed, acceleration, speed**2, acceleration**2, speed * acceleration)
+    columns = np.column_stack([np.ones(len(logs)), *shapes])
+    return np.asarray(np.exp(logs[:, 0] - columns @ np.linalg.lstsq(columns, logs[:, 0], rcond=None)[0]))
+
+
+def _lasting(energy: Array) -> Array:
+    """The energy of each window that a neighbour has as well; 0 where it has none."""
+    beside = np.concatenate([[np.nan], energy, [np.nan]])
+    return np.asarray(np.nan_to_num(np.minimum(energy, np.fmax(beside[:-2], beside[2:]))))

@@ -1,0 +1,1 @@
+"""What is measured of an answer for its readers: errors, places, bounds. It decides nothing."""

@@ -1,0 +1,59 @@
+"""Findings of effects that are not named: not seen from which size, for what, or why that cannot be tested."""
+
+from collections.abc import Sequence
+
+from cosim.diagnosis.answer.result import Bound, Finding
+from cosim.diagnosis.effects import TRIED, hypothesis_of, named
+from cosim.diagnosis.effects.base import Seen
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.measure.bounds import SeenFrom, bounds
+from cosim.diagnosis.measure.findings import unit_on
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import Prepared
+from pyfmi_models.effects import CATALOGUE
+from pyfmi_models.mount import Mount
+
+
+def not_found(comparison: Comparison, chosen: Fit, known: Sequence[str], largest: float) -> list[Finding]:
+    """One finding for each effect that is tried and not named; `largest` is the evidence of the strongest that is."""
+    found, prepared = bounds(comparison, chosen, known, largest), comparison.problem.prepared
+    return [_absent(name, found.get(name), chosen.mount, prepared) for name in TRIED if name not in known]
+
+
+def _absent(name: str, found: SeenFrom | None, mount: Mount, prepared: Prepared) -> Finding:
+    form = CATALOGUE[name][0]
+    main = form.main
+    where = _looked(found, mount, prepared) if found else named(name).why_not(mount, prepared)
+    value = main.factor * found.size if found else None
+    bound = Bound(
+        value=value,
+        unit=unit_on(main.unit, mount),
+        band_hz=(0.0, prepared.cutoff),
+        range=_range(found, prepared),
+        power=found.power if found else None,
+        reason=where,
+    )
+    return Finding(
+        effect=name,
+        title=form.title,
+        answer="not_seen" if found else "not_testable",
+        probability=0.0,
+        gain=0.0,
+        units={main.parameter: bound.unit},
+        visible_from=value if main.is_size else None,
+        evidence=where,
+        action="" if found or named(name).is_settled(mount) else form.to_record,
+        bound=bound,
+    )
+
+
+def _range(found: SeenFrom | None, prepared: Prepared) -> dict[str, tuple[float, float]]:
+    """What a bound holds for: the members that were concealed, and the positions and speeds that were visited."""
+    visited = {key: (float(prepared.ranges[key][0]), float(prepared.ranges[key][1])) for key in ("q", "v")}
+    member = hypothesis_of(found.instance).member if found else ""
+    own = {member: found.places} if found and member else {}
+    return own | (visited if prepared.has_position else {"v": visited["v"]})
+
+
+def _looked(found: SeenFrom, mount: Mount, prepared: Prepared) -> str:
+    return hypothesis_of(found.instance).looked(Seen(found.size, *found.places, prepared.cutoff), mount)

@@ -1,0 +1,161 @@
+"""Conceal an effect in recordings, at a size, and weigh what the search would find of it.
+
+    r' = r + D w        D: columns of the effect, derivatives of the torque that the recorded motion needs
+
+A machine with the effect needs D w more torque for the same motion, so r' is what the same structure would have left of
+its recordings: exactly where the effect is linear in its size, to first order elsewhere. Evidence is quadratic in r, so
+Gram matrices of r, of the structure's tangents, of the nuisances and of all columns are made once; a size costs two
+small factorisations.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import log
+from typing import Any
+
+import numpy as np
+
+from cosim.diagnosis.evidence.comparison import Comparison, aside_for
+from cosim.diagnosis.evidence.marginal import Group, Marginal, marginal
+from cosim.diagnosis.search.stages import least
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import Array
+from cosim.estimation.priors import trust
+
+ROUNDS = 3
+"""How often noise and sizes are estimated anew once an effect is concealed; they start from the recordings' own."""
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """Where an effect's columns are, by number, and how it is looked for."""
+
+    effect: str
+    columns: Any
+    prior: Array
+    """How large coefficients may be (one standard deviation)."""
+    price: float
+    """Nats that the search for it costs."""
+    must_stand_out: bool = False
+    """Whether it must remove more energy than the noise of the reading holds."""
+    is_common_misfit: bool = False
+    """Whether laws of friction lack the like of it so often that it needs more evidence."""
+
+
+@dataclass(frozen=True)
+class Worth:
+    """What is found of a concealed effect."""
+
+    evidence: float
+    """Nats, search priced."""
+    plain: float
+    """Share of the plain residual energy."""
+    above_noise: float
+    """Energy in that of the reading's noise."""
+
+
+class Concealment:
+    """Concealing columns of effects in what a fitted structure leaves."""
+
+    def __init__(self, comparison: Comparison, found: Fit, columns: Sequence[Array], largest: float = 0.0) -> None:
+        self._comparison, self._found, self._largest = comparison, found, largest
+        nuisances = comparison.nuisances.columns
+        self._own, self._many = 1 + found.slopes.shape[1], nuisances.shape[1]
+        stacked = np.column_stack([found.residual, found.slopes, nuisances, *columns])
+        self._grams = comparison.bands.grams(comparison.bands.transform(stacked))
+        self._plain = self._plain_gram(np.column_stack([found.residual, *columns]))
+        self._before: dict[str, Marginal] = {}
+
+    def _plain_gram(self, columns: Array) -> Array:
+        """Gram matrix of residual and columns beyond the tangents of the structure, in N2 m2 over the rows."""
+        weight = self._comparison.problem.weight[:, None]
+        slopes = self._found.slopes * weight
+        basis, _ = np.linalg.qr(slopes / (np.sqrt((slopes**2).sum(0)) + 1e-300))
+        own = columns * weight
+        own = own - basis @ (basis.T @ own)
+        return np.asarray(own.T @ own)
+
+    def energy(self, hidden: Hidden, weights: Array) -> float:
+        """Share of the plain energy that concealing adds, relative to what is left now."""
+        place = 1 + hidden.columns
+        added = weights @ self._plain[np.ix_(place, place)] @ weights
+        return float(added) / max(float(self._plain[0, 0]), 1e-300)
+
+    def worth(self, hidden: Hidden, weights: Array) -> Worth:
+        """Conceal an effect with these coefficients and weigh what is found of it."""
+        base, groups = self._base(hidden.effect)
+        place = self._own + self._many + hidden.columns
+        grams = _concealed(self._grams, place, weights)
+        now = self._marginal(grams, base, groups, np.zeros(0), self._start(hidden.effect, base, groups))
+        after = self._marginal(grams, np.concatenate([base, place]), groups, hidden.prior, now)
+        evidence = after.log_likelihood - now.log_likelihood - hidden.price
+        tangents = np.arange(1, self._own)
+        removed = _left(grams.sum(0), tangents) - _left(grams.sum(0), np.concatenate([tangents, place]))
+        noise = float(self._comparison.floor @ self._comparison.bands.count)
+        return Worth(evidence, self._plain_share(hidden, weights), removed / max(noise, 1e-300))
+
+    def is_found(self, hidden: Hidden, weights: Array) -> bool:
+        """Whether the search would add the concealed effect: its rules of evidence and of size."""
+        worth, policy = self.worth(hidden, weights), self._comparison.policy
+        enough = worth.evidence >= least(policy, self._largest, worth.plain) and worth.plain >= policy.least_plain_gain
+        large = worth.plain >= policy.small_gain or worth.evidence >= policy.small_evidence
+        rare = not hidden.is_common_misfit or worth.evidence >= policy.least_bent
+        loud = not hidden.must_stand_out or worth.above_noise >= policy.least_above_noise
+        return enough and large and rare and loud
+
+    def _plain_share(self, hidden: Hidden, weights: Array) -> float:
+        place = 1 + hidden.columns
+        plain = _concealed(self._plain[None], place, weights)[0]
+        towards = plain[place, 0]
+        beta = np.linalg.lstsq(plain[np.ix_(place, place)], towards, rcond=1e-9)[0]
+        return float(beta @ towards) / max(float(plain[0, 0]), 1e-300)
+
+    def _base(self, effect: str) -> tuple[Any, list[Group]]:
+        """Numbers of residual, tangents and the nuisances that stay beside an effect, and the groups of the latter."""
+        aside = aside_for(effect)
+        staying = [group for group in self._comparison.nuisances.groups if group.name not in aside]
+        kept = [self._own + column for group in staying for column in group.columns]
+        edges = self._own - 1 + np.cumsum([0, *(len(group.columns) for group in staying)])
+        groups = [
+            Group(np.arange(first, last), group.prior)
+            for first, last, group in zip(edges, edges[1:], staying, strict=False)
+        ]
+        return np.array([*range(self._own), *kept]), groups
+
+    def _start(self, effect: str, base: Any, groups: list[Group]) -> Marginal:
+        """The marginal likelihood with nothing concealed."""
+        key = ",".join(sorted(aside_for(effect)))
+        if key not in self._before:
+            self._before[key] = self._marginal(self._grams, base, groups, np.zeros(0), None)
+        return self._before[key]
+
+    def _marginal(self, grams: Array, rows: Any, groups: list[Group], prior: Array, start: Marginal | None) -> Marginal:
+        bands, found = self._comparison.bands, self._found
+        free = np.ones(len(rows) - 1)
+        free[: len(found.free)] = trust(found, self._comparison.problem.prepared.reach)
+        free[len(free) - len(prior) :] = prior
+        chosen = grams[:, rows][:, :, rows]
+        rounds = {} if start is None else {"rounds": ROUNDS}
+        return marginal(chosen, free, groups, bands.count, bands.effective, self._comparison.floor, start, **rounds)
+
+
+def _concealed(grams: Array, place: Any, weights: Array) -> Array:
+    """Gram matrices once columns at `place`, times weights, are added to the first column."""
+    out = grams.copy()
+    cross = grams[:, :, place] @ weights
+    own = grams[:, 0, 0] + 2 * cross[:, 0] + cross[:, place] @ weights
+    out[:, 0, :] += cross
+    out[:, :, 0] = out[:, 0, :]
+    out[:, 0, 0] = own
+    return np.asarray(out)
+
+
+def _left(gram: Array, rows: Any) -> float:
+    """Energy of the first column that least squares on some others leaves."""
+    towards = gram[rows, 0]
+    return float(gram[0, 0] - towards @ np.linalg.lstsq(gram[np.ix_(rows, rows)], towards, rcond=1e-12)[0])
+
+
+def price(members: int, phases: int = 0, phase_price: float = 0.0) -> float:
+    """Nats that a search among so many members, with phases of each recording's own, costs."""
+    return log(max(members, 1)) + phase_price * phases

@@ -1,0 +1,147 @@
+"""From structures to sentences: findings of effects that stand, that rival them, or that were not proven."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from math import ceil, floor, log10
+
+import numpy as np
+
+from cosim.diagnosis.answer.result import Answer, Finding, Trace
+from cosim.diagnosis.decide.calibration import LIKELY
+from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.measure.advice import advice
+from cosim.diagnosis.measure.locate import where
+from cosim.diagnosis.search.rivals import AcceptedEffect
+from cosim.diagnosis.search.sizes import Z95, Numbers, is_told, numbers_of
+from cosim.diagnosis.search.stages import CandidateFit
+from pyfmi_models.effects import Effect
+from pyfmi_models.model import parameters_of
+from pyfmi_models.mount import LINEAR_UNITS, Mount
+
+CYCLES = "cycles_per_rev"
+"""How often a ripple comes round: in a turn, or on a linear axis in a metre."""
+
+EXCLUDED_NATS, EXCLUDED_SHARE = 10.0, 0.02
+"""Evidence (odds of 20 000 to 1) and share of the error energy by which a rival must be behind to be called ruled out:
+one that fits as well is only less likely, however the noise is counted."""
+
+
+def accepted(
+    one: AcceptedEffect,
+    mount: Mount,
+    errors: Mapping[str, float],
+    traces: Sequence[Trace],
+    members: Sequence[str],
+    probability: float,
+    predicted: float,
+) -> Finding:
+    """Describe an effect that stands, with the further waves of a ripple; `members` are rivals that stay open."""
+    alike = [effect for effect in mount.effects if effect.id == one.effect.id][-len(one.effects) :]
+    effect = max(alike, key=lambda own: float(getattr(own, "amplitude", 0.0)))
+    harmonics = [other for other in alike if other is not effect]
+    numbers = numbers_of(effect, mount, errors)
+    own = hypothesis_of(effect)
+    ranges = {n: (numbers.values[n] - Z95 * e, numbers.values[n] + Z95 * e) for n, e in numbers.errors.items()}
+    size, size_range = _size(effect, numbers, mount)
+    return Finding(
+        effect=effect.id,
+        title=effect.title,
+        answer=answered(probability, members, is_told(effect, numbers, mount)),
+        probability=probability,
+        gain=one.own.plain_gain,
+        parameters=numbers.values,
+        harmonics=tuple(numbers_of(other, mount, errors).values for other in harmonics),
+        standard_errors=numbers.errors,
+        ranges=ranges,
+        units=_units(effect, mount),
+        size=size,
+        size_range=size_range,
+        statement=effect.statement("N" if mount.motion == "linear" else "N·m") + own.further(harmonics),
+        where=where(effect, traces),
+        ruled_out=tuple(_behind(one, members, True)),
+        less_likely=tuple(_behind(one, members, False)),
+        told_apart_by=effect.told_apart_by,
+        action=effect.action,
+        evidence=f"removes {100 * one.own.plain_gain:.0f} % of the error energy in training "
+        f"(evidence {one.own.evidence:.0f} nats; {predicted:.0f} nats on the held-out recordings){own.caveat}",
+        visible_from=visible_from(effect, numbers),
+    )
+
+
+def answered(probability: float, members: Sequence[str], is_told: bool) -> Answer:
+    """Found is what no rival of the set can be, is more likely there than not, and has a size that is told."""
+    return "found" if not members and probability >= LIKELY and is_told else "ambiguous"
+
+
+def _behind(one: AcceptedEffect, members: Sequence[str], far: bool) -> Iterator[str]:
+    """Say by how much the rivals outside the set are behind: those far behind by both measures, or the others."""
+    for rival in one.rivals:
+        margin, lead = one.margin(rival), one.own.plain_gain - rival.plain_gain
+        if rival.effect.id not in one.effect.rivals or rival.effect.id in members:
+            continue
+        if (margin >= EXCLUDED_NATS and lead >= EXCLUDED_SHARE) == far:
+            both = f"{100 * rival.plain_gain:.1f} % of the error energy, this {100 * one.own.plain_gain:.1f} %"
+            yield f"{rival.effect.title}: removes {both} ({margin:.0f} nats behind)"
+
+
+def visible_from(effect: Effect, numbers: Numbers) -> float | None:
+    """Size that would still stand out three standard errors from nothing."""
+    main = effect.leading()
+    told = main.parameter in numbers.errors and main.is_size
+    return 3 * main.factor * numbers.errors[main.parameter] if told else None
+
+
+def rival_finding(rival: CandidateFit, probability: float, mount: Mount) -> Finding:
+    """Describe a rival that could not be excluded, or an effect that the held-out recordings do not confirm."""
+    effect = rival.effect
+    values = {variable.name: float(variable.start) for variable in parameters_of(effect)}
+    size, _ = _size(effect, Numbers(values, {}), mount)
+    return Finding(
+        effect=effect.id,
+        title=effect.title,
+        answer="ambiguous",
+        probability=probability,
+        gain=rival.plain_gain,
+        parameters=values,
+        units=_units(effect, mount),
+        size=size,
+        statement=effect.statement("N" if mount.motion == "linear" else "N·m"),
+        told_apart_by=effect.told_apart_by,
+        action=advice(effect, False),
+    )
+
+
+def taken_finding(one: CandidateFit, quantity: str, mount: Mount) -> Finding:
+    """Describe an effect in whose place something without a name explains more."""
+    evidence = f"what goes with {quantity} explains more in its place"
+    return replace(rival_finding(one, 0.0, mount), answer="not_proven", evidence=evidence)
+
+
+def _size(effect: Effect, numbers: Numbers, mount: Mount) -> tuple[str, str]:
+    name, factor, unit, _ = effect.leading()
+    value, error = factor * numbers.values[name], factor * numbers.errors.get(name, float("nan"))
+    text = f"{abs(value):.3g} {unit_on(unit, mount)}"
+    ends = sorted((abs(value) - Z95 * error, abs(value) + Z95 * error))
+    return text, between(*ends) if np.isfinite(error) else ""
+
+
+def between(low: float, high: float) -> str:
+    """Write a range with as many digits as tell its ends apart by three steps at least, both alike: 5.995 to 6.005.
+
+    Three digits of the larger end at least; nothing is written with a power of ten.
+    """
+    larger, width = max(abs(low), abs(high)), high - low
+    digits = 2 - floor(log10(larger)) if larger > 0 else 0
+    finer = ceil(log10(3 / width)) if width > 0 else digits
+    places = min(max(digits, finer, 0), 12)
+    return f"{low:.{places}f} to {high:.{places}f}"
+
+
+def _units(effect: Effect, mount: Mount) -> dict[str, str]:
+    units = {v.name: mount.in_axis_units(v).unit for v in parameters_of(effect)}
+    return units | ({CYCLES: "1/m"} if mount.motion == "linear" and CYCLES in units else {})
+
+
+def unit_on(unit: str, mount: Mount) -> str:
+    """A unit as it is printed: that of force and length on a linear axis."""
+    return (LINEAR_UNITS.get(unit, unit) if mount.motion == "linear" else unit).replace("N.m", "N·m")

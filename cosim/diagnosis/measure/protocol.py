@@ -1,0 +1,172 @@
+"""The proof: torque residuals on recordings, the one that was never fitted first of all.
+
+Protocol: low-pass of 30 Hz on both sides (lower for slow recordings; the band of the analysis where 30 Hz is mostly
+noise, or where most of what the base leaves lies above 30 Hz inside that band), five-point differences, RMS over 3 s ..
+end - 0.5 s (shorter recordings: 5 % off each end).
+Beside it the same over clear motion only, in the band of the analysis.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtri
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.answer.result import HeldOut, Trace
+from cosim.diagnosis.evidence.error import interval_of, is_noise
+from cosim.diagnosis.measure.flagged import Residual, Spans, flagged, noise_at
+from cosim.estimation.discrepancy_basis import discrepancy_basis
+from cosim.estimation.fit import free_parameters
+from cosim.estimation.inverse import Inverse
+from cosim.estimation.least_squares import projected
+from cosim.estimation.prepare import Array, Band, Piece, Prepared, prepare
+from cosim.estimation.residuals import residuals
+from cosim.estimation.row_weights import least_speed
+from cosim.support.statistics import rms
+from pyfmi_models.mount import Mount
+
+CUTOFF = 30.0
+Z95 = 1.96
+
+
+@dataclass(frozen=True)
+class Structures:
+    """The three models that are compared: as delivered, refitted, with the missing physics."""
+
+    nominal: Mount
+    before: Mount
+    after: Mount
+
+    def base_parameters(self) -> dict[str, tuple[float, float, float]]:
+        """Each number of the base, by its full name, in the three models."""
+        tables = [{v.name: v.start for v in one.parameters()} for one in (self.nominal, self.before, self.after)]
+        names = [name for name in tables[0] if name.startswith(("axis.", "friction.")) and name in tables[2]]
+        kept = [name for name in names if not name.endswith(("torque_limit", "smoothing"))]
+        return {name: (tables[0][name], tables[1][name], tables[2][name]) for name in kept}
+
+
+def judge(recordings: Sequence[Recording], models: Structures, band: Band) -> HeldOut:
+    """Compare the three models on recordings that none of them was fitted to.
+
+    Where the protocol's band is mostly noise, the `band` of the analysis is what is judged.
+    """
+    prepared = judged_band(recordings, models, band)
+    inside = np.concatenate([piece.inside for piece in prepared.pieces])
+    left = {
+        name: np.concatenate(residuals(prepared, mount))[inside]
+        for name, mount in (("nominal", models.nominal), ("before", models.before), ("after", models.after))
+    }
+    return HeldOut(
+        name=", ".join(recording.name for recording in recordings),
+        nominal_rms=rms(left["nominal"]),
+        before_rms=rms(left["before"]),
+        after_rms=rms(left["after"]),
+        floor_rms=_floor(prepared, models.after),
+        confidence_interval=interval_of(left["before"], left["after"], prepared.pieces[0].dt),
+        sliding=_sliding(recordings, models, band),
+        cutoff_hz=prepared.cutoff,
+        motion_hz=max(prepared.band),
+    )
+
+
+def judged_band(recordings: Sequence[Recording], models: Structures, band: Band) -> Prepared:
+    """Recordings in the band in which `judge` compares models on them."""
+    own, protocol = (
+        [heldout_rms(recordings, one, edges) ** 2 for one in (models.before, models.after)]
+        for edges in (band, Band(CUTOFF))
+    )
+    is_above = band.cutoff > CUTOFF and own[0] > 2 * protocol[0]
+    return prepare(recordings, band if is_above or is_noise(own, protocol) else CUTOFF)
+
+
+def heldout_rms(recordings: Sequence[Recording], mount: Mount, band: float | Band = CUTOFF) -> float:
+    """RMS of the torque residual of one model by the protocol, in its band or another [Hz]."""
+    prepared = prepare(recordings, band)
+    inside = np.concatenate([piece.inside for piece in prepared.pieces])
+    return rms(np.concatenate(residuals(prepared, mount))[inside])
+
+
+def _sliding(recordings: Sequence[Recording], models: Structures, band: Band) -> dict[str, float]:
+    prepared = prepare(recordings, band)
+    v, inside = (np.concatenate([getattr(piece, name) for piece in prepared.pieces]) for name in ("v", "inside"))
+    least = least_speed(v[inside])
+    moving = inside & (np.abs(v) > least)
+    return {
+        "before_rms": rms(np.concatenate(residuals(prepared, models.before))[moving]),
+        "after_rms": rms(np.concatenate(residuals(prepared, models.after))[moving]),
+        "cutoff_hz": prepared.cutoff,
+        "motion_hz": max(prepared.band),
+        "least_speed": least,
+    }
+
+
+def _floor(prepared: Prepared, mount: Mount) -> float:
+    """RMS that a general friction model and slow drifts, fitted to this very recording, would leave: noise, roughly."""
+    kept = [piece.kept for piece in prepared.pieces]
+    left = [one[rows] for one, rows in zip(residuals(prepared, mount), kept, strict=True)]
+    drift = np.concatenate([_drifts(piece)[piece.kept] for piece in prepared.pieces])
+    return rms(projected(np.concatenate(left), np.column_stack([*discrepancy_basis(prepared), drift])))
+
+
+def _drifts(piece: Piece) -> Array:
+    x = (piece.t - piece.t[0]) / (piece.t[-1] - piece.t[0])
+    sign = np.tanh(piece.v / (0.01 * np.abs(piece.v).max() + 1e-300))
+    waves = [np.cos(np.pi * k * x) for k in range(6)]
+    return piece.lowpass(np.column_stack([*waves, *(sign * wave for wave in waves)]))
+
+
+def of_the_best(interval: tuple[float, float], value: float, many: int) -> tuple[float, float]:
+    """Widen the 95 % range of a value that was the best of `many`: each must hold at 5 % / many (Bonferroni)."""
+    wider = float(ndtri(0.025 / many) / ndtri(0.025))
+    low, high = (value + wider * (end - value) for end in interval)
+    return low, high
+
+
+def traces(train: Sequence[Recording], heldout: Sequence[Recording], models: Structures) -> tuple[Trace, ...]:
+    """Signals of all recordings for pictures and for the file of missing torque."""
+    prepared = [prepare([recording], CUTOFF) for recording in (*train, *heldout)]
+    pieces = [_residuals(one, models, number < len(train)) for number, one in enumerate(prepared)]
+    spans = iter(flagged([one for parts in pieces for one in parts]))
+    intervals = [tuple(span for _ in parts for span in next(spans)) for parts in pieces]
+    found = zip(prepared, pieces, intervals, strict=True)
+    return tuple(_trace(one, parts, when) for one, parts, when in found)
+
+
+def _residuals(prepared: Prepared, models: Structures, fitted: bool) -> list[Residual]:
+    """What the refitted base and the better model leave of each piece, away from its edges."""
+    inverse = Inverse(models.before, free_parameters(models.before))
+    pieces = []
+    for piece, after in zip(prepared.pieces, residuals(prepared, models.after), strict=True):
+        torque, slopes = inverse.torque(piece, inverse.present)
+        rows = piece.inside
+        left = (piece.tau - torque)[rows]
+        pieces.append(Residual(piece.t[rows], piece.v[rows], left, after[rows], slopes[rows], fitted))
+    return pieces
+
+
+def _trace(prepared: Prepared, pieces: Sequence[Residual], intervals: Spans) -> Trace:
+    (name,) = prepared.names
+    q, tau = (np.concatenate([getattr(p, signal)[p.inside] for p in prepared.pieces]) for signal in ("q", "tau"))
+    t, v, before, after = (
+        np.concatenate([getattr(one, signal) for one in pieces]) for signal in ("t", "v", "residual", "after")
+    )
+    return Trace(
+        name=name,
+        heldout=not pieces[0].fitted,
+        t=t,
+        q=q,
+        v=v,
+        tau=tau,
+        before=tau - before,
+        after=tau - after,
+        missing=before,
+        band=Z95 * noise_at(v, after, v),
+        intervals=intervals,
+        extras=_extras(prepared),
+    )
+
+
+def _extras(prepared: Prepared) -> dict[str, Array]:
+    names = set.intersection(*(set(piece.extras) for piece in prepared.pieces)) - {"q_d", "v"}
+    return {name: np.concatenate([piece.extras[name][piece.inside] for piece in prepared.pieces]) for name in names}

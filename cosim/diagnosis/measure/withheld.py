@@ -1,0 +1,60 @@
+"""A diagnosis that names nothing, as the recordings themselves are in doubt: the refitted base, and why."""
+
+import time
+from collections.abc import Sequence
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.answer.doubt_entry import Sanity
+from cosim.diagnosis.answer.result import Diagnosis, Finding
+from cosim.diagnosis.effects import TRIED
+from cosim.diagnosis.measure.breakdown import parts
+from cosim.diagnosis.measure.locate import regions
+from cosim.diagnosis.measure.protocol import Structures, judge, traces
+from cosim.estimation.prepare import quality
+from cosim.estimation.problem import Problem
+from pyfmi_models.effects import CATALOGUE
+from pyfmi_models.mount import Mount
+
+WHY = "the recordings are in doubt"
+ACTION = "settle what is said about the recordings first, then diagnose again"
+
+
+def without_names(
+    problem: Problem,
+    base: Mount,
+    train: Sequence[Recording],
+    heldout: Sequence[Recording],
+    sanity: tuple[Sanity, ...],
+    started: float,
+) -> Diagnosis:
+    """Measure the refitted base and name no effect: what would be found is an error of the recordings.
+
+    The verdict is "unknown": something is wrong, and it is none of the effects. `started` is when the diagnosis was
+    [s of `time.perf_counter`].
+    """
+    models, linear = Structures(problem.mount, base, base), problem.mount.motion == "linear"
+    signals = traces(train, heldout, models)
+    return Diagnosis(
+        verdict=("unknown",),
+        findings=tuple(_untestable(name) for name in TRIED),
+        heldout=judge(heldout, models, problem.prepared.band),
+        traces=signals,
+        parts=parts(signals),
+        regions=regions(signals, False, linear),
+        regions_after=regions(signals, True, linear),
+        mount=problem.mount.name,
+        motion=problem.mount.motion,
+        data_quality=tuple(
+            note for recording in (*train, *heldout) for note in quality(recording, problem.prepared.cutoff)
+        ),
+        sanity=sanity,
+        base_parameters=models.base_parameters(),
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _untestable(name: str) -> Finding:
+    title = CATALOGUE[name][0].title
+    return Finding(
+        effect=name, title=title, answer="not_testable", probability=0.0, gain=0.0, evidence=WHY, action=ACTION
+    )

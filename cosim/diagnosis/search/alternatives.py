@@ -1,0 +1,56 @@
+"""What training leaves open, held-out recordings may choose: a name that they refuse gives way to a rival of its set.
+
+A constant torque, friction of two directions and a load are one thing on a short stroke: training has them within a nat
+of each other and names the simplest. Where that one does not predict, another of the set may: it was found in training
+as well as the first, so nothing is named that only held-out recordings know.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.search.instrumental_variable import misfits_of
+from cosim.diagnosis.search.proof import Proof, prove
+from cosim.diagnosis.search.rivals import AcceptedEffect, Examined, margins
+from cosim.diagnosis.search.stages import CandidateFit
+
+
+def prove_sets(comparison: Comparison, examined: Examined, held: Predictive) -> tuple[Examined, Proof]:
+    """Keep the effects that predict; of a set whose first does not, the member that predicts best.
+
+    One effect gives way: what was fitted in another's place was fitted beside the names that training gave.
+    """
+    proof = prove(comparison, examined, held)
+    ways = [way for refused in proof.unproven for way in _ways(comparison, examined, proof, refused, held)]
+    return max(ways, key=lambda way: held.predicted(way[1].chosen), default=(examined, proof))
+
+
+def _ways(
+    comparison: Comparison, examined: Examined, proof: Proof, refused: AcceptedEffect, held: Predictive
+) -> Iterator[tuple[Examined, Proof]]:
+    """Proofs in which a rival stands in the place of what was refused, and all that stood still does."""
+    told, least = margins(refused), comparison.policy.set_margin
+    stood = {one.effect.id for one in proof.standing}
+    for rival in refused.rivals:
+        if told[rival.effect.id] < least and rival.effect.id not in stood:
+            swapped = _in_place(comparison, examined, refused, rival)
+            again = prove(comparison, swapped, held)
+            if stood | {rival.effect.id} <= {one.effect.id for one in again.standing}:
+                yield swapped, replace(again, unproven=(refused, *again.unproven))
+
+
+def _in_place(comparison: Comparison, examined: Examined, out: AcceptedEffect, rival: CandidateFit) -> Examined:
+    """The same list with a rival in an effect's place; what was refused is no rival of it any more."""
+    own, mount = len(comparison.problem.mount.effects), rival.fit.mount
+    others = tuple(one for one in out.rivals if one is not rival)
+    accepted = AcceptedEffect(
+        tuple(effect for effect in mount.effects[own:] if effect.id == rival.effect.id),
+        rival,
+        out.without,
+        others,
+        {one.effect.id: out.margin(one) - out.margin(rival) for one in others},
+        misfits_of(comparison.problem.prepared, mount, rival.effect),
+    )
+    effects = tuple(accepted if one is out else one for one in examined.effects)
+    return replace(examined, chosen=rival.fit, effects=effects)

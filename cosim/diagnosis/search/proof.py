@@ -1,0 +1,171 @@
+"""Proof: what each effect is worth on recordings that nothing was fitted to, in the same nats as the evidence."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+from cosim.diagnosis.answer.ledger import Rule, all_pass, at_least, until_refused
+from cosim.diagnosis.decide.decision import Gain, held_out_rules
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.search.admissibility import is_degenerate
+from cosim.diagnosis.search.rivals import AcceptedEffect, Examined
+from cosim.diagnosis.search.sizes import tells
+from cosim.diagnosis.search.stages import is_small
+from cosim.estimation.fit import Fit
+from cosim.estimation.problem import Problem
+from pyfmi_models.mount import Mount
+
+
+@dataclass(frozen=True)
+class Proof:
+    """The effects that stand, the structure with just them, what each predicts and removes, and those that do not."""
+
+    chosen: Fit
+    standing: tuple[AcceptedEffect, ...]
+    predicted: dict[str, float]
+    """Nats that the held-out recordings lose without an effect, by its id."""
+    unproven: tuple[AcceptedEffect, ...]
+    removes: dict[str, float]
+    """Share of the held-out residual energy that each removes, by its id."""
+
+
+def prove(comparison: Comparison, examined: Examined, held: Predictive) -> Proof:
+    """Keep the effects that predict.
+
+    First the length of the list: effects in order of their evidence, up to where the held-out recordings are predicted
+    best; stopping at the first that does not help would lose a later one that does. Then effects are taken out until
+    all that are left stand, and those of which no size is told, unless they surely predict.
+    """
+    order = sorted(examined.effects, key=lambda one: -one.own.evidence)
+    chosen, some = _longest(comparison, examined, order, held)
+    chosen, standing, gains = _told(comparison, examined, chosen, some, held)
+    predicted = {one.effect.id: 0.0 for one in order} | {name: gain.nats for name, gain in gains.items()}
+    removes = {name: gain.narrow for name, gain in gains.items()}
+    return Proof(chosen, tuple(standing), predicted, tuple(one for one in order if one not in standing), removes)
+
+
+def without(comparison: Comparison, examined: Examined, proof: Proof, out: AcceptedEffect, held: Predictive) -> Proof:
+    """The proof of what is left where one of the effects that stand is taken out."""
+    rest = [one for one in proof.standing if one is not out]
+    chosen, standing, gains = _told(comparison, examined, _with(comparison.problem, examined, rest), rest, held)
+    fallen = tuple(one for one in rest if one not in standing)
+    predicted = proof.predicted | {name: gain.nats for name, gain in gains.items()}
+    removes = {name: gain.narrow for name, gain in gains.items()}
+    return Proof(chosen, tuple(standing), predicted, (*proof.unproven, *fallen), removes)
+
+
+def _told(
+    comparison: Comparison, examined: Examined, chosen: Fit, some: Sequence[AcceptedEffect], held: Predictive
+) -> tuple[Fit, list[AcceptedEffect], dict[str, Gain]]:
+    """The effects that stand, but for those of which recordings tell no size, unless they surely predict."""
+    chosen, standing, gains = _standing(comparison, examined, chosen, some, held)
+    told = [one for one in standing if _is_sure(comparison, chosen, one, gains[one.effect.id])]
+    if len(told) == len(standing):
+        return chosen, standing, gains
+    fit, kept, known = _standing(comparison, examined, _with(comparison.problem, examined, told), told, held)
+    return fit, kept, gains | known
+
+
+def _standing(
+    comparison: Comparison, examined: Examined, chosen: Fit, some: Sequence[AcceptedEffect], held: Predictive
+) -> tuple[Fit, list[AcceptedEffect], dict[str, Gain]]:
+    """Of some effects those that stand, their structure, and what each gains, or gained before it was taken out.
+
+    One that does not stand may be spoilt by another: the one that falls lowest is taken out, or the one that helps
+    least, whichever leaves the better prediction in the end.
+    """
+    problem = comparison.problem
+    gains = {one.effect.id: _gain(problem, chosen, one, some, held) for one in some}
+    nats = {one.effect.id: gains[one.effect.id].nats for one in some}
+    falling = [one for one in some if not _stands(comparison, examined, chosen, one, gains[one.effect.id])]
+    if not falling:
+        return chosen, list(some), gains
+    out = {min(group, key=lambda one: nats[one.effect.id]).effect.id for group in (falling, some)}
+    ways = []
+    for name in sorted(out):
+        rest = [one for one in some if one.effect.id != name]
+        ways.append(_standing(comparison, examined, _with(problem, examined, rest), rest, held))
+    best, kept, known = max(ways, key=lambda way: held.predicted(way[0]))
+    return best, kept, gains | known
+
+
+def _stands(comparison: Comparison, examined: Examined, chosen: Fit, one: AcceptedEffect, gain: Gain) -> bool:
+    """Whether an effect stands on the held-out recordings, and is still what its name says in the structure there."""
+    rules = until_refused(_validation(comparison, examined, chosen, one, gain))
+    comparison.enter(one.effect.id, chosen, one.own.plain_gain)
+    comparison.judge(one.effect.id, chosen, rules)
+    return all_pass(rules)
+
+
+def _validation(
+    comparison: Comparison, examined: Examined, chosen: Fit, one: AcceptedEffect, gain: Gain
+) -> Iterator[Rule]:
+    """Rules by which held-out recordings confirm an effect."""
+    policy = comparison.policy
+    within = not is_degenerate(comparison.problem, one.within(chosen.mount))
+    yield Rule("no number at its bound, and no other effect in disguise", within)
+    if len(examined.effects) == 1 and is_small(one.own, policy):
+        share = min(gain.narrow, gain.wide)
+        yield Rule("a small effect halves the held-out error", gain.matters_alone(policy), share, policy.halved)
+    yield from held_out_rules(gain, _share(comparison.problem, examined.base, one), policy)
+
+
+def _is_sure(comparison: Comparison, chosen: Fit, one: AcceptedEffect, gain: Gain) -> bool:
+    """Whether an effect surely predicts, or the recordings tell a size of it in the structure that stands."""
+    sure = at_least("evidence on held-out recordings", gain.nats, comparison.policy.sure_predicted, "nats")
+    if sure.outcome:
+        return True
+    told = Rule("its size differs from none", tells(comparison.problem, chosen, one.within(chosen.mount)))
+    comparison.judge(one.effect.id, chosen, [told])
+    return told.outcome
+
+
+def _longest(
+    comparison: Comparison, examined: Examined, order: Sequence[AcceptedEffect], held: Predictive
+) -> tuple[Fit, list[AcceptedEffect]]:
+    fits = [_with(comparison.problem, examined, order[:count]) for count in range(len(order) + 1)]
+    likelihoods = [held.predicted(one) for one in fits]
+    best = max(range(len(fits)), key=lambda count: likelihoods[count])
+    while best < len(order) and _between(fits, likelihoods, best, held).halves(comparison.policy):
+        best += 1
+    return fits[best], list(order[:best])
+
+
+def _between(fits: Sequence[Fit], likelihoods: Sequence[float], count: int, held: Predictive) -> Gain:
+    """What one effect more gains."""
+    without, grown = fits[count], fits[count + 1]
+    return _gained(likelihoods[count + 1] - likelihoods[count], without.mount, grown.mount, held)
+
+
+def _with(problem: Problem, examined: Examined, some: Sequence[AcceptedEffect]) -> Fit:
+    """The structure with some of the effects, refitted from the one with all."""
+    if len(some) == len(examined.effects):
+        return examined.chosen
+    if not some:
+        return examined.base
+    own = examined.chosen.mount.effects[: len(problem.mount.effects)]
+    kept = tuple(effect for one in some for effect in one.effects)
+    return problem.fit(replace(examined.chosen.mount, effects=(*own, *kept)), 30)
+
+
+def _gain(
+    problem: Problem, chosen: Fit, one: AcceptedEffect, standing: Sequence[AcceptedEffect], held: Predictive
+) -> Gain:
+    """What the held-out recordings lose without an effect."""
+    without = one.without
+    if len(standing) != 1 or len(without.mount.effects) != len(problem.mount.effects):
+        own = len(problem.mount.effects)
+        rest = [e for k, e in enumerate(chosen.mount.effects) if e.id != one.effect.id or k < own]
+        without = problem.fit(replace(chosen.mount, effects=tuple(rest)), 30)
+    after, before = (held.predicted(fit) for fit in (chosen, without))
+    return _gained(after - before, without.mount, chosen.mount, held)
+
+
+def _gained(nats: float, without: Mount, mount: Mount, held: Predictive) -> Gain:
+    return Gain(nats, *held.plain_gains(without, mount), held.at_rest(without, mount))
+
+
+def _share(problem: Problem, base: Fit, one: AcceptedEffect) -> float:
+    """Plain energy that an effect removes, relative to what the base leaves."""
+    energy = [float(((problem.weight * fit.residual) ** 2).sum()) for fit in (one.own.fit, one.without, base)]
+    return (energy[1] - energy[0]) / max(energy[2], 1e-300)

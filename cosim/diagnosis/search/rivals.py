@@ -1,0 +1,204 @@
+"""Each effect that was found, taken out and challenged: is it needed, and who else could stand in its place?"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from cosim.diagnosis.answer.ledger import Rule, all_pass, at_least, until_refused
+from cosim.diagnosis.decide.policy import Policy
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.instrumental_variable import Misfits, excludes, misfits_of, settled
+from cosim.diagnosis.search.stages import (
+    IN_TURN,
+    CandidateFit,
+    InTurn,
+    Search,
+    Stage,
+    admission,
+    best_of,
+    is_full,
+    is_small,
+    margin,
+    stage,
+    weighed,
+)
+from cosim.estimation.fit import Fit
+from pyfmi_models.effects import Effect
+from pyfmi_models.mount import Mount
+
+ROUNDS = 4
+
+
+@dataclass(frozen=True)
+class AcceptedEffect:
+    """One effect (with the harmonics of a ripple), what it is worth beside the others, and its rivals."""
+
+    effects: tuple[Effect, ...]
+    own: CandidateFit
+    without: Fit
+    rivals: tuple[CandidateFit, ...]
+    """One of each kind, the closest first."""
+    margins: Mapping[str, float]
+    """Nats by which this effect is better than each rival."""
+    misfits: Misfits = field(default_factory=dict)
+
+    @property
+    def effect(self) -> Effect:
+        """The effect; of a ripple its strongest wave."""
+        return _strongest(self.effects)
+
+    def within(self, mount: Mount) -> Effect:
+        """The same effect as a mount has it, whose effects were fitted anew."""
+        return _strongest([one for one in mount.effects if one.id == self.effect.id][-len(self.effects) :])
+
+    def margin(self, rival: CandidateFit) -> float:
+        """Nats by which this effect is better than a rival."""
+        return self.margins[rival.effect.id]
+
+
+def _strongest(waves: Sequence[Effect]) -> Effect:
+    return max(waves, key=lambda one: float(getattr(one, "amplitude", 0.0)))
+
+
+@dataclass(frozen=True)
+class Examined:
+    """The structure that stands, and its effects."""
+
+    base: Fit
+    chosen: Fit
+    effects: tuple[AcceptedEffect, ...]
+    last: Stage
+    """What was tried beside the structure that stands."""
+
+
+def examine(comparison: Comparison, found: Search, refits: InTurn = IN_TURN) -> Examined:
+    """Take out, challenge and swap, and add what has evidence beside what was swapped in, until nothing changes."""
+    chosen, known = found.chosen, {_names(one.current): one for one in found.stages}
+    for _ in range(ROUNDS):
+        effects, better = _round(comparison, chosen, known, refits)
+        if better is None:
+            better = _grown(comparison, effects, _beside(comparison, chosen, known, refits))
+        if better is None:
+            break
+        chosen = better
+    else:  # swaps went in a circle: what stands is examined as it is
+        effects = [_challenged(comparison, chosen, group, known, refits) for group in grouped(comparison, chosen)]
+    return Examined(found.base, chosen, tuple(effects), _beside(comparison, chosen, known, refits))
+
+
+def _beside(comparison: Comparison, fit: Fit, known: dict[tuple[str, ...], Stage], refits: InTurn) -> Stage:
+    """What was tried beside a structure, found once."""
+    if _names(fit) not in known:
+        known[_names(fit)] = stage(comparison, fit, refits)
+    return known[_names(fit)]
+
+
+def _grown(comparison: Comparison, effects: Sequence[AcceptedEffect], beside: Stage) -> Fit | None:
+    """The structure with one more effect, of which the search, which went another way, may not have known."""
+    if any(is_small(one.own, comparison.policy) for one in effects):
+        return None
+    best = best_of(comparison, beside, max((one.own.evidence for one in effects), default=0.0))
+    return None if best is None or is_full(best, comparison) else best.fit
+
+
+def _round(
+    comparison: Comparison, chosen: Fit, known: dict[tuple[str, ...], Stage], refits: InTurn
+) -> tuple[list[AcceptedEffect], Fit | None]:
+    effects = []
+    for group in grouped(comparison, chosen):
+        one = _challenged(comparison, chosen, group, known, refits)
+        if one.own.evidence < comparison.policy.keep_evidence and len(grouped(comparison, chosen)) > 1:
+            return [], one.without
+        best = settled(one.misfits, one.own, one.rivals)
+        if best is one.own:
+            free = [r for r in one.rivals if excludes(one.misfits, one.effect, r.effect) is None]
+            best = next((rival for rival in free if _takes(rival, one, comparison.policy)), best)
+        if best is not one.own:
+            return [], best.fit
+        effects.append(one)
+    return effects, None
+
+
+def _takes(rival: CandidateFit, one: AcceptedEffect, policy: Policy) -> bool:
+    """Whether a rival takes the place: it is better, or near and simpler; one that is near and less simple does not."""
+    fewer = one.own.fit.count - rival.fit.count
+    margin = one.margin(rival)
+    return margin < (policy.set_margin if fewer > 0 else -policy.set_margin if fewer < 0 else 0.0)
+
+
+def grouped(comparison: Comparison, chosen: Fit) -> list[tuple[Effect, ...]]:
+    """Effects that were added, those of one kind together."""
+    groups: dict[str, list[Effect]] = {}
+    for effect in chosen.mount.effects[len(comparison.problem.mount.effects) :]:
+        groups.setdefault(effect.id, []).append(effect)
+    return [tuple(group) for group in groups.values()]
+
+
+def _challenged(
+    comparison: Comparison,
+    chosen: Fit,
+    group: tuple[Effect, ...],
+    known: dict[tuple[str, ...], Stage],
+    refits: InTurn,
+) -> AcceptedEffect:
+    problem = comparison.problem
+    refits.on_progress(group[0].title)
+    rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
+    beside = _beside(comparison, problem.fit(replace(chosen.mount, effects=rest), 45), known, refits)
+    own = weighed(comparison, chosen, beside.current, effect=group[0])
+    others = [one for one in beside.tried if one.effect.id != group[0].id]
+    rivals = [one for one in others if _is_admissible(comparison, one)]
+    best: dict[str, CandidateFit] = {}
+    for rival in rivals:
+        if rival.effect.id not in best or rival.evidence > best[rival.effect.id].evidence:
+            best[rival.effect.id] = rival
+    misfits = misfits_of(problem.prepared, chosen.mount, group[0])
+    margins = {rival.effect.id: margin(comparison, own, rival) for rival in best.values()}
+    ranked = sorted(best.values(), key=lambda rival: margins[rival.effect.id])
+    found = AcceptedEffect(group, own, beside.current, tuple(ranked), margins, misfits)
+    _enter(comparison, found)
+    return found
+
+
+def _is_admissible(comparison: Comparison, one: CandidateFit) -> bool:
+    rules = until_refused(admission(comparison, one))
+    comparison.judge(one.effect.id, one.fit, rules)
+    return all_pass(rules)
+
+
+def _enter(comparison: Comparison, found: AcceptedEffect) -> None:
+    """Enter an effect that was challenged into the ledger: what it is worth beside the others, and each rival."""
+    name, own, policy = found.effect.id, found.own, comparison.policy
+    comparison.enter(name, own.fit, own.plain_gain)
+    kept = at_least("evidence beside the other effects", own.evidence, policy.keep_evidence, "nats")
+    comparison.judge(name, own.fit, [kept, *(_ahead(found, rival, policy) for rival in found.rivals)])
+    for rival in found.rivals:
+        comparison.enter(rival.effect.id, rival.fit, rival.plain_gain)
+        behind = found.margin(rival)
+        rule = Rule(
+            f"less than the margin of a set behind {name}",
+            behind < policy.set_margin,
+            behind,
+            policy.set_margin,
+            "nats",
+        )
+        comparison.judge(rival.effect.id, rival.fit, [rule])
+
+
+def _ahead(found: AcceptedEffect, rival: CandidateFit, policy: Policy) -> Rule:
+    return at_least(f"ahead of {rival.effect.id}", found.margin(rival), policy.set_margin, "nats")
+
+
+def _names(found: Fit) -> tuple[str, ...]:
+    """Which effects a structure holds."""
+    return tuple(sorted(effect.id for effect in found.mount.effects))
+
+
+def margins(one: AcceptedEffect) -> dict[str, float]:
+    """Nats by which an effect is better than each rival; where the set point speaks of both, by that."""
+    told = {rival.effect.id: excludes(one.misfits, one.effect, rival.effect) for rival in one.rivals}
+    return {name: one.margins[name] if by is None else by / 2 for name, by in told.items()}
+
+
+def explains(one: AcceptedEffect) -> dict[str, float]:
+    """Share of the plain residual energy that an effect, or a rival in its place, removes."""
+    return {candidate.effect.id: max(candidate.plain_gain, 0.0) for candidate in (one.own, *one.rivals)}

@@ -1,0 +1,46 @@
+"""What the decision is made from: numbers of what stands, and of what is left."""
+
+from math import inf
+
+from cosim.diagnosis.decide.decision import EffectScores, ResidualScores
+from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.evidence.adequacy import over_time, share_beside, share_left, share_there
+from cosim.diagnosis.evidence.bursts import burst_share
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.search.nameless import Nameless
+from cosim.diagnosis.search.proof import Proof
+from cosim.diagnosis.search.rivals import explains, margins
+from cosim.diagnosis.terms.flexible import flexible_terms
+
+
+def effect_scores(proof: Proof) -> list[EffectScores]:
+    """Scores of the effects that stand."""
+    said = {one.effect.id: (proof.predicted[one.effect.id], proof.removes[one.effect.id]) for one in proof.standing}
+    return [
+        EffectScores(one.effect.id, one.own.evidence, margins(one), explains(one), *said[one.effect.id])
+        for one in proof.standing
+    ]
+
+
+def residual_scores(comparison: Comparison, found: Nameless, held: Predictive) -> ResidualScores:
+    """What is left beside what stands, and what took names away.
+
+    What follows an effect's own table (`Hypothesis.tables`) and is less than the effect is the same in another form.
+    """
+    chosen, shapes = found.proof.chosen, _own_shapes(found.proof)
+    left, there = share_left(comparison, chosen), held.residual(chosen.mount)
+    terms, shown = flexible_terms(comparison, chosen, held), over_time(comparison, chosen)
+    terms = [one for one in terms if one.evidence > shapes.get(one.name, -inf)]
+    beside = share_beside(comparison, chosen, there, held)
+    there_left, bursts = share_there(comparison, chosen, there, held), burst_share(comparison, chosen)
+    return ResidualScores(left, there_left, terms, shown, beside, found.quantities, bursts)
+
+
+def _own_shapes(proof: Proof) -> dict[str, float]:
+    """Terms that are effects that stand in another form, and the evidence of those effects [nats]."""
+    shapes: dict[str, float] = {}
+    for one in proof.standing:
+        for name in hypothesis_of(one.effect).tables:
+            shapes[name] = max(one.own.evidence, shapes.get(name, -inf))
+    return shapes

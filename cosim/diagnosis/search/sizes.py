@@ -1,0 +1,60 @@
+"""Sizes of effects with their standard errors, and whether recordings determine them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cosim.diagnosis.effects import hypothesis_of
+from cosim.estimation.blocks import Blocks, covariance
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import Array
+from cosim.estimation.problem import Problem
+from pyfmi_models.effects import Effect
+from pyfmi_models.model import Variable, parameters_of
+from pyfmi_models.mount import Mount
+
+Z95 = 1.96
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Parameters of one effect, and what the recordings say of their precision."""
+
+    values: dict[str, float]
+    errors: dict[str, float]
+
+
+def standard_errors(chosen: Fit, blocks: Blocks, weight: Array) -> dict[str, float]:
+    """Block-robust standard errors of all fitted parameters (sandwich with blocks as clusters)."""
+    spread = covariance(chosen.slopes * weight[:, None], chosen.residual * weight, blocks)
+    return dict(zip(chosen.free, np.sqrt(np.maximum(np.diag(spread), 0)).tolist(), strict=True))
+
+
+def numbers_of(effect: Effect, mount: Mount, errors: Mapping[str, float]) -> Numbers:
+    """Parameters of an effect of a fitted mount with their standard errors, by the effect's own names."""
+    prefix = next(name for name, part in mount.components().items() if part is effect)
+    values = {variable.name: float(variable.start) for variable in parameters_of(effect)}
+    return Numbers(values, {name: errors[f"{prefix}.{name}"] for name in values if f"{prefix}.{name}" in errors})
+
+
+def is_told(effect: Effect, numbers: Numbers, mount: Mount) -> bool:
+    """Whether the recordings tell the size of an effect: its 95 % range holds neither "none" nor all that it may be.
+
+    Of several sizes (a level and a viscosity, an offset and a drift) one is enough. At a bound nothing is told.
+    """
+    own, known = hypothesis_of(effect), {variable.name: variable for variable in parameters_of(effect)}
+    sizes = [name for name in own.sizes or (effect.main.parameter,) if name in numbers.errors]
+    return not sizes or any(_excludes(numbers, name, own.none(mount), known[name]) for name in sizes)
+
+
+def tells(problem: Problem, chosen: Fit, effect: Effect) -> bool:
+    """Whether the training recordings tell a size of an effect of a fitted structure."""
+    errors = standard_errors(chosen, Blocks.of(problem.prepared), problem.weight)
+    return is_told(effect, numbers_of(effect, chosen.mount, errors), chosen.mount)
+
+
+def _excludes(numbers: Numbers, name: str, none: float, known: Variable) -> bool:
+    value, half = numbers.values[name], Z95 * numbers.errors[name]
+    whole = value - half <= known.low and value + half >= known.high
+    return abs(value - none) > half and not whole and known.low < value < known.high

@@ -1,0 +1,296 @@
+"""Search: which effects are worth a refit, what each is worth after it, and what comes next.
+
+In every stage each form of an effect is screened by two statistics - the evidence of a linear step, the share of the
+plain energy - and the best forms by either are refitted. Nothing is dropped because something else was rejected.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import inf, log
+
+from cosim.diagnosis.answer.ledger import Rule, all_pass, at_least, until_refused
+from cosim.diagnosis.decide.policy import Policy
+from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.evidence.comparison import Comparison, Screened, aside_for
+from cosim.diagnosis.search.admissibility import in_time, name_rules
+from cosim.diagnosis.search.base_moved import owed_to_base
+from cosim.diagnosis.search.commanded import is_asked_for
+from cosim.diagnosis.search.harmonics import with_harmonics
+from cosim.diagnosis.search.instrumental_variable import is_told, misfits_of, settled
+from cosim.estimation.fit import Fit
+from cosim.estimation.residuals import away_from_turns, gets_memory, removed_at_rest
+from pyfmi_models.effects import Effect
+
+OnProgress = Callable[[str], None]
+MOST_WAVES = 8
+"""Effects that one diagnosis may add, each harmonic of a ripple counted."""
+
+
+@dataclass(frozen=True)
+class CandidateFit:
+    """A structure with one effect more, refitted, and what the effect is worth."""
+
+    effect: Effect
+    fit: Fit
+    evidence: float
+    """Nats above the structure without the effect, search priced."""
+    price: float
+    """Nats that are not its own: what the search among the members of its form costs, and what is owed to other numbers
+    of the base; taken off already."""
+    plain_gain: float
+    """Share of the plain residual energy removed."""
+    above_noise: float = inf
+    """Energy that a spring removes, in those of the reading's noise."""
+    away: float = 1.0
+    """Share of the energy that a timing effect removes which it removes away from turns."""
+    at_rest: float = 1.0
+    """Share of the energy at rest that a contact that bends removes."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """A structure, and all effects that were refitted beside it, best first."""
+
+    current: Fit
+    tried: tuple[CandidateFit, ...]
+    screened: tuple[Screened, ...]
+
+
+Start = tuple[Effect, int]
+"""An effect that is worth a refit, and how many members of its form were tried."""
+
+
+class InTurn:
+    """The refits of a stage, one after the other; a context, after which none comes.
+
+    Args:
+        on_progress: told, in a few words, what is being refitted.
+    """
+
+    def __init__(self, on_progress: OnProgress = lambda _: None) -> None:
+        self.on_progress = on_progress
+
+    def __enter__(self) -> "InTurn":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def __call__(self, comparison: Comparison, current: Fit, worth: Sequence[Start]) -> list[CandidateFit]:
+        """Refit a structure with each of some effects."""
+        found = []
+        for number, (effect, many) in enumerate(worth, 1):
+            self.say(effect, number, len(worth))
+            found.append(refitted(comparison, current, effect, many))
+        return found
+
+    def say(self, effect: Effect, number: int, of: int) -> None:
+        """Say what is being refitted, and how far a stage is."""
+        self.on_progress(f"{effect.title} ({number} of {of})")
+
+
+IN_TURN = InTurn()
+
+
+def stage(comparison: Comparison, current: Fit, refits: InTurn = IN_TURN) -> Stage:
+    """Screen all candidates beside a structure and refit the best forms."""
+    screened = comparison.screen(current)
+    fits = refits(comparison, current, starts(screened, comparison.policy))
+    for one in fits:
+        comparison.enter(one.effect.id, one.fit, one.plain_gain)
+    return Stage(current, tuple(sorted(fits, key=lambda one: -one.evidence)), tuple(screened))
+
+
+def starts(screened: Sequence[Screened], policy: Policy) -> list[Start]:
+    """Effects worth a refit."""
+    forms: dict[type[Effect], list[Screened]] = {}
+    for one in screened:
+        forms.setdefault(one.form, []).append(one)
+    hopeful = {form: members for form, members in forms.items() if any(is_hopeful(one, policy) for one in members)}
+    ranked = []
+    for statistic in ("evidence", "plain"):
+        best = {form: max(members, key=lambda one: getattr(one, statistic)) for form, members in hopeful.items()}
+        order = sorted(best, key=lambda form: -getattr(best[form], statistic))
+        ranked.append([best[form] for form in order[: policy.refitted]])
+    chosen = list({_key(one): one for group in ranked for one in group}.values())
+    found = [(one.candidate.start(one.coefficients), len(forms[one.form])) for one in chosen]
+    kinds = {type(effect) for effect, _ in found}
+    # Twins are alike at first order: where one is tried, the other must be, whatever a linear score says.
+    twins = [(twin, many) for effect, many in found for twin in hypothesis_of(effect).twins(effect)]
+    return found + [(twin, many) for twin, many in twins if type(twin) not in kinds]
+
+
+def is_hopeful(one: Screened, policy: Policy) -> bool:
+    """Whether a linear step towards a candidate promises anything, by either statistic."""
+    return one.evidence > 0 or one.plain >= policy.least_plain_gain
+
+
+def _key(one: Screened) -> object:
+    """What tells candidates apart that are worth a refit each: the form, where its refit looks for the rest itself."""
+    return one.form if hypothesis_of(one.candidate.instances[0]).finds_its_way else id(one)
+
+
+def refitted(comparison: Comparison, current: Fit, effect: Effect, many: int) -> CandidateFit:
+    """Add an effect to a fitted structure, refit everything, weigh it."""
+    problem = comparison.problem
+    grown = replace(current.mount, effects=(*current.mount.effects, effect))
+    found, aside = problem.fit(grown, 36), aside_for(effect.id)
+    before = comparison.evidence(current, aside)
+    found = hypothesis_of(effect).tuned(problem, found, effect, lambda fit: comparison.evidence(fit, aside) - before)
+    return weighed(comparison, found, current, many)
+
+
+def weighed(
+    comparison: Comparison, found: Fit, current: Fit, many: int = 1, effect: Effect | None = None
+) -> CandidateFit:
+    """What an effect of a fitted structure (the last one) is worth beside the structure without it."""
+    effect = effect or found.mount.effects[-1]
+    aside = aside_for(effect.id)
+    price = log(max(many, 1)) + owed_to_base(comparison, found, current, aside)
+    gain = comparison.evidence(found, aside) - comparison.evidence(current, aside) - price
+    own, problem = hypothesis_of(effect), comparison.problem
+    loud = comparison.above_noise(found, current) if own.must_stand_out else inf
+    left, without = (problem.weight * one.residual for one in (found, current))
+    away = away_from_turns(problem, left, without) if own.is_timing else 1.0
+    share = 1 - float(left @ left) / max(float(without @ without), 1e-300)
+    remembers = gets_memory(found.mount, current.mount)
+    rest = removed_at_rest(problem.weight, found.residual, current.residual) if remembers else 1.0
+    return CandidateFit(effect, found, gain, price, share, loud, away, rest)
+
+
+@dataclass(frozen=True)
+class Search:
+    """Structures in the order in which effects were added, and the stage beside each."""
+
+    base: Fit
+    stages: tuple[Stage, ...]
+
+    @property
+    def chosen(self) -> Fit:
+        """The last structure."""
+        return self.stages[-1].current
+
+
+def search(comparison: Comparison, base: Fit, refits: InTurn = IN_TURN) -> Search:
+    """Add the admissible effect of the largest evidence until none has enough; beside a small one nothing is added."""
+    stages, largest = [stage(comparison, base, refits)], 0.0
+    while True:
+        now = stages[-1]
+        best = best_of(comparison, now, largest)
+        if best is None or is_full(best, comparison):
+            return Search(base, tuple(stages))
+        largest = max(largest, best.evidence)
+        stages.append(stage(comparison, with_harmonics(comparison, best.fit, best.effect), refits))
+        if is_small(best, comparison.policy):
+            return Search(base, tuple(stages))
+
+
+def least(policy: Policy, largest: float, gain: float) -> float:
+    """Evidence that one more effect of this plain gain must have beside others of which the largest has so much."""
+    if not largest:
+        return policy.evidence_if_large if gain >= policy.large_gain else policy.least_evidence
+    lowest, highest = policy.further_evidence
+    return min(highest, max(lowest, policy.further_share * largest))
+
+
+def best_of(comparison: Comparison, now: Stage, largest: float = 0.0) -> CandidateFit | None:
+    """The admissible candidate of the largest evidence among those with enough, beside effects with at most `largest`.
+
+    A small one is taken if it is the only thing there is: then the held-out recordings must show that it matters.
+    """
+    policy = comparison.policy
+    asked = {id(one): until_refused(_search_rules(comparison, one, largest)) for one in now.tried}
+    for one in now.tried:
+        comparison.judge(one.effect.id, one.fit, asked[id(one)])
+    fit = [one for one in now.tried if all_pass(asked[id(one)])]
+    best = _demanded(comparison, [one for one in fit if not is_minor(one, policy)])
+    if best is None and not largest:
+        best = _demanded(comparison, [one for one in fit if not is_common(one, policy)])
+    for one in fit:
+        comparison.judge(one.effect.id, one.fit, list(_choice(one, best, policy)))
+    return best
+
+
+def _choice(one: CandidateFit, best: CandidateFit | None, policy: Policy) -> Iterator[Rule]:
+    """Rules by which one of several that pass is taken first."""
+    if one is not best and is_minor(one, policy):
+        name = "more than what friction laws lack of any machine" if is_common(one, policy) else "not a small effect"
+        yield Rule(
+            name, False, one.evidence, policy.least_bent if is_common(one, policy) else policy.small_evidence, "nats"
+        )
+    elif best:
+        yield Rule("most evidence at its step of the search", one is best, one.evidence, best.evidence, "nats")
+
+
+def _search_rules(comparison: Comparison, one: CandidateFit, largest: float) -> Iterator[Rule]:
+    """Rules by which the search takes an effect, beside others of which the largest has so much evidence."""
+    policy = comparison.policy
+    yield at_least("evidence", one.evidence, least(policy, largest, one.plain_gain), "nats")
+    yield from admission(comparison, one)
+
+
+def _demanded(comparison: Comparison, fit: Sequence[CandidateFit]) -> CandidateFit | None:
+    """The best of some candidates that the set point does not exclude; between delay and lag it decides."""
+    misfits = {id(one): misfits_of(comparison.problem.prepared, one.fit.mount, one.effect) for one in fit}
+    timed = [one for one in fit if misfits[id(one)]]
+    rules = {id(one): Rule("the set point demands it", is_told(misfits[id(one)], one)) for one in timed}
+    for one in timed:
+        comparison.judge(one.effect.id, one.fit, [rules[id(one)]])
+    demanded = [one for one in fit if id(one) not in rules or rules[id(one)].outcome]
+    if not demanded:
+        return None
+    best = first_of(comparison, demanded)
+    return settled(misfits[id(best)], best, demanded)
+
+
+def first_of(comparison: Comparison, several: Sequence[CandidateFit]) -> CandidateFit:
+    """The best of some candidates beside one structure."""
+    ranked = sorted(several, key=lambda one: -one.evidence)
+    best = ranked[0]
+    for rival in ranked[1:]:
+        if aside_for(best.effect.id) != aside_for(rival.effect.id) and margin(comparison, best, rival) < 0:
+            best = rival
+    return best
+
+
+def margin(comparison: Comparison, one: CandidateFit, other: CandidateFit) -> float:
+    """Nats by which one structure is better than another; nuisances that either effect is stand aside for both."""
+    aside = aside_for(one.effect.id, other.effect.id)
+    return comparison.evidence(one.fit, aside) - one.price - comparison.evidence(other.fit, aside) + other.price
+
+
+def is_minor(one: CandidateFit, policy: Policy) -> bool:
+    """Whether an effect explains little, and not surely, or what laws lack of any machine."""
+    return is_small(one, policy) or is_common(one, policy)
+
+
+def is_small(one: CandidateFit, policy: Policy) -> bool:
+    """Whether an effect explains little, and not surely."""
+    return one.plain_gain < policy.small_gain and one.evidence < policy.small_evidence
+
+
+def is_common(one: CandidateFit, policy: Policy) -> bool:
+    """Whether an effect is no more than what laws of friction lack of any machine."""
+    return hypothesis_of(one.effect).is_common_misfit and one.evidence < policy.least_bent
+
+
+def admission(comparison: Comparison, one: CandidateFit) -> Iterator[Rule]:
+    """Rules of whether an effect is large enough to matter, means what its name says, and shows in this motion."""
+    policy, problem, own = comparison.policy, comparison.problem, hypothesis_of(one.effect)
+    yield at_least("share of the error energy", one.plain_gain, policy.least_plain_gain)
+    if own.must_stand_out:
+        yield at_least("energy relative to the reading's noise", one.above_noise, policy.least_above_noise)
+    if own.is_timing:
+        yield at_least("share that it removes away from reversals", one.away, policy.least_away)
+    if one.at_rest < 1.0:
+        yield at_least("share of the error at rest", one.at_rest, policy.halved)
+    yield from name_rules(problem, one)
+    yield Rule("the model explains the changes of the torque", in_time(problem, one))
+    if own.must_stand_out:
+        yield Rule("the set point demands it", is_asked_for(comparison, one.fit, one.effect))
+
+
+def is_full(best: CandidateFit, comparison: Comparison) -> bool:
+    """Whether a structure with this effect has more than may be named."""
+    added = best.fit.mount.effects[len(comparison.problem.mount.effects) :]
+    return len({effect.id for effect in added}) > comparison.policy.most_effects or len(added) > MOST_WAVES

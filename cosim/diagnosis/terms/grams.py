@@ -1,0 +1,175 @@
+"""Residual, tangents, nuisances and columns of candidate terms as Gram matrices of each band and recording.
+
+    y = X d + C beta + Z u + e,    d ~ N(0, T^2),  beta ~ N(0, s^2 prior^2),  u, e as in `marginal.py`
+
+Every choice of terms and of recordings is then a sum of parts of these matrices: a fit takes milliseconds.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.diagnosis.evidence.bands import Bands
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.marginal import Group, Marginal, marginal
+from cosim.diagnosis.terms.candidate_terms import CandidateTerm
+from cosim.estimation.fit import Fit
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.priors import trust
+from cosim.estimation.problem import Problem
+from cosim.support.statistics import rms
+from pyfmi_models.mount import Mount
+
+Index = npt.NDArray[np.int64]
+PASSES = 3
+"""How often the noise of least squares is renewed."""
+SIZE = 0.5
+"""What a term may be, relative to the friction level or to all torque where there is none (half-normal). Unit: 1."""
+
+
+def columns_of(mount: Mount, term: CandidateTerm, prepared: Prepared) -> Array:
+    """Torque that a unit of each coefficient adds at the kept rows, (rows, count), at the term's own coefficients."""
+    whole, names = with_terms(mount, [term])
+    inverse = Inverse(whole, names)
+    return stacked(inverse, prepared.pieces, inverse.present)[1]
+
+
+def with_terms(mount: Mount, added: Sequence[CandidateTerm]) -> tuple[Mount, tuple[str, ...]]:
+    """A mount with terms, and the names of their coefficients, one term after the other."""
+    whole = replace(mount, effects=(*mount.effects, *(one.effect for one in added)))
+    prefixes = list(whole.components())[-len(added) :] if added else []
+    pairs = zip(prefixes, added, strict=True)
+    return whole, tuple(f"{prefix}.c{k}" for prefix, one in pairs for k in range(one.count))
+
+
+@dataclass(frozen=True, eq=False)
+class Grams:
+    """Gram matrices (recordings, bands, 1 + n, 1 + n) of [residual, tangents, nuisances, columns of the terms]."""
+
+    parts: Array
+    plain: Array
+    """The same of weighted rows, all bands together: what least squares sees."""
+    count: Array
+    """Rows of each recording and band that count."""
+    coarsening: float
+    floor: Array
+    trust: Array
+    """Prior size of each tangent's parameter."""
+    nuisances: tuple[Group, ...]
+    columns: tuple[slice, ...]
+    """Where the columns of each term are, among the n."""
+    unit: Array
+    """What a coefficient of size one stands for, of each column of the terms."""
+
+    @property
+    def recordings(self) -> int:
+        """How many recordings."""
+        return len(self.parts)
+
+    @property
+    def many(self) -> int:
+        """How many tangents and nuisances."""
+        return int(self.columns[0].start) if self.columns else int(self.parts.shape[-1]) - 1
+
+    def marginal(self, chosen: Sequence[int], which: Sequence[int]) -> Marginal:
+        """Marginal likelihood of tangents, nuisances and the chosen terms on some recordings, with their sizes."""
+        kept = [0, *(1 + k for k in range(self.many)), *(1 + k for k in self._places(chosen))]
+        grams = self.parts[which].sum(0)[:, kept][:, :, kept]
+        groups, first = list(self.nuisances), self.many
+        for one in chosen:
+            last = first + len(self._places([one]))
+            groups.append(Group(np.arange(first, last), SIZE))
+            first = last
+        free = np.ones(len(kept) - 1)
+        free[: len(self.trust)] = self.trust
+        return marginal(grams, free, groups, *self._rows(which), self.floor)
+
+    def fitted(self, chosen: Sequence[int], which: Sequence[int]) -> Array:
+        """Numbers of the tangents and the chosen terms: least squares, with the sizes of the marginal likelihood.
+
+        Least squares as the base was fitted: weights by bands would move the base for reasons of their own.
+        """
+        sizes = self.marginal(chosen, which).sizes[len(self.nuisances) :]
+        kept = [0, *(1 + k for k in range(len(self.trust))), *(1 + k for k in self._places(chosen))]
+        gram = self.plain[which].sum(0)[kept][:, kept]
+        spread = [np.full(len(self._places([one])), max(size, 1e-6)) for one, size in zip(chosen, sizes, strict=True)]
+        precision = 1 / np.concatenate([self.trust, *spread]) ** 2
+        effective = float(self._rows(which)[1].sum())
+        beta = np.zeros(len(kept) - 1)
+        for _ in range(PASSES):
+            left = gram[0, 0] - 2 * gram[0, 1:] @ beta + beta @ gram[1:, 1:] @ beta
+            noise = max(left, 1e-12 * gram[0, 0]) / effective + 1e-300
+            normal = gram[1:, 1:] / noise + np.diag(precision)
+            scale = 1 / np.sqrt(np.diag(normal))
+            beta = scale * np.linalg.solve(normal * np.outer(scale, scale), scale * gram[1:, 0] / noise)
+        return beta
+
+    def _places(self, chosen: Sequence[int]) -> list[int]:
+        return [k for one in chosen for k in range(self.columns[one].start, self.columns[one].stop)]
+
+    def _rows(self, which: Sequence[int]) -> tuple[Array, Array]:
+        count = self.count[which].sum(0) + 1e-9
+        return count, count / (1 + count / self.coarsening)
+
+    def predicted(self, chosen: Sequence[int], beta: Array, which: Sequence[int]) -> float:
+        """Log-likelihood of what fitted numbers leave of other recordings; only the nuisances are free there."""
+        tangents, far = len(self.trust), self.many
+        places = [0, *(1 + k for k in range(tangents)), *(1 + k for k in self._places(chosen))]
+        kept = [*places, *range(1 + tangents, 1 + far)]
+        own = np.zeros((len(kept), 1 + far - tangents))
+        own[: len(places), 0] = [1.0, *-beta]
+        own[len(places) :, 1:] = np.eye(far - tangents)
+        grams = own.T @ self.parts[which].sum(0)[:, kept][:, :, kept] @ own
+        groups = [Group(np.asarray(one.columns) - tangents, one.prior) for one in self.nuisances]
+        free = np.ones(far - tangents)
+        return marginal(grams, free, groups, *self._rows(which), self.floor).log_likelihood
+
+
+def grams_of(comparison: Comparison, found: Fit, columns: Sequence[Array], added: Sequence[CandidateTerm]) -> Grams:
+    """Gram matrices of the training recordings, beside a structure."""
+    level = rms(comparison.nuisances.level) or float(np.std(_torque(comparison.problem)))
+    unit = [one.prior * (level if one.in_torque else 1.0) for one in added]
+    scaled = [column[:, size > 0] * size[size > 0] for column, size in zip(columns, unit, strict=True)]
+    widths = [found.slopes.shape[1], comparison.nuisances.columns.shape[1], *(one.shape[1] for one in scaled)]
+    edges = np.cumsum([0, *widths])
+    whole = np.column_stack([found.residual, found.slopes, comparison.nuisances.columns, *scaled])
+    rows = comparison.bands.transform(whole)
+    owner = comparison.problem.prepared.recording_of
+    parts, count = _by_recording(comparison.bands, rows, owner, comparison.problem.weight)
+    plain = _plain(whole * comparison.problem.weight[:, None], owner)
+    groups = tuple(Group(np.asarray(g.columns) + edges[1], g.prior) for g in comparison.nuisances.groups)
+    return Grams(
+        parts,
+        plain,
+        count,
+        comparison.policy.coarsening,
+        comparison.floor,
+        trust(found, comparison.problem.prepared.reach),
+        groups,
+        tuple(slice(int(first), int(last)) for first, last in pairwise(edges[2:])),
+        np.concatenate([size[size > 0] for size in unit]) if unit else np.zeros(0),
+    )
+
+
+def _torque(problem: Problem) -> Array:
+    return problem.prepared.stacked("tau")
+
+
+def _by_recording(bands: Bands, rows: Array, owner: Index, weight: Array) -> tuple[Array, Array]:
+    parts, count = [], []
+    for number in range(int(owner.max()) + 1):
+        own = owner == number
+        counted = float(np.mean(weight[own] > 0)) if own.any() else 0.0
+        places = [own & (bands.band == band) for band in range(len(bands.count))]
+        parts.append(np.array([rows[place].T @ rows[place] for place in places]))
+        count.append([counted * int(place.sum()) for place in places])
+    return np.array(parts), np.array(count)
+
+
+def _plain(rows: Array, owner: Index) -> Array:
+    parts = [rows[owner == number] for number in range(int(owner.max()) + 1)]
+    return np.array([part.T @ part for part in parts])

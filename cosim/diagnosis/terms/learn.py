@@ -1,0 +1,240 @@
+"""Model what has no name: terms chosen in training, delivered only where recordings that nothing saw are better off.
+
+The answer itself is decided before and does not change. Terms are chosen one after the other (`select.py`); the
+held-out recordings then say how many of them stay, as they do for named effects, and have a veto: none of them may be
+worse off.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from cosim.diagnosis.answer.entries import BinsEntry, LearnedEntry, NotLearnedEntry
+from cosim.diagnosis.decide.policy import Policy
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.error import interval_of
+from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.terms.agreement import formula_of
+from cosim.diagnosis.terms.candidate_terms import CandidateTerm, candidate_terms
+from cosim.diagnosis.terms.dictionary import OF_LAW
+from cosim.diagnosis.terms.formula import Formula
+from cosim.diagnosis.terms.grams import columns_of, grams_of
+from cosim.diagnosis.terms.partial import partial
+from cosim.diagnosis.terms.select import begun, fitted, paths
+from cosim.diagnosis.terms.spelled import Spelled
+from cosim.estimation.fit import Fit
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.residuals import away_from_turns, residuals
+from cosim.support.statistics import rms
+from pyfmi_models.effects.learned_base import LearnedEffect
+from pyfmi_models.mount import Mount
+
+LEAST_GAIN = 0.01
+"""Share of the held-out error that a term must remove: less is no better model, only a larger one. Unit: 1."""
+FEWER = 3
+"""How often the waves of a term are halved before it is given up."""
+SURE = 10.0
+"""Nats that a term must have three times over (training, training recordings left out one by one, held-out ones) where
+nothing else says that something without a name is left. Of 43 nulls of a generator by others one has a term
+that helps the held-out recordings alone, none one that is sure."""
+MIDDLE = (0.025, 0.975)
+"""Quantiles of a term's torque between which its size is told."""
+
+
+@dataclass(frozen=True)
+class Learned:
+    """A model with learned terms, and what they are worth on the held-out recordings."""
+
+    mount: Mount
+    effects: tuple[LearnedEffect, ...]
+    quantities: tuple[str, ...]
+    size: float
+    """Half the range of the terms' torque in training, outermost 5 % left out [N m or N]."""
+    before: float
+    after: float
+    interval: tuple[float, float]
+    """95 % range of before - after."""
+    cutoff: float
+    """Of the low-pass in front of these errors [Hz]."""
+    helps: bool
+    """Whether the held-out recordings prove it: else it is no part of the delivered model."""
+    evidence: tuple[float, ...] = field(default=())
+    predicted: tuple[float, ...] = field(default=())
+    gain: float = 0.0
+    """What the held-out recordings gain by the terms. Unit: nats."""
+    away: float = 1.0
+    """Share of the energy that the terms remove in training which they remove away from turns."""
+    data: tuple[BinsEntry, ...] = field(default=())
+    """What the training recordings leave without each term, over what it goes over."""
+    formulas: tuple[Formula | None, ...] = field(default=())
+    """Of each term, where one is as good as its table."""
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether training, what training left out and the held-out recordings each prove it for themselves."""
+        return self.helps and min(*self.evidence, *self.predicted, self.gain) >= SURE
+
+    def says_unknown(self, policy: Policy, least: float) -> bool:
+        """Whether it says alone that something has no name: sure, a large share of the rest, `least` nats or more.
+
+        Another friction law over speed is no missing effect, nor is what laws lack about turns.
+        """
+        follows = 1 - (self.after / self.before) ** 2 >= policy.follows
+        of_law = set(self.quantities) <= set(OF_LAW)
+        elsewhere = self.away >= policy.least_away_unnamed
+        return self.is_sure and follows and min(self.evidence) >= least and elsewhere and not of_law
+
+    @property
+    def unit(self) -> str:
+        """Of its errors."""
+        return "N" if self.mount.motion == "linear" else "N·m"
+
+    def judged_in(self, band: Prepared, without: Mount) -> "Learned":
+        """The same with its errors on recordings in another band, in which too it must help."""
+        old, new = (np.concatenate(_left(band, one)) for one in (without, self.mount))
+        interval = interval_of(old, new, band.pieces[0].dt)
+        helps = self.helps and interval[0] > 0
+        told = replace(self, before=rms(old), after=rms(new), interval=interval, cutoff=band.cutoff)
+        return replace(told, helps=helps)
+
+    def sentence(self) -> str:
+        """Say it to a mechanic."""
+        depends, (low, high) = ", and on ".join(self.quantities), self.interval
+        error = f"held-out error {self.before:.2g} → {self.after:.2g} {self.unit}"
+        if not self.helps:
+            return (
+                f"A table over {depends} was tried for what has no name and is not in the model: {error}, "
+                "not clearly less, or more on one recording."
+            )
+        said = f"Something that depends on {depends}, {self.size:.2g} {self.unit}; modelled as a table"
+        return f"{said}; {error} [less by {low:.2g} to {high:.2g}]."
+
+    def as_json(self) -> LearnedEntry:
+        """Return what `diagnosis.json` holds under `learned`."""
+        linear = self.mount.motion == "linear"
+        tables = [effect.for_reader("N" if linear else "N.m") for effect in self.effects]
+        return {
+            "quantities": list(self.quantities),
+            "size": float(self.size),
+            "table": [{**table, "data": one} for table, one in zip(tables, self.data, strict=True)],
+            "formula": [{"table": k, **one.as_json()} for k, one in self._spelled().items()],
+            "before": self.before,
+            "after": self.after,
+            "interval": list(self.interval),
+            "cutoff_hz": self.cutoff,
+            "range": [effect.learned_in(linear) for effect in self.effects],
+            "evidence": [float(one) for one in self.evidence],
+            "predicted": [float(one) for one in self.predicted],
+            "statement": self.sentence(),
+        }
+
+    def stated(self) -> tuple[tuple[Spelled, str], ...]:
+        """The formulas in words, each with what the diagnosis says of the learned term."""
+        return tuple((one, self.sentence()) for one in self._spelled().values())
+
+    def _spelled(self) -> dict[int, Spelled]:
+        """The formulas in words, by the number of the table each stands for."""
+        linear, pairs = self.mount.motion == "linear", enumerate(zip(self.effects, self.formulas, strict=True))
+        return {k: Spelled(effect, one, linear) for k, (effect, one) in pairs if one}
+
+    def refused(self) -> NotLearnedEntry:
+        """Return what `diagnosis.json` holds under `not_learned`."""
+        return {
+            "quantities": list(self.quantities),
+            "before": self.before,
+            "after": self.after,
+            "cutoff_hz": self.cutoff,
+            "statement": self.sentence(),
+        }
+
+
+NOTHING_TRIED: NotLearnedEntry = {
+    "quantities": [],
+    "statement": "No table over what was recorded predicts what has no name, so none was added to the model.",
+}
+
+
+def learn(comparison: Comparison, found: Fit, held: Predictive) -> Learned | None:
+    """Learn what a structure leaves; None where no term predicts training recordings that were left out.
+
+    Where nothing is better on the held-out recordings, what came nearest is returned, and does not help.
+    """
+    tried = [one for one in candidate_terms(found.mount, comparison.problem.prepared) if is_recorded(one, held)]
+    columns = [columns_of(found.mount, one, comparison.problem.prepared) for one in tried]
+    best: Learned | None = None
+    for chosen in begun(paths(grams_of(comparison, found, columns, tried), range(len(tried)))):
+        own = _judged(comparison, found, [tried[k] for k in chosen.order], held)
+        if own and (best is None or (not own.helps, own.after) < (not best.helps, best.after)):
+            best = replace(own, evidence=chosen.evidence, predicted=chosen.predicted)
+    return _measured(comparison, found, best, held) if best and best.helps else best
+
+
+def _measured(comparison: Comparison, found: Fit, learned: Learned, held: Predictive) -> Learned:
+    """Add the size of the terms, the data that they were learned from, and formulas that are as good."""
+    problem, whole = comparison.problem, learned.mount
+    rows = [partial(whole, one, problem.prepared, problem.weight) for one in learned.effects]
+    formulas = (formula_of(whole, one, found, comparison, held) for one in learned.effects)
+    data = tuple(one.data() for one in rows)
+    left = problem.prepared.stacked("tau") - stacked(Inverse(whole, ()), problem.prepared.pieces, np.zeros(0))[0]
+    away = away_from_turns(problem, problem.weight * left, problem.weight * found.residual)
+    return replace(learned, size=_size(comparison, learned), data=data, formulas=tuple(formulas), away=away)
+
+
+def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], held: Predictive) -> Learned | None:
+    """Fit some terms and ask the held-out recordings, which may veto; None where no fit breaks no rule."""
+    whole, effects = allowed(comparison, found, terms)
+    if not effects:
+        return None
+    pairs = list(zip(_left(held.protocol, found.mount), _left(held.protocol, whole), strict=True))
+    left = [np.concatenate(parts) for parts in zip(*pairs, strict=True)]
+    before, after = map(rms, left)
+    gain = held.log_likelihood(held.residual(whole)) - held.log_likelihood(held.residual(found.mount))
+    worse = any(rms(new) > rms(old) for old, new in pairs)
+    interval = interval_of(left[0], left[1], held.protocol.pieces[0].dt)
+    proven = gain >= comparison.policy.least_predicted or 1 - (after / before) ** 2 >= comparison.policy.follows
+    refused = worse or not proven or after > (1 - LEAST_GAIN) * before or interval[0] <= 0
+    names = tuple(one.name for one in terms)
+    return Learned(whole, effects, names, 0.0, before, after, interval, held.protocol.cutoff, not refused, gain=gain)
+
+
+def allowed(
+    comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]
+) -> tuple[Mount, tuple[LearnedEffect, ...]]:
+    """Fit terms that break no rule, with fewer waves where they would: a drive that falls where no row tells."""
+    for _ in range(FEWER):
+        mount, fit = fitted(comparison, found, terms)
+        effects = tuple(one.learned(one.coefficients.tolist()).admitted() for one in fit)
+        broken = [bool(effect.broken_rule()) for effect in effects]
+        if not any(broken):
+            return replace(mount, effects=(*mount.effects, *effects)), effects
+        terms = [one.coarser() if fails else one for one, fails in zip(terms, broken, strict=True)]
+    return found.mount, ()
+
+
+def _left(held: Prepared, mount: Mount) -> list[Array]:
+    """What a model leaves of each held-out recording, by the protocol."""
+    pieces = held.pieces
+    left = [one[piece.inside] for one, piece in zip(residuals(held, mount), pieces, strict=True)]
+    owners = [piece.recording for piece in pieces]
+    return [
+        np.concatenate([one for one, own in zip(left, owners, strict=True) if own == number])
+        for number in sorted(set(owners))
+    ]
+
+
+def is_recorded(term: CandidateTerm, held: Predictive) -> bool:
+    """Whether the held-out recordings have what a term goes over."""
+    return all(one.name in piece.extras for one in term.effect.inputs() for piece in held.prepared.pieces)
+
+
+def _size(comparison: Comparison, learned: Learned) -> float:
+    """Half the middle range of the torque that the terms add in training."""
+    prepared = comparison.problem.prepared
+    count = len(learned.mount.effects) - len(learned.effects)
+    plain = replace(learned.mount, effects=learned.mount.effects[:count])
+    with_it, without = (Inverse(mount, ()) for mount in (learned.mount, plain))
+    nothing = np.zeros(0)
+    parts = [(with_it.torque(p, nothing)[0] - without.torque(p, nothing)[0])[p.kept] for p in prepared.pieces]
+    return float(np.ptp(np.quantile(np.concatenate(parts), MIDDLE))) / 2

@@ -1,0 +1,143 @@
+"""What recordings say about one learned term: the rest that a model leaves without it, over what the term goes over.
+
+    left = tau - needed(without the term) = f g,   g = needed(with a term of one) - needed(without)
+
+f is the term's value, a torque or a relative change of the friction level; of the latter g is the friction itself.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import log
+from typing import Any
+
+import numpy as np
+
+from cosim.diagnosis.answer.entries import BinsEntry
+from cosim.diagnosis.terms.followed import followed, since_reversal
+from cosim.estimation.blocks import Blocks
+from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.prepare import Array, Prepared
+from cosim.support.statistics import Z95
+from pyfmi_models.effects import Effect
+from pyfmi_models.effects.learned import LearnedFriction
+from pyfmi_models.effects.learned_base import FOLLOWED, LearnedEffect
+from pyfmi_models.mount import Mount
+from pyfmi_models.waves import INPUT
+
+BINS, COARSE = 24, (12, 5)
+"""Bins over one quantity, and over two."""
+FEWEST = 8
+"""Rows below which a bin says nothing."""
+DOUBLED = LearnedFriction(over="speed", seen=(-1.0, 1.0), level_change=(log(2.0),))
+"""Twice the friction level, whatever the speed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Partial:
+    """Kept rows of one term, one value a row."""
+
+    effect: LearnedEffect
+    over: Array
+    """The quantity; of a term that remembers, the torque that it says."""
+    by: Array | None
+    left: Array
+    unit: Array
+    """g of the module."""
+    weight: Array
+    blocks: Blocks
+
+    def data(self) -> BinsEntry:
+        """Return the mean of f over bins with its 95 % band; None where a bin holds too few rows."""
+        edges = [_edges(one, count) for one, count in zip(self._quantities(), self._bins(), strict=True)]
+        cell, shape = self._cells(edges)
+        mean, half = self._means(cell, int(np.prod(shape)))
+        value, band = (_listed(one.reshape(shape)) for one in (mean, half))
+        told: BinsEntry = {"at": _centres(edges[0]), "value": value, "band": band}
+        return told if self.by is None else {**told, "by_at": _centres(edges[1])}
+
+    def _quantities(self) -> tuple[Array, ...]:
+        return (self.over,) if self.by is None else (self.over, self.by)
+
+    def _bins(self) -> tuple[int, ...]:
+        return (BINS,) if self.by is None else COARSE
+
+    def _cells(self, edges: Sequence[Array]) -> tuple[Any, tuple[int, ...]]:
+        shape = tuple(len(one) - 1 for one in edges)
+        places = [
+            np.clip(np.searchsorted(edge, one, "right") - 1, 0, len(edge) - 2)
+            for one, edge in zip(self._quantities(), edges, strict=True)
+        ]
+        return np.ravel_multi_index(places, shape), shape
+
+    def _means(self, cell: Any, many: int) -> tuple[Array, Array]:
+        """Weighted mean of each cell, and its half band from what blocks of rows differ by."""
+        weight = self.weight**2
+        power, rows = np.bincount(cell, weight * self.unit**2, many), np.bincount(cell, minlength=many)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            mean = np.bincount(cell, weight * self.unit * self.left, many) / power
+            mean[(rows < FEWEST) | (power <= 1e-9 * power.max())] = np.nan
+        score = weight * self.unit * (self.left - self.unit * np.nan_to_num(mean)[cell])
+        sums = np.array([np.bincount(cell[own], score[own], many) for own in self.blocks.rows])
+        return mean, np.asarray(Z95 * np.sqrt((sums**2).sum(0)) / np.maximum(power, 1e-300))
+
+
+def partial(mount: Mount, effect: LearnedEffect, prepared: Prepared, weight: Array) -> Partial:
+    """Rows of one learned effect of a mount, beside all its others."""
+    bare, one = without(mount, effect), effect.of_one()
+    base = needed(bare, prepared)
+    added = needed(replace(bare, effects=(*bare.effects, one or effect)), prepared) - base
+    over, *by = [_quantity(name, mount, prepared) for name in effect.quantities()] or [added]
+    unit = added if one else np.ones_like(added)
+    left, blocks = prepared.stacked("tau") - base, Blocks.of(prepared)
+    return Partial(effect, over, by[0] if by else None, left, unit, weight, blocks)
+
+
+def faded(mount: Mount, effect: LearnedEffect, prepared: Prepared, weight: Array) -> Partial:
+    """Rows of a term that fades after a reversal, over the time or the way since then: f changes the friction level."""
+    bare = without(mount, effect)
+    base, doubled = needed(bare, prepared), replace(bare, effects=(*bare.effects, DOUBLED))
+    over = np.concatenate([since_reversal(effect.since(), piece)[piece.kept] for piece in prepared.pieces])
+    left, unit = prepared.stacked("tau") - base, needed(doubled, prepared) - base
+    return Partial(effect, over, None, left, unit, weight, Blocks.of(prepared))
+
+
+def without(mount: Mount, effect: Effect) -> Mount:
+    """The mount without one of its effects."""
+    return replace(mount, effects=tuple(one for one in mount.effects if one is not effect))
+
+
+def needed(mount: Mount, prepared: Prepared) -> Array:
+    """Torque that a mount needs at the kept rows."""
+    return stacked(Inverse(mount, ()), prepared.pieces, np.zeros(0))[0]
+
+
+def _quantity(name: str, mount: Mount, prepared: Prepared) -> Array:
+    """A quantity at the kept rows.
+
+    The command is that which the model needs: over the recorded one, which holds what is left, anything goes a little.
+    """
+    return needed(mount, prepared) if name == "command" else _recorded(name, prepared)
+
+
+def _recorded(name: str, prepared: Prepared) -> Array:
+    own = {"position": "q", "speed": "v", "turn": "q"}
+    if name in own:
+        found = prepared.stacked(own[name])
+        return np.mod(found + np.pi, 2 * np.pi) - np.pi if name == "turn" else found
+    if name in FOLLOWED:
+        return np.concatenate([followed(name, piece)[piece.kept] for piece in prepared.pieces])
+    return np.concatenate([piece.extras[name.removeprefix(INPUT)][piece.kept] for piece in prepared.pieces])
+
+
+def _edges(values: Array, count: int) -> Array:
+    low, high = float(values.min()), float(values.max())
+    return np.linspace(low, high if high > low else low + 1.0, count + 1)
+
+
+def _centres(edges: Array) -> list[Any]:
+    return [float(one) for one in (edges[1:] + edges[:-1]) / 2]
+
+
+def _listed(values: Array) -> list[Any]:
+    """Numbers of JSON, which has no NaN; a band of nothing stays a number nobody reads."""
+    return [_listed(one) if one.ndim else (float(one) if np.isfinite(one) else None) for one in values]

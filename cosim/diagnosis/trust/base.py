@@ -1,0 +1,89 @@
+"""Does the refitted base leave the card? What a fit has to bend that far is often all that is wrong."""
+
+from collections.abc import Mapping, Sequence
+
+from cosim.diagnosis.answer.doubt_entry import Alternative, Sanity
+from cosim.plots.quantities import raised
+from pyfmi_models.model import Variable
+from pyfmi_models.mount import Mount
+
+FAR = 3.0
+"""A number of the base that leaves the card's by more than this factor says that card and recordings differ; what
+owners write is rarely more than a factor of two off."""
+FELT = 0.1
+"""Share of the friction at the highest speed below which a change of a friction number is not felt, however large."""
+WORDS = {"axis.inertia": "inertia", "friction.Fc": "Coulomb friction", "friction.sigma2": "viscous friction"}
+"""Numbers of the base that any recording in motion tells; what only the slowest motion tells is left out."""
+CAUSES = {
+    "axis.inertia": "another payload, a gear that one side does not count, or a unit",
+    "friction.Fc": "another bearing, brake or temperature, or the torque's unit",
+    "friction.sigma2": "another lubricant or temperature, or a term the card lacks that goes with speed",
+}
+
+
+def base_far_from_card(
+    card: Mount,
+    refitted: Mount,
+    bounds: Mapping[str, tuple[float, float]],
+    top_speed: float,
+    alternatives: Sequence[Alternative] = (),
+) -> tuple[Sanity, ...]:
+    """Say which numbers of the refitted base leave the card by more than `FAR`, or sit at a bound of the fit.
+
+    Args:
+        card: the base as delivered.
+        refitted: the same structure with fitted numbers.
+        bounds: lowest and highest value of each parameter in the fit.
+        top_speed: highest recorded speed [rad/s, m/s]: a viscous friction counts by what it makes there.
+        alternatives: what explains a wrong inertia, if that was asked already.
+    """
+    before, after = ({v.name: v for v in one.parameters()} for one in (card, refitted))
+    said = []
+    for name, words in WORDS.items():
+        for full in (one for one in before if one == name or one.startswith(f"{name}.")):
+            if full in after and _is_felt(full, before, after, top_speed):
+                said += _far(full, words, CAUSES[name], before[full], after[full].start, bounds.get(full))
+    causes = tuple(alternatives)
+    return tuple(
+        Sanity(finding="base_far_from_card", statement=text, alternatives=causes if "inertia" in text[:24] else ())
+        for text in said
+    )
+
+
+def _far(
+    name: str, words: str, causes: str, card: Variable, value: float, bounds: tuple[float, float] | None
+) -> list[str]:
+    """One sentence, or none."""
+    side = {"positive": " forward", "negative": " backward"}.get(name.rsplit(".", 1)[-1], "")
+    numbers = f"{card.start:.3g} → {value:.3g} {raised(card.unit)}"
+    if bounds and _at_bound(value, bounds, card.start):
+        return [
+            f"Refitted, the {words}{side} ends at a bound of the fit ({numbers}): it stands in for something else, "
+            f"or these recordings do not determine it. Possible causes: {causes}."
+        ]
+    factor = value / card.start if card.start > 0 else 1.0
+    if 1 / FAR <= factor <= FAR:
+        return []
+    how = f"{factor:.3g} times the card's" if factor > 1 else f"{1 / factor:.3g} times smaller than the card's"
+    return [f"Refitted, the {words}{side} is {how} ({numbers}). Possible causes: {causes}."]
+
+
+def _at_bound(value: float, bounds: tuple[float, float], start: float) -> bool:
+    """Whether a value that did not start at a bound ended there, to within the fit's own margin."""
+    margin = 1e-6 * max(abs(start), abs(value), 1e-300)
+    return any(abs(value - edge) <= margin and abs(start - edge) > margin for edge in bounds)
+
+
+def _is_felt(name: str, before: Mapping[str, Variable], after: Mapping[str, Variable], top: float) -> bool:
+    """Whether a change of a friction number matters beside the friction at the highest speed."""
+    if not name.startswith("friction."):
+        return True
+    sizes = [
+        sum(abs(v.start) * (top if "sigma2" in v.name else 1.0) for v in one.values() if v.name.startswith(_TORQUES))
+        for one in (before, after)
+    ]
+    change = abs(after[name].start - before[name].start) * (top if "sigma2" in name else 1.0)
+    return change > FELT * max(sizes)
+
+
+_TORQUES = ("friction.Fc", "friction.sigma2")

@@ -1,0 +1,78 @@
+"""Everything that is doubtful about recordings beside a card, in two steps: before the base is fitted, and after."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.answer.doubt_entry import Sanity
+from cosim.diagnosis.trust.balance import Balance
+from cosim.diagnosis.trust.base import base_far_from_card
+from cosim.diagnosis.trust.clocks import clocks
+from cosim.diagnosis.trust.judgement import judged
+from cosim.diagnosis.trust.likelihood import Reference
+from cosim.diagnosis.trust.limits import encoder_step, little_motion, no_set_point
+from cosim.diagnosis.trust.load import load_far_from_card
+from cosim.diagnosis.trust.other_machine import other_machine
+from cosim.estimation.fit import edges_of
+from cosim.estimation.problem import Problem
+from pyfmi_models.card import Card
+from pyfmi_models.mount import Mount
+
+ASSUMED = '" was taken for '
+"""How a note begins that a reader leaves who did not believe the unit of the time stamps."""
+
+
+def doubts(train: Sequence[Recording], heldout: Sequence[Recording], card: Card) -> tuple[Sanity, ...]:
+    """What is doubtful about recordings beside a card, those first beside which no effect may be named.
+
+    Raises:
+        RecordingError: a unit is wrong beyond doubt; the message names the option that puts it right.
+    """
+    reference = _reference(card)
+    found = judged(train, heldout, reference)
+    if not found:
+        balances = [Balance([one], reference.linear) for one in (*train, *heldout)]
+        found = (
+            *clocks(balances[: len(train)], ", ".join(one.name for one in train)),
+            *other_machine(balances[: len(train)], balances[len(train) :]),
+        )
+    return tuple(sorted((*found, *assumed_units((*train, *heldout))), key=lambda one: not one.blocks_naming))
+
+
+def assumed_units(recordings: Sequence[Recording]) -> tuple[Sanity, ...]:
+    """Say which time stamps were taken for another unit than seconds when they were read."""
+    said = [note for one in recordings for note in one.notes if ASSUMED in note]
+    return (Sanity(finding="time_unit", statement=" ".join(said)),) if said else ()
+
+
+def _reference(card: Card) -> Reference:
+    mount, controller = card.plant(), card.controller
+    level = getattr(mount.friction, "Fc", None)
+    return Reference(
+        inertia=float(mount.axis.inertia),
+        coulomb=float(np.mean(level)) if level is not None else None,
+        torque_limit=float(mount.axis.torque_limit),
+        record_hz=float(controller.record_hz) if controller else None,
+        linear=mount.motion == "linear",
+    )
+
+
+def of_base(
+    problem: Problem, refitted: Mount, train: Sequence[Recording], heldout: Sequence[Recording]
+) -> tuple[Sanity, ...]:
+    """What the refitted base says of card and recordings, and what these recordings cannot show."""
+    bounds = edges_of(problem.mount, problem.prepared.pieces)
+    return (
+        *base_far_from_card(problem.mount, refitted, bounds, problem.top_speed),
+        *load_far_from_card(problem.mount, refitted, problem.prepared.stacked("q")),
+        *encoder_step([*train, *heldout], problem.mount, problem.prepared.cutoff),
+        *little_motion(problem.prepared),
+        *no_set_point([*train, *heldout]),
+    )
+
+
+def single_readings(given: Sequence[Recording], used: Sequence[Recording]) -> tuple[Sanity, ...]:
+    """Say of recordings as they were `given`, and as they are `used`, which readings were false."""
+    said = [" ".join(after.notes[len(before.notes) :]) for before, after in zip(given, used, strict=True)]
+    return tuple(Sanity(finding="single_readings", statement=text) for text in said if text)

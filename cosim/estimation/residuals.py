@@ -1,0 +1,58 @@
+"""What a structure leaves of recordings, and where something that was added removes it."""
+
+import numpy as np
+
+from cosim.estimation.inverse import Inverse
+from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.problem import Problem
+from cosim.estimation.row_weights import far_from_turns
+from pyfmi_models.mount import Mount
+
+LEAST_REMOVED = 0.02
+"""Share of the energy below which it says nothing where it is removed: what is slow and small removes as little."""
+
+
+LEAST_AT_REST = 10
+"""Rows at rest below which nothing is concluded from them."""
+
+
+def away_from_turns(problem: Problem, left: Array, without: Array) -> float:
+    """Share of the energy that something removes which it removes away from turns; 1 where it hardly removes any.
+
+    Args:
+        problem: whose rows these are.
+        left: weighted residual of training with it (rows,) [N m].
+        without: the same without it.
+    """
+    removed = without**2 - left**2
+    whole = float(removed.sum())
+    if whole <= LEAST_REMOVED * float(without @ without):
+        return 1.0
+    return float(far_from_turns(problem.prepared) @ removed) / whole
+
+
+def removed_at_rest(weight: Array, left: Array, without: Array) -> float:
+    """Share of the energy at rest, of which a law without memory says nothing, that a contact that bends removes.
+
+    There it says what is held, and must be right; 1 where the axis hardly rests.
+
+    Args:
+        weight: of each row for the law without memory (rows,); 0 where that says nothing.
+        left: residual with the contact (rows,) [N m].
+        without: the same without it.
+    """
+    rest = weight == 0
+    if rest.sum() < LEAST_AT_REST:
+        return 1.0
+    return 1 - float(left[rest] @ left[rest]) / max(float(without[rest] @ without[rest]), 1e-300)
+
+
+def gets_memory(mount: Mount, without: Mount) -> bool:
+    """Whether friction remembers with something that was added, and did not without it."""
+    return bool(mount.law.states()) and not without.law.states()
+
+
+def residuals(prepared: Prepared, mount: Mount) -> list[Array]:
+    """Measured minus model torque at all rows of each piece."""
+    inverse = Inverse(mount, ())
+    return [piece.tau - inverse.torque(piece, np.zeros(0))[0] for piece in prepared.pieces]

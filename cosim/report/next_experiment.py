@@ -1,0 +1,66 @@
+"""What one more recording would tell, and how to take it."""
+
+from collections.abc import Collection, Iterator
+
+from cosim.diagnosis.answer.result import Diagnosis
+from cosim.report import words
+from cosim.report.motion import motion
+from cosim.report.quantities import Scales
+
+SMALL = 0.1
+"""A difference below this share of the noise takes longer to show than a recording lasts."""
+FURTHER = "record motion that goes further or faster than in these recordings, where the axis may"
+FURTHER_STILL = "Where the axis may go further or faster than in these recordings, record that instead."
+
+
+def next_experiment(diagnosis: Diagnosis, scales: Scales) -> dict[str, object] | None:
+    """Return its sentences and what to type; None where nothing is open."""
+    plan = diagnosis.next_experiment
+    if not plan:
+        return None
+    titles = {finding.effect: words.lowered(finding.title) for finding in diagnosis.findings}
+    names = [titles.get(str(name), str(name)) for name in plan.get("separates", ())]
+    said = [words.started(words.closed(str(plan.get("description", ""))))]
+    if how := motion(plan.get("set_point", {}), scales):
+        said.append(words.closed(f"That is {how}, measured from the middle of what was visited"))
+    said.append(_difference(diagnosis, " from ".join(names), scales) if len(names) > 1 else "")
+    return {"sentences": [text for text in said if text], "steps": list(_steps(diagnosis))}
+
+
+def is_weak(diagnosis: Diagnosis) -> bool:
+    """Whether rivals would differ by too little, whatever motion within what was visited is recorded."""
+    gap = float(diagnosis.next_experiment.get("expected_difference") or 0.0)
+    return 0.0 < gap < SMALL * diagnosis.heldout.floor_rms
+
+
+def to_record(diagnosis: Diagnosis) -> str:
+    """Return what to record next, as an order; empty where nothing is open."""
+    return FURTHER if is_weak(diagnosis) else str(diagnosis.next_experiment.get("description", ""))
+
+
+def is_about(diagnosis: Diagnosis, effects: Collection[str]) -> bool:
+    """Whether the next experiment is about these effects; one that separates no others is about whatever is open."""
+    separates = diagnosis.next_experiment.get("separates", ())
+    return not separates or not set(effects).isdisjoint(separates)
+
+
+def _difference(diagnosis: Diagnosis, names: str, scales: Scales) -> str:
+    gap, unit = float(diagnosis.next_experiment.get("expected_difference") or 0.0), scales.torque
+    if not gap:
+        return f"It separates {names}."
+    ends = f"they then differ by {unit.text(gap)} RMS; noise is {unit.text(diagnosis.heldout.floor_rms)}"
+    if is_weak(diagnosis):
+        return f"Of motions within what was visited it best separates {names}, and hardly: {ends}. {FURTHER_STILL}"
+    return f"It separates {names}: {ends}."
+
+
+def _steps(diagnosis: Diagnosis) -> Iterator[tuple[str, str]]:
+    """What to type: try the motion on the model, then diagnose again with the new recording."""
+    plan, command = diagnosis.next_experiment, str(diagnosis.provenance.get("command", ""))
+    if plan.get("command"):
+        yield "Then", str(plan["command"])
+    if plan.get("scenario"):
+        yield "Try it on the model first", f"cosim run {plan['scenario']} --out next"
+    if " --" in command:
+        train, options = command.split(" --", 1)
+        yield "With the new recording", f"{train} new_recording.parquet --{options} --force"

@@ -1,0 +1,229 @@
+"""Everything the template prints, put together from a diagnosis."""
+
+import base64
+import hashlib
+from collections.abc import Iterator
+from importlib.resources import files as resources
+
+import numpy as np
+
+from cosim.diagnosis.answer.result import Diagnosis, Trace
+from cosim.diagnosis.measure.breakdown import Samples, bars, samples, worst
+from cosim.plots.quantities import joined
+from cosim.report import tables, unknown, words
+from cosim.report.explorer import payload
+from cosim.report.figures_dynamic import effect
+from cosim.report.figures_proof import looked_for, proof
+from cosim.report.figures_time import WIDE, overlay, recording
+from cosim.report.figures_where import plane, region, strongest
+from cosim.report.findings import block
+from cosim.report.lead import heading, lead
+from cosim.report.learned import nameless
+from cosim.report.next_experiment import next_experiment
+from cosim.report.quantities import Scales
+from cosim.report.sheet import Picture
+from cosim.report.untrained import untrained
+
+MOST_RECORDINGS, MOST_REGIONS = 6, 12
+
+
+def context(diagnosis: Diagnosis) -> dict[str, object]:
+    """Return the values of the template."""
+    scales = Scales.of(diagnosis)
+    chosen = samples(diagnosis.traces)
+    sections = (_first, _findings, _middle, _time, _end)
+    return {name: value for section in sections for name, value in section(diagnosis, scales, chosen).items()}
+
+
+def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
+    """Return the first screen."""
+    kind = words.verdict(diagnosis)
+    rows = scales.labelled(diagnosis.parts)
+    return {
+        "heading": heading(diagnosis),
+        "mount": diagnosis.mount,
+        "careful": [one.statement for one in diagnosis.sanity],
+        "identity": identity(diagnosis),
+        "lead": lead(diagnosis, scales),
+        "facts": unknown.facts(diagnosis, scales) if kind == "unknown" else None,
+        "limits": tables.limits(diagnosis, scales) if kind == "none" else None,
+        "unseen": "" if kind == "none" else tables.unseen(diagnosis),
+        "proof": proof(diagnosis, rows, scales),
+        "parts_table": tables.parts(rows, scales),
+        "added": diagnosis.adds_physics,
+        "with_effects": _with_effects(diagnosis),
+        "box": _box(diagnosis, [row.label for row in rows if row.change == "worse"], scales),
+        "noun": "torque" if diagnosis.motion == "rotary" else "force",
+    }
+
+
+def identity(diagnosis: Diagnosis) -> list[dict[str, str]]:
+    """Return machine, recordings, model and version."""
+    made, many = diagnosis.provenance, len(diagnosis.traces)
+    recorded = [float(entry["seconds"]) for entry in made.get("recordings", ()) if entry.get("seconds")]
+    seconds = sum(recorded) or sum(float(trace.t[-1] - trace.t[0]) for trace in diagnosis.traces if trace.t.size)
+    rates = [entry["rate_hz"] for entry in made.get("recordings", ()) if entry.get("rate_hz")]
+    rest = f", {seconds:.0f} s" + (f" at {_rate(rates[0])}" if rates else "")
+    told = [("", diagnosis.mount, ""), ("", f"{many} recording{'s' if many != 1 else ''}", rest)]
+    told.append(("Model", words.model(diagnosis), ""))
+    told.append(("cosim", str(made.get("version", "")), ""))
+    return [dict(zip(("label", "value", "rest"), part, strict=True)) for part in told if part[1]]
+
+
+def _rate(hertz: float) -> str:
+    return joined(f"{hertz / 1000:.4g}", "kHz") if round(hertz) >= 1000 else joined(f"{hertz:.4g}", "Hz")
+
+
+def _with_effects(diagnosis: Diagnosis) -> str:
+    held = len({finding.effect for finding in diagnosis.in_model})
+    if diagnosis.learned:
+        return "with what was learned" if not held else "with the effects and what was learned"
+    if held and words.verdict(diagnosis) == "either":
+        return "with the likeliest cause"
+    return {0: "after (nothing added)", 1: "with the effect"}.get(held, f"with the {words.count(held).lower()} effects")
+
+
+def _box(diagnosis: Diagnosis, worse: list[str], scales: Scales) -> dict[str, str] | None:
+    """Say where the improved model is proven and where to keep the old one."""
+    files = words.delivered(diagnosis)
+    if not files:
+        return None
+    proven = words.proven_range(diagnosis, scales)
+    text = (
+        f"is proven {proven}. Elsewhere, keep the delivered model." if proven else "is proven on the unseen runs only."
+    )
+    said = [f"in front of {words.model(diagnosis)}"] if "correction" in diagnosis.improved else []
+    said += [text, f"It is worse here: {', '.join(worse)}." if worse else ""]
+    if "ssp" in diagnosis.improved:
+        said.append(f"{diagnosis.improved['ssp']} holds both, wired to a controller.")
+    return {"file": files[0], "text": " ".join(filter(None, [*said, *words.left_out(diagnosis)]))}
+
+
+def _findings(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
+    found = [one for one in words.blocks(diagnosis) if one.first.effect != "unknown"]
+    blocks = [block(one, diagnosis, scales, effect(one.first, chosen, scales)) for one in found]
+    return {"blocks": blocks, "experiment": next_experiment(diagnosis, scales)}
+
+
+def _middle(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
+    """Return everything looked for, what stays, proof, and where."""
+    return {
+        "looked": tables.looked(diagnosis, scales),
+        "looked_picture": looked_for(diagnosis.findings, diagnosis.ambiguous_with),
+        "meanings": words.MEANINGS,
+        "nameless": nameless(diagnosis, scales),
+        "unexplained": unexplained(diagnosis, scales),
+        "spans": tables.spans(diagnosis),
+        "proof_table": tables.proof(diagnosis, scales),
+        "proof_sentence": _proof_sentence(diagnosis, scales),
+        "places": list(_places(diagnosis, scales, chosen)),
+    }
+
+
+MISFIT = "A friction law that is not quite the machine's leaves as much: that is no proof of another effect."
+"""What can be said of a rest that was judged to be no effect: what it goes with was not asked."""
+
+
+def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
+    """Say how much error is left above the noise, and what it goes with."""
+    held, unit = diagnosis.heldout, scales.torque
+    rest = float(np.sqrt(max(held.after_rms**2 - held.floor_rms**2, 0.0)))
+    if quiet := rest <= 0.5 * held.floor_rms:
+        error, noise = unit.text(held.after_rms), unit.text(held.floor_rms)
+        left = f"Hardly anything: {error} of error on unseen runs against {noise} of noise."
+    else:
+        left = f"{unit.text(rest)} of error on unseen runs stays unexplained, beyond the noise."
+    goes = f"It goes with {', '.join(diagnosis.depends_on)}." if diagnosis.depends_on else ""
+    misfit = "" if goes or quiet or words.verdict(diagnosis) == "withheld" else MISFIT
+    there = "" if quiet else untrained(diagnosis, scales)
+    return [text for text in (left, there, goes, misfit) if text]
+
+
+def _proof_sentence(diagnosis: Diagnosis, scales: Scales) -> str:
+    held, unit = diagnosis.heldout, scales.torque
+    kept = f"{held.name} was not used for fitting."
+    if not diagnosis.adds_physics:
+        return f"{kept} Nothing was added to the model, so there is no gain to prove."
+    low, high = held.confidence_interval
+    sure = "" if low > 0 else " That range includes zero: no clear change." if high >= 0 else " It is worse."
+    gain = f"The error falls by {unit.text(held.before_rms - held.after_rms)} (95 % range {unit.span(low, high)})."
+    return f"{kept} {gain}{sure}{_black_box(diagnosis, scales)}"
+
+
+def _black_box(diagnosis: Diagnosis, scales: Scales) -> str:
+    """Say what a smooth black box would have reached in place of named physics."""
+    held, unit = diagnosis.heldout, scales.torque
+    if held.black_box_rms is None:
+        return ""
+    error = unit.text(held.black_box_rms)
+    return f" The refitted base with a black box beside it, learnt on the training recordings, leaves {error}."
+
+
+def _places(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> Iterator[Picture]:
+    after = {other.axis: other for other in diagnosis.regions_after}
+    for before in diagnosis.regions[:MOST_REGIONS]:
+        yield region(before, after.get(before.axis), scales)
+    if chosen.t.size > 200 and (top := strongest(chosen)) > 0:
+        yield plane("before", chosen, chosen.before, scales, top)
+        yield plane("after", chosen, chosen.after, scales, top)
+
+
+def _time(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
+    """Return when, and the worst seconds."""
+    traces = sorted((t for t in diagnosis.traces if t.t.size > 1), key=lambda trace: not trace.heldout)
+    shown, hidden = traces[:MOST_RECORDINGS], traces[MOST_RECORDINGS:]
+    most = (
+        max((_most(trace)[0] for trace in shown), default=1.0),
+        max((_most(trace)[1] for trace in shown), default=1.0),
+    )
+    span = worst(traces[0], traces[0].tau - traces[0].after)
+    return {
+        "times": [recording(place, trace, scales, most) for place, trace in enumerate(shown)],
+        "hidden": f"{len(hidden)} more recordings are in the explorer below." if hidden else "",
+        "overlay": overlay(traces[0], span, scales, WIDE),
+        "overlay_small": overlay(traces[0], span, scales),
+        "worst": tables.worst(traces[0], scales),
+    }
+
+
+def _most(trace: Trace) -> tuple[float, float]:
+    """Return the heights that hold missing torque (but for single spikes) and RMS bars."""
+    tall = float(np.nanquantile(np.abs(trace.missing), 0.999))
+    return 1.15 * max(tall, float(np.nanmax(trace.band))), 1.05 * float(np.nanmax(bars(trace)[1:]))
+
+
+def _end(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
+    """Return parameters, quality, provenance, explorer."""
+    made, here = diagnosis.provenance, resources("cosim.report")
+    script = here.joinpath("explorer.js").read_text("utf-8")
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    told = [made.get("date", ""), f"cosim {made['version']}" if made.get("version") else ""]
+    told += [
+        f"seed {made['seed']}" if "seed" in made else "",
+        f"{diagnosis.seconds:.1f} s" if diagnosis.seconds else "",
+    ]
+    return {
+        "parameters": tables.parameters(diagnosis),
+        "parameters_sentence": " ".join(_refitted(diagnosis)),
+        "law": words.law(diagnosis),
+        "quality": diagnosis.data_quality,
+        "command": str(made.get("command", "")),
+        "files": tables.files(diagnosis),
+        "made": ", ".join(str(text) for text in told if text),
+        "data": payload(diagnosis, scales),
+        "script": script,
+        "script_hash": digest,
+        "css": here.joinpath("report.css").read_text("utf-8"),
+    }
+
+
+def _refitted(diagnosis: Diagnosis) -> Iterator[str]:
+    """Say that the base was refitted, and whether the loop, in which noise reaches the motion, biased the numbers."""
+    yield "The base was refitted on the training recordings before any effect was tested."
+    tested = diagnosis.loop_bias
+    if tested and tested["biased"]:
+        moves = [f"{name} by {100 * move:+.0f} %".replace("-", "−") for name, move in tested["moved"].items()]
+        yield f"An instrumental-variable test with the set point would move {', '.join(moves)}: the control loop, or an"
+        yield "imprecise friction law, biases the fit."
+    elif tested:
+        yield "An instrumental-variable test with the set point does not move them: the loop did not bias the fit."

@@ -1,0 +1,225 @@
+"""The diagnosis on a terminal: plain text, 80 columns, colour never needed."""
+
+import os
+import sys
+import textwrap
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TextIO
+
+from cosim.diagnosis.answer.result import Diagnosis, Finding
+from cosim.report.findings import do, where
+from cosim.report.lead import heading
+from cosim.report.next_experiment import to_record
+from cosim.report.quantities import Scales
+from cosim.report.untrained import untrained
+from cosim.report.words import (
+    ANSWERS,
+    Block,
+    blocks,
+    delivered,
+    law,
+    left_out,
+    limit,
+    lowered,
+    model,
+    proven_range,
+    sized,
+    unseen_torque,
+)
+
+WIDTH = 80
+REPORT = "report.html"
+WORDS = {"found": ANSWERS["found"].upper(), "ambiguous": ANSWERS["ambiguous"].upper(), "not_proven": "unproven"}
+NAME, SIZE, RANGE = 21, 12, 16
+ORDER = 10
+"""Columns of what to do, before the text."""
+
+
+def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -> str:
+    """Return the whole answer as lines of at most 80 columns: the verdict, what to do, which file to open, the rest.
+
+    Args:
+        diagnosis: the answer.
+        bold: mark the verdict with an ANSI code.
+        out: folder of its files, where they were written.
+    """
+    scales = Scales.of(diagnosis)
+    title = printable(_title(diagnosis))
+    parts = [
+        [f"\033[1m{line}\033[0m" if bold else line for line in textwrap.wrap(title, WIDTH)],
+        [line for one in diagnosis.sanity for line in _ordered("Careful", one.statement)],
+        [line for block in blocks(diagnosis) for line in _to_do(block, diagnosis)],
+        _files(diagnosis, scales, out),
+        [""],
+        [line for block in blocks(diagnosis) for line in _block(block, scales)],
+        _goes_with(diagnosis),
+        _wrapped(untrained(diagnosis, scales), 2) if "unknown" in diagnosis.verdict else [],
+        _rest(diagnosis, scales),
+        _wrapped(diagnosis.learned.get("statement", "") or diagnosis.not_learned.get("statement", ""), 0),
+        _formulas(diagnosis),
+        _wrapped(law(diagnosis), 0),
+        _error(diagnosis, scales),
+        _next(diagnosis),
+        _wrote(diagnosis),
+    ]
+    return "\n".join(line for part in parts for line in part)
+
+
+def _ordered(word: str, text: str) -> list[str]:
+    """Return a word and what it is about, set off to the right of it."""
+    margin = " " * ORDER
+    return textwrap.wrap(printable(f"{word:<{ORDER}}{text}"), WIDTH, subsequent_indent=margin)
+
+
+def _to_do(block: Block, diagnosis: Diagnosis) -> list[str]:
+    """Return what to do about a finding."""
+    action = do(block, diagnosis) if block.answer != "not_proven" else ""
+    return _ordered("Do", f"{block.title}: {action[:1].lower()}{action[1:]}") if action else []
+
+
+def _files(diagnosis: Diagnosis, scales: Scales, out: Path | None) -> list[str]:
+    """Return which file to open, and which model to use where."""
+    lines = _ordered("Open", str(out / REPORT)) if out and REPORT in diagnosis.files else []
+    proven, files = proven_range(diagnosis, scales), delivered(diagnosis)
+    suffix = f" (proven {proven})" if proven else ""
+    return lines + (_ordered("Use", files[0] + suffix) if files else [])
+
+
+def print_summary(diagnosis: Diagnosis, stream: TextIO | None = None) -> None:
+    """Print the summary; bold only on a terminal that wants it (NO_COLOR, TERM=dumb)."""
+    out = stream or sys.stdout
+    text = summary(diagnosis, bold=styled(out))
+    encoding = getattr(out, "encoding", None) or "utf-8"
+    print(text.encode(encoding, "replace").decode(encoding), file=out)
+
+
+def styled(stream: TextIO) -> bool:
+    """Return whether a stream is a terminal that takes ANSI codes."""
+    return stream.isatty() and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+
+
+def _title(diagnosis: Diagnosis) -> str:
+    card = model(diagnosis) or diagnosis.mount
+    title = heading(diagnosis, card)
+    return title if card in title else f"{title} ({card})"
+
+
+def _block(block: Block, scales: Scales) -> list[str]:
+    """Return one row, or one a rival, joined by "or"."""
+    if len(block.findings) == 1:
+        return _row(WORDS.get(block.answer, block.answer), block.first, scales)
+    first = _row("EITHER", block.first, scales)
+    return first + [line for rival in block.findings[1:] for line in _wrapped(_rival(rival), 12)]
+
+
+def _rival(finding: Finding) -> str:
+    return f"or {lowered(finding.title)}, probability {finding.probability:.2f}"
+
+
+def _row(word: str, finding: Finding, scales: Scales) -> list[str]:
+    """Return answer, name and size with its range of a finding, and below it probability and place."""
+    told = f"probability {finding.probability:.2f}" if finding.answer in ("found", "ambiguous") else ""
+    size, size_range = sized(finding)
+    columns = f"  {word:<9} {lowered(finding.title):<{NAME}} {size:<{SIZE}} {size_range:<{RANGE}}"
+    first = textwrap.wrap(printable(columns.rstrip()), WIDTH, subsequent_indent=" " * 12) or [""]
+    return first + _wrapped(", ".join(text for text in (told, where(finding, scales)) if text), 12)
+
+
+def _wrapped(text: str, indent: int) -> list[str]:
+    margin = " " * indent
+    return textwrap.wrap(printable(text), WIDTH, initial_indent=margin, subsequent_indent=margin)
+
+
+def _goes_with(diagnosis: Diagnosis) -> list[str]:
+    """Return on what an unknown rest depends."""
+    return _wrapped(f"The rest goes with: {', '.join(diagnosis.depends_on)}", 2) if diagnosis.depends_on else []
+
+
+def _formulas(diagnosis: Diagnosis) -> list[str]:
+    """Return each closed form that is as good on unseen recordings as what was learned, with its numbers."""
+    lines = []
+    for one in diagnosis.learned.get("formula", ()):
+        numbers = ", ".join(
+            f"{name} {told['value']:.3g}{'' if told['unit'] == '1' else ' ' + told['unit']}"
+            for name, told in one["parameters"].items()
+        )
+        lines += _wrapped(f"As good, and shorter: {one['equation']}; {numbers}", 0)
+    return lines
+
+
+def proposed(diagnosis: Diagnosis, files: Sequence[Path]) -> str:
+    """Say where the formulas were written as effects, or why there is nothing to propose."""
+    if files:
+        return f"Proposed, for you to review: {', '.join(map(str, files))}; no model holds it."
+    if diagnosis.learned:
+        return "Nothing to propose: no formula is as good as what was learned."
+    unknown = "unknown" in diagnosis.verdict
+    reason = "nothing was learned for what has no name" if unknown else "nothing is left without a name"
+    return f"Nothing to propose: {reason}."
+
+
+def _rest(diagnosis: Diagnosis, scales: Scales) -> list[str]:
+    """Return what was not seen, with the size that would have shown, and what could not be tested."""
+    lines: list[str] = []
+    least = unseen_torque(diagnosis, scales)
+    limits = ", ".join(_limit(one, least) for one in diagnosis.findings if one.answer == "not_seen")
+    untold = _untold([one for one in diagnosis.findings if one.answer == "not_testable"])
+    for word, text in (("not seen", limits), ("no test", untold)):
+        if text:
+            lines += textwrap.wrap(f"  {word:<9} {printable(text)}", WIDTH, subsequent_indent=" " * 12)
+    return lines
+
+
+def _limit(finding: Finding, least: str) -> str:
+    """Return a name with the size from which it would have shown."""
+    said = limit(finding) or least
+    return _with(lowered(finding.title), f"< {said}" if said[:1].isdigit() else said)
+
+
+def _untold(findings: Sequence[Finding]) -> str:
+    """Return names with why they cannot be tested, a reason that several share once."""
+    sharing: dict[str, list[str]] = {}
+    for finding in findings:
+        sharing.setdefault(finding.evidence.rstrip("."), []).append(lowered(finding.title))
+    each = {reason: f"each: {reason}" if len(names) > 1 and reason else reason for reason, names in sharing.items()}
+    return ", ".join(_with(", ".join(names), each[reason]) for reason, names in sharing.items())
+
+
+def _with(name: str, said: str) -> str:
+    said = said.replace("\N{NO-BREAK SPACE}", " ").rstrip(".")
+    return name + (f" ({said})" if said else "")
+
+
+def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:
+    held, unit = diagnosis.heldout, scales.torque
+    before, after, noise = (unit.number(x) for x in (held.before_rms, held.after_rms, held.floor_rms))
+    added = len({finding.effect for finding in diagnosis.in_model})
+    improved = f" with the effect{'s' if added > 1 else ''} {after}," if added else ""
+    improved = f" with what was learned {after}," if diagnosis.learned else improved
+    return _wrapped(
+        f"Error on the recording not fitted, RMS [{unit.unit}]: refitted {before},{improved} noise {noise}", 0
+    )
+
+
+def _next(diagnosis: Diagnosis) -> list[str]:
+    """Return the one experiment that would tell more, and its command."""
+    plan = diagnosis.next_experiment
+    said = [to_record(diagnosis)] if plan.get("description") else []
+    said += [f"cosim run {plan['scenario']} --out next"] if plan.get("scenario") else []
+    said += [str(plan["command"])] if plan.get("command") else []
+    return _wrapped("Next: " + ", then: ".join(said), 0) if said else []
+
+
+def _wrote(diagnosis: Diagnosis) -> list[str]:
+    names = [*diagnosis.files, *reversed(delivered(diagnosis))]
+    lines = [f"Wrote {' '.join(names)}" if names else "", *left_out(diagnosis)]
+    return [line for text in lines for line in _wrapped(text, 0)]
+
+
+def printable(text: str) -> str:
+    """Return text without control characters: a name in a file must not steer the terminal."""
+    return "".join(letter if letter.isprintable() else " " for letter in text)
+
+
+__all__ = ["print_summary", "printable", "proposed", "styled", "summary"]
