@@ -9,8 +9,8 @@ import pytest
 from motions import Array, Motion
 
 from cosim.diagnosis.answer.ledger import all_pass
+from cosim.diagnosis.search import admissibility
 from cosim.diagnosis.search.admissibility import in_time, is_degenerate, name_rules, needs_turns
-from cosim.diagnosis.search.stages import admissibility
 
 
 class Hypothesis:

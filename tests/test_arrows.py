@@ -79,7 +79,7 @@ def belongs(name: str, *rooms: str) -> bool:
 
 
 def folder_of(name: str) -> str:
-    """cosim.system.plan -> cosim.system; rooms of the diagnosis are folders; studies and physics are one folder each."""
+    """cosim.system.plan -> cosim.system; rooms of the diagnosis are folders; studies and physics one folder each."""
     parts = name.split(".")
     if (room := ".".join(parts[:3])) in ROOMS:
         return room

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.search import rivals
 from cosim.diagnosis.search.rivals import AcceptedEffect, Examined, examine, explains, grouped, margins
-from cosim.diagnosis.search.stages import rivals
 
 RULES = replace(POLICY, set_margin=3.0, keep_evidence=8.0)
 

@@ -116,7 +116,7 @@ class TestCommand:
         assert self.run(self.arguments(folder, out, "--json")) == 0
         printed = json.loads(capsys.readouterr().out)
         assert printed == json.loads((out / "diagnosis.json").read_text())
-        schema = json.loads((files("cosim") / "diagnosis" / "schema.json").read_text())
+        schema = json.loads((files("cosim") / "delivery" / "schema.json").read_text())
         jsonschema.Draft202012Validator(schema).validate(printed)
         assert sorted(printed["verdict"]) == ["cogging", "friction_asymmetry"]
         assert printed["heldout"]["after_rms"] < 0.15 * printed["heldout"]["before_rms"]
@@ -156,7 +156,7 @@ class TestCommand:
         assert "Wrote diagnosis.json card.toml" in printed
         assert "report.html" not in printed
         told = json.loads((out / "diagnosis.json").read_text())
-        schema = json.loads((files("cosim") / "diagnosis" / "schema.json").read_text())
+        schema = json.loads((files("cosim") / "delivery" / "schema.json").read_text())
         jsonschema.Draft202012Validator(schema).validate(told)
         assert sorted(told["verdict"]) == ["cogging", "friction_asymmetry"]
         assert told["provenance"]["command"].endswith(f"--propose {tmp_path / 'proposed'} --quick")

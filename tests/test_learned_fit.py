@@ -10,9 +10,9 @@ from learned_cases import droop, learned, parts, recording, wanders, warm_place
 from test_unknown import FC, Array, Extra, iron, kick
 
 from cosim.delivery.deliver import as_json, deliver_quickly
+from cosim.delivery.proposal import Proposal
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
-from cosim.delivery.proposal import Proposal
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.measure.protocol import CUTOFF
 from cosim.diagnosis.terms.learn import SURE, learn

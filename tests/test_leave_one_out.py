@@ -11,7 +11,7 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.effects.candidates import Candidate
 from cosim.diagnosis.evidence.comparison import Screened
-from cosim.diagnosis.search.stages import stages as search
+from cosim.diagnosis.search import stages as search
 from cosim.diagnosis.terms.dictionary import dictionary
 from cosim.estimation.prepare import prepare
 from cosim_studies.proof.generator import make_case, to_toml

@@ -169,7 +169,7 @@ def test_who_calls_what_is_noted_for_each_test_that_passes(tmp_path: Path) -> No
     assert done.returncode == 0, done.stderr
     found = read(out)
     assert [one.seconds for one in found] == sorted(one.seconds for one in found)
-    source = (mutants.HOME / "cosim" / "diagnosis" / "proof.py").read_text("utf-8")
+    source = (mutants.HOME / "cosim" / "diagnosis" / "search" / "proof.py").read_text("utf-8")
     line = source[: source.index("def prove(")].count("\n") + 1
     assert all("prove" in one.calls["cosim/diagnosis/search/proof.py"] for one in found)
     assert len(mutants_choice.calling("cosim/diagnosis/search/proof.py", source, line, found)) == len(found)

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from test_search import compared
 
+from cosim.diagnosis.search import side_by_side
 from cosim.diagnosis.search.side_by_side import SideBySide
-from cosim.diagnosis.search.stages import CandidateFit, InTurn, side_by_side, starts
+from cosim.diagnosis.search.stages import CandidateFit, InTurn, starts
 from cosim.support.cell import Cell, LostError
 from pyfmi_models.effects.backlash import Backlash
 

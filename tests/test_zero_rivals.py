@@ -11,8 +11,9 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.decide.decision import EffectScores, open_rivals
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search import rivals
 from cosim.diagnosis.search.rivals import AcceptedEffect, examine, explains, margins
-from cosim.diagnosis.search.stages import CandidateFit, Search, Stage, rivals, weighed
+from cosim.diagnosis.search.stages import CandidateFit, Search, Stage, weighed
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
-from cosim.diagnosis.terms.spelled import Spelled
 from cosim.diagnosis.answer.entries import NotLearnedEntry
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.decide.decision import Decision, ResidualScores, beside_rest, decide, least_left, rest_rules
@@ -35,6 +34,7 @@ from cosim.diagnosis.search.scores import effect_scores, residual_scores
 from cosim.diagnosis.search.sizes import standard_errors
 from cosim.diagnosis.search.stages import InTurn, search
 from cosim.diagnosis.terms.learn import NOTHING_TRIED, Learned, learn
+from cosim.diagnosis.terms.spelled import Spelled
 from cosim.diagnosis.trust.admission import check_effects, check_recordings
 from cosim.diagnosis.trust.denied import beyond_denial, without_denied
 from cosim.diagnosis.trust.doubts import doubts, of_base, single_readings

@@ -29,8 +29,9 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.evidence import comparison
 from cosim.diagnosis.measure import bounds
-from cosim.diagnosis.search.stages import Start, global_test
-from cosim.diagnosis.search.stages import stages as search
+from cosim.diagnosis.search import global_test
+from cosim.diagnosis.search import stages as search
+from cosim.diagnosis.search.stages import Start
 from cosim.diagnosis.terms import flexible
 from cosim.support.version import __version__
 from cosim_studies.proof.conduct import code

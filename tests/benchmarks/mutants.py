@@ -49,9 +49,13 @@ GROUPS = {
     ),
     "master": ("cosim/master/*.py", "cosim/master/loop/[!b]*.py"),
     "hardware": ("cosim/hardware/*.py",),
-    "decision": tuple(
-        f"cosim/diagnosis/{name}.py"
-        for name in ("decision", "marginal", "rivals", "admissibility", "adequacy", "proof")
+    "decision": (
+        "cosim/diagnosis/decide/decision.py",
+        "cosim/diagnosis/evidence/marginal.py",
+        "cosim/diagnosis/evidence/adequacy.py",
+        "cosim/diagnosis/search/rivals.py",
+        "cosim/diagnosis/search/admissibility.py",
+        "cosim/diagnosis/search/proof.py",
     ),
 }
 """Modules whose tests are tested; from each group as many mutants."""

@@ -186,8 +186,8 @@ def page(rows: Sequence[dict[str, Any]], options: argparse.Namespace, seconds: f
         f"mount-cosim {__version__}, code {code()[:16]}, seed {options.seed}: {len(usual)} cases of the home "
         f"generator, {seconds / 60:.0f} minutes. As the policy is, {sum(map(is_right, usual.values()))} answers are "
         "right: nothing where nothing is concealed, `unknown` first, the name first, all names of several. Each "
-        "constant of `cosim/diagnosis/decide/policy.py` at half and at twice its value: answers that become another, and "
-        "how many are right then. Cases in [table.csv](table.csv). No number on this page was written by hand.",
+        "constant of `cosim/diagnosis/decide/policy.py` at half and at twice its value: answers that become another, "
+        "and how many are right then. Cases in [table.csv](table.csv). No number on this page was written by hand.",
         "",
         "| constant | value | others at half | right | others at twice | right |",
         "|---|---|---|---|---|---|",
