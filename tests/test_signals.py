@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from cosim.data.signals import (
     Sine,
     Slews,
     Steps,
+    check_signal,
 )
 from cosim.data.star import SIDEREAL_RATE
 from cosim.support.errors import RecordingError, SignalError
@@ -104,6 +106,27 @@ def test_steps_act_from_the_tick_of_their_time() -> None:
 @pytest.mark.parametrize("signal", [*MOTIONS, Noise(kind="noise", rms=2.0, seed=3)], ids=lambda signal: signal.kind)
 def test_chunks_do_not_matter(signal: Signal, ticks: int, chunk: int) -> None:
     np.testing.assert_array_equal(values(signal, ticks, chunk), values(signal, ticks, ticks))
+
+
+def test_a_sum_of_many_sines_costs_what_its_sines_cost_and_adds_them_in_their_order() -> None:
+    many = Multisine(kind="multisine", frequencies=np.linspace(0.1, 400, 3000).tolist(), amplitudes=1e-3)
+    began = process_time()
+    values(many, 1, 1)
+    short = process_time() - began
+    began = process_time()
+    together = values(many, 40, 40)
+    assert short < process_time() - began, "each sine apart takes as long for one tick as for many"
+    np.testing.assert_array_equal(values(many, 40, 1), together)
+
+
+def test_a_sum_of_too_many_sines_is_refused_with_what_to_do() -> None:
+    many = Multisine(kind="multisine", frequencies=np.linspace(0.1, 400, 100_000).tolist(), amplitudes=1e-3)
+    rule = re.escape(
+        "has 100,000 frequencies; in 150,000 steps that is 1.5e+10 sines, and 2e+09 are the most. Take fewer"
+    )
+    with pytest.raises(SignalError, match=rule):
+        check_signal("sum", many, 1e-4, 150_000)
+    check_signal("sum", many, 1e-4, 20_000)
 
 
 def test_noise_is_white_of_its_size_and_repeats_by_its_seed() -> None:

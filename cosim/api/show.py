@@ -21,6 +21,8 @@ Row = Mapping[str, Json]
 Tables = Mapping[str, Sequence[Row]]
 NO_RECORDINGS = (".fmu", ".ssp", ".ssd", ".toml", "")
 """Suffixes of what is no recording; a name without one is that of what is shipped."""
+START = 200
+"""Characters of a start value; that of an array of a million numbers has some millions."""
 WIRES = "wires"
 """The table that is drawn on a screen."""
 
@@ -150,7 +152,8 @@ def _of_text(recording: Recording, name: str) -> Row:
 def _fmu(path: Path) -> tuple[Facts, Tables]:
     from cosim.fmi.description import describe as read
     from cosim.fmi.sound import doubts_of
-    from cosim.fmi.variables import ports_of
+    from cosim.fmi.variables import variables_of
+    from cosim.support.memory import many_objects
 
     description = read(path)
     kinds = {"co-simulation": description.coSimulation, "model exchange": description.modelExchange}
@@ -164,20 +167,30 @@ def _fmu(path: Path) -> tuple[Facts, Tables]:
     }
     facts |= {f"note {number}": f"{doubt}." for number, doubt in enumerate(doubts_of(description), 1)}
     order = ("input", "output", "parameter", "structuralParameter", "calculatedParameter", "local", "independent")
-    ports = sorted(ports_of(description).values(), key=lambda port: order.index(port.causality))
-    variables = [
-        {
-            "variable": port.name,
-            "causality": port.causality,
-            "type": _type(port),
-            "unit": port.unit,
-            "start": "" if port.start is None else f"{port.start:g}" if isinstance(port.start, float) else port.start,
-            "description": port.description,
-        }
-        for port in ports
-        if not port.array
-    ]
+    with many_objects():
+        ports = sorted(variables_of(description), key=lambda port: order.index(port.causality))
+        variables = [
+            {
+                "variable": port.name,
+                "causality": port.causality,
+                "type": _type(port),
+                "unit": port.unit,
+                "start": _first_values(port.start),
+                "description": port.description,
+            }
+            for port in ports
+        ]
     return facts, {"variables": variables}
+
+
+def _first_values(start: Any) -> str:
+    """Write a start value; of an array of many the first ones and their number."""
+    if start is None or isinstance(start, float):
+        return "" if start is None else f"{start:g}"
+    first = str(start)[:START].split()
+    if len(start) <= START or len(first) < 2:
+        return str(start)
+    return f"{' '.join(first[:-1])} ... ({len(start.split()):,} values)"
 
 
 def _type(port: Any) -> str:

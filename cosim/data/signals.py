@@ -15,6 +15,9 @@ from pydantic import Field, model_validator
 from cosim.data.set_points import Chirp, Multisine, Ramp, Sidereal, SignalSection, Sine, Slews, Star, Stream
 from cosim.support.errors import SignalError
 
+MOST_SINES = 2e9
+"""Sines that a signal may add in a run: a minute or two of a processor."""
+
 
 class Signal(Protocol):
     """What the master feeds from outside."""
@@ -27,16 +30,21 @@ class Signal(Protocol):
         """Make a stream that starts at tick 0; a tick lasts `step` seconds."""
 
 
-def check_frequency(name: str, signal: Signal, step: float) -> None:
-    """Refuse a signal that its samples could not show.
+def check_signal(name: str, signal: Signal, step: float, ticks: int) -> None:
+    """Refuse a signal that its samples could not show, or that takes minutes to compute.
 
     Raises:
-        SignalError: a frequency is half of that of the ticks, or above.
+        SignalError: a frequency is half of that of the ticks, or above; or it adds too many sines in a run of `ticks`.
     """
     fastest, limit = getattr(signal, "fastest", 0.0), 0.5 / step
     if fastest >= limit:
         rule = f"at a step of {step:g} s it must stay below {limit:g} Hz"
         raise SignalError(f'The signal "{name}" has {fastest:g} Hz; {rule}.', culprit=name, value=fastest)
+    tones = getattr(signal, "tones", 1)
+    if tones * ticks > MOST_SINES and tones > 1:
+        rule = f"in {ticks:,} steps that is {tones * ticks:.3g} sines, and {MOST_SINES:.3g} are the most"
+        way = 'Take fewer, a shorter run, or replay the sum from a recording (kind = "recorded")'
+        raise SignalError(f'The signal "{name}" has {tones:,} frequencies; {rule}. {way}.', culprit=name, value=tones)
 
 
 class Constant(SignalSection):
@@ -161,5 +169,5 @@ __all__ = [
     "Star",
     "Steps",
     "Stream",
-    "check_frequency",
+    "check_signal",
 ]

@@ -39,7 +39,7 @@ STATUSES = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Port:
     """A variable of a component as the outside sees it, or an element of an array; `unit` is empty where unknown.
 

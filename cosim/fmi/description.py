@@ -1,18 +1,23 @@
 """What an FMU says about itself, read by FMPy and judged: can it run here, and which variables does it have."""
 
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from io import BytesIO
 from math import inf
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from cosim.fmi.sound import check_variables, check_xml
-from cosim.support.archive import contents
+from cosim.fmi.sound import check_count, check_variables
+from cosim.support.archive import contents, read
 from cosim.support.errors import FmuError
 from cosim.support.files import sha256
+from cosim.support.memory import many_objects
+from cosim.support.xml_files import LARGEST, check_xml
 
-READ = {"modelDescription.xml", "sources/buildDescription.xml"}
+DESCRIPTION = "modelDescription.xml"
+READ = {DESCRIPTION, "sources/buildDescription.xml"}
 """XML members that FMPy reads."""
 INTERFACES = {
     "coSimulation": "co-simulation",
@@ -34,14 +39,18 @@ def describe(path: Path) -> Any:
         raise FmuError(f"{path} does not exist.", culprit=str(path))
     if not zipfile.is_zipfile(path):
         raise FmuError(f"{path} is no FMU: it is not a zip archive.", culprit=str(path))
-    names = {one.filename for one in contents(path, complaint_of(path))}
-    if "modelDescription.xml" not in names:
+    complaint = complaint_of(path)
+    names = {one.filename for one in contents(path, complaint)}
+    if DESCRIPTION not in names:
         raise FmuError(f"{path} is no FMU: the archive holds no modelDescription.xml.", culprit=str(path))
     try:
         for member in names & READ:
-            check_xml(path, member)
-        version = _version(path)
-        with path.open("rb") as file:  # FMPy would leave it open where it cannot read it
+            check_xml(read(path, member, complaint, LARGEST), member, complaint)
+        content = read(path, DESCRIPTION, complaint)
+        check_count(content, path)
+        version = _version(content)
+        # FMPy would leave the file open where it cannot read it
+        with path.open("rb") as file, _long_attributes(), many_objects():
             description = fmpy.read_model_description(file, validate=False) if version[:2] in ("2.", "3.") else None
     except FmuError:
         raise
@@ -161,9 +170,21 @@ def _names(path: Path) -> list[str]:
         return archive.namelist()
 
 
-def _version(path: Path) -> str:
-    with zipfile.ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
-        return ElementTree.parse(file).getroot().get("fmiVersion", "?")
+def _version(content: bytes) -> str:
+    _, root = next(ElementTree.iterparse(BytesIO(content), ("start",)))
+    return str(root.get("fmiVersion", "?"))
+
+
+@contextmanager
+def _long_attributes() -> Iterator[None]:
+    """Let libxml2 take attributes of more than 10 MB: a million start values of an array are longer."""
+    from lxml import etree
+
+    etree.set_default_parser(etree.XMLParser(huge_tree=True, resolve_entities=False, no_network=True))
+    try:
+        yield
+    finally:
+        etree.set_default_parser(None)
 
 
 def origin_of(path: Path, description: Any) -> dict[str, Any]:

@@ -1,20 +1,19 @@
 """What the description of somebody else's FMU must not hold, as far as FMPy does not see to it."""
 
-import io
-import zipfile
+from collections.abc import Mapping
 from math import inf
 from pathlib import Path
 from typing import Any
-from xml.parsers import expat
 
 from cosim.support.errors import FmuError
+from cosim.support.xml_files import in_ascii
 
 REFERENCES = 2**32
 """A value reference is a number of 32 bits."""
 INDICATORS = 1_000_000
 """Event indicators at most, for which memory is taken."""
-LARGEST = 2**28
-"""Bytes of an XML member at most."""
+VARIABLES = 300_000
+"""Variables at most, each of which takes 2 kB of memory while it is read; tools write 200,000."""
 WORDS = {
     "causality": ("parameter", "calculatedParameter", "input", "output", "local", "independent"),
     "variability": ("constant", "fixed", "tunable", "discrete", "continuous"),
@@ -26,34 +25,19 @@ _MOST_DOUBTS = 5
 """Doubts about variables that are told one by one."""
 
 
-class _Begun(Exception):
-    """The root of the document has begun."""
-
-
-def check_xml(path: Path, member: str) -> None:
-    """Refuse an XML member that is too large, or that defines what it is made of (DOCTYPE): FMI needs none.
+def check_count(content: bytes, path: Path) -> None:
+    """Refuse the text of a model description with more variables than can be read in a reasonable time.
 
     Raises:
-        FmuError: names the archive and the member.
+        FmuError: names the FMU and the limit.
     """
-
-    def doctype(*_: Any) -> None:
-        raise FmuError(f"{path} has a DOCTYPE in {member}, which FMI does not know.", culprit=str(path))
-
-    def begun(*_: Any) -> None:
-        raise _Begun
-
-    parser = expat.ParserCreate()
-    parser.StartDoctypeDeclHandler, parser.StartElementHandler = doctype, begun
-    with zipfile.ZipFile(path) as archive:
-        if archive.getinfo(member).file_size > LARGEST:
-            raise FmuError(f"{path} has more than {LARGEST >> 20} MiB of {member}.", culprit=str(path))
-        try:
-            with archive.open(member) as file:
-                for piece in iter(lambda: file.read(io.DEFAULT_BUFFER_SIZE), b""):
-                    parser.Parse(piece)
-        except (_Begun, expat.ExpatError, LookupError, ValueError):
-            return  # it is well so far, or no XML, which is said where it is read
+    text = in_ascii(content)
+    count = min(
+        text.count(b"valueReference"), text.count(b"name")
+    )  # FMI 3 repeats references, and units have names too
+    if count > VARIABLES:
+        message = f"{path} has {count:,} variables; {VARIABLES:,} are the most. Export it without inner ones."
+        raise FmuError(message, culprit=str(path), value=count)
 
 
 def check_variables(path: Path, description: Any) -> None:
@@ -67,6 +51,7 @@ def check_variables(path: Path, description: Any) -> None:
         message = f"{path} has numberOfEventIndicators = {indicators}; {INDICATORS:,} are the most."
         raise FmuError(message, culprit=str(path), value=indicators)
     names: set[str] = set()
+    known_kinds: set[tuple[str, ...]] = set()
     words = WORDS | {"causality": (*WORDS["causality"], *_STRUCTURAL.get(description.fmiVersion[:1], ()))}
     for variable in description.modelVariables:
         if not variable.name:
@@ -77,13 +62,20 @@ def check_variables(path: Path, description: Any) -> None:
             raise _error(path, variable, f"has the value reference {reference}; {rule}")
         for key in ("min", "max", "nominal"):
             _check_number(path, variable, key)
-        for key, known in words.items():
-            if getattr(variable, key) not in (None, *known):
-                rule = f"FMI {description.fmiVersion} knows {', '.join(known)}"
-                raise _error(path, variable, f'has {key} = "{getattr(variable, key)}"; {rule}', *known)
+        kind = (variable.causality, variable.variability, variable.initial)
+        if kind not in known_kinds:
+            _check_words(path, variable, words, description.fmiVersion)
+            known_kinds.add(kind)
         if variable.name in names:
             raise _error(path, variable, "is there twice")
         names.add(variable.name)
+
+
+def _check_words(path: Path, variable: Any, words: Mapping[str, tuple[str, ...]], version: str) -> None:
+    for key, known in words.items():
+        if getattr(variable, key) not in (None, *known):
+            rule = f"FMI {version} knows {', '.join(known)}"
+            raise _error(path, variable, f'has {key} = "{getattr(variable, key)}"; {rule}', *known)
 
 
 def doubts_of(description: Any) -> tuple[str, ...]:
@@ -116,7 +108,8 @@ def _doubt(variable: Any) -> str:
 def inherited(variable: Any, key: str) -> str | None:
     """Return an attribute of a variable, or that of its declared type where it states none itself."""
     own: str | None = getattr(variable, key, None)
-    return own if own is not None else getattr(variable.declaredType, key, None)
+    declared = variable.declaredType
+    return own if own is not None or declared is None else getattr(declared, key, None)
 
 
 def _contradiction(low: str | None, high: str | None) -> str:
@@ -134,6 +127,8 @@ def _number(text: str) -> float | None:
 
 def _check_number(path: Path, variable: Any, key: str) -> None:
     text = inherited(variable, key)
+    if text is None:
+        return
     try:
         float(text or 0)
     except (TypeError, ValueError):

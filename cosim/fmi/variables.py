@@ -5,44 +5,57 @@ The size of an array may follow structural parameters; it is that of their start
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import fields
 from math import inf, prod
 from typing import Any
 
 from cosim.fmi.component import Port
 from cosim.fmi.sound import inherited
 from cosim.fmi.types import FLOATS, OF_FMI2, elements, indexed
+from cosim.support.memory import many_objects
 from cosim.support.units import BASE, in_base_units
 
 MOST_ELEMENTS = 65_536
 """Elements of an array at most that become ports; a larger one is shown, and can be neither wired nor recorded."""
+MOST_TOGETHER = 4 * MOST_ELEMENTS
+"""Elements of all arrays of an FMU that become ports, of the first ones: each takes half a kB."""
 
 
 def ports_of(description: Any, sizes: Mapping[str, int] | None = None) -> dict[str, Port]:
-    """List the variables of a model description by name.
+    """List the variables of a model description and the elements of its arrays by name.
 
     Args:
         description: FMPy's.
         sizes: values of structural parameters by name where they are not their start values.
     """
-    own = _own_units(description)
-    listed = (port for one in description.modelVariables for port in _ports(one, own, sizes or {}))
     found: dict[str, Port] = {}
-    for port in listed:
-        found.setdefault(port.name, port)
+    room = MOST_TOGETHER
+    with many_objects():
+        for port in variables_of(description, sizes):
+            found.setdefault(port.name, port)
+            count = prod(port.shape) if port.shape else 0
+            if 0 < count <= min(MOST_ELEMENTS, room):
+                room -= count
+                for one in _elements(port, count):
+                    found.setdefault(one.name, one)
     return found
 
 
-def _ports(variable: Any, own_units: Mapping[str, str], sizes: Mapping[str, int]) -> Iterator[Port]:
-    shape = tuple(_size(one, sizes) for one in variable.dimensions)
-    names = [variable.name, *(alias.name for alias in variable.aliases or ())]
-    for port in (_port(variable, name, own_units, shape) for name in names):
-        yield port
-        if 0 < prod(shape) <= MOST_ELEMENTS and shape:
-            starts = _starts(port, prod(shape))
-            for number, index in enumerate(elements(shape)):
-                one = replace(port, name=indexed(port.name, index), start=starts[number], shape=())
-                yield replace(one, array=port.name, element=number)
+def variables_of(description: Any, sizes: Mapping[str, int] | None = None) -> Iterator[Port]:
+    """Yield the variables of a model description under each of their names, arrays whole; arguments of `ports_of`."""
+    own = _own_units(description)
+    for variable in description.modelVariables:
+        shape = tuple(_size(one, sizes or {}) for one in variable.dimensions) if variable.dimensions else ()
+        yield _port(variable, variable.name, own, shape)
+        for alias in variable.aliases or ():
+            yield _port(variable, alias.name, own, shape)
+
+
+def _elements(array: Port, count: int) -> Iterator[Port]:
+    starts = _starts(array, count)
+    common = {one.name: getattr(array, one.name) for one in fields(array)} | {"shape": (), "array": array.name}
+    for number, index in enumerate(elements(array.shape)):
+        yield Port(**common | {"name": indexed(array.name, index), "start": starts[number], "element": number})
 
 
 def _size(dimension: Any, sizes: Mapping[str, int]) -> int:
@@ -52,9 +65,8 @@ def _size(dimension: Any, sizes: Mapping[str, int]) -> int:
 
 
 def _port(variable: Any, name: str, own_units: Mapping[str, str], shape: tuple[int, ...]) -> Port:
-    stated = {key: inherited(variable, key) for key in ("unit", "min", "max")}
+    unit, low, high = inherited(variable, "unit") or "", inherited(variable, "min"), inherited(variable, "max")
     kind = OF_FMI2.get(variable.type, variable.type)
-    unit = stated["unit"] or ""
     return Port(
         name=name,
         reference=variable.valueReference,
@@ -62,8 +74,8 @@ def _port(variable: Any, name: str, own_units: Mapping[str, str], shape: tuple[i
         unit=own_units.get(unit, unit) if kind in FLOATS else "",
         description=variable.description or "",
         start=_start(variable.start, kind, bool(shape)),
-        low=-inf if stated["min"] is None else float(stated["min"]),
-        high=inf if stated["max"] is None else float(stated["max"]),
+        low=-inf if low is None else float(low),
+        high=inf if high is None else float(high),
         not_settable=_not_settable(variable, kind),
         type=kind,
         items=_items(variable.declaredType) if kind == "Enumeration" else {},

@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 
-from cosim.data.signals import Samples, Signal, check_frequency
+from cosim.data.signals import Samples, Signal, check_signal
 from cosim.fmi.alias import Aliased
 from cosim.fmi.component import Component
 from cosim.fmi.function import FunctionComponent, load_function
@@ -84,7 +84,7 @@ def _made(stack: ExitStack, name: str, source: Source) -> Component:
 def _signal(name: str, given: Any, system: System) -> Signal:
     """Return what is given as a signal: a generator as it is, an array or a number as samples."""
     made: Signal = given if hasattr(given, "stream") else Samples(given, name=name)
-    check_frequency(name, made, system.step)
+    check_signal(name, made, system.step, system.ticks)
     if isinstance(made, Samples):
         made.check(system.ticks + system.ends_on_a_row)
     return made

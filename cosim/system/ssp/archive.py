@@ -13,6 +13,7 @@ from cosim.fmi.description import first_line
 from cosim.support.archive import DAMAGED, contents
 from cosim.support.errors import ScenarioError
 from cosim.support.files import cache_home, replacing, sha256
+from cosim.support.xml_files import check_xml
 
 MAIN = "SystemStructure.ssd"
 """The file of the system that is meant where no other is chosen."""
@@ -78,8 +79,10 @@ class Archive:
 
     def xml(self, source: str, tag: str) -> ElementTree.Element:
         """Read an XML member whose root is `tag`, as in `ssv:ParameterSet`."""
+        content = self.read(source)
+        check_xml(content, f'"{source}"', self.error)
         try:
-            root = ElementTree.fromstring(self.read(source))
+            root = ElementTree.fromstring(content)
         except (ElementTree.ParseError, LookupError, ValueError) as error:  # the last two: encodings that are not known
             raise self.error(f'"{source}" is not valid XML: {first_line(error)}') from error
         if root.tag != tagged(tag):
