@@ -8,15 +8,8 @@ import numpy.typing as npt
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.decide.decision import (
-    EffectScores,
-    ResidualScores,
-    TermScores,
-    decide,
-    doubted,
-    least_left,
-    open_rivals,
-)
+from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores, TermScores
+from cosim.diagnosis.decide.decision import decide, doubted, least_left, open_rivals
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.evidence.comparison import Comparison
@@ -63,9 +56,10 @@ def test_a_rival_that_is_beaten_by_the_margin_of_a_set_is_out_of_it_and_the_clos
 
 def test_the_nearer_a_rival_the_less_probable_is_the_effect_and_all_add_up_to_one_at_most() -> None:
     told = [
-        decide([scores("torque_offset", 200.0, gravity_unbalance=m)], QUIET, POLICY).probabilities["torque_offset"]
-        for m in (0.1, 1.0, 2.9)
+        decide(Scores([scores("torque_offset", 200.0, gravity_unbalance=margin)], QUIET), POLICY).probabilities
+        for margin in (0.1, 1.0, 2.9)
     ]
+    told = [one["torque_offset"] for one in told]
     own = [one["torque_offset"] for one in told]
     assert own == sorted(own)
     assert own[0] < own[-1]
@@ -75,26 +69,26 @@ def test_the_nearer_a_rival_the_less_probable_is_the_effect_and_all_add_up_to_on
 
 def test_an_effect_of_little_evidence_is_less_probable_than_one_of_much() -> None:
     few, many = (
-        decide([scores("cogging", evidence)], QUIET, POLICY).probabilities["cogging"]["cogging"]
+        decide(Scores([scores("cogging", evidence)], QUIET), POLICY).probabilities["cogging"]["cogging"]
         for evidence in (1.0, 100.0)
     )
     assert few < many
 
 
 def test_nothing_is_unknown_where_nothing_is_left_and_what_is_left_says_what_it_follows() -> None:
-    assert not decide([], QUIET, POLICY).is_unknown
-    assert decide([], QUIET, POLICY).depends_on == ()
+    assert not decide(Scores([], QUIET), POLICY).is_unknown
+    assert decide(Scores([], QUIET), POLICY).depends_on == ()
     terms = [TermScores("position", POLICY.floor + 5, 3.0, 0.6), TermScores("temperature", POLICY.floor - 5, 3.0, 0.2)]
-    left = decide([], ResidualScores(0.0, 0.0, terms), POLICY)
+    left = decide(Scores([], ResidualScores(0.0, 0.0, terms)), POLICY)
     assert left.is_unknown
     assert left.depends_on == ("position",)
-    large = decide([], ResidualScores(POLICY.large_residual + 0.01, 0.0, (), "time"), POLICY)
+    large = decide(Scores([], ResidualScores(POLICY.large_residual + 0.01, 0.0, (), "time")), POLICY)
     assert large.is_unknown
     assert large.depends_on == ("time",)
 
 
 def test_what_was_surely_learned_is_unknown_too_and_names_stay() -> None:
-    named = decide([scores("cogging", 60.0)], QUIET, POLICY)
+    named = decide(Scores([scores("cogging", 60.0)], QUIET), POLICY)
     more = named.with_rest(("position",), (), POLICY)
     assert (more.is_unknown, more.depends_on, more.sets) == (True, ("position",), named.sets)
     assert more.with_rest(("speed",), (), POLICY) == more
@@ -108,7 +102,7 @@ def test_what_is_left_must_be_more_than_what_the_equations_of_strong_names_lack(
 def test_what_the_held_out_recordings_contradict_is_unknown_only_where_training_is_sure() -> None:
     def is_unknown(evidence: float, share: float, predicted: float = 0.0) -> bool:
         term = TermScores("temperature", evidence, predicted, share)
-        return decide([], ResidualScores(0.0, 0.0, [term]), POLICY).is_unknown
+        return decide(Scores([], ResidualScores(0.0, 0.0, [term])), POLICY).is_unknown
 
     assert not is_unknown(POLICY.floor_alone + 5, -2 * POLICY.contradicted)
     assert not is_unknown(POLICY.floor_alone + 5, 0.0, -2 * POLICY.denied * POLICY.floor_alone)

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from motions import RATE, Array, Motion
 
-from cosim.diagnosis.decide.decision import IN_BURSTS, EffectScores, ResidualScores, decide
+from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores
+from cosim.diagnosis.decide.decision import IN_BURSTS, decide
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.bursts import ABOVE, burst_share
 
@@ -86,7 +87,7 @@ def test_bursts_are_unknown_and_take_nothing_from_a_name() -> None:
     one = EffectScores("cogging", 50.0, {"delay": 9.0}, {"cogging": 0.5, "delay": 0.1}, 20.0, 0.5)
     quiet = ResidualScores(0.0, 0.0, in_bursts=POLICY.large_in_bursts)
     loud = replace(quiet, in_bursts=1.001 * POLICY.large_in_bursts)
-    named, shaken = (decide([one], left, POLICY) for left in (quiet, loud))
+    named, shaken = (decide(Scores([one], left), POLICY) for left in (quiet, loud))
     assert not named.is_unknown
     assert shaken.is_unknown
     assert shaken.depends_on == (IN_BURSTS,)

@@ -5,13 +5,11 @@ from math import exp
 
 import pytest
 
+from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores, TermScores
 from cosim.diagnosis.decide.calibration import calibrated
 from cosim.diagnosis.decide.decision import (
     Decision,
-    EffectScores,
     Gain,
-    ResidualScores,
-    TermScores,
     beside_rest,
     decide,
     doubted,
@@ -167,7 +165,7 @@ def test_beside_what_has_no_name_a_margin_counts_for_a_share() -> None:
         "cable_wrap", 60.0, {"gravity_unbalance": 9.0, "delay": 13.0}, {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
     )
     alone, beside = (
-        decide([one], left(share=share), replace(ROUND, margin_beside_unknown=0.25)) for share in (0.0, 1.0)
+        decide(Scores([one], left(share=share)), replace(ROUND, margin_beside_unknown=0.25)) for share in (0.0, 1.0)
     )
     assert (alone.is_unknown, alone.sets["cable_wrap"]) == (False, ())
     assert (beside.is_unknown, beside.sets["cable_wrap"]) == (True, ("gravity_unbalance",))
@@ -179,7 +177,7 @@ def test_what_was_learned_for_what_has_no_name_leaves_rivals_as_open_as_what_is_
     explained = {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
     one = EffectScores("cable_wrap", 60.0, {"gravity_unbalance": 9.0}, explained)
     rules = replace(ROUND, margin_beside_unknown=0.25)
-    learned, seen = beside_rest([one], ("time",), rules), decide([one], left(share=1.0), rules)
+    learned, seen = beside_rest([one], ("time",), rules), decide(Scores([one], left(share=1.0)), rules)
     assert learned == seen
     assert learned.sets["cable_wrap"] == ("gravity_unbalance",)
 
@@ -199,18 +197,18 @@ def test_what_is_left_beside_a_sure_name_must_reach_its_share_of_that_evidence()
 def test_a_doubtful_name_excuses_nothing_that_is_left() -> None:
     weak = effect("delay", 20.0, 0.5)
     residual = left(TermScores("position", 16.0, 0.0, 0.5))
-    found = decide([weak], residual, ROUND)
+    found = decide(Scores([weak], residual), ROUND)
     assert (found.is_unknown, found.doubtful) == (True, ("delay",))
-    assert decide([weak], left(), ROUND).doubtful == ()
+    assert decide(Scores([weak], left()), ROUND).doubtful == ()
 
 
 def test_a_name_beside_something_unknown_is_less_likely_unless_it_removes_nearly_all() -> None:
     residual = left(share=1.0)
     sure, doubtful = effect("cogging", 80.0, 0.875), effect("delay", 80.0, 0.875 - LITTLE)
-    found = decide([sure, doubtful], residual, ROUND)
+    found = decide(Scores([sure, doubtful], residual), ROUND)
     assert (found.is_unknown, found.doubtful) == (True, ("delay",))
-    assert decide([sure, replace(doubtful, removes=0.875)], residual, ROUND).doubtful == ()
-    alone = decide([sure, doubtful], left(), ROUND)
+    assert decide(Scores([sure, replace(doubtful, removes=0.875)], residual), ROUND).doubtful == ()
+    alone = decide(Scores([sure, doubtful], left()), ROUND)
     assert found.probabilities["cogging"] == alone.probabilities["cogging"]
     assert found.probabilities["delay"]["delay"] == pytest.approx(0.375 * alone.probabilities["delay"]["delay"])
 
@@ -233,7 +231,7 @@ def test_what_the_rest_follows_is_beyond_a_share_of_its_own_and_of_the_best() ->
 @pytest.mark.parametrize("evidence", [1.0, 2000.0])
 def test_probabilities_are_calibrated_posterior_shares_times_what_is_explained(margin: float, evidence: float) -> None:
     one = EffectScores("delay", evidence, {"lag": margin, "far": 9.0}, {"delay": 0.75, "lag": 0.5, "far": 0.25})
-    found = decide([one], left(), ROUND).probabilities["delay"]
+    found = decide(Scores([one], left()), ROUND).probabilities["delay"]
     total = 1 + exp(-margin) + exp(-9.0) + exp(-min(evidence, 700.0))
     whole = (1 + exp(-margin)) / total
     lag = exp(-0.25 * margin) / (1 + exp(-0.25 * margin))
@@ -251,5 +249,5 @@ def test_a_term_that_removes_next_to_nothing_in_training_and_held_out_is_no_unkn
     sure = TermScores("acceleration", 1000.0, 100.0, 0.0, plain=ROUND.least_plain_gain)
     barely = replace(sure, plain=0.99 * ROUND.least_plain_gain)
     there = replace(barely, share=ROUND.least_plain_gain)
-    said = [decide([], ResidualScores(0.0, 0.0, [one]), ROUND).is_unknown for one in (sure, barely, there)]
+    said = [decide(Scores([], ResidualScores(0.0, 0.0, [one])), ROUND).is_unknown for one in (sure, barely, there)]
     assert said == [True, False, True]

@@ -11,11 +11,13 @@ from test_unknown import FC, Array, Extra, iron, kick
 
 from cosim.delivery.deliver import as_json, deliver_quickly
 from cosim.delivery.proposal import Proposal
+from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores
+from cosim.diagnosis.decide.decision import decide
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.measure.protocol import CUTOFF
-from cosim.diagnosis.terms.learn import SURE, learn
+from cosim.diagnosis.terms.learn import SURE, Learned, learn
 from cosim.diagnosis.terms.select import begun, paths
 from cosim.estimation.prepare import prepare
 from pyfmi_models.card import parse_card, read_card
@@ -58,6 +60,11 @@ def nothing(now: dict[str, Array]) -> Array:
         (swerve, "speed and acceleration", 0.5),
     ],
 )
+def says_unknown(found: Learned, *named: EffectScores) -> bool:
+    """Whether a learned term alone makes the answer "unknown", beside effects that are named."""
+    return decide(Scores(named, ResidualScores(0.0, 0.0), found.scores()), POLICY).is_unknown
+
+
 def test_what_has_no_name_is_modelled_and_the_held_out_error_falls(extra: Extra, quantity: str, least: float) -> None:
     found = learned(extra)
     assert found is not None
@@ -108,10 +115,11 @@ def test_sure_is_what_three_kinds_of_recordings_prove_each_for_itself() -> None:
 def test_what_is_sure_but_a_small_share_of_the_rest_or_of_a_name_does_not_say_unknown() -> None:
     found = learned(warm_place)
     assert found is not None
-    assert found.says_unknown(POLICY, 0.0)
-    assert not replace(found, after=0.95 * found.before).says_unknown(POLICY, 0.0)
-    assert not found.says_unknown(POLICY, min(found.evidence) + 1)
-    assert not replace(found, quantities=("speed",)).says_unknown(POLICY, 0.0)  # another friction law, no more
+    assert says_unknown(found)
+    assert not says_unknown(replace(found, after=0.95 * found.before))
+    stronger = EffectScores("cogging", (min(found.evidence) + 1) / POLICY.imitation, {}, {"cogging": 1.0})
+    assert not says_unknown(found, stronger)
+    assert not says_unknown(replace(found, quantities=("speed",)))  # another friction law, no more
 
 
 def test_the_size_of_a_term_is_that_of_what_was_missing() -> None:

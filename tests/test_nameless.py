@@ -10,7 +10,8 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.diagnosis import diagnose as whole
 from cosim.diagnosis.answer.result import Diagnosis
-from cosim.diagnosis.decide.decision import ResidualScores, decide, followed
+from cosim.diagnosis.answer.scores import ResidualScores, Scores
+from cosim.diagnosis.decide.decision import decide, followed
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import HYPOTHESES, hypothesis_of
 from cosim.diagnosis.search.nameless import Nameless, _challenge, _Offered, nameless
@@ -107,9 +108,9 @@ def test_friction_over_position_keeps_its_name(tmp_path: Path) -> None:
 
 def test_what_takes_a_name_is_unknown_whatever_is_left_beside_it() -> None:
     residual = ResidualScores(0.0, 0.0, in_place=("torque and position",))
-    assert decide([], residual, POLICY).is_unknown
+    assert decide(Scores([], residual), POLICY).is_unknown
     assert followed(residual, POLICY) == ("torque and position",)
-    assert not decide([], ResidualScores(0.0, 0.0), POLICY).is_unknown
+    assert not decide(Scores([], ResidualScores(0.0, 0.0)), POLICY).is_unknown
 
 
 def test_tables_of_hypotheses_are_terms_that_exist() -> None:

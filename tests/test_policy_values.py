@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from cosim.diagnosis.decide.decision import Gain, ResidualScores, TermScores, is_left, stands
+from cosim.diagnosis.answer.scores import ResidualScores, TermScores
+from cosim.diagnosis.decide.decision import Gain, is_left, stands
 from cosim.diagnosis.decide.policy import POLICY, Policy
 from cosim.diagnosis.search.stages import least
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.decide.decision import Decision, ResidualScores, decide
+from cosim.diagnosis.answer.scores import ResidualScores, Scores
+from cosim.diagnosis.decide.decision import Decision, decide
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.adequacy import over_time, share_beside, share_left, share_there
 from cosim.diagnosis.evidence.comparison import Comparison
@@ -61,7 +62,7 @@ def left(extra: Extra) -> tuple[ResidualScores, Decision]:
     sizes = share_left(comparison, base), share_there(comparison, base, rest, held)
     shown, beside = over_time(comparison, base), share_beside(comparison, base, rest, held)
     residual = ResidualScores(*sizes, flexible_terms(comparison, base, held), shown, beside)
-    return residual, decide([], residual, POLICY)
+    return residual, decide(Scores([], residual), POLICY)
 
 
 def kick(now: dict[str, Array]) -> Array:

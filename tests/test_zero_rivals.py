@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.decide.decision import EffectScores, open_rivals
+from cosim.diagnosis.answer.scores import EffectScores
+from cosim.diagnosis.decide.decision import open_rivals
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.search import rivals

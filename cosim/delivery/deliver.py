@@ -149,6 +149,7 @@ def as_json(found: Diagnosis) -> JsonObject:
         "loop_bias": found.loop_bias,
         "base_parameters": {name: list(values) for name, values in found.base_parameters.items()},
         "ledger": [trial.as_json() for trial in found.ledger],
+        "scores": found.scores.as_json() if found.scores else {},
         "improved": found.improved,
         "provenance": found.provenance,
         "seconds": found.seconds,

@@ -8,7 +8,8 @@ from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.entries import NotLearnedEntry
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
-from cosim.diagnosis.decide.decision import Decision, ResidualScores, beside_rest, decide, least_left, rest_rules
+from cosim.diagnosis.answer.scores import Scores
+from cosim.diagnosis.decide.decision import Decision, decide, rest_rules
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.band import in_band
 from cosim.diagnosis.evidence.comparison import Comparison
@@ -30,7 +31,7 @@ from cosim.diagnosis.search.global_test import global_test
 from cosim.diagnosis.search.nameless import Nameless, nameless
 from cosim.diagnosis.search.proof import Proof
 from cosim.diagnosis.search.rivals import Examined, examine
-from cosim.diagnosis.search.scores import effect_scores, residual_scores
+from cosim.diagnosis.search.scores import scores_of
 from cosim.diagnosis.search.sizes import standard_errors
 from cosim.diagnosis.search.stages import InTurn, search
 from cosim.diagnosis.terms.learn import NOTHING_TRIED, Learned, learn
@@ -70,10 +71,14 @@ class Answer:
 
     comparison: Comparison
     base: Fit
-    decision: Decision
     held: Predictive
     found: Nameless
-    rest: ResidualScores
+    scores: Scores
+
+    @property
+    def decision(self) -> Decision:
+        """What is named, what stays open, whether something unknown is left."""
+        return decide(self.scores, self.comparison.policy)
 
     @property
     def proof(self) -> Proof:
@@ -178,15 +183,7 @@ def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Record
     held = Predictive.of(comparison, prepared, examined.base, prepare(heldout, CUTOFF))
     examined, proof = prove_sets(comparison, examined, held)
     found = nameless(comparison, examined, proof, held)
-    residual = residual_scores(comparison, found, held)
-    return Answer(
-        comparison,
-        examined.base,
-        decide(effect_scores(found.proof), residual, comparison.policy),
-        held,
-        found,
-        residual,
-    )
+    return Answer(comparison, examined.base, held, found, scores_of(comparison, found, held))
 
 
 def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Recording], card: Card) -> Diagnosis:
@@ -197,7 +194,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
     signals = traces(train, heldout, models)
     found = _findings(answer, signals)
     bias = loop_bias(prepared, answer.chosen, problem.weight)
-    rest = rest_rules(effect_scores(answer.proof), answer.rest, answer.comparison.policy)
+    rest = rest_rules(answer.scores.effects, answer.scores.rest, answer.comparison.policy)
     enter_answer(answer.comparison, answer.chosen, found, tuple(rest), decision.is_unknown)
     return Diagnosis(
         verdict=_verdict(found, decision),
@@ -216,6 +213,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         loop_bias=bias.as_json() if bias else {},
         base_parameters=models.base_parameters(),
         ledger=finished(answer.comparison, answer.held, answer.chosen),
+        scores=answer.scores,
     )
 
 
@@ -247,9 +245,7 @@ def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Lear
     after = tried.mount if tried.helps else answer.chosen.mount
     models = Structures(problem.mount, answer.base.mount, after)
     told = tried.judged_in(judged_band(heldout, models, problem.prepared.band), answer.chosen.mount)
-    policy, scores = answer.comparison.policy, effect_scores(answer.proof)
-    if not answer.decision.is_unknown and told.says_unknown(policy, least_left(scores, policy)):
-        answer = replace(answer, decision=beside_rest(scores, told.quantities, policy))
+    answer = replace(answer, scores=replace(answer.scores, learned=told.scores()))
     return answer, told if answer.decision.is_unknown else None
 
 

@@ -22,6 +22,7 @@ from cosim.diagnosis.answer.entries import (
     Provenance,
 )
 from cosim.diagnosis.answer.ledger import Trial
+from cosim.diagnosis.answer.scores import Scores
 from pyfmi_models.effects import CATALOGUE, Effect
 
 Array = npt.NDArray[np.float64]
@@ -208,6 +209,8 @@ class Diagnosis:
     """Per base parameter: as delivered, refitted, with the missing physics."""
     ledger: tuple[Trial, ...] = ()
     """Every structure that was fitted, with the rules by which it was judged."""
+    scores: Scores | None = None
+    """What was decided from; None where nothing is named, as the recordings are in doubt."""
     provenance: Provenance = field(default_factory=Provenance)
     improved: Improved = field(default_factory=Improved)
     files: tuple[str, ...] = ("report.html",)

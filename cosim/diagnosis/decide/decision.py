@@ -1,67 +1,16 @@
 """The decision, from scores alone: what is named, what stays open, whether something unknown is left. No data here."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import exp
 
 from cosim.diagnosis.answer.ledger import Rule, all_pass
+from cosim.diagnosis.answer.scores import EffectScores, LearnedScores, ResidualScores, Scores, TermScores
 from cosim.diagnosis.decide.calibration import calibrated
 from cosim.diagnosis.decide.policy import Policy
 
 IN_BURSTS = "time, in bursts"
 """What the rest is said to go with where it comes now and then."""
-
-
-@dataclass(frozen=True)
-class EffectScores:
-    """Scores of an effect that stands after the proof. Nats."""
-
-    effect: str
-    evidence: float
-    """Beside the other effects, in training."""
-    margins: Mapping[str, float]
-    """By how much it is better than each rival."""
-    explains: Mapping[str, float]
-    """Share of the residual energy that the effect, or a rival in its place, removes."""
-    predicted: float = 0.0
-    """What the held-out recordings lose without it ..."""
-    removes: float = 0.0
-    """... and the share of their residual energy that it removes."""
-
-    def with_margins_of(self, share: float) -> "EffectScores":
-        """The same with so much of each margin."""
-        return replace(self, margins={name: share * margin for name, margin in self.margins.items()})
-
-
-@dataclass(frozen=True)
-class TermScores:
-    """Scores of a flexible term, a smooth shape of a recorded quantity, beside the structure that stands."""
-
-    name: str
-    evidence: float
-    predicted: float
-    share: float
-    """Share of the held-out residual energy that it predicts."""
-    away: float = 1.0
-    """Share of the training residual energy that it removes which it removes away from turns."""
-    plain: float = 1.0
-    """Share of the training residual energy that it removes."""
-
-
-@dataclass(frozen=True)
-class ResidualScores:
-    """What is left: its slow part relative to friction, in training and held out, and what it follows."""
-
-    share: float
-    share_there: float
-    terms: Sequence[TermScores] = ()
-    over_time: str = "time"
-    share_beside: float = 0.0
-    """The same beside what friction laws cannot agree on."""
-    in_place: tuple[str, ...] = ()
-    """Quantities of which a term explains more than a name did that was taken out for it."""
-    in_bursts: float = 0.0
-    """Share of its energy that comes in bursts."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +39,27 @@ class Decision:
         return Decision(self.sets, told, True, follows, doubtful)
 
 
-def decide(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Decision:
-    """Decide what is named, what stays open and whether something without a name is left."""
+def decide(scores: Scores, policy: Policy) -> Decision:
+    """Decide what is named, what stays open and whether something without a name is left.
+
+    Pure: scores that were stored are decided again in less than a millisecond, by this policy or another.
+    """
+    found, learned = _of_rest(scores.effects, scores.rest, policy), scores.learned
+    if found.is_unknown or not learned or not _says_unknown(learned, least_left(scores.effects, policy), policy):
+        return found
+    return beside_rest(scores.effects, learned.quantities, policy)
+
+
+def _says_unknown(learned: LearnedScores, least: float, policy: Policy) -> bool:
+    """Whether a learned term says alone that something has no name: sure, a large share of the rest, `least` nats.
+
+    Another friction law over speed is no missing effect, nor is what laws lack about turns.
+    """
+    elsewhere = learned.away >= policy.least_away_unnamed and not learned.is_of_law
+    return learned.is_sure and learned.removed >= policy.follows and learned.evidence >= least and elsewhere
+
+
+def _of_rest(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Decision:
     if is_left(effects, residual, policy):
         return beside_rest(effects, followed(residual, policy), policy)
     named = _named(effects, policy)

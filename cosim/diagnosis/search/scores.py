@@ -2,7 +2,7 @@
 
 from math import inf
 
-from cosim.diagnosis.decide.decision import EffectScores, ResidualScores
+from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.evidence.adequacy import over_time, share_beside, share_left, share_there
 from cosim.diagnosis.evidence.bursts import burst_share
@@ -21,6 +21,11 @@ def effect_scores(proof: Proof) -> list[EffectScores]:
         EffectScores(one.effect.id, one.own.evidence, margins(one), explains(one), *said[one.effect.id])
         for one in proof.standing
     ]
+
+
+def scores_of(comparison: Comparison, found: Nameless, held: Predictive) -> Scores:
+    """Scores of what stands, and of what is left beside it."""
+    return Scores(effect_scores(found.proof), residual_scores(comparison, found, held))
 
 
 def residual_scores(comparison: Comparison, found: Nameless, held: Predictive) -> ResidualScores:

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cosim.diagnosis.decide.decision import TermScores
+from cosim.diagnosis.answer.scores import TermScores
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.terms.dictionary import OF_LAW, Term, dictionary

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cosim.diagnosis.answer.entries import BinsEntry, LearnedEntry, NotLearnedEntry
-from cosim.diagnosis.decide.policy import Policy
+from cosim.diagnosis.answer.scores import LearnedScores
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.error import interval_of
 from cosim.diagnosis.evidence.predictive import Predictive
@@ -76,15 +76,13 @@ class Learned:
         """Whether training, what training left out and the held-out recordings each prove it for themselves."""
         return self.helps and min(*self.evidence, *self.predicted, self.gain) >= SURE
 
-    def says_unknown(self, policy: Policy, least: float) -> bool:
-        """Whether it says alone that something has no name: sure, a large share of the rest, `least` nats or more.
-
-        Another friction law over speed is no missing effect, nor is what laws lack about turns.
-        """
-        follows = 1 - (self.after / self.before) ** 2 >= policy.follows
+    def scores(self) -> LearnedScores:
+        """What the decision looks at."""
+        removed = 1 - (self.after / self.before) ** 2
         of_law = set(self.quantities) <= set(OF_LAW)
-        elsewhere = self.away >= policy.least_away_unnamed
-        return self.is_sure and follows and min(self.evidence) >= least and elsewhere and not of_law
+        return LearnedScores(
+            tuple(self.quantities), float(min(self.evidence)), float(removed), float(self.away), self.is_sure, of_law
+        )
 
     @property
     def unit(self) -> str:

@@ -1,0 +1,100 @@
+"""Scores: all numbers from which a diagnosis is decided, as plain data that can be stored and decided again."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any, cast
+
+from cosim.support.plain import JsonObject
+
+
+@dataclass(frozen=True)
+class EffectScores:
+    """Scores of an effect that stands after the proof. Nats."""
+
+    effect: str
+    evidence: float
+    """Beside the other effects, in training."""
+    margins: Mapping[str, float]
+    """By how much it is better than each rival."""
+    explains: Mapping[str, float]
+    """Share of the residual energy that the effect, or a rival in its place, removes."""
+    predicted: float = 0.0
+    """What the held-out recordings lose without it ..."""
+    removes: float = 0.0
+    """... and the share of their residual energy that it removes."""
+
+    def with_margins_of(self, share: float) -> "EffectScores":
+        """The same with so much of each margin."""
+        return replace(self, margins={name: share * margin for name, margin in self.margins.items()})
+
+
+@dataclass(frozen=True)
+class TermScores:
+    """Scores of a flexible term, a smooth shape of a recorded quantity, beside the structure that stands."""
+
+    name: str
+    evidence: float
+    predicted: float
+    share: float
+    """Share of the held-out residual energy that it predicts."""
+    away: float = 1.0
+    """Share of the training residual energy that it removes which it removes away from turns."""
+    plain: float = 1.0
+    """Share of the training residual energy that it removes."""
+
+
+@dataclass(frozen=True)
+class ResidualScores:
+    """What is left: its slow part relative to friction, in training and held out, and what it follows."""
+
+    share: float
+    share_there: float
+    terms: Sequence[TermScores] = ()
+    over_time: str = "time"
+    share_beside: float = 0.0
+    """The same beside what friction laws cannot agree on."""
+    in_place: tuple[str, ...] = ()
+    """Quantities of which a term explains more than a name did that was taken out for it."""
+    in_bursts: float = 0.0
+    """Share of its energy that comes in bursts."""
+
+
+@dataclass(frozen=True)
+class LearnedScores:
+    """Scores of a term that was learned for what has no name."""
+
+    quantities: tuple[str, ...]
+    """What it goes over."""
+    evidence: float
+    """The lower one of what training and what training left out say for it [nats]."""
+    removed: float
+    """Share of the held-out error energy that it removes."""
+    away: float
+    """Share of the training residual energy that it removes which it removes away from turns."""
+    is_sure: bool
+    """Whether training, what training left out and the held-out recordings each prove it for themselves."""
+    is_of_law: bool
+    """Whether another friction law over speed would say the same."""
+
+
+@dataclass(frozen=True)
+class Scores:
+    """Everything that `decide` looks at."""
+
+    effects: Sequence[EffectScores]
+    """Effects that stand on the held-out recordings."""
+    rest: ResidualScores
+    learned: LearnedScores | None = None
+
+    def as_json(self) -> JsonObject:
+        """Plain data: `scores` in diagnosis.json, each number with all its digits."""
+        return cast(JsonObject, asdict(self))
+
+    @classmethod
+    def of_json(cls, entry: Mapping[str, Any]) -> "Scores":
+        """The scores that plain data describe."""
+        rest, learned = dict(entry["rest"]), entry["learned"]
+        rest["terms"] = [TermScores(**one) for one in rest["terms"]]
+        rest["in_place"] = tuple(rest["in_place"])
+        known = LearnedScores(**{**learned, "quantities": tuple(learned["quantities"])}) if learned else None
+        return cls([EffectScores(**one) for one in entry["effects"]], ResidualScores(**rest), known)

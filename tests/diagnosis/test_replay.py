@@ -1,0 +1,46 @@
+"""What was decided is decided again from the scores of a diagnosis that was written."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from cosim.diagnosis.answer.scores import EffectScores, LearnedScores, ResidualScores, Scores, TermScores
+from cosim.diagnosis.decide.decision import decide
+from cosim.diagnosis.decide.policy import POLICY
+
+EFFECT = EffectScores("cogging", 80.0, {"position_friction": 2.0, "gravity_unbalance": 41.5}, {
+    "cogging": 0.7, "position_friction": 0.6, "gravity_unbalance": 0.1,
+}, 12.0, 0.55)  # fmt: skip
+REST = ResidualScores(0.01, 0.02, [TermScores("position", 9.25, 3.5, 0.2)], "time", 0.01, (), 0.03)
+LEARNED = LearnedScores(("temperature",), 400.0, 0.8, 0.9, True, False)
+CASES = [
+    Scores([], ResidualScores(0.0, 0.0)),
+    Scores([EFFECT], REST),
+    Scores([EFFECT], REST, LEARNED),
+    Scores([EFFECT], replace(REST, in_place=("load",), in_bursts=0.9), replace(LEARNED, is_of_law=True)),
+]
+
+
+@pytest.mark.parametrize("scores", CASES)
+def test_stored_scores_are_decided_as_they_were(scores: Scores) -> None:
+    stored = json.loads(json.dumps(scores.as_json()))
+    assert decide(Scores.of_json(stored), POLICY) == decide(scores, POLICY)
+
+
+def test_another_policy_may_decide_otherwise() -> None:
+    stored = Scores.of_json(json.loads(json.dumps(CASES[1].as_json())))
+    assert decide(stored, POLICY).sets == {"cogging": ("position_friction",)}
+    assert decide(stored, replace(POLICY, set_margin=1.0)).sets == {"cogging": ()}
+
+
+def test_a_learned_term_alone_says_unknown_unless_a_friction_law_would_do() -> None:
+    assert decide(CASES[2], POLICY).depends_on == ("temperature",)
+    assert not decide(replace(CASES[2], learned=replace(LEARNED, is_of_law=True)), POLICY).is_unknown
+
+
+def test_the_decision_imports_no_arrays() -> None:
+    text = Path(decide.__code__.co_filename).read_text("utf-8")
+    assert "numpy" not in text
+    assert "estimation" not in text
