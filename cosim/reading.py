@@ -3,13 +3,15 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from cosim.data.limits import LIMIT
+from cosim.data.questions import OF_ROWS
 from cosim.data.recording import Recording
 from cosim.data.runs import split
 from cosim.support.errors import InputError, UnitError
 from cosim.support.units import unit
 
-LAYOUT = ("separator", "decimal", "header", "encoding", "period", "limit")
-"""What `--layout` may say of a text; `limit` holds for any file."""
+LAYOUT = ("separator", "decimal", "header", "encoding", *OF_ROWS, LIMIT)
+"""What `--layout` may say: how a text is written, what becomes of rows, and the factor that raises limits."""
 TORQUE = {"linear": "N", "rotary": "N.m"}
 SUITED = {"linear": {"q": "m", "v": "m/s"}, "rotary": {"q": "rad", "v": "rad/s"}}
 """Units in which position and speed of an axis are kept."""

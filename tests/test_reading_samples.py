@@ -200,7 +200,7 @@ def test_a_file_of_a_machine_gives_its_motion(tmp_path: Path, name: str) -> None
 def test_what_is_not_known_is_asked_and_nothing_else(tmp_path: Path, name: str) -> None:
     shown = preview(sample(name, tmp_path))
     asked = bool(shown.undecided or shown.refused)
-    assert asked == (name in ANSWERS and name != "halscope.log")  # a pin of HAL has no unit, and none is asked for
+    assert asked == (name in ANSWERS)
     assert all("--" in sentence for sentence in (*shown.undecided, *[shown.refused] * bool(shown.refused)))
 
 
@@ -264,8 +264,6 @@ def _row(name: str, shown: Preview | None) -> str:
         return f"| `{name}` | {BY_WHOM[name]} | position only: no torque | |"
     said = ANSWERS.get(name, "")
     became = "read" if not (shown.undecided or shown.refused) else "asks"
-    if name == "halscope.log":
-        became = "read; pins have no units"
     return f"| `{name}` | {BY_WHOM[name]} | {became} | {f'`{said}` ' if said else ''}|"
 
 

@@ -91,7 +91,7 @@ def _unit_of(path: Path, found: Columns, ours: str, theirs: str) -> str:
     if all(map(is_known, both)) and both[0] != "1" != both[1] and contradict(*both):
         raise questions.two_units(path, found, ours, theirs, both)
     text = units_stated(found, theirs, ours) or bracketed(theirs)
-    if text and not is_known(text):
+    if text and not (is_known(text) and (ours != "t" or text == "1" or suits("t", text))):
         raise questions.unknown_unit(path, ours, theirs, text)
     return text
 
@@ -128,7 +128,7 @@ def _missing(
     """Return the file's names of those of our columns that are missing."""
     lacking = [rule for rule in ("t", *required) if not any(name in values for name in rule.split("|"))]
     free = [name for name in values if name not in taken and name not in OURS]
-    if lacking and found.numbered and len(free) >= len([rule for rule in lacking if rule != "t"]):
+    if lacking and found.numbered and questions.may_serve(found, lacking, free):
         raise questions.unnamed(path, found, lacking, free)
     roles: dict[str, str] = {}
     beside = (OPTIONAL if lacking else ALWAYS) if required else ()

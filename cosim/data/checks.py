@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from cosim.data.limits import LARGEST, listed, short
-from cosim.data.questions import coarse_time, untimed
+from cosim.data.questions import coarse_time, empty, repeated, untimed
 from cosim.data.runs import many, mixed, split, text_of
 from cosim.support.errors import RecordingError
 
@@ -72,6 +72,8 @@ def numbers(
         fault = _fault(column)
         if fault is None:
             table[name] = np.ascontiguousarray(column, dtype=np.float64)
+        elif name in needed and _is_empty_only(column):
+            raise empty(path, name, fault)
         elif name in needed:
             raise RecordingError(f'{path}: column "{short(name)}" holds {fault}.', culprit=str(path), value=name)
         else:
@@ -88,6 +90,11 @@ def _fault(column: np.ndarray) -> str | None:
         return _beyond(column)
     more = f" ({len(bad):,} such rows)" if len(bad) > 1 else ""
     return f"{column[bad[0]]} at row {bad[0] + 1:,}, which is not a finite number{more}"
+
+
+def _is_empty_only(column: np.ndarray) -> bool:
+    """Whether every sample of a column that is no finite number is none at all."""
+    return column.dtype.kind == "f" and bool(np.isnan(column[~np.isfinite(column)]).all())
 
 
 def _beyond(column: np.ndarray) -> str | None:
@@ -123,15 +130,14 @@ def check_time(path: Path, t: np.ndarray, minimum: int, values: Mapping[str, np.
         raise RecordingError(f"{message}: {apart}", culprit=str(path), value=after)
     if float(np.mean(np.diff(t) == 0)) > COARSE:
         raise coarse_time(path, f"{message}.", t)
-    raise RecordingError(f"{message}{_differing(values, row)}.", culprit=str(path), value=after)
+    raise repeated(path, f"{message}{_differing(values, row)}.")
 
 
 def _differing(values: Mapping[str, np.ndarray], row: int) -> str:
     """Say how a row (from 1) differs from the one before it."""
     pairs = [(name, *column[row - 2 : row].tolist()) for name, column in values.items()]
     name, one, other = next(((name, one, other) for name, one, other in reversed(pairs) if one != other), ("", 0, 0))
-    told = f' and its rows differ: "{short(name)}" is {text_of(one)} and {text_of(other)}' if name else ""
-    return f"{told}. Leave one of the two out"
+    return f' and its rows differ: "{short(name)}" is {text_of(one)} and {text_of(other)}' if name else ""
 
 
 def check_motion(path: Path, table: dict[str, np.ndarray], needed: tuple[str, ...]) -> None:

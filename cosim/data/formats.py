@@ -12,6 +12,7 @@ from cosim.data.binary import apart, hdf5, matlab, mcap, mdf, numpy_files, parqu
 from cosim.data.columns import ORIGIN_KEY, UNIT_KEY, Columns
 from cosim.data.limits import LIMIT, allowed_by, short, within
 from cosim.data.long_form import in_columns
+from cosim.data.questions import OF_ROWS
 from cosim.data.text import json_records
 from cosim.data.text.own_times import parted
 from cosim.data.text.reader import read_text
@@ -41,7 +42,7 @@ CONVERTED = {
 
 
 def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns:
-    """Read every column of a file; `layout` is what `--layout` says of a text, and of limits.
+    """Read every column of a file; `layout` is what `--layout` says.
 
     Raises:
         RecordingError: the file is missing, empty, too large, of an unknown kind, or cannot be read.
@@ -52,7 +53,7 @@ def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns
     reader = _READERS.get(suffix)
     if reader is None:
         raise RecordingError(f"{path} is {_what_to_do(path, suffix)}", culprit=str(path))
-    stated = {key: text for key, text in (layout or {}).items() if key != LIMIT}
+    stated = {key: text for key, text in (layout or {}).items() if key not in (LIMIT, *OF_ROWS)}
     here = partial(read_text, stated=stated) if reader is read_text else reader
 
     def read(path: Path) -> Columns:

@@ -139,6 +139,8 @@ def on_one_time(
     needed = [served.sources[ours] for ours in chosen(served.values, tuple(required)) if ours != "t"]
     for name in needed:
         _check_times(path, channels[name])
+    if not any(one.grows for one in channels.values()):
+        _check_times(path, longest)
     channels = {name: one for name, one in channels.items() if one.grows}
     roles = {name: ours for name, ours in roles.items() if name in channels}
     channels |= {

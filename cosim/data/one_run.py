@@ -14,9 +14,10 @@ from cosim.data.columns import Columns
 from cosim.data.joining import on_one_time
 from cosim.data.limits import listed, short
 from cosim.data.order import in_order
+from cosim.data.questions import EMPTY, REPEATED
 from cosim.data.runs import equal, split, starts, text_of
 from cosim.data.spacing import with_time
-from cosim.data.sparse import filled
+from cosim.data.sparse import filled, without_empty
 from cosim.data.times import read_clock
 from cosim.support.errors import RecordingError
 from cosim.support.numbers import whole
@@ -40,13 +41,15 @@ def rows_of_one(
         found: all that the file holds.
         columns: what the user says of names, as `assign` takes it.
         units: what the user says of units.
-        layout: what the user says of the layout: `period`, the distance of rows without a time.
+        layout: what the user says of rows: `period`, their distance where there is no time; `nan`, `repeated`.
         required: columns that are needed; see `on_one_time`.
 
     Raises:
         RecordingError: as `on_one_time`, `with_time` and `one_run`.
     """
-    return one_run(path, timed(path, found, columns, units, layout, required), columns, units)
+    rows = timed(path, found, columns, units, layout, required)
+    one = one_run(path, rows, columns, units)
+    return rows if one is rows else _full(path, one, columns, units, layout, required)
 
 
 def timed(
@@ -58,8 +61,30 @@ def timed(
     required: Sequence[str],
 ) -> Columns:
     """Return all rows of a table or file, as `rows_of_one` does of one recording of it."""
+    _check_layout(layout)
     found = with_time(on_one_time(path, found, columns, units, required), layout)
-    return in_order(path, filled(path, found, columns, units, required), columns, units, required)
+    found = _full(path, found, columns, units, layout, required)
+    return in_order(path, found, columns, units, required, layout.get(REPEATED, ""))
+
+
+def _full(
+    path: Path,
+    found: Columns,
+    columns: Mapping[str, str],
+    units: Mapping[str, str],
+    layout: Mapping[str, str],
+    required: Sequence[str],
+) -> Columns:
+    """Return a table whose rows have what is needed, as far as that is known."""
+    found = filled(path, found, columns, units, required)
+    return without_empty(path, found, columns, units, required, layout)
+
+
+def _check_layout(layout: Mapping[str, str]) -> None:
+    for key, choices in ((EMPTY, ("gap",)), (REPEATED, ("first", "last"))):
+        if layout.get(key, choices[0]) not in choices:
+            text = f"--layout {key}={short(layout[key])}: it is {' or '.join(choices)}."
+            raise RecordingError(text, culprit=key, value=layout[key], choices=choices)
 
 
 def one_run(path: Path, found: Columns, columns: Mapping[str, str], units: Mapping[str, str]) -> Columns:

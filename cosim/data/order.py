@@ -55,7 +55,12 @@ class Ordered:
 
 
 def in_order(
-    path: Path, found: Columns, columns: Mapping[str, str], units: Mapping[str, str], required: Sequence[str]
+    path: Path,
+    found: Columns,
+    columns: Mapping[str, str],
+    units: Mapping[str, str],
+    required: Sequence[str],
+    repeated: str = "",
 ) -> Columns:
     """Return a table with its rows in the order of their times, and a note for each thing that was done.
 
@@ -65,6 +70,7 @@ def in_order(
         columns: what the user says of names, as `assign` takes it: which column is the time.
         units: what the user says of units.
         required: columns that are needed.
+        repeated: which of the rows of one time that differ is kept, "first" or "last"; none is left out without.
 
     Raises:
         RecordingError: as `assign`, where it is open which column is the time.
@@ -77,7 +83,7 @@ def in_order(
     if clock.dtype.kind not in "iuf":
         return found
     others = {key: one for key, one in found.values.items() if key != name}
-    ordered = order_of(clock.astype(np.float64), others, found.restarts)
+    ordered = _single(order_of(clock.astype(np.float64), others, found.restarts), repeated)
     if not ordered.done:
         return found
     values = {key: one[ordered.rows] for key, one in found.values.items()}
@@ -86,6 +92,18 @@ def in_order(
     notes = tuple(f"{path.stem}: {text.format(time=short(name))}" for text in ordered.done)
     start = "" if ordered.rows[0] else found.start
     return replace(found, values=values, notes=(*found.notes, *notes), start=start)
+
+
+def _single(ordered: Ordered, repeated: str) -> Ordered:
+    """Keep the first or the last of rows of one time."""
+    again = np.diff(ordered.t) == 0
+    if not repeated or not again.any():
+        return ordered
+    kept = np.append(True, ~again) if repeated == "first" else np.append(~again, True)
+    count, first = int(again.sum()), int(ordered.rows[~kept].min()) + 1
+    said = "rows have" if count > 1 else "row has"
+    done = f"{count:,} {said} the time of another and differ; the {repeated} was kept. Row {first:,} is left out first."
+    return Ordered(ordered.rows[kept], ordered.t[kept], (*ordered.done, done))
 
 
 def order_of(t: Array, others: Mapping[str, np.ndarray], restarts: Sequence[int] = ()) -> Ordered:

@@ -9,10 +9,10 @@ from cosim.data.assign import assign
 from cosim.data.columns import Columns
 from cosim.data.formats import read_columns
 from cosim.data.one_run import rows_of_one
-from cosim.data.questions import PERIOD
 from cosim.data.recording import REQUIRED, Recording
 from cosim.data.runs import named, split
 from cosim.data.speeds import with_speed
+from cosim.data.times import check_slow
 from cosim.support.errors import ManyRecordingsError, RecordingError, UndecidedError
 from cosim.support.files import sha256
 
@@ -59,9 +59,8 @@ def preview(path: Path, options: Mapping[str, Mapping[str, str]] | None = None) 
         RecordingError: it is not even a table with a time.
     """
     said: Options = {name: dict((options or {}).get(name, {})) for name in ("columns", "units", "layout")}
-    layout = {key: text for key, text in said["layout"].items() if key != PERIOD}
     file, _ = split(path)
-    found = read_columns(file, layout)
+    found = read_columns(file, said["layout"])
     undecided: list[str] = []
     own = sha256(file)
     for _ in range(TRIES):
@@ -86,6 +85,9 @@ def _judged(path: Path, own: str, found: Columns, said: Options, undecided: tupl
         there = {"t", *found.values, *said["columns"]}  # a table has our names only where they are given
         said = said | {"units": {ours: text for ours, text in said["units"].items() if ours in there}}
         timed = rows_of_one(path, found, said["columns"], said["units"], said["layout"], required)
+        table = assign(path, timed, said["columns"], said["units"], required)
+        if "t" in table.values:
+            check_slow(path, table.values["t"], table.sources["t"], table.units.get("t", ""))
         recording = Recording.judged(path, name, timed, own, said["columns"], said["units"], required)
     served = assign(path, timed, said["columns"], said["units"], required)
     served = with_speed(path, timed, served, said["units"]) if required else served

@@ -16,6 +16,10 @@ READ_COLUMNS, READ_ROWS = 6, 3
 """Columns and rows that a question shows as they were read."""
 PERIOD = "period"
 """Key of `--layout` for rows without a time: their distance, `1ms`."""
+EMPTY, REPEATED = "nan", "repeated"
+"""Keys of `--layout` for rows without a value, `gap`, and for rows of one time that differ, `first` or `last`."""
+OF_ROWS = (PERIOD, EMPTY, REPEATED)
+"""Keys of `--layout` that say what becomes of rows, whatever the format; the others say how a text is written."""
 
 
 def first_rows(values: Mapping[str, np.ndarray], names: Sequence[str] = ()) -> str:
@@ -94,6 +98,21 @@ def two_units(path: Path, found: Columns, role: str, name: str, both: Sequence[s
     return UndecidedError(text, decided_by=deciding, culprit=str(path), value=name, choices=tuple(both))
 
 
+FITTING = {"tau": ("N.m", "mN.m"), "q": ("deg", "rad", "mm"), "v": ("rpm", "deg/s", "rad/s", "mm/s")}
+"""Units that are offered for a column which states none."""
+
+
+def no_unit(path: Path, role: str, name: str, why: str) -> UndecidedError:
+    """Ask for the unit of a column that states none, and whose values are hardly in SI units."""
+    options = " or ".join(f"{role}={text}" for text in FITTING[role])
+    number = ', or how much one of it is, "tau=0.04 N.m"' if role == "tau" else ""
+    text = (
+        f'{path}: "{short(name)}" states no unit and {why}; say which it is in, for example --units {options}{number}.'
+    )
+    deciding = {"units": {role: FITTING[role][0]}}
+    return UndecidedError(text, decided_by=deciding, culprit=str(path), value=name, choices=FITTING[role])
+
+
 EXAMPLES = {"t": "ms", "tau": "mN.m", "q": "deg", "v": "deg/s", "q_d": "deg", "temperature": "degC"}
 """A unit for each of our columns, to show how an option is written."""
 
@@ -101,9 +120,19 @@ EXAMPLES = {"t": "ms", "tau": "mN.m", "q": "deg", "v": "deg/s", "q_d": "deg", "t
 def unknown_unit(path: Path, role: str, name: str, text: str) -> UndecidedError:
     """Ask for the unit of a column whose own is not known."""
     option = EXAMPLES.get(role, "1")
-    told = f'{path}: "{short(text)}" of column "{short(name)}" is no unit known here; say which it is in, for example '
+    kind = "unit of time" if role == "t" else "unit known here"
+    column = f'"{short(text)}" of column "{short(name)}"'
+    told = f"{path}: {column} is no {kind}; say which it is in, for example "
     deciding = {"units": {role: option}}
     return UndecidedError(f"{told}--units {role}={option}.", decided_by=deciding, culprit=str(path), value=text)
+
+
+def may_serve(found: Columns, lacking: Sequence[str], free: Sequence[str]) -> bool:
+    """Whether as many columns without a name hold numbers as there are columns of ours to be named beside the time."""
+    measured = [name for name in free if _is_measured(found.values[name])]
+    others = [rule for rule in lacking if rule != "t"]
+    growing = "t" in lacking and any(grows(found.values[name]) for name in measured)
+    return len(measured or free) >= len(others) + growing
 
 
 def unnamed(path: Path, found: Columns, lacking: Sequence[str], free: Sequence[str]) -> UndecidedError:
@@ -126,12 +155,10 @@ def unnamed(path: Path, found: Columns, lacking: Sequence[str], free: Sequence[s
 
 
 def counting(path: Path, name: str, step: float) -> UndecidedError:
-    """Ask what a column without a name counts that grows by whole numbers: samples, or a unit of time."""
-    text = (
-        f"{path}: {name} steps by {step:.6g}; say what one is, for example --units t=ms, or for samples that are 0.5 "
-    )
-    deciding = {"units": {"t": "ms"}}
-    return UndecidedError(f'{text}ms apart --units "t=0.5 ms".', decided_by=deciding, culprit=str(path), value=step)
+    """Ask what a column counts that is not named as a time and grows by whole numbers: samples, or a unit of time."""
+    asked = f'{path}: "{short(name)}" steps by {step:.6g}; say what one is, for example --units t=ms, or for samples'
+    text = f'{asked} that are 0.5 ms apart --units "t=0.5 ms".'
+    return UndecidedError(text, decided_by={"units": {"t": "ms"}}, culprit=str(path), value=step)
 
 
 def rates(path: Path, name: str, step: float, fitting: Sequence[str], said: str) -> UndecidedError:
@@ -162,6 +189,21 @@ def coarse_time(path: Path, message: str, t: np.ndarray) -> UndecidedError:
     )
     deciding = {"layout": {PERIOD: period}}
     return UndecidedError(text, decided_by=deciding, culprit=str(path), value=step)
+
+
+def empty(path: Path, name: str, said: str) -> UndecidedError:
+    """Ask what becomes of rows in which a column that is needed has no value."""
+    text = f'{path}: column "{short(name)}" holds {said}. --layout {EMPTY}=gap leaves such rows out: a gap in time.'
+    return UndecidedError(text, decided_by={"layout": {EMPTY: "gap"}}, culprit=str(path), value=name)
+
+
+def repeated(path: Path, message: str) -> UndecidedError:
+    """Ask which of several rows of one time is the reading; `message` says how they differ."""
+    text = f"{message} Leave one of the two out: --layout {REPEATED}=first keeps the first of them, last the last."
+    choices = ("first", "last")
+    return UndecidedError(
+        text, decided_by={"layout": {REPEATED: "first"}}, culprit=str(path), value=REPEATED, choices=choices
+    )
 
 
 def untimed(path: Path, values: Mapping[str, np.ndarray], message: str) -> UndecidedError:

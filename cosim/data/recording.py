@@ -21,7 +21,6 @@ from cosim.data.checks import check_motion, check_names, check_sampling, check_t
 from cosim.data.columns import Columns
 from cosim.data.formats import read_columns
 from cosim.data.one_run import rows_of_one, timed
-from cosim.data.questions import PERIOD
 from cosim.data.registers import at_an_end, continued
 from cosim.data.runs import named, split
 from cosim.data.speeds import with_speed
@@ -85,7 +84,8 @@ class Recording:
                 unless it is given its own.
             required: columns that must be there, move, and be finite; () for any table with a time.
             layout: how a text is written, where it is not to be found out: separator, decimal, header, encoding;
-                `period`, the distance of rows without a time; `limit`, the factor by which limits are raised.
+                `period`, the distance of rows without a time; `nan` ("gap") and `repeated` ("first", "last"), what
+                becomes of rows without a value and of rows of one time; `limit`, the factor by which limits are raised.
 
         Raises:
             RecordingError: one sentence that names file, column, row and value.
@@ -93,7 +93,7 @@ class Recording:
         """
         path, layout = Path(path), dict(layout or {})
         file, _ = split(path)
-        found = read_columns(file, {key: text for key, text in layout.items() if key != PERIOD})
+        found = read_columns(file, layout)
         found = rows_of_one(path, found, columns or {}, units or {}, layout, required)
         return cls.judged(path, named(path), found, sha256(file), columns or {}, units or {}, required)
 
@@ -141,6 +141,7 @@ class Recording:
         table, notes = numbers(path, numeric, ("t", *chosen(values, required)))
         table, joined = continued(path.stem, table, stated)
         end, stays = at_an_end(table["q"], stated.get("q", "")) if "q" in table else (0.0, np.empty((0, 2), int))
+        silent = assumed(path, table, served.sources, stated)
         si = {column: unit(text) for column, text in stated.items() if column in table}
         table = {key: si[key].to_si(column) if key in si else column for key, column in table.items()}
         check_time(path, table["t"], MINIMUM_ROWS if required else 2, found.values)
@@ -155,7 +156,6 @@ class Recording:
         if masked:
             said = f'"q" stays at {end:.6g}, the end of what the drive sends, in {int(np.diff(stays).sum()):,} rows'
             joined = (*joined, f"{path.stem}: {said} from row {stays[0, 0] + 1:,} on; nothing is judged there.")
-        silent = assumed(path, table, served.sources, stated)
         notes = (*found.notes, *served.notes, *silent, *clock.notes, *notes, *joined)
         return cls(name, table, {"t": "s"} | {key: one.si for key, one in si.items()}, origin, notes, others, masked)
 

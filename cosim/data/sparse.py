@@ -2,6 +2,10 @@
 
 An outer join of topics writes a row for each time at which any of them had a value, and leaves the others empty. Where
 a column that is needed is empty in more than `SPARSE` of the rows, each column has its own times: those of its values.
+
+Where less is empty, these are rows without a sample. Rows of a table that hold no value at all are left out; so are
+those before the first and after the last in which all that is needed has a value, as of a logger that starts before
+the devices that it asks. Others are left out, a gap in time, if the user says so.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,6 +18,9 @@ from cosim.data.assign import assign
 from cosim.data.checks import chosen
 from cosim.data.columns import Columns
 from cosim.data.joining import LEAST, on_one_time
+from cosim.data.limits import listed
+from cosim.data.order import order_of
+from cosim.data.questions import EMPTY, PERIOD
 from cosim.data.times import read_clock
 from cosim.support.units import unit
 
@@ -49,6 +56,8 @@ def filled(
     size = unit(clock.unit).factor if clock.unit else 1.0
     t = size * clock.values.astype(np.float64)
     there = {key: np.isfinite(one) for key, one in found.values.items() if key != name and one.dtype.kind in "fiub"}
+    if any(_begins_again(t, found, served.sources[one], there) for one in needed):
+        return found  # several recordings: each is filled when it is taken
     parted = replace(
         found,
         values={key: found.values[key][rows] for key, rows in there.items()},
@@ -64,6 +73,76 @@ def filled(
     own = joined.values["t"] / size if "t" in units else joined.values["t"]
     values = {name: own} | {key: one for key, one in joined.values.items() if key != "t"}
     return replace(joined, values=values, units=joined.units | {name: clock.unit if "t" in units else "s"})
+
+
+def without_empty(
+    path: Path,
+    found: Columns,
+    columns: Mapping[str, str],
+    units: Mapping[str, str],
+    required: Sequence[str],
+    layout: Mapping[str, str],
+) -> Columns:
+    """Return a table without rows that hold no sample, with a note.
+
+    Args:
+        path: the file, for messages and notes.
+        found: its columns, of equal length.
+        columns: what the user says of names, as `assign` takes it.
+        units: what the user says of units.
+        required: columns that are needed.
+        layout: what the user says of rows: `nan=gap` leaves those between others out too in which a column that is
+            needed has no value; with a `period` time is none of the file's values.
+
+    Raises:
+        RecordingError: as `assign`.
+    """
+    if not any(_is_empty(column).any() for column in found.values.values() if column.dtype != object):
+        return found
+    empty = {name: _is_empty(column) for name, column in found.values.items()}
+    served = assign(path, found, columns, units, required)
+    made = served.sources.get("t") if PERIOD in layout else None
+    others = [rows for name, rows in empty.items() if name != made]
+    blank = np.logical_and.reduce(others) if others else np.zeros(len(next(iter(empty.values()))), bool)
+    needed = [name for name in ("t", *chosen(served.values, tuple(required))) if name in served.values]
+    lacks = {theirs: empty[theirs] for theirs in (served.sources[name] for name in needed)}
+    bad = np.logical_or.reduce([*lacks.values()]) if lacks else blank
+    whole = np.flatnonzero(~bad)
+    if not len(whole):
+        return found
+    ends = (np.arange(len(bad)) < whole[0]) | (np.arange(len(bad)) > whole[-1])
+    between = bad & ~blank & ~ends
+    left = blank | ends | between
+    if not left.any() or (between.any() and EMPTY not in layout):
+        return found  # it is asked what becomes of rows between others, by their number in the file
+    notes = [_told(path, "without any value", blank)] if blank.any() else []
+    lacking = [name for name, rows in lacks.items() if (rows & ~blank).any()]
+    if lacking:
+        said = listed(tuple(f'"{name}"' for name in lacking))
+        notes.append(_told(path, f"in which {said} has no value", bad & ~blank))
+    values = {name: column[~left] for name, column in found.values.items()}
+    restarts = tuple(row - int(left[:row].sum()) for row in found.restarts)
+    start = "" if left[0] else found.start
+    return replace(found, values=values, notes=(*found.notes, *notes), start=start, restarts=restarts)
+
+
+def _told(path: Path, which: str, rows: np.ndarray) -> str:
+    count, first = int(rows.sum()), int(np.flatnonzero(rows)[0]) + 1
+    said = f"{count:,} rows {which} were" if count > 1 else f"one row {which} was"
+    return f"{path.stem}: {said} left out; the first is row {first:,}."
+
+
+def _begins_again(t: np.ndarray, found: Columns, name: str, there: Mapping[str, np.ndarray]) -> bool:
+    """Whether time falls or stays in the samples of a column, however they are put in order."""
+    rows = np.flatnonzero(there.get(name, np.zeros(len(t), bool)) & np.isfinite(t))
+    return bool((np.diff(order_of(t[rows], {name: found.values[name][rows]}).t) <= 0).any())
+
+
+def _is_empty(column: np.ndarray) -> np.ndarray:
+    """Which rows of a column hold nothing."""
+    if column.dtype.kind in "fmM":
+        return np.array(column != column, bool)
+    return np.array([one is None for one in column], bool) if column.dtype == object else np.zeros(len(column), bool)
 
 
 def _is_sparse(column: np.ndarray) -> bool:

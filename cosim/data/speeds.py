@@ -177,6 +177,8 @@ def _chosen(path: Path, found: Columns, served: Assigned, given: Mapping[str, st
             served = replace(served, notes=(*served.notes, f"{path.stem}: {told}; --units v=... says it otherwise."))
         elif best.name != "v":
             return served  # the speed of another shaft: it is left out as one that repeats
+    if _near(factor, 1.0) and stated and not served.units.get("q") and unit(spelled(stated)).si.endswith("/s"):
+        served = replace(served, units=served.units | {"q": unit(spelled(stated)).si.removesuffix("/s")})
     if not ours:
         return replace(served, units=served.units | ({"v": stated} if stated else {}))
     values = {"v" if name == best.name else name: column for name, column in served.values.items()}

@@ -13,6 +13,8 @@ import numpy as np
 
 from cosim.data import questions
 from cosim.data.limits import short
+from cosim.data.roles import is_named
+from cosim.data.text.unit_words import is_unit
 
 SLOWEST, FASTEST = 10.0, 50e3
 """Rates at which servos are sampled [Hz]."""
@@ -101,6 +103,29 @@ def _of_stamps(column: np.ndarray) -> Clock:
     return Clock(np.asarray(seconds, dtype=np.float64), "s", start)
 
 
+def check_slow(path: Path, column: np.ndarray, name: str, stated: str) -> None:
+    """Ask for the unit of a time that steps by a second or more and states none, of a table that is no axis.
+
+    Raises:
+        UndecidedError: it may count seconds, or less; the message names the option that decides.
+    """
+    if stated or column.dtype.kind not in "iuf" or len(column) < 2 or _of_date(column):
+        return
+    values = column.astype(np.float64)
+    steps = np.diff(values[np.isfinite(values)])
+    step = float(np.median(steps)) if len(steps) else 0.0
+    if step >= 1 and not _is_since_1970(values):
+        if not is_named(name, "time"):
+            raise questions.counting(path, name, step)
+        fitting = [unit for unit, size in SECONDS.items() if SLOWEST <= 1 / (step * size) <= FASTEST]
+        said = " or ".join(f"{1 / (step * SECONDS[unit]):.4g} Hz in {unit}" for unit in ("s", *fitting))
+        raise questions.rates(path, name, step, [*fitting, "s"], said)
+
+
+def _is_since_1970(values: np.ndarray) -> bool:
+    return bool(YEARS[0] <= values[0] <= YEARS[1])
+
+
 def _of_date(column: np.ndarray) -> str:
     """Return the unit in which a column counts since 1970, or an empty text if it does not."""
     first = float(column[0])
@@ -119,7 +144,7 @@ def _of_sampling(path: Path, column: np.ndarray, name: str) -> str:
     if step < 1:
         said = f"{1 / step:.4g} Hz in s and {1 / (step * SECONDS['ms']):.4g} Hz in ms"
         raise questions.rates(path, name, step, ("ms", "s"), said)
-    if name.startswith("#"):
+    if not is_named(name, "time") and not is_unit(name):
         raise questions.counting(path, name, step)
     span = float(np.nanmax(values) - np.nanmin(values))
     fitting = [unit for unit, size in SECONDS.items() if SLOWEST <= 1 / (step * size) <= FASTEST]

@@ -7,6 +7,11 @@ NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf(inity)
 CLOCK = r"\d{1,2}:\d{2}(:\d{2}([.,;:]\d+)?)?( ?[AaPp][Mm])?"
 DATE = r"(\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[./-]\d{1,2}[./-]\d{2,4})"
 STAMP = re.compile(rf"({DATE}([T ]{CLOCK})?|{CLOCK})(Z| ?[+-]\d{{2}}:?\d{{2}})?")
+NOTHING = (
+    "", "#N/A", "#N/A N/A", "#NA", "-1.#IND", "-1.#QNAN", "-NaN", "-nan", "1.#IND", "1.#QNAN", "N/A", "NA", "NULL",
+    "NaN", "n/a", "nan", "null", "-", "--", "---", "n.a.", "#NV", "#VALUE!", "#DIV/0!", "NaN(ind)", "-nan(ind)", "None",
+)  # fmt: skip
+"""What stands for no value: Arrow's own words, dashes, and those of spreadsheets and C libraries."""
 
 
 def split(line: str, separator: str) -> list[str]:

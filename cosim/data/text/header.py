@@ -88,8 +88,16 @@ def _chosen(fitting: Sequence[tuple[str, ...]]) -> Header:
     if not rest:
         return Header(units or fitting[0], units)
     place = 1 if len(rest) > 1 and _says_more(rest[1], rest[0]) else 0
-    names = _grouped(rest[place], rest[place + 1]) if len(rest) > place + 1 else rest[place]
-    return Header(names, units)
+    if len(rest) == place + 1:
+        return Header(rest[place], units)
+    groups = rest[place + 1]
+    timed = [is_unit(name) and is_named(group, "time") for name, group in zip(rest[place], groups, strict=True)]
+    names = tuple(
+        group if is_time else name
+        for name, group, is_time in zip(_grouped(rest[place], groups), groups, timed, strict=True)
+    )
+    alone = tuple(name if is_time else "" for name, is_time in zip(rest[place], timed, strict=True))
+    return Header(names, units or (alone if any(timed) else ()))
 
 
 def _says_more(upper: Sequence[str], lower: Sequence[str]) -> bool:

@@ -6,13 +6,13 @@ between. What is above that is a preamble.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
 from cosim.data.limits import short
-from cosim.data.text.fields import is_value, split
+from cosim.data.text.fields import NOTHING, is_value, split
 from cosim.data.text.header import LABEL, header_of, is_row_of_units, words_of_line
 from cosim.data.text.unit_words import is_unit
 from cosim.support.errors import RecordingError
@@ -146,7 +146,10 @@ def _labels(preamble: Sequence[list[str]], count: int) -> tuple[str, ...]:
 
 
 def _first(rows: Sequence[list[str]], values: Sequence[list[bool]], body: Sequence[int]) -> int:
-    """Return the first line that has values where most lines have them, and is followed by such lines."""
+    """Return the first line that has values where most lines have them, and is followed by such lines.
+
+    Rows right above it that hold values in some of the columns only, and nothing else, are samples too.
+    """
     width = min(len(values[index]) for index in body)
     often = [sum(values[index][place] for index in body) for place in range(width)]
     places = [place for place, count in enumerate(often) if count > FILLED * max(often)]
@@ -155,8 +158,19 @@ def _first(rows: Sequence[list[str]], values: Sequence[list[bool]], body: Sequen
     for start, index in enumerate(written):
         window = written[start : start + WINDOW]
         if index in full and sum(one in full for one in window) >= len(window) - 1:
-            return index
+            return _before(rows, values, {*body}, written[: start + 1])
     return min(full, default=body[0])
+
+
+def _before(rows: Sequence[list[str]], values: Sequence[list[bool]], body: Set[int], written: Sequence[int]) -> int:
+    """Return the first of the lines that lead without a break to the last one and hold nothing but values."""
+    first = written[-1]
+    for index in reversed(written[:-1]):
+        fields = zip(rows[index], values[index], strict=True)
+        if index not in body or any(field not in NOTHING and not found for field, found in fields):
+            break
+        first = index
+    return first
 
 
 def _below_names(lines: Sequence[str], rows: Sequence[list[str]], first: int, separator: str, count: int) -> int:

@@ -13,17 +13,12 @@ from pyarrow import csv
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, short
 from cosim.data.text.cleaning import without_comments
+from cosim.data.text.fields import NOTHING, is_number
 from cosim.data.text.header import CLOCK_FORMAT, LABEL, NO_UNIT
 from cosim.data.text.layout import MANY_SHORT, Layout
 from cosim.data.text.names import split_unit
 from cosim.data.text.unit_words import contradict, is_unit, spelled
 from cosim.support.errors import RecordingError
-
-NOTHING = (
-    "", "#N/A", "#N/A N/A", "#NA", "-1.#IND", "-1.#QNAN", "-NaN", "-nan", "1.#IND", "1.#QNAN", "N/A", "NA", "NULL",
-    "NaN", "n/a", "nan", "null", "-", "--", "---", "n.a.", "#NV", "#VALUE!", "#DIV/0!", "NaN(ind)", "-nan(ind)", "None",
-)  # fmt: skip
-"""What stands for no value: Arrow's own words, dashes, and those of spreadsheets and C libraries."""
 
 
 def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
@@ -35,7 +30,7 @@ def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
     table, notes = _parsed(path, body, layout)
     names, units, contradictions = names_of(layout)
     pairs = zip(names, table.columns, strict=True)
-    kept = {name: grouped(as_array(column), layout.decimal) for name, column in pairs if name or _holds(column)}
+    kept = {name: _values(column, layout.decimal) for name, column in pairs if name or _holds(column)}
     return Columns(
         kept,
         {name: unit for name, unit in units.items() if name in kept},
@@ -46,6 +41,17 @@ def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
         contradictions=contradictions,
         header=layout.line,
     )
+
+
+def _values(column: Any, decimal: str) -> np.ndarray:
+    """Return a column of text as numbers where it holds some: thousands may be parted, and empty cells hold blanks."""
+    found = as_array(column)
+    if found.dtype != object:
+        return found
+    texts = [None if text is None or not str(text).strip() else str(text).strip() for text in found]
+    if all(text is None or is_number(text, decimal) for text in texts) and any(texts):
+        return np.array([np.nan if text is None else float(text.replace(decimal, ".")) for text in texts])
+    return grouped(found, decimal)
 
 
 def _holds(column: Any) -> bool:

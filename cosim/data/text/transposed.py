@@ -14,9 +14,9 @@ import numpy as np
 
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells
-from cosim.data.text.fields import is_value, split
+from cosim.data.text.fields import NOTHING, is_value, split
 from cosim.data.text.layout import Layout
-from cosim.data.text.table import NOTHING, names_of
+from cosim.data.text.table import names_of
 from cosim.data.text.unit_words import is_unit
 
 LINES = 100

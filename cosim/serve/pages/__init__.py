@@ -36,6 +36,8 @@ HINTS = {
     "header": "line of the names, 0 for none",
     "encoding": "utf-8, latin-1",
     "period": "1ms",
+    "nan": "gap: leave rows without a value out",
+    "repeated": "first, last: which of the rows of one time is kept",
     "limit": "3: three times as much",
 }
 """Examples of what a layout may say."""

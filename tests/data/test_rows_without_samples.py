@@ -1,0 +1,133 @@
+"""Rows without a sample, rows of one time, and what a table counts that is no axis: left out with a note, or asked."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from cosim.data.preview import preview
+from cosim.data.recording import Recording
+from cosim.support.errors import RecordingError, UndecidedError
+
+T = np.arange(400) / 200
+TAU, Q = np.cos(5 * T), 0.3 * np.sin(3 * T)
+
+
+def written(path: Path, header: str, *columns: object, empty: str = "nan") -> Path:
+    rows = zip(*columns, strict=True)
+    lines = [",".join(empty if x != x else x if isinstance(x, str) else f"{x:.9g}" for x in row) for row in rows]
+    path.write_text("\n".join(([header] if header else []) + lines) + "\n")
+    return path
+
+
+def without(column: np.ndarray, *rows: int) -> np.ndarray:
+    column = column.copy()
+    column[[*rows]] = np.nan
+    return column
+
+
+@pytest.mark.parametrize("empty", ["nan", "", "---"])
+def test_a_logger_that_starts_before_its_devices_costs_the_rows_before_them(tmp_path: Path, empty: str) -> None:
+    columns = (T, without(TAU, 0, 1, 2, 3, 399), without(Q, 0, 1), without(Q, 0, 1, 2))
+    seen = Recording.read(written(tmp_path / "run.csv", "t,tau,q,other", *columns, empty=empty))
+    np.testing.assert_allclose(seen.t, T[4:399])
+    np.testing.assert_allclose(seen["other"], Q[4:399], atol=1e-9)  # whole, once the rows without a torque are gone
+    note = 'run: 5 rows in which "tau", "q" has no value were left out; the first is row 1.'
+    assert note in seen.notes
+
+
+def test_rows_without_any_value_are_gaps(tmp_path: Path) -> None:
+    rows = (100, 101, 250)
+    columns = [without(one, *rows) for one in (T, TAU, Q)]
+    seen = Recording.read(written(tmp_path / "run.csv", "t,tau,q", *columns))
+    np.testing.assert_allclose(seen.t, np.delete(T, rows))
+    assert "run: 3 rows without any value were left out; the first is row 101." in seen.notes
+    assert [gap.missing for gap in seen.gaps] == [2, 1]
+
+
+def test_rows_are_left_out_of_evenly_spaced_ones_in_their_places(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.csv", "tau,q", without(TAU, 100), without(Q, 100))
+    seen = Recording.read(path, layout={"period": "5ms"})
+    np.testing.assert_allclose(seen.t, np.delete(T, 100))
+
+
+def test_a_value_that_is_missing_between_others_is_asked_for_by_its_row(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.csv", "t,tau,q", T, without(TAU, 0), without(Q, 100))
+    with pytest.raises(UndecidedError, match=r'"tau" holds nan at row 1,.* --layout nan=gap leaves such rows out'):
+        Recording.read(path)
+    seen = Recording.read(path, layout={"nan": "gap"})
+    np.testing.assert_allclose(seen.t, np.delete(T, [0, 100]))
+    with pytest.raises(RecordingError, match="nan=hold: it is gap"):
+        Recording.read(path, layout={"nan": "hold"})
+
+
+@pytest.mark.parametrize(("kept", "value"), [("first", 0.25), ("last", 0.5)])
+def test_which_of_the_rows_of_one_time_is_kept_is_said_by_an_option(tmp_path: Path, kept: str, value: float) -> None:
+    rows = np.insert(np.arange(400), 200, 200)
+    q = Q[rows]
+    q[[200, 201]] = 0.25, 0.5
+    path = written(tmp_path / "run.csv", "t,tau,q", T[rows], TAU[rows], q)
+    with pytest.raises(UndecidedError, match=r'"q" is 0.25 and 0.5\. .* --layout repeated=first keeps the first'):
+        Recording.read(path)
+    seen = Recording.read(path, layout={"repeated": kept})
+    np.testing.assert_allclose(seen.t, T)
+    assert seen["q"][200] == value
+    assert any(f"the {kept} was kept" in note for note in seen.notes)
+
+
+def test_names_are_found_above_rows_that_are_half_empty(tmp_path: Path) -> None:
+    columns = (T, Q, without(TAU, 0), *(without(Q, 0) for _ in range(8)))
+    header = "timestamp,target,effort," + ",".join(f"pos ({n})" for n in range(8))
+    seen = preview(written(tmp_path / "run.csv", header, *columns, empty=""))
+    assert seen.found.values.keys() == {"timestamp", "target", "effort", *(f"pos ({n})" for n in range(8))}
+
+
+def test_a_table_that_begins_again_in_rows_half_empty_is_many_recordings(tmp_path: Path) -> None:
+    """A logger that writes blocks of two rows, the second of which is empty."""
+    path = written(tmp_path / "run.csv", "t [s],force [N],x", np.tile([0, 0.01], 60), np.tile([1, np.nan], 60), T[:120])
+    assert "tau" not in str(preview(Path(f"{path}:#1")).undecided)
+    with pytest.raises(RecordingError, match="These are 60 recordings"):
+        preview(path)
+
+
+@pytest.mark.parametrize(
+    ("header", "options", "question"),
+    [
+        ("idx,ts,motorU,rpm", {}, '"ts" steps by 11, which is 0.09091 Hz in s or 90.91 Hz in ms'),
+        (
+            "x,step,motorU,rpm",
+            {"columns": {"t": "step"}},
+            '"step" steps by 11; say what one is, for example --units t=ms',
+        ),
+    ],
+)
+def test_a_time_that_counts_is_asked_for_in_a_table_that_is_no_axis_too(
+    tmp_path: Path, header: str, options: dict[str, dict[str, str]], question: str
+) -> None:
+    seen = preview(written(tmp_path / "run.csv", header, T, 11 * np.arange(400), T**2, 0 * T), options)
+    assert any(question in text for text in seen.undecided)
+    assert seen.options["units"] == {"t": "ms"}
+
+
+def test_a_frequency_is_no_unit_of_a_time(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.csv", "timestep (8Hz),torque (Nm),position (rad)", 10 * np.arange(400), TAU, Q)
+    with pytest.raises(UndecidedError, match='"8 Hz" of column "timestep" is no unit of time; say which'):
+        Recording.read(path, {"t": "timestep"})
+
+
+def test_a_unit_that_stands_for_the_name_of_the_time_has_its_name_above(tmp_path: Path) -> None:
+    path = written(
+        tmp_path / "run.csv", "Axis1\nTime,Analog 1,Analog 2\nms,Torque (Nm),Angle (rad)", 5 * np.arange(400), TAU, Q
+    )
+    seen = Recording.read(path)
+    assert seen.sample_time == pytest.approx(5e-3)
+    assert 't = "Time" in ms' in " ".join(seen.notes)
+
+
+def test_cells_that_stand_beside_the_samples_leave_the_columns_that_are_asked_for(tmp_path: Path) -> None:
+    beside = ["Record Length", "Sample Interval", "Vertical Units", *[""] * 397]
+    values = ["2500", "4e-05", "V", *[""] * 397]
+    path = written(tmp_path / "run.csv", "", beside, values, [""] * 400, T, Q)
+    seen = preview(path, {"columns": {"t": "#4"}})
+    assert len(seen.recording) == 400
+    assert all("for example ." not in text for text in seen.undecided)
