@@ -6,6 +6,7 @@
     investigate scenario, card, machine               ->  InvestigateResult: motions until one answer is left
     identify    recordings and a card                 ->  IdentifyResult: the card's numbers with standard errors
     export      a card                                ->  Exported: FMUs, SSP, Modelica
+    sweep       a sweep file                          ->  SweepResult: a table, a row a run, and the best
     show        any file of this project              ->  Shown: what it holds
 
 SI units inside, other units only where files come in. Time is counted in integer ticks, never summed. Results print
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from cosim.api.recordings import read
     from cosim.api.run import run
     from cosim.api.show import Shown, show
+    from cosim.api.sweep import SweepResult, sweep
     from cosim.data.recording import Recording
     from cosim.master.result import RunResult
     from cosim.support.errors import CosimError, InputError, StepError
@@ -45,6 +47,7 @@ _HOMES = {
     "cosim.api.run": ("run",),
     "cosim.master.result": ("RunResult",),
     "cosim.api.show": ("Shown", "show"),
+    "cosim.api.sweep": ("SweepResult", "sweep"),
     "cosim.data.recording": ("Recording",),
     "cosim.support.errors": ("CosimError", "InputError", "StepError"),
     "pyfmi_models.card": ("Card", "read_card"),
@@ -65,6 +68,7 @@ __all__ = [
     "RunResult",
     "Shown",
     "StepError",
+    "SweepResult",
     "__version__",
     "diagnose",
     "export",
@@ -74,6 +78,7 @@ __all__ = [
     "read_card",
     "run",
     "show",
+    "sweep",
 ]
 
 
@@ -86,4 +91,4 @@ def __getattr__(name: str) -> "Any":
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from tiny_fmu import tiny
 
-from cosim.sweep import Summary, conduct, read_sweep
+from cosim.sweeps import Summary, conduct, read_sweep
 from cosim.system.scenario import Scenario, read_scenario
 
 __all__ = ["tiny"]

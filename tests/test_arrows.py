@@ -25,7 +25,7 @@ FLOORS = (
     {"cosim.fmi", "cosim.reading"},
     {"cosim.system"},
     {"cosim.master", "cosim.plots"},
-    {"cosim.hardware", "cosim.observatory", "cosim.sweep", "cosim.models", "cosim.estimation"},
+    {"cosim.hardware", "cosim.observatory", "cosim.sweeps", "cosim.models", "cosim.estimation"},
     {"cosim.diagnosis.answer"},
     {"cosim.diagnosis.decide"},
     {"cosim.diagnosis.effects"},

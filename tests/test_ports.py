@@ -12,7 +12,7 @@ from cosim.system.wire import Record, Wire
 
 SPLIT = '.partition(".")'
 ROOT = Path(__file__).parents[1] / "cosim"
-SPEAK_OF_PORTS = ("system", "master", "hardware", "observatory", "sweep")
+SPEAK_OF_PORTS = ("system", "master", "hardware", "observatory", "sweeps")
 SPLITS = {"ports.py": 2, "reading.py": 1}
 """The reader itself, and the number of the standard that an SSP names."""
 

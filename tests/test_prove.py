@@ -12,7 +12,7 @@ from test_arrows import imports
 from cosim.cli import main
 from cosim.cli.prove import _line
 from cosim.support.errors import OutputError, ProofError
-from cosim.sweep.journal import RUNS
+from cosim.sweeps.journal import RUNS
 from cosim_studies.proof import baselines, marks
 from cosim_studies.proof.cases import TOGETHER, cases_of
 from cosim_studies.proof.conduct import Benchmark, conduct

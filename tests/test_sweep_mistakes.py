@@ -9,7 +9,7 @@ from test_cli_run import call
 from tiny_fmu import tiny
 
 from cosim.support.errors import FmuError, SweepError, WiringError
-from cosim.sweep import read_sweep
+from cosim.sweeps import read_sweep
 
 __all__ = ["folder", "tiny"]
 

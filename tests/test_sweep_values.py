@@ -11,9 +11,9 @@ from sweeps import K, folder, written
 from tiny_fmu import tiny
 
 from cosim.data.recording import Recording
-from cosim.sweep import read_sweep
-from cosim.sweep.statistics import KINDS, Statistic
-from cosim.sweep.variation import Normal, Range, Values, Variation
+from cosim.sweeps import read_sweep
+from cosim.sweeps.statistics import KINDS, Statistic
+from cosim.sweeps.variation import Normal, Range, Values, Variation
 
 __all__ = ["folder", "tiny"]
 

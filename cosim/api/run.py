@@ -1,17 +1,20 @@
 """`cosim.run`: a scenario to a recording, its statistics and a page of pictures."""
 
 import json
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
+from cosim.api.changes import changed
 from cosim.master.isolated import CALL_TIMEOUT, run_isolated
 from cosim.master.result import RunResult, Statistics
 from cosim.master.simulate import Options, Progress
 from cosim.master.simulate import run as run_here
 from cosim.models.cache import with_fmus
+from cosim.plots.digest import tracking
 from cosim.support.files import check_free, replacing
 from cosim.support.lock import claimed
+from cosim.sweeps.variation import Value
 from cosim.system.scenario import Scenario, read_scenario
 
 RECORDING, STATISTICS, PAGE = "recording.parquet", "run.json", "run.html"
@@ -21,6 +24,8 @@ def run(
     scenario: str | Path | Scenario,
     out: str | Path | None = None,
     *,
+    set: Mapping[str, Value] | None = None,  # the word of the option
+    stop: float | None = None,
     page: bool = True,
     force: bool = False,
     compiled: bool = True,
@@ -35,6 +40,8 @@ def run(
     Args:
         scenario: a scenario (.toml) or SSP: its path, the name of a shipped one ("sidereal"), or a `Scenario`.
         out: folder for recording.parquet, run.json and run.html; None keeps the recording in memory and writes nothing.
+        set: other numbers for this run, by name: {"controller.kp": 400.0}; those that a sweep can vary.
+        stop: time at which it ends instead [s].
         page: write run.html, the page of pictures.
         force: overwrite what is there.
         compiled: False asks for the loop in Python, which is slow and gives the same bits.
@@ -49,7 +56,8 @@ def run(
         `RunResult`.
 
     Raises:
-        ScenarioError, WiringError, FmuError, SignalError, OutputError: before the first step; one sentence each.
+        ScenarioError, SweepError, WiringError, FmuError, SignalError, OutputError: before the first step; one sentence
+            each.
         StepError: a component failed; what was recorded before is in the file.
         LostComponentError: an isolated component ended, crashed or blocked its process.
     """
@@ -57,7 +65,7 @@ def run(
     folder = None if out is None else Path(out)
     for path in files_of(folder, page).values():
         check_free(path, force)
-    ready = with_fmus(wanted, on_build)
+    ready = changed(with_fmus(wanted, on_build), set or {}, stop)
     options = Options(None, force, on_progress, compiled, command)
     if folder is None:
         done = run_here(ready, options)
@@ -90,6 +98,7 @@ class Delivery:
         """Write the page and the statistics beside the recording."""
         files, force = files_of(self.folder, self.page), self.options.force
         told: Statistics = {**done.statistics, "scenario": scenario.name, "recording": str(files["recording"])}
+        told["tracking"] = [asdict(one) | {"statement": str(one)} for one in tracking(files["recording"])]
         if self.page:
             from cosim.plots.run_page import write_page
 

@@ -27,7 +27,7 @@ from cosim.support.terminal import abandon_stdout, finish_stdout, keep_stdout, p
 from cosim.support.version import __version__
 from pyfmi_models.errors import ModelError
 
-SEVERAL = ("--columns", "--units", "--layout", "--variables", "--limits")
+SEVERAL = ("--columns", "--units", "--layout", "--variables", "--limits", "--set")
 """Options that may be followed by several name=value pairs."""
 INTERRUPTED, TERMINATED = 130, 143
 """Exit codes."""

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from cosim.cli.complete import cards
-from cosim.cli.options import Columns, Force, Layout, Units, command_of
+from cosim.cli.options import Columns, Force, Layout, Out, Units, command_of, default_out
 from cosim.reading import pairs_of, read_recordings
 from cosim.support.memory import keep_freed_memory
 from cosim.support.terminal import put, put_json, say, stage
@@ -21,7 +21,7 @@ def diagnose(
     card: Annotated[
         str, typer.Option("--card", help="Model card (.toml), or the name of a shipped one.", autocompletion=cards)
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
+    out: Out = None,
     columns: Columns = None,
     units: Units = None,
     layout: Layout = None,
@@ -42,6 +42,7 @@ def diagnose(
     force: Force = False,
 ) -> None:
     """Say which physics a card lacks, and prove it on a recording that was never fitted."""
+    out = out or default_out(Path(train[0]).stem)
     from cosim.api.diagnose import diagnose as find
     from cosim.report.terminal import proposed, summary
     from pyfmi_models.card import read_card

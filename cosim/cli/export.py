@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import typer
 
 from cosim.cli.complete import cards
-from cosim.cli.options import Force
+from cosim.cli.options import Force, Out, default_out
 from cosim.support.terminal import put, put_json, stage
 
 
@@ -27,7 +27,7 @@ def export(
         str,
         typer.Argument(help="A model card (.toml), or the name of a shipped one: paper_mount.", autocompletion=cards),
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Directory for the FMUs.")],
+    out: Out = None,
     fmi: Annotated[Fmi, typer.Option("--fmi", help="FMI version.")] = Fmi.both,
     platform: Annotated[str, typer.Option("--platform", help="host, all, or names with commas between.")] = "host",
     ssp: Annotated[bool, typer.Option("--ssp", help="Also wire plant, controller and a set point: NAME.ssp.")] = False,
@@ -36,6 +36,7 @@ def export(
     force: Force = False,
 ) -> None:
     """Write the plant of a card and, where it has one, its controller as FMUs."""
+    out = out or default_out(Path(card).stem)
     from cosim.api.export import planned
 
     plan = planned(card, out, VERSIONS[fmi], platform, ssp, modelica, force)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cosim.cli.options import Force
+from cosim.cli.options import Force, Out, default_out
 from cosim.support.terminal import put, put_json, say
 
 if TYPE_CHECKING:
@@ -18,12 +18,13 @@ INPUT, OUTPUT = "q", "tau"
 
 def firmware(
     card: Annotated[str, typer.Argument(help="A model card (.toml), or the name of a shipped one: paper_mount.")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Directory for the C project.")],
+    out: Out = None,
     target: Annotated[str, typer.Option("--target", help="cortex-a9 or host.")] = "cortex-a9",
     as_json: Annotated[bool, typer.Option("--json", help="Print stack and memory as JSON.")] = False,
     force: Force = False,
 ) -> None:
     """Write the controller of a card as a small C project without a heap; print what stack and memory it takes."""
+    out = out or default_out(Path(card).stem)
     from cosim.support.files import check_free, directory
     from pyfmi_models.card import read_card
     from pyfmi_models.export.firmware import firmware as project_of

@@ -8,7 +8,7 @@ import typer
 
 from cosim.cli.drive import JsonOption, KeyOption, MachineOption, machine_of, virtual_drive
 from cosim.cli.firmware import firmware
-from cosim.cli.options import Force, command_of
+from cosim.cli.options import Force, Out, command_of, default_out
 from cosim.cli.supervisor import alpaca, indi
 from cosim.support.terminal import put, put_json, say
 
@@ -25,7 +25,7 @@ DriveOption = Annotated[str, typer.Option("--drive", help="udp://HOST:PORT, inst
 @app.command()
 def run(
     scenario: ScenarioArgument,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Directory for black box and recording.")],
+    out: Out = None,
     machine: MachineOption = "simulated",
     drive: DriveOption = "",
     key: KeyOption = "",
@@ -34,6 +34,7 @@ def run(
     force: Force = False,
 ) -> None:
     """Run a scenario with its plant replaced by a machine; write DIR/black_box.bin, recording.parquet and run.json."""
+    out = out or default_out(Path(scenario).stem)
     from cosim.hardware.blackbox import read_black_box, recording_of
     from cosim.hardware.session import Session, run_session
     from cosim.models.cache import cards_of, with_fmus

@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from cosim.cli.complete import cards
-from cosim.cli.options import Columns, Force, Layout, Units
+from cosim.cli.options import Columns, Force, Layout, Out, Units, default_out
 from cosim.support.terminal import put, put_json, say, stage
 
 
@@ -15,7 +15,7 @@ def identify(
     card: Annotated[
         str, typer.Option("--card", help="Model card (.toml), or the name of a shipped one.", autocompletion=cards)
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the results.")],
+    out: Out = None,
     free: Annotated[
         list[str] | None, typer.Option("--free", help="A parameter to identify: sigma0, Fc, inertia ... [all]")
     ] = None,
@@ -34,6 +34,7 @@ def identify(
     force: Force = False,
 ) -> None:
     """Identify a card's numbers: friction map, presliding steps, output error in closed loop."""
+    out = out or default_out(Path(recordings[0]).stem)
     from cosim.api.identify import identify as find
     from cosim.estimation.identify.deliver import check_out
     from cosim.reading import read_recordings

@@ -9,7 +9,7 @@ import typer
 
 from cosim.cli.complete import cards, scenarios
 from cosim.cli.drive import KeyOption, machine_of
-from cosim.cli.options import Force, command_of
+from cosim.cli.options import Force, Out, command_of, default_out
 from cosim.reading import pairs_of
 from cosim.support.errors import InputError
 from cosim.support.terminal import put, put_json, say, stage
@@ -20,7 +20,7 @@ def investigate(
         str, typer.Argument(help="Plant, controller, set point and columns (.toml).", autocompletion=scenarios)
     ],
     card: Annotated[str, typer.Option("--card", help="The model as believed.", autocompletion=cards)],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder; an investigation begun there is gone on with.")],
+    out: Out = None,
     machine: Annotated[
         str,
         typer.Option("--machine", help="A card or plant FMU in the plant's place; of a --drive its file."),
@@ -41,6 +41,7 @@ def investigate(
     force: Force = False,
 ) -> None:
     """Ask the machine: record, diagnose, and run the motion that tells most, until one answer is left."""
+    out = out or default_out(Path(scenario).stem)
     from cosim.api.investigate import investigate as ask
     from cosim.investigation.log import PAGE
 

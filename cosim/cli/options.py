@@ -1,10 +1,17 @@
 """Options that more than one verb has, and the command line that does the same again."""
 
 from collections.abc import Mapping, Sequence
+from itertools import count
+from pathlib import Path
 from shlex import join
 from typing import Annotated
 
 import typer
+
+from cosim.support.terminal import say
+
+RESULTS = "cosim_out"
+"""Folder of results whose own folder is not given."""
 
 Columns = Annotated[
     list[str] | None, typer.Option("--columns", help="Our name = the file's: tau=force run3.csv:tau=current ...")
@@ -13,7 +20,19 @@ Units = Annotated[list[str] | None, typer.Option("--units", help="Units in the f
 Layout = Annotated[
     list[str] | None, typer.Option("--layout", help="How texts are written: decimal=comma header=4 period=1ms ...")
 ]
+Out = Annotated[
+    Path | None, typer.Option("--out", "-o", help="Folder for the results; cosim_out/NAME-n where it is not given.")
+]
 Force = Annotated[bool, typer.Option("--force", help="Overwrite what is there.")]
+
+
+def default_out(name: str) -> Path:
+    """Return a folder that is not there yet, for results of `name`, and say so: cosim_out/NAME-1, -2, ..."""
+    stem = "".join(c if c.isalnum() or c in "._-" else "_" for c in name).strip("._") or "results"
+    free = (Path(RESULTS) / f"{stem}-{k}" for k in count(1))
+    found = next(path for path in free if not path.exists())
+    say(f"results go to {found}")
+    return found
 
 
 def command_of(verb: str, arguments: Sequence[object], options: Mapping[str, object]) -> str:

@@ -1,16 +1,15 @@
 """`cosim paper`: the paper's experiments to tables, figures and a page."""
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from cosim.cli.options import Force
+from cosim.cli.options import Force, Out, default_out
 from cosim.support.terminal import put, put_json, say, stage
 
 
 def paper(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for tables and figures.")],
+    out: Out = None,
     seeds: Annotated[int, typer.Option("--seeds", min=1, help="Seeds for the conditions with noise.", max=10_000)] = 20,
     seed: Annotated[int, typer.Option("--seed", min=0, help="The first seed.")] = 1000,
     full: Annotated[
@@ -23,6 +22,7 @@ def paper(
     force: Force = False,
 ) -> None:
     """Run every tracking experiment of the paper on FMUs; write tables and figures beside the published numbers."""
+    out = out or default_out("paper")
     from cosim_studies.paper.comparison import Plan
     from cosim_studies.paper.report import reproduce
 

@@ -8,11 +8,12 @@ from typing import Annotated
 
 import typer
 
+from cosim.cli.options import Out, default_out
 from cosim.support.terminal import put, put_json, say, stage
 
 
 def prove(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the proof; one begun there is continued.")],
+    out: Out = None,
     cases: Annotated[int, typer.Option("--cases", help="Cases in all.")] = 60,
     seed: Annotated[int, typer.Option("--seed", help="Seed of the benchmark.")] = 1,
     seconds: Annotated[float, typer.Option("--seconds", help="Length of each recording [s].")] = 60.0,
@@ -30,6 +31,7 @@ def prove(
     force: Annotated[bool, typer.Option("--force", help="Start over, whatever is there.")] = False,
 ) -> None:
     """Conceal effects in simulated recordings, seal the truth, diagnose, open, and score against the bars."""
+    out = out or default_out("prove")
     from cosim_studies.proof.conduct import GENERATOR, Benchmark, check, code, conduct
     from cosim_studies.proof.ledger import enlist
 

@@ -2,14 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from cosim.cli.complete import scenarios
-from cosim.cli.options import Force, command_of
+from cosim.cli.options import Force, Out, command_of, default_out
 from cosim.support.files import in_bytes
 from cosim.support.terminal import put, put_json, say, stage
 
@@ -31,7 +30,11 @@ def run(
             autocompletion=scenarios,
         ),
     ],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Directory for the recording.")],
+    out: Out = None,
+    sets: Annotated[
+        list[str] | None, typer.Option("--set", help="Another number for this run: controller.kp=400 noise.seed=7 ...")
+    ] = None,
+    stop: Annotated[float | None, typer.Option("--stop", help="Time at which it ends instead [s].")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the statistics as JSON.")] = False,
     force: Force = False,
     interpreted: Annotated[
@@ -50,6 +53,7 @@ def run(
     ] = 60.0,
 ) -> None:
     """Run a scenario and write DIR/recording.parquet, DIR/run.json (its statistics) and DIR/run.html (its pictures)."""
+    from cosim.api.changes import changed, values_of
     from cosim.api.run import Delivery, files_of, is_foreign
     from cosim.master.simulate import Options
     from cosim.models.cache import with_fmus
@@ -57,13 +61,19 @@ def run(
     from cosim.system.scenario import read_scenario
     from cosim.system.variant import ssp_of
 
-    wanted, files = read_scenario(scenario, outside), files_of(out, page)
+    wanted, values = read_scenario(scenario, outside), values_of(sets or [])
+    out = out or default_out(wanted.name)
+    files = files_of(out, page)
     for one in files.values():
         check_free(one, force)
     if ssp_of(scenario)[0] is not None and wanted.description:
         say(wanted.description)
-    ready = with_fmus(wanted, say)
-    command = command_of("run", [scenario], {"--out": out, "--interpreted": interpreted, "--outside": outside})
+    ready = changed(with_fmus(wanted, say), values, stop)
+    command = command_of(
+        "run",
+        [scenario],
+        {"--set": sets, "--stop": stop, "--out": out, "--interpreted": interpreted, "--outside": outside},
+    )
     options = Options(None, force, None, not interpreted, command)
     apart = is_foreign(wanted) if isolate is None else isolate
     done = _run(ready, Delivery(out, options, apart, call_timeout, page))

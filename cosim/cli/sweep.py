@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from cosim.cli.options import command_of
+from cosim.cli.options import Out, command_of, default_out
 from cosim.support.terminal import messages, put, put_json, say, stage
 
 PAUSE = 10.0
@@ -18,7 +18,7 @@ PAUSE = 10.0
 
 def sweep(
     file: Annotated[Path, typer.Argument(help="What is varied and what is kept (.toml).", metavar="SWEEP")],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for the table; one begun there is continued.")],
+    out: Out = None,
     cluster: Annotated[str, typer.Option("--cluster", help="Address of a Dask scheduler: tcp://host:8786.")] = "",
     workers: Annotated[int | None, typer.Option("--workers", help="Processes; the cores of this machine.")] = None,
     retry: Annotated[bool, typer.Option("--retry", help="Run again what failed.")] = False,
@@ -26,35 +26,34 @@ def sweep(
     force: Annotated[bool, typer.Option("--force", help="Start over, whatever is there.")] = False,
 ) -> None:
     """Run a scenario many times; write DIR/table.parquet, a row a run, and DIR/sweep.svg, its picture."""
-    from cosim.models.cache import with_fmus
-    from cosim.sweep import conduct, read_sweep
-    from cosim.system.scenario import read_scenario
+    out = out or default_out(file.stem)
+    from cosim.api.sweep import sweep as conduct
+    from cosim.sweeps import read_sweep
 
-    wanted = read_sweep(file)
-    ready = with_fmus(read_scenario(wanted.scenario), say)
-    title = f"{ready.name}: {wanted.design.runs:,} runs of {ready.stop:g} s"
+    title = f"{file.stem}: {read_sweep(file).design.runs:,} runs"
+    command = command_of("sweep", [file], {"--out": out, "--cluster": cluster})
     try:
         with _reporting(title) as on_progress:
             done = conduct(
-                wanted,
-                ready,
+                file,
                 out,
                 workers=workers,
-                address=cluster,
-                force=force,
+                cluster=cluster,
                 retry=retry,
+                force=force,
+                command=command,
                 on_progress=on_progress,
-                command=command_of("sweep", [file], {"--out": out, "--cluster": cluster}),
+                on_build=say,
             )
     except KeyboardInterrupt:
         say(f"what was done until then is in {out / 'table.parquet'}; the same command goes on from there")
         raise
-    facts = asdict(done) | {"table": str(done.table), "picture": _picture(done.table)}
-    say(_sentence(facts))
+    for line in str(done).splitlines():
+        say(line)
     if as_json:
-        put_json(facts)
+        put_json(asdict(done.summary) | {"table": str(done.table), "picture": str(done.picture), "best": done.best})
     else:
-        put(facts["table"])
+        put(str(done.table))
 
 
 @contextmanager
@@ -74,15 +73,3 @@ def _reporting(title: str) -> Iterator[Callable[[int, int, int], None]]:
                 last, before = time.monotonic(), done
 
         yield on_progress
-
-
-def _picture(table: Path) -> str:
-    from cosim.plots.sweep import draw
-
-    return str(draw(table, table.with_name("sweep.svg")))
-
-
-def _sentence(facts: dict[str, object]) -> str:
-    before = f", {facts['found']:,} of them done before" if facts["found"] else ""
-    failed = f"; {facts['failed']:,} came to nothing, the table says why" if facts["failed"] else ""
-    return f"{facts['runs']:,} runs{before}, {facts['seconds']:.3g} s{failed}; picture: {facts['picture']}"

@@ -13,7 +13,7 @@ from cosim.data.recording import Recording
 from cosim.investigation.story import Answered, Moved, answered_of, moved_of
 from cosim.support.errors import OutputError
 from cosim.support.files import sha256
-from cosim.sweep.journal import RUNS, Journal, clear
+from cosim.sweeps.journal import RUNS, Journal, clear
 
 KIND, RECORDINGS, DIAGNOSIS = "investigation", "recordings", "diagnosis"
 STORY, PAGE = "story.json", "story.html"

@@ -30,6 +30,7 @@ class Statistics(TypedDict):
     scenario: NotRequired[str]
     recording: NotRequired[str]
     page: NotRequired[str]
+    tracking: NotRequired[Sequence[Mapping[str, float | str]]]
 
 
 @dataclass(frozen=True)
@@ -51,12 +52,15 @@ class RunResult:
         return self.recording.frame()
 
     def __str__(self) -> str:
-        return "\n".join([f"{self.name}: {_speed(self.statistics)}", *remarks(self.statistics)])
+        first, *more = [*_tracked(self.statistics), _speed(self.statistics)]
+        return "\n".join([f"{self.name}: {first}", *more, *remarks(self.statistics)])
 
     def _repr_html_(self) -> str:
         said, files = remarks(self.statistics), {kind: str(path) for kind, path in self.files.items()}
         notes = {"note": " ".join(said)} if said else {}
-        return facts(self.name, {"speed": _speed(self.statistics)} | notes | files)
+        tracked = _tracked(self.statistics)
+        answer = {"tracking": "; ".join(tracked)} if tracked else {}
+        return facts(self.name, answer | {"speed": _speed(self.statistics)} | notes | files)
 
 
 def remarks(statistics: Statistics) -> list[str]:
@@ -73,6 +77,10 @@ def remarks(statistics: Statistics) -> list[str]:
     if statistics["warnings"]:
         said.append(f"{statistics['warnings']:,} steps ended with a warning of their FMU")
     return said
+
+
+def _tracked(statistics: Statistics) -> list[str]:
+    return [str(one["statement"]) for one in statistics.get("tracking", ())]
 
 
 def _speed(statistics: Statistics) -> str:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from cosim.data.formats import UNIT_KEY
+from cosim.plots.quantities import number, scale_of
 from cosim.plots.style import Array
 from cosim.support.statistics import hann
 
@@ -20,6 +21,8 @@ ERROR = "error"
 BUCKETS = 560
 """Pieces of time in a line, each with its smallest and largest value."""
 DOTS = 3_000
+WORDS = {"″": "arcsec", "′": "arcmin", "°": "deg"}
+"""Units in words: beside a line of digits a stroke is no unit."""
 SEGMENT = 1 << 19
 """Samples of the longest piece whose spectrum is taken at once."""
 
@@ -121,6 +124,44 @@ def condense(pieces: Iterable[Piece], units: Mapping[str, str], rows: int) -> Di
     step = (made.end - made.start) / max(rows - 1, 1)
     made.spectra = {name: found for name, one in spectra.items() if (found := one.density(step)) is not None}
     return made
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """How well an axis followed its set point: RMS and largest error, in the SI unit of its set point."""
+
+    axis: str
+    unit: str
+    rms: float
+    largest: float
+
+    def __str__(self) -> str:
+        scale = scale_of(self.unit, self.largest)
+        rms, largest = (number(scale.factor * value, 3) for value in (self.rms, self.largest))
+        name = f"{self.axis}: " if self.axis else ""
+        return f"{name}RMS tracking error {rms} {WORDS.get(scale.unit, scale.unit)} (largest {largest})"
+
+
+def tracking(path: Path) -> tuple[Tracking, ...]:
+    """How well each axis of a recording written by `cosim run` followed its set point; axes without one are left out.
+
+    The file is read piece by piece, and only the columns that are needed.
+    """
+    from pyarrow import parquet
+
+    with parquet.ParquetFile(path, pre_buffer=False) as file:
+        units = {one.name: (one.metadata or {}).get(UNIT_KEY, b"").decode() for one in file.schema_arrow}
+        axes = [axis for axis in axes_of(units) if axis.error and axis.error not in units]
+        wanted = list(dict.fromkeys(name for axis in axes for name in (axis.columns["q_d"], axis.measured)))
+        squares, largest = np.zeros(len(axes)), np.zeros(len(axes))
+        for batch in file.iter_batches(batch_size=1 << 16, columns=wanted) if axes else ():
+            for k, axis in enumerate(axes):
+                error = _values(batch.column(axis.columns["q_d"])) - _values(batch.column(axis.measured))
+                squares[k] += error @ error
+                largest[k] = max(largest[k], np.abs(error).max(initial=0.0))
+        rms = np.sqrt(squares / max(file.metadata.num_rows, 1))
+    found = zip(axes, rms.tolist(), largest.tolist(), strict=True)
+    return tuple(Tracking(axis.name, units[axis.columns["q_d"]], one, most) for axis, one, most in found)
 
 
 def axes_of(columns: Iterable[str]) -> tuple[Axis, ...]:

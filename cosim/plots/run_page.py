@@ -16,7 +16,7 @@ import numpy as np
 
 from cosim.data.formats import ORIGIN_KEY
 from cosim.plots.chart import Chart
-from cosim.plots.digest import ERROR, Axis, Digest, Line, digest
+from cosim.plots.digest import ERROR, WORDS, Axis, Digest, Line, digest
 from cosim.plots.quantities import Scale, number, scale_of
 from cosim.plots.style import AFTER, BEFORE, MEASURED
 from cosim.support.files import replacing
@@ -25,8 +25,6 @@ from cosim.system.scenario import Scenario
 
 SIZE = (360, 220)
 """px; the width of a phone, so that texts keep their size there."""
-WORDS = {"″": "arcsec", "′": "arcmin", "°": "deg"}
-"""Units in words: beside a line of digits a stroke is no unit."""
 TITLES = {"tau": "torque", "v": "speed", "friction": "friction"}
 Facts = Mapping[str, Any]
 

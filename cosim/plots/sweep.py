@@ -1,6 +1,7 @@
 """A picture of a sweep's table: one parameter a curve, two on a grid a map, otherwise a panel for each pair.
 
 Each row of panels is a statistic. Runs without a result are red marks at the foot of a panel, or red crosses in a map.
+A ring marks the best run, whose first statistic is nearest to zero.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,6 +34,17 @@ class Results:
     gridded: bool
     title: str
 
+    @property
+    def best(self) -> int | None:
+        """The run whose first statistic is nearest to zero; None where no run has a result."""
+        size = np.abs(next(iter(self.statistics.values())))
+        return int(np.nanargmin(size)) if np.isfinite(size).any() else None
+
+    def best_row(self) -> dict[str, float]:
+        """What the best run varied, and its statistics; {} where there is none."""
+        best, columns = self.best, {**self.varied, **self.statistics}
+        return {} if best is None else {"run": best, **{name: float(one[best]) for name, one in columns.items()}}
+
     def label(self, name: str) -> str:
         """Return a column with its unit."""
         unit = self.units.get(name, "")
@@ -42,17 +54,23 @@ class Results:
 def draw(table: Path, picture: Path) -> Path:
     """Draw a table written by a sweep as SVG or PNG; returns `picture`."""
     import matplotlib
-    from matplotlib.figure import Figure
 
     from cosim.support.files import replacing
 
     results = read_results(table)
     with matplotlib.rc_context(rc=STYLE), replacing(picture, force=True) as partial:
-        figure = _map_figure(Figure, results) if _is_map(results) else _panel_figure(Figure, results)
-        figure.suptitle(results.title, x=0.01, ha="left", color=GREY)
         clean = {"metadata": {"Date": None}} if picture.suffix == ".svg" else {"dpi": 110}
-        figure.savefig(partial, format=picture.suffix[1:], **clean)
+        figure_of(results).savefig(partial, format=picture.suffix[1:], **clean)
     return picture
+
+
+def figure_of(results: Results) -> Any:
+    """Draw results as a matplotlib figure."""
+    from matplotlib.figure import Figure
+
+    figure = _map_figure(Figure, results) if _is_map(results) else _panel_figure(Figure, results)
+    figure.suptitle(results.title, x=0.01, ha="left", color=GREY)
+    return figure
 
 
 def read_results(table: Path) -> Results:
@@ -109,6 +127,7 @@ def _map(axes: "Axes", results: Results, name: str) -> None:
     _bar(axes, colours, results.label(name))
     lost = np.isnan(results.statistics[name])
     axes.plot(x[lost], y[lost], "x", color=LOST, ms=5)
+    _mark(axes, results, x, y)
     _scales(axes, results, first, second)
 
 
@@ -170,6 +189,13 @@ def _panel(axes: "Axes", results: Results, parameter: str, name: str) -> None:
     axes.plot(x[good], y[good], ".", color=AFTER, ms=2 * size, mew=0, alpha=_weight(len(x)), rasterized=many)
     axes.plot(*_middle(x[good], y[good], exact=alone and results.gridded), color=AFTER)
     axes.plot(x[~good], np.zeros((~good).sum()), "|", color=LOST, ms=12, transform=axes.get_xaxis_transform())
+    _mark(axes, results, x, y)
+
+
+def _mark(axes: "Axes", results: Results, x: Array, y: Array) -> None:
+    """Put a ring round the best run."""
+    if results.best is not None:
+        axes.plot(x[results.best], y[results.best], "o", mfc="none", mec="black", ms=9, clip_on=False)
 
 
 def _weight(count: int) -> float:

@@ -13,8 +13,8 @@ from cosim.support.cell import cores
 from cosim.support.errors import ProofError
 from cosim.support.plain import Parsed
 from cosim.support.version import __version__
-from cosim.sweep.journal import Journal
-from cosim.sweep.pool import MOST
+from cosim.sweeps.journal import Journal
+from cosim.sweeps.pool import MOST
 from cosim_studies.proof.cases import CaseSpec, cases_of
 from cosim_studies.proof.page import MADE, proof, write
 from cosim_studies.proof.play import CaseRunner, Tool

@@ -31,11 +31,6 @@ from attack_kinds import kinds  # noqa: E402
 from attack_targets import Target, Yard, line  # noqa: E402
 from attack_worker import Ended, attempt  # noqa: E402
 
-import cosim.api.identify  # noqa: E402  what is loaded here need not be loaded in each fork
-import cosim.api.run  # noqa: E402
-import cosim.api.show  # noqa: E402
-import cosim.hardware.session  # noqa: E402
-import cosim.sweep  # noqa: E402, F401
 from cosim.support.files import replacing  # noqa: E402
 from cosim.support.version import __version__  # noqa: E402
 

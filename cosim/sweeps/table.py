@@ -10,7 +10,7 @@ from pyarrow import parquet
 
 from cosim.data.formats import ORIGIN_KEY, UNIT_KEY
 from cosim.support.files import replacing
-from cosim.sweep.job import Row
+from cosim.sweeps.job import Row
 
 TYPES = {"run": pa.int64(), "status": pa.string(), "reason": pa.string()}
 

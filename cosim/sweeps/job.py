@@ -10,10 +10,10 @@ from cosim.data.recording import Recording
 from cosim.master.simulate import run
 from cosim.support.errors import CosimError, StepError
 from cosim.support.plain import Parsed
-from cosim.sweep.address import Address, addresses, find
-from cosim.sweep.design import Point
-from cosim.sweep.file import Sweep
-from cosim.sweep.statistics import Statistic
+from cosim.sweeps.address import Address, addresses, find
+from cosim.sweeps.design import Point
+from cosim.sweeps.file import Sweep
+from cosim.sweeps.statistics import Statistic
 from cosim.system.scenario import Scenario
 from cosim.system.wire import Record
 

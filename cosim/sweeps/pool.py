@@ -11,9 +11,9 @@ from typing import Any
 
 from cosim.support.cell import Cell, LostError, cores
 from cosim.support.errors import MissingPackageError, SweepError
-from cosim.sweep.design import Point
-from cosim.sweep.job import Job, Row, work
-from cosim.sweep.portable_job import PortableJob
+from cosim.sweeps.design import Point
+from cosim.sweeps.job import Job, Row, work
+from cosim.sweeps.portable_job import PortableJob
 
 Numbered = tuple[int, Point]
 

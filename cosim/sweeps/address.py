@@ -17,7 +17,7 @@ from cosim.fmi.description import describe
 from cosim.fmi.variables import ports_of
 from cosim.support.complaint import complaint
 from cosim.support.errors import ScenarioError, SweepError
-from cosim.sweep.variation import Value
+from cosim.sweeps.variation import Value
 from cosim.system.ports import PortRef
 from cosim.system.scenario import Scenario
 from cosim.system.sections import ComponentSection
@@ -62,8 +62,8 @@ def addresses(scenario: Scenario) -> dict[str, Address]:
     return found
 
 
-def find(name: str, known: Mapping[str, Address], where: str) -> Address:
-    """Return the address of this name; `where` begins the message.
+def find(name: str, known: Mapping[str, Address], where: str, done: str = "varied") -> Address:
+    """Return the address of this name; `where` begins the message, `done` says what was to be done with it.
 
     Raises:
         SweepError: there is none; lists those of the same owner, or the owners.
@@ -73,8 +73,8 @@ def find(name: str, known: Mapping[str, Address], where: str) -> Address:
     owner = PortRef(name).owner
     near = tuple(one for one in known if one.startswith(f"{owner}."))
     owners = tuple(dict.fromkeys(PortRef(one).owner for one in known))
-    rule = f"of {owner} can be varied: {', '.join(near)}" if near else f"there are: {', '.join(owners)}"
-    raise SweepError(f'{where}: "{name}" is nothing that can be varied; {rule}.', culprit=name, choices=near or owners)
+    rule = f"of {owner} can be {done}: {', '.join(near)}" if near else f"there are: {', '.join(owners)}"
+    raise SweepError(f'{where}: "{name}" is nothing that can be {done}; {rule}.', culprit=name, choices=near or owners)
 
 
 def _ports(component: ComponentSection) -> dict[str, Port]:

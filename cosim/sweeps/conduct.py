@@ -11,12 +11,12 @@ from cosim.support.cell import LostError
 from cosim.support.errors import SweepError
 from cosim.support.files import sha256
 from cosim.support.version import __version__
-from cosim.sweep.file import Sweep
-from cosim.sweep.job import Job, Row, job_of, rehearse
-from cosim.sweep.journal import Journal
-from cosim.sweep.pool import Numbered, Pool, close_cells, cluster, free, local, most_workers, new_cell, warm
-from cosim.sweep.portable_job import files_of
-from cosim.sweep.table import write_table
+from cosim.sweeps.file import Sweep
+from cosim.sweeps.job import Job, Row, job_of, rehearse
+from cosim.sweeps.journal import Journal
+from cosim.sweeps.pool import Numbered, Pool, close_cells, cluster, free, local, most_workers, new_cell, warm
+from cosim.sweeps.portable_job import files_of
+from cosim.sweeps.table import write_table
 from cosim.system.scenario import Scenario
 
 OnProgress = Callable[[int, int, int], None]

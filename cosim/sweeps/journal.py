@@ -17,7 +17,7 @@ from cosim.support.errors import OutputError
 from cosim.support.files import check_free, directory, replacing
 from cosim.support.interrupts import uninterrupted
 from cosim.support.plain import Parsed
-from cosim.sweep.job import Row
+from cosim.sweeps.job import Row
 
 RUNS = "runs.jsonl"
 MADE = ("sweep.json", RUNS, "table.parquet", "sweep.svg", "recordings")

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.support.files import cache_home, replacing
-from cosim.sweep.job import Job
+from cosim.sweeps.job import Job
 from cosim.system.scenario import Scenario
 from cosim.system.sections import ComponentSection
 

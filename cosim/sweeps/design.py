@@ -7,7 +7,7 @@ from math import prod
 
 import numpy as np
 
-from cosim.sweep.variation import Value, Variation
+from cosim.sweeps.variation import Value, Variation
 
 Point = tuple[Value, ...]
 """Values of one run, in the order of the variations."""
