@@ -145,7 +145,7 @@ class Equations:
         states, slopes = np.zeros((self.count, len(steps[0]) + 1)), list[Slopes]()
         for k, one in enumerate(self._affine):
             out = one.rows([*steps, *states[:, :-1]], full)
-            states[k] = recurrence(out[0], out[1][:, None])[:, 0]
+            states[k] = recurrence(out[0], out[1:2])[0]
             kept, added = out[2:].reshape(2, len(one.by), len(steps[0]))
             change = kept * states[k, :-1] + added
             slopes.append(_carried(out[0], {j - k: row for j, row in zip(one.by, change, strict=True)}, slopes))
@@ -219,7 +219,7 @@ def _carried(kept: Array, change: Mapping[int, Array], before: Sequence[Slopes])
     for j, row in change.items():
         if j >= 0:
             drift[live.index(j)] += row
-    return Slopes(live, recurrence(kept, drift.T).T)
+    return Slopes(live, recurrence(kept, drift))
 
 
 def _asked(this: Mount, needed: Any, motion: Motion) -> Any:

@@ -16,10 +16,12 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 ROOT = Path(__file__).resolve().parents[3]
 _LOOP = ("loop", "part", "coupling", "exchange", "rodas4", "typed", "pool")
+_DETMATH = tuple(f"pyfmi_models/export/c/{name}.c" for name in ("detmath", "detmath_trig"))
 LIBRARIES = {
-    "cosim/master/loop/_loop": (
-        *(f"cosim/master/loop/{name}.c" for name in _LOOP),
-        *(f"pyfmi_models/export/c/{name}.c" for name in ("detmath", "detmath_trig")),
+    "cosim/master/loop/_loop": (*(f"cosim/master/loop/{name}.c" for name in _LOOP), *_DETMATH),
+    "cosim/estimation/kernels/_kernels": (
+        *(f"cosim/estimation/kernels/{name}.c" for name in ("tape", "filter")),
+        *_DETMATH,
     ),
     "cosim_studies/proof/_machine": ("cosim_studies/proof/truth.c",),
 }

@@ -1,0 +1,49 @@
+"""What a diagnosis computes most, in one C library; None where it was not built, and then Python does the same."""
+
+import ctypes
+import sys
+from ctypes import POINTER, c_int, c_longlong, c_void_p
+from functools import cache
+from pathlib import Path
+
+SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+
+
+class CTape(ctypes.Structure):
+    """A tape as `kernels.h` has it."""
+
+    _fields_ = [
+        ("shared", c_void_p),
+        ("rowwise", c_void_p),
+        *((name, c_longlong) for name in ("shared_count", "rowwise_count", "inputs", "slots", "outputs", "registers")),
+    ]
+
+
+ARGUMENTS = {
+    "tape_run": [POINTER(CTape), c_void_p, c_void_p, c_longlong, c_void_p],
+    "filter_run": [c_void_p, c_longlong, c_longlong, c_longlong, c_void_p, c_void_p, c_longlong],
+    "recurrence_run": [c_void_p, c_void_p, c_longlong, c_longlong, c_void_p],
+}
+
+
+@cache
+def library() -> ctypes.CDLL | None:
+    """The library; None where it is missing or does not fit this machine."""
+    try:
+        found = ctypes.CDLL(str(Path(__file__).with_name(f"_kernels{SUFFIX}")))
+        for name, arguments in ARGUMENTS.items():
+            function = getattr(found, name)
+            function.argtypes, function.restype = arguments, c_int
+    except (OSError, AttributeError):
+        return None
+    return found
+
+
+def done(failed: int) -> None:
+    """Check what a kernel returned.
+
+    Raises:
+        MemoryError: there was not enough memory.
+    """
+    if failed:
+        raise MemoryError("there is not enough memory for the rows of a recording")

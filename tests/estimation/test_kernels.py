@@ -1,0 +1,83 @@
+"""The kernels in C do what NumPy and SciPy do, on any rows, and without them a diagnosis computes the same."""
+
+from collections.abc import Callable
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from cosim.estimation import filters, rowwise
+from cosim.estimation.filters import lowpass
+from cosim.estimation.kernels import library
+from cosim.estimation.rowwise import OPERATIONS, Rowwise, recurrence
+
+NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
+SPECIAL = np.array([0.0, 1.0, -1.0, 2.0, -3.0, 0.5, 1e-300, 1e5, np.inf, -np.inf, np.nan])
+X = ca.SX.sym("x", 2)
+
+
+@pytest.fixture
+def interpreted(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """Do without the library from now on."""
+
+    def without() -> None:
+        for module in (filters, rowwise):
+            monkeypatch.setattr(module, "library", lambda: None)
+
+    return without
+
+
+def operated(operation: int, x: ca.SX, y: ca.SX) -> ca.SX:
+    if operation in (ca.OP_ASSIGN, ca.OP_CONSTPOW):
+        return x + 0 * y
+    function = rowwise.ON_ROWS[rowwise.CODES[operation]]
+    many = function.nin if isinstance(function, np.ufunc) else function.__code__.co_argcount
+    return ca.SX.binary(operation, x, y) if many == 2 else ca.SX.unary(operation, x)
+
+
+def test_the_library_was_built() -> None:
+    assert library() is not None
+
+
+@pytest.mark.parametrize("operation", OPERATIONS, ids=[NAMES[one] for one in OPERATIONS])
+def test_an_operation_in_c_is_that_of_numpy(operation: int, interpreted: Callable[[], None]) -> None:
+    columns = np.random.default_rng(operation).normal(0, 3, (2, 1000))
+    columns[:, :121] = np.array(np.meshgrid(SPECIAL[:11], SPECIAL[:11])).reshape(2, -1)
+    if operation == ca.OP_POW:  # 1 to the power of what is no number, and what is infinite and negative: nobody asks
+        columns = np.where(np.isfinite(columns), columns, 0.3)
+    function = Rowwise(X, ca.SX.sym("p"), operated(operation, X[0], X[1]))
+    found = function(columns, np.ones(1))
+    interpreted()
+    wanted = function(columns, np.ones(1))
+    np.testing.assert_allclose(found, wanted, rtol=1e-13, atol=1e-300)
+
+
+def test_a_row_has_the_same_bits_wherever_it_stands() -> None:
+    curve = Rowwise(X, ca.SX.sym("p"), ca.tanh(X[0]) * ca.exp(-((X[1] / 3) ** 2)) + ca.sin(X[0]) ** 1.3)
+    columns = np.random.default_rng(3).normal(0, 2, (2, 777))
+    turned = np.roll(columns, 101, axis=1)
+    assert np.array_equal(np.roll(curve(columns, np.ones(1)), 101, axis=1), curve(turned, np.ones(1)), equal_nan=True)
+
+
+@pytest.mark.parametrize("passes", [1, 2])
+@pytest.mark.parametrize("shape", [(400,), (400, 1), (60, 11), (9, 8), (2, 3), (400, 0)])
+def test_the_filter_has_the_bits_of_scipy(shape: tuple[int, ...], passes: int, interpreted: Callable[[], None]) -> None:
+    columns = np.random.default_rng(1).normal(size=shape).cumsum(axis=0)
+    kept = columns.copy()
+    found = [lowpass(one, 1e-3, 30.0, passes) for one in (columns, np.asfortranarray(columns))]
+    assert np.array_equal(columns, kept)
+    interpreted()
+    wanted = lowpass(columns, 1e-3, 30.0, passes)
+    assert all(np.array_equal(one, wanted) for one in found)
+
+
+@pytest.mark.parametrize(("signals", "rows"), [(1, 50), (5, 50), (9, 1), (3, 0), (0, 4)])
+def test_a_recurrence_is_solved_step_by_step(signals: int, rows: int, interpreted: Callable[[], None]) -> None:
+    rng = np.random.default_rng(2)
+    keeps, adds = rng.uniform(0, 1, rows), rng.normal(size=(signals, rows))
+    by_hand = np.zeros((signals, rows + 1))
+    for k in range(rows):
+        by_hand[:, k + 1] = keeps[k] * by_hand[:, k] + adds[:, k]
+    assert np.array_equal(recurrence(keeps, adds), by_hand)
+    interpreted()
+    np.testing.assert_allclose(recurrence(keeps, adds), by_hand, rtol=1e-13)
