@@ -26,12 +26,14 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from cosim.data import questions
 from cosim.data.assign import OURS, assign
 from cosim.data.checks import chosen
 from cosim.data.columns import Columns
 from cosim.data.limits import listed, short
-from cosim.data.order import order_of
+from cosim.data.order import order_of, single
 from cosim.data.registers import register_of
+from cosim.data.roles import is_named
 from cosim.support.errors import RecordingError
 
 Array = npt.NDArray[np.float64]
@@ -107,7 +109,12 @@ class Read:
 
 
 def on_one_time(
-    path: Path, found: Columns, columns: Mapping[str, str], units: Mapping[str, str], required: Sequence[str]
+    path: Path,
+    found: Columns,
+    columns: Mapping[str, str],
+    units: Mapping[str, str],
+    required: Sequence[str],
+    repeated: str = "",
 ) -> Columns:
     """Put channels with times of their own on one time base; a table whose columns share their times stays as it is.
 
@@ -117,6 +124,7 @@ def on_one_time(
         columns: what the user says of names, as `assign` takes it.
         units: what the user says of units.
         required: columns that are needed; the base is taken from them.
+        repeated: which of the samples of one time that differ is kept, "first" or "last".
 
     Returns:
         Columns of equal length with the time `t` [s], and a note that says what was read at which times.
@@ -126,10 +134,10 @@ def on_one_time(
     """
     if not found.clocks:
         return found
-    found = _of_one_clock(found, columns["t"]) if "t" in columns else found
+    found = _of_one_clock(found, columns["t"]) if "t" in columns else _without_times(found)
     if (table := _as_table(found)) is not None:
         return table
-    channels = {name: one for name in found.clocks if (one := _channel(found, name))}
+    channels = {name: one for name in found.clocks if (one := _channel(found, name, repeated))}
     if not channels:
         return replace(found, values={}, clocks={})
     longest = max(channels.values(), key=lambda one: len(one.t))
@@ -156,6 +164,15 @@ def _of_one_clock(found: Columns, name: str) -> Columns:
     return found if own is None else replace(found, clocks={k: v for k, v in found.clocks.items() if v is own})
 
 
+def _without_times(found: Columns) -> Columns:
+    """Leave out the vectors of time themselves."""
+    named = {name: clock for name, clock in found.clocks.items() if is_named(name, "time")}
+    times = [name for name, clock in named.items() if np.array_equal(found.values[name], clock)]
+    times = times if len(times) < len(found.clocks) else []
+    values = {name: column for name, column in found.values.items() if name not in times}
+    return replace(found, values=values, clocks={k: v for k, v in found.clocks.items() if k not in times})
+
+
 def _as_table(found: Columns) -> Columns | None:
     """Channels as a table, if they share one clock and all of their samples are valid."""
     first, *others = found.clocks.values()
@@ -164,15 +181,17 @@ def _as_table(found: Columns) -> Columns | None:
         _is_numeric(one) and np.isfinite(one).all() for one in columns
     ):
         return None
-    values = {"t": first} | {name: found.values[name] for name in found.clocks if name != "t"}
-    return replace(found, values=values, units=found.units | {"t": "s"}, clocks={})
+    times = (name for name in found.clocks if is_named(name, "time") and np.array_equal(found.values[name], first))
+    own = next(times, "t")
+    values = {own: first} | {name: found.values[name] for name in found.clocks if name != own}
+    return replace(found, values=values, units=found.units | {own: "s"}, clocks={})
 
 
 def _is_numeric(column: np.ndarray) -> bool:
     return column.dtype.kind in "fiub"
 
 
-def _channel(found: Columns, name: str) -> Channel | None:
+def _channel(found: Columns, name: str, repeated: str) -> Channel | None:
     t, x = found.clocks[name], found.values[name]
     if not (_is_numeric(t) and _is_numeric(x)):
         return None
@@ -180,7 +199,9 @@ def _channel(found: Columns, name: str) -> Channel | None:
     valid = np.isfinite(x) & np.isfinite(t)
     if valid.sum() < LEAST:
         return None
-    ordered = order_of(t[valid], {name: x[valid]})
+    ordered = single(order_of(t[valid], {name: x[valid]}), repeated)
+    if len(ordered.t) < LEAST:
+        return None
     return Channel(name, ordered.t, x[valid][ordered.rows], int((~valid).sum()), ordered.done)
 
 
@@ -191,7 +212,10 @@ def _check_times(path: Path, channel: Channel) -> None:
         before, after = float(channel.t[row]), float(channel.t[row + 1])
         how = "stands still and values differ" if after == before else "runs backwards"
         where = f"at its sample {row + 2:,} ({before:.9g} s to {after:.9g} s)"
-        text = f'{path}: the time of "{short(channel.name)}" {how} {where}. Split the file there.'
+        text = f'{path}: the time of "{short(channel.name)}" {how} {where}.'
+        if after == before:
+            raise questions.repeated(path, text)
+        text = f"{text} Split the file there."
         raise RecordingError(text, culprit=str(path), value=after)
 
 

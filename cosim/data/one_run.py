@@ -62,7 +62,7 @@ def timed(
 ) -> Columns:
     """Return all rows of a table or file, as `rows_of_one` does of one recording of it."""
     _check_layout(layout)
-    found = with_time(on_one_time(path, found, columns, units, required), layout)
+    found = with_time(on_one_time(path, found, columns, units, required, layout.get(REPEATED, "")), layout)
     found = _full(path, found, columns, units, layout, required)
     return in_order(path, found, columns, units, required, layout.get(REPEATED, ""))
 
@@ -76,7 +76,7 @@ def _full(
     required: Sequence[str],
 ) -> Columns:
     """Return a table whose rows have what is needed, as far as that is known."""
-    found = filled(path, found, columns, units, required)
+    found = filled(path, found, columns, units, required, layout.get(REPEATED, ""))
     return without_empty(path, found, columns, units, required, layout)
 
 

@@ -83,7 +83,7 @@ def in_order(
     if clock.dtype.kind not in "iuf":
         return found
     others = {key: one for key, one in found.values.items() if key != name}
-    ordered = _single(order_of(clock.astype(np.float64), others, found.restarts), repeated)
+    ordered = single(order_of(clock.astype(np.float64), others, found.restarts), repeated)
     if not ordered.done:
         return found
     values = {key: one[ordered.rows] for key, one in found.values.items()}
@@ -94,7 +94,7 @@ def in_order(
     return replace(found, values=values, notes=(*found.notes, *notes), start=start)
 
 
-def _single(ordered: Ordered, repeated: str) -> Ordered:
+def single(ordered: Ordered, repeated: str) -> Ordered:
     """Keep the first or the last of rows of one time."""
     again = np.diff(ordered.t) == 0
     if not repeated or not again.any():

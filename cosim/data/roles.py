@@ -38,7 +38,7 @@ STEMS: dict[str, Names] = {
     "temperature": ("temperatur",),
     "voltage": ("voltage", "spannung", "volt", "flux", "psi"),
     "acceleration": ("accel", "beschleunigung"),
-    "asked": ("soll", "setpoint", "command", "reference", "desired", "target", "demand"),
+    "asked": ("soll", "goal", "setpoint", "command", "reference", "desired", "target", "demand"),
     "wrong": (
         "error",
         "fehler",

@@ -29,7 +29,12 @@ SPARSE = 0.2
 
 
 def filled(
-    path: Path, found: Columns, columns: Mapping[str, str], units: Mapping[str, str], required: Sequence[str]
+    path: Path,
+    found: Columns,
+    columns: Mapping[str, str],
+    units: Mapping[str, str],
+    required: Sequence[str],
+    repeated: str = "",
 ) -> Columns:
     """Return a table whose rows are full: one with own times of its columns is put on one time base.
 
@@ -39,6 +44,7 @@ def filled(
         columns: what the user says of names, as `assign` takes it.
         units: what the user says of units.
         required: columns that are needed; the base is taken from them.
+        repeated: which of the samples of one time that differ is kept, "first" or "last".
 
     Raises:
         RecordingError: as `assign`, `read_clock` and `on_one_time`.
@@ -67,7 +73,8 @@ def filled(
         notes=(*found.notes, *clock.notes),
     )
     said = {key: text for key, text in columns.items() if key != "t"}
-    joined = on_one_time(path, parted, said, {key: text for key, text in units.items() if key != "t"}, required)
+    scales = {key: text for key, text in units.items() if key != "t"}
+    joined = on_one_time(path, parted, said, scales, required, repeated)
     if "t" not in joined.values:
         return found
     own = joined.values["t"] / size if "t" in units else joined.values["t"]
@@ -133,9 +140,9 @@ def _told(path: Path, which: str, rows: np.ndarray) -> str:
 
 
 def _begins_again(t: np.ndarray, found: Columns, name: str, there: Mapping[str, np.ndarray]) -> bool:
-    """Whether time falls or stays in the samples of a column, however they are put in order."""
+    """Whether time falls in the samples of a column, however they are put in order."""
     rows = np.flatnonzero(there.get(name, np.zeros(len(t), bool)) & np.isfinite(t))
-    return bool((np.diff(order_of(t[rows], {name: found.values[name][rows]}).t) <= 0).any())
+    return bool((np.diff(order_of(t[rows], {name: found.values[name][rows]}).t) < 0).any())
 
 
 def _is_empty(column: np.ndarray) -> np.ndarray:

@@ -84,7 +84,13 @@ def test_names_are_found_above_rows_that_are_half_empty(tmp_path: Path) -> None:
 
 def test_a_table_that_begins_again_in_rows_half_empty_is_many_recordings(tmp_path: Path) -> None:
     """A logger that writes blocks of two rows, the second of which is empty."""
-    path = written(tmp_path / "run.csv", "t [s],force [N],x", np.tile([0, 0.01], 60), np.tile([1, np.nan], 60), T[:120])
+    path = written(
+        tmp_path / "run.csv",
+        "t [s],force [N],x",
+        np.tile([0, 0.01], 60),
+        np.where(np.arange(120) % 2, np.nan, T[:120]),
+        T[:120],
+    )
     assert "tau" not in str(preview(Path(f"{path}:#1")).undecided)
     with pytest.raises(RecordingError, match="These are 60 recordings"):
         preview(path)
@@ -131,3 +137,11 @@ def test_cells_that_stand_beside_the_samples_leave_the_columns_that_are_asked_fo
     seen = preview(path, {"columns": {"t": "#4"}})
     assert len(seen.recording) == 400
     assert all("for example ." not in text for text in seen.undecided)
+
+
+def test_names_are_found_where_the_columns_behind_them_are_empty(tmp_path: Path) -> None:
+    header = "Id,1\nTime[ms],Realtime Tick,Present Position,Goal Position,,,,,"
+    columns = (5.0 * np.arange(400), 3.0 * np.arange(400), Q, Q, *[[""] * 400] * 5)
+    seen = preview(written(tmp_path / "run.csv", header, *columns), {"columns": {"q": "Present Position"}})
+    assert seen.recording.sample_time == pytest.approx(5e-3)
+    assert {*seen.found.values} == {"Time", "Realtime Tick", "Present Position", "Goal Position"}

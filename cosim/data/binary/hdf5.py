@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.data.binary.channels import with_clocks
 from cosim.data.binary.hdf5_chunks import check_chunks, pieces
 from cosim.data.binary.packages import is_table, left_out, opaque, package, vectors
 from cosim.data.columns import Columns
@@ -30,16 +31,19 @@ def read(path: Path) -> Columns:
     h5py = package("h5py", "hdf5", path)
     with h5py.File(path, "r") as file:
         items = _vectors(path, h5py, file)
-        often = Counter(name.split("/")[-1] for name in items)
-        names = {whole: whole.split("/")[-1] if often[whole.split("/")[-1]] == 1 else whole for whole in items}
-        found = {names[whole]: _values(path, item) for whole, item in items.items()}
-        units = {names[whole]: _unit(item) for whole, item in items.items()}
+        arrays = {name: _values(path, item) for name, item in items.items()}
+        stated = {name: text for name, item in items.items() if (text := _unit(item))}
         objects = any(name.startswith(INTERNAL) for name in file)
+    if channels := with_clocks(path, arrays, stated):
+        return channels
+    often = Counter(name.split("/")[-1] for name in arrays)
+    names = {whole: whole.split("/")[-1] if often[whole.split("/")[-1]] == 1 else whole for whole in arrays}
+    found = {names[whole]: array for whole, array in arrays.items()}
     values = vectors(path, found)
     if objects and not values:
         raise opaque(path)
-    stated = {name: unit for name, unit in units.items() if unit and name in values}
-    return Columns(values, stated, notes=left_out(path, found, values))
+    units = {names[whole]: text for whole, text in stated.items() if names[whole] in values}
+    return Columns(values, units, notes=left_out(path, found, values))
 
 
 def _vectors(path: Path, h5py: Any, file: Any) -> dict[str, Any]:

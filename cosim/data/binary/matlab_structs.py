@@ -33,12 +33,12 @@ class Found:
 
 
 def arrays_of(values: Mapping[str, Any]) -> Found:
-    """Return the arrays in the variables of a MAT file, as SciPy gives them with `simplify_cells`."""
+    """Return the arrays in the variables of a MAT file by path, as SciPy gives them with `simplify_cells`."""
     found = Found()
     for name, value in values.items():
         if not name.startswith("__"):
             _walk(found, name, value, 0)
-    return found.named()
+    return found
 
 
 def _walk(found: Found, path: str, value: Any, depth: int) -> None:

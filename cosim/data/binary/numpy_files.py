@@ -6,6 +6,7 @@ programs and are never loaded. A text vector as long as a table is wide names it
 
 import zipfile
 from collections.abc import Mapping
+from dataclasses import replace
 from math import prod
 from pathlib import Path
 from typing import IO
@@ -13,6 +14,7 @@ from typing import IO
 import numpy as np
 from numpy.lib import format as npy
 
+from cosim.data.binary.channels import with_clocks
 from cosim.data.binary.packages import is_table, left_out, vectors
 from cosim.data.columns import Columns
 from cosim.data.limits import check_columns, check_unpacked, listed
@@ -53,6 +55,8 @@ def _archive(path: Path) -> Columns:
             f"{path} holds no arrays of numbers; it holds: {listed(tuple(members))}.", culprit=str(path)
         )
     found = _named(found)
+    if channels := with_clocks(path, found, {}):
+        return replace(channels, notes=notes + channels.notes)
     values = vectors(path, found)
     return Columns(values, notes=notes + left_out(path, found, values))
 

@@ -4,10 +4,12 @@ Columns of structs and of lists of one length, as data sets of robots have them,
 """
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from cosim.data.binary.channels import with_clocks
+from cosim.data.binary.packages import left_out, vectors
 from cosim.data.columns import ORIGIN_KEY, UNIT_KEY, Columns
 from cosim.data.limits import check_cells
 from cosim.data.text.table import as_array
@@ -22,6 +24,8 @@ def read(path: Path) -> Columns:
         table, metadata = file.read(), file.metadata.metadata or {}
     default_memory_pool().release_unused()  # what was unpacked on the way: a fifth of large recordings
     units = {field.name: (field.metadata or {}).get(UNIT_KEY, b"").decode("utf-8", "replace") for field in table.schema}
+    if table.num_rows == 1 and (one_row := _of_one_row(path, table, units)):
+        return one_row
     columns = [(name, table[name]) for name in table.column_names if not name.startswith("__index_level_")]
     leaves = dict(leaf for name, column in columns for leaf in _leaves(path, name, column))
     check_cells(path, table.num_rows, len(leaves))
@@ -30,6 +34,24 @@ def read(path: Path) -> Columns:
     notes = () if isinstance(origin, dict) else (f"{path.stem}: its origin was left out, as it is no table of facts.",)
     stated = {name: unit for name, unit in units.items() if unit}
     return Columns(values, stated, origin if isinstance(origin, dict) else {}, notes=notes)
+
+
+def _of_one_row(path: Path, table: Any, units: Mapping[str, str]) -> Columns | None:
+    """Return a table whose single row holds lists: a signal each, as those of MAT files are; None of any other."""
+    import pyarrow as pa
+
+    kinds = (pa.types.is_list, pa.types.is_large_list, pa.types.is_fixed_size_list)
+    lists = [field.name for field in table.schema if any(is_one(field.type) for is_one in kinds)]
+    cells = {name: table[name][0].values for name in lists if table[name][0].is_valid}
+    check_cells(path, sum(map(len, cells.values())), 1)
+    arrays = {name: as_array(pa.chunked_array([cell])) for name, cell in cells.items()}
+    if not any(one.dtype.kind == "f" and len(one) > 1 for one in arrays.values()):
+        return None
+    if channels := with_clocks(path, arrays, units):
+        return channels
+    values = vectors(path, arrays)
+    stated = {name: units[name] for name in values if units.get(name)}
+    return Columns(values, stated, notes=left_out(path, arrays, values))
 
 
 def _leaves(path: Path, name: str, column: Any) -> Iterator[tuple[str, Any]]:

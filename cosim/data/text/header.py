@@ -71,7 +71,7 @@ def header_of(above: Sequence[str], body: Sequence[Sequence[str]], separator: st
     for words in reversed(lines):
         if words and LABEL.search(words[0].lower()):
             continue
-        if not words or (not fitting and not _are_names(words)):
+        if not words or (not fitting and not _are_names(words, body)):
             break
         fitting.append(words)
     if fitting:
@@ -138,14 +138,16 @@ def words_of_line(line: str, body: Sequence[Sequence[str]], separator: str, coun
             fields = fields[:-1]
         if len(fields) == count - 1:
             fields = _aligned(fields, body)
-        if len(fields) == count and not any(is_value(field, ".") for field in fields) and _are_names(fields):
+        if len(fields) == count and not any(is_value(field, ".") for field in fields) and _are_names(fields, body):
             return tuple(fields)
     return ()
 
 
-def _are_names(fields: Sequence[str]) -> bool:
-    """Whether half of the fields at least hold something."""
-    return sum(map(bool, fields)) * 2 >= len(fields)
+def _are_names(fields: Sequence[str], body: Sequence[Sequence[str]]) -> bool:
+    """Whether half of the fields at least hold something, of those above columns that do."""
+    above = [any(len(row) > place and row[place] for row in body) for place in range(len(fields))]
+    told = [bool(field) for field, has in zip(fields, above, strict=True) if has or not any(above)]
+    return sum(told) * 2 >= len(told)
 
 
 def _headings(line: str, separator: str, count: int) -> tuple[str, ...]:

@@ -1,6 +1,7 @@
 """Tables whose channels have times of their own: several columns of time, each in front of the channels it belongs to.
 
     Time [s]; Torque; Time [s]; Position        NI and LabVIEW; also Time 1, Torque, Time 2, Position
+    tau; q; t_tau; t_q                          in any order, by their names
 
 A column of time begins a group, which may end before the others do. Where all of them are alike, they are one time.
 """
@@ -14,6 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.data.assign import units_stated
+from cosim.data.clocks import owners
 from cosim.data.columns import Columns
 from cosim.data.roles import is_named
 from cosim.data.times import read_clock
@@ -35,20 +37,32 @@ def parted(path: Path, found: Columns) -> Columns:
     names = [*found.values]
     starts = [place for place, name in enumerate(names) if _is_time(found, name)]
     groups = list(pairwise([*starts, len(names)]))
-    if found.clocks or len(starts) < 2 or starts[0] or any(end - start < 2 for start, end in groups):
+    if found.clocks or len(starts) < 2:
         return found
+    owned = {name: names[start] for start, end in groups for name in names[start + 1 : end]}
+    if starts[0] or any(end - start < 2 for start, end in groups):
+        owned = _by_name(found, [names[start] for start in starts])
+        starts = [names.index(time) for time in dict.fromkeys(owned.values())]
+        if len(starts) < 2:
+            return found
     times = [found.values[names[start]] for start in starts]
     if all(np.array_equal(times[0], other, equal_nan=True) for other in times[1:]):
         return _of_one_time(found, names, starts)
     values: dict[str, np.ndarray] = {}
     clocks: dict[str, np.ndarray] = {}
-    for start, end in groups:
-        clock = seconds(path, found, names[start])
-        there = np.isfinite(clock)
-        for name in names[start + 1 : end]:
-            values[name], clocks[name] = found.values[name][there], clock[there]
+    stamps = {time: seconds(path, found, time) for time in dict.fromkeys(owned.values())}
+    for name, time in owned.items():
+        there = np.isfinite(stamps[time])
+        values[name], clocks[name] = found.values[name][there], stamps[time][there]
     units = {name: text for name, text in found.units.items() if name in values}
     return replace(found, values=values, units=units, clocks=clocks)
+
+
+def _by_name(found: Columns, times: Sequence[str]) -> dict[str, str]:
+    """Return the time that is named after each channel; nothing where a channel has none."""
+    channels = [name for name in found.values if name not in times]
+    owned = owners(channels, times, dict.fromkeys(found.values, len(next(iter(found.values.values())))))
+    return owned if len(owned) == len(channels) else {}
 
 
 def _of_one_time(found: Columns, names: Sequence[str], starts: Sequence[int]) -> Columns:

@@ -1,0 +1,83 @@
+"""Named arrays as channels with times of their own: a vector of time for each channel, or for each device."""
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from cosim.data.binary.packages import beside, is_table
+from cosim.data.clocks import grouped, owners
+from cosim.data.columns import Columns
+from cosim.data.limits import check_cells, listed
+from cosim.data.roles import is_named
+from cosim.data.text.own_times import seconds
+
+PLAIN = ("data", "value", "values", "val", "y", "signal", "samples")
+"""Names of the values of a channel that has its name from its group."""
+GROWS = 0.8
+"""Share of the steps of a time that are positive: a few samples may stand twice or be late."""
+MOST = 200
+"""Vectors of time of one file: each is compared with each channel."""
+
+
+def with_clocks(path: Path, found: Mapping[str, np.ndarray], units: Mapping[str, str]) -> Columns | None:
+    """Return the arrays of a file as channels with times of their own; None where they have one time, or none.
+
+    Args:
+        path: the file, for messages and notes.
+        found: arrays by their whole names, groups parted by points or strokes; a table (rows, k) is k channels.
+        units: the units that the file states, by name.
+
+    Raises:
+        RecordingError: what a time counts is not stated and cannot be known from its rate.
+    """
+    vectors = _vectors(found)
+    times = [name for name, one in vectors.items() if _is_time(name, one)]
+    channels = [name for name in vectors if name not in times]
+    if not 1 < len(times) <= MOST or not channels:
+        return None
+    owned = owners(channels, times, {name: len(one) for name, one in vectors.items()})
+    used = list(dict.fromkeys(owned.values()))
+    if len(used) < 2 or all(np.array_equal(vectors[used[0]], vectors[one]) for one in used):
+        return None
+    check_cells(path, sum(len(vectors[name]) for name in (*owned, *used)), 1)
+    plain = Columns({name: vectors[name].astype(np.float64) for name in (*owned, *used)}, dict(units))
+    clocks = {time: seconds(path, plain, time) for time in used}
+    names = _short([*owned, *used])
+    left = tuple(name for name in channels if name not in owned)
+    note = f"{path.stem}: arrays without a time of their length were left out: {listed(left)}."
+    return replace(
+        plain,
+        values={names[name]: plain.values[name] for name in owned} | {names[time]: clocks[time] for time in used},
+        units={names[name]: text for name, text in units.items() if name in owned},
+        clocks={names[name]: clocks[owned.get(name, name)] for name in (*owned, *used)},
+        notes=(note,) if left else (),
+    )
+
+
+def _vectors(found: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return the numeric arrays as vectors, longer than one."""
+    numeric = {name: value for name, value in found.items() if value.dtype.kind in "fiub" and value.size > 1}
+    tables = {name: beside(value) for name, value in numeric.items()}
+    return {
+        f"{name}_{k + 1}" if is_table(numeric[name].shape) else name: table[:, k]
+        for name, table in tables.items()
+        for k in range(table.shape[1])
+    }
+
+
+def _is_time(name: str, column: np.ndarray) -> bool:
+    """Whether a vector is named as a time and grows, as far as its samples are in order."""
+    own = is_named(grouped(name)[1], "time") and column.dtype.kind in "fiu"
+    return own and float(np.mean(np.diff(column.astype(np.float64)) > 0)) >= GROWS
+
+
+def _short(names: Sequence[str]) -> dict[str, str]:
+    """Return for each name its last part where that is the only one; that of its group where it says nothing."""
+    parts = {name: grouped(name) for name in names}
+    telling = {name: group if group and last.lower() in PLAIN else name for name, (group, last) in parts.items()}
+    last = {name: grouped(text)[1] for name, text in telling.items()}
+    often = Counter(last.values())
+    return {name: text if often[text] == 1 else name for name, text in last.items()}
