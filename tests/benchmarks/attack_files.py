@@ -24,15 +24,20 @@ from typing import IO
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import attack_files_bags
 import attack_files_hdf5
+import attack_files_mcap
+import attack_files_tables
+from tree_cost import megabytes
 
 Maker = Callable[[Random, Path], None]
 """Writes a file at the path, as the dice say."""
 
 FILES: dict[str, tuple[str, Maker]] = {
-    f"{module.KIND}: {make.__doc__.rstrip('.').lower()}": (module.SUFFIX, make)
-    for module in (attack_files_hdf5,)
-    for make in module.MAKERS
+    f"{kind}: {make.__doc__.rstrip('.').lower()}": (suffix, make)
+    for module in (attack_files_hdf5, attack_files_bags, attack_files_mcap, attack_files_tables)
+    for kind, (suffix, makers) in module.KINDS.items()
+    for make in makers
 }
 """Name to suffix and maker."""
 FOREIGN = frozenset(name for name, (_, make) in FILES.items() if make.__name__.endswith("_elsewhere"))
@@ -47,7 +52,9 @@ SECONDS, MEGABYTES, PATIENCE = 20.0, 1000.0, 90.0
 
 @dataclass(frozen=True)
 class Cost:
-    """What a file cost: bytes, exit code, seconds of the clock and of a processor, peak of memory [MB], last line."""
+    """What a file cost: bytes, exit code, seconds of the clock and of a processor, peak of memory of all its
+    processes together [MB], last line.
+    """
 
     name: str
     size: int
@@ -88,12 +95,14 @@ def cost(name: str, path: Path, command: list[str]) -> Cost:
         process = (
             subprocess.Popen([*command, str(path)], stdout=out, stderr=out).pid if command else _reading(path, out)
         )
+        most = 0.0
         while (ended := os.wait4(process, os.WNOHANG))[0] == 0:
+            most = max(most, megabytes(process))
             if time.monotonic() - began > PATIENCE:
                 os.kill(process, signal.SIGKILL)
                 ended = os.wait4(process, 0)
                 break
-            time.sleep(0.02)
+            time.sleep(0.05)
         _, status, used = ended
         out.seek(0)
         text = out.read()
@@ -104,7 +113,7 @@ def cost(name: str, path: Path, command: list[str]) -> Cost:
         os.waitstatus_to_exitcode(status),
         time.monotonic() - began,
         used.ru_utime + used.ru_stime,
-        used.ru_maxrss * 1.024e-3,
+        most,
         said.replace(str(path), path.name),
     )
 

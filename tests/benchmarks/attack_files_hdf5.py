@@ -11,7 +11,6 @@ import h5py
 import numpy as np
 
 Maker = Callable[[Random, Path], None]
-KIND, SUFFIX = "hdf5", ".h5"
 ROWS = 400
 
 
@@ -232,3 +231,4 @@ MAKERS = (
     many_groups, many_datasets, deep_groups, circles, large_attribute, compound, arrays_in_cells, lengths_that_vary,
     plain,
 )  # fmt: skip
+KINDS = {"hdf5": (".h5", MAKERS)}

@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 import attack_files
 
 KINDS = sorted({name.partition(":")[0] for name in attack_files.FILES})
-EACH = 6
+EACH = 2
 """Files of each kind; `python tests/benchmarks/attack_files.py` shows all."""
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.data.binary.messages import columns_of
+from cosim.data.binary.messages import Message, columns_of
 from cosim.data.one_run import rows_of_one
 from cosim.data.recording import REQUIRED, Recording
 
@@ -52,7 +52,8 @@ def joints(t: float, name: str = "az", **values: float) -> tuple[str, str, int, 
 
 
 def read(messages: list[tuple[str, str, int, object]], **columns: str) -> Recording:
-    found = rows_of_one(PATH, columns_of(PATH, messages), columns, {}, {}, REQUIRED)
+    packed = [Message(topic, kind, logged, 100, lambda given=given: given) for topic, kind, logged, given in messages]
+    found = rows_of_one(PATH, columns_of(PATH, packed), columns, {}, {}, REQUIRED)
     return Recording.judged(PATH, "run", found, "", columns, {}, REQUIRED)
 
 

@@ -6,6 +6,7 @@ A file may convert a channel by a formula, which asammdf has numexpr evaluate: a
 keeps the worst out there was bypassed before (numexpr 564, 2026), so only plain arithmetic reaches it.
 """
 
+import mmap
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -15,24 +16,45 @@ import numpy as np
 
 from cosim.data.binary.packages import package
 from cosim.data.columns import Columns
-from cosim.data.limits import check_cells, listed, short
+from cosim.data.limits import check_cells, check_unpacked, listed, short
 from cosim.support.errors import RecordingError
 
 ARITHMETIC, LONGEST = frozenset("0123456789.eEXx+-*/(), \t"), 200
 """Signs of numbers, of the channel itself and of four operations, and how many a formula may have."""
+PACKED, STATED = b"##DZ", 32
+"""Mark of a packed block, and where in it its size unpacked is stated (ASAM MDF 4.2, DZBLOCK)."""
 TIME = 1
 """Kind of a master channel that is a time; others are angles, distances and indices (ASAM MDF 4.2, cn_sync_type)."""
 
 
 def read(path: Path) -> Columns:
     """Read an MDF file."""
-    mdf = package("asammdf", "mdf", path).MDF(path)
+    opener = package("asammdf", "mdf", path).MDF
+    _check_packed(path)
+    mdf = opener(path)
     try:
         _check_formulas(path, mdf)
+        check_unpacked(path, sum(one.cycles_nr * _bytes(one) for one in (group.channel_group for group in mdf.groups)))
         check_cells(path, max((one.channel_group.cycles_nr for one in mdf.groups), default=0), len(mdf.channels_db))
         return _columns(path, mdf)
     finally:
         mdf.close()
+
+
+def _check_packed(path: Path) -> None:
+    """Refuse packed blocks that say that they unpack to more than the file may."""
+    size = 0
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        place = data.find(PACKED)
+        while place >= 0:
+            size += int.from_bytes(data[place + STATED : place + STATED + 8], "little")
+            check_unpacked(path, size, "what is packed in it")
+            place = data.find(PACKED, place + len(PACKED))
+
+
+def _bytes(group: Any) -> int:
+    """Return the bytes of a record of a group of channels."""
+    return int(group.samples_byte_nr) + int(getattr(group, "invalidation_bytes_nr", 0))
 
 
 def _columns(path: Path, mdf: Any) -> Columns:

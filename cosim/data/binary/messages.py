@@ -12,15 +12,16 @@ Source: common_interfaces, sensor_msgs/msg/JointState: position in rad or m, vel
 in N.m or N.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from cosim.data.columns import Columns
-from cosim.data.limits import check_cells, check_columns, check_time, listed
+from cosim.data.limits import COLUMNS, NUMBER, allowance, check_cells, check_columns, check_time, listed
 from cosim.data.roles import guess
 
 JOINTS = ("position", "velocity", "effort")
@@ -65,31 +66,61 @@ class Topic:
         return np.where(unset, logged, stamps)
 
 
-def columns_of(path: Path, messages: Iterable[tuple[str, str, int, Any]], release: str = "ROS 2") -> Columns:
-    """Make columns of messages, each (topic, type, time it was logged in ns, decoded message); `release` wrote them."""
+@dataclass(frozen=True)
+class Message:
+    """A message as it lies in a file: topic, type, time it was logged [ns], bytes, and what decodes it."""
+
+    topic: str
+    kind: str
+    logged: int
+    size: int
+    decode: Callable[[], Any]
+
+
+def columns_of(path: Path, messages: Iterable[Message], release: str = "ROS 2") -> Columns:
+    """Make columns of messages; `release` wrote them. Images and clouds are left out before they are decoded."""
     topics: dict[tuple[str, str], Topic] = {}
-    for name, kind, logged, message in messages:
-        header = getattr(message, "header", None)
-        frame = str(getattr(header, "frame_id", ""))
-        if (name, frame) not in topics:
-            again = any(other == name for other, _ in topics)
-            topics[name, frame] = Topic(f"{name} ({frame})" if again else name, kind)
-        topic = topics[name, frame]
-        topic.stamps.append(_stamp(header))
-        topic.logged.append(logged)
-        topic.rows.append(dict(_numbers(message, kind)))
-        check_cells(path, len(topic.rows), len(topic.rows[-1]) + 1)
+    wide: dict[str, int] = {}
+    most = COLUMNS * allowance(path).raised
+    for one in messages:
         check_time(path)
-    chosen = max(topics.values(), key=lambda topic: topic.tells_an_axis, default=None)
+        if one.size > NUMBER * most:
+            wide[one.topic] = one.size // NUMBER
+        if one.topic in wide:
+            continue
+        message = one.decode()
+        row = dict(islice(_numbers(message, one.kind), most + 1))
+        if len(row) > most:
+            wide[one.topic] = len(row)
+            continue
+        topic = _topic(topics, one, getattr(message, "header", None))
+        topic.logged.append(one.logged)
+        topic.rows.append(row)
+        check_cells(path, len(topic.rows), len(row) + 1)
+    narrow = [topic for (name, _), topic in topics.items() if name not in wide]
+    chosen = max(narrow, key=lambda topic: topic.tells_an_axis, default=None)
     if chosen is None or not any(chosen.rows):
+        check_columns(path, max(wide.values(), default=0))
         return Columns({})
-    others = [one for one in topics.values() if one is not chosen]
+    others = [one for one in narrow if one is not chosen]
     beside = [one for one in others if len(one.rows) >= LEAST and 0 < len(one.names) <= WIDE]
-    return _joined(path, [chosen, *(() if chosen.is_whole else beside)], others, release)
+    left = [*(one.name for one in others), *wide]
+    return _joined(path, [chosen, *(() if chosen.is_whole else beside)], left, release)
 
 
-def _joined(path: Path, topics: Sequence[Topic], others: Sequence[Topic], release: str) -> Columns:
-    """Columns of topics, the first of which is the one that tells of an axis."""
+def _topic(topics: dict[tuple[str, str], Topic], message: Message, header: Any) -> Topic:
+    """Return the topic of a message with its stamp noted; publishers that name different frames have one each."""
+    frame = str(getattr(header, "frame_id", ""))
+    if (message.topic, frame) not in topics:
+        again = any(other == message.topic for other, _ in topics)
+        topics[message.topic, frame] = Topic(f"{message.topic} ({frame})" if again else message.topic, message.kind)
+    topic = topics[message.topic, frame]
+    topic.stamps.append(_stamp(header))
+    return topic
+
+
+def _joined(path: Path, topics: Sequence[Topic], others: Sequence[str], release: str) -> Columns:
+    """Columns of topics, the first of which is the one that tells of an axis; `others` are named where left out."""
     check_columns(path, sum(len(one.names) for one in topics))
     times = [one.times() for one in topics]
     if any(abs(int(t[0]) - one.logged[0]) > APART for t, one in zip(times, topics, strict=True)) and len(topics) > 1:
@@ -105,7 +136,7 @@ def _joined(path: Path, topics: Sequence[Topic], others: Sequence[Topic], releas
             whole = name if topic is topics[0] else f"{topic.name}.{name}"
             values[whole] = np.array([row[name] for row in topic.rows if name in row])
             clocks[whole] = clock if told.all() else clock[told]
-    left = tuple(sorted(one.name for one in others if one not in topics))
+    left = tuple(sorted({*others} - {one.name for one in topics}))
     read = " and ".join(one.name for one in topics)
     notes = (f"{path.stem}: of its topics {read} was read; left out: {listed(left)}.",) if left else ()
     start = str(np.datetime64(first // 1_000_000, "ms")) if first > DATES else ""

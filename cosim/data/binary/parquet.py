@@ -11,7 +11,7 @@ from typing import Any
 from cosim.data.binary.channels import with_clocks
 from cosim.data.binary.packages import left_out, vectors
 from cosim.data.columns import ORIGIN_KEY, UNIT_KEY, Columns
-from cosim.data.limits import check_cells
+from cosim.data.limits import NUMBER, check_cells, check_unpacked, short
 from cosim.data.text.table import as_array
 
 
@@ -21,7 +21,10 @@ def read(path: Path) -> Columns:
 
     with parquet.ParquetFile(path) as file:
         check_cells(path, file.metadata.num_rows, len(file.schema_arrow))
+        texts = _check_declared(path, file.metadata)
+    with parquet.ParquetFile(path, read_dictionary=texts) as file:
         table, metadata = file.read(), file.metadata.metadata or {}
+    _check_texts(path, table)
     default_memory_pool().release_unused()  # what was unpacked on the way: a fifth of large recordings
     units = {field.name: (field.metadata or {}).get(UNIT_KEY, b"").decode("utf-8", "replace") for field in table.schema}
     if table.num_rows == 1 and (one_row := _of_one_row(path, table, units)):
@@ -52,6 +55,35 @@ def _of_one_row(path: Path, table: Any, units: Mapping[str, str]) -> Columns | N
     values = vectors(path, arrays)
     stated = {name: units[name] for name in values if units.get(name)}
     return Columns(values, stated, notes=left_out(path, arrays, values))
+
+
+def _check_declared(path: Path, metadata: Any) -> list[str]:
+    """Refuse a file whose columns say that they unpack to more than it may; returns those of texts.
+
+    A page of repeats claims few bytes and holds any number of values, so both are counted.
+    """
+    size, texts = 0, []
+    for number in range(metadata.num_columns):
+        column = metadata.schema.column(number)
+        width = max(column.length, NUMBER)
+        parts = [metadata.row_group(group).column(number) for group in range(metadata.num_row_groups)]
+        size += sum(max(part.num_values * width, part.total_uncompressed_size) for part in parts)
+        check_unpacked(path, size, f"column {short(column.path)}")
+        texts += [column.path] if column.physical_type == "BYTE_ARRAY" else []
+    return texts
+
+
+def _check_texts(path: Path, table: Any) -> None:
+    """Refuse texts that take more than a file may unpack to once each row has its own: one text may be in each row."""
+    import pyarrow as pa
+    import pyarrow.compute as pc
+
+    size = 0
+    for name in table.column_names:
+        for part in table[name].chunks if pa.types.is_dictionary(table[name].type) else ():
+            lengths = pc.binary_length(part.dictionary)
+            size += pc.sum(lengths.take(part.indices)).as_py() or 0
+            check_unpacked(path, size, f"column {short(name)}")
 
 
 def _leaves(path: Path, name: str, column: Any) -> Iterator[tuple[str, Any]]:

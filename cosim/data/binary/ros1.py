@@ -8,13 +8,14 @@ import bz2
 import struct
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from cosim.data.binary.messages import columns_of
+from cosim.data.binary.messages import Message, columns_of
 from cosim.data.columns import Columns
 from cosim.data.limits import check_text, check_time, check_unpacked, short
 from cosim.support.errors import RecordingError
@@ -98,7 +99,7 @@ def _whole(data: bytes) -> bytes:
     return data[:place]
 
 
-def _messages(path: Path, data: bytes) -> Iterator[tuple[str, str, int, Any]]:
+def _messages(path: Path, data: bytes) -> Iterator[Message]:
     known: dict[bytes, Connection] = {}
     unpacked = 0
     for fields, body in _records(data):
@@ -112,7 +113,7 @@ def _messages(path: Path, data: bytes) -> Iterator[tuple[str, str, int, Any]]:
             yield from _message(known, inner, content)
 
 
-def _message(known: dict[bytes, Connection], fields: Fields, body: bytes) -> Iterator[tuple[str, str, int, Any]]:
+def _message(known: dict[bytes, Connection], fields: Fields, body: bytes) -> Iterator[Message]:
     """Learn a connection, or decode a message of one."""
     kind, key = _kind(fields), fields.get(b"conn", b"")
     if kind == CONNECTION and key not in known:
@@ -123,7 +124,8 @@ def _message(known: dict[bytes, Connection], fields: Fields, body: bytes) -> Ite
     if kind == MESSAGE and key in known:
         one = known[key]
         seconds, nanos = struct.unpack("<II", fields[b"time"])
-        yield one.topic, one.kind, seconds * 10**9 + nanos, _decoded(Cursor(body), one.types, one.kind, 0)
+        decode = partial(_decoded, Cursor(body), one.types, one.kind, 0)
+        yield Message(one.topic, one.kind, seconds * 10**9 + nanos, len(body), decode)
 
 
 def _records(data: bytes) -> Iterator[tuple[Fields, bytes]]:

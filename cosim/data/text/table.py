@@ -20,6 +20,9 @@ from cosim.data.text.names import split_unit
 from cosim.data.text.unit_words import contradict, is_unit, spelled
 from cosim.support.errors import RecordingError
 
+NESTED = "a list"
+"""What stands for each list of lengths that differ: it is no number, and millions of objects would be made of it."""
+
 
 def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
     """Parse the body of a text whose layout is known."""
@@ -244,7 +247,25 @@ def as_array(column: Any) -> np.ndarray:
     numeric = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_boolean(kind)
     if numeric or pa.types.is_null(kind) or pa.types.is_decimal(kind):
         return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
+    if pa.types.is_dictionary(kind):
+        return _shared(column) if _is_text(kind.value_type) else as_array(column.cast(kind.value_type))
+    if pa.types.is_nested(kind):
+        return np.full(len(column), NESTED, dtype=object)
     return np.asarray(column.to_pylist(), dtype=object)
+
+
+def _is_text(kind: Any) -> bool:
+    tests = (pa.types.is_string, pa.types.is_large_string, pa.types.is_binary, pa.types.is_large_binary)
+    return any(test(kind) for test in tests)
+
+
+def _shared(column: Any) -> np.ndarray:
+    """Return texts that stand once in a dictionary as one object each, however many rows have it."""
+    parts = [np.empty(0, dtype=object)]
+    for part in column.chunks:
+        texts = np.array([*part.dictionary.to_pylist(), None], dtype=object)
+        parts.append(texts[part.indices.fill_null(len(texts) - 1).to_numpy(zero_copy_only=False)])
+    return np.concatenate(parts)
 
 
 def _is_long(column: Any) -> bool:

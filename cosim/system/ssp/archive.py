@@ -2,10 +2,13 @@
 
 import posixpath
 import re
+import shutil
 import zipfile
 from collections.abc import Iterator
+from contextlib import contextmanager
 from math import isfinite, nan
 from pathlib import Path
+from typing import IO
 from urllib.parse import unquote, urlsplit
 from xml.etree import ElementTree
 
@@ -68,14 +71,24 @@ class Archive:
         beyond = self._beyond(source)
         if beyond is not None:
             return beyond.read_bytes()
-        name = self._member(source)
-        if self.members[name].file_size > LARGEST:
-            raise self.error(f'"{name}" has more than {LARGEST >> 20} MiB')
+        with self._opened(source) as file:
+            return file.read()
+
+    def _info(self, source: str) -> zipfile.ZipInfo:
+        info = self.members[self._member(source)]
+        if info.file_size > LARGEST:
+            raise self.error(f'"{info.filename}" has more than {LARGEST >> 20} MiB')
+        return info
+
+    @contextmanager
+    def _opened(self, source: str) -> Iterator[IO[bytes]]:
+        """Open a member; what goes wrong within the block is said of it."""
+        info = self._info(source)
         try:
-            with zipfile.ZipFile(self.path) as archive:
-                return archive.read(self.members[name])
+            with zipfile.ZipFile(self.path) as archive, archive.open(info) as file:
+                yield file
         except (*DAMAGED, OSError) as error:
-            raise self.error(f'"{name}" is damaged or encrypted: {first_line(error)}') from error
+            raise self.error(f'"{info.filename}" is damaged or encrypted: {first_line(error)}') from error
 
     def xml(self, source: str, tag: str) -> ElementTree.Element:
         """Read an XML member whose root is `tag`, as in `ssv:ParameterSet`."""
@@ -110,10 +123,9 @@ class Archive:
         for source, path in found.items():
             if path.parent != home:
                 continue
-            content = self.read(source)
-            if not path.is_file() or path.stat().st_size != len(content):
-                with replacing(path, force=True) as partial:
-                    partial.write_bytes(content)
+            if not path.is_file() or path.stat().st_size != self._info(source).file_size:
+                with replacing(path, force=True) as partial, self._opened(source) as file, partial.open("wb") as copy:
+                    shutil.copyfileobj(file, copy)
         return found
 
     def nested(self, source: str) -> "Archive":
