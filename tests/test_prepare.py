@@ -1,5 +1,7 @@
 """From a recording to what the tests work on: bands, pieces, holes, noise, and what is refused before."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.trust.admission import check_recordings
 from cosim.diagnosis.trust.judgement import judged
 from cosim.diagnosis.trust.likelihood import Reference
+from cosim.estimation.blocks import Blocks
 from cosim.estimation.filters import derivative, lowpass
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import choose_cutoff, noise_of, prepare, quality
@@ -90,7 +93,7 @@ class TestPreparation:
 
     def test_where_polls_are_uneven_the_band_ends_where_lines_bridge_the_steps(self) -> None:
         """A computer that polls a drive is late by one to four steps, time and again: no half second without."""
-        t, q, v, a = wander()
+        t, q, _, a = wander()
         steps = np.random.default_rng(3).choice([1, 5], len(t), p=[0.9, 0.1])
         rows = np.cumsum(15 * steps)
         rows = rows[rows < len(t)]
@@ -98,7 +101,8 @@ class TestPreparation:
         prepared = prepare([polled], 30.0)
         assert 0.5 < prepared.cutoff < 6.0
         (piece,) = prepared.pieces
-        slow = lowpass(v, float(t[1] - t[0]), prepared.cutoff)
+        dt = float(t[1] - t[0])
+        slow = derivative(lowpass(q, dt, prepared.cutoff), dt)  # what even rows say in that band
         assert np.abs(piece.v - np.interp(piece.t, t, slow))[piece.inside].max() < 0.05 * np.abs(slow).max()
 
     def test_a_recording_that_is_nothing_but_holes_is_refused(self) -> None:
@@ -118,8 +122,40 @@ class TestPreparation:
         t, q, v, a = wander(4.0)
         short = [recorded(5 * a + 2 * np.sign(v), t, q, f"run_{k}") for k in range(3)]
         check_recordings(short, short[:1])
-        with pytest.raises(RecordingError, match="fitting needs 8 s"):
-            check_recordings(short[:1], short[:1])
+
+    @pytest.mark.parametrize("rate", [200.0, 1000.0, 5000.0])
+    def test_a_constant_speed_has_no_acceleration_at_the_ends_of_its_pieces(self, rate: float) -> None:
+        t = np.arange(round(4 * rate)) / rate
+        (piece,) = prepare([Recording("run", {"t": t, "tau": 0 * t, "q": 0.4 * t})], 10.0).pieces
+        assert np.abs(piece.lowpass(piece.a)[piece.kept]).max() < 1e-5
+
+    def test_standard_errors_come_from_five_blocks_at_least(self) -> None:
+        t = np.arange(3240) / 500
+        short = prepare([Recording("run", {"t": t, "tau": np.cos(t), "q": np.sin(t)})], 20.0)
+        assert len(Blocks.of(short).rows) == 5
+
+    @pytest.mark.parametrize(
+        ("seconds", "hertz", "rate", "rule"),
+        [
+            (6.48, 1.0, 5000.0, ""),
+            (4.5, 0.5, 500.0, ""),
+            (8.5, 0.0, 500.0, ""),
+            (6.48, 0.0, 500.0, "only 6.48 s .* with 0 cycles"),
+            (6.48, 0.1, 500.0, "fitting needs 8 s, or 4 s with 2 cycles in 500 rows. Record longer"),
+            (3.0, 2.0, 500.0, "only 3 s"),
+            (6.0, 2.0, 60.0, "in 36[01] rows"),
+            (1.5, 2.0, 500.0, "a recording needs 2 s"),
+        ],
+    )
+    @pytest.mark.parametrize("name", ["q", "v"])
+    def test_how_short_a_recording_may_be_follows_from_its_motion(
+        self, seconds: float, hertz: float, rate: float, rule: str, name: str
+    ) -> None:
+        t = np.arange(round(seconds * rate) + 1) / rate
+        v = 0.3 * np.cos(2 * np.pi * hertz * t + 0.3) if hertz else np.full(len(t), 0.3)
+        given = Recording("run", {"t": t, "tau": v, name: np.cumsum(v) / rate if name == "q" else v})
+        with pytest.raises(RecordingError, match=rule) if rule else nullcontext():
+            check_recordings([given], [given])
 
     def test_a_constant_speed_says_nothing_about_units(self) -> None:
         t = np.arange(5000) / 500

@@ -148,6 +148,7 @@ def as_json(found: Diagnosis) -> JsonObject:
         "policy": found.policy,
         "loop_bias": found.loop_bias,
         "base_parameters": {name: list(values) for name, values in found.base_parameters.items()},
+        "not_determined": {one.variable.name: one.as_json() for one in found.not_determined},
         "ledger": [trial.as_json() for trial in found.ledger],
         "scores": found.scores.as_json() if found.scores else {},
         "improved": found.improved,

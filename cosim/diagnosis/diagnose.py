@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.entries import NotLearnedEntry
+from cosim.diagnosis.answer.not_determined import as_sanity, not_determined
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.answer.scores import Scores
 from cosim.diagnosis.decide.decision import Decision, decide, rest_rules
@@ -40,6 +41,7 @@ from cosim.diagnosis.trust.admission import check_effects, check_recordings
 from cosim.diagnosis.trust.denied import beyond_denial, without_denied
 from cosim.diagnosis.trust.doubts import doubts, of_base, single_readings
 from cosim.estimation.blocks import Blocks
+from cosim.estimation.determined import limited, with_held
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Band, prepare, quality
 from cosim.estimation.problem import Problem
@@ -90,6 +92,12 @@ class Answer:
         """The structure that is delivered."""
         return self.proof.chosen
 
+    def models(self, after: Mount | None = None) -> Structures:
+        """The three models as cards hold them; the last is `after`, or what is delivered without a learned term."""
+        problem = self.comparison.problem
+        fitted = (limited(problem, one)[0] for one in (self.base.mount, after or self.chosen.mount))
+        return Structures(problem.mount, *fitted)
+
 
 def diagnose(
     train: Sequence[Recording],
@@ -123,9 +131,9 @@ def diagnose(
     sanity = (*doubts(train, heldout, card), *single_readings(given, (*train, *heldout)))
     problem = _problem(train, card)
     on_progress("refitting the base")
-    base = problem.fit(problem.mount, 75)
+    problem, base = with_held(problem, problem.fit(problem.mount, 75))
     sanity = (*sanity, *of_base(problem, base.mount, train, heldout))
-    refitted = _improved(card, base.mount)
+    refitted = _improved(card, limited(problem, base.mount)[0])
     on_model_ready("before", refitted.plant())
     if any(one.blocks_naming for one in beyond_denial(sanity)):
         return _refused(refitted, without_names(problem, base.mount, train, heldout, sanity, started))
@@ -138,15 +146,17 @@ def diagnose(
     on_progress("proving on the recording that was not fitted")
     answer, tried = _learned(_answer(comparison, examined, heldout), heldout)
     learned = tried if tried and tried.helps else None
-    model = learned.mount if learned else answer.chosen.mount
-    delivered, first, named = (_improved(card, one) for one in (model, examined.chosen.mount, answer.chosen.mount))
+    mounts = (learned.mount if learned else answer.chosen.mount, examined.chosen.mount, answer.chosen.mount)
+    delivered, first, named = (_improved(card, limited(problem, one)[0]) for one in mounts)
+    unknown = not_determined(problem, limited(problem, mounts[0])[1])
     on_model_ready("after", delivered.plant())
     experiment = _experiment(answer)
     described = _with_learned(_described(answer, train, heldout, card), answer, learned, train, heldout)
     diagnosis = replace(
         _with_search(described, answer, examined, heldout),
         not_learned=_not_learned(tried) if answer.decision.is_unknown else {},
-        sanity=sanity,
+        sanity=(*sanity, *as_sanity(unknown)),
+        not_determined=unknown,
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,
     )
@@ -190,7 +200,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
     """What stands, measured on all recordings and put into words."""
     problem, decision = answer.comparison.problem, answer.decision
     prepared, linear = problem.prepared, problem.mount.motion == "linear"
-    models = Structures(problem.mount, answer.base.mount, answer.chosen.mount)
+    models = answer.models()
     signals = traces(train, heldout, models)
     found = _findings(answer, signals)
     bias = loop_bias(prepared, answer.chosen, problem.weight)
@@ -223,8 +233,7 @@ def _with_learned(
     """Let what describes the delivered model hold the learned term too; names and answers stay as they are."""
     if not learned:
         return named
-    problem = answer.comparison.problem
-    models = Structures(problem.mount, answer.base.mount, learned.mount)
+    problem, models = answer.comparison.problem, answer.models(learned.mount)
     signals, held = traces(train, heldout, models), judge(heldout, models, problem.prepared.band)
     return replace(
         named,
@@ -243,7 +252,7 @@ def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Lear
     if not tried:
         return answer, None
     after = tried.mount if tried.helps else answer.chosen.mount
-    models = Structures(problem.mount, answer.base.mount, after)
+    models = answer.models(after)
     told = tried.judged_in(judged_band(heldout, models, problem.prepared.band), answer.chosen.mount)
     answer = replace(answer, scores=replace(answer.scores, learned=told.scores()))
     return answer, told if answer.decision.is_unknown else None

@@ -8,6 +8,8 @@ import numpy.typing as npt
 from cosim.estimation.prepare import Array, Prepared
 
 BLOCK_SECONDS = 5.0
+FEWEST = 5
+"""Blocks, at least: of one alone a fit leaves a score of zero, and no error. Short recordings have shorter blocks."""
 Index = npt.NDArray[np.int64]
 
 
@@ -20,8 +22,10 @@ class Blocks:
 
     @classmethod
     def of(cls, prepared: Prepared, seconds: float = BLOCK_SECONDS) -> "Blocks":
-        """Cut each piece into blocks of about so many seconds."""
+        """Cut each piece into blocks of about so many seconds, shorter where all pieces together have few of them."""
         rows, recording, first = [], [], 0
+        total = sum(len(piece.kept) * piece.dt * piece.stride for piece in prepared.pieces)
+        seconds = min(seconds, total / FEWEST)
         for piece in prepared.pieces:
             kept = np.arange(first, first + len(piece.kept))
             count = max(1, round(len(kept) * piece.dt * piece.stride / seconds))

@@ -1,6 +1,7 @@
 """The low-pass of all signals and models, and the derivative."""
 
 from functools import lru_cache
+from math import ceil
 
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +11,10 @@ from cosim.estimation.kernels import done, library
 
 Array = npt.NDArray[np.float64]
 EDGE = 15
-"""Rows by which signals are continued at both ends, turned about their last row, before they are filtered."""
+"""Rows, at least, by which signals are continued at both ends, turned about their last row, before filtering."""
+FADED = 6.0
+"""Periods of the cutoff by which they are continued: what the filter starts with has faded to 1e-6 there. With fewer an
+axis at constant speed was taken to start and stop at the ends of each piece."""
 
 
 def lowpass(columns: Array, dt: float, cutoff: float, passes: int = 1) -> Array:
@@ -18,7 +22,7 @@ def lowpass(columns: Array, dt: float, cutoff: float, passes: int = 1) -> Array:
     if cutoff >= 0.45 / dt:
         return columns
     sections, settled = _filter(dt, cutoff, passes)
-    edge, kernels = min(EDGE, len(columns) - 1), library()
+    edge, kernels = min(max(EDGE, ceil(FADED / (cutoff * dt))), len(columns) - 1), library()
     if kernels is not None:
         signals = np.array(columns.T, order="C", ndmin=2)
         many, rows = signals.shape

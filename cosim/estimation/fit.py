@@ -86,6 +86,7 @@ def fit(
     evaluations: int = 25,
     fixed: Sequence[str] = (),
     freed: Sequence[str] = (),
+    held: Sequence[str] = (),
 ) -> Fit:
     """Fit all free parameters of a mount, starting from its numbers.
 
@@ -97,6 +98,7 @@ def fit(
         evaluations: how many evaluations of the model may be spent.
         fixed: endings of the names of parameters that stay.
         freed: endings of the names of parameters that are fitted although their parts declare that they stay.
+        held: names of parameters that keep their start although they are unknown: they count as free.
 
     Returns:
         The fit; residual = measured - model torque, N m.
@@ -105,7 +107,8 @@ def fit(
     inverse, tau = Inverse(mount, free), np.concatenate([piece.tau[piece.kept] for piece in pieces])
     known = {variable.name: variable for variable in mount.parameters()}
     start = np.array([known[name].start for name in free])
-    edges = _edges(mount, [known[name] for name in free], pieces)
+    stays, (low, high) = np.isin(free, held), _edges(mount, [known[name] for name in free], pieces)
+    edges = np.where(stays, start, low), np.where(stays, start, high)
     own = coordinates(mount, free, np.array([_scale(known[name]) for name in free]), edges)
     pull = _Prior(_centre(prior or mount, free))
     # Pieces without weight are only looked at once, at the end.

@@ -18,6 +18,8 @@ class Problem:
     prepared: Prepared
     weight: Array
     sample_time: float
+    held: tuple[str, ...] = ()
+    """Numbers of the base that these recordings do not determine: no fit changes them, none takes them for known."""
 
     @property
     def seconds(self) -> float:
@@ -35,4 +37,4 @@ class Problem:
 
     def fit(self, mount: Mount, evaluations: int, freed: Sequence[str] = ()) -> Fit:
         """Fit a structure, its base held to the card; `freed` names endings of parameters, as in `fit`."""
-        return fit(mount, self.prepared.pieces, self.weight, self.mount, evaluations, freed=freed)
+        return fit(mount, self.prepared.pieces, self.weight, self.mount, evaluations, freed=freed, held=self.held)

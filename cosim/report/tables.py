@@ -144,9 +144,10 @@ def worst(trace: Trace, scales: Scales) -> Table:
 
 def parameters(diagnosis: Diagnosis) -> Table:
     """List the base parameters: as delivered, refitted, with the missing physics."""
-    rows = []
+    rows, unknown = [], {one.variable.name for one in diagnosis.not_determined}
     for name, (given, refitted, full) in diagnosis.base_parameters.items():
         change = f"{100 * (full / given - 1):+.0f} %".replace("-", "−") if given else ""
+        change = "not determined" if name in unknown else change
         values = (number(value, 4) for value in (given, refitted, full))
         rows.append((name, *values, change, raised(base_unit(name, diagnosis.motion))))
     named = ("Parameter", "As delivered", "Refitted", "With the effects", "Change", "Unit")

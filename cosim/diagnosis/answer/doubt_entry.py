@@ -14,6 +14,7 @@ Kind = Literal[
     "clocks",
     "other_machine",
     "base_far_from_card",
+    "not_determined",
     "single_readings",
     "encoder_step",
     "no_set_point",

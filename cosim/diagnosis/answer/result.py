@@ -22,6 +22,7 @@ from cosim.diagnosis.answer.entries import (
     Provenance,
 )
 from cosim.diagnosis.answer.ledger import Trial
+from cosim.diagnosis.answer.not_determined import NotDetermined
 from cosim.diagnosis.answer.scores import Scores
 from pyfmi_models.effects import CATALOGUE, Effect
 
@@ -203,6 +204,8 @@ class Diagnosis:
     global_test: dict[str, float] = field(default_factory=dict)
     """Is anything missing at all: {"statistic", "threshold", "p"}; {} where it was not asked."""
     policy: str = POLICY
+    not_determined: tuple[NotDetermined, ...] = ()
+    """Numbers of the delivered base that the recordings do not determine."""
     friction_law: LawProposal = field(default_factory=LawProposal)
     loop_bias: BiasEntry = field(default_factory=BiasEntry)
     base_parameters: dict[str, tuple[float, float, float]] = field(default_factory=dict)

@@ -80,6 +80,8 @@ class Hypothesis(Generic[Form]):
     rank: ClassVar[float] = 1e3
     """Place among all hypotheses: friction, loads, drive and clock, mechanics, sensor; a new one comes last."""
     needs_position: ClassVar[bool] = True
+    share_of: ClassVar[str] = ""
+    """Number of the base of which its size is a share: where that is not determined, no size of it can be told."""
     imitated_by: ClassVar[str] = ""
     """Nuisance that is this effect in another form: beside it the effect would be explained away."""
     tables: ClassVar[tuple[str, ...]] = ()
@@ -191,6 +193,7 @@ QUICK_CHANGES = Where(axis="frequency", description="wherever the torque changes
 HELD = "the model has it already"
 NO_FRICTION = "the card says that there is no friction"
 NO_POSITION = "no position was recorded"
+NOT_DETERMINED = "these recordings do not determine what it is a share of, the"
 UNSEEN = "no size of it would have shown in these recordings"
 RESTLESS = "a friction law that says nothing about rest cannot tell it from"
 """Reasons why an effect cannot be tested; the last one goes on with the effect that was found."""

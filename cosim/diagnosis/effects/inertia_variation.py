@@ -24,6 +24,7 @@ class VaryingInertia(Hypothesis[InertiaVariation]):
 
     forms = (InertiaVariation,)
     member: ClassVar[str] = "cycles_per_rev"
+    share_of: ClassVar[str] = "axis.inertia"
     rank: ClassVar[float] = 18
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from cosim.diagnosis.answer.result import Bound, Finding
 from cosim.diagnosis.effects import TRIED, hypothesis_of, named
-from cosim.diagnosis.effects.base import Seen
+from cosim.diagnosis.effects.base import NOT_DETERMINED, Seen
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.measure.bounds import SeenFrom, bounds
 from cosim.diagnosis.measure.findings import unit_on
@@ -16,14 +16,18 @@ from pyfmi_models.mount import Mount
 
 def not_found(comparison: Comparison, chosen: Fit, known: Sequence[str], largest: float) -> list[Finding]:
     """One finding for each effect that is tried and not named; `largest` is the evidence of the strongest that is."""
-    found, prepared = bounds(comparison, chosen, known, largest), comparison.problem.prepared
-    return [_absent(name, found.get(name), chosen.mount, prepared) for name in TRIED if name not in known]
+    problem, found = comparison.problem, bounds(comparison, chosen, known, largest)
+    sizeless = {name for name in TRIED if named(name).share_of in problem.held}
+    seen = {name: one for name, one in found.items() if name not in sizeless}
+    reasons = {name: f"{NOT_DETERMINED} {named(name).share_of.rpartition('.')[2]}" for name in sizeless}
+    lost = [name for name in TRIED if name not in known]
+    return [_absent(n, seen.get(n), chosen.mount, problem.prepared, reasons.get(n, "")) for n in lost]
 
 
-def _absent(name: str, found: SeenFrom | None, mount: Mount, prepared: Prepared) -> Finding:
+def _absent(name: str, found: SeenFrom | None, mount: Mount, prepared: Prepared, reason: str) -> Finding:
     form = CATALOGUE[name][0]
     main = form.main
-    where = _looked(found, mount, prepared) if found else named(name).why_not(mount, prepared)
+    where = _looked(found, mount, prepared) if found else reason or named(name).why_not(mount, prepared)
     value = main.factor * found.size if found else None
     bound = Bound(
         value=value,

@@ -5,11 +5,13 @@ from collections.abc import Sequence
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.doubt_entry import Sanity
+from cosim.diagnosis.answer.not_determined import as_sanity, not_determined
 from cosim.diagnosis.answer.result import Diagnosis, Finding
 from cosim.diagnosis.effects import TRIED
 from cosim.diagnosis.measure.breakdown import parts
 from cosim.diagnosis.measure.locate import regions
 from cosim.diagnosis.measure.protocol import Structures, judge, traces
+from cosim.estimation.determined import limited
 from cosim.estimation.prepare import quality
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import CATALOGUE
@@ -32,6 +34,8 @@ def without_names(
     The verdict is "unknown": something is wrong, and it is none of the effects. `started` is when the diagnosis was
     [s of `time.perf_counter`].
     """
+    base, limits = limited(problem, base)
+    unknown = not_determined(problem, limits)
     models, linear = Structures(problem.mount, base, base), problem.mount.motion == "linear"
     signals = traces(train, heldout, models)
     return Diagnosis(
@@ -47,7 +51,8 @@ def without_names(
         data_quality=tuple(
             note for recording in (*train, *heldout) for note in quality(recording, problem.prepared.cutoff)
         ),
-        sanity=sanity,
+        sanity=(*sanity, *as_sanity(unknown)),
+        not_determined=unknown,
         base_parameters=models.base_parameters(),
         seconds=time.perf_counter() - started,
     )

@@ -1,18 +1,23 @@
 """Can these recordings be held against this card? What cannot be right is refused before anything is fitted."""
 
 from collections.abc import Sequence
+from math import pi
 
 import numpy as np
 
 from cosim.data.recording import Recording
-from cosim.estimation.filters import lowpass
+from cosim.estimation.filters import derivative, lowpass
 from cosim.estimation.prepare import LEAST_SECONDS as SHORTEST
+from cosim.estimation.prepare import STEADY, Array
 from cosim.support.errors import InputError, RecordingError
+from cosim.support.statistics import rms
 from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount
 
 LEAST_SECONDS = 8.0
-"""Seconds that the recordings to be fitted must have together."""
+"""Seconds of recordings to be fitted, together, that are enough whatever the motion is ..."""
+QUICK_SECONDS, LEAST_CYCLES, LEAST_ROWS = 4.0, 2.0, 500
+"""... and those that are, if the speed goes up and down so many times in them, in so many rows."""
 
 
 def check_effects(mount: Mount) -> None:
@@ -32,22 +37,49 @@ def is_held(effect: Effect) -> bool:
 
 def check_recordings(train: Sequence[Recording], heldout: Sequence[Recording]) -> None:
     """Refuse recordings that are too short or do not move (RecordingError)."""
-    seconds = sum(recording.duration for recording in train)
-    if seconds < LEAST_SECONDS:
-        names = ", ".join(recording.name for recording in train)
-        text = f"{names}: only {seconds:.3g} s of recording; fitting needs {LEAST_SECONDS:g} s."
-        raise RecordingError(text, culprit=names, value=seconds)
     for recording in (*train, *heldout):
         if recording.duration < SHORTEST:
-            text = f"{recording.name}: only {recording.duration:.3g} s long; a recording needs {SHORTEST:g} s."
+            text = (
+                f"{recording.name}: only {recording.duration:.3g} s long; a recording needs {SHORTEST:g} s, "
+                f"whether it is fitted or held out. Record longer, or split what there is in another place."
+            )
             raise RecordingError(text, culprit=recording.name, value=recording.duration)
         _check_motion(recording)
+    _check_length(train)
+
+
+def _check_length(train: Sequence[Recording]) -> None:
+    """Refuse too little to fit: what is enough follows from how often the motion repeats what is to be told."""
+    seconds, rows = sum(one.duration for one in train), sum(len(one) for one in train)
+    cycles = sum(map(_cycles, train))
+    is_quick = seconds >= QUICK_SECONDS and cycles >= LEAST_CYCLES and rows >= LEAST_ROWS
+    if seconds < LEAST_SECONDS and not is_quick:
+        names = ", ".join(recording.name for recording in train)
+        text = (
+            f"{names}: only {seconds:.3g} s of recording to fit, with {cycles:.2g} cycles of motion in {rows} rows; "
+            f"fitting needs {LEAST_SECONDS:g} s, or {QUICK_SECONDS:g} s with {LEAST_CYCLES:g} cycles in {LEAST_ROWS} "
+            f"rows. Record longer, speed up and slow down more often, or give more recordings."
+        )
+        raise RecordingError(text, culprit=names, value=seconds)
+
+
+def _cycles(recording: Recording) -> float:
+    """How often the speed goes up and down, were it a wave of its RMS frequency; a constant speed has no cycles."""
+    slow, dt = _slow(recording), recording.sample_time
+    speed = derivative(slow, dt) if "q" in recording else slow
+    if np.std(speed) <= STEADY * rms(speed):
+        return 0.0
+    return recording.duration * rms(derivative(speed, dt)) / (2 * pi * float(np.std(speed)))
+
+
+def _slow(recording: Recording) -> Array:
+    """Position, or the speed where that alone was read, without what is faster than 10 Hz."""
+    dt = recording.sample_time
+    return lowpass(recording["q" if "q" in recording else "v"], dt, min(10.0, 0.2 / dt))
 
 
 def _check_motion(recording: Recording) -> None:
-    name = "q" if "q" in recording else "v"
-    dt = recording.sample_time
-    slow = lowpass(recording[name], dt, min(10.0, 0.2 / dt))
+    name, slow = "q" if "q" in recording else "v", _slow(recording)
     moves = np.abs(np.diff(slow)).sum() if name == "q" else np.abs(slow).max()
     if moves <= 0:
         raise RecordingError(f"{recording.name}: {name} never moves, so there is nothing to diagnose.", culprit=name)
