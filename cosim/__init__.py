@@ -4,6 +4,7 @@
     run         a scenario                            ->  RunResult, with its recording
     diagnose    recordings and a card                 ->  DiagnosisResult: what the card lacks, and a better card
     investigate scenario, card, machine               ->  InvestigateResult: motions until one answer is left
+    card        recordings                            ->  CardResult: a first card, with ranges
     identify    recordings and a card                 ->  IdentifyResult: the card's numbers with standard errors
     export      a card                                ->  Exported: FMUs, SSP, Modelica
     sweep       a sweep file                          ->  SweepResult: a table, a row a run, and the best
@@ -24,6 +25,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+    from cosim.api.card import CardResult, card
     from cosim.api.diagnose import DiagnosisResult, diagnose
     from cosim.api.export import Exported, export
     from cosim.api.identify import IdentifyResult, identify
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
     from pyfmi_models.errors import ModelError
 
 _HOMES = {
+    "cosim.api.card": ("CardResult", "card"),
     "cosim.api.diagnose": ("DiagnosisResult", "diagnose"),
     "cosim.api.export": ("Exported", "export"),
     "cosim.api.identify": ("IdentifyResult", "identify"),
@@ -57,6 +60,7 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
     "Card",
+    "CardResult",
     "CosimError",
     "DiagnosisResult",
     "Exported",
@@ -70,6 +74,7 @@ __all__ = [
     "StepError",
     "SweepResult",
     "__version__",
+    "card",
     "diagnose",
     "export",
     "identify",

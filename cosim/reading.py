@@ -33,7 +33,7 @@ def read_recordings(
         given: what `--columns` was given, ["tau=force", "run3.csv:tau=current", ...]; it comes before the card's, and
             what is said of one file before what is said of all.
         units: what `--units` was given, ["q=deg", "run3.csv:q=arcsec", ...].
-        motion: kind of the axis.
+        motion: kind of the axis; "" where it is not known yet.
         layout: what `--layout` was given, ["decimal=comma", "run3.txt:header=4", ...].
 
     Raises:
@@ -47,7 +47,8 @@ def read_recordings(
         _check_layout(one)
     read = zip(paths, names, scales, written, strict=True)
     recordings = [Recording.read(path, dict(columns) | name, scale, layout=text) for path, name, scale, text in read]
-    check_kind(recordings, motion)
+    if motion:
+        check_kind(recordings, motion)
     return recordings
 
 

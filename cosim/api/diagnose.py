@@ -2,12 +2,13 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
 import pandas as pd
 
+from cosim.api.defaults import estimated, split
 from cosim.api.recordings import Source, read_all
 from cosim.api.why import frame
 from cosim.data.recording import Recording
@@ -43,6 +44,8 @@ class DiagnosisResult:
     """The card refitted, without any effect."""
     proposals: tuple[Proposal, ...] = ()
     """Effect files for a person to review, of formulas that are as good as what was learned for what has no name."""
+    notes: tuple[str, ...] = ()
+    """What was chosen where less was given: a card from the recordings, a recording that was kept out of the fit."""
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -88,10 +91,11 @@ class DiagnosisResult:
 
 def diagnose(
     train: Source | Sequence[Source],
-    heldout: Source | Sequence[Source],
-    card: str | Path | Card,
+    heldout: Source | Sequence[Source] = (),
+    card: str | Path | Card | None = None,
     out: str | Path | None = None,
     *,
+    motion: str = "",
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     fmu: str | Path | None = None,
@@ -107,10 +111,13 @@ def diagnose(
     Args:
         train: recordings that may be fitted, one or several, each a path, data frame, mapping of arrays or `Recording`
             (see `cosim.read`).
-        heldout: recordings that prove the result and may veto an effect; nothing is fitted to them.
-        card: the model as delivered: its path, the name of a shipped one, or a `Card`.
+        heldout: recordings that prove the result and may veto an effect; nothing is fitted to them. () keeps the last
+            of several, or the end of a single one.
+        card: the model as delivered: its path, the name of a shipped one, or a `Card`; None estimates one from the
+            recordings, as `cosim.card` does.
         out: folder for diagnosis.json, card.toml, the improved FMUs, missing_torque.parquet and report.html; None
             writes nothing and closes no loop.
+        motion: "rotary" or "linear", where there is neither a card nor a unit that says it.
         columns: our name to the source's, as in `cosim.read`; they come before the card's.
         units: our name to the unit in the source, as in `cosim.read`.
         fmu: anyone's plant FMU as the base; the card then says roughly what it is.
@@ -125,24 +132,20 @@ def diagnose(
         `DiagnosisResult`. Torques are in N.m (N on a linear axis), positions in rad (m), times in s.
 
     Raises:
-        InputError: a recording is held out and among the training recordings, or given twice; or the card holds what
-            a diagnosis cannot take into account.
-        RecordingError, UnitError: as `cosim.read`; or the recordings cannot belong to this card, or are too short.
-        CardError: the card is not good.
-        WiringError, FmuError: the FMU has no such variables, or cannot be run.
+        InputError: recordings or card do not go together. RecordingError, UnitError: as `cosim.read`, or too short.
+        CardError: the card is not good. WiringError, FmuError: the FMU has no such variables, or cannot be run.
         OutputError: a file is there already; nothing was diagnosed then.
     """
     folder = None if out is None else Path(out)
     if folder:
         check_out(folder, force, QUICK if quick else FILES)
         check_directory(folder)
-    given = _read(train, heldout, card, columns or {}, units)
+    given = _read(train, heldout, card, columns or {}, units, motion, on_progress)
     if fmu is not None:
         given = _beside(_black_box(fmu, variables or {}), given, on_progress)
-    listeners = _Listeners(on_progress, on_answer)
     before = _written(folder) if folder and force else {}
-    rest = command, listeners
-    done = _delivered(given, folder, *rest) if folder and not quick else _found(given, folder, *rest)
+    way = _delivered if folder and not quick else _found
+    done = way(given, folder, command, _Listeners(on_progress, on_answer))
     _forget(before)
     return done
 
@@ -178,6 +181,8 @@ class _Given:
     card: Card
     more: Callable[[Card, Path], Improved] = lambda *_: Improved()
     base: str = ""
+    notes: tuple[str, ...] = ()
+    """What was chosen where less was given."""
 
 
 class _Listeners(NamedTuple):
@@ -190,52 +195,66 @@ class _Listeners(NamedTuple):
 def _read(
     train: Source | Sequence[Source],
     heldout: Source | Sequence[Source],
-    card: str | Path | Card,
+    card: str | Path | Card | None,
     columns: Mapping[str, str],
     units: Mapping[str, str] | None,
+    motion: str,
+    on_progress: Callable[[str], None],
 ) -> _Given:
     """Read the card, and the recordings as it calls their columns; check that they belong together."""
-    believed = card if isinstance(card, Card) else read_card(card)
-    names = dict(believed.columns) | dict(columns)
+    believed, notes = card if isinstance(card, Card) or card is None else read_card(card), []
+    names = (dict(believed.columns) if believed else {}) | dict(columns)
     fitted, held = read_all(train, "train", names, units), read_all(heldout, "heldout", names, units)
-    check_kind([*fitted, *held], believed.mount.motion)
     check_split(fitted, held)
-    return _Given(fitted, held, believed)
+    if not held:
+        fitted, held, said = split(fitted)
+        notes.append(said)
+    if believed is None:
+        believed, said = estimated(fitted, motion, on_progress)
+        notes.append(said)
+    check_kind([*fitted, *held], believed.mount.motion)
+    return _Given(fitted, held, believed, notes=tuple(notes))
 
 
 def _beside(box: BlackBox, given: _Given, on_progress: Callable[[str], None]) -> _Given:
     """Put the card that is most like an FMU in its place."""
     base = as_base(box, given.train, given.heldout, given.card, on_progress)
     correction = Correction(box, base.card, *motion_of(given.train[0]))
-    return _Given(base.train, base.heldout, base.card, correction.deliver, box.told)
+    return _Given(base.train, base.heldout, base.card, correction.deliver, box.told, given.notes)
 
 
 def _found(given: _Given, out: Path | None, command: str, listeners: _Listeners) -> DiagnosisResult:
     """Diagnose, and write the answer and the card where there is a folder."""
-    outcome = find(given.train, given.heldout, given.card, listeners.on_progress)
+    outcome = _noted(find(given.train, given.heldout, given.card, listeners.on_progress), given.notes)
     listeners.on_answer(outcome.diagnosis)
     done = without_files(outcome.diagnosis)
     if out:
         done = deliver_quickly(outcome, given.train, given.heldout, given.card, out, command, given.base)
-    return _result(done, outcome)
+    return _result(done, outcome, given)
 
 
-def _delivered(given: _Given, out: Path, command: str, listeners: _Listeners) -> DiagnosisResult:
+def _delivered(given: _Given, out: Path | None, command: str, listeners: _Listeners) -> DiagnosisResult:
     """Diagnose with the loops closed beside it, and write all files."""
+    assert out is not None  # files need a folder
     train, heldout, card = given.train, given.heldout, given.card
     with Loops(card, heldout) as loops, side_by_side(listeners.on_progress) as refits:
         loops.close("nominal", card.plant())
-        outcome = find(train, heldout, card, listeners.on_progress, loops.close, refits)
+        outcome = _noted(find(train, heldout, card, listeners.on_progress, loops.close, refits), given.notes)
         listeners.on_answer(outcome.diagnosis)
         done = deliver(
             outcome, train, heldout, card, out, command, loops, listeners.on_progress, given.more, given.base
         )
-    return _result(done, outcome)
+    return _result(done, outcome, given)
 
 
-def _result(done: Diagnosis, outcome: Outcome) -> DiagnosisResult:
+def _noted(outcome: Outcome, notes: tuple[str, ...]) -> Outcome:
+    found = outcome.diagnosis
+    return replace(outcome, diagnosis=replace(found, data_quality=(*notes, *found.data_quality)))
+
+
+def _result(done: Diagnosis, outcome: Outcome, given: _Given) -> DiagnosisResult:
     proposals = tuple(Proposal(formula, statement) for formula, statement in outcome.formulas)
-    return DiagnosisResult(done, outcome.card, outcome.refitted, proposals)
+    return DiagnosisResult(done, outcome.card, outcome.refitted, proposals, given.notes)
 
 
 def check_split(train: Sequence[Recording], heldout: Sequence[Recording]) -> None:

@@ -35,6 +35,7 @@ VERBS = (
     "demo",
     "export",
     "run",
+    "card",
     "identify",
     "diagnose",
     "why",

@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,15 +12,24 @@ from cosim.reading import pairs_of, read_recordings
 from cosim.support.memory import keep_freed_memory
 from cosim.support.terminal import put, put_json, say, stage
 
+if TYPE_CHECKING:
+    from cosim.data.recording import Recording
+    from pyfmi_models.card import Card
+
 
 def diagnose(
     train: Annotated[list[Path], typer.Argument(help="Recordings that may be fitted.", metavar="TRAIN...")],
     heldout: Annotated[
-        list[Path], typer.Option("--heldout", help="Recordings that prove the result, and may veto an effect.")
-    ],
+        list[Path] | None,
+        typer.Option("--heldout", help="Recordings that prove the result; the last of TRAIN where not given."),
+    ] = None,
     card: Annotated[
-        str, typer.Option("--card", help="Model card (.toml), or the name of a shipped one.", autocompletion=cards)
-    ],
+        str,
+        typer.Option(
+            "--card", help="Model card (.toml) or a shipped one's name; else estimated.", autocompletion=cards
+        ),
+    ] = "",
+    motion: Annotated[str, typer.Option("--motion", help="Without a card: rotary or linear.")] = "",
     out: Out = None,
     columns: Columns = None,
     units: Units = None,
@@ -45,23 +54,17 @@ def diagnose(
     out = out or default_out(Path(train[0]).stem)
     from cosim.api.diagnose import diagnose as find
     from cosim.report.terminal import proposed, summary
-    from pyfmi_models.card import read_card
 
     keep_freed_memory()
     _check_folders(out, propose, quick, force)
-    believed = read_card(card)
-    recordings = read_recordings((*train, *heldout), believed.columns, columns, units, believed.mount.motion, layout)
-    seconds = sum(recording.duration for recording in recordings)
-    say(f"Read {len(recordings)} recordings, {seconds:.0f} s; card {believed.mount.name}")
-    given: dict[str, object] = {"--heldout": heldout, "--card": card, "--out": out}
+    believed, recordings = _read(train, heldout or [], card, motion, (columns, units, layout))
+    given: dict[str, object] = {"--heldout": heldout, "--card": card, "--motion": motion, "--out": out}
     given |= {"--columns": columns, "--units": units, "--layout": layout}
     given |= {"--fmu": fmu, "--variables": variables, "--propose": propose, "--quick": quick}
     with stage("looking for what the model lacks") as progress:
         found = find(
-            recordings[: len(train)],
-            recordings[len(train) :],
-            believed,
-            out,
+            *(recordings[: len(train)], recordings[len(train) :], believed, out),
+            motion=motion,
             fmu=fmu,
             variables=pairs_of("--variables", variables),
             quick=quick,
@@ -69,11 +72,29 @@ def diagnose(
             command=command_of("diagnose", train, given),
             on_progress=progress.tell,
         )
+    for note in found.notes:
+        say(note)
     put_json(found.as_json()) if as_json else put(summary(found.diagnosis, out=out))
     if propose:
         say(proposed(found.diagnosis, found.propose(propose, force)))
     if check and found.missing:
         sys.exit(1)
+
+
+def _read(
+    train: list[Path], heldout: list[Path], card: str, motion: str, options: tuple[list[str] | None, ...]
+) -> "tuple[Card | None, list[Recording]]":
+    """Read the card, if one is given, and all recordings."""
+    from pyfmi_models.card import read_card
+
+    believed = read_card(card) if card else None
+    names, kind = (believed.columns, believed.mount.motion) if believed else ({}, motion)
+    columns, units, layout = options
+    recordings = read_recordings((*train, *heldout), names, columns, units, kind, layout)
+    seconds, several = sum(recording.duration for recording in recordings), "s" * (len(recordings) > 1)
+    named = f"card {believed.mount.name}" if believed else "no card"
+    say(f"Read {len(recordings)} recording{several}, {seconds:.0f} s; {named}")
+    return believed, recordings
 
 
 def _check_folders(out: Path, propose: Path | None, quick: bool, force: bool) -> None:

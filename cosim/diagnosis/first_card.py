@@ -1,0 +1,209 @@
+"""A first card from recordings alone: inertia, friction, a constant torque and a weight, where the motion tells them.
+
+The torque balance of the recordings gives the start (`trust/balance.py`), inverse dynamics the numbers:
+
+    tau = J a + Fc sign(v) + sigma2 v [+ offset] [+ mgl sin(q + phase)]
+
+A constant torque and a weight are taken where their size is clear of its error and they explain a share of the error
+that matters; a diagnosis with the card looks for everything else.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import atan2, isfinite
+from typing import Literal
+
+import numpy as np
+
+from cosim.data.own_rate import as_analysed
+from cosim.data.recording import Recording
+from cosim.diagnosis.evidence.band import in_band
+from cosim.diagnosis.search.sizes import Z95, standard_errors
+from cosim.diagnosis.trust.balance import Balance
+from cosim.estimation.blocks import Blocks
+from cosim.estimation.fit import Fit, fit
+from cosim.estimation.problem import Problem
+from cosim.estimation.row_weights import weights
+from cosim.support.errors import InputError, RecordingError
+from pyfmi_models.effects import Effect, GravityUnbalance, TorqueOffset
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+CLEAR = 3.0
+"""Standard errors that a number must be away from nothing to be taken as determined; noise alone: 1 in 370."""
+MATTERS = 0.05
+"""Share of the error energy that a constant torque or a weight must remove: less is for a diagnosis to judge."""
+LEAST_TRAVEL = 0.35
+"""Travel [rad] from which a weight is told from a constant torque and a spring: its cosine changes by .06 in 20 deg."""
+EVALUATIONS, ROUNDS = 60, 2
+"""Evaluations of a fit, and fits one after the other: the pull of a prior towards a rough start dies out."""
+OnProgress = Callable[[str], None]
+Motion = Literal["rotary", "linear"]
+
+
+@dataclass(frozen=True)
+class Number:
+    """One number of a card as estimated: value, standard error, and whether the recordings determine it."""
+
+    name: str
+    value: float
+    error: float
+    unit: str
+    is_determined: bool
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """95 % range."""
+        return self.value - Z95 * self.error, self.value + Z95 * self.error
+
+
+@dataclass(frozen=True)
+class FirstCard:
+    """An axis as estimated from recordings: the mount, its numbers, and what is to be known of it."""
+
+    mount: Mount
+    numbers: tuple[Number, ...]
+    explained: float
+    """Share of the torque's energy that the model explains."""
+    notes: tuple[str, ...] = ()
+
+    def number(self, name: str) -> Number:
+        """A number by its name."""
+        return next(one for one in self.numbers if one.name == name)
+
+
+def first_card(
+    recordings: Sequence[Recording],
+    motion: Motion,
+    inertia: float | None = None,
+    on_progress: OnProgress = lambda _: None,
+) -> FirstCard:
+    """Estimate an axis.
+
+    Args:
+        recordings: of one axis; tau, and q or v.
+        motion: "rotary" or "linear".
+        inertia: where it is known [kg m2, kg]; it is not fitted then.
+        on_progress: called with a few words before each fit.
+
+    Raises:
+        RecordingError: too little motion, or the recordings do not determine the inertia and none is given.
+    """
+    linear = motion == "linear"
+    recordings = [as_analysed(one) for one in recordings]
+    on_progress("reading the torque balance")
+    problem, found = _base(recordings, motion, inertia)
+    kept, best = [], found
+    for effect in _extras(problem, found):
+        on_progress(f"trying {effect.title.lower()}")
+        tried = _fitted(problem, replace(best.mount, effects=(*best.mount.effects, effect)), inertia)
+        if _is_clear(problem, best, tried):
+            kept.append(effect.id)
+            best = tried
+    numbers = tuple(_numbers(problem, best, inertia, linear))
+    _check_inertia(numbers, linear)
+    tau = problem.weight * problem.prepared.stacked("tau")
+    left = problem.weight * best.residual
+    explained = 1 - float(left @ left) / max(float(tau @ tau), 1e-300)
+    return FirstCard(_held(best.mount, numbers), numbers, explained, tuple(_notes(numbers, explained, problem)))
+
+
+def _base(recordings: Sequence[Recording], motion: Motion, inertia: float | None) -> tuple[Problem, Fit]:
+    """Inertia, level and viscous friction, from the torque balance on."""
+    balance = Balance(recordings, motion == "linear")
+    if not balance.is_told:
+        text = f"{', '.join(one.name for one in recordings)}: too little motion to estimate an axis from"
+        raise RecordingError(f"{text}; record some swings and slews, ten seconds or more.", culprit="motion")
+    said = balance.solution(balance.own_order)
+    rough = balance.torque / max(balance.acceleration, 1e-300)
+    start = inertia or (said.inertia.value if said.inertia.value > said.inertia.error else 0.1 * rough)
+    level = said.coulomb.value if said.coulomb.value > said.coulomb.error else 0.3 * balance.torque
+    top = max(float(np.abs(one).max()) for one in (balance.prepared.stacked("v"),))
+    friction = Coulomb(Fc=level, sigma2=0.1 * level / max(top, 1e-300))
+    mount = Mount(name="axis", axis=Axis(inertia=start), friction=friction, effects=(), motion=motion)
+    for _ in range(ROUNDS):
+        prepared = in_band(recordings, mount)
+        slowest = max(one.sample_time for one in recordings)
+        problem = Problem(mount, prepared, weights(mount.friction, prepared), slowest)
+        found = _fitted(problem, mount, inertia)
+        mount = found.mount
+    return problem, found
+
+
+def _fitted(problem: Problem, mount: Mount, inertia: float | None) -> Fit:
+    """Fit a structure; an inertia that is known stays."""
+    fixed = ("axis.inertia",) if inertia else ()
+    return fit(mount, problem.prepared.pieces, problem.weight, problem.mount, EVALUATIONS, fixed)
+
+
+def _extras(problem: Problem, found: Fit) -> list[Effect]:
+    """A constant torque, and on an axis that turns far enough a weight, each started where the rest says."""
+    extras: list[Effect] = [TorqueOffset(torque=float(np.mean(found.residual)))]
+    prepared = problem.prepared
+    travel = float(np.ptp(prepared.stacked("q"))) if prepared.has_position else 0.0
+    if found.mount.motion == "rotary" and travel > LEAST_TRAVEL:
+        q = prepared.stacked("q")
+        columns = np.column_stack([np.sin(q), np.cos(q), np.ones_like(q)])
+        sine, cosine, _ = np.linalg.lstsq(columns, found.residual, rcond=None)[0].tolist()
+        extras.insert(0, GravityUnbalance(mgl=max(float(np.hypot(sine, cosine)), 1e-9), phase=atan2(cosine, sine)))
+    return extras
+
+
+def _is_clear(problem: Problem, without: Fit, tried: Fit) -> bool:
+    """Whether the last effect is clear of its error and explains a share of the error that matters."""
+    effect = tried.mount.effects[-1]
+    prefix = next(name for name, part in tried.mount.components().items() if part is effect)
+    errors = standard_errors(tried, Blocks.of(problem.prepared), problem.weight)
+    name = f"{prefix}.{effect.main.parameter}"
+    value, error = tried.parameters().get(name, 0.0), errors.get(name, np.inf)
+    gained = 1 - (problem.error(tried) / max(problem.error(without), 1e-300)) ** 2
+    return abs(value) > CLEAR * error and gained > MATTERS
+
+
+def _numbers(problem: Problem, found: Fit, inertia: float | None, linear: bool) -> list[Number]:
+    errors = standard_errors(found, Blocks.of(problem.prepared), problem.weight)
+    known = {variable.name: variable for variable in found.mount.parameters()}
+    numbers = [Number("axis.inertia", inertia, 0.0, "kg" if linear else "kg.m2", True)] if inertia else []
+    for name, value in found.parameters().items():
+        variable, error = known[name], errors[name]
+        inside = isfinite(error) and value > variable.low and value < variable.high
+        determined = inside and (abs(value) > CLEAR * error or name.endswith("phase"))
+        unit = _linear(variable.unit) if linear else variable.unit
+        numbers.append(Number(name, value, error, unit, determined))
+    return numbers
+
+
+def _linear(unit: str) -> str:
+    """The unit of a number of an axis that moves along, from that of one that turns."""
+    return {"kg.m2": "kg", "N.m": "N", "N.m.s/rad": "N.s/m"}.get(unit, unit)
+
+
+def _held(mount: Mount, numbers: Sequence[Number]) -> Mount:
+    """The mount without what the recordings do not determine: friction that is not seen is none."""
+    open_ = {one.name for one in numbers if not one.is_determined}
+    law = mount.friction
+    zero = {name: 0.0 for name in ("Fc", "sigma2") if f"friction.{name}" in open_}
+    return replace(mount, friction=replace(law, **zero))  # type: ignore[arg-type]
+
+
+def _check_inertia(numbers: Sequence[Number], linear: bool) -> None:
+    one = next(one for one in numbers if one.name == "axis.inertia")
+    if not one.is_determined:
+        what = "mass" if linear else "inertia"
+        raise InputError(
+            f"These recordings do not determine the {what}: the axis hardly accelerates, or friction hides it. "
+            f"Give it, --inertia VALUE [{one.unit}], or record faster swings.",
+            culprit="inertia",
+        )
+
+
+def _notes(numbers: Sequence[Number], explained: float, problem: Problem) -> list[str]:
+    notes = []
+    for name, words in (("friction.Fc", "Coulomb friction"), ("friction.sigma2", "viscous friction")):
+        if not next(one for one in numbers if one.name == name).is_determined:
+            notes.append(f"The recordings do not determine the {words}; the card has none.")
+    if explained < 0.5:
+        notes.append(
+            f"The card explains {100 * explained:.0f} % of the torque's energy only: something else acts here."
+        )
+    return notes

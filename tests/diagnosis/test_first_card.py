@@ -1,0 +1,113 @@
+"""A card from recordings alone, and a diagnosis to which neither a card nor a held-out recording is given."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import cosim
+from cosim.api.defaults import split
+from cosim.cli import main
+from cosim.support.errors import InputError
+from pyfmi_models.card import read_card
+from pyfmi_models.effects import TorqueOffset
+
+SECONDS, RATE = 30.0, 500.0
+TRUE = {"axis.inertia": 2.0, "friction.Fc": 1.5, "friction.sigma2": 3.0}
+NOISE, READING = 0.02, 1e-6
+"""Of the torque [N m] and of the position [rad], RMS."""
+
+
+def table(seed: int, offset: float = 0.0, weight: float = 0.0, seconds: float = SECONDS) -> pd.DataFrame:
+    """Swings of an axis of which everything is known, in both directions, with stops between."""
+    dice = np.random.default_rng(seed)
+    t = np.arange(round(seconds * RATE)) / RATE
+    waves = [(0.9, 0.13), (0.35, 0.41), (0.12, 0.97)]
+    phases = dice.uniform(0, 2 * np.pi, len(waves))
+    parts = [(a, 2 * np.pi * f, p) for (a, f), p in zip(waves, phases, strict=True)]
+    q = sum(a * np.sin(w * t + p) for a, w, p in parts)
+    v = sum(a * w * np.cos(w * t + p) for a, w, p in parts)
+    acceleration = sum(-a * w**2 * np.sin(w * t + p) for a, w, p in parts)
+    tau = TRUE["axis.inertia"] * acceleration + TRUE["friction.Fc"] * np.tanh(v / 1e-3) + TRUE["friction.sigma2"] * v
+    tau += offset + weight * np.sin(q + 0.4)
+    noises = (dice.normal(0, size, len(t)) for size in (NOISE, READING))
+    return pd.DataFrame({"t": t, "tau": tau + next(noises), "q": q + next(noises)})
+
+
+def test_inertia_and_friction_are_estimated_with_ranges_that_hold_the_truth(tmp_path: Path) -> None:
+    found = cosim.card([table(1), table(2)], tmp_path / "axis.toml", motion="rotary")
+    for name, true in TRUE.items():
+        one = found.found.number(name)
+        assert one.is_determined
+        assert one.value == pytest.approx(true, rel=0.05), name
+    assert read_card(str(tmp_path / "axis.toml")).plant().parameters()
+    assert not found.card.effects
+    assert found.card.unbalance is None
+    assert "inertia: 2.0" in str(found)
+    assert found.as_json()["numbers"]["axis.inertia"]["determined"]  # type: ignore[index,call-overload]
+
+
+def test_a_constant_torque_and_a_weight_are_taken_where_they_are_clear() -> None:
+    (offset,) = cosim.card(table(3, offset=0.8), motion="rotary").card.effects
+    assert isinstance(offset, TorqueOffset)
+    assert float(offset.torque) == pytest.approx(0.8, rel=0.05)
+    load = cosim.card([table(4, weight=2.5), table(5, weight=2.5)], motion="rotary").card.unbalance
+    assert load is not None
+    assert float(load.mgl) == pytest.approx(2.5, rel=0.05)
+    assert float(load.phase) == pytest.approx(0.4, abs=0.05)
+
+
+def steady(seed: int) -> pd.DataFrame:
+    """Constant speeds alone: nothing says what the inertia is."""
+    t = np.arange(round(SECONDS * RATE)) / RATE
+    v = 0.4
+    dice = np.random.default_rng(seed)
+    tau = TRUE["friction.Fc"] + TRUE["friction.sigma2"] * v + dice.normal(0, NOISE, len(t))
+    return pd.DataFrame({"t": t, "tau": tau, "q": v * t})
+
+
+def test_what_is_not_determined_is_demanded_by_its_option() -> None:
+    with pytest.raises(InputError, match=r"do not determine the inertia: .*--inertia VALUE \[kg\.m2\]"):
+        cosim.card(steady(1), motion="rotary")
+    given = cosim.card(table(6), motion="rotary", inertia=2.0)
+    assert given.card.mount.inertia == 2.0
+    assert "inertia: 2.000 kg.m2, as given" in str(given)
+
+
+def test_units_say_whether_an_axis_turns_and_without_them_it_is_said() -> None:
+    assert cosim.card(table(7)).notes[0].startswith("No unit says whether the axis turns")
+    assert cosim.card(table(7), units={"q": "mm", "tau": "N"}).card.mount.motion == "linear"
+    with pytest.raises(InputError, match='motion "sideways" is no kind of axis; there are: rotary, linear'):
+        cosim.card(table(7), motion="sideways")
+
+
+def test_of_several_recordings_the_last_is_kept_and_a_single_one_is_cut() -> None:
+    several = [cosim.read(table(seed), name=f"run {seed}") for seed in (1, 2, 3)]
+    train, held, said = split(several)
+    assert (train, held) == (several[:2], several[2:])
+    assert said.startswith("run 3, the last of 3 recordings, is kept out of the fit")
+    (first,), (rest,), said = split(several[:1])
+    assert len(first) + len(rest) == len(several[0])
+    assert first.t[-1] < rest.t[0]
+    assert "which is weaker than a second recording" in said
+
+
+def test_two_files_and_no_option_give_an_answer(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for seed in (1, 2):
+        table(seed, seconds=15.0).to_csv(f"run{seed}.csv", index=False)
+    with pytest.raises(SystemExit) as left:
+        main(["diagnose", "run1.csv", "run2.csv", "--quick", "--json"])
+    assert not left.value.code
+    said = capsys.readouterr()
+    assert json.loads(said.out)["verdict"] == []
+    assert "run2, the last of 2 recordings, is kept out of the fit and proves the result" in said.err
+    assert re.search(
+        r"No card was given; it is estimated from the recordings: inertia (1\.9\d*|2(\.0\d*)?) kg", said.err
+    )
+    assert Path("cosim_out/run1-1/card.toml").exists()
