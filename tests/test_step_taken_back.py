@@ -52,8 +52,7 @@ def test_after_a_step_taken_back_torque_comes_alone(prepared: Prepared, monkeypa
     asked: list[tuple[int, bytes]] = []
 
     def counted(inverse: Inverse, pieces: Sequence[Piece], values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        where = np.array([variable.start for variable in inverse.mount.parameters()])
-        asked.append((len(inverse.free), (values if len(inverse.free) else where).tobytes()))
+        asked.append((len(inverse.by), values.tobytes()))
         return stacked(inverse, pieces, values)
 
     monkeypatch.setattr(fitting, "stacked", counted)
@@ -72,7 +71,7 @@ def test_evaluations_are_spent_once(prepared: Prepared, monkeypatch: pytest.Monk
     asked: list[int] = []
 
     def counted(inverse: Inverse, *arguments: object) -> tuple[np.ndarray, np.ndarray]:
-        asked.append(len(inverse.free))
+        asked.append(len(inverse.by))
         return stacked(inverse, *arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(fitting, "stacked", counted)

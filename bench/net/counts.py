@@ -35,7 +35,7 @@ def counted() -> Iterator[Counts]:
 
     def counting_torque(self: Inverse, piece: Piece, values: Any) -> Any:
         counts.evaluations += 1
-        counts.row_columns += len(piece.t) * (1 + len(self.free))
+        counts.row_columns += len(piece.t) * (1 + len(self.by))
         return torque(self, piece, values)
 
     with patch.object(Problem, "fit", counting_fit), patch.object(Inverse, "torque", counting_torque):

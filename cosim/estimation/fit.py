@@ -145,6 +145,7 @@ class _Model:
 
     def __init__(self, inverse: Inverse, pieces: Sequence[Piece]) -> None:
         self._inverse, self._pieces = inverse, pieces
+        self._alone = replace(inverse, alone=True)
         self._here: dict[bytes, tuple[Array, Array]] = {}
         self._tried: dict[bytes, tuple[Array, Array]] = {}
         self._goes_on = True
@@ -154,8 +155,7 @@ class _Model:
         if self._goes_on:
             self._goes_on = False
             return self._looked_up(values)[0]
-        alone = Inverse(with_values(self._inverse.mount, self._inverse.free, values), ())
-        return stacked(alone, self._pieces, np.zeros(0))[0]
+        return stacked(self._alone, self._pieces, values)[0]
 
     def whole(self, values: Array) -> tuple[Array, Array]:
         """Torque, and its derivatives (rows, free); of the last values that were asked for they are at hand."""

@@ -26,7 +26,7 @@ from cosim.estimation.spectrum import Spectrum
 from cosim.estimation.tonal_disturbance import Tone, in_phase, phases_of
 from pyfmi_models.effects import ClockEffect, DriveEffect, Effect
 from pyfmi_models.effects.base import TonalEffect, Transmission
-from pyfmi_models.model import with_symbols
+from pyfmi_models.model import Variable, with_symbols
 from pyfmi_models.mount import Mount
 
 BUMP = 1e-6
@@ -39,25 +39,36 @@ class Inverse:
 
     mount: Mount
     free: tuple[str, ...]
+    alone: bool = False
+    """Whether torque comes without its derivatives."""
+
+    @property
+    def by(self) -> tuple[str, ...]:
+        """Names of the parameters by which torque is differentiated."""
+        return () if self.alone else self.free
 
     @cached_property
     def names(self) -> tuple[str, ...]:
         """Names of all parameters of the mount, in its order."""
-        return tuple(variable.name for variable in self.mount.parameters())
+        return tuple(variable.name for variable in self._parameters)
+
+    @cached_property
+    def _parameters(self) -> tuple[Variable, ...]:
+        return self.mount.parameters()
 
     @cached_property
     def start(self) -> Array:
         """Present values of all parameters."""
-        return np.array([variable.start for variable in self.mount.parameters()])
+        return np.array([variable.start for variable in self._parameters])
 
     @cached_property
     def present(self) -> Array:
         """Present values of the free parameters, in the order of `free`."""
-        return np.asarray(self.start[[self.names.index(name) for name in self.free]], float)
+        return np.asarray(self.start[self._places], float)
 
     @cached_property
     def _equations(self) -> Equations:
-        return equations_of(self.mount, self.names, self.free)
+        return equations_of(self.mount, self.names, self.by)
 
     def torque(self, piece: Piece, values: Array) -> tuple[Array, Array]:
         """Return needed torque (rows,) and its derivatives (rows, free) at all rows of a piece, filtered once more."""
@@ -94,8 +105,13 @@ class Inverse:
 
     def _with(self, values: Array) -> Array:
         full = self.start.copy()
-        full[[self.names.index(name) for name in self.free]] = values
+        full[self._places] = values
         return full
+
+    @cached_property
+    def _places(self) -> list[int]:
+        """Where the free parameters are among all."""
+        return [self.names.index(name) for name in self.free]
 
     def _momentary(self, piece: Piece, full: Array) -> tuple[Array, Array]:
         """Torque that the motion of each moment and the states need, and its derivatives (free, rows)."""
@@ -202,9 +218,7 @@ class Inverse:
 
         `added` gives the torque (sets, rows) for several sets of numbers.
         """
-        bumped = {
-            1 + k: self._bumped(full, name) for k, name in enumerate(self.free) if name.startswith(tuple(prefixes))
-        }
+        bumped = {1 + k: self._bumped(full, name) for k, name in enumerate(self.by) if name.startswith(tuple(prefixes))}
         now, *others = added([full, *(other for other, _ in bumped.values())])
         out = columns.copy()
         out[:, 0] += now
@@ -224,7 +238,7 @@ class Inverse:
 
         now = inverse(full)
         out = spectrum.times(now)
-        for column, name in enumerate(self.free):
+        for column, name in enumerate(self.by):
             if name.split(".")[0] in drives:
                 other, change = self._bumped(full, name)
                 out[:, 1 + column] += spectrum.times((inverse(other) - now) / change, slice(1))[:, 0]
@@ -243,7 +257,7 @@ class Inverse:
 
         at = np.clip(piece.t - later(full), piece.t[0], piece.t[-1])
         out, slope = spline(at), spline(at, 1)[:, 0]
-        for column, name in enumerate(self.free):
+        for column, name in enumerate(self.by):
             if name.split(".")[0] in clocks:
                 other, change = self._bumped(full, name)
                 out[:, 1 + column] -= slope * (later(other) - later(full)) / change

@@ -7,6 +7,10 @@ import numpy.typing as npt
 
 from cosim.estimation.prepare import Array
 
+QUICKER, SLOWER = 5.0, 4.0
+"""By how much less the steps of a fit are damped after one that kept its promise, by how much more after one that was
+taken back (twice that after the next). With a fixed factor of 5 and of 8 two of five steps were taken back; with these
+and the gain ratio between one in four, and the same fits took .77 of the evaluations (48 fits of the demo)."""
 ENOUGH = 1e-5
 """A fit ends when a step lowers the sum of squares, or promises to lower it, by less than this share."""
 
@@ -25,9 +29,10 @@ def least_squares(
     model would: of a diagnosis's evaluations a tenth served such steps.
 
     Few parameters and many rows make the normal equations 10 times cheaper than a decomposition of the Jacobian.
-    Reference: Marquardt, J. SIAM 11 (1963) 431; scaling by the diagonal of the normal matrix.
+    Reference: Marquardt, J. SIAM 11 (1963) 431; scaling by the diagonal of the normal matrix; the damping follows the
+    ratio of what a step gains to what it promised (Nielsen, IMM-REP-1999-05, Technical University of Denmark).
     """
-    x, damping = start, 1e-3
+    x, damping, slower = start, 1e-3, SLOWER
     r = residuals(x)
     cost = float(r @ r)
     normal, slope = _normal(jacobian(x), r)
@@ -35,16 +40,19 @@ def least_squares(
         free = ~((x <= bounds[0]) & (slope > 0) | (x >= bounds[1]) & (slope < 0))
         step = _damped(normal, slope, damping, free)
         trial = np.clip(x + step, *bounds)
-        if 0 <= _promised(normal, slope, trial - x) < enough * cost:
+        promised = _promised(normal, slope, trial - x)
+        if 0 <= promised < enough * cost:
             break
         r = residuals(trial)
         lower = float(r @ r)
         if not lower < cost:
-            damping *= 8
+            damping, slower = damping * slower, 2 * slower
             if damping > 1e6:
                 break
             continue
-        gained, x, cost, damping = 1 - lower / cost, trial, lower, damping / 5
+        ratio = (cost - lower) / promised if promised > 0 else 1.0
+        damping, slower = damping * max(1 / QUICKER, 1 - (2 * ratio - 1) ** 3), SLOWER
+        gained, x, cost = 1 - lower / cost, trial, lower
         normal, slope = _normal(jacobian(x), r)
         if gained < enough:
             break
