@@ -51,7 +51,7 @@ def test_where_every_row_counts_it_is_the_density_of_the_data_with_the_prior_of_
     density = -(y @ np.linalg.solve(covariance, y) + np.linalg.slogdet(covariance)[1]) / 2
     assert one.log_likelihood == pytest.approx(density - (0.7 / 0.5) ** 2 / 2, rel=1e-9)
     assert one.beta == pytest.approx(prior @ x.T @ np.linalg.solve(covariance, y), rel=1e-9)
-    assert (one.noise, one.sizes) == (NOISE, SIZE)
+    assert (one.noise.tolist(), one.sizes.tolist()) == (NOISE.tolist(), SIZE.tolist())
 
 
 def test_rows_that_say_nothing_new_count_less_in_the_likelihood_and_in_the_fit() -> None:

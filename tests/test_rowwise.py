@@ -4,7 +4,7 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from cosim.estimation.rowwise import CHUNK, STRIDE, Rowwise, Stepwise
+from cosim.estimation.rowwise import CHUNK, STRIDE, Rowwise, Stepwise, Tape
 
 X, P = ca.SX.sym("x", 3), ca.SX.sym("p", 2)
 a, b, c = X[0], X[1], X[2]
@@ -29,7 +29,7 @@ def test_rows_are_what_casadi_says(name: str, rows: int) -> None:
     columns = np.random.default_rng(rows).normal(0, 2, (3, rows))
     columns[:, : rows // 3] = np.round(columns[:, : rows // 3])
     numbers = np.array([1.7, 0.6])
-    found = Rowwise(X, P, expression)(columns, numbers)
+    found = Rowwise(Tape.of(X, P, expression))(columns, numbers)
     function = ca.Function("each", [X, P], [ca.densify(expression)])
     wanted = np.array([np.asarray(function(one, numbers)).ravel() for one in columns.T])
     assert found.shape == (expression.numel(), rows)

@@ -3,7 +3,7 @@
 Expressions are compiled once for a structure; its numbers are parameters.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -11,7 +11,8 @@ import casadi as ca
 import numpy as np
 
 from cosim.estimation.prepare import Array, Piece
-from cosim.estimation.rowwise import Rowwise, Stepwise, recurrence
+from cosim.estimation.rowwise import Rowwise, Stepwise, Tape, recurrence
+from cosim.estimation.tape_cache import stored
 from cosim.estimation.tonal_disturbance import without_tones
 from pyfmi_models.effects import DriveEffect, MotionEffect, SensorEffect
 from pyfmi_models.effects.base import Motion
@@ -40,10 +41,10 @@ class _Affine(NamedTuple):
 
 
 class Equations:
-    """Compiled expressions of a mount in which the parameters `free` may vary."""
+    """Expressions of a mount in which the parameters `free` may vary; `key` tells their structure from others."""
 
-    def __init__(self, mount: Mount, free: tuple[str, ...]) -> None:
-        self._mount, self._free = mount, free
+    def __init__(self, mount: Mount, free: tuple[str, ...], key: tuple[Any, ...]) -> None:
+        self._mount, self._free, self._key = mount, free, key
         self._inputs = tuple(variable.name for variable in mount.inputs())
         owners = [(name, part.states()) for name, part in mount.of_kind(MotionEffect) if part.states()]
         self._owners = [*owners, ("friction", mount.law.states())]
@@ -97,13 +98,23 @@ class Equations:
     @cached_property
     def torque(self) -> Rowwise:
         """Torque and its derivatives by states and free parameters, from the columns and the states."""
+        return self._rowwise("torque", self._torque)
+
+    def _rowwise(self, name: str, make: Callable[[], Tape]) -> Rowwise:
+        ((tape, _),) = self._stored(name, lambda: [(make(), [])])
+        return Rowwise(tape)
+
+    def _stored(self, name: str, make: Callable[[], list[tuple[Tape, list[int]]]]) -> list[tuple[Tape, list[int]]]:
+        return stored((self._key, name), [type(part) for part in self._mount.components().values()], make)
+
+    def _torque(self) -> Tape:
         s, (this, motion, own) = self._symbols, self._known
         level, near = this.level(motion, own), this.inertia(this.axis.inertia, motion, own)
         torque = near * s["a"] + ca.jacobian(near, motion.q) * motion.v**2 / 2
         torque += this.law.contact(own["friction"], motion.v, level) + this.viscous(motion, own)
         torque = self._true(_asked(this, torque + this.loads(motion, own), motion))
         rows = ca.vertcat(torque, ca.jacobian(torque, s["state"]).T, ca.jacobian(torque, s["free"]).T)
-        return Rowwise(ca.vertcat(self._column, s["state"]), s["p"], rows)
+        return Tape.of(ca.vertcat(self._column, s["state"]), s["p"], rows)
 
     @cached_property
     def _following(self) -> Any:
@@ -154,6 +165,9 @@ class Equations:
     @cached_property
     def _affine(self) -> list["_Affine"]:
         """For each state what its step keeps of it, what it adds, and how both change; [] where one is not linear."""
+        return [_Affine(Rowwise(tape), by) for tape, by in self._stored("affine", self._affine_tapes)]
+
+    def _affine_tapes(self) -> list[tuple[Tape, list[int]]]:
         state = self._symbols["state"]
         kept = [ca.jacobian(self._following[k], state[k]) for k in range(self.count)]
         if any(ca.depends_on(one, state[k]) for k, one in enumerate(kept)):
@@ -161,14 +175,14 @@ class Equations:
         added = [ca.substitute(self._following[k], state[k], 0.0) for k in range(self.count)]
         return [self._changing(k, *both) for k, both in enumerate(zip(kept, added, strict=True))]
 
-    def _changing(self, k: int, kept: Any, added: Any) -> "_Affine":
+    def _changing(self, k: int, kept: Any, added: Any) -> tuple[Tape, list[int]]:
         """Both parts of a step, and their derivatives by those states before and free parameters that change them."""
         s = self._symbols
         by = ca.vertcat(ca.SX(0, 1), *(s["state"][j] for j in range(k)), s["free"])
         slopes = [ca.jacobian(one, by) for one in (kept, added)]
         own = [j for j in range(by.numel()) if any(one[j].nnz() for one in slopes)]
         rows = ca.vertcat(kept, added, *(one[j] for one in slopes for j in own))
-        return _Affine(Rowwise(ca.vertcat(self._step_column, s["state"]), s["p"], rows), own)
+        return Tape.of(ca.vertcat(self._step_column, s["state"]), s["p"], rows), own
 
     def _walked(self, steps: Sequence[Array], full: Array) -> tuple[Array, list[Slopes]]:
         """A state's step may depend on itself and on those before it, so their derivatives are carried one by one."""
@@ -190,10 +204,13 @@ class Equations:
     @cached_property
     def _step_slopes(self) -> Rowwise:
         """Derivatives of each state's step by all states and by the free parameters, from columns, dt and states."""
+        return self._rowwise("step slopes", self._step_slopes_tape)
+
+    def _step_slopes_tape(self) -> Tape:
         s = self._symbols
         by_state = ca.vec(ca.jacobian(self._following, s["state"]).T)
         by_free = ca.vec(ca.jacobian(self._following, s["free"]).T)
-        return Rowwise(ca.vertcat(self._step_column, s["state"]), s["p"], ca.vertcat(by_state, by_free))
+        return Tape.of(ca.vertcat(self._step_column, s["state"]), s["p"], ca.vertcat(by_state, by_free))
 
     def motion(self, piece: Piece, full: Array) -> Array:
         """True speed and acceleration at all rows of a piece, (2, rows)."""
@@ -203,7 +220,8 @@ class Equations:
 
     @cached_property
     def _motion(self) -> Rowwise:
-        return Rowwise(self._column, self._symbols["p"], self._true(ca.vertcat(self._symbols["v"], self._symbols["a"])))
+        s = self._symbols
+        return self._rowwise("motion", lambda: Tape.of(self._column, s["p"], self._true(ca.vertcat(s["v"], s["a"]))))
 
 
 def _carried(kept: Array, change: Mapping[int, Array], before: Sequence[Slopes]) -> Slopes:
@@ -268,7 +286,7 @@ def equations_of(mount: Mount, names: tuple[str, ...], free: tuple[str, ...]) ->
     """Return the equations of a structure, built once."""
     parts = [(type(part), *structure_of(part).values()) for part in mount.components().values()]
     key = (mount.motion, names, free, *parts)
-    found = _KNOWN.pop(key, None) or Equations(mount, free)
+    found = _KNOWN.pop(key, None) or Equations(mount, free, key)
     _KNOWN[key] = found
     if len(_KNOWN) > MOST_KNOWN:
         del _KNOWN[next(iter(_KNOWN))]

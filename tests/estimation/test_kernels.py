@@ -6,10 +6,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from cosim.diagnosis.evidence import marginal as evidence
+from cosim.diagnosis.evidence.marginal import Group, marginal
 from cosim.estimation import filters, rowwise
 from cosim.estimation.filters import lowpass
 from cosim.estimation.kernels import library
-from cosim.estimation.rowwise import OPERATIONS, Rowwise, recurrence
+from cosim.estimation.rowwise import OPERATIONS, Rowwise, Tape, recurrence
 
 NAMES = {getattr(ca, name): name for name in dir(ca) if name.startswith("OP_")}
 SPECIAL = np.array([0.0, 1.0, -1.0, 2.0, -3.0, 0.5, 1e-300, 1e5, np.inf, -np.inf, np.nan])
@@ -45,7 +47,7 @@ def test_an_operation_in_c_is_that_of_numpy(operation: int, interpreted: Callabl
     columns[:, :121] = np.array(np.meshgrid(SPECIAL[:11], SPECIAL[:11])).reshape(2, -1)
     if operation == ca.OP_POW:  # 1 to the power of what is no number, and what is infinite and negative: nobody asks
         columns = np.where(np.isfinite(columns), columns, 0.3)
-    function = Rowwise(X, ca.SX.sym("p"), operated(operation, X[0], X[1]))
+    function = Rowwise(Tape.of(X, ca.SX.sym("p"), operated(operation, X[0], X[1])))
     found = function(columns, np.ones(1))
     interpreted()
     wanted = function(columns, np.ones(1))
@@ -53,7 +55,7 @@ def test_an_operation_in_c_is_that_of_numpy(operation: int, interpreted: Callabl
 
 
 def test_a_row_has_the_same_bits_wherever_it_stands() -> None:
-    curve = Rowwise(X, ca.SX.sym("p"), ca.tanh(X[0]) * ca.exp(-((X[1] / 3) ** 2)) + ca.sin(X[0]) ** 1.3)
+    curve = Rowwise(Tape.of(X, ca.SX.sym("p"), ca.tanh(X[0]) * ca.exp(-((X[1] / 3) ** 2)) + ca.sin(X[0]) ** 1.3))
     columns = np.random.default_rng(3).normal(0, 2, (2, 777))
     turned = np.roll(columns, 101, axis=1)
     assert np.array_equal(np.roll(curve(columns, np.ones(1)), 101, axis=1), curve(turned, np.ones(1)), equal_nan=True)
@@ -81,3 +83,23 @@ def test_a_recurrence_is_solved_step_by_step(signals: int, rows: int, interprete
     assert np.array_equal(recurrence(keeps, adds), by_hand)
     interpreted()
     np.testing.assert_allclose(recurrence(keeps, adds), by_hand, rtol=1e-13)
+
+
+@pytest.mark.parametrize("many", [1, 6, 23])
+def test_the_marginal_likelihood_in_c_is_that_of_numpy(many: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(many)
+    drawn = [rng.normal(size=(60, 1 + many)) @ rng.normal(size=(1 + many, 1 + many)) for _ in range(5)]
+    grams, count = np.array([one.T @ one for one in drawn]), np.full(5, 60.0)
+    groups = [Group(np.arange(many // 2, many), 0.3), Group(np.arange(many // 4, many // 2), 0.1)][: 1 + many // 4]
+    given = grams, np.full(many, 2.0), groups, count, count / 2, np.full(5, 1e-3)
+    found = marginal(*given)
+    monkeypatch.setattr(evidence, "library", lambda: None)
+    for one, other in zip(vars(found).values(), vars(marginal(*given)).values(), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9)
+
+
+def test_what_is_not_positive_definite_is_refused_as_numpy_refuses_it() -> None:
+    grams = np.array([[[1.0, 0.0, 0.0], [0.0, 1.0, 2.0], [0.0, 2.0, 1.0]]])
+    ones = np.ones(1)
+    with pytest.raises(np.linalg.LinAlgError):
+        marginal(1e6 * grams, np.full(2, 1e9), [], ones, ones, ones)

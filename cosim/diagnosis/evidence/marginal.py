@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.estimation.kernels import done, library
 from cosim.estimation.prepare import Array
 
 ROUNDS = 6
@@ -64,26 +65,59 @@ def marginal(
         start: noise and sizes to start from.
         rounds: how often they are renewed.
     """
-    yy, xy, xx = grams[:, 0, 0], grams[:, 1:, 0], np.ascontiguousarray(grams[:, 1:, 1:])
-    rows = xx.reshape(len(xx), -1)  # one matrix product over bands is several times faster than einsum
-    share = effective / np.maximum(count, 1e-300)
-    noise = np.maximum(yy / count, floor) if start is None else start.noise
+    floored = np.maximum(grams[:, 0, 0] / count, floor)
+    noise = floored if start is None else start.noise
     sizes = np.array([group.prior for group in groups]) if start is None else start.sizes
     variance = np.square(np.clip(free, 1e-150, 1e150))
+    rows = count, effective, floor
+    return (_compiled if library() else _interpreted)(grams, variance, groups, rows, (noise, sizes), rounds)
+
+
+Rows = tuple[Array, Array, Array]
+"""Of each band: rows, independent rows, least noise variance."""
+
+
+def _compiled(
+    grams: Array, variance: Array, groups: Sequence[Group], rows: Rows, start: tuple[Array, Array], rounds: int
+) -> Marginal:
+    kernels = library()
+    assert kernels
+    edges = np.cumsum([0, *(len(group.columns) for group in groups)])
+    columns = np.concatenate([np.zeros(0, np.int64), *(group.columns for group in groups)]).astype(np.int64)
+    noise, sizes = (np.array(one, float) for one in start)
+    beta, found = np.empty(len(variance)), np.empty(1)
+    prior = np.array([group.prior for group in groups], float)
+    grams, *own = (np.ascontiguousarray(one, float) for one in (grams, *rows))
+    at = [one.ctypes.data for one in (grams, variance, columns, edges, prior, *own, noise, sizes, beta, found)]
+    done(
+        kernels.marginal_run(*at[:2], len(grams), len(variance), *at[2:5], len(groups), *at[5:8], rounds, *at[8:]),
+        "Gram matrices are not positive definite",
+    )
+    return Marginal(float(found[0]), noise, sizes, beta)
+
+
+def _interpreted(
+    grams: Array, variance: Array, groups: Sequence[Group], rows: Rows, start: tuple[Array, Array], rounds: int
+) -> Marginal:
+    """What `marginal_run` does, by NumPy."""
+    yy, xy, xx = grams[:, 0, 0], grams[:, 1:, 0], np.ascontiguousarray(grams[:, 1:, 1:])
+    flat = xx.reshape(len(xx), -1)  # one matrix product over bands is several times faster than einsum
+    (count, effective, floor), (noise, sizes) = rows, start
+    share = effective / np.maximum(count, 1e-300)
     for last in range(rounds + 1):
         for group, size in zip(groups, sizes, strict=True):
             variance[group.columns] = max(size, 1e-6 * group.prior) ** 2
         weight = share / noise
-        normal = (weight @ rows).reshape(xx.shape[1:]) + np.diag(1 / variance)
+        normal = (weight @ flat).reshape(xx.shape[1:]) + np.diag(1 / variance)
         scale = 1 / np.sqrt(np.diag(normal))
         factor = np.linalg.cholesky(normal * np.outer(scale, scale) + 1e-12 * np.eye(len(scale)))
         inverse = np.linalg.inv(factor) * scale
         covariance = inverse.T @ inverse
         beta = covariance @ (weight @ xy)
-        left = yy - 2 * xy @ beta + rows @ np.outer(beta, beta).ravel()
+        left = yy - 2 * xy @ beta + flat @ np.outer(beta, beta).ravel()
         if last == rounds:
             break
-        noise = np.maximum((np.maximum(left, 0) + rows @ covariance.ravel()) / count, floor)
+        noise = np.maximum((np.maximum(left, 0) + flat @ covariance.ravel()) / count, floor)
         sizes = np.array([_size(beta[g.columns], np.diag(covariance)[g.columns], g.prior) for g in groups])
     log_normal = 2 * float(np.sum(np.log(np.diag(factor)) - np.log(scale)))
     penalty = sum((size / group.prior) ** 2 for size, group in zip(sizes, groups, strict=True)) / 2

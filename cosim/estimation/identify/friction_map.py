@@ -18,7 +18,7 @@ import numpy as np
 from cosim.data.recording import Recording
 from cosim.estimation.identify.estimate import Array, Estimate, Outputs, estimate
 from cosim.estimation.prepare import choose_cutoff, prepare
-from cosim.estimation.rowwise import Rowwise
+from cosim.estimation.rowwise import Rowwise, Tape
 from cosim.support.errors import InputError
 from pyfmi_models.friction import Stribeck
 from pyfmi_models.model import parameters_of
@@ -114,7 +114,7 @@ def _curve() -> Rowwise:
     v, p = ca.SX.sym("v"), ca.SX.sym("p", len(NAMES))
     law = Stribeck(**{name: p[index] for index, name in enumerate(NAMES)})
     torque = law.level(v) + law.viscous(v)
-    return Rowwise(v, p, ca.vertcat(torque, ca.jacobian(torque, p).T))
+    return Rowwise(Tape.of(v, p, ca.vertcat(torque, ca.jacobian(torque, p).T)))
 
 
 def _starts(samples: Samples, count: int = 3) -> list[Array]:

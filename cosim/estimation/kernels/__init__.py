@@ -6,6 +6,8 @@ from ctypes import POINTER, c_int, c_longlong, c_void_p
 from functools import cache
 from pathlib import Path
 
+import numpy as np
+
 SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 
@@ -23,6 +25,10 @@ ARGUMENTS = {
     "tape_run": [POINTER(CTape), c_void_p, c_void_p, c_longlong, c_void_p],
     "filter_run": [c_void_p, c_longlong, c_longlong, c_longlong, c_void_p, c_void_p, c_longlong],
     "recurrence_run": [c_void_p, c_void_p, c_longlong, c_longlong, c_void_p],
+    "marginal_run": [
+        *(c_void_p, c_void_p, c_longlong, c_longlong, c_void_p, c_void_p, c_void_p, c_longlong),
+        *(c_void_p, c_void_p, c_void_p, c_longlong, c_void_p, c_void_p, c_void_p, c_void_p),
+    ],
 }
 
 
@@ -39,11 +45,14 @@ def library() -> ctypes.CDLL | None:
     return found
 
 
-def done(failed: int) -> None:
-    """Check what a kernel returned.
+def done(returned: int, meaning: str = "") -> None:
+    """Check what a kernel returned: 1 without memory, 2 where the numbers do not allow what was to be done.
 
     Raises:
         MemoryError: there was not enough memory.
+        numpy.linalg.LinAlgError: the numbers do not allow it, in the words of `meaning`.
     """
-    if failed:
+    if returned == 1:
         raise MemoryError("there is not enough memory for the rows of a recording")
+    if returned:
+        raise np.linalg.LinAlgError(meaning)
