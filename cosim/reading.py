@@ -5,9 +5,9 @@ from pathlib import Path
 
 from cosim.data.limits import LIMIT
 from cosim.data.questions import OF_ROWS
-from cosim.data.recording import Recording
-from cosim.data.runs import split
-from cosim.support.errors import InputError, UnitError
+from cosim.data.recording import REQUIRED, Recording
+from cosim.data.runs import JOINT, split
+from cosim.support.errors import InputError, RecordingError, UndecidedError, UnitError
 from cosim.support.units import unit
 
 LAYOUT = ("separator", "decimal", "header", "encoding", *OF_ROWS, LIMIT)
@@ -28,7 +28,7 @@ def read_recordings(
     """Read recordings of an axis that is "rotary" or "linear".
 
     Args:
-        paths: the files.
+        paths: the files; several of one run with a `+` between them, or their folder.
         columns: names of a card, {"tau": "force"}.
         given: what `--columns` was given, ["tau=force", "run3.csv:tau=current", ...]; it comes before the card's, and
             what is said of one file before what is said of all.
@@ -46,10 +46,31 @@ def read_recordings(
     for one in written:
         _check_layout(one)
     read = zip(paths, names, scales, written, strict=True)
-    recordings = [Recording.read(path, dict(columns) | name, scale, layout=text) for path, name, scale, text in read]
+    recordings = [_read(path, paths, dict(columns) | name, scale, text) for path, name, scale, text in read]
     if motion:
         check_kind(recordings, motion)
     return recordings
+
+
+def _read(
+    path: Path, paths: Sequence[Path], columns: Mapping[str, str], units: Mapping[str, str], layout: Mapping[str, str]
+) -> Recording:
+    """Read a recording; where another of the files has what it lacks, the refusal says how both are one."""
+    try:
+        return Recording.read(path, columns, units, layout=layout)
+    except RecordingError as error:
+        others = [one for one in paths if one.parent == path.parent and one != path] if error.value in REQUIRED else []
+        for other in others:
+            run = path.with_name(f"{path.name}{JOINT}{other.name}")
+            try:
+                Recording.read(run, columns, units, layout=layout)
+            except UndecidedError:
+                pass
+            except RecordingError:
+                continue
+            way = f"If {path.name} and {other.name} are files of one run, give them as one: {run}."
+            raise RecordingError(f"{error} {way}", culprit=str(path), value=error.value) from error
+        raise
 
 
 def options_of(

@@ -164,9 +164,10 @@ def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
     torn.write_text("PAR1 torn")
     header.write_text("t,tau,q\n")
     (tmp_path / "e.csv.gz").write_bytes(gzip.compress(b"t,q\n1,2\n")[:-9])
+    (tmp_path / "folder").mkdir()
     sentences = {
         tmp_path / "none.csv": "does not exist",
-        tmp_path: "is not a file",
+        tmp_path / "folder": "is not a file",
         empty: "is empty",
         odd: "is a spreadsheet; save its table as CSV",
         torn: "cannot be read as .parquet",

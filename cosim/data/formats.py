@@ -67,6 +67,11 @@ def read_columns(path: Path, layout: Mapping[str, str] | None = None) -> Columns
     return columns
 
 
+def is_recording(path: Path) -> bool:
+    """Whether a file is of a kind that may hold a recording, and no folder."""
+    return suffix_of(path) in _READERS and path.is_file()
+
+
 def _what_to_do(path: Path, suffix: str) -> str:
     """Say what a file is that is not read here, and how it becomes one that is."""
     told = CONVERTED.get(path.suffix.lower())

@@ -7,14 +7,13 @@ from shlex import quote
 
 from cosim.data.assign import assign
 from cosim.data.columns import Columns
-from cosim.data.formats import read_columns
 from cosim.data.one_run import rows_of_one
+from cosim.data.parts import options_within, read_run
 from cosim.data.recording import REQUIRED, Recording
-from cosim.data.runs import named, split
+from cosim.data.runs import named
 from cosim.data.speeds import with_speed
 from cosim.data.times import check_slow
 from cosim.support.errors import ManyRecordingsError, RecordingError, UndecidedError
-from cosim.support.files import sha256
 
 TRIES = 8
 """Questions that a file may leave open: one for each column of ours, and its time."""
@@ -59,10 +58,10 @@ def preview(path: Path, options: Mapping[str, Mapping[str, str]] | None = None) 
         RecordingError: it is not even a table with a time.
     """
     said: Options = {name: dict((options or {}).get(name, {})) for name in ("columns", "units", "layout")}
-    file, _ = split(path)
-    found = read_columns(file, said["layout"])
+    found, own = read_run(path, said["columns"], said["units"], said["layout"])
+    inner = dict(zip(("columns", "units"), options_within(path, said["columns"], said["units"]), strict=True))
+    said |= {name: dict(pairs) for name, pairs in inner.items()}
     undecided: list[str] = []
-    own = sha256(file)
     for _ in range(TRIES):
         try:
             return _judged(path, own, found, said, tuple(undecided))

@@ -19,14 +19,14 @@ from cosim.data.assign import assign
 from cosim.data.assumed import assumed
 from cosim.data.checks import check_motion, check_names, check_sampling, check_time, chosen, numbers
 from cosim.data.columns import Columns
-from cosim.data.formats import read_columns
 from cosim.data.one_run import rows_of_one, timed
+from cosim.data.parts import options_within, read_run
 from cosim.data.registers import at_an_end, continued
-from cosim.data.runs import named, split
+from cosim.data.runs import named
 from cosim.data.speeds import with_speed
 from cosim.data.times import read_clock
 from cosim.support.errors import OutputError
-from cosim.support.files import replacing, sha256
+from cosim.support.files import replacing
 from cosim.support.html import table as html_table
 from cosim.support.plain import JsonObject
 from cosim.support.statistics import rms
@@ -92,10 +92,10 @@ class Recording:
             UnitError: a unit is unknown.
         """
         path, layout = Path(path), dict(layout or {})
-        file, _ = split(path)
-        found = read_columns(file, layout)
-        found = rows_of_one(path, found, columns or {}, units or {}, layout, required)
-        return cls.judged(path, named(path), found, sha256(file), columns or {}, units or {}, required)
+        found, own = read_run(path, columns or {}, units or {}, layout)
+        columns, units = options_within(path, columns or {}, units or {})
+        found = rows_of_one(path, found, columns, units, layout, required)
+        return cls.judged(path, named(path), found, own, columns, units, required)
 
     @classmethod
     def of(

@@ -10,6 +10,8 @@ import numpy as np
 from cosim.data.limits import NAME, short
 from cosim.support.errors import ManyRecordingsError
 
+JOINT = "+"
+"""Sign between the files of one run."""
 TOLD_BY = 4
 """Columns that may tell recordings apart together; where it takes more, their numbers are shorter."""
 MIXED = 20
@@ -39,9 +41,11 @@ def split(path: Path | str) -> tuple[Path, str]:
 
 
 def named(path: Path) -> str:
-    """Return what a recording is called: its file without the suffix, and which recording of it."""
+    """Return what a recording is called: its file, or files, without the suffix, and which recording of it."""
     file, which = split(path)
-    return f"{file.stem}:{which}" if which else file.stem
+    several = JOINT in str(file) and not exists(file)
+    name = JOINT.join(Path(one).stem for one in str(file).split(JOINT)) if several else file.stem
+    return f"{name}:{which}" if which else name
 
 
 def starts(t: np.ndarray) -> np.ndarray:
@@ -128,6 +132,14 @@ def _stays(column: np.ndarray, begins: np.ndarray) -> bool:
 
 def _differ(texts: list[str]) -> bool:
     return len(set(texts)) == len(texts)
+
+
+def exists(path: Path) -> bool:
+    """Whether there is a file or folder; a name that is too long, or holds a zero byte, has none."""
+    try:
+        return path.exists()
+    except (OSError, ValueError):
+        return False
 
 
 def _is_file(text: str) -> bool:

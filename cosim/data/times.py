@@ -30,12 +30,16 @@ COUNTED = re.compile(r"(?<=:\d\d)[;:](\d{1,3})$")
 
 @dataclass(frozen=True)
 class Clock:
-    """Time stamps, the unit they are in, when they start if that is known, and what was concluded."""
+    """Time stamps, the unit they are in, when they start if that is known, and what was concluded.
+
+    `origin` is the time of a 0 in ns since 1970, where the column holds dates from which it was taken off.
+    """
 
     values: np.ndarray
     unit: str = ""
     start: str = ""
     notes: tuple[str, ...] = ()
+    origin: int = 0
 
 
 def read_clock(path: Path, column: np.ndarray, name: str, stated: str, servo: bool) -> Clock:
@@ -62,8 +66,8 @@ def read_clock(path: Path, column: np.ndarray, name: str, stated: str, servo: bo
     if not unit and servo:
         unit = _of_sampling(path, column, name)
         notes = _told(path, column, name, unit)
-    values, start = _since_first(column, unit)
-    return Clock(values, unit, start, notes)
+    values, start, origin = _since_first(column, unit)
+    return Clock(values, unit, start, notes, origin)
 
 
 def _parsed(column: np.ndarray) -> np.ndarray:
@@ -100,7 +104,8 @@ def _of_stamps(column: np.ndarray) -> Clock:
     if column.dtype.kind == "m":
         seconds = seconds + DAY * np.cumsum(np.concatenate([[0], np.diff(seconds) < -DAY / 2]))
     start = str(column[0].astype("datetime64[ms]")) if column.dtype.kind == "M" and not missing[0] else ""
-    return Clock(np.asarray(seconds, dtype=np.float64), "s", start)
+    origin = int(column[~missing][0].astype("datetime64[ns]").astype(np.int64)) if start else 0
+    return Clock(np.asarray(seconds, dtype=np.float64), "s", start, origin=origin)
 
 
 def check_slow(path: Path, column: np.ndarray, name: str, stated: str) -> None:
@@ -163,10 +168,18 @@ def _told(path: Path, column: np.ndarray, name: str, unit: str) -> tuple[str, ..
     return (f"{path.stem}: {told}",)
 
 
-def _since_first(column: np.ndarray, unit: str) -> tuple[np.ndarray, str]:
-    """Return times since the first where they count from 1970 in less than seconds, exact to the last digit."""
+def _since_first(column: np.ndarray, unit: str) -> tuple[np.ndarray, str, int]:
+    """Return times since the first where they count from 1970 in less than seconds, exact to the last digit.
+
+    Returns also the first as an ISO text and in ns since 1970.
+    """
     first = column[0]
     if unit in ("ms", "us", "ns") and YEARS[0] <= float(first) * SECONDS[unit] <= YEARS[1]:
         ticks = int(float(first) * SECONDS[unit] * 1e3)
-        return np.asarray(column - first, dtype=np.float64), str(np.datetime64(ticks, "ms"))
-    return np.asarray(column, dtype=np.float64), ""
+        origin = int(first) * round(SECONDS[unit] / SECONDS["ns"])
+        return (
+            np.asarray(column - column.dtype.type(int(first)), dtype=np.float64),
+            str(np.datetime64(ticks, "ms")),
+            origin,
+        )
+    return np.asarray(column, dtype=np.float64), "", 0

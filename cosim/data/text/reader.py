@@ -4,9 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from cosim.data.columns import Columns
 from cosim.data.importers import importer_of
-from cosim.data.limits import check_columns, short
+from cosim.data.limits import check_cells, check_columns, short
 from cosim.data.text import json_records, transposed
 from cosim.data.text.cleaning import without_brackets, without_remarks
 from cosim.data.text.encoding import text_of
@@ -15,6 +17,8 @@ from cosim.data.text.table import table_of
 from cosim.data.text.vocabulary import with_vocabulary
 from cosim.support.errors import RecordingError
 
+LEAST = 10
+"""Lines of one number each that are a column; fewer are a preamble or a setting."""
 LINES, HEAD = 400, 1 << 20
 """Lines, and bytes, from which a layout is found out."""
 
@@ -43,7 +47,7 @@ def read_text(path: Path, stated: Mapping[str, str] | None = None) -> Columns:
     lines = head_of(data)
     layout = find_layout(path, lines, stated or {})
     if layout is None:
-        return _nothing(path, lines)
+        return _one_column(path, data) or _nothing(path, lines)
     told = f"{layout}{'' if encoding == 'utf-8' else f', {encoding}'}"
     return with_vocabulary(replace(table_of(path, data, layout), layout=told))
 
@@ -59,6 +63,20 @@ def _check_first_line(path: Path, data: bytes) -> None:
     """Refuse a line of more fields than a table may have columns before it is cut into them."""
     line = data[: data.find(b"\n")] if b"\n" in data[:HEAD] else data[: 50 * HEAD].partition(b"\n")[0]
     check_columns(path, 1 + max(line.count(sign) for sign in (b",", b";", b"\t")))
+
+
+def _one_column(path: Path, data: bytes) -> Columns | None:
+    """Return a text of one number a line as a column without a name; None for any other."""
+    values = data.split()
+    if len(values) < LEAST or len(values) != sum(bool(line.strip()) for line in data.split(b"\n")):
+        return None
+    check_cells(path, len(values), 1)
+    try:
+        column = np.array(values, np.float64)
+    except ValueError:
+        return None
+    note = f"{path.stem}: it is one column of numbers, a value a line; signals that take turns in it cannot be parted."
+    return Columns({"#1": column}, numbered=True, notes=(note,), layout="one column")
 
 
 def _nothing(path: Path, lines: Sequence[str]) -> Columns:
