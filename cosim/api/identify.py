@@ -91,8 +91,8 @@ def identify(
     check_kind(taken, believed.mount.motion)
     found = find(taken, believed, Options(tuple(free), cut, keep_inertia, starts, seed), on_progress)
     if folder:
-        for warning in found.best.warnings if found.best else ():
-            on_progress(f"careful: {warning} card.toml will hold it; --free leaves it out.")
+        if found.kept:
+            on_progress(f"not determined: {', '.join(found.kept)}; card.toml keeps the given card's.")
         on_progress("drawing")
         found = deliver.deliver(found, taken, believed, folder, time.perf_counter() - started)
     return IdentifyResult(found, believed)

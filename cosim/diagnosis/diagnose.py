@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
+from cosim.diagnosis.answer.doubt_entry import not_determined_doubts
 from cosim.diagnosis.answer.entries import NotLearnedEntry
-from cosim.diagnosis.answer.not_determined import as_sanity, not_determined
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.answer.scores import Scores
 from cosim.diagnosis.decide.decision import Decision, decide, rest_rules
@@ -43,6 +43,7 @@ from cosim.diagnosis.trust.doubts import doubts, of_base, single_readings
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.determined import limited, with_held
 from cosim.estimation.fit import Fit
+from cosim.estimation.not_determined import not_determined
 from cosim.estimation.prepare import Band, prepare, quality
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import weights
@@ -155,7 +156,7 @@ def diagnose(
     diagnosis = replace(
         _with_search(described, answer, examined, heldout),
         not_learned=_not_learned(tried) if answer.decision.is_unknown else {},
-        sanity=(*sanity, *as_sanity(unknown)),
+        sanity=(*sanity, *not_determined_doubts(unknown)),
         not_determined=unknown,
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,

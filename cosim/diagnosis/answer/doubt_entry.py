@@ -1,8 +1,10 @@
 """What is doubtful about recordings beside a card, as data: it stands in `sanity` of diagnosis.json."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from cosim.estimation.not_determined import NotDetermined
 from cosim.support.plain import JsonObject
 
 Kind = Literal[
@@ -50,3 +52,8 @@ class Sanity:
             "alternatives": [{"what": one.what, "likelihood": one.likelihood} for one in self.alternatives],
             "blocks_naming": self.blocks_naming,
         }
+
+
+def not_determined_doubts(entries: Sequence[NotDetermined]) -> tuple[Sanity, ...]:
+    """What the recordings do not determine, as doubts."""
+    return tuple(Sanity(finding="not_determined", statement=one.statement) for one in entries)

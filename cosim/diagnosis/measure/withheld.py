@@ -4,14 +4,14 @@ import time
 from collections.abc import Sequence
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.answer.doubt_entry import Sanity
-from cosim.diagnosis.answer.not_determined import as_sanity, not_determined
+from cosim.diagnosis.answer.doubt_entry import Sanity, not_determined_doubts
 from cosim.diagnosis.answer.result import Diagnosis, Finding
 from cosim.diagnosis.effects import TRIED
 from cosim.diagnosis.measure.breakdown import parts
 from cosim.diagnosis.measure.locate import regions
 from cosim.diagnosis.measure.protocol import Structures, judge, traces
 from cosim.estimation.determined import limited
+from cosim.estimation.not_determined import not_determined
 from cosim.estimation.prepare import quality
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import CATALOGUE
@@ -51,7 +51,7 @@ def without_names(
         data_quality=tuple(
             note for recording in (*train, *heldout) for note in quality(recording, problem.prepared.cutoff)
         ),
-        sanity=(*sanity, *as_sanity(unknown)),
+        sanity=(*sanity, *not_determined_doubts(unknown)),
         not_determined=unknown,
         base_parameters=models.base_parameters(),
         seconds=time.perf_counter() - started,

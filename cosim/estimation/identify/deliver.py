@@ -12,6 +12,8 @@ from cosim.data.recording import Recording
 from cosim.estimation.identify.estimate import Estimate
 from cosim.estimation.identify.friction_map import FrictionMap
 from cosim.estimation.identify.identify import Identified
+from cosim.estimation.not_determined import NotDetermined
+from cosim.plots.quantities import number
 from cosim.support.files import check_free, directory, replacing
 from cosim.support.plain import JsonObject
 from cosim.support.version import __version__
@@ -36,9 +38,7 @@ def deliver(found: Identified, recordings: Sequence[Recording], card: Card, out:
     origin = _origin(recordings)
     found = replace(found, card=replace(found.card, origin=origin))
     with replacing(out / CARD, True) as partial:
-        partial.write_text(
-            card_text(found.card, f"{card.mount.name}, identified from recordings; see {JSON}."), "utf-8"
-        )
+        partial.write_text(card_text(found.card, _comment(found, card)), "utf-8")
     for name, draw in FIGURES.items():
         draw(found, recordings, card, out / name)
     with replacing(out / JSON, True) as partial:
@@ -56,12 +56,24 @@ def as_json(found: Identified, card: Card) -> JsonObject:
             for name, one in found.presliding.items()
         },
         "output_error": [_estimate(one) for one in found.output_error],
+        "not_determined": {one.variable.name: one.as_json() for one in not_determined(found, card)},
         "not_done": list(found.not_done),
         "origin": found.card.origin,
         "card": CARD,
         "given_card": card.path,
         "version": __version__,
     }
+
+
+def not_determined(found: Identified, card: Card) -> list[NotDetermined]:
+    """Numbers that were to be identified and that nothing determines: the given card's are kept."""
+    known = {variable.name: variable for variable in card.plant().parameters()}
+    return [NotDetermined(known[name], known[name].start) for name in found.kept]
+
+
+def _comment(found: Identified, card: Card) -> str:
+    kept = f"\nNot determined by them, and as in the given card: {', '.join(found.kept)}." if found.kept else ""
+    return f"{card.mount.name}, identified from recordings; see {JSON}.{kept}"
 
 
 def _origin(recordings: Sequence[Recording]) -> JsonObject:
@@ -92,6 +104,7 @@ def _estimate(one: Estimate) -> JsonObject:
         "standard_errors": dict(zip(one.names, one.standard_errors.tolist(), strict=True)),
         "start": dict(zip(one.names, one.start.tolist(), strict=True)),
         "correlation": np.round(one.correlation, 6).tolist(),
+        "not_determined": dict(one.held),
         "rms": one.rms.tolist(),
         "evaluations": one.evaluations,
         "warnings": list(one.warnings),
@@ -112,10 +125,11 @@ def summary(found: Identified, card: Card) -> str:
         best = found.best
         lines.append(f"Output error in closed loop, best of {len(found.output_error)} starts")
         lines += [
-            f"  {name:24} {before[name]:12.5g} -> {value:12.6g} +- {error:.2g}"
+            f"  {name:24} {number(before[name], 5):>12} -> {number(value, 6):>12} +- {number(error, 2)}"
             for name, value, error in zip(best.names, best.values, best.standard_errors, strict=True)
         ]
         lines += [f"  Mind: {warning}" for warning in best.warnings]
+    lines += [one.statement.replace("\N{NO-BREAK SPACE}", " ") for one in not_determined(found, card)]
     return "\n".join([*lines, *(f"Not done: {reason}" for reason in found.not_done)])
 
 
@@ -135,5 +149,10 @@ def _told(name: str, fit: Estimate) -> list[str]:
 
 
 def _numbers(fit: Estimate) -> str:
-    pairs = zip(fit.names, fit.values, fit.standard_errors, strict=True)
-    return ", ".join(f"{name.split('.')[-1]} {value:.5g} +- {error:.1g}" for name, value, error in pairs)
+    """Numbers with standard errors; those that these swamp are no numbers."""
+    certain, told = fit.certain, []
+    for name, error in zip(fit.names, fit.standard_errors.tolist(), strict=True):
+        said = f"{number(certain[name], 5)} +- {number(error, 1)}" if name in certain else "not determined"
+        told.append(f"{name.split('.')[-1]} {said}")
+    told += [f"{name.split('.')[-1]} not determined ({number(value, 4)} is kept)" for name, value in fit.held.items()]
+    return ", ".join(told)

@@ -7,13 +7,15 @@ logarithms, so that none changes its sign. Standard errors are those of dependen
 are taken as independent): Liang and Zeger, Biometrika 73 (1986) 13.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim.estimation.least_squares import least_squares
+from cosim.plots.quantities import number
+from cosim.support.errors import InputError
 from cosim.support.statistics import column_rms
 
 Array = npt.NDArray[np.float64]
@@ -21,7 +23,7 @@ BLOCKS = 50
 ALIKE = 0.98
 """Two parameters whose estimates correlate more than this are told to be inseparable."""
 UNCERTAIN = 0.5
-"""A parameter whose standard error exceeds this share of it is told to be unknown."""
+"""A parameter whose standard error exceeds this share of it, or of the card's number, is not determined."""
 ENOUGH = 1e-7
 """A fit ends when a step lowers the sum of squares by less than this share: less than a standard error moves it."""
 ROUGH = 1e-3
@@ -30,6 +32,8 @@ KEPT = 4
 """Evaluations that are kept: a search that ends with some that were no better ends at one before them."""
 WIDEST = 1e3
 """A parameter may differ from its start by this factor."""
+EDGE = 1e-4
+"""Share of a limit of the search within which it has ended there."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +58,19 @@ class Estimate:
     covariance: Array
     rms: Array
     evaluations: int
+    held: Mapping[str, float] = field(default_factory=dict)
+    """Numbers that the data do not determine, at the card's value; they are not among `names`."""
 
     @property
     def standard_errors(self) -> Array:
         """Standard deviation of each estimate."""
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def certain(self) -> dict[str, float]:
+        """Numbers by name, but for those whose standard error says that they are not determined."""
+        triples = zip(self.names, self.values.tolist(), self.standard_errors.tolist(), strict=True)
+        return {name: value for name, value, error in triples if error <= UNCERTAIN * abs(value)}
 
     @property
     def correlation(self) -> Array:
@@ -69,11 +81,8 @@ class Estimate:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Parameters, or pairs of them, that these recordings cannot tell."""
-        lost = [
-            f"{name} = {value:.3g} +- {error:.2g} is not identifiable here."
-            for name, value, error in zip(self.names, self.values, self.standard_errors, strict=True)
-            if error > UNCERTAIN * abs(value)
-        ]
+        lost = [f"{name} is not determined here: {number(value, 4)} is kept." for name, value in self.held.items()]
+        lost += [f"{name} is not determined here." for name in self.names if name not in self.certain]
         pairs = [
             f"{a} and {self.names[j]} cannot be told apart here: they correlate by {self.correlation[i, j]:+.3f}."
             for i, a in enumerate(self.names)
@@ -112,6 +121,57 @@ def settle(rough: Estimate, model: Model, limits: Array | None = None, evaluatio
     counted = rough.evaluations + settled.evaluations
     rms = _rms(outputs.residual)
     return Estimate(rough.names, rough.start, np.exp(found), _covariance(outputs, scale), rms, counted)
+
+
+def determined(found: Estimate, model: Model, card: Array, limits: Array | None = None) -> Estimate:
+    """Hold what the data do not determine at the card's numbers, one after the other, and fit the rest again.
+
+    The least certain number goes first: what depends on it may be certain without it. A number that ended where its
+    search ends is not determined either.
+
+    Args:
+        found: an estimate of all numbers.
+        model: what it was fitted with.
+        card: the card's numbers, which are kept, (names,).
+        limits: as of `estimate`.
+
+    Raises:
+        InputError: no number is determined.
+    """
+    own, kept, best = np.asarray(card, float), list(range(len(found.names))), found
+    edges = np.array([(0.0, np.inf)] * len(kept)) if limits is None else limits
+    while (worst := _least_certain(best, own[kept], edges[kept])) is not None:
+        del kept[worst]
+        if not kept:
+            raise InputError(f"these recordings determine none of {', '.join(found.names)}.")
+        rough = replace(best, names=tuple(found.names[k] for k in kept), start=found.start[kept])
+        rough = replace(rough, values=np.delete(best.values, worst), covariance=np.eye(len(kept)))
+        best = settle(rough, _beside(model, own, kept), edges[kept])
+    held = {name: float(own[k]) for k, name in enumerate(found.names) if k not in kept}
+    return replace(best, held=held)
+
+
+def _least_certain(found: Estimate, card: Array, limits: Array) -> int | None:
+    """The number that is determined least, if it is not determined."""
+    share = found.standard_errors / np.maximum(np.abs(card), np.abs(found.values))
+    ratio = found.values / found.start
+    ended = (ratio > (1 - EDGE) * WIDEST) | (ratio < (1 + EDGE) / WIDEST)
+    ended |= (found.values < (1 + EDGE) * limits[:, 0]) | (found.values > (1 - EDGE) * limits[:, 1])
+    share = np.where(ended | ~np.isfinite(share), np.inf, share)
+    worst = int(np.argmax(share))
+    return worst if share[worst] > UNCERTAIN else None
+
+
+def _beside(model: Model, numbers: Array, kept: Sequence[int]) -> Model:
+    """A model of some of its numbers, the others as given."""
+
+    def some(values: Array) -> Outputs:
+        full = numbers.copy()
+        full[list(kept)] = values
+        outputs = model(full)
+        return Outputs(outputs.residual, outputs.slopes[:, :, list(kept)])
+
+    return some
 
 
 class _Search:

@@ -1,33 +1,41 @@
 """The quasi-static friction-velocity map: friction torque over speed in steady sliding.
 
     tau_f = tau - J q''          at speeds above a cut, where bristles have slipped
-    tau_f = [Fc + (Fs - Fc) exp(-|v/Vs|^delta)] sign(v) + sigma2 v
+    tau_f = level(v) sign(v) + viscous(v)
 
-Fitted for each direction and for both together. Fc, Fs - Fc and sigma2 enter linearly, so the two others are searched
-on a grid and no start is needed (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413).
+Fitted for each direction and for both together, with the card's own law and those of its numbers that the torque of
+steady sliding holds. Of a Stribeck curve, [Fc + (Fs - Fc) exp(-|v/Vs|^delta)] + sigma2 v, three enter linearly, so the
+two others are searched on a grid (variable projection: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413); any
+other law starts from the card's numbers, and from these in proportion to the torque.
 Single parameters are ill-conditioned, curves are not: compare the curves and their bands.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from cosim.data.recording import Recording
-from cosim.estimation.identify.estimate import Array, Estimate, Outputs, estimate
+from cosim.estimation.identify.estimate import Array, Estimate, Model, Outputs, determined, estimate
 from cosim.estimation.prepare import choose_cutoff, prepare
 from cosim.estimation.rowwise import Rowwise, Tape
 from cosim.support.errors import InputError
-from pyfmi_models.friction import Stribeck
-from pyfmi_models.model import parameters_of
+from pyfmi_models.friction import FrictionLaw, Stribeck
+from pyfmi_models.model import Pair, Scalar, fields_of, parameters_of
 
 NAMES = ("Fc", "Fs", "Vs", "delta", "sigma2")
+"""Numbers of a Stribeck curve, which is the map where no card's law is given."""
+PLAIN = Stribeck(Fc=1.0, Fs=1.0, Vs=1.0)
+NOT_SEARCHED = ("smoothing",)
+"""Numbers of the calculation, not of the friction."""
 DIRECTIONS = {"positive": (1.0,), "negative": (-1.0,), "both": (1.0, -1.0)}
 CUT = 0.07
 """Speeds below this share of the highest are left out, unless a cut is given."""
 LEAST_ROWS = 50
+NOTHING = 1e-3
+"""Start of a number that the card has at zero, in units of its nominal value: a search of logarithms cannot leave 0."""
 Z95 = 1.96
 
 
@@ -46,25 +54,71 @@ class FrictionMap:
     cut: float
     keep_inertia: bool
     samples: Samples
+    law: FrictionLaw = PLAIN
 
     def curve(self, direction: str, v: Array) -> tuple[Array, Array]:
         """Friction torque at speeds v > 0 and the half-width of its 95 % band."""
-        fit = self.fits[direction]
-        torque, *slopes = _curve()(v[None, :], fit.values)
-        by_parameter = np.stack(slopes, axis=1)
+        fit, side = self.fits[direction], one_sided(self.law, direction)
+        names = sliding_names(side)
+        numbers = dict(fit.held) | dict(zip(fit.names, fit.values.tolist(), strict=True))
+        torque, *slopes = _curve(side, names)(v[None, :], np.array([numbers[name] for name in names]))
+        by_parameter = np.stack([slopes[names.index(name)] for name in fit.names], axis=1)
         spread = np.einsum("ij,jk,ik->i", by_parameter, fit.covariance, by_parameter)
         return torque, Z95 * np.sqrt(np.maximum(spread, 0))
 
 
 def friction_map(
-    recordings: Sequence[Recording], inertia: float, cut: float | None = None, keep_inertia: bool = True
+    recordings: Sequence[Recording],
+    inertia: float,
+    cut: float | None = None,
+    keep_inertia: bool = True,
+    law: FrictionLaw | None = None,
 ) -> FrictionMap:
-    """Fit the maps; raise InputError where no speed is above the cut in either direction."""
+    """Fit the maps of the card's law, or plain Stribeck curves; numbers that are not determined keep the card's.
+
+    Raises:
+        InputError: no speed is above the cut in either direction, or the law has no numbers for a map.
+    """
     samples, cut = samples_of(recordings, inertia, cut, keep_inertia)
-    fits = {name: _fitted(samples, signs) for name, signs in DIRECTIONS.items() if _enough(samples, signs)}
-    if not fits:
+    sides = [(name, _of(samples, signs)) for name, signs in DIRECTIONS.items() if _enough(samples, signs)]
+    if not sides:
         raise InputError(f"No friction map: fewer than {LEAST_ROWS} rows are faster than the cut of {cut:.3g}.")
-    return FrictionMap(fits, cut, keep_inertia, samples)
+    if law is None:
+        return FrictionMap({name: _fitted(one, PLAIN)[0] for name, one in sides}, cut, keep_inertia, samples)
+    fits = {}
+    for name, one in sides:
+        own = one_sided(law, name)
+        best, model = _fitted(one, own)
+        fits[name] = determined(best, model, _numbers(own, best.names), _limits(own, best.names))
+    return FrictionMap(fits, cut, keep_inertia, samples, law)
+
+
+def one_sided(law: FrictionLaw, direction: str) -> FrictionLaw:
+    """The law with the numbers of one direction; of both: with their mean."""
+    pairs = {name: value for name in fields_of(law) if isinstance(value := getattr(law, name), Pair)}
+    return replace(law, **{name: getattr(two, direction, sum(two) / 2) for name, two in pairs.items()})
+
+
+def sliding_names(law: FrictionLaw) -> tuple[str, ...]:
+    """Numbers of a one-sided law that its torque in steady sliding holds and that a search of positive numbers finds.
+
+    Raises:
+        InputError: there is none, or the law does not say what it is in steady sliding.
+    """
+    known = [one.name for one in parameters_of(law) if one.low >= 0 and one.name not in NOT_SEARCHED]
+    symbols = {name: ca.SX.sym(name) for name in known}
+    try:
+        torque = _sliding(replace(law, **symbols), ca.SX.sym("v"))
+    except TypeError as error:
+        raise InputError(f'the card\'s law "{law.key}" has no torque in steady sliding: {error}.') from error
+    names = tuple(name for name, symbol in symbols.items() if ca.depends_on(torque, symbol))
+    if not names:
+        raise InputError(f'the torque of the card\'s law "{law.key}" in steady sliding has no number to fit.')
+    return names
+
+
+def _sliding(law: FrictionLaw, v: Scalar) -> Scalar:
+    return ca.SX(law.level(v) + law.viscous(v))
 
 
 def samples_of(
@@ -92,32 +146,58 @@ def _enough(samples: Samples, signs: tuple[float, ...]) -> bool:
     return all(len(_of(samples, (sign,)).v) >= LEAST_ROWS for sign in signs)
 
 
-def _fitted(samples: Samples, signs: tuple[float, ...]) -> Estimate:
-    folded, curve = _of(samples, signs), _curve()
+def _fitted(folded: Samples, law: FrictionLaw) -> tuple[Estimate, Model]:
+    """The best estimate of all numbers of a one-sided law, and what it was fitted with."""
+    names = sliding_names(law)
+    curve = _curve(law, names)
 
     def model(values: Array) -> Outputs:
         torque, *slopes = curve(folded.v[None, :], values)
         return Outputs((folded.friction - torque)[:, None], np.stack(slopes, axis=1)[:, None, :])
 
-    fits = [estimate(NAMES, start, model, _limits()) for start in _starts(folded)]
-    return min(fits, key=lambda fit: fit.rms[0])
+    starts = _stribeck_starts(folded, names) if set(names) == set(NAMES) else _own_starts(folded, law, names)
+    fits = [estimate(names, start, model, _limits(law, names)) for start in starts]
+    return min(fits, key=lambda fit: fit.rms[0]), model
 
 
-def _limits() -> Array:
-    """Lowest and highest value of each parameter, as the law declares them: (parameters, 2)."""
-    declared = {one.name: one for one in parameters_of(Stribeck(Fc=1.0, Fs=1.0, Vs=1.0))}
-    return np.array([(declared[name].low, declared[name].high) for name in NAMES])
+def _numbers(law: FrictionLaw, names: Sequence[str]) -> Array:
+    return np.array([float(getattr(law, name)) for name in names])
 
 
-def _curve() -> Rowwise:
+def _limits(law: FrictionLaw, names: Sequence[str]) -> Array:
+    """Lowest and highest value of each number, as the law declares them: (numbers, 2)."""
+    declared = {one.name: one for one in parameters_of(law)}
+    return np.array([(declared[name].low, declared[name].high) for name in names])
+
+
+def _curve(law: FrictionLaw, names: Sequence[str]) -> Rowwise:
     """Steady friction torque at v > 0 and its derivatives: the law's own equation."""
-    v, p = ca.SX.sym("v"), ca.SX.sym("p", len(NAMES))
-    law = Stribeck(**{name: p[index] for index, name in enumerate(NAMES)})
-    torque = law.level(v) + law.viscous(v)
+    v, p = ca.SX.sym("v"), ca.SX.sym("p", len(names))
+    torque = _sliding(replace(law, **{name: p[index] for index, name in enumerate(names)}), v)
     return Rowwise(Tape.of(v, p, ca.vertcat(torque, ca.jacobian(torque, p).T)))
 
 
-def _starts(samples: Samples, count: int = 3) -> list[Array]:
+def _own_starts(samples: Samples, law: FrictionLaw, names: Sequence[str]) -> list[Array]:
+    """The card's numbers; and those in which the torque is linear in proportion to what was recorded."""
+    limits, middle = _limits(law, names), float(np.median(samples.v))
+    nominal = {one.name: one.nominal for one in parameters_of(law)}
+    card = np.array([value if value > 0 else NOTHING * abs(nominal[name]) for name, value in _pairs(law, names)])
+    torque, *slopes = (float(column[0]) for column in _curve(law, names)(np.array([[middle]]), card))
+    typical = float(np.median(np.abs(samples.friction)))
+    size = typical / torque if torque > 0 else 1.0
+    linear = np.isin(names, law.linear)
+    even = np.where(
+        linear & (np.array(slopes) > 0), typical / (max(1, linear.sum()) * np.maximum(slopes, 1e-300)), card
+    )
+    tried = (card, np.where(linear, size * card, card), size * card, even)
+    return [np.clip(one, np.maximum(limits[:, 0], 1e-12), limits[:, 1]) for one in tried]
+
+
+def _pairs(law: FrictionLaw, names: Sequence[str]) -> list[tuple[str, float]]:
+    return list(zip(names, _numbers(law, names).tolist(), strict=True))
+
+
+def _stribeck_starts(samples: Samples, names: Sequence[str], count: int = 3) -> list[Array]:
     """The best (Vs, delta) of a grid, the linear parameters fitted for each."""
     v, friction = samples.v, samples.friction
     found = []
@@ -131,4 +211,5 @@ def _starts(samples: Samples, count: int = 3) -> list[Array]:
     best = [numbers for _, numbers in sorted(found, key=lambda item: item[0]) if min(numbers) > 0]
     typical = float(np.median(np.abs(friction)))
     plain = [typical, typical, float(np.median(v)), 2.0, 0.1 * typical / float(v.max())]
-    return [np.array(numbers) for numbers in (best or [plain])[:count]]
+    order = [NAMES.index(name) for name in names]
+    return [np.array(numbers)[order] for numbers in (best or [plain])[:count]]

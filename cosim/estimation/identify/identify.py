@@ -7,17 +7,18 @@
 The map gives the static part of the starts, presliding that of the bristles, output error has the last word.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
 
+from cosim.data.own_rate import at_own_rate
 from cosim.data.recording import Recording
 from cosim.estimation.fit import with_values
-from cosim.estimation.identify.estimate import Estimate
-from cosim.estimation.identify.friction_map import NAMES, FrictionMap, friction_map
-from cosim.estimation.identify.output_error import closed_loop, fit_outputs
+from cosim.estimation.identify.estimate import Estimate, determined
+from cosim.estimation.identify.friction_map import FrictionMap, friction_map
+from cosim.estimation.identify.output_error import closed_loop, fit_outputs, output_model
 from cosim.estimation.identify.presliding import Presliding, presliding
 from cosim.support.errors import InputError
 from pyfmi_models.card import Card
@@ -49,6 +50,8 @@ class Identified:
     presliding: dict[str, Presliding]
     output_error: tuple[Estimate, ...]
     not_done: tuple[str, ...]
+    kept: tuple[str, ...] = ()
+    """Full names of the free parameters that nothing determines: they are the given card's."""
 
     @property
     def best(self) -> Estimate | None:
@@ -77,10 +80,12 @@ def identify(
         not_done.append("presliding: no recording without a set point is held by friction.")
     started = _started(card, free, found_map, found_steps)
     found_outputs = _tried(not_done, "output error", lambda: _outputs(moves, started, free, options, on_progress)) or ()
-    if not (found_map or found_steps or found_outputs):
-        raise InputError(f"Nothing can be identified: {' '.join(not_done)}")
     improved = _with_estimate(started, found_outputs[0]) if found_outputs else started
-    return Identified(improved, found_map, found_steps, tuple(found_outputs), tuple(not_done))
+    sure = {*_found(found_map, found_steps), *(found_outputs[0].names if found_outputs else ())}
+    kept = tuple(name for name in free if name not in sure)
+    if len(kept) == len(free):
+        raise InputError(f"Nothing can be identified of {', '.join(free)}: {' '.join(not_done)}".rstrip(": "))
+    return Identified(improved, found_map, found_steps, tuple(found_outputs), tuple(not_done), kept)
 
 
 def free_names(card: Card, chosen: Sequence[str]) -> tuple[str, ...]:
@@ -126,7 +131,9 @@ def _tried(not_done: list[str], name: str, work: Callable[[], Result]) -> Result
 def _map(moves: Sequence[Recording], card: Card, options: Options) -> FrictionMap:
     if not moves:
         raise InputError("every recording is a presliding step.")
-    return friction_map(moves, card.mount.inertia, options.cut, options.keep_inertia)
+    return friction_map(
+        [*map(at_own_rate, moves)], card.mount.inertia, options.cut, options.keep_inertia, card.friction
+    )
 
 
 def _outputs(
@@ -135,19 +142,34 @@ def _outputs(
     driven = [one for one in moves if "q_d" in one and "q" in one]
     if not driven:
         raise InputError("no moving recording has a set point q_d, which drives the simulated loop.")
-    return fit_outputs(closed_loop(card, free), driven, options.starts, options.seed, on_progress)
+    machine = closed_loop(card, free)
+    best, *others = fit_outputs(machine, driven, options.starts, options.seed, on_progress)
+    on_progress("what these recordings do not determine")
+    limits = np.array([(one.low, one.high) for one in (machine.plant.parameters[k] for k in machine.places)])
+    own = machine.numbers[machine.places]
+    return [determined(best, output_model(machine, driven), own, limits), *others]
 
 
 def _started(card: Card, free: tuple[str, ...], found: FrictionMap | None, steps: dict[str, Presliding]) -> Card:
     """The card with the map's static friction and the bristles of the presliding steps, where those are free."""
+    return with_numbers(card, {name: value for name, value in _found(found, steps).items() if name in free})
+
+
+def _found(found: FrictionMap | None, steps: Mapping[str, Presliding]) -> dict[str, float]:
+    """Numbers of the map and of the presliding steps that these determine, by full name."""
     numbers: dict[str, float] = {}
     for direction, fit in found.fits.items() if found else ():
-        end = "" if direction == "both" else f".{direction}"
-        numbers |= {f"friction.{n}{end}": v for n, v in zip(NAMES, fit.values.tolist(), strict=True)}
-    bristles = [one.direct.values[:2] for one in steps.values()]
-    if bristles:
-        numbers |= dict(zip(("friction.sigma0", "friction.sigma1"), np.mean(bristles, axis=0).tolist(), strict=True))
-    return with_numbers(card, {name: value for name, value in numbers.items() if name in free})
+        ends = {
+            "" if direction == "both" else f".{direction}",
+            "" if found and len(found.fits) == 1 else f".{direction}",
+        }
+        for end in ends:
+            numbers |= {f"friction.{n}{end}": v for n, v in zip(fit.names, fit.values.tolist(), strict=True)}
+    for name in ("friction.sigma0", "friction.sigma1"):
+        sure = [value for one in steps.values() if (value := one.direct.certain.get(name))]
+        if sure:
+            numbers[name] = float(np.mean(sure))
+    return numbers
 
 
 def _with_estimate(card: Card, found: Estimate) -> Card:

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cosim.data.held import held_columns
+from cosim.data.own_rate import at_own_rate
 from cosim.data.recording import Recording
 from cosim.estimation.identify.estimate import Array, Estimate, Model, Outputs, explore, settle
 from cosim.estimation.identify.machine import Machine
@@ -69,19 +71,25 @@ def closed_loop(card: Card, free: Sequence[str]) -> Machine:
 
 
 def replay_of(machine: Machine, recording: Recording) -> Replay:
-    """Make a recording ready for a machine."""
-    t = recording.t - recording.t[0]
+    """Make a recording ready for a machine.
+
+    What drives it is taken from all rows. What is compared are rows in which both readings are new: a reading that is
+    repeated is late.
+    """
+    new = at_own_rate(recording)
+    t = new.t - recording.t[0]
     if machine.controller is None:
         # From rest at position zero (see `presliding`): the first reading is one sample of noise.
-        reference, start = _torque(machine, recording), dict[str, float]()
+        drives = recording if "tau" not in held_columns(recording.table) else new
+        reference, start = _torque(machine, drives), dict[str, float]()
         inside = t <= (len(reference) - 1) * machine.tick
     else:
         signals = set_point(recording, machine.tick)
         reference = np.column_stack(list(signals.values()))
         start = {"position": float(recording["q"][0]), "speed": float(signals["v_d"][0])}
         inside = (t >= SETTLED) & (t <= (len(reference) - 2) * machine.tick)
-    measured = np.column_stack([recording["q"], recording["tau"]])[inside]
-    return Replay(reference, start, t[inside], measured, recording.sample_time)
+    measured = np.column_stack([new["q"], new["tau"]])[inside]
+    return Replay(reference, start, t[inside], measured, new.sample_time)
 
 
 def _torque(machine: Machine, recording: Recording) -> Array:

@@ -15,6 +15,7 @@ from math import ceil
 import casadi as ca
 import numpy as np
 
+from cosim.data.own_rate import at_own_rate
 from cosim.data.recording import Recording
 from cosim.estimation.identify.estimate import Array, Estimate
 from cosim.estimation.identify.machine import Machine
@@ -68,11 +69,12 @@ def machines(card: Card, step: Recording) -> dict[str, Machine]:
 def simulated(card: Card, recording: Recording, found: Presliding) -> dict[str, Array]:
     """Position after the step by each model with its estimate, at the rows of the recording but the last."""
     step = _from_zero(recording)
-    rows = {}
+    new, rows = at_own_rate(step), {}
     for name, machine in machines(card, step).items():
-        measured = step["q"][: len(step) - 1]
+        measured = new["q"][: len(new) - 1]
         rest = output_model(machine, [step])(getattr(found, name).values).residual[:, 0]
-        rows[name] = measured[: len(rest)] - rest[: len(measured)]
+        position = measured[: len(rest)] - rest[: len(measured)]
+        rows[name] = np.interp(step.t[:-1], new.t[: len(position)], position)
     return rows
 
 

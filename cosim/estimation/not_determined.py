@@ -1,9 +1,8 @@
-"""Numbers of the delivered card that the recordings did not determine: which, what the card holds, and what would."""
+"""Numbers of a delivered card that the recordings did not determine: which, what the card holds, and what would."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from cosim.diagnosis.answer.doubt_entry import Sanity
 from cosim.estimation.determined import Limited
 from cosim.estimation.problem import Problem
 from cosim.plots.quantities import joined, number, raised
@@ -31,7 +30,7 @@ class NotDetermined:
     limit: Limited | None = None
 
     def as_json(self) -> JsonObject:
-        """The entry as diagnosis.json holds it: `limit` is "highest", "lowest", or null where nothing is known."""
+        """The entry as JSON holds it: `limit` is "highest", "lowest", or null where nothing is known."""
         limit = ("highest" if self.limit.is_highest else "lowest") if self.limit else None
         return {"value": self.value, "unit": self.variable.unit, "limit": limit, "statement": self.statement}
 
@@ -50,12 +49,7 @@ class NotDetermined:
 
 
 def not_determined(problem: Problem, limits: Mapping[str, Limited]) -> tuple[NotDetermined, ...]:
-    """All numbers that a delivered card holds without being found: those held, and those at a limit."""
+    """All numbers that a diagnosis delivers without having found them: those held, and those at a limit."""
     known = {variable.name: variable for variable in problem.mount.parameters()}
     held = (NotDetermined(known[name], known[name].start) for name in problem.held)
     return (*held, *(NotDetermined(known[name], one.value, one) for name, one in limits.items()))
-
-
-def as_sanity(entries: tuple[NotDetermined, ...]) -> tuple[Sanity, ...]:
-    """The same as entries of `sanity`."""
-    return tuple(Sanity(finding="not_determined", statement=one.statement) for one in entries)
