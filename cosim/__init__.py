@@ -4,6 +4,7 @@
     run         a scenario                            ->  RunResult, with its recording
     diagnose    recordings and a card                 ->  DiagnosisResult: what the card lacks, and a better card
     investigate scenario, card, machine               ->  InvestigateResult: motions until one answer is left
+    compare     runs, recordings                      ->  Comparison: overlay and differences
     card        recordings                            ->  CardResult: a first card, with ranges
     identify    recordings and a card                 ->  IdentifyResult: the card's numbers with standard errors
     export      a card                                ->  Exported: FMUs, SSP, Modelica
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from cosim.api.card import CardResult, card
+    from cosim.api.compare import Comparison, compare
     from cosim.api.diagnose import DiagnosisResult, diagnose
     from cosim.api.export import Exported, export
     from cosim.api.identify import IdentifyResult, identify
@@ -42,6 +44,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "cosim.api.card": ("CardResult", "card"),
+    "cosim.api.compare": ("Comparison", "compare"),
     "cosim.api.diagnose": ("DiagnosisResult", "diagnose"),
     "cosim.api.export": ("Exported", "export"),
     "cosim.api.identify": ("IdentifyResult", "identify"),
@@ -61,6 +64,7 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 __all__ = [
     "Card",
     "CardResult",
+    "Comparison",
     "CosimError",
     "DiagnosisResult",
     "Exported",
@@ -75,6 +79,7 @@ __all__ = [
     "SweepResult",
     "__version__",
     "card",
+    "compare",
     "diagnose",
     "export",
     "identify",

@@ -35,6 +35,7 @@ VERBS = (
     "demo",
     "export",
     "run",
+    "compare",
     "card",
     "identify",
     "diagnose",

@@ -29,6 +29,11 @@ SEGMENT = 1 << 19
 Piece = Mapping[str, Array]
 
 
+def in_words(unit: str) -> str:
+    """Write the sign of an angle at the beginning of a unit as a word."""
+    return WORDS.get(unit[:1], unit[:1]) + unit[1:]
+
+
 @dataclass(frozen=True)
 class Axis:
     """The columns of one axis by their role; `name` is the prefix they share."""
@@ -139,7 +144,7 @@ class Tracking:
         scale = scale_of(self.unit, self.largest)
         rms, largest = (number(scale.factor * value, 3) for value in (self.rms, self.largest))
         name = f"{self.axis}: " if self.axis else ""
-        return f"{name}RMS tracking error {rms} {WORDS.get(scale.unit, scale.unit)} (largest {largest})"
+        return f"{name}RMS tracking error {rms} {in_words(scale.unit)} (largest {largest})"
 
 
 def tracking(path: Path) -> tuple[Tracking, ...]:

@@ -16,7 +16,7 @@ import numpy as np
 
 from cosim.data.formats import ORIGIN_KEY
 from cosim.plots.chart import Chart
-from cosim.plots.digest import ERROR, WORDS, Axis, Digest, Line, digest
+from cosim.plots.digest import ERROR, Axis, Digest, Line, digest, in_words
 from cosim.plots.quantities import Scale, number, scale_of
 from cosim.plots.style import AFTER, BEFORE, MEASURED
 from cosim.support.files import replacing
@@ -139,8 +139,7 @@ def _spectrum(small: Digest, name: str) -> str:
 
 def _scale(line: Line) -> Scale:
     scale = scale_of(line.unit, max(map(abs, line.span)))
-    sign = scale.unit[:1]
-    return Scale(scale.factor, WORDS.get(sign, sign) + scale.unit[1:])
+    return Scale(scale.factor, in_words(scale.unit))
 
 
 def _shown(line: Line, scale: Scale) -> tuple[float, float]:

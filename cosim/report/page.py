@@ -1,7 +1,5 @@
 """Everything the template prints, put together from a diagnosis."""
 
-import base64
-import hashlib
 from collections.abc import Iterator
 from importlib.resources import files as resources
 
@@ -9,6 +7,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.result import Diagnosis, Trace
 from cosim.diagnosis.measure.breakdown import Samples, bars, samples, worst
+from cosim.plots.explorer import script_of_page
 from cosim.plots.quantities import joined
 from cosim.report import tables, unknown, words
 from cosim.report.explorer import payload
@@ -195,8 +194,7 @@ def _most(trace: Trace) -> tuple[float, float]:
 def _end(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
     """Return parameters, quality, provenance, explorer."""
     made, here = diagnosis.provenance, resources("cosim.report")
-    script = here.joinpath("explorer.js").read_text("utf-8")
-    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    script, digest = script_of_page()
     told = [made.get("date", ""), f"cosim {made['version']}" if made.get("version") else ""]
     told += [
         f"seed {made['seed']}" if "seed" in made else "",

@@ -1,4 +1,4 @@
-// Draws the recordings on a canvas. Drag to zoom, double-click for all, arrow keys move, + and - zoom.
+// Draws records on a canvas, sheet above sheet over time; `data` is what explorer.py packs. Drag to zoom, double-click for all, arrow keys move, + and - zoom.
 (async () => {
   const box = document.getElementById("explorer"), canvas = box.querySelector("canvas");
   const data = JSON.parse(document.getElementById("recordings").textContent);
@@ -25,9 +25,9 @@
       }
       recording.values[name] = values;
     });
-    const { tau, before, after } = recording.values;
-    recording.values.lost = tau.map((x, i) => x - before[i]);
-    recording.values.left = tau.map((x, i) => x - after[i]);
+    for (const [name, one, other] of data.differences) {
+      recording.values[name] = recording.values[one].map((x, i) => x - recording.values[other][i]);
+    }
     return recording;
   }
 
@@ -45,6 +45,7 @@
   function panel(g, frame, lines, title) {
     const first = Math.max(0, Math.floor(index(view[0]))), last = Math.min(record.count - 1, Math.ceil(index(view[1])));
     let low = Infinity, high = -Infinity;
+    lines = lines.filter(([name]) => record.values[name]);
     for (const [name] of lines) for (let i = first; i <= last; i++) {
       const y = record.values[name][i];
       if (y < low) low = y;
@@ -64,7 +65,7 @@
     g.textAlign = "left"; g.fillStyle = ink.grey; g.fillText(title, 0, frame.y - 9);
     g.save(); g.beginPath(); g.rect(frame.x, frame.y, frame.w, frame.h); g.clip();
     for (const [name, colour, dash] of lines) {
-      g.beginPath(); g.strokeStyle = colour; g.lineWidth = 1.4; g.setLineDash(dash);
+      g.beginPath(); g.strokeStyle = ink[colour]; g.lineWidth = 1.4; g.setLineDash(dash);
       let pen = false;
       for (let i = first; i <= last; i++) {
         const value = record.values[name][i];
@@ -85,17 +86,11 @@
     canvas.width = w * ratio; canvas.height = h * ratio;
     const g = canvas.getContext("2d");
     g.scale(ratio, ratio); g.font = getComputedStyle(canvas).font;
-    const left = 50, width = w - left - 16, gap = 32, free = h - 24 - gap * 2 - 44;
-    const heights = [free * 0.45, free * 0.32, free * 0.23];
+    const left = 50, width = w - left - 16, gap = 32, free = h - 24 - gap * (data.sheets.length - 1) - 44;
     let top = 24, x;
-    const sheets = [
-      [[["tau", ink.ink, []], ["before", ink.before, [6, 3]], ["after", ink.after, []]], `${box.dataset.noun} [${data.torque}]`],
-      [[["lost", ink.before, []], ["left", ink.after, []]], `error: measured minus model [${data.torque}]`],
-      [[["q", ink.ink, []]], `position [${data.position}]`],
-    ];
-    sheets.forEach(([lines, title], row) => {
-      x = panel(g, { x: left, y: top, w: width, h: heights[row] }, lines, title);
-      top += heights[row] + gap;
+    data.sheets.forEach(({ title, share, lines }, row) => {
+      x = panel(g, { x: left, y: top, w: width, h: free * share }, lines, (record.titles || [])[row] || title);
+      top += free * share + gap;
     });
     const [marks, places] = ticks(view[0], view[1], width / 90);
     g.textAlign = "center"; g.fillStyle = ink.grey;
@@ -115,7 +110,7 @@
 
   async function open(number, span) {
     record = await unpack(data.recordings[number]);
-    show(...(span || record.worst[1]));
+    show(...(span || record.spans[data.first] || [record.start, record.start + record.length]));
   }
 
   const time = (px) => view[0] + ((px - 50) / (canvas.clientWidth - 66)) * (view[1] - view[0]);
@@ -137,8 +132,9 @@
   const select = box.querySelector("select");
   data.recordings.forEach((r, i) => select.add(new Option(r.name + (r.heldout ? " (not fitted)" : ""), i, false, i === data.open)));
   select.addEventListener("change", () => open(+select.value));
-  const buttons = { before: () => show(...record.worst[0]), after: () => show(...record.worst[1]), all: () => show(record.start, record.start + record.length) };
-  for (const button of box.querySelectorAll("button")) button.addEventListener("click", buttons[button.dataset.to]);
+  for (const button of box.querySelectorAll("button")) {
+    button.addEventListener("click", () => show(...(record.spans[button.dataset.to] || [record.start, record.start + record.length])));
+  }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => view && draw());
   new ResizeObserver(() => view && draw()).observe(canvas);
   box.hidden = false;

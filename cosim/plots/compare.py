@@ -1,0 +1,170 @@
+"""Recordings over each other: figure and page of a comparison."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.plots.explorer import INKS, Sheet, record, script_of_page
+from cosim.plots.quantities import number, scale_of
+from cosim.plots.style import AFTER, BEFORE, GREY, MEASURED, STYLE, Array
+from cosim.support.files import replacing
+from cosim.support.version import __version__
+
+COLOURS = (MEASURED, BEFORE, AFTER, GREY)
+PANEL = (9.0, 1.7)
+"""Inches of one panel."""
+AROUND = 0.02
+"""Share of the time that is shown on each side of the largest difference."""
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How far a column of one recording is from that of the first."""
+
+    column: str
+    other: str
+    unit: str
+    rms: float
+    relative: float
+    """RMS of the difference relative to the standard deviation of the first; inf where that is constant."""
+    largest: float
+    at: float
+    """Time of the largest difference [s]."""
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """Columns that all have, on the time stamps of the first: arrays of shape (recordings, rows)."""
+
+    names: tuple[str, ...]
+    t: Array
+    columns: Mapping[str, Array]
+    units: Mapping[str, str]
+
+    def differences(self) -> list[Difference]:
+        """Each further recording against the first, column by column."""
+        return [self._difference(name, k) for name in self.columns for k in range(1, len(self.names))]
+
+    def _difference(self, name: str, k: int) -> Difference:
+        first, gap = self.columns[name][0], self.columns[name][k] - self.columns[name][0]
+        seen = np.isfinite(gap)
+        if not seen.any():
+            return Difference(name, self.names[k], self.units.get(name, ""), np.nan, np.nan, np.nan, np.nan)
+        rms, spread = float(np.sqrt(np.mean(gap[seen] ** 2))), float(np.std(first[seen]))
+        most = int(np.nanargmax(np.abs(gap)))
+        relative = rms / spread if spread > 0 else float("inf") if rms else 0.0
+        return Difference(
+            name, self.names[k], self.units.get(name, ""), rms, relative, float(gap[most]), float(self.t[most])
+        )
+
+
+def figure_of(overlay: Overlay) -> Any:
+    """Draw each column with its difference below as a matplotlib figure."""
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context(rc=STYLE):
+        count = len(overlay.columns)
+        figure = Figure(figsize=(PANEL[0], 2 * PANEL[1] * count), layout="constrained")
+        panels = figure.subplots(2 * count, 1, squeeze=False, sharex=True, height_ratios=[2, 1] * count)[:, 0]
+        for (name, values), top, below in zip(overlay.columns.items(), panels[::2], panels[1::2], strict=True):
+            scale = scale_of(overlay.units.get(name, ""), float(np.nanmax(np.abs(values), initial=0)))
+            rest = scale_of(overlay.units.get(name, ""), float(np.nanmax(np.abs(values - values[0]), initial=0)))
+            for k, one in enumerate(values):
+                colour = COLOURS[k % len(COLOURS)]
+                top.plot(overlay.t, scale.factor * one, color=colour, lw=1.1, label=overlay.names[k])
+                if k:
+                    below.plot(overlay.t, rest.factor * (one - values[0]), color=colour, lw=0.9)
+            top.set_title(_titled(name, scale.unit), loc="left")
+            below.set_title(_titled("difference from the first", rest.unit), loc="left")
+            top.grid(axis="y")
+            below.grid(axis="y")
+        panels[0].legend(loc="upper right", ncols=len(overlay.names), frameon=False)
+        panels[-1].set_xlabel("time [s]")
+        return figure
+
+
+def write_figure(overlay: Overlay, path: Path, force: bool) -> Path:
+    """Write the figure as SVG."""
+    import matplotlib
+
+    with matplotlib.rc_context(rc=STYLE), replacing(path, force) as partial:
+        figure_of(overlay).savefig(partial, format="svg", metadata={"Date": None})
+    return path
+
+
+def write_page(overlay: Overlay, notes: Sequence[str], path: Path, force: bool) -> Path:
+    """Write the page: a table of differences, and the explorer; self-contained, no network."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+    from markupsafe import Markup
+
+    loader = PackageLoader("cosim.plots", "")
+    pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    script, digest = script_of_page()
+    folder = files("cosim.plots")
+    css = "".join(folder.joinpath(name).read_text("utf-8") for name in ("run_page.css", "compare.css"))
+    text = pages.get_template("compare.html.j2").render(
+        names=overlay.names,
+        lead=_lead(overlay),
+        notes=notes,
+        rows=[_row(one) for one in overlay.differences()],
+        key=[(name, INKS[k % len(INKS)]) for k, name in enumerate(overlay.names)],
+        data=_payload(overlay),
+        script=Markup(script),
+        script_hash=digest,
+        css=Markup(css),
+        made=f"Made by mount-cosim {__version__}.",
+    )
+    with replacing(path, force) as partial:
+        partial.write_text(text, "utf-8")
+    return path
+
+
+def _lead(overlay: Overlay) -> str:
+    seconds = float(overlay.t[-1] - overlay.t[0])
+    return f"{len(overlay.columns)} columns over {seconds:.4g} s that all have in common, {len(overlay.t):,} rows."
+
+
+def _row(one: Difference) -> dict[str, str]:
+    scale = scale_of(one.unit, abs(one.largest))
+    rms, largest = (number(scale.factor * value, 3) for value in (one.rms, one.largest))
+    relative = "–" if not np.isfinite(one.relative) else f"{100 * one.relative:.3g} %"
+    row = {"column": one.column, "other": one.other, "unit": scale.unit or "1", "rms": rms, "relative": relative}
+    return row | {"largest": largest, "at": f"{one.at:.6g}"}
+
+
+def _payload(overlay: Overlay) -> dict[str, Any]:
+    """What `explorer.js` reads: a record for each column."""
+    keys = [f"r{k}" for k in range(len(overlay.names))]
+    lines = [(key, INKS[k % len(INKS)], ()) for k, key in enumerate(keys)]
+    gaps = [(f"d{k}", INKS[k % len(INKS)], ()) for k in range(1, len(keys))]
+    sheets = (Sheet("", 0.62, lines), Sheet("", 0.38, gaps))
+    return {
+        "sheets": [sheet.as_json() for sheet in sheets],
+        "differences": [],
+        "recordings": [_record(overlay, name, keys) for name in overlay.columns],
+        "first": "all",
+        "open": 0,
+    }
+
+
+def _record(overlay: Overlay, name: str, keys: Sequence[str]) -> dict[str, Any]:
+    values = overlay.columns[name]
+    scale = scale_of(overlay.units.get(name, ""), float(np.nanmax(np.abs(values), initial=0)))
+    rest = scale_of(overlay.units.get(name, ""), float(np.nanmax(np.abs(values - values[0]), initial=0)))
+    signals = {key: scale.factor * one for key, one in zip(keys, values, strict=True)}
+    signals |= {f"d{k}": rest.factor * (values[k] - values[0]) for k in range(1, len(keys))}
+    made: dict[str, Any] = dict(record(name, overlay.t, signals, 1 / len(overlay.columns)))
+    gap = np.nanmax(np.abs(values[1:] - values[0]), axis=0)
+    centre = float(overlay.t[int(np.nanargmax(gap))]) if np.isfinite(gap).any() else float(overlay.t[0])
+    around = AROUND * float(overlay.t[-1] - overlay.t[0])
+    titles = [_titled(name, scale.unit), _titled(f"difference from {overlay.names[0]}", rest.unit)]
+    return {**made, "titles": titles, "spans": {"largest": [centre - around, centre + around]}}
+
+
+def _titled(title: str, unit: str) -> str:
+    return f"{title} [{unit}]" if unit else title
