@@ -13,8 +13,13 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
 
+for name in ("starlette", "uvicorn", "httpx2", "asammdf", "h5py", "mcap"):
+    pytest.importorskip(name, reason="an extra is not installed")
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="forks, and limits of Linux")
-SLOW = ("recording, identified", "sweep", "number", "SSP, XML, run", "FMU, XML, run", "FMU, binary, run")
+SLOW = (
+    "recording, identified", "sweep", "number", "SSP, XML, run", "FMU, XML, run", "FMU, binary, run", "FMU, failing",
+    "recording, binary", "crafted", "page, bytes",
+)  # fmt: skip
 """Kinds of which a mutation takes a second or more: the whole attack has them."""
 EACH = 3
 

@@ -1,6 +1,6 @@
-"""Spoilt files and numbers of every kind against the command line: what is it that a user sees, and what is left?
+"""Spoilt files, numbers and requests of every kind: what is it that a user sees, and what is left?
 
-    python tests/benchmarks/attack.py --seed 1 --out results/attack [--count 3000]
+    python tests/benchmarks/attack.py --seed 1 --out results/attack [--count 5200] [--journal FILE --seconds 250]
 
 Each mutation runs in a forked process with limits of time and memory (attack_worker.py) and ends in one of these ways:
 
@@ -14,9 +14,12 @@ Each mutation runs in a forked process with limits of time and memory (attack_wo
 import argparse
 import collections
 import json
+import math
 import os
+import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -25,9 +28,9 @@ from shutil import rmtree
 
 for name in ("OMP", "OPENBLAS", "ARROW"):
     os.environ.setdefault(f"{name}_NUM_THREADS", "1")
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1])]
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1]), str(Path(__file__).parents[1] / "data")]
 
-from attack_kinds import kinds  # noqa: E402
+from attack_kinds import kinds, untouched  # noqa: E402
 from attack_targets import Target, Yard, line  # noqa: E402
 from attack_worker import Ended, attempt  # noqa: E402
 
@@ -42,7 +45,7 @@ LOUD = 3
 
 @dataclass(frozen=True)
 class Found:
-    """One mutation: its kind, number, what was done, how it ended, and what was said."""
+    """One mutation: its kind, number, what was done, how it ended, what was said, what it took [s of the clock, MB]."""
 
     kind: str
     number: int
@@ -50,6 +53,7 @@ class Found:
     end: str
     said: str
     seconds: float
+    megabytes: float = 0.0
 
 
 def judged(target: Target, ended: Ended, folder: Path, file: Path, good: bytes) -> str:
@@ -90,10 +94,23 @@ def journalled(journal: Path) -> list[Found]:
     return [Found(**json.loads(one)) for one in journal.read_text("utf-8").splitlines()] if journal.exists() else []
 
 
-def attacks(targets: list[Target], seed: int, count: int, journal: Path) -> Iterator[Found]:
-    """Attack, and write down each; those of a journal that was begun are not played again."""
+def attacks(
+    targets: list[Target],
+    seed: int,
+    count: int,
+    journal: Path,
+    seconds: float = math.inf,
+    part: tuple[int, int] = (1, 1),
+) -> Iterator[Found]:
+    """Attack for so long, and write down each; those of a journal that was begun are not played again.
+
+    Of the attacks a part is played, (1, 2) is the first of two halves: several processes may write one journal.
+    """
     done = {one.number: one for one in journalled(journal)}
-    for place, target in drawn(targets, seed, count):
+    end = time.monotonic() + seconds
+    for place, target in drawn(targets, seed, count)[part[0] - 1 :: part[1]]:
+        if time.monotonic() > end:
+            return
         if place not in done:
             done[place] = attack(target, seed, place)
             with journal.open("a", encoding="utf-8") as file:
@@ -101,15 +118,10 @@ def attacks(targets: list[Target], seed: int, count: int, journal: Path) -> Iter
         yield done[place]
 
 
-def untouched(dice: Random, raw: bytes) -> tuple[str, bytes]:
-    """Spoil nothing."""
-    return "nothing", raw
-
-
 def controls(targets: list[Target]) -> Iterator[Found]:
     """Every good file to its command: an attack means nothing where these are not answered."""
     for target in targets:
-        for place, seed in enumerate(target.seeds):
+        for place, seed in enumerate(target.seeds if all(content for _, content in target.seeds) else ()):
             yield attack(replace(target, seeds=[seed], spoil=untouched), 0, place)
 
 
@@ -128,7 +140,7 @@ def attack(target: Target, seed: int, place: int, keep: bool = False) -> Found:
         if keep:
             print(f"{folder}\n{ended.out}\n{ended.err}\n{ended.left} {ended.running} {ended.code}")
         note = f" LEFT {ended.left} {ended.running}" if end == "left" else ""
-        return Found(target.kind, place, how, end, said[-600:] + note, ended.seconds)
+        return Found(target.kind, place, how, end, said[-600:] + note, ended.seconds, ended.megabytes)
     finally:
         if not keep:
             rmtree(folder, ignore_errors=True)
@@ -136,41 +148,52 @@ def attack(target: Target, seed: int, place: int, keep: bool = False) -> Found:
 
 def page(found: list[Found], seed: int, asked: int) -> str:
     """The table for people."""
-    counts = collections.Counter((one.kind, one.end) for one in found)
-    total = collections.Counter(one.end for one in found)
-    rows = [
-        (kind, [counts[kind, end] for end in (*FINE, *DEFECTS)]) for kind in dict.fromkeys(one.kind for one in found)
-    ]
-    rows.append(("**all**", [total[end] for end in (*FINE, *DEFECTS)]))
-    head = ("attacked", "tried", *FINE, *DEFECTS)
-    defects = sum(total[end] for end in DEFECTS)
+    names = list(dict.fromkeys(one.kind for one in sorted(found, key=lambda one: one.number)))
+    groups = [(name, [one for one in found if one.kind == name]) for name in names] + [("**all**", found)]
+    rows = []
+    for name, some in groups:
+        ends = collections.Counter(one.end for one in some)
+        took = max(one.seconds for one in some), max(one.megabytes for one in some)
+        counts = [f"{ends[end]:,}" for end in (*FINE, *DEFECTS)]
+        rows.append([name, f"{len(some):,}", *counts, f"{took[0]:.2g}", f"{took[1]:.0f}"])
+    head = ("attacked", "tried", *FINE, *DEFECTS, "longest [s]", "most memory [MB]")
+    defects = sum(one.end in DEFECTS for one in found)
     lines = [
-        "# Spoilt files and numbers against the command line",
+        "# Spoilt files, numbers and requests against the command line, the page and the servers",
         "",
         f"    python tests/benchmarks/attack.py --seed {seed} --count {asked} --out results/attack",
         "",
-        f"mount-cosim {__version__}; {len(found):,} mutations (whole ones of each kind, {asked:,} in all asked for), "
-        f"{defects} defects. "
-        "What the columns mean stands at the top of `tests/benchmarks/attack.py`; "
-        "`defects.json` has what was said in each defect.",
+        f"mount-cosim {__version__} at {commit()}; {len(found):,} mutations of {asked:,} asked for, {defects} defects. "
+        "The top of `tests/benchmarks/attack.py` says what the columns mean; `defects.json` has what was said in each. "
+        "Seconds are those of the clock, on a computer with other work; memory is that of all processes of an attack "
+        "together (what the bench itself has loaded, some 200 MB, is in it).",
         "",
         "| " + " | ".join(head) + " |",
         "|---|" + "--:|" * (len(head) - 1),
-        *(f"| {kind} | {sum(row)} | " + " | ".join(f"{one:,}" for one in row) + " |" for kind, row in rows),
+        *(f"| {' | '.join(row)} |" for row in rows),
         "",
-        f"Seconds of a mutation: median {sorted(one.seconds for one in found)[len(found) // 2]:.2g}, "
-        f"longest {max(one.seconds for one in found):.2g}.",
+        f"Seconds of a mutation: median {sorted(one.seconds for one in found)[len(found) // 2]:.2g}.",
     ]
     return "\n".join(lines) + "\n"
+
+
+def commit() -> str:
+    """The commit of this tree."""
+    told = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], cwd=Path(__file__).parent, capture_output=True, text=True
+    )
+    return told.stdout.strip() or "?"
 
 
 def main() -> None:
     """Attack and write the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--count", type=int, default=3000)
+    parser.add_argument("--count", type=int, default=5200)
     parser.add_argument("--only", type=int, help="number of one attack, to play it again and look")
     parser.add_argument("--journal", type=Path, help="file of what is done: a run that ended early goes on from there")
+    parser.add_argument("--seconds", type=float, default=math.inf, help="stop after so long; a journal keeps the rest")
+    parser.add_argument("--part", default="1:1", help="1:2 is the first half: two processes may write one journal")
     parser.add_argument("--so-far", action="store_true", help="only write the table of what the journal has")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
@@ -183,11 +206,13 @@ def main() -> None:
         if given.only is not None:
             attack(dict(drawn(targets, given.seed, given.count))[given.only], given.seed, given.only, keep=True)
             return
-        for one in controls(targets):
+        journal = given.journal or Path(folder) / "journal"
+        for one in () if journal.exists() or given.part[0] != "1" else controls(targets):
             if one.end != "answered":
                 raise SystemExit(f"the good file of {one.kind} (number {one.number}) is {one.end}: {one.said}")
         found = []
-        for one in attacks(targets, given.seed, given.count, given.journal or Path(folder) / "journal"):
+        part = int(given.part.partition(":")[0]), int(given.part.partition(":")[2])
+        for one in attacks(targets, given.seed, given.count, journal, given.seconds, part):
             found.append(one)
             if one.end in DEFECTS:
                 print(f"{one.end} {one.kind} {one.number} ({one.how}): ...{one.said[-300:]}", flush=True)

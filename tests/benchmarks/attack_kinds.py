@@ -5,8 +5,12 @@ from collections.abc import Callable
 from pathlib import Path
 from random import Random
 
+import attack_machines
+import attack_recordings
+import attack_services
 from attack_mutations import NUMBERS, of_archive, of_bytes, of_json, of_member, of_text, of_xml
 from attack_targets import TESTS, Target, Yard, bytes_of, recorded, same, spoke, told
+from investigations import SCENARIO
 
 from cosim.cli import main
 from cosim.hardware.blackbox import HEADER, MAGIC, read_black_box, recording_of
@@ -154,7 +158,52 @@ def kinds(yard: Yard) -> list[Target]:
         Target("machine file", 40, machine, of_text, on_machine(yard), recorded),
         Target("sweep", 10, sweep, of_text, swept, spoke),
         Target("number on the command line", 50, [("number", b"1")], number, numbered(yard), spoke),
+        *services(text),
+        *machines_and_files(yard),
     ]
+
+
+def services(text: list[tuple[str, bytes]]) -> list[Target]:
+    """What answers over a network; spoilt are files that are dropped, and requests."""
+    element, put = [("indi.xml", attack_services.ASKED)], [("alpaca.txt", attack_services.PUT)]
+    request = [("request.txt", attack_services.request_of_page())]
+    well = attack_services.served_well
+    return [
+        Target("page, requests", 150, text, of_text, attack_services.page, well),
+        Target("page, bytes", 60, request, untouched, attack_services.page_bytes, well),
+        Target("Alpaca", 120, put, untouched, attack_services.alpaca, well),
+        Target("INDI", 80, element, untouched, attack_services.indi, well),
+    ]
+
+
+def machines_and_files(yard: Yard) -> list[Target]:
+    """Investigations, FMUs that fail, binary recordings that are spoilt or were made to cost much."""
+    begun, whole = attack_machines.investigated, attack_machines.failed_or_whole
+    made = attack_recordings.crafted_kinds()
+    return [
+        Target(
+            "investigation",
+            110,
+            [("scenario.txt", b"[]\n" + SCENARIO.encode())],
+            attack_machines.investigation,
+            begun,
+            spoke,
+        ),
+        Target(
+            "FMU, failing", 60, [("fmu.json", b"")], attack_machines.behaviour, attack_machines.behaving(yard), whole
+        ),
+        Target("recording, NumPy and JSON", 90, attack_recordings.arrays(), of_bytes, show, told),
+        Target("recording, binary", 60, attack_recordings.binaries(), of_bytes, show, told),
+        *(
+            Target(f"crafted, {kind}", 6, [(f"run{suffix}", b"")], attack_recordings.crafted(kind), show, told)
+            for kind, suffix in made.items()
+        ),
+    ]
+
+
+def untouched(dice: Random, raw: bytes) -> tuple[str, bytes]:
+    """Spoil nothing."""
+    return "nothing", raw
 
 
 SWEEP = """scenario = "{scenario}"

@@ -13,9 +13,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from shutil import rmtree
 
+from tree_cost import megabytes
+
 BUSY, SECONDS, GRACE, MEMORY = 15.0, 120.0, 60.0, 6_000_000_000
 """What a command may take: s of a processor, or of the clock, until Ctrl-C; s to end then; bytes beyond those at its
 start. The clock's are many, for a computer that has other things to do."""
+LOOK = 0.3
+"""Seconds between two looks at what it takes."""
 TICK = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
 FILE = 500_000_000
 """Bytes of a file that it may write."""
@@ -23,7 +27,10 @@ FILE = 500_000_000
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended: exit code (negative: signal), whether by Ctrl-C or not even so, streams, what was left."""
+    """How a command ended: exit code (negative: signal), whether by Ctrl-C or not even so, streams, what was left.
+
+    `megabytes`: most memory that it and what it started held together, as far as it was looked at.
+    """
 
     code: int
     asked: bool
@@ -33,6 +40,7 @@ class Ended:
     left: tuple[str, ...]
     running: int
     seconds: float
+    megabytes: float = 0.0
 
 
 def attempt(command: Callable[[], object], folder: Path) -> Ended:
@@ -43,22 +51,26 @@ def attempt(command: Callable[[], object], folder: Path) -> Ended:
     process = os.fork()
     if process == 0:
         _live(command, folder, streams)
-    asked = not _ended(process, folder, SECONDS)
-    hung = asked and not _interrupted(process, folder)
-    _, status = os.waitpid(process, 0)
+    held = [0.0]
+    asked = not _ended(process, folder, SECONDS, held)
+    hung = asked and not _interrupted(process, folder, held)
+    _, status, used = os.wait4(process, 0)
+    most = max(*held, used.ru_maxrss * 1.024e-3)
     running = _running(folder)
     with suppress(ProcessLookupError):
         os.killpg(process, signal.SIGKILL)
     out, err = (one.read_text("utf-8", "replace") for one in streams)
     left = tuple(sorted(str(one.relative_to(folder)) for one in _left(folder)))
     rmtree(folder / "tmp", ignore_errors=True)
-    return Ended(os.waitstatus_to_exitcode(status), asked, hung, out, err, left, running, time.monotonic() - began)
+    return Ended(
+        os.waitstatus_to_exitcode(status), asked, hung, out, err, left, running, time.monotonic() - began, most
+    )
 
 
-def _interrupted(process: int, folder: Path) -> bool:
+def _interrupted(process: int, folder: Path, held: list[float]) -> bool:
     """Press Ctrl-C; returns whether the process ends by it, else it is killed."""
     os.kill(process, signal.SIGINT)
-    if _ended(process, folder, GRACE):
+    if _ended(process, folder, GRACE, held):
         return True
     os.killpg(process, signal.SIGKILL)
     return False
@@ -70,11 +82,12 @@ def _left(folder: Path) -> list[Path]:
     return [*(folder / "tmp").iterdir(), *hidden]
 
 
-def _ended(process: int, folder: Path, seconds: float) -> bool:
-    """Wait for the end of a process; returns whether it came in time."""
+def _ended(process: int, folder: Path, seconds: float, held: list[float]) -> bool:
+    """Wait for the end of a process; returns whether it came in time. What it held meanwhile goes into a list [MB]."""
     handle, used, last = os.pidfd_open(process), _used(folder), time.monotonic() + seconds
     try:
-        while not select.select([handle], [], [], 2.0)[0]:
+        while not select.select([handle], [], [], LOOK)[0]:
+            held.append(megabytes(process))
             if time.monotonic() > last or _used(folder) - used > BUSY:
                 return False
         return True
