@@ -100,15 +100,15 @@ def attacks(
     count: int,
     journal: Path,
     seconds: float = math.inf,
-    part: tuple[int, int] = (1, 1),
+    part: tuple[int, int] = (0, 1),
 ) -> Iterator[Found]:
     """Attack for so long, and write down each; those of a journal that was begun are not played again.
 
-    Of the attacks a part is played, (1, 2) is the first of two halves: several processes may write one journal.
+    Of the attacks a part is played, (0, 2) is the first of two halves: several processes may write one journal.
     """
     done = {one.number: one for one in journalled(journal)}
     end = time.monotonic() + seconds
-    for place, target in drawn(targets, seed, count)[part[0] - 1 :: part[1]]:
+    for place, target in drawn(targets, seed, count)[part[0] :: part[1]]:
         if time.monotonic() > end:
             return
         if place not in done:
@@ -193,7 +193,7 @@ def main() -> None:
     parser.add_argument("--only", type=int, help="number of one attack, to play it again and look")
     parser.add_argument("--journal", type=Path, help="file of what is done: a run that ended early goes on from there")
     parser.add_argument("--seconds", type=float, default=math.inf, help="stop after so long; a journal keeps the rest")
-    parser.add_argument("--part", default="1:1", help="1:2 is the first half: two processes may write one journal")
+    parser.add_argument("--workers", type=int, default=1, help="processes that attack at once")
     parser.add_argument("--so-far", action="store_true", help="only write the table of what the journal has")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
@@ -207,18 +207,29 @@ def main() -> None:
             attack(dict(drawn(targets, given.seed, given.count))[given.only], given.seed, given.only, keep=True)
             return
         journal = given.journal or Path(folder) / "journal"
-        for one in () if journal.exists() or given.part[0] != "1" else controls(targets):
+        for one in () if journal.exists() else controls(targets):
             if one.end != "answered":
                 raise SystemExit(f"the good file of {one.kind} (number {one.number}) is {one.end}: {one.said}")
-        found = []
-        part = int(given.part.partition(":")[0]), int(given.part.partition(":")[2])
-        for one in attacks(targets, given.seed, given.count, journal, given.seconds, part):
-            found.append(one)
-            if one.end in DEFECTS:
-                print(f"{one.end} {one.kind} {one.number} ({one.how}): ...{one.said[-300:]}", flush=True)
+        journal.touch()
+        workers = [_worker(targets, given, journal, number) for number in range(given.workers)]
+        for worker in workers:
+            os.waitpid(worker, 0)
+        written(journalled(journal), given.seed, given.count, given.out)
     finally:
         rmtree(folder, ignore_errors=True)
-    written(found, given.seed, given.count, given.out)
+
+
+def _worker(targets: list[Target], given: argparse.Namespace, journal: Path, number: int) -> int:
+    """Play one share of the attacks in a process of its own, and tell the defects; returns its number."""
+    process = os.fork()
+    if process == 0:
+        try:
+            for one in attacks(targets, given.seed, given.count, journal, given.seconds, (number, given.workers)):
+                if one.end in DEFECTS:
+                    print(f"{one.end} {one.kind} {one.number} ({one.how}): ...{one.said[-300:]}", flush=True)
+        finally:
+            os._exit(0)
+    return process
 
 
 def written(found: list[Found], seed: int, asked: int, out: Path) -> None:
