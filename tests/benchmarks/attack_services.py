@@ -17,6 +17,7 @@ from random import Random
 from typing import Any
 from urllib.parse import urlencode
 
+import httpx2
 import numpy as np
 import serve_work
 from attack_mutations import NUMBERS, WORDS, of_bytes, of_text
@@ -93,7 +94,7 @@ def page(folder: Path, file: Path, dice: Random) -> Callable[[], None]:
             job = new(client)
             found = [client.put(f"{job}/files", params={"name": file.name}, content=file.read_bytes()).status_code]
             for _ in range(REQUESTS):
-                with suppress(ValueError, UnicodeError, TypeError):  # what the client itself does not send
+                with suppress(ValueError, TypeError, httpx2.InvalidURL):  # what the client itself does not send
                     found.append(_request(client, job, dice))
             found.append(0 if client.get("/").status_code == 200 and client.get(job).status_code < 500 else 599)
         finally:
