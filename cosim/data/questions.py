@@ -217,10 +217,13 @@ def untimed(path: Path, values: Mapping[str, np.ndarray], message: str) -> Undec
     return UndecidedError(text, decided_by=deciding, culprit=str(path), value="t", choices=tuple(values))
 
 
-def time_by_speed(path: Path, stated: str, fitting: str, name: str) -> UndecidedError:
-    """Ask for the unit of a time that the file states, and that makes a speed no slope of the position."""
+def time_by_speed(path: Path, stated: str, fitting: str, name: str, what: str = "the slope") -> UndecidedError:
+    """Ask for the unit of a time that the file states, and that makes a speed no slope of the position.
+
+    `what` of the position the column is: its slope, or its second derivative.
+    """
     text = (
-        f'{path} states its time in {stated}, but "{short(name)}" is the slope of the position only in {fitting}; say '
+        f'{path} states its time in {stated}, but "{short(name)}" is {what} of the position only in {fitting}; say '
         f"which it is, --units t={fitting} or --units t={stated}."
     )
     deciding = {"units": {"t": fitting}}
@@ -228,12 +231,12 @@ def time_by_speed(path: Path, stated: str, fitting: str, name: str) -> Undecided
 
 
 def position_by_speed(
-    path: Path, name: str, fitting: str, is_stated: bool, values: Mapping[str, np.ndarray]
+    path: Path, name: str, fitting: str, is_stated: bool, values: Mapping[str, np.ndarray], what: str = "the slope"
 ) -> UndecidedError:
-    """Ask for the unit of a position whose slope is a speed only in another unit."""
+    """Ask for the unit of a position whose slope is a speed only in another unit; `what` as in `time_by_speed`."""
     states = "states another unit" if is_stated else "states no unit"
     text = (
-        f'{path}: "{short(name)}" is the slope of the position only if that is in {fitting}, and the file {states}; '
+        f'{path}: "{short(name)}" is {what} of the position only if that is in {fitting}, and the file {states}; '
         f"say which it is, --units {quote(f'q={fitting}')} or --units q=rad. {first_rows(values, ['t', 'q', name])}"
     )
     deciding = {"units": {"q": fitting}}

@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.data import questions
+from cosim.data.accelerations import check_acceleration
 from cosim.data.assign import OURS, Assigned, units_stated
 from cosim.data.columns import Columns
 from cosim.data.limits import listed, short
@@ -85,6 +86,8 @@ def with_speed(path: Path, found: Columns, served: Assigned, given: Mapping[str,
     if "v" not in served.values or any(one.name == "v" for one in speeds):
         best = max(speeds, key=lambda one: _rank(found, one), default=None)
         served = _chosen(path, found, served, given, best) if best else served
+    if not speeds:
+        check_acceleration(path, found, served, given)
     again = tuple(one.name for one in speeds if one.name in served.values and one.name != "v")
     others = [name for name in served.values if name not in (*OURS, *again) and not name.endswith(KEPT)]
     again += tuple(name for name in others if _is_torque_again(served, name))

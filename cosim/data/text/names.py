@@ -97,8 +97,8 @@ def suffixed_unit(name: str, role: str = "") -> str:
         return spelled(found[1])
     parts = PARTS.findall(name)
     if len(parts) > 1 and parts[-2] in PREFIXES and name.endswith(parts[-2] + parts[-1]):
-        text = f"{parts[-2]}{parts[-1].lower()}"  # `pos_mDeg`: thousandths, not degrees
-        return spelled(text) if is_unit(text) else ""
+        texts = (f"{parts[-2]}{parts[-1]}", f"{parts[-2]}{parts[-1].lower()}")  # `pos_mDeg`: thousandths, not degrees
+        return next((spelled(text) for text in texts if is_unit(text)), "")
     for count in range(min(LONGEST, len(parts)), 0, -1):
         text = _joined(parts[-count:])
         if text and is_unit(text) and _is_certain(text, len(parts) == count, role):
@@ -112,6 +112,8 @@ def _joined(parts: list[str]) -> str:
     if len(parts) == 1:
         return parts[0]
     if len(parts) == 3:
+        if parts[1:] == ["s", "2"]:
+            return f"{parts[0]}/s2"
         return f"{parts[0]}/{parts[2]}" if parts[1].lower() in ("per", "p") else ""
     first, second = parts
     if second in ("s", "S", "sec", "min", "s2"):

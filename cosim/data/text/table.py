@@ -12,6 +12,7 @@ from pyarrow import csv
 
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, short
+from cosim.data.text.cells import lists_of
 from cosim.data.text.cleaning import without_comments
 from cosim.data.text.fields import NOTHING, is_number
 from cosim.data.text.header import CLOCK_FORMAT, LABEL, NO_UNIT
@@ -33,7 +34,13 @@ def table_of(path: Path, data: bytes, layout: Layout) -> Columns:
     table, notes = _parsed(path, body, layout)
     names, units, contradictions = names_of(layout)
     pairs = zip(names, table.columns, strict=True)
-    kept = {name: _values(column, layout.decimal) for name, column in pairs if name or _holds(column)}
+    read = {name: _values(column, layout.decimal) for name, column in pairs if name or _holds(column)}
+    parted = {name: lists_of(path, column) for name, column in read.items()}
+    kept = {
+        (f"{name}.{k}" if parted[name] else name): one
+        for name, column in read.items()
+        for k, one in enumerate(parted[name] or [column], 1)
+    }
     return Columns(
         kept,
         {name: unit for name, unit in units.items() if name in kept},
