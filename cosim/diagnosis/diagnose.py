@@ -40,9 +40,11 @@ from cosim.diagnosis.terms.spelled import Spelled
 from cosim.diagnosis.trust.admission import check_effects, check_recordings
 from cosim.diagnosis.trust.denied import beyond_denial, without_denied
 from cosim.diagnosis.trust.doubts import doubts, of_base, single_readings
+from cosim.diagnosis.trust.limits import half_sample
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.determined import limited, with_held
 from cosim.estimation.fit import Fit
+from cosim.estimation.half_sample import are_even, moved, torque_late
 from cosim.estimation.not_determined import not_determined
 from cosim.estimation.prepare import Band, prepare, quality
 from cosim.estimation.problem import Problem
@@ -130,10 +132,10 @@ def diagnose(
     check_effects(card.plant())
     check_recordings(train, heldout)
     sanity = (*doubts(train, heldout, card), *single_readings(given, (*train, *heldout)))
-    problem = _problem(train, card)
     on_progress("refitting the base")
-    problem, base = with_held(problem, problem.fit(problem.mount, 75))
-    sanity = (*sanity, *of_base(problem, base.mount, train, heldout))
+    problem, base, late = _refitted(train, heldout, card)
+    train, heldout = [moved(one, late) for one in train], [moved(one, late) for one in heldout]
+    sanity = (*sanity, *half_sample(given, late, problem.sample_time), *of_base(problem, base.mount, train, heldout))
     refitted = _improved(card, limited(problem, base.mount)[0])
     on_model_ready("before", refitted.plant())
     if any(one.blocks_naming for one in beyond_denial(sanity)):
@@ -162,6 +164,17 @@ def diagnose(
         seconds=time.perf_counter() - started,
     )
     return Outcome(diagnosis, delivered, first, refitted, named, experiment, learned.stated() if learned else ())
+
+
+def _refitted(train: Sequence[Recording], heldout: Sequence[Recording], card: Card) -> tuple[Problem, Fit, float]:
+    """The refitted base, and by how much its torque acts later than it is stamped: by that it was moved [s]."""
+    problem = _problem(train, card)
+    base = problem.fit(problem.mount, 75)
+    late = torque_late(problem, base) if are_even((*train, *heldout)) else 0.0
+    if late:
+        problem = _problem([moved(one, late) for one in train], card)
+        base = problem.fit(problem.mount, 75)
+    return *with_held(problem, base), late
 
 
 def _refused(refitted: Card, withheld: Diagnosis) -> Outcome:

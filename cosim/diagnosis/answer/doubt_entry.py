@@ -19,6 +19,7 @@ Kind = Literal[
     "not_determined",
     "single_readings",
     "encoder_step",
+    "half_sample",
     "no_set_point",
     "little_motion",
 ]

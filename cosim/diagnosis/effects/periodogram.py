@@ -21,6 +21,11 @@ LEAST_TURNS, REPEATING = 8, 0.9
 """Periods of a motion, and share of the energy of its speed in their harmonics, that show that it repeats itself."""
 NEIGHBOURS = 10
 """Tones that a piece tells apart, on either side of one, whose mean power is the level there."""
+CAUSED = 3.0
+"""Amplitude of a line of the torque that the motion needs, in units of the tone, from which the motion makes the tone.
+A disturbance moves the axis too, but by no more torque than its own, or twice that where the loop amplifies it."""
+LINE = 20.0
+"""Power of a line, in units of the level of its neighbours: noise comes to that once in 5e8."""
 BAND, FINE = 1.15, 16
 """Ratio of cycles that share one choice of rows, and bins of angle in the shortest wave of such a band."""
 
@@ -50,6 +55,7 @@ def tones(span: Span, signal: Array) -> list[float]:
 
     Each piece has its own phase, so powers are added, each in units of the level of its neighbours. Where the motion
     repeats itself or turns steadily, what depends on it is a tone as well: such tones are no sign of a disturbance.
+    Neither is what lies at a line of the torque that the motion itself needs.
     """
     pieces = [np.flatnonzero(span.piece == number) for number in np.unique(span.piece)]
     pieces = [own for own in pieces if len(own) >= LEAST_ROWS]
@@ -57,7 +63,9 @@ def tones(span: Span, signal: Array) -> list[float]:
     fine = np.arange(*span.detectable, 0.25 / seconds)
     if not pieces or len(fine) < NEIGHBOURS:
         return []
-    standing = np.sum([_standing(span.t[own], signal[own], fine) for own in pieces], axis=0)
+    needed = span.tau - span.residual
+    powers = [_without_lines(span.t[own], signal[own], needed[own], fine) for own in pieces]
+    standing = np.sum(powers, axis=0)
     turned = [_turned(span.t[own], span.angle[own], fine) for own in pieces]
     repeated = [_repeated(span.t[own], span.v[own], fine) for own in pieces]
     standing[np.all(np.logical_or(turned, repeated), axis=0)] = 0.0
@@ -85,6 +93,17 @@ def _repeated(t: Array, v: Array, hertz: Array) -> npt.NDArray[np.bool_]:
     harmonic = [np.abs(f - pitch * np.maximum(np.round(f / pitch), 1)) < 2 * width for f in (fine, hertz)]
     repeats = pitch > LEAST_TURNS * width and power[harmonic[0]].sum() > REPEATING * power.sum()
     return np.asarray(harmonic[1] & repeats)
+
+
+def _without_lines(t: Array, signal: Array, needed: Array, hertz: Array) -> Array:
+    """How far a piece's tones stand out; 0 at lines of the torque that the motion needs, if those are much larger.
+
+    A line of the motion makes one in whatever the model misses: a torque that is half a row late, a friction law that
+    is not quite the machine's.
+    """
+    power, own = _spectrum(t, signal, hertz), _spectrum(t, needed, hertz)
+    is_line = (own > CAUSED**2 * power) & (_standing(t, needed, hertz) > LINE)
+    return np.where(is_line, 0.0, _standing(t, signal, hertz))
 
 
 def _standing(t: Array, signal: Array, hertz: Array) -> Array:

@@ -52,6 +52,19 @@ def rounding_torque(recording: Recording, step: float, inertia: float, band: flo
     return inertia * acceleration / max(float(np.std(recording["tau"])), 1e-300)
 
 
+def half_sample(recordings: Sequence[Recording], late: float, sample_time: float) -> tuple[Sanity, ...]:
+    """Say that the torque acts so many seconds later than it is stamped, less than a row, and was moved by that."""
+    if not late:
+        return ()
+    names, side = ", ".join(one.name for one in recordings), "after" if late > 0 else "before"
+    how = "as one that holds until the next row" if late > 0 else "as one that is a mean since the last row"
+    text = (
+        f"The torque of {names} acts {1e3 * abs(late):.2g} ms {side} its time stamp, {abs(late) / sample_time:.2g} of "
+        f"a row, {how}. It was moved by that; it is no delay of the machine."
+    )
+    return (Sanity(finding="half_sample", statement=text),)
+
+
 def no_set_point(recordings: Sequence[Recording]) -> tuple[Sanity, ...]:
     """Say what it costs that the set point was not recorded."""
     without = [one.name for one in recordings if "q_d" not in one]
