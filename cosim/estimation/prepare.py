@@ -18,11 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import butter, sosfiltfilt
 
 from cosim.data.recording import GAP, Gap, Recording
 from cosim.data.resolution import resolution
-from cosim.estimation.filters import EDGE, derivative, gain, lowpass, passes_of
+from cosim.estimation.filters import EDGE, derivative, gain, highpass, lowpass, passes_of
 from cosim.support.errors import RecordingError
 from cosim.support.statistics import rms
 
@@ -283,5 +282,5 @@ def _cutoff(recording: Recording, inertia: float, noise_share: float) -> float:
 
 def noise_of(values: Array, dt: float) -> float:
     """RMS of white noise per sample, judged from the upper 40 % of the spectrum."""
-    high = sosfiltfilt(butter(4, 0.6 * 0.5 / dt, "highpass", fs=1 / dt, output="sos"), values - values[0])
+    high = highpass(values - values[0], dt, 0.6 * 0.5 / dt)
     return float(np.sqrt(np.mean(high[20:-20] ** 2) / 0.4))

@@ -1,6 +1,7 @@
 """The kernels in C do what NumPy and SciPy do, on any rows, and without them a diagnosis computes the same."""
 
 from collections.abc import Callable
+from math import ceil
 
 import casadi as ca
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from cosim.diagnosis.evidence import marginal as evidence
 from cosim.diagnosis.evidence.marginal import Group, marginal
 from cosim.estimation import filters, rowwise
-from cosim.estimation.filters import lowpass
+from cosim.estimation.filters import EDGE, FADED, highpass, lowpass
 from cosim.estimation.kernels import library
 from cosim.estimation.rowwise import OPERATIONS, Rowwise, Tape, recurrence
 
@@ -103,3 +104,15 @@ def test_what_is_not_positive_definite_is_refused_as_numpy_refuses_it() -> None:
     ones = np.ones(1)
     with pytest.raises(np.linalg.LinAlgError):
         marginal(1e6 * grams, np.full(2, 1e9), [], ones, ones, ones)
+
+
+@pytest.mark.parametrize("cutoff", [0.004, 0.03, 0.2, 0.44])
+def test_the_filter_is_the_butterworth_of_scipy(cutoff: float) -> None:
+    from scipy.signal import butter, sosfiltfilt
+
+    columns = np.random.default_rng(5).normal(size=(2000, 3)).cumsum(axis=0)
+    turned = max(EDGE, ceil(FADED / cutoff))
+    wanted = sosfiltfilt(butter(4, cutoff, fs=1.0, output="sos"), columns, axis=0, padlen=turned)
+    np.testing.assert_allclose(lowpass(columns, 1.0, cutoff), wanted, rtol=1e-9, atol=1e-9)
+    wanted = sosfiltfilt(butter(4, cutoff, "highpass", fs=1.0, output="sos"), columns[:, 0])
+    np.testing.assert_allclose(highpass(columns[:, 0], 1.0, cutoff), wanted, rtol=1e-9, atol=1e-9)

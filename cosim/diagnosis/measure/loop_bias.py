@@ -14,7 +14,7 @@ Reference: Wooldridge, Introductory Econometrics, section 15.5.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from cosim.diagnosis.answer.entries import BiasEntry
 from cosim.diagnosis.search.instrumental_variable import on_set_point
@@ -88,4 +88,4 @@ def _tested(slopes: Array, rest: Array, residual: Array, blocks: Blocks, names: 
     moves = beta[:many] / scale[:many] / np.where(values == 0, 1.0, np.abs(values))
     far = (np.abs(moves) > MOVES) & (np.abs(beta[:many]) > CLEARLY * errors)
     moved = {name: float(move) for name, move, is_far in zip(names, moves, far, strict=True) if is_far}
-    return LoopBias(float(f_distribution.sf(wald, many, count - 1)), moved)
+    return LoopBias(float(fdtrc(many, count - 1, wald)), moved)

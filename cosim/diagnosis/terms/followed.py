@@ -1,9 +1,9 @@
 """Quantities that no moment tells, along a recorded motion: what the plant's own states follow (`learned_base.py`)."""
 
 import numpy as np
-from scipy.signal import lfilter
 
 from cosim.estimation.prepare import Array, Piece
+from cosim.estimation.rowwise import recurrence
 from pyfmi_models.effects.learned_base import SEEN_WITHIN
 
 
@@ -13,7 +13,7 @@ def followed(name: str, piece: Piece) -> Array:
         return np.concatenate([[0.0], np.cumsum(np.abs(piece.v[1:] + piece.v[:-1]) / 2 * piece.dt)])
     keep = np.exp(-piece.dt / SEEN_WITHIN)
     middle = np.concatenate([[0.0], (piece.v[1:] + piece.v[:-1]) / 2])
-    past = lfilter([1 - keep], [1.0, -keep], middle)
+    past = recurrence(np.full(len(middle), keep), (1 - keep) * middle[None])[0, 1:]
     return np.asarray((piece.v - past) / SEEN_WITHIN)
 
 
