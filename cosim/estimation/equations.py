@@ -45,16 +45,15 @@ class Equations:
 
     def __init__(self, mount: Mount, free: tuple[str, ...], key: tuple[Any, ...]) -> None:
         self._mount, self._free, self._key = mount, free, key
-        self._inputs = tuple(variable.name for variable in mount.inputs())
+        self._starts = tuple((variable.name, float(variable.start)) for variable in mount.inputs())
+        self._inputs = tuple(name for name, _ in self._starts)
         owners = [(name, part.states()) for name, part in mount.of_kind(MotionEffect) if part.states()]
         self._owners = [*owners, ("friction", mount.law.states())]
         self.count = sum(len(states) for _, states in self._owners)
 
-    def columns(self, piece: Piece) -> Array:
-        """What each row gives: time, reading, its derivatives, and the inputs of effects."""
-        starts = {variable.name: variable.start for variable in self._mount.inputs()}
-        given = [piece.extras.get(name, np.full(len(piece.t), starts[name])) for name in self._inputs]
-        return np.vstack([piece.t, piece.q, piece.v, piece.a, *given])
+    def given(self, piece: Piece) -> tuple[Array, tuple[Array, ...]]:
+        """What each row gives, and each step: time, reading, its derivatives, and the inputs of effects."""
+        return piece.given(self._starts)
 
     @cached_property
     def _symbols(self) -> dict[str, Scalar]:
@@ -212,11 +211,12 @@ class Equations:
         by_free = ca.vec(ca.jacobian(self._following, s["free"]).T)
         return Tape.of(ca.vertcat(self._step_column, s["state"]), s["p"], ca.vertcat(by_state, by_free))
 
-    def motion(self, piece: Piece, full: Array) -> Array:
-        """True speed and acceleration at all rows of a piece, (2, rows)."""
+    def motion(self, piece: Piece, full: Array) -> tuple[Array, Array]:
+        """True speed and acceleration at all rows of a piece."""
         if not any(self._mount.of_kind(SensorEffect)):
-            return np.vstack([piece.v, piece.a])
-        return self._motion(self.columns(piece), full)
+            return piece.v, piece.a
+        v, a = self._motion(self.given(piece)[0], full)
+        return v, a
 
     @cached_property
     def _motion(self) -> Rowwise:

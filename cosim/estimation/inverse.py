@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import numpy.typing as npt
@@ -31,6 +32,9 @@ from pyfmi_models.mount import Mount
 
 BUMP = 1e-6
 """Relative change of a parameter by which a frequency response is differentiated."""
+
+
+_SPECTRA: WeakKeyDictionary[Piece, Spectrum] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -77,8 +81,7 @@ class Inverse:
 
     def momentary(self, piece: Piece, values: Array) -> Array:
         """Torque that the motion and the states need, and its derivatives: (rows, 1 + free), filtered once more."""
-        # One signal after the other in memory is how they are filtered.
-        return piece.lowpass(np.vstack(self._momentary(piece, self._with(values))).T)
+        return piece.lowpass(self._momentary(piece, self._with(values)).T)
 
     def behind(self, piece: Piece, columns: Array, values: Array) -> Array:
         """The same after springs, drive and clocks, which act on a torque as a whole, and with what shakes the axis."""
@@ -113,22 +116,17 @@ class Inverse:
         """Where the free parameters are among all."""
         return [self.names.index(name) for name in self.free]
 
-    def _momentary(self, piece: Piece, full: Array) -> tuple[Array, Array]:
-        """Torque that the motion of each moment and the states need, and its derivatives (free, rows)."""
-        rows = self._equations.columns(piece)
-        state, slopes = self._states(piece, rows, full)
+    def _momentary(self, piece: Piece, full: Array) -> Array:
+        """Torque that the motion of each moment and the states need, and its derivatives: (1 + free, rows)."""
+        rows, steps = self._equations.given(piece)
+        count = self._equations.count
+        state, slopes = self._equations.states(steps, full) if count else (np.zeros((0, len(piece.t))), [])
         out = self._equations.torque([*rows, *state], full)
-        torque, by_state, by_free = out[0], out[1 : 1 + len(state)], out[1 + len(state) :]
+        torque, by_state, by_free = out[0].copy(), out[1 : 1 + count], out[1 + count :]
         for row, slope in zip(by_state, slopes, strict=True):
             by_free[slope.live] += row * slope.values
-        return torque, by_free
-
-    def _states(self, piece: Piece, rows: Array, full: Array) -> tuple[Array, list[Slopes]]:
-        """States of effects and friction along the motion, (states, rows), and their derivatives."""
-        if self._equations.count == 0:
-            return np.zeros((0, len(piece.t))), []
-        middle, end = (rows[:, 1:] + rows[:, :-1]) / 2, rows[:, 1:]
-        return self._equations.states([*middle, *end, np.full(len(piece.t) - 1, piece.dt)], full)
+        out[count] = torque  # one signal after the other in memory is how they are filtered
+        return out[count:]
 
     def _parts(self, kind: type[Effect]) -> list[str]:
         return [name for name, part in self.mount.components().items() if isinstance(part, kind)]
@@ -155,7 +153,7 @@ class Inverse:
         if not couplings:
             return columns
         v, a = self._equations.motion(piece, full)
-        spectrum = Spectrum(piece.lowpass(a)[:, None], piece.dt)
+        spectrum = self._spectrum(piece, a)
 
         def added(sets: Sequence[Array]) -> Array:
             total = np.zeros((len(sets), len(a)))
@@ -169,6 +167,14 @@ class Inverse:
             return total
 
         return self._with_changes(columns, full, added, ("axis.inertia", *motors, *couplings))
+
+    def _spectrum(self, piece: Piece, a: Array) -> Spectrum:
+        """Of the filtered acceleration; where that is the recorded one, the same each time."""
+        if a is not piece.a:
+            return Spectrum(piece.lowpass(a)[:, None], piece.dt)
+        if piece not in _SPECTRA:
+            _SPECTRA[piece] = Spectrum(piece.lowpass(a)[:, None], piece.dt)
+        return _SPECTRA[piece]
 
     def _far(self, full: Array) -> Iterator[tuple[float, Any]]:
         """Couplings, the nearest first, each with the inertia behind it."""

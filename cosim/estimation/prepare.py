@@ -85,6 +85,23 @@ class Piece:
         """Second pass of the filter, along the first axis."""
         return lowpass(columns, self.dt, self.cutoff, passes_of(self.cutoff, self.motion))
 
+    @cached_property
+    def _given(self) -> dict[tuple[tuple[str, float], ...], tuple[Array, tuple[Array, ...]]]:
+        return {}
+
+    def given(self, inputs: tuple[tuple[str, float], ...]) -> tuple[Array, tuple[Array, ...]]:
+        """What models are given at each row (time, reading, speed, acceleration, inputs), and in each step from there.
+
+        A step is given these in its middle, then at its end, then its length. `inputs` are names, each with the value
+        of an input that was not recorded. Nothing that is returned may be changed.
+        """
+        if inputs not in self._given:
+            columns = [self.extras.get(name, np.full(len(self.t), start)) for name, start in inputs]
+            rows = np.vstack([self.t, self.q, self.v, self.a, *columns])
+            middle, end = (rows[:, 1:] + rows[:, :-1]) / 2, rows[:, 1:]
+            self._given[inputs] = rows, (*middle, *end, np.full(len(self.t) - 1, self.dt))
+        return self._given[inputs]
+
     def gain(self, hertz: float) -> float:
         """What all passes together leave of a tone."""
         own = gain(hertz, self.dt, self.cutoff)

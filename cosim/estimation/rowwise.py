@@ -155,7 +155,7 @@ class Rowwise:
             _on_rows(self._tape, numbers, [*columns], out)
             return out
         given = [np.ascontiguousarray(one, float) for one in columns]
-        at = (c_void_p * len(given))(*(one.ctypes.data for one in given))
+        at = (c_void_p * len(given))(*(one.__array_interface__["data"][0] for one in given))
         done(kernels.tape_run(byref(self._as_c), numbers.ctypes.data, at, rows, out.ctypes.data))
         return out
 
