@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
-from cosim.estimation.equations import Equations, Slopes, equations_of
+from cosim.estimation.equations import Equations, equations_of
 from cosim.estimation.play import stepped_torque
 from cosim.estimation.prepare import Array, Piece
 from cosim.estimation.row_weights import described_rows
