@@ -298,8 +298,10 @@ def page(truths: Sequence[Mapping[str, str]], scores: Sequence[Score], before: M
         f"mount-cosim {__version__}. {len(scores)} logs of {tools} tools from public repositories, found by search;",
         "they are not stored here, [logs.tsv](logs.tsv) names repository and path of each, what it holds, and both",
         "outcomes. tests/benchmarks/public_logs.tsv is what they hold by their repositories' documents and code, read",
-        "with other tools: ranges in SI units, and the answers that an owner can give. Only what is asked is answered. "
-        "*Before* is commit 2ad1e55.",
+        "with other tools: ranges in SI units, and the answers that an owner can give. Only what is asked is answered.",
+        "*Before* is commit 2ad1e55, which was scored on the logs that were found first. Nothing in the code knows a",
+        "name of these files, but they were at hand while it was written: they show what kinds are read, not how often",
+        "an unknown log is.",
         "",
         "| outcome | means | before | now |",
         "| --- | --- | --- | --- |",

@@ -145,3 +145,9 @@ def test_names_are_found_where_the_columns_behind_them_are_empty(tmp_path: Path)
     seen = preview(written(tmp_path / "run.csv", header, *columns), {"columns": {"q": "Present Position"}})
     assert seen.recording.sample_time == pytest.approx(5e-3)
     assert {*seen.found.values} == {"Time", "Realtime Tick", "Present Position", "Goal Position"}
+
+
+def test_fewer_names_than_columns_are_asked_for_where_numbers_have_points(tmp_path: Path) -> None:
+    path = written(tmp_path / "run.csv", "t,tau", T, TAU, Q)
+    with pytest.raises(UndecidedError, match='has names that do not fit its 3 columns, "t,tau"; say which is which'):
+        Recording.read(path)

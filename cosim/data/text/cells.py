@@ -19,7 +19,14 @@ MOST = 0.8
 """Share of the lines whose cells must all be such for a table to be one of measures."""
 LEAST = 5
 """Lines of measures that a table needs."""
-LIST = re.compile(r"[\[(]\s*[-+.\d][-+.\deE,;\s]*[\])]")
+LIST = re.compile(r"[\[(]+\s*[-+.\d][-+.\deE,;\s]*[\])]+")
+BARE = re.compile(rb"(?<=[,;\t])[ \t]*(\[+[ \t]*[-+.\d][-+.\deE, \t]*\]+)")
+"""A list in a cell that no quotes keep together."""
+
+
+def with_quotes(data: bytes, lines: Sequence[str]) -> bytes:
+    """Return a text whose cells hold lists with quotes around these: their commas part no columns."""
+    return BARE.sub(rb'"\1"', data) if any(BARE.search(line.encode()) for line in lines) else data
 
 
 def without_units(path: Path, data: bytes, lines: Sequence[str]) -> tuple[bytes, tuple[str, ...]]:

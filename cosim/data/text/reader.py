@@ -10,7 +10,7 @@ from cosim.data.columns import Columns
 from cosim.data.importers import importer_of
 from cosim.data.limits import check_cells, check_columns, short
 from cosim.data.text import json_records, transposed
-from cosim.data.text.cells import without_units
+from cosim.data.text.cells import with_quotes, without_units
 from cosim.data.text.cleaning import without_brackets, without_remarks
 from cosim.data.text.encoding import text_of
 from cosim.data.text.layout import find_layout
@@ -45,6 +45,7 @@ def read_text(path: Path, stated: Mapping[str, str] | None = None) -> Columns:
     if importer:
         return importer(path, data, lines)
     data = without_brackets(without_remarks(data), lines)
+    data = with_quotes(data, lines)
     data, units = without_units(path, data, head_of(data))
     lines = head_of(data)
     layout = find_layout(path, lines, stated or {})
