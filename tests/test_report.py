@@ -70,9 +70,18 @@ def test_two_effects_are_told_on_the_first_screen() -> None:
     first = re.sub(r"<[^>]+>", " ", page().split("<h2>Findings")[0].split("</style>")[1])
     assert "Two effects are missing from the model" in first
     assert "Turning forward takes 0.26 N·m more than backward." in first
-    for text in ("0.39 to 0.45", "Found", "Two possible causes", "Not proven", "mount_improved.fmu", "20 to 90°/s"):
+    for text in (
+        "0.39 to 0.45",
+        "Detected",
+        "Two possible causes",
+        "Not confirmed",
+        "mount_improved.fmu",
+        "20 to 90°/s",
+    ):
         assert text in first
-    assert "Not seen: delay, clock skew. These recordings cannot show: thermal drift, dwell break-away." in first
+    assert (
+        "Not detected: delay, clock skew. Not testable with these recordings: thermal drift, dwell break-away." in first
+    )
 
 
 def test_nothing_missing_has_its_own_first_screen() -> None:
@@ -248,7 +257,7 @@ def test_browser_shows_it_without_complaint(kind: str, motion: str, width: int, 
 
 def test_a_proposed_friction_law_is_told_on_page_and_terminal_and_the_bases_own_is_not() -> None:
     told = diagnosis("two")
-    said = "Friction law: maxwell_slip in place of lugre would remove up to 8 % of the error energy"
+    said = "Friction law: maxwell_slip instead of lugre would reduce the residual variance by up to 8 %"
     assert words.law(told).startswith(said)
     assert said in render(told)
     assert said in " ".join(summary(told).split())

@@ -62,10 +62,10 @@ def test_page_and_terminal_use_one_word_for_what_may_be() -> None:
     whole = of(*FOUND, MAYBE)
     (block,) = (one for one in words.blocks(whole) if one.first is MAYBE)
     (row,) = (row for row in in_words(whole)["findings"] if row["what"] == "Cable wrap")
-    assert block.word == row["answer"] == "Maybe"
+    assert block.word == row["answer"] == "Possible"
     lines = summary(whole).splitlines()
     assert lines[0] == "Two effects are missing from mount.toml, perhaps one more"
-    assert [line.split()[0] for line in lines if "cable wrap  " in line] == ["MAYBE"]
+    assert [line.split()[0] for line in lines if "cable wrap  " in line] == ["possible"]
     assert "A further error may come from cable wrap: its probability is 0.49." in said(whole)
 
 

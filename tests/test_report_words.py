@@ -41,9 +41,9 @@ def test_terminal_summary_fits_80_columns(kind: str, motion: str) -> None:
 
     text = summary(diagnosis(kind, motion))
     assert max(map(len, text.splitlines())) <= 80
-    assert "not seen" in text
+    assert "not detected" in text
     assert "\033" not in text
-    assert ("EITHER    gravity unbalance" in text) == (kind == "two")
+    assert ("either    gravity unbalance" in text) == (kind == "two")
 
 
 def test_terminal_is_bold_only_where_wanted(monkeypatch: pytest.MonkeyPatch) -> None:

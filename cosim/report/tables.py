@@ -169,7 +169,7 @@ def files(diagnosis: Diagnosis) -> Table:
 def unseen(diagnosis: Diagnosis) -> str:
     """Return the one line on what was not seen and what these recordings cannot show."""
     said = []
-    for answer, start in (("not_seen", "Not seen"), ("not_testable", "These recordings cannot show")):
+    for answer, start in (("not_seen", "Not detected"), ("not_testable", "Not testable with these recordings")):
         names = [lowered(finding.title) for finding in diagnosis.findings if finding.answer == answer]
         rest = f" and {len(names) - 5} more" if len(names) > 6 else ""
         if names:

@@ -20,17 +20,15 @@ from cosim.report.words import (
     delivered,
     law,
     left_out,
-    limit,
     lowered,
     model,
     proven_range,
     sized,
-    unseen_torque,
 )
 
 WIDTH = 80
 REPORT = "report.html"
-WORDS = {"found": ANSWERS["found"].upper(), "ambiguous": ANSWERS["ambiguous"].upper(), "not_proven": "unproven"}
+WORDS = {"found": ANSWERS["found"].lower(), "ambiguous": ANSWERS["ambiguous"].lower(), "not_proven": "no proof"}
 NAME, SIZE, RANGE = 21, 12, 16
 ORDER = 10
 """Columns of what to do, before the text."""
@@ -55,7 +53,7 @@ def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -
         [line for block in blocks(diagnosis) for line in _block(block, scales)],
         _goes_with(diagnosis),
         _wrapped(untrained(diagnosis, scales), 2) if "unknown" in diagnosis.verdict else [],
-        _rest(diagnosis, scales),
+        _rest(diagnosis),
         _wrapped(diagnosis.learned.get("statement", "") or diagnosis.not_learned.get("statement", ""), 0),
         _formulas(diagnosis),
         _wrapped(law(diagnosis), 0),
@@ -109,7 +107,7 @@ def _block(block: Block, scales: Scales) -> list[str]:
     """Return one row, or one a rival, joined by "or"."""
     if len(block.findings) == 1:
         return _row(WORDS.get(block.answer, block.answer), block.first, scales)
-    first = _row("EITHER", block.first, scales)
+    first = _row("either", block.first, scales)
     return first + [line for rival in block.findings[1:] for line in _wrapped(_rival(rival), 12)]
 
 
@@ -159,47 +157,23 @@ def proposed(diagnosis: Diagnosis, files: Sequence[Path]) -> str:
     return f"Nothing to propose: {reason}."
 
 
-def _rest(diagnosis: Diagnosis, scales: Scales) -> list[str]:
-    """Return what was not seen, with the size that would have shown, and what could not be tested."""
-    lines: list[str] = []
-    least = unseen_torque(diagnosis, scales)
-    limits = ", ".join(_limit(one, least) for one in diagnosis.findings if one.answer == "not_seen")
-    untold = _untold([one for one in diagnosis.findings if one.answer == "not_testable"])
-    for word, text in (("not seen", limits), ("no test", untold)):
-        if text:
-            lines += textwrap.wrap(f"  {word:<9} {printable(text)}", WIDTH, subsequent_indent=" " * 12)
-    return lines
-
-
-def _limit(finding: Finding, least: str) -> str:
-    """Return a name with the size from which it would have shown."""
-    said = limit(finding) or least
-    return _with(lowered(finding.title), f"< {said}" if said[:1].isdigit() else said)
-
-
-def _untold(findings: Sequence[Finding]) -> str:
-    """Return names with why they cannot be tested, a reason that several share once."""
-    sharing: dict[str, list[str]] = {}
-    for finding in findings:
-        sharing.setdefault(finding.evidence.rstrip("."), []).append(lowered(finding.title))
-    each = {reason: f"each: {reason}" if len(names) > 1 and reason else reason for reason, names in sharing.items()}
-    return ", ".join(_with(", ".join(names), each[reason]) for reason, names in sharing.items())
-
-
-def _with(name: str, said: str) -> str:
-    said = said.replace("\N{NO-BREAK SPACE}", " ").rstrip(".")
-    return name + (f" ({said})" if said else "")
+def _rest(diagnosis: Diagnosis) -> list[str]:
+    """Return how many other effects were not detected, how many could not be tested, and where their limits are."""
+    answers = [one.answer for one in diagnosis.findings]
+    counts = (answers.count("not_seen"), "not detected"), (answers.count("not_testable"), "not testable here")
+    said = [f"{number} {words}" for number, words in counts if number]
+    where_ = REPORT if REPORT in diagnosis.files else "diagnosis.json"
+    return _wrapped(f"Other effects: {', '.join(said)}; upper limits and reasons in {where_}", 2) if said else []
 
 
 def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     held, unit = diagnosis.heldout, scales.torque
     before, after, noise = (unit.number(x) for x in (held.before_rms, held.after_rms, held.floor_rms))
     added = len({finding.effect for finding in diagnosis.in_model})
-    improved = f" with the effect{'s' if added > 1 else ''} {after}," if added else ""
-    improved = f" with what was learned {after}," if diagnosis.learned else improved
-    return _wrapped(
-        f"Error on the recording not fitted, RMS [{unit.unit}]: refitted {before},{improved} noise {noise}", 0
-    )
+    improved = f" → {after} (with the effect{'s' if added > 1 else ''})" if added else ""
+    improved = f" → {after} (with what was learned)" if diagnosis.learned else improved
+    text = f"Validation RMS error [{unit.unit}]: {before} (refitted card){improved}; noise floor {noise}"
+    return _wrapped(text, 0)
 
 
 def _next(diagnosis: Diagnosis) -> list[str]:

@@ -11,20 +11,24 @@ from cosim.report.quantities import Scales
 
 COUNTS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
 ANSWERS = {
-    "found": "Found",
-    "ambiguous": "Maybe",
-    "not_proven": "Not proven",
-    "not_seen": "Not seen",
-    "not_testable": "Cannot be tested",
+    "found": "Detected",
+    "ambiguous": "Possible",
+    "not_proven": "Not confirmed",
+    "not_seen": "Not detected",
+    "not_testable": "Not testable",
     "unknown": "Unknown",
 }
 MEANINGS = (
     (
         "found",
-        "Found",
+        "Detected",
         "The error on unseen runs falls, and every rival fits worse. Its probability, 0.5 or more, stands beside it.",
     ),
-    ("ambiguous", "Maybe", "The error on unseen runs falls, but its probability is below 0.5 or its size is not told."),
+    (
+        "ambiguous",
+        "Possible",
+        "The error on unseen runs falls, but its probability is below 0.5 or its size is not told.",
+    ),
     (
         "ambiguous",
         "Two possible causes",
@@ -32,11 +36,11 @@ MEANINGS = (
     ),
     (
         "not_proven",
-        "Not proven",
+        "Not confirmed",
         "It fits better, but not on runs the fit never saw, or something without a name fits better still.",
     ),
-    ("not_seen", "Not seen", "It would have shown from the size given."),
-    ("not_testable", "Cannot be tested", "The recordings lack the condition given; it says how to record it."),
+    ("not_seen", "Not detected", "It would have been detected from the size given (upper limit)."),
+    ("not_testable", "Not testable", "The recordings lack the condition given; it says how to record it."),
     ("unknown", "Unknown", "Error above the noise that no known effect lowers."),
 )
 
@@ -81,8 +85,8 @@ def law(diagnosis: Diagnosis) -> str:
         return ""
     share = f"{100 * float(told['gain']):.0f} %"
     return (
-        f"Friction law: {told['proposed']} in place of {told['base']} would remove up to {share} of the error "
-        "energy that is left. This is no missing effect."
+        f"Friction law: {told['proposed']} instead of {told['base']} would reduce the residual variance by up to "
+        f"{share}; not counted as a missing effect."
     )
 
 
