@@ -14,6 +14,7 @@ import numpy.typing as npt
 from cosim.data import questions
 from cosim.data.assign import OURS, Assigned, units_stated
 from cosim.data.columns import Columns
+from cosim.data.limits import LARGEST
 from cosim.data.roles import is_named
 from cosim.data.text.unit_words import is_known, spelled
 from cosim.data.times import SECONDS, read_clock
@@ -71,7 +72,7 @@ def _kind(found: Columns, name: str) -> str:
 
 def _is_numeric(served: Assigned, name: str) -> bool:
     column = served.values.get(name)
-    return column is not None and column.dtype.kind in "fiu" and bool(np.isfinite(column).all())
+    return column is not None and column.dtype.kind in "fiu" and bool((np.abs(column) < LARGEST).all())
 
 
 def _ratio(t: Array, q: Array, a: Array) -> float:

@@ -195,7 +195,7 @@ def _kept(t: Array, others: Sequence[np.ndarray], anew: Set[int]) -> Rows:
     for start, end in pairwise([*_starts(t, anew), len(t)]):
         block = start + np.argsort(t[start:end], kind="stable")
         again, same = _repeats(t, others, block)
-        if np.mean(again) > COARSE and again.sum() > 2 * same.sum():
+        if again.sum() > max(COARSE * len(again), 2 * same.sum()):
             return np.arange(len(t))  # a time of too few digits: rows that differ have one time
         single = block[np.concatenate([[True], ~same])]
         late = t[start:end] < np.maximum.accumulate(t[start:end])

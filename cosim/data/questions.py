@@ -132,7 +132,7 @@ def may_serve(found: Columns, lacking: Sequence[str], free: Sequence[str]) -> bo
     measured = [name for name in free if _is_measured(found.values[name])]
     others = [rule for rule in lacking if rule != "t"]
     growing = "t" in lacking and any(grows(found.values[name]) for name in measured)
-    return len(measured or free) >= len(others) + growing
+    return len(measured) >= len(others) + growing if measured else "t" in lacking and len(free) >= len(others)
 
 
 def unnamed(path: Path, found: Columns, lacking: Sequence[str], free: Sequence[str]) -> UndecidedError:

@@ -17,7 +17,7 @@ from cosim.data import questions
 from cosim.data.accelerations import check_acceleration
 from cosim.data.assign import OURS, Assigned, units_stated
 from cosim.data.columns import Columns
-from cosim.data.limits import listed, short
+from cosim.data.limits import LARGEST, listed, short
 from cosim.data.registers import continued
 from cosim.data.roles import is_named, is_speed
 from cosim.data.text.unit_words import is_known, spelled
@@ -126,7 +126,7 @@ def _speed(path: Path, found: Columns, served: Assigned, name: str) -> Speed | N
     t = clock.values.astype(np.float64) * (unit(clock.unit).factor if clock.unit else 1.0)
     turned, _ = continued(path.stem, {"q": served.values["q"].astype(np.float64)}, served.units)
     q, v = _si(turned["q"], served.units.get("q", "")), _si(served.values[name], _unit_of(found, served, name))
-    good = np.isfinite(t) & np.isfinite(q) & np.isfinite(v)
+    good = np.isfinite(t) & (np.abs(q) < LARGEST) & (np.abs(v) < LARGEST)
     t, q, v = t[good], q[good], v[good]
     return Speed(name, *_slope(t, q, v)) if len(t) >= LEAST else None
 

@@ -7,7 +7,7 @@ import pytest
 
 from cosim.data.preview import preview
 from cosim.data.recording import Recording
-from cosim.support.errors import RecordingError, UndecidedError
+from cosim.support.errors import ManyRecordingsError, RecordingError, UndecidedError
 
 T = np.arange(400) / 200
 TAU, Q = np.cos(5 * T), 0.3 * np.sin(3 * T)
@@ -151,3 +151,19 @@ def test_fewer_names_than_columns_are_asked_for_where_numbers_have_points(tmp_pa
     path = written(tmp_path / "run.csv", "t,tau", T, TAU, Q)
     with pytest.raises(UndecidedError, match='has names that do not fit its 3 columns, "t,tau"; say which is which'):
         Recording.read(path)
+
+
+def test_a_question_without_an_example_is_none(tmp_path: Path) -> None:
+    """Columns without names of which none holds numbers: there is nothing to propose."""
+    words = ["1 a", "b 2"] * 200
+    path = written(tmp_path / "run.csv", "", [f"{k}" if k % 2 else "x" for k in range(400)], words, T)
+    seen = preview(path, {"columns": {"t": "#3"}})
+    assert all("for example ." not in text for text in seen.undecided)
+
+
+def test_single_rows_and_absurd_values_warn_of_nothing(tmp_path: Path) -> None:
+    v = Q.copy()
+    v[7] = 1e300
+    with pytest.raises(ManyRecordingsError, match="These are 2 recordings"):
+        preview(written(tmp_path / "run.csv", "t,tau,q,speed", np.append(T[:-1], 0.0), TAU, Q, v))
+    assert "speed" in preview(written(tmp_path / "run.csv", "t,tau,q,speed", T, TAU, Q, v)).found.values
