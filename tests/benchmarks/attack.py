@@ -155,7 +155,7 @@ def page(found: list[Found], seed: int, asked: int) -> str:
         ends = collections.Counter(one.end for one in some)
         took = max(one.seconds for one in some), max(one.megabytes for one in some)
         counts = [f"{ends[end]:,}" for end in (*FINE, *DEFECTS)]
-        rows.append([name, f"{len(some):,}", *counts, f"{took[0]:.2g}", f"{took[1]:.0f}"])
+        rows.append([name, f"{len(some):,}", *counts, f"{took[0]:.2g}", f"{took[1]:.0f}" if took[1] else "-"])
     head = ("attacked", "tried", *FINE, *DEFECTS, "longest [s]", "most memory [MB]")
     defects = sum(one.end in DEFECTS for one in found)
     lines = [
@@ -165,8 +165,8 @@ def page(found: list[Found], seed: int, asked: int) -> str:
         "",
         f"mount-cosim {__version__} at {commit()}; {len(found):,} mutations of {asked:,} asked for, {defects} defects. "
         "The top of `tests/benchmarks/attack.py` says what the columns mean; `defects.json` has what was said in each. "
-        "Seconds are those of the clock, on a computer with other work; memory is that of all processes of an attack "
-        "together (what the bench itself has loaded, some 200 MB, is in it).",
+        "Seconds are those of the clock, on a computer with other work. Memory is that of all processes of an attack "
+        "for themselves together, looked at ten times a second; - where it was not looked at.",
         "",
         "| " + " | ".join(head) + " |",
         "|---|" + "--:|" * (len(head) - 1),

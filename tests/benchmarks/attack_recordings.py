@@ -2,6 +2,7 @@
 
 import io
 import json
+import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -19,9 +20,14 @@ def crafted(kind: str) -> Spoil:
     names = [one for one in attack_files.FILES if one.startswith(f"{kind}: ") and one not in attack_files.LONG]
 
     def made(dice: Random, raw: bytes) -> tuple[str, bytes]:
-        name = dice.choice(names)
+        name, seed = dice.choice(names), dice.randrange(10**6)
         with tempfile.TemporaryDirectory(prefix="crafted-") as folder:
-            return name[:80], attack_files.made(name, dice.randrange(10**6), Path(folder)).read_bytes()
+            process = os.fork()  # what making a file takes of memory goes with it
+            if process == 0:
+                attack_files.made(name, seed, Path(folder))
+                os._exit(0)
+            os.waitpid(process, 0)
+            return name[:80], next(Path(folder).glob("run*")).read_bytes()
 
     return made
 

@@ -18,7 +18,7 @@ from tree_cost import megabytes
 BUSY, SECONDS, GRACE, MEMORY = 15.0, 120.0, 60.0, 6_000_000_000
 """What a command may take: s of a processor, or of the clock, until Ctrl-C; s to end then; bytes beyond those at its
 start. The clock's are many, for a computer that has other things to do."""
-LOOK = 0.3
+LOOK = 0.1
 """Seconds between two looks at what it takes."""
 TICK = os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 100
 FILE = 500_000_000
@@ -29,7 +29,7 @@ FILE = 500_000_000
 class Ended:
     """How a command ended: exit code (negative: signal), whether by Ctrl-C or not even so, streams, what was left.
 
-    `megabytes`: most memory that it and what it started held together, as far as it was looked at.
+    `megabytes`: most memory that it and what it started held together, looked at ten times a second.
     """
 
     code: int
@@ -54,8 +54,7 @@ def attempt(command: Callable[[], object], folder: Path) -> Ended:
     held = [0.0]
     asked = not _ended(process, folder, SECONDS, held)
     hung = asked and not _interrupted(process, folder, held)
-    _, status, used = os.wait4(process, 0)
-    most = max(*held, used.ru_maxrss * 1.024e-3)
+    _, status = os.waitpid(process, 0)
     running = _running(folder)
     with suppress(ProcessLookupError):
         os.killpg(process, signal.SIGKILL)
@@ -63,7 +62,7 @@ def attempt(command: Callable[[], object], folder: Path) -> Ended:
     left = tuple(sorted(str(one.relative_to(folder)) for one in _left(folder)))
     rmtree(folder / "tmp", ignore_errors=True)
     return Ended(
-        os.waitstatus_to_exitcode(status), asked, hung, out, err, left, running, time.monotonic() - began, most
+        os.waitstatus_to_exitcode(status), asked, hung, out, err, left, running, time.monotonic() - began, max(held)
     )
 
 

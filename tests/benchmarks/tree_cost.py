@@ -16,10 +16,12 @@ def family(process: int) -> Iterator[int]:
 
 
 def megabytes(process: int) -> float:
-    """Return the memory that a process and those it started hold now [MB]; what they share counts once."""
+    """Return the memory that a process and those it started hold for themselves now [MB].
+
+    What a fork still shares with the process that forked it is not its own.
+    """
     total = 0.0
     for one in family(process):
         with suppress(OSError), open(f"/proc/{one}/smaps_rollup", encoding="ascii") as file:
-            held = next((line for line in file if line.startswith("Pss:")), "Pss: 0 kB")
-            total += int(held.split()[1]) * 1.024e-3
+            total += sum(int(line.split()[1]) for line in file if line.startswith("Private_")) * 1.024e-3
     return total
