@@ -61,7 +61,7 @@ class TestInverse:
         mount = replace(read_card("paper_mount").plant(), friction=law)
         piece = prepare([recorded(a, t, q)], 20.0).pieces[0]
         inverse = Inverse(mount, ())
-        states = inverse._states(piece, inverse._equations.columns(piece), inverse.start)[0]
+        states = inverse._equations.states(inverse._equations.given(piece)[1], inverse.start)[0]
         np.testing.assert_allclose(states, walked(law, piece.v, piece.dt), rtol=1e-9, atol=1e-9)
 
     @pytest.mark.parametrize("times", [1e-3, 0.0099, 0.0101, 0.3, 3.0, 40.0, 1e4])
@@ -79,7 +79,7 @@ class TestInverse:
         mount = replace(read_card("paper_mount").plant(), friction=law)
         piece = prepare([recorded(a, t, q)], 20.0).pieces[0]
         inverse = Inverse(mount, ())
-        states = inverse._states(piece, inverse._equations.columns(piece), inverse.start)[0]
+        states = inverse._equations.states(inverse._equations.given(piece)[1], inverse.start)[0]
         rows = np.arange(len(piece.v) - 1)
         fine = np.interp((np.arange(50 * len(rows)) + 0.5) / 50, np.arange(len(piece.v)), piece.v)
         exact = numeric(law).along(fine, piece.dt / 50)[:, 49::50]

@@ -119,6 +119,11 @@ def test_a_sum_of_many_sines_costs_what_its_sines_cost_and_adds_them_in_their_or
     np.testing.assert_array_equal(values(many, 40, 1), together)
 
 
+def test_a_few_sines_may_go_on_for_ever() -> None:
+    gusts = Multisine(kind="multisine", frequencies=[0.1 * k for k in range(1, 11)], amplitudes=1e-3)
+    check_signal("gusts", gusts, 1e-4, 10**9)
+
+
 def test_a_sum_of_too_many_sines_is_refused_with_what_to_do() -> None:
     many = Multisine(kind="multisine", frequencies=np.linspace(0.1, 400, 100_000).tolist(), amplitudes=1e-3)
     rule = re.escape(

@@ -15,6 +15,8 @@ from pydantic import Field, model_validator
 from cosim.data.set_points import Chirp, Multisine, Ramp, Sidereal, SignalSection, Sine, Slews, Star, Stream
 from cosim.support.errors import SignalError
 
+FEW_SINES = 100
+"""Sines of a signal that take no longer than the step for which they are added, some us: a run may be endless."""
 MOST_SINES = 2e9
 """Sines that a signal may add in a run: a minute or two of a processor."""
 
@@ -41,7 +43,7 @@ def check_signal(name: str, signal: Signal, step: float, ticks: int) -> None:
         rule = f"at a step of {step:g} s it must stay below {limit:g} Hz"
         raise SignalError(f'The signal "{name}" has {fastest:g} Hz; {rule}.', culprit=name, value=fastest)
     tones = getattr(signal, "tones", 1)
-    if tones * ticks > MOST_SINES and tones > 1:
+    if tones * ticks > MOST_SINES and tones > FEW_SINES:
         rule = f"in {ticks:,} steps that is {tones * ticks:.3g} sines, and {MOST_SINES:.3g} are the most"
         way = 'Take fewer, a shorter run, or replay the sum from a recording (kind = "recorded")'
         raise SignalError(f'The signal "{name}" has {tones:,} frequencies; {rule}. {way}.', culprit=name, value=tones)
