@@ -49,6 +49,11 @@ def nothing(now: dict[str, Array]) -> Array:
     return 0 * now["t"]
 
 
+def says_unknown(found: Learned, *named: EffectScores) -> bool:
+    """Whether a learned term alone makes the answer "unknown", beside effects that are named."""
+    return decide(Scores(named, ResidualScores(0.0, 0.0), found.scores()), POLICY).is_unknown
+
+
 @pytest.mark.parametrize(
     ("extra", "quantity", "least"),
     [
@@ -60,11 +65,6 @@ def nothing(now: dict[str, Array]) -> Array:
         (swerve, "speed and acceleration", 0.5),
     ],
 )
-def says_unknown(found: Learned, *named: EffectScores) -> bool:
-    """Whether a learned term alone makes the answer "unknown", beside effects that are named."""
-    return decide(Scores(named, ResidualScores(0.0, 0.0), found.scores()), POLICY).is_unknown
-
-
 def test_what_has_no_name_is_modelled_and_the_held_out_error_falls(extra: Extra, quantity: str, least: float) -> None:
     found = learned(extra)
     assert found is not None
