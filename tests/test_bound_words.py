@@ -71,7 +71,7 @@ def test_a_tone_is_told_between_two_frequencies_and_is_not_testable_above_the_ba
 def test_an_answer_not_seen_says_its_band_where_its_words_stand(
     effect: Effect, places: tuple[float, float], words: str, prepared: Prepared
 ) -> None:
-    finding = _absent(effect.id, SeenFrom(0.1, places, 0.95, effect), ROTARY, prepared)
+    finding = _absent(effect.id, SeenFrom(0.1, places, 0.95, effect), ROTARY, prepared, "")
     assert finding.bound is not None
     assert (finding.answer, finding.evidence, finding.bound.reason) == ("not_seen", words, words)
     assert finding.bound.band_hz == (0.0, CUTOFF)
@@ -80,7 +80,7 @@ def test_an_answer_not_seen_says_its_band_where_its_words_stand(
 
 
 def test_without_a_bound_the_reason_stands_in_place_of_the_band(prepared: Prepared) -> None:
-    finding = _absent("cogging", None, ROTARY, prepared)
+    finding = _absent("cogging", None, ROTARY, prepared, "")
     assert finding.bound is not None
     assert (finding.answer, finding.bound.value) == ("not_testable", None)
     assert finding.evidence == finding.bound.reason == "no size of it would have shown in these recordings"

@@ -7,16 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfiltfilt
 
 from cosim.delivery.closed_loop import Loops
 from cosim.diagnosis.measure import regression
 from cosim.diagnosis.measure.regression import kernel
-from cosim.estimation.filters import lowpass
 from cosim.estimation.fit import fit
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import prepare
-from cosim.estimation.rowwise import recurrence
 from cosim_studies.demo import beside
 from cosim_studies.proof.generator import make_case, write_case
 from cosim_studies.proof.tool import given
@@ -33,23 +30,6 @@ for _ in range(20):
     del several
 print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt)
 """
-
-
-@pytest.mark.parametrize("shape", [(400,), (400, 1), (400, 7)])
-def test_the_filter_has_the_bits_of_scipys(shape: tuple[int, ...]) -> None:
-    columns = np.random.default_rng(1).normal(size=shape)
-    sections = butter(4, 30.0, fs=240.0, output="sos")
-    assert np.array_equal(lowpass(columns, 1 / 240, 30.0), sosfiltfilt(sections, columns, axis=0))
-
-
-@pytest.mark.parametrize("count", [0, 1, 5])
-def test_a_recurrence_is_what_it_says(count: int) -> None:
-    rng = np.random.default_rng(2)
-    decay, drift = rng.uniform(-1, 1, 60), rng.normal(size=(60, count))
-    by_hand = np.zeros((61, count))
-    for k in range(60):
-        by_hand[k + 1] = decay[k] * by_hand[k] + drift[k]
-    np.testing.assert_allclose(recurrence(decay, drift), by_hand, rtol=0, atol=1e-14)
 
 
 def test_a_black_box_is_the_same_in_chunks_of_any_size(monkeypatch: pytest.MonkeyPatch) -> None:

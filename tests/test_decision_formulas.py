@@ -130,7 +130,7 @@ def test_where_a_fiftieth_of_the_energy_goes_it_is_asked_where(
 ) -> None:
     """Of a hundred rows the last half are about turns; all is removed there."""
     far = np.repeat([1.0, 0.0], 50)
-    monkeypatch.setattr("cosim.diagnosis.search.admissibility.far_from_turns", lambda _: far)
+    monkeypatch.setattr("cosim.estimation.residuals.far_from_turns", lambda _: far)
     problem: Any = SimpleNamespace(prepared=None)
     without, left = np.ones(100), np.ones(100)
     left[50:] = math.sqrt(1 - 2 * removed)

@@ -186,10 +186,11 @@ ROUNDED_ONE_WAY = {
     "copysign",
     "clip",
     "deg2rad",
+    "add",  # one after the other, by `accumulate`
 }
 NO_ARITHMETIC = {
     *("asarray", "array", "ndarray", "float64", "intp", "where", "searchsorted", "stack", "concatenate"),
-    *("zeros_like", "full_like", "random", "pi"),
+    *("zeros_like", "full_like", "random", "pi", "newaxis"),
 }
 OF_MATH = {"pi", "inf", "sqrt", "factorial", "frexp", "ldexp"}
 

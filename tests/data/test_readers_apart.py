@@ -90,7 +90,8 @@ def test_a_reader_that_fails_costs_a_sentence_and_the_next_file_is_read(
 @pytest.mark.parametrize(("name", "package"), [("run.h5", "h5py"), ("run.mf4", "asammdf")])
 @pytest.mark.usefixtures("readers")
 def test_a_format_whose_package_is_missing_says_how_to_get_it(tmp_path: Path, name: str, package: str) -> None:
-    (tmp_path / f"{package}.py").write_text("raise ImportError")
+    # Where this package is installed beside the reader's, no other folder comes before them: the import is forbidden.
+    (tmp_path / "sitecustomize.py").write_text(f"import sys\nsys.modules[{package!r}] = None\n")
     (tmp_path / name).write_text("x")
     with pytest.raises(MissingPackageError, match=rf"needs the package {package} to be read: pip install 'mount-cosim"):
         Recording.read(tmp_path / name)
