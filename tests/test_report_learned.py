@@ -77,7 +77,7 @@ def test_a_model_with_a_table_is_not_called_unchanged() -> None:
     assert "with what was learned" in html
     assert TOLD["statement"] in text
     assert "As good, and shorter: torque = k1 q³; k1 0.31 N.m/rad3" in text
-    assert "with what was learned 0.39" in text
+    assert "→ 0.39 (with what was learned)" in text
 
 
 @pytest.mark.parametrize("kind", ["two", "none", "unknown"])

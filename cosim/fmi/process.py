@@ -128,14 +128,16 @@ class Variables:
 
     def say(self, before: dict[bytes, bytes], now: dict[bytes, bytes]) -> list[str]:
         """Name the variables."""
-        names = sorted(map(os.fsdecode, _differing(before, now)))
+        names = sorted(map(os.fsdecode, _changed(before, now)))
+        if not names:
+            return []
         more = [f"{len(names) - MOST_NAMED} more"] if len(names) > MOST_NAMED else []
         return [f"the environment variable{'s' * (len(names) > 1)} {', '.join([*names[:MOST_NAMED], *more])}"]
 
     def restore(self, before: dict[bytes, bytes]) -> None:
         """Put them back."""
         now = self.read()
-        for key in _differing(before, now):
+        for key in _changed(before, now):
             if os.environb.get(key) == now.get(key):  # changed through Python, or never known to it
                 os.environb.pop(key, None)
                 os.environb.update({key: before[key]} if key in before else {})
@@ -147,8 +149,15 @@ class Variables:
                 time.tzset()
 
 
-def _differing(one: dict[bytes, bytes], other: dict[bytes, bytes]) -> list[bytes]:
-    return [key for key in {**one, **other} if one.get(key) != other.get(key)]
+def _changed(before: dict[bytes, bytes], now: dict[bytes, bytes]) -> list[bytes]:
+    """Variables that are other ones now.
+
+    In a thread beside the main one those that Python knows of are left out: other threads may set them meanwhile.
+    """
+    keys = [key for key in {**before, **now} if before.get(key) != now.get(key)]
+    if threading.current_thread() is threading.main_thread():
+        return keys
+    return [key for key in keys if os.environb.get(key) != now.get(key)]
 
 
 class Arithmetic:

@@ -5,6 +5,7 @@ import os
 import platform
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from tiny_fmu import tiny
 
 import cosim
 from cosim.data.recording import Recording
+from cosim.fmi.guard import Guard
 
 __all__ = ["tiny"]
 
@@ -261,3 +263,28 @@ def test_a_recording_lies_where_out_says_though_an_fmu_changes_the_working_direc
         assert call("run", "moves.toml", "--out", stage, option) == 0
         made = sorted(str(one.relative_to(tmp_path)) for one in (tmp_path / stage).iterdir())
         assert made == [f"{stage}/{name}" for name in ("recording.parquet", "run.html", "run.json")]
+
+
+def test_what_another_thread_sets_in_the_environment_meanwhile_is_no_change_of_a_component(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COSIM_TEST_GONE", "1")
+    inside, changed, found = threading.Event(), threading.Event(), []
+
+    def simulate() -> None:
+        guard = Guard()
+        with guard.kept():
+            inside.set()
+            changed.wait(10)
+        found.extend(guard.notes())
+
+    thread = threading.Thread(target=simulate)
+    thread.start()
+    assert inside.wait(10)
+    monkeypatch.setenv("COSIM_TEST_NEW", "1")
+    monkeypatch.delenv("COSIM_TEST_GONE")
+    changed.set()
+    thread.join(10)
+    assert found == []
+    assert os.environ["COSIM_TEST_NEW"] == "1"
+    assert "COSIM_TEST_GONE" not in os.environ
