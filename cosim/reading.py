@@ -13,7 +13,7 @@ from cosim.support.units import unit
 LAYOUT = ("separator", "decimal", "header", "encoding", *OF_ROWS, LIMIT)
 """What `--layout` may say: how a text is written, what becomes of rows, and the factor that raises limits."""
 TORQUE = {"linear": "N", "rotary": "N.m"}
-SUITED = {"linear": {"q": "m", "v": "m/s"}, "rotary": {"q": "rad", "v": "rad/s"}}
+SUITED = {"rotary": {"q": "rad", "v": "rad/s"}, "linear": {"q": "m", "v": "m/s"}}
 """Units in which position and speed of an axis are kept."""
 
 
@@ -125,7 +125,11 @@ def _check_layout(layout: Mapping[str, str]) -> None:
 
 
 def check_kind(recordings: Sequence[Recording], motion: str) -> None:
-    """Units stated for tau, q or v must be those of the card's kind of axis."""
+    """Units stated for tau, q or v must be those of the kind of axis, "rotary" or "linear" (InputError)."""
+    if motion not in SUITED:
+        kinds = tuple(SUITED)
+        text = f'motion "{motion}" is no kind of axis; there are: {", ".join(kinds)}.'
+        raise InputError(text, culprit="motion", choices=kinds)
     for recording in recordings:
         for name, wanted in SUITED[motion].items():
             stated = recording.units.get(name, wanted) if name in recording else wanted

@@ -9,7 +9,6 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.first_card import FirstCard, Motion, Number, first_card
 from cosim.plots.quantities import number
 from cosim.reading import check_kind
-from cosim.support.errors import InputError
 from cosim.support.files import check_free, replacing
 from cosim.support.html import text as html_text
 from cosim.support.plain import JsonObject
@@ -18,7 +17,6 @@ from pyfmi_models.card import Card, MountSection
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.effects import GravityUnbalance
 
-KINDS: tuple[Motion, ...] = ("rotary", "linear")
 WORDS = {
     "axis.inertia": "inertia",
     "friction.Fc": "Coulomb friction",
@@ -127,12 +125,12 @@ def kind_of(recordings: Sequence[Recording], motion: str) -> tuple[Motion, str]:
     Raises:
         InputError: it is no kind of axis.
     """
-    given = next((kind for kind in KINDS if kind == motion), None)
-    if motion and not given:
-        raise InputError(f'motion "{motion}" is no kind of axis; there are: {", ".join(KINDS)}.', culprit="motion")
+    if motion:
+        check_kind(recordings, motion)
+        return ("linear" if motion == "linear" else "rotary"), ""
     stated = {one.units.get(name, "") for one in recordings for name in ("q", "v", "tau")}
-    if given or stated & {"m", "m/s", "N"}:
-        return given or "linear", ""
+    if stated & {"m", "m/s", "N"}:
+        return "linear", ""
     unknown = "No unit says whether the axis turns or moves along; it is taken to turn (otherwise --motion linear)."
     return "rotary", "" if stated & {"rad", "rad/s", "N.m"} else unknown
 

@@ -30,8 +30,8 @@ def changed(scenario: Scenario, values: Mapping[str, Value], stop: float | None 
         scenario = find(name, known, OPTION, "set").set(scenario, value)
     if stop is not None:
         scenario = replace(scenario, ticks=whole(stop - scenario.start, scenario.step, scenario.path, "stop"))
-    told = {**values, **({} if stop is None else {"stop": stop})}
-    lines = "".join(f"\n# for this run: {name} = {value}" for name, value in told.items())
+    changes = {**values, **({} if stop is None else {"stop": stop})}
+    lines = "".join(f"\n# for this run: {name} = {value}" for name, value in changes.items())
     return replace(scenario, text=scenario.text.rstrip("\n") + lines + "\n") if lines else scenario
 
 

@@ -26,14 +26,12 @@ def card(
 ) -> None:
     """Estimate a first card from recordings: inertia, friction, constant torque and weight, with ranges."""
     from cosim.api.card import card as estimate
-    from cosim.api.card import kind_of
     from cosim.reading import read_recordings
     from cosim.support.files import check_free, directory
 
     file = out or default_out(recordings[0].stem) / "card.toml"
     check_free(file, force)
     read = read_recordings(recordings, {}, columns, units, motion, layout)
-    kind_of(read, motion)
     with stage("estimating a card") as progress:
         done = estimate(read, motion=motion, inertia=inertia, on_progress=progress.log)
     directory(file.parent)

@@ -33,8 +33,10 @@ CLEAR = 3.0
 """Standard errors that a number must be away from nothing to be taken as determined; noise alone: 1 in 370."""
 MATTERS = 0.05
 """Share of the error energy that a constant torque or a weight must remove: less is for a diagnosis to judge."""
+LITTLE = 0.5
+"""Share of the torque's energy below which the card is not yet a model of the axis, which is said."""
 LEAST_TRAVEL = 0.35
-"""Travel [rad] from which a weight is told from a constant torque and a spring: its cosine changes by .06 in 20 deg."""
+"""Travel [rad] from which a weight differs from a constant torque and a spring: its cosine changes by .06 in 20 deg."""
 EVALUATIONS, ROUNDS = 60, 2
 """Evaluations of a fit, and fits one after the other: the pull of a prior towards a rough start dies out."""
 OnProgress = Callable[[str], None]
@@ -93,19 +95,18 @@ def first_card(
     recordings = [as_analysed(one) for one in recordings]
     on_progress("reading the torque balance")
     problem, found = _base(recordings, motion, inertia)
-    kept, best = [], found
+    best = found
     for effect in _extras(problem, found):
         on_progress(f"trying {effect.title.lower()}")
         tried = _fitted(problem, replace(best.mount, effects=(*best.mount.effects, effect)), inertia)
         if _is_clear(problem, best, tried):
-            kept.append(effect.id)
             best = tried
     numbers = tuple(_numbers(problem, best, inertia, linear))
     _check_inertia(numbers, linear)
     tau = problem.weight * problem.prepared.stacked("tau")
     left = problem.weight * best.residual
     explained = 1 - float(left @ left) / max(float(tau @ tau), 1e-300)
-    return FirstCard(_held(best.mount, numbers), numbers, explained, tuple(_notes(numbers, explained, problem)))
+    return FirstCard(_held(best.mount, numbers), numbers, explained, tuple(_notes(numbers, explained)))
 
 
 def _base(recordings: Sequence[Recording], motion: Motion, inertia: float | None) -> tuple[Problem, Fit]:
@@ -118,7 +119,7 @@ def _base(recordings: Sequence[Recording], motion: Motion, inertia: float | None
     rough = balance.torque / max(balance.acceleration, 1e-300)
     start = inertia or (said.inertia.value if said.inertia.value > said.inertia.error else 0.1 * rough)
     level = said.coulomb.value if said.coulomb.value > said.coulomb.error else 0.3 * balance.torque
-    top = max(float(np.abs(one).max()) for one in (balance.prepared.stacked("v"),))
+    top = float(np.abs(balance.prepared.stacked("v")).max())
     friction = Coulomb(Fc=level, sigma2=0.1 * level / max(top, 1e-300))
     mount = Mount(name="axis", axis=Axis(inertia=start), friction=friction, effects=(), motion=motion)
     for _ in range(ROUNDS):
@@ -197,12 +198,12 @@ def _check_inertia(numbers: Sequence[Number], linear: bool) -> None:
         )
 
 
-def _notes(numbers: Sequence[Number], explained: float, problem: Problem) -> list[str]:
+def _notes(numbers: Sequence[Number], explained: float) -> list[str]:
     notes = []
     for name, words in (("friction.Fc", "Coulomb friction"), ("friction.sigma2", "viscous friction")):
         if not next(one for one in numbers if one.name == name).is_determined:
             notes.append(f"The recordings do not determine the {words}; the card has none.")
-    if explained < 0.5:
+    if explained < LITTLE:
         notes.append(
             f"The card explains {100 * explained:.0f} % of the torque's energy only: something else acts here."
         )

@@ -6,7 +6,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from cosim.fmi.component import DISCARD, FATAL, NOT_EXACT, POOL_FULL, STATUSES, WARNING, Component
+from cosim.fmi.component import DISCARD, FATAL, NOT_EXACT, POOL_FULL, STATUSES, TERMINATED, WARNING, Component
 from cosim.master.typed import TypedComponent
 from cosim.support.activity import doing
 from cosim.support.errors import StepError
@@ -90,6 +90,21 @@ def refusal(plan: Plan, failure: Failure, component: Component, when: str) -> St
     last = ", ".join(f"{key} = {shown(key, value)}" for key, value in inputs.items()) or "none"
     message = f"{name} {what} {when}{said}; its last inputs: {last}."
     return StepError(message, component=name, tick=failure.tick, inputs=inputs)
+
+
+def who_ended(plan: Plan, failure: Failure) -> str:
+    """Say which component asked to end the simulation, and when.
+
+    Raises:
+        StepError: it did not ask, it failed.
+    """
+    part = plan.parts[failure.part]
+    component = part.component
+    when = f"at tick {failure.tick:,} ({plan.start + failure.tick * plan.step:.9g} s)"
+    if failure.status == TERMINATED or (failure.status == DISCARD and getattr(component, "terminated", bool)()):
+        return f"{part.name} asked to end the simulation {when}"
+    tell_failed(plan, component, failure.status)
+    raise refusal(plan, failure, component, when)
 
 
 def tell_failed(plan: Plan, component: Component, status: int) -> None:

@@ -8,9 +8,9 @@ from time import perf_counter
 import numpy as np
 
 from cosim.data.writer import MemoryWriter
-from cosim.fmi.component import DISCARD, TERMINATED, Component
+from cosim.fmi.component import Component
 from cosim.fmi.guard import Guard
-from cosim.master.access import refusal, tell_failed
+from cosim.master.access import who_ended
 from cosim.master.given import Given
 from cosim.master.loop import CompiledLoop, InterpretedLoop, slow_because
 from cosim.master.result import Statistics
@@ -140,14 +140,7 @@ class Execution:
         failure = self.loop.failure
         if failure is None:
             return
-        part = self.plan.parts[failure.part]
-        name, component = part.name, part.component
-        when = f"at tick {failure.tick:,} ({self.plan.start + failure.tick * self.plan.step:.9g} s)"
-        if failure.status == TERMINATED or (failure.status == DISCARD and getattr(component, "terminated", bool)()):
-            self.ended = f"{name} asked to end the simulation {when}"
-            return
-        tell_failed(self.plan, component, failure.status)
-        raise refusal(self.plan, failure, component, when)
+        self.ended = who_ended(self.plan, failure)
 
 
 def guard_of(plan: Plan) -> Guard:

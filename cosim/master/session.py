@@ -15,7 +15,7 @@ import numpy as np
 from cosim.data.recording import Recording
 from cosim.fmi.component import Port
 from cosim.fmi.types import FLOATS
-from cosim.master.access import refusal, tell_failed
+from cosim.master.access import who_ended
 from cosim.master.execution import guard_of
 from cosim.master.given import Given
 from cosim.master.initialisation import initialise
@@ -67,7 +67,7 @@ class Session:
         self._stack.close()
 
     def _open(self, stack: ExitStack) -> None:
-        system, self._tick = self._system, 0
+        system, self._tick, self.ended = self._system, 0, ""
         wiring = _in_hand(wiring_of(stack, system))
         self._plan = plan = make_plan(wiring, system.step, system.decimation, system.start)
         settings = started(wiring, system, plan)
@@ -98,8 +98,10 @@ class Session:
         """Take all components over some ticks.
 
         Raises:
-            StepError: a component failed.
+            StepError: a component failed, or had asked to end the simulation (`ended` says which).
         """
+        if self.ended:
+            raise StepError(f"{self.ended}: it cannot be stepped on.", component="")
         while ticks > 0:
             offset = self._tick - self._first
             if offset >= BLOCK:
@@ -109,8 +111,11 @@ class Session:
             rows = self._run_one(offset) if some == 1 else self._run(offset, some)
             if rows is not None and rows.shape[1]:
                 self._rows.append(rows)
-            if self._loop.failure is not None:
-                self._failed()
+            if (failure := self._loop.failure) is not None:
+                self._tick = self._loop.tick
+                self.ended = "The simulation failed"  # and stays so where the next line raises
+                self.ended = who_ended(self._plan, failure)
+                return
             self._tick += some
             ticks -= some
 
@@ -131,14 +136,6 @@ class Session:
             return self._loop.run(ticks, signals)
         with self._guard.kept():
             return self._loop.run(ticks, signals)
-
-    def _failed(self) -> None:
-        failure = self._loop.failure
-        assert failure is not None
-        component = self._plan.parts[failure.part].component
-        when = f"at tick {failure.tick:,} ({self._plan.start + failure.tick * self._plan.step:.9g} s)"
-        tell_failed(self._plan, component, failure.status)
-        raise refusal(self._plan, failure, component, when)
 
     def __getitem__(self, name: str) -> float:
         """The value of an output, an input or a signal as it is now."""

@@ -27,7 +27,7 @@ MEANINGS = (
     (
         "ambiguous",
         "Possible",
-        "The error on unseen runs falls, but its probability is below 0.5 or its size is not told.",
+        "The error on unseen runs falls, but its probability is below 0.5 or its size is not determined.",
     ),
     (
         "ambiguous",

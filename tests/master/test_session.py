@@ -85,3 +85,13 @@ def test_a_component_that_fails_says_when_and_the_rows_before_are_there(scenario
         with pytest.raises(StepError, match=r"plant returned an error at tick 100 \(0\.1 s\)"):
             session.step(500)
         assert len(session.recording) == 50
+        with pytest.raises(StepError, match=r"The simulation failed: it cannot be stepped on\."):
+            session.step()
+
+
+def test_a_component_that_asks_to_end_ends_the_session_without_an_error(scenario: Path) -> None:
+    with cosim.open(scenario, set={"plant.fail_at": 0.1, "plant.status": 17.0}) as session:
+        session.step(500)
+        assert session.ended.startswith("plant asked to end the simulation at tick 10")
+        with pytest.raises(StepError, match=r"asked to end the simulation .*: it cannot be stepped on"):
+            session.step()
