@@ -10,6 +10,7 @@
     identify    recordings and a card                 ->  IdentifyResult: the card's numbers with standard errors
     export      a card                                ->  Exported: FMUs, SSP, Modelica
     sweep       a sweep file                          ->  SweepResult: a table, a row a run, and the best
+    check_effect, check_law   a class of your own physics  ->  Checks that it must pass
     show        any file of this project              ->  Shown: what it holds
 
 SI units inside, other units only where files come in. Time is counted in integer ticks, never summed. Results print
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from typing import Any
 
     from cosim.api.card import CardResult, card
+    from cosim.api.checks import check_effect, check_law
     from cosim.api.compare import Comparison, compare
     from cosim.api.diagnose import DiagnosisResult, diagnose
     from cosim.api.export import Exported, export
@@ -38,14 +40,17 @@ if TYPE_CHECKING:
     from cosim.api.run import run
     from cosim.api.show import Shown, show
     from cosim.api.sweep import SweepResult, sweep
+    from cosim.checks.suite import Checks
     from cosim.data.recording import Recording
     from cosim.master.result import RunResult
-    from cosim.support.errors import CosimError, InputError, StepError
+    from cosim.support.errors import CheckError, CosimError, InputError, StepError
     from pyfmi_models.card import Card, read_card
     from pyfmi_models.errors import ModelError
+    from pyfmi_models.plugins import load_plugins
 
 _HOMES = {
     "cosim.api.card": ("CardResult", "card"),
+    "cosim.api.checks": ("check_effect", "check_law"),
     "cosim.api.compare": ("Comparison", "compare"),
     "cosim.api.diagnose": ("DiagnosisResult", "diagnose"),
     "cosim.api.export": ("Exported", "export"),
@@ -57,10 +62,12 @@ _HOMES = {
     "cosim.master.result": ("RunResult",),
     "cosim.api.show": ("Shown", "show"),
     "cosim.api.sweep": ("SweepResult", "sweep"),
+    "cosim.checks.suite": ("Checks",),
     "cosim.data.recording": ("Recording",),
-    "cosim.support.errors": ("CosimError", "InputError", "StepError"),
+    "cosim.support.errors": ("CheckError", "CosimError", "InputError", "StepError"),
     "pyfmi_models.card": ("Card", "read_card"),
     "pyfmi_models.errors": ("ModelError",),
+    "pyfmi_models.plugins": ("load_plugins",),
 }
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
@@ -68,6 +75,8 @@ __all__ = [
     "Card",
     "CardResult",
     "Comparison",
+    "CheckError",
+    "Checks",
     "CosimError",
     "DiagnosisResult",
     "Exported",
@@ -82,11 +91,14 @@ __all__ = [
     "SweepResult",
     "__version__",
     "card",
+    "check_effect",
+    "check_law",
     "compare",
     "diagnose",
     "export",
     "identify",
     "investigate",
+    "load_plugins",
     "open",
     "read",
     "read_card",

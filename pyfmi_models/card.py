@@ -14,6 +14,7 @@ from typing import Any, Literal, TypeVar, get_args
 
 from pydantic import Field, ValidationError
 
+from pyfmi_models import plugins
 from pyfmi_models.controller_section import ControllerSection, Section, compose
 from pyfmi_models.effects import CATALOGUE, Effect, GravityUnbalance
 from pyfmi_models.errors import CardError
@@ -132,6 +133,7 @@ def shipped_cards() -> list[str]:
 
 def parse_card(text: str, path: str) -> Card:
     """Check the text of a card; `path` is its name in errors."""
+    plugins.load()
     try:
         raw = _Card.model_validate(parsed(text))
     except tomllib.TOMLDecodeError as error:

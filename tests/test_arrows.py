@@ -37,7 +37,7 @@ FLOORS = (
     {"cosim.diagnosis"},
     {"cosim.report"},
     {"cosim.delivery"},
-    {"cosim.investigation"},
+    {"cosim.investigation", "cosim.checks"},
     {"cosim.api", "cosim_studies"},
     {"cosim.serve"},
     {"cosim", "cosim.cli"},
@@ -47,7 +47,9 @@ FLOORS = (
 FLOOR_OF = {folder: number for number, floor in enumerate(FLOORS) for folder in floor}
 HIGHEST = {"cosim", "cosim.api", "cosim.cli", "cosim.serve", "cosim_studies"}
 ROOMS = {folder for floor in FLOORS for folder in floor if folder.count(".") == 2}
-KNOW_PHYSICS = ROOMS | {"cosim.diagnosis", "cosim.report", "cosim.delivery", "cosim.investigation"} | HIGHEST
+KNOW_PHYSICS = (
+    ROOMS | {"cosim.diagnosis", "cosim.report", "cosim.delivery", "cosim.investigation", "cosim.checks"} | HIGHEST
+)
 KNOW_PHYSICS |= {"cosim.models", "cosim.estimation"}
 NEED_HEAVY = KNOW_PHYSICS | {"cosim.plots"}
 """Folders that may import CasADi, the compiler or matplotlib: a run needs none of them."""

@@ -46,6 +46,11 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", GUIDE, re.MULTILINE | re.DOTALL)
 
 
+def own_files() -> list[str]:
+    """The blocks that are files of the packages."""
+    return [block for block in blocks("python") if block.startswith(("# pyfmi_models/", "# cosim/"))]
+
+
 def run(folder: Path, *arguments: str) -> str:
     done = subprocess.run(
         [sys.executable, *arguments],
@@ -66,7 +71,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for package in (pyfmi_models, cosim):
         source = Path(str(package.__file__)).parent
         shutil.copytree(source, folder / source.name, ignore=shutil.ignore_patterns("__pycache__"))
-    for block in blocks("python"):
+    for block in own_files():
         name = block.partition("\n")[0].removeprefix("# ")
         assert not (folder / name).exists()
         (folder / name).write_text(block, "utf-8")
@@ -121,3 +126,23 @@ def test_a_diagnosis_finds_the_effect_in_recordings(copy: Path) -> None:
     assert wind["parameters"]["coefficient"] == pytest.approx(0.02, rel=0.05)
     assert wind["parameters"]["direction"] == pytest.approx(0.4, abs=0.1)
     assert 'effect = "wind_load"' in (copy / "found" / "card.toml").read_text("utf-8")
+
+
+def test_the_same_files_in_a_folder_of_their_own_pass_the_checks(tmp_path: Path) -> None:
+    (mine := tmp_path / "mine").mkdir()
+    for block in own_files():
+        path = Path(block.partition("\n")[0].removeprefix("# "))
+        name = f"{path.stem}_hypothesis.py" if "diagnosis" in path.parts else path.name
+        (mine / name).write_text(block.replace("pyfmi_models.effects.wind_load", "wind_load"), "utf-8")
+    (tmp_path / "tube.toml").write_text(blocks("toml")[0], "utf-8")
+    assert "wind_load" in cosim_in(tmp_path, "-m", "cosim", "show", "tube.toml", "--plugins", "mine")
+    (script,) = [block for block in blocks("python") if block.startswith("# check_mine.py")]
+    table = cosim_in(tmp_path, "-c", script)
+    assert table.count("passed") == 9, table
+    assert table.count("not applicable") == 1, table
+
+
+def cosim_in(folder: Path, *arguments: str) -> str:
+    done = subprocess.run([sys.executable, *arguments], cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout

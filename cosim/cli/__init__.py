@@ -16,6 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
 from math import isfinite
+from pathlib import Path
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -60,7 +61,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         keep_stdout()
         one_thread()
         check_given(given)
-        rest = repeated([argument for argument in given if argument != "--debug"])
+        rest = repeated(plugged([argument for argument in given if argument != "--debug"]))
         application(rest, debug)(rest, prog_name="cosim")
     except KeyboardInterrupt as error:  # while a verb was loaded, or after it had ended
         if debug:
@@ -93,6 +94,26 @@ def check_given(arguments: Sequence[str]) -> None:
         if not text.strip():
             say(f'cosim: {name} "{text}": it must not be empty; write "." for the folder that you are in.')
             sys.exit(2)
+
+
+def plugged(arguments: Sequence[str]) -> list[str]:
+    """Take `--plugins DIR` out of the arguments, wherever it is, and put the folder where plugins are looked for."""
+    rest, folders, values = [], [], iter(arguments)
+    for argument in values:
+        option, assigned, value = argument.partition("=")
+        if option != "--plugins":
+            rest.append(argument)
+            continue
+        value = value if assigned else next(values, "")
+        if not os.path.isdir(value):
+            what = "is a file, not a folder" if os.path.exists(value) else "there is no such folder"
+            say(f"cosim: --plugins {value}: {what}; it must be a folder of Python files with laws or effects.")
+            sys.exit(2)
+        folders.append(os.path.abspath(value))
+    known = filter(None, os.environ.get("COSIM_PLUGINS", "").split(os.pathsep))
+    if folders:
+        os.environ["COSIM_PLUGINS"] = os.pathsep.join(dict.fromkeys([*known, *folders]))
+    return rest
 
 
 def leave(error: KeyboardInterrupt) -> NoReturn:
@@ -207,6 +228,9 @@ def _options(
     version: Annotated[
         bool, typer.Option("--version", "-V", callback=_version, is_eager=True, help="Show the version.")
     ] = False,
-    debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks; may stand anywhere.")] = False,
+    plugins: Annotated[
+        Path | None, typer.Option("--plugins", help="Folder of your own laws and effects; may be anywhere.")
+    ] = None,
+    debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks; may be anywhere.")] = False,
 ) -> None:
     """Co-simulation of a telescope mount that finds the physics its model left out."""

@@ -1,5 +1,6 @@
 """Options that more than one verb has, and the command line that does the same again."""
 
+import os
 from collections.abc import Mapping, Sequence
 from itertools import count
 from pathlib import Path
@@ -49,4 +50,6 @@ def command_of(verb: str, arguments: Sequence[object], options: Mapping[str, obj
         for value in given if isinstance(given, list) else [given]:
             if value is not None and value is not False and value != "":
                 words += [name] if value is True else [name, str(value)]
+    for folder in filter(None, os.environ.get("COSIM_PLUGINS", "").split(os.pathsep)):
+        words += ["--plugins", folder]
     return join(words)

@@ -14,6 +14,7 @@ from cosim.support.errors import ScenarioError
 from cosim.support.files import cache_home, directory, sha256
 from cosim.system.scenario import Scenario
 from cosim.system.sections import ComponentSection
+from pyfmi_models import plugins
 
 FMI: Literal[3] = 3
 """Version of the FMUs built for a run."""
@@ -59,7 +60,8 @@ def fmu_of_card(card: str, part: Literal["plant", "controller"], on_build: Calla
 def _fmu(component: ComponentSection, where: str, on_build: Callable[[str], None]) -> Path:
     card, part = str(component.card), str(component.part)
     source = _card_file(card, where)
-    key = hashlib.sha256(f"{_sources()} {part} {FMI} ".encode() + source.read_bytes()).hexdigest()[:16]
+    made_by = f"{_sources()} {part} {FMI} ".encode() + b"".join(path.read_bytes() for path in plugins.files())
+    key = hashlib.sha256(made_by + source.read_bytes()).hexdigest()[:16]
     path = _home() / f"{source.stem}-{part}-{key}.fmu"
     if not path.exists():
         on_build(f"building the FMU of the {part} of {card}")

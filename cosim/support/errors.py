@@ -14,6 +14,7 @@ CosimError                  everything this package raises on purpose
 │   ├── HardwareError       a machine file breaks a rule, or a scenario cannot run on a machine
 │   ├── FmuError            a file is no FMU, or one that cannot run here
 │   └── OutputError         a result would overwrite a file, or cannot be written
+├── CheckError              a law or an effect of one's own fails a check
 ├── StepError               a component failed while stepping: component, tick, time, last inputs
 ├── LostComponentError      a component crashed, ended or blocked the process that it ran in
 └── MissingPackageError     an optional package is needed and not installed
@@ -123,6 +124,10 @@ class FmuError(InputError):
 
 class OutputError(InputError):
     """A result would overwrite a file, or cannot be written."""
+
+
+class CheckError(CosimError):
+    """A law or an effect of one's own fails a check, or several: each with its reason."""
 
 
 class StepError(CosimError):

@@ -9,19 +9,31 @@ from typing import Any
 from cosim.diagnosis.effects.base import Hypothesis
 from cosim.diagnosis.effects.candidates import Candidate, span_of
 from cosim.estimation.prepare import Array, Prepared
+from pyfmi_models import plugins
 from pyfmi_models.discovery import classes_in
 from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount
 
-HYPOTHESES: tuple[Hypothesis[Any], ...] = tuple(
-    sorted((kind() for kind in classes_in(__name__, __path__, Hypothesis, "forms")), key=lambda one: one.rank)
-)
+HYPOTHESES: list[Hypothesis[Any]] = []
 """All that a diagnosis looks for, in the order in which it does."""
-TRIED = tuple(dict.fromkeys(form.id for one in HYPOTHESES for form in one.forms))
+TRIED: list[str] = []
 """Effects that a diagnosis can name; the catalogue holds more, for cards and FMUs."""
-_OF_FORM: dict[type[Effect], Hypothesis[Any]] = {form: one for one in HYPOTHESES for form in one.forms}
-_NAMED: dict[str, Hypothesis[Any]] = {form.id: one for one in reversed(HYPOTHESES) for form in one.forms}
+_OF_FORM: dict[type[Effect], Hypothesis[Any]] = {}
+_NAMED: dict[str, Hypothesis[Any]] = {}
 _NONE = Hypothesis[Any]()
+
+
+def _take(*kinds: type[Hypothesis[Any]]) -> None:
+    """Take hypotheses into the tables, in place, as others hold them; one that is defined anew replaces the old one."""
+    kept = [one for one in HYPOTHESES if not any(plugins.is_again(kind, type(one)) for kind in kinds)]
+    HYPOTHESES[:] = sorted([*kept, *(kind() for kind in kinds)], key=lambda one: one.rank)
+    TRIED[:] = dict.fromkeys(form.id for one in HYPOTHESES for form in one.forms)
+    _OF_FORM.update({form: one for one in HYPOTHESES for form in one.forms})
+    _NAMED.update({form.id: one for one in reversed(HYPOTHESES) for form in one.forms})
+
+
+_take(*classes_in(__name__, __path__, Hypothesis, "forms"))
+plugins.follow(Hypothesis, "forms", _take)
 
 
 def hypothesis_of(effect: Effect) -> Hypothesis[Any]:
