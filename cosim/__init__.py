@@ -74,9 +74,9 @@ _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 __all__ = [
     "Card",
     "CardResult",
-    "Comparison",
     "CheckError",
     "Checks",
+    "Comparison",
     "CosimError",
     "DiagnosisResult",
     "Exported",
