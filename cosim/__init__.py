@@ -8,6 +8,7 @@
     compare     runs, recordings                      ->  Comparison: overlay and differences
     card        recordings                            ->  CardResult: a first card, with ranges
     identify    recordings and a card                 ->  IdentifyResult: the card's numbers with standard errors
+                recordings and an FMU, or a system    ->  CalibrateResult: its numbers with standard errors
     export      a card                                ->  Exported: FMUs, SSP, Modelica
     sweep       a sweep file                          ->  SweepResult: a table, a row a run, and the best
     check_effect, check_law   a class of your own physics  ->  Checks that it must pass
@@ -28,6 +29,7 @@ TYPE_CHECKING = False
 if TYPE_CHECKING:
     from typing import Any
 
+    from cosim.api.calibrate import CalibrateResult
     from cosim.api.card import CardResult, card
     from cosim.api.checks import check_effect, check_law
     from cosim.api.compare import Comparison, compare
@@ -49,6 +51,7 @@ if TYPE_CHECKING:
     from pyfmi_models.plugins import load_plugins
 
 _HOMES = {
+    "cosim.api.calibrate": ("CalibrateResult",),
     "cosim.api.card": ("CardResult", "card"),
     "cosim.api.checks": ("check_effect", "check_law"),
     "cosim.api.compare": ("Comparison", "compare"),
@@ -72,6 +75,7 @@ _HOMES = {
 _HOME_OF = {name: module for module, names in _HOMES.items() for name in names}
 
 __all__ = [
+    "CalibrateResult",
     "Card",
     "CardResult",
     "CheckError",

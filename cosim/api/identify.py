@@ -1,17 +1,24 @@
-"""`cosim.identify`: recordings and a card to the same card with identified numbers."""
+"""`cosim.identify`: recordings and a card, an FMU or a system to the same with identified numbers."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import overload
 
+from cosim.api.calibrate import CalibrateResult, calibrate, subject_of
 from cosim.api.recordings import Source, read_all
+from cosim.calibration.calibrate import Options as Calibration
+from cosim.calibration.fit import Loss
+from cosim.calibration.processes import TIMEOUT
 from cosim.estimation.identify import deliver
 from cosim.estimation.identify.identify import Identified, Options
 from cosim.estimation.identify.identify import identify as find
 from cosim.reading import check_kind
+from cosim.support.errors import InputError
 from cosim.support.html import text as html_text
 from cosim.support.plain import JsonObject
+from cosim.system.scenario import Scenario
 from pyfmi_models.card import Card, read_card
 
 
@@ -43,6 +50,7 @@ class IdentifyResult:
         return html_text(str(self))
 
 
+@overload
 def identify(
     recordings: Source | Sequence[Source],
     card: str | Path | Card,
@@ -56,40 +64,149 @@ def identify(
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     force: bool = False,
+    on_progress: Callable[[str], None] = ...,
+) -> IdentifyResult: ...
+
+
+@overload
+def identify(
+    recordings: Source | Sequence[Source],
+    card: None = None,
+    out: str | Path | None = None,
+    *,
+    free: Sequence[str],
+    fmu: str | Path | None = None,
+    system: str | Path | Scenario | None = None,
+    heldout: Source | Sequence[Source] | None = None,
+    set: Mapping[str, float] | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    step: float | None = None,
+    interpolation: str = "hold",
+    window: float | None = None,
+    loss: Loss = "linear",
+    workers: int | None = None,
+    timeout: float = 60.0,
+    starts: int = 4,
+    seed: int = 0,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    force: bool = False,
+    on_progress: Callable[[str], None] = ...,
+) -> CalibrateResult: ...
+
+
+def identify(
+    recordings: Source | Sequence[Source],
+    card: str | Path | Card | None = None,
+    out: str | Path | None = None,
+    *,
+    fmu: str | Path | None = None,
+    system: str | Path | Scenario | None = None,
+    free: Sequence[str] = (),
+    heldout: Source | Sequence[Source] | None = None,
+    set: Mapping[str, float] | None = None,  # the word of the option
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    step: float | None = None,
+    interpolation: str = "hold",
+    window: float | None = None,
+    loss: Loss = "linear",
+    workers: int | None = None,
+    timeout: float = TIMEOUT,
+    cut: float | None = None,
+    keep_inertia: bool = True,
+    starts: int = 4,
+    seed: int = 0,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    force: bool = False,
     on_progress: Callable[[str], None] = lambda text: None,
-) -> IdentifyResult:
-    """Identify a card's numbers: friction map, presliding steps, output error in closed loop.
+) -> IdentifyResult | CalibrateResult:
+    """Identify numbers of a card, of a foreign FMU, or of a whole system, from recordings.
+
+    A card: friction map, presliding steps, output error in closed loop. An FMU or system: output error in open loop,
+    min sum (y - y_measured)^2 over the numbers in `free`; columns feed the inputs and are compared with the outputs of
+    the same names (docs/calibration.md).
 
     Args:
         recordings: one or several, each a path, data frame, mapping of arrays or `Recording` (see `cosim.read`).
         card: the model as believed: its path, the name of a shipped one, or a `Card`.
-        out: folder for card.toml, identify.json and the figures; None writes nothing.
-        free: parameters to identify ("sigma0", "Fc", "inertia"); () for all of inertia and friction.
-        cut: slowest speed of the friction map [rad/s; m/s]; None chooses it.
-        keep_inertia: friction map of tau - J q'' (True) or of tau alone.
+        out: folder for the files; None writes nothing.
+        fmu: an FMU of anybody, in place of a card.
+        system: a scenario or SSP, in place of a card; its numbers are called "component.parameter".
+        free: parameters to identify; of a card () for all of inertia and friction.
+        heldout: recordings that are not fitted and show the error before and after (FMU, system).
+        set: values of other parameters, or starts of free ones (FMU, system).
+        bounds: (least, greatest) by name, in place of the variable's min and max (FMU, system).
+        step: of the simulation [s]; None is that of the rows (FMU), or the system's own.
+        interpolation: of inputs between rows, "hold" or "linear" (FMU, system).
+        window: seconds after which a simulation starts anew from the recording; None: never (FMU, system).
+        loss: "linear", or "soft_l1" for recordings with outliers (FMU, system).
+        workers: processes that simulate; None is one a core (FMU, system).
+        timeout: seconds that the first simulation may take (FMU, system).
+        cut: slowest speed of the friction map [rad/s; m/s]; None chooses it (card).
+        keep_inertia: friction map of tau - J q'' (True) or of tau alone (card).
         starts: starts of the output-error fit, of which the best is kept.
         seed: of the random starts.
-        columns: our name to the source's, as in `cosim.read`; they come before the card's.
+        columns: our name to the source's, as in `cosim.read`; of an FMU its variable to the source's column.
         units: our name to the unit in the source, as in `cosim.read`.
         force: overwrite what is there.
         on_progress: told in a few words what is being done.
 
     Returns:
-        `IdentifyResult`. Standard errors are those of the least-squares fits (Ljung 1999, chapter 9).
+        `IdentifyResult` of a card, `CalibrateResult` of an FMU or system. Standard errors are those of the
+        least-squares fits (Ljung 1999, chapter 9).
 
     Raises:
-        InputError: the recordings tell nothing, or a parameter is unknown.
+        InputError: the recordings tell nothing, a parameter or column is unknown, or the model cannot be simulated.
         RecordingError, UnitError: as `cosim.read`.
-        CardError: the card is not good.
+        CardError, FmuError, ScenarioError: the model is not good.
         OutputError: a file is there already; nothing was fitted then.
     """
-    started, folder = time.perf_counter(), None if out is None else Path(out)
+    check_one(card, fmu, system)
+    folder = None if out is None else Path(out)
+    if card is not None:
+        given = Options(tuple(free), cut, keep_inertia, starts, seed)
+        return _of_card(recordings, card, folder, given, columns, units, force, on_progress)
+    options = Calibration(
+        tuple(free), set or {}, bounds or {}, columns or {}, step, interpolation, window, starts, seed, loss
+    )
+    return calibrate(
+        recordings,
+        heldout,
+        subject_of(fmu, system, on_progress),
+        replace(options, workers=workers, timeout=timeout),
+        folder,
+        units=units,
+        force=force,
+        on_progress=on_progress,
+    )
+
+
+def check_one(*models: object) -> None:
+    """Refuse a call with no model, or with more than one (InputError)."""
+    given = sum(one is not None for one in models)
+    if given != 1:
+        what = "none of them is given" if not given else f"{given} are given"
+        raise InputError(f"Identify needs one of card, fmu and system; {what}.", culprit="card")
+
+
+def _of_card(
+    recordings: Source | Sequence[Source],
+    card: str | Path | Card,
+    folder: Path | None,
+    options: Options,
+    columns: Mapping[str, str] | None,
+    units: Mapping[str, str] | None,
+    force: bool,
+    on_progress: Callable[[str], None],
+) -> IdentifyResult:
+    started = time.perf_counter()
     if folder:
         deliver.check_out(folder, force)
     believed = card if isinstance(card, Card) else read_card(card)
     taken = read_all(recordings, "recording", dict(believed.columns) | dict(columns or {}), units)
     check_kind(taken, believed.mount.motion)
-    found = find(taken, believed, Options(tuple(free), cut, keep_inertia, starts, seed), on_progress)
+    found = find(taken, believed, options, on_progress)
     if folder:
         if found.kept:
             on_progress(f"not determined: {', '.join(found.kept)}; card.toml keeps the given card's.")

@@ -28,8 +28,15 @@ from cosim.support.terminal import abandon_stdout, finish_stdout, keep_stdout, p
 from cosim.support.version import __version__
 from pyfmi_models.errors import ModelError
 
-SEVERAL = ("--columns", "--units", "--layout", "--variables", "--limits", "--set")
+SEVERAL = ("--columns", "--units", "--layout", "--variables", "--limits", "--set", "--bounds")
 """Options that may be followed by several name=value pairs."""
+NAMES = ("--free",)
+"""Options that may be followed by several names, up to the next option or file."""
+SUFFIXES = (
+    *(".csv", ".gz", ".tsv", ".txt", ".log", ".dat", ".lvm", ".json", ".parquet", ".npz", ".npy"),
+    *(".mat", ".h5", ".hdf5", ".mf4", ".mcap", ".bag", ".db3"),
+)
+"""Suffixes of recordings, which no name of a parameter has."""
 INTERRUPTED, TERMINATED = 130, 143
 """Exit codes."""
 VERBS = (
@@ -124,19 +131,25 @@ def leave(error: KeyboardInterrupt) -> NoReturn:
 
 
 def repeated(arguments: Sequence[str]) -> list[str]:
-    """Let `--columns a=b c=d` (all of `SEVERAL`) take several values: repeat the option before each further one."""
+    """Let `--columns a=b c=d` (`SEVERAL`) and `--free a b` (`NAMES`) take several values: repeat the option."""
     out: list[str] = []
     option = ""
     for argument in arguments:
         if argument.startswith("-"):
-            option = argument if argument in SEVERAL else ""
+            option = argument if argument in (*SEVERAL, *NAMES) else ""
         elif option and out[-1] != option:
-            if "=" in argument:
+            if "=" in argument if option in SEVERAL else not is_file(argument):
                 out.append(option)
             else:
                 option = ""
         out.append(argument)
     return out
+
+
+def is_file(argument: str) -> bool:
+    """Whether an argument names a file: one that is there, in a folder, or with the suffix of a recording."""
+    path = argument.partition(":")[0]
+    return os.path.exists(path) or os.sep in argument or path.lower().endswith(SUFFIXES)
 
 
 def application(arguments: Sequence[str], debug: bool = False) -> typer.Typer:

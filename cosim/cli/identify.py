@@ -1,5 +1,6 @@
-"""`cosim identify`: recordings and a card to the same card with identified numbers."""
+"""`cosim identify`: recordings and a card, an FMU or a system to the same with identified numbers."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -7,34 +8,83 @@ import typer
 
 from cosim.cli.complete import cards
 from cosim.cli.options import Columns, Force, Layout, Out, Units, default_out
+from cosim.support.errors import InputError
 from cosim.support.terminal import put, put_json, say, stage
 
 
 def identify(
-    recordings: Annotated[list[Path], typer.Argument(help="Recordings of the axis.", metavar="RECORDING...")],
+    recordings: Annotated[list[Path], typer.Argument(help="Recordings.", metavar="RECORDING...")],
     card: Annotated[
-        str, typer.Option("--card", help="Model card (.toml), or the name of a shipped one.", autocompletion=cards)
-    ],
+        str | None, typer.Option("--card", help="Model card (.toml), or a shipped one.", autocompletion=cards)
+    ] = None,
+    fmu: Annotated[Path | None, typer.Option("--fmu", help="An FMU of anybody, in place of a card.")] = None,
+    system: Annotated[str | None, typer.Option("--system", help="A scenario or SSP, in place of a card.")] = None,
     out: Out = None,
     free: Annotated[
-        list[str] | None, typer.Option("--free", help="A parameter to identify: sigma0, Fc, inertia ... [all]")
+        list[str] | None, typer.Option("--free", help="Parameters to identify: sigma0 Fc ... [of a card: all]")
     ] = None,
+    heldout: Annotated[
+        list[Path] | None, typer.Option("--heldout", help="Recording that is not fitted (FMU, system).")
+    ] = None,
+    set_: Annotated[
+        list[str] | None, typer.Option("--set", help="Other values, or starts: Motor.J=0.02 ... (FMU, system)")
+    ] = None,
+    bounds: Annotated[
+        list[str] | None, typer.Option("--bounds", help="Least and greatest value: Motor.J=0.01..1 ... (FMU, system)")
+    ] = None,
+    step: Annotated[float | None, typer.Option("--step", help="Of the simulation [s]; else the rows' (FMU).")] = None,
+    interpolation: Annotated[
+        str, typer.Option("--interpolation", help="Of inputs between rows: hold or linear (FMU, system).")
+    ] = "hold",
+    window: Annotated[
+        float | None, typer.Option("--window", help="Start anew from the recording every so many s (FMU, system).")
+    ] = None,
+    loss: Annotated[
+        str, typer.Option("--loss", help="linear, or soft_l1 for recordings with outliers (FMU, system).")
+    ] = "linear",
+    workers: Annotated[int | None, typer.Option("--workers", min=1, help="Processes (FMU, system). [cores]")] = None,
+    timeout: Annotated[
+        float, typer.Option("--timeout", help="Seconds that the first simulation may take (FMU, system).")
+    ] = 60.0,
     cut: Annotated[
-        float | None, typer.Option("--cut", min=0.0, help="Slowest speed of the friction map [rad/s or m/s].")
+        float | None, typer.Option("--cut", min=0.0, help="Slowest speed of the friction map [rad/s or m/s] (card).")
     ] = None,
     keep_inertia: Annotated[
-        bool, typer.Option("--keep-inertia/--drop-inertia", help="Friction map: tau - J q'', or tau alone.")
+        bool, typer.Option("--keep-inertia/--drop-inertia", help="Friction map: tau - J q'', or tau alone (card).")
     ] = True,
     starts: Annotated[int, typer.Option("--starts", min=1, help="Starts of the output-error fit.")] = 4,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of the random starts.")] = 0,
     columns: Columns = None,
     units: Units = None,
     layout: Layout = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print identify.json instead of the summary.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the JSON file instead of the summary.")] = False,
     force: Force = False,
 ) -> None:
-    """Identify a card's numbers: friction map, presliding steps, output error in closed loop."""
+    """Identify numbers of a card, of a foreign FMU (--fmu) or of a whole system (--system), with standard errors."""
+    from cosim.api.identify import check_one
+
+    check_one(card, fmu, system)
     out = out or default_out(Path(recordings[0]).stem)
+    if card is not None:
+        given: Any = {"free": free or (), "cut": cut, "keep_inertia": keep_inertia, "starts": starts, "seed": seed}
+        _card(recordings, card, out, given, columns, units, layout, as_json, force)
+        return
+    model = {"fmu": fmu, "system": system, "free": free or (), "workers": workers, "timeout": timeout}
+    how = {"step": step, "interpolation": interpolation, "window": window, "loss": loss, "starts": starts, "seed": seed}
+    _model(recordings, heldout or [], out, {**model, **how}, (set_, bounds, columns, units), as_json, force)
+
+
+def _card(
+    recordings: list[Path],
+    card: str,
+    out: Path,
+    given: dict[str, Any],
+    columns: Sequence[str] | None,
+    units: Sequence[str] | None,
+    layout: Sequence[str] | None,
+    as_json: bool,
+    force: bool,
+) -> None:
     from cosim.api.identify import identify as find
     from cosim.estimation.identify.deliver import check_out
     from cosim.reading import read_recordings
@@ -45,7 +95,6 @@ def identify(
     read = read_recordings(recordings, believed.columns, columns, units, believed.mount.motion, layout)
     seconds, several = sum(one.duration for one in read), "s" * (len(read) > 1)
     say(f"Read {len(read)} recording{several}, {seconds:.0f} s; card {believed.mount.name}")
-    given: Any = {"free": free or (), "cut": cut, "keep_inertia": keep_inertia, "starts": starts, "seed": seed}
     with stage("identifying") as progress:
         done = find(read, believed, out, force=force, on_progress=progress.log, **given)
     if as_json:
@@ -53,3 +102,51 @@ def identify(
     else:
         put(str(done))
         say(f"Wrote {out / 'card.toml'}, identify.json and the figures")
+
+
+def _model(
+    recordings: list[Path],
+    heldout: list[Path],
+    out: Path,
+    given: dict[str, Any],
+    pairs: tuple[Sequence[str] | None, ...],
+    as_json: bool,
+    force: bool,
+) -> None:
+    from cosim.api.identify import identify as find
+    from cosim.reading import pairs_of
+
+    set_, bounds, columns, units = (
+        pairs_of(option, one) for option, one in zip(("--set", "--bounds", "--columns", "--units"), pairs, strict=True)
+    )
+    values = {name: _number("--set", name, text) for name, text in set_.items()}
+    limits = {name: _range(name, text) for name, text in bounds.items()}
+    with stage("identifying") as progress:
+        done = find(
+            recordings,
+            out=out,
+            heldout=heldout or None,
+            set=values,
+            bounds=limits,
+            columns=columns,
+            units=units,
+            force=force,
+            on_progress=progress.log,
+            **given,
+        )
+    put_json(done.as_json()) if as_json else put(str(done))
+    say(f"Wrote {', '.join(str(path) for path in done.files.values())}")
+
+
+def _number(option: str, name: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise InputError(f"{option} {name}={text}: it must be a number.", culprit=name, value=text) from None
+
+
+def _range(name: str, text: str) -> tuple[float, float]:
+    low, dots, high = text.partition("..")
+    if not dots:
+        raise InputError(f"--bounds {name}={text}: write it as least..greatest, for example 0.01..1.", culprit=name)
+    return _number("--bounds", name, low), _number("--bounds", name, high)

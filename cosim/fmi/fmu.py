@@ -29,6 +29,7 @@ from cosim.fmi.description import (
 )
 from cosim.fmi.guard import Guard
 from cosim.fmi.listeners import callbacks2, registered, same_directory
+from cosim.fmi.own_starts import own_starts
 from cosim.fmi.settings import STRUCTURAL, Setting, settings_of, sizes_of, tell
 from cosim.fmi.sound import doubts_of
 from cosim.fmi.variables import ports_of
@@ -75,6 +76,7 @@ class FmuComponent:
         self._tolerance = tolerance
         self.ports: Mapping[str, Port] = ports_of(self._description)
         self._sizes: Mapping[str, int] = {}
+        self._starts: Mapping[str, float] = own_starts(self.path)
         self.feedthrough = feedthrough_of(self._description)
         self.origin: dict[str, Any] = origin_of(self.path, self._description)
         self._messages: deque[str] = deque(maxlen=5)
@@ -119,7 +121,7 @@ class FmuComponent:
         if self._worst == FATAL:
             raise FmuError(f"{self.name} ({self.path}) failed for good and cannot start again; open it anew.")
         self.configure(parameters)
-        settings = settings_of(self.ports, self.name, parameters)
+        settings = settings_of(self.ports, self.name, {**self._starts, **parameters})
         with self._starting():
             if self._started:
                 self._fmu.reset()

@@ -63,7 +63,7 @@ def _opened(stack: ExitStack, name: str, source: Source, system: System) -> Comp
 
     Structural parameters are told at once, because the wires depend on the arrays whose size they are.
     """
-    component = _made(stack, name, source)
+    component = open_source(stack, name, source)
     names = system.variables.get(name, {})
     if hasattr(component, "configure"):
         given = system.parameters.get(name, {}).items()
@@ -71,7 +71,12 @@ def _opened(stack: ExitStack, name: str, source: Source, system: System) -> Comp
     return cast(Component, Aliased(component, names)) if names else component
 
 
-def _made(stack: ExitStack, name: str, source: Source) -> Component:
+def open_source(stack: ExitStack, name: str, source: Source) -> Component:
+    """Open a component under its own names, which the stack closes; one that is given open stays as it is.
+
+    Raises:
+        FmuError, WiringError: it cannot be opened.
+    """
     if isinstance(source, Function):
         guard = Guard()
         function, origin = load_function(source.source, source.where, guard)

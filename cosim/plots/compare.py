@@ -113,7 +113,7 @@ def write_page(overlay: Overlay, notes: Sequence[str], path: Path, force: bool) 
         notes=notes,
         rows=[_row(one) for one in overlay.differences()],
         key=[(name, INKS[k % len(INKS)]) for k, name in enumerate(overlay.names)],
-        data=_payload(overlay),
+        data=payload({"": overlay}),
         script=Markup(script),
         script_hash=digest,
         css=Markup(css),
@@ -137,28 +137,36 @@ def _row(one: Difference) -> dict[str, str]:
     return row | {"largest": largest, "at": f"{one.at:.6g}"}
 
 
-def _payload(overlay: Overlay) -> dict[str, Any]:
-    """What `explorer.js` reads: a record for each column."""
-    keys = [f"r{k}" for k in range(len(overlay.names))]
+def payload(overlays: Mapping[str, Overlay]) -> dict[str, Any]:
+    """What `explorer.js` reads: a record for each column of overlays, which all lie as many over each other.
+
+    Args:
+        overlays: by what stands before the names of their columns; "" for nothing.
+    """
+    first = next(iter(overlays.values()))
+    keys = [f"r{k}" for k in range(len(first.names))]
     lines = [(key, INKS[k % len(INKS)], ()) for k, key in enumerate(keys)]
     gaps = [(f"d{k}", INKS[k % len(INKS)], ()) for k in range(1, len(keys))]
     sheets = (Sheet("", 0.62, lines), Sheet("", 0.38, gaps))
+    share = 1 / sum(len(one.columns) for one in overlays.values())
     return {
         "sheets": [sheet.as_json() for sheet in sheets],
         "differences": [],
-        "recordings": [_record(overlay, name, keys) for name in overlay.columns],
+        "recordings": [
+            _record(one, name, f"{before}{name}", share) for before, one in overlays.items() for name in one.columns
+        ],
         "first": "all",
         "open": 0,
     }
 
 
-def _record(overlay: Overlay, name: str, keys: Sequence[str]) -> dict[str, Any]:
-    values = overlay.columns[name]
+def _record(overlay: Overlay, name: str, label: str, share: float) -> dict[str, Any]:
+    values, keys = overlay.columns[name], [f"r{k}" for k in range(len(overlay.names))]
     scale = scale_of(overlay.units.get(name, ""), float(np.nanmax(np.abs(values), initial=0)))
     rest = scale_of(overlay.units.get(name, ""), float(np.nanmax(np.abs(values - values[0]), initial=0)))
     signals = {key: scale.factor * one for key, one in zip(keys, values, strict=True)}
     signals |= {f"d{k}": rest.factor * (values[k] - values[0]) for k in range(1, len(keys))}
-    made: dict[str, Any] = dict(record(name, overlay.t, signals, 1 / len(overlay.columns)))
+    made: dict[str, Any] = dict(record(label, overlay.t, signals, share))
     gap = np.nanmax(np.abs(values[1:] - values[0]), axis=0)
     centre = float(overlay.t[int(np.nanargmax(gap))]) if np.isfinite(gap).any() else float(overlay.t[0])
     around = AROUND * float(overlay.t[-1] - overlay.t[0])

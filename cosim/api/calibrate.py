@@ -1,0 +1,131 @@
+"""`cosim.identify` of a foreign FMU or of a system: recordings to numbers, and the FMU with these."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import isfinite
+from pathlib import Path
+
+from cosim.api.recordings import Source, read
+from cosim.calibration import deliver
+from cosim.calibration.calibrate import Calibrated, Options
+from cosim.calibration.calibrate import calibrate as find
+from cosim.calibration.page import number_rows
+from cosim.calibration.subject import Subject, of_fmu, of_system
+from cosim.data.recording import Recording
+from cosim.models.cache import with_fmus
+from cosim.plots.quantities import number
+from cosim.support.html import table as html_table
+from cosim.support.plain import JsonObject
+from cosim.system.scenario import Scenario, read_scenario
+
+
+@dataclass(frozen=True)
+class CalibrateResult:
+    """What was identified of an FMU or a system: numbers with standard errors, and how well outputs are followed."""
+
+    calibrated: Calibrated
+    files: Mapping[str, Path] = field(default_factory=dict)
+    """What was written, by kind: json, report, parameter_set, fmu."""
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """The numbers by name, in the model's units."""
+        return dict(self.calibrated.values)
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """Standard errors by name; inf where a number is not determined."""
+        names = [one.name for one in self.calibrated.free]
+        return dict(zip(names, self.calibrated.uncertainty.standard_errors, strict=True))
+
+    @property
+    def not_determined(self) -> tuple[str, ...]:
+        """Sentences on what the recordings do not determine."""
+        return tuple(one.statement for one in self.calibrated.uncertainty.not_determined)
+
+    def as_json(self) -> JsonObject:
+        """Return everything but the columns as plain data, as identified.json holds it."""
+        return deliver.as_json(self.calibrated)
+
+    def __str__(self) -> str:
+        return "\n".join(_lines(self.calibrated))
+
+    def __repr__(self) -> str:
+        return f"CalibrateResult({', '.join(f'{name}={value:.6g}' for name, value in self.numbers.items())})"
+
+    def _repr_html_(self) -> str:
+        return html_table("Numbers", number_rows(self.calibrated))
+
+
+def calibrate(
+    recordings: Source | Sequence[Source],
+    heldout: Source | Sequence[Source] | None,
+    subject: Subject,
+    options: Options,
+    out: Path | None,
+    *,
+    units: Mapping[str, str] | None = None,
+    force: bool = False,
+    on_progress: Callable[[str], None] = lambda text: None,
+) -> CalibrateResult:
+    """Find numbers of a subject and write the files; see `cosim.identify`."""
+    if out:
+        deliver.check_out(out, subject.source, subject.alone, force)
+    train, kept = _read(recordings, "recording", units), _read(heldout, "heldout", units)
+    done = find(subject, train, kept, options, on_progress)
+    files = deliver.deliver(done, (*train, *kept), out, force) if out else {}
+    return CalibrateResult(done, files)
+
+
+def subject_of(
+    fmu: str | Path | None, system: str | Path | Scenario | None, on_build: Callable[[str], None]
+) -> Subject:
+    """Read what is calibrated.
+
+    Raises:
+        FmuError, ScenarioError: it cannot be read.
+    """
+    if fmu is not None:
+        return of_fmu(Path(fmu))
+    scenario = system if isinstance(system, Scenario) else read_scenario(str(system))
+    return of_system(with_fmus(scenario, on_build))
+
+
+def _read(sources: Source | Sequence[Source] | None, kind: str, units: Mapping[str, str] | None) -> list[Recording]:
+    if sources is None:
+        return []
+    several = sources if isinstance(sources, list | tuple) else [sources]
+    return [read(one, units=units, name=f"{kind} {k}", required=()) for k, one in enumerate(several, 1)]
+
+
+def _lines(done: Calibrated) -> list[str]:
+    """The summary for a terminal."""
+    lines = [f"{done.subject.source.name}: {done.evaluations:,} simulations"]
+    for row in number_rows(done):
+        error = f"± {row['error']}" if row["error"] != "not determined" else "(not determined)"
+        bound = "; at its bound" if deliver.at_bound(done, row["name"]) else ""
+        lines.append(f"  {row['name']} = {row['value']} {error} {row['unit']} (was {row['start']}{bound})")
+    lines += [one.statement for one in done.uncertainty.not_determined]
+    lines += _pairs(done)
+    for one in done.traces:
+        kept = " (kept out)" if one.held_out else ""
+        before, after = number(one.rms(one.before), 3), number(one.rms(one.after), 3)
+        lines.append(f"  {one.recording}{kept}: {one.output} RMS error {before} -> {after} {one.unit}".rstrip())
+    if done.lost:
+        lines.append(f"{len(done.lost)} points could not be simulated, the last one: {done.lost[-1]}")
+    return [*lines, *done.notes]
+
+
+def _pairs(done: Calibrated) -> list[str]:
+    """Pairs of numbers that are known together far better than alone."""
+    found, names = done.uncertainty, [one.name for one in done.free]
+    return [
+        f"{names[i]} and {names[k]} are correlated ({found.correlation[i, k]:.3f}): only together are they well known."
+        for i in range(len(names))
+        for k in range(i)
+        if abs(found.correlation[i, k]) > STRONG and all(isfinite(found.standard_errors[j]) for j in (i, k))
+    ]
+
+
+STRONG = 0.98
+"""Correlation from which a pair is named: one of them alone is known five times worse than if the other were given."""

@@ -1,0 +1,1 @@
+"""Numbers of a foreign FMU, or of a whole system, from recordings: see `calibrate`."""

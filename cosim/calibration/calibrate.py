@@ -1,0 +1,183 @@
+"""Calibration of a foreign FMU, or of a whole system: numbers found from recordings by output error in open loop.
+
+names -> free        checked against the model (`free`)
+recordings -> experiments    matched, converted, laid on ticks (`experiment`)
+points -> outputs    in processes of their own (`processes`, `simulation`)
+fit -> uncertainty   least squares over several starts (`fit`), and what it is worth (`uncertainty`)
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cosim.calibration.experiment import Array, Experiment, experiment_of, matching, record_of
+from cosim.calibration.fit import LOSSES, Fit, Loss, fit
+from cosim.calibration.free import Free, free_of
+from cosim.calibration.processes import TIMEOUT, Outputs, Processes
+from cosim.calibration.residuals import Residuals, Rows
+from cosim.calibration.simulation import Job, Point
+from cosim.calibration.subject import Subject, unknown
+from cosim.calibration.uncertainty import Uncertainty, uncertainty_of
+from cosim.calibration.windows import windows_of
+from cosim.data.recording import Recording
+from cosim.support.errors import InputError
+
+INTERPOLATIONS = ("hold", "linear")
+
+
+@dataclass(frozen=True)
+class Options:
+    """How a calibration is done.
+
+    Args:
+        free: names of the numbers that may change.
+        given: values of other numbers, or starts of free ones, by name.
+        bounds: least and greatest value by name, where the model's min and max are not meant.
+        columns: variable to column, where names differ.
+        step: of the simulation [s]; None is that of the rows.
+        interpolation: of inputs between rows: "hold" or "linear".
+        window: seconds after which a simulation starts anew from the recording; None simulates each as a whole.
+        starts: starts of the fit, of which two that agree are enough.
+        seed: of the random starts.
+        loss: "linear", or "soft_l1" for recordings with outliers.
+        workers: processes; None is one a core.
+        timeout: seconds that the first simulation may take.
+    """
+
+    free: tuple[str, ...]
+    given: Point = field(default_factory=dict)
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    columns: Mapping[str, str] = field(default_factory=dict)
+    step: float | None = None
+    interpolation: str = "hold"
+    window: float | None = None
+    starts: int = 4
+    seed: int = 0
+    loss: Loss = "linear"
+    workers: int | None = None
+    timeout: float = TIMEOUT
+
+
+@dataclass(frozen=True)
+class Trace:
+    """One output of one recording: what was measured, and what the model gives before and after."""
+
+    recording: str
+    output: str
+    unit: str
+    times: Array
+    measured: Array
+    before: Array
+    after: Array
+    held_out: bool
+
+    def rms(self, simulated: Array) -> float:
+        """RMS of simulated minus measured, in the output's unit."""
+        rest = (simulated - self.measured)[np.isfinite(self.measured)]
+        return float(np.sqrt(np.mean(rest**2)))
+
+
+@dataclass(frozen=True)
+class Calibrated:
+    """What a calibration found: numbers, how well they are known, and how well the model follows the recordings."""
+
+    subject: Subject
+    free: tuple[Free, ...]
+    values: Mapping[str, float]
+    uncertainty: Uncertainty
+    traces: tuple[Trace, ...]
+    fit: Fit
+    evaluations: int
+    lost: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def calibrate(
+    subject: Subject,
+    train: Sequence[Recording],
+    heldout: Sequence[Recording],
+    options: Options,
+    say: Callable[[str], None] = lambda text: None,
+) -> Calibrated:
+    """Find the numbers of a model with which it follows recordings, and judge them on recordings kept out.
+
+    Raises:
+        InputError: a name, a column, a unit or an option does not fit; or the model cannot be simulated at its start.
+    """
+    _check(options)
+    for name in options.given:
+        if name not in subject.known:
+            raise unknown("--set", name, subject.source, subject.known, "what can be set")
+    free = free_of(subject, options.free, options.given, options.bounds)
+    matched = [matching(subject, one, options.columns) for one in (*train, *heldout)]
+    laid = [
+        experiment_of(subject, one, match, options.step, options.interpolation)
+        for one, match in zip((*train, *heldout), matched, strict=True)
+    ]
+    whole, fitted = tuple(laid), laid[: len(train)]
+    if options.window is not None:
+        fitted = [part for one in fitted for part in windows_of(subject, one, options.window, options.free)]
+    start = np.array([one.start / one.scale for one in free])
+    before = {one.name: one.start for one in free}
+    notes = tuple(dict.fromkeys(note for match in matched for note in match.notes))
+    job = Job(subject, (*whole, *fitted), options.given)
+    all_, part = slice(0, len(whole)), slice(len(whole), None)
+    with Processes(job, options.workers, options.timeout) as processes:
+        say("first simulation")
+        old = processes.first(before, all_)
+        _check_numbers(subject, whole, old)
+        rows = Rows.of(fitted)
+        _check_rows(rows, len(free))
+        residuals = Residuals(processes, free, rows, 1 / rows.spread, part)
+        found = fit(residuals, start, options.starts, options.seed, options.loss, say)
+        values = residuals.point(found.x)
+        (new,) = processes.at([values], all_)
+        evaluations, lost = processes.evaluations, tuple(processes.reasons)
+    if new is None:
+        text = f"{subject.source} cannot be simulated on all recordings with the numbers that were found"
+        raise InputError(f"{text}: {lost[-1]}", culprit="heldout")
+    uncertainty = uncertainty_of(found, free, residuals.scales, rows)
+    traces = _traces(subject, whole, len(train), old, new)
+    return Calibrated(subject, free, values, uncertainty, traces, found, evaluations, lost, notes)
+
+
+def _check(options: Options) -> None:
+    for name, value, choices in (
+        ("--loss", options.loss, LOSSES),
+        ("--interpolation", options.interpolation, INTERPOLATIONS),
+    ):
+        if value not in choices:
+            text = f'{name} "{value}": there are: {", ".join(choices)}.'
+            raise InputError(text, culprit=name, value=value, choices=choices)
+    for name, number in (("--step", options.step), ("--window", options.window), ("--timeout", options.timeout)):
+        if number is not None and not 0 < number < float("inf"):
+            raise InputError(f"{name} {number:g}: it must be above 0.", culprit=name, value=number)
+
+
+def _check_numbers(subject: Subject, experiments: Sequence[Experiment], outputs: Outputs) -> None:
+    for experiment, columns in zip(experiments, outputs, strict=True):
+        for name, values in zip(experiment.outputs, columns, strict=True):
+            bad = np.flatnonzero(~np.isfinite(values))
+            if len(bad):
+                at = float(experiment.times[bad[0]])
+                text = f"{subject.source} gives no number for {name} at {at:g} s with the numbers it starts from."
+                raise InputError(text, culprit=name)
+
+
+def _check_rows(rows: Rows, count: int) -> None:
+    if len(rows.measured) <= count:
+        text = f"{len(rows.measured)} measured numbers cannot determine {count}; more rows are needed."
+        raise InputError(text, culprit="recordings")
+
+
+def _traces(
+    subject: Subject, experiments: Sequence[Experiment], trained: int, old: Outputs, new: Outputs
+) -> tuple[Trace, ...]:
+    found = []
+    for k, (one, before, after) in enumerate(zip(experiments, old, new, strict=True)):
+        for (name, measured), a, b in zip(one.outputs.items(), before, after, strict=True):
+            port = subject.ports.get(name) or subject.ports.get(record_of(subject, name))
+            unit = port.unit if port else ""
+            found.append(Trace(one.name, name, unit, one.times, measured, a, b, k >= trained))
+    return tuple(found)

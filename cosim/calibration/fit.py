@@ -1,0 +1,159 @@
+"""Least squares over several starts, with the weights of outputs found by the fit.
+
+    minimise  sum rho(z^2)  over x in its bounds,        rho(s) = s, or 2 (sqrt(1 + s) - 1) for "soft_l1"
+
+Weights are first one over the spread of each measured output, then one over the RMS of its residual, which makes the
+least squares those of greatest likelihood for independent noise of the outputs. Reference: Ljung, System Identification
+(1999), 7.4; solver: SciPy's trust region reflective (Branch, Coleman, Li, 1999).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from cosim.calibration.experiment import Array
+from cosim.calibration.free import Free
+from cosim.calibration.residuals import Residuals
+
+Loss = Literal["linear", "soft_l1"]
+LOSSES: tuple[Loss, ...] = get_args(Loss)
+FACTOR = 5.0
+"""Further starts lie within this factor of the numbers that were given."""
+TRIED = 8
+"""Random points that are simulated for each further start, of which the best becomes the start."""
+EVALUATIONS = 60
+"""Evaluations of one start; derivatives come on top."""
+TOLERANCE = 1e-8
+AGREE = 1e-3
+"""Share by which the sums of two starts may differ to have found the same minimum."""
+ROUNDS = 3
+"""Rounds in which the weights of outputs are found."""
+EXACT = 1e-6
+"""Least residual of an output relative to its spread: no solver is more exact."""
+BAD = 10.0
+"""Rows of a point that cannot be simulated, times the RMS at the start."""
+OUTLIER = 1.4826
+"""Standard deviation of a normal distribution over its median absolute deviation."""
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Where a fit ended: x = p / scale, the weighted residual there, its derivatives, and the sum by start."""
+
+    x: Array
+    z: Array
+    jacobian: Array
+    loss: str
+    outlier: float
+    """Residual beyond which the loss is linear."""
+    starts: tuple[float, ...]
+    agreeing: int
+    """Starts that ended at the same least sum."""
+
+
+def fit(residuals: Residuals, x: Array, starts: int, seed: int, loss: Loss, say: Callable[[str], None]) -> Fit:
+    """Fit from the point given and from random ones near it.
+
+    Args:
+        residuals: of the experiments, with weights for a first look; they are changed.
+        x: start, x = p / scale.
+        starts: how many starts.
+        seed: of the random ones.
+        loss: one of `LOSSES`.
+        say: told in a few words what is being done.
+    """
+    spread = residuals.rows.spread
+    residuals.weights = 1 / spread
+    z = residuals.at(x)
+    residuals.bad = BAD * max(float(np.sqrt(np.mean(z**2))), 1.0)
+    found: list[tuple[float, Array]] = []
+    for k, one in enumerate(_starts(residuals, x, starts, seed)):
+        say(f"start {k + 1} of {starts}")
+        found.append(_minimum(residuals, one, loss, _outlier(z, loss)))
+        if _agreeing(found) > 1:
+            break
+    best = min(found, key=lambda pair: pair[0])[1]
+    agreeing = _agreeing(found)
+    best, outlier = _weighted(residuals, best, loss, say)
+    jacobian = residuals.jacobian(best)
+    jacobian = residuals.jacobian(best)  # again, with steps that fit the noise
+    return Fit(best, residuals.at(best), jacobian, loss, outlier, tuple(one for one, _ in found), agreeing)
+
+
+def _weighted(residuals: Residuals, best: Array, loss: Loss, say: Callable[[str], None]) -> tuple[Array, float]:
+    """Find the weights of outputs and fit on with them."""
+    rows, outlier = residuals.rows, 1.0
+    for k in range(ROUNDS):
+        rest = residuals.at(best) / residuals.weights[rows.output]
+        noise = np.array([_size(rest[rows.output == one], loss) for one in range(len(rows.names))])
+        weights = 1 / np.maximum(noise, EXACT * rows.spread)
+        change = float(np.abs(weights / residuals.weights - 1).max())
+        residuals.weights, outlier = weights, 1.0
+        if k and change < 0.02:
+            break
+        say(f"weights of outputs, round {k + 1}")
+        residuals.bad = BAD * max(float(np.sqrt(np.mean(residuals.at(best) ** 2))), 1.0)
+        best = _minimum(residuals, best, loss, outlier)[1]
+    return best, outlier
+
+
+def _minimum(residuals: Residuals, x: Array, loss: Loss, outlier: float) -> tuple[float, Array]:
+    low = np.array([one.low for one in residuals.free]) / residuals.scales
+    high = np.array([one.high for one in residuals.free]) / residuals.scales
+    edge = np.where(np.isfinite(high - low), 1e-9 * (high - low), 1e-9)
+    fixed = high - low <= 0
+    high = np.where(fixed, high + 1e-9, high)
+    inside = np.clip(x, low + np.where(fixed, 0, edge), high - np.where(fixed, 0, edge))
+    done = least_squares(
+        residuals.at,
+        inside,
+        residuals.jacobian,
+        (low, high),
+        x_scale="jac",
+        loss=loss,
+        f_scale=outlier,
+        ftol=TOLERANCE,
+        xtol=TOLERANCE,
+        gtol=1e-12,
+        max_nfev=EVALUATIONS,
+    )
+    return float(done.cost), np.asarray(done.x, np.float64)
+
+
+def _starts(residuals: Residuals, x: Array, count: int, seed: int) -> list[Array]:
+    """The start that is given, and the best of random points for each further one."""
+    if count < 2:
+        return [x]
+    random = np.random.default_rng(seed)
+    points = [_drawn(residuals.free, residuals.scales, random) for _ in range(TRIED * (count - 1))]
+    costs = [float(z @ z) for z in residuals.many(points)]
+    groups = np.array_split(np.argsort(costs), count - 1)
+    return [x, *(points[int(group[0])] for group in groups)]
+
+
+def _drawn(free: Sequence[Free], scales: Array, random: np.random.Generator) -> Array:
+    """A random point: within a factor of the start, or within a scale of zero."""
+    values = []
+    for one in free:
+        u = float(random.uniform(-1, 1))
+        value = one.start * FACTOR**u if one.start else one.start + u * one.scale
+        values.append(np.clip(value, one.low, one.high))
+    return np.array(values, np.float64) / scales
+
+
+def _agreeing(found: Sequence[tuple[float, Array]]) -> int:
+    """How many starts ended at the least sum."""
+    least = min(cost for cost, _ in found)
+    return sum(cost <= least * (1 + AGREE) + 1e-300 for cost, _ in found)
+
+
+def _outlier(z: Array, loss: str) -> float:
+    return 1.0 if loss == "linear" else max(OUTLIER * float(np.median(np.abs(z))), EXACT)
+
+
+def _size(rest: Array, loss: str) -> float:
+    """Size of the residuals of an output; a robust one where outliers are expected."""
+    return float(np.sqrt(np.mean(rest**2))) if loss == "linear" else OUTLIER * float(np.median(np.abs(rest)))

@@ -1,0 +1,148 @@
+"""Residuals of a calibration and their derivatives by finite differences.
+
+    z = w (y(p) - y_measured),   one row a number that was measured, w a weight for each output
+
+The step of a difference is chosen by noise: it moves the rows by `SHARE` of what one standard error would, so that the
+model is as good as linear over it, but by no less than `FLOOR` of an output's spread, far above what a solver's
+tolerance makes of two runs. Differences are central, one-sided at a bound or beside a point that cannot be simulated.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.calibration.experiment import Array, Experiment
+from cosim.calibration.free import Free
+from cosim.calibration.processes import Outputs, Processes
+
+SHARE = 0.3
+FLOOR = 1e-4
+FIRST, LEAST, MOST = 1e-3, 1e-9, 0.1
+"""Steps relative to a number's size: the first one, and the least and greatest."""
+KEPT = 4
+"""Simulations that are kept, for each number."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The measured numbers of all experiments in one column: where each is from."""
+
+    measured: Array
+    output: npt.NDArray[np.intp]
+    """Which output each row is of."""
+    names: tuple[str, ...]
+    spread: Array
+    """RMS of each output about its mean; 1 where it is constant at 0."""
+    seen: tuple[tuple[npt.NDArray[np.bool_], ...], ...]
+    runs: tuple[slice, ...]
+    """Rows of each experiment and output, in their order."""
+
+    @classmethod
+    def of(cls, experiments: Sequence[Experiment]) -> "Rows":
+        """Put the outputs of experiments below each other."""
+        names = tuple(dict.fromkeys(name for one in experiments for name in one.outputs))
+        seen = tuple(tuple(np.isfinite(values) for values in one.outputs.values()) for one in experiments)
+        parts = [values[np.isfinite(values)] for one in experiments for values in one.outputs.values()]
+        numbers = [names.index(name) for one in experiments for name in one.outputs]
+        output = np.concatenate([np.full(len(part), k) for part, k in zip(parts, numbers, strict=True)])
+        measured = np.concatenate(parts)
+        ends = np.cumsum([len(part) for part in parts])
+        runs = tuple(slice(int(end - len(part)), int(end)) for end, part in zip(ends, parts, strict=True))
+        spread = np.array([_spread(measured[output == k]) for k in range(len(names))])
+        return cls(measured, output, names, spread, seen, runs)
+
+    def of_outputs(self, outputs: Outputs) -> Array:
+        """Simulated numbers in the same order."""
+        pairs = (pair for masks, run in zip(self.seen, outputs, strict=True) for pair in zip(masks, run, strict=True))
+        return np.concatenate([values[mask] for mask, values in pairs])
+
+
+@dataclass
+class Residuals:
+    """Residuals z at points x = p / scale; keeps the steps that derivatives have found to be good."""
+
+    processes: Processes
+    free: tuple[Free, ...]
+    rows: Rows
+    weights: Array
+    part: slice
+    steps: Array = field(init=False)
+    bad: float = 0.0
+    """What a row is at a point that cannot be simulated."""
+
+    def __post_init__(self) -> None:
+        self.scales = np.array([one.scale for one in self.free])
+        self.steps = FIRST * np.ones(len(self.free))
+        self._known: dict[bytes, Array | None] = {}
+
+    def point(self, x: Array) -> Mapping[str, float]:
+        """Values by name."""
+        inside = ((one, float(np.clip(v * one.scale, one.low, one.high))) for one, v in zip(self.free, x, strict=True))
+        return {one.name: value for one, value in inside}
+
+    def simulated(self, points: Sequence[Array]) -> list[Array | None]:
+        """Outputs at points, in rows."""
+        if len(self._known) > KEPT * (len(self.free) + 1):
+            self._known.clear()
+        new = [x for x in dict.fromkeys(x.tobytes() for x in points) if x not in self._known]
+        found = self.processes.at([self.point(np.frombuffer(x)) for x in new], self.part)
+        self._known |= {x: None if one is None else self._rows(one) for x, one in zip(new, found, strict=True)}
+        return [self._known[x.tobytes()] for x in points]
+
+    def _rows(self, outputs: Outputs) -> Array | None:
+        values = self.rows.of_outputs(outputs)
+        return values if np.isfinite(values).all() else None
+
+    def at(self, x: Array) -> Array:
+        """Residuals at a point."""
+        return self.many([x])[0]
+
+    def many(self, points: Sequence[Array]) -> list[Array]:
+        """Residuals at points; where a point cannot be simulated, all rows are large."""
+        return [
+            np.full(len(self.rows.measured), self.bad) if one is None else self._residual(one)
+            for one in self.simulated(points)
+        ]
+
+    def _residual(self, values: Array) -> Array:
+        return self.weights[self.rows.output] * (values - self.rows.measured)
+
+    def jacobian(self, x: Array) -> Array:
+        """Derivatives d z / d x at a point, shape (rows, numbers)."""
+        size = np.maximum(np.abs(x), 1.0)
+        low = np.array([one.low for one in self.free]) / self.scales
+        high = np.array([one.high for one in self.free]) / self.scales
+        up, down = np.minimum(x + self.steps * size, high), np.maximum(x - self.steps * size, low)
+        points = [_moved(x, k, value) for values in (up, down) for k, value in enumerate(values)]
+        here, *found = self.simulated([x, *points])
+        columns = np.zeros((len(self.rows.measured), len(x)))
+        for k in range(len(x)):
+            ends = [(up[k], found[k]), (down[k], found[k + len(x)]), (x[k], here)]
+            good = [(at, values) for at, values in ends if values is not None]
+            if len(good) > 1 and good[0][0] != good[1][0]:
+                (first, above), (second, below) = good[:2]
+                columns[:, k] = self.weights[self.rows.output] * (above - below) / (first - second)
+        if here is not None:
+            self._learn(columns, self._residual(here), size)
+        return columns
+
+    def _learn(self, columns: Array, z: Array, size: Array) -> None:
+        """Choose the next steps."""
+        noise = SHARE * float(np.sqrt(np.mean(z**2)))
+        least = FLOOR * self.weights * self.rows.spread
+        floor = float(np.sqrt(np.sum(least[self.rows.output] ** 2)))
+        slopes = np.linalg.norm(columns, axis=0)
+        wanted = np.divide(max(noise, floor), slopes, out=np.full(len(slopes), np.inf), where=slopes > 0)
+        self.steps = np.clip(wanted / size, LEAST, MOST)
+
+
+def _moved(x: Array, k: int, value: float) -> Array:
+    moved = x.copy()
+    moved[k] = value
+    return moved
+
+
+def _spread(values: Array) -> float:
+    return float(np.std(values)) or float(np.abs(values).max()) or 1.0

@@ -1,0 +1,130 @@
+"""A motor as another team would export it, with numbers to identify, for calibrations.
+
+    J w' = gear kt i - d w - Fc tanh(w / 0.05),   phi' = w;   outputs w and phi, input i
+
+`idle` does nothing. Beyond |J| = `crash_above` it crashes, below `nan_below` it gives NaN, below `hang_below` it hangs.
+`planted` changes what it does: 1 the sign, 2 a gain of 1.05, 3 no friction, 4 one sample late, 5 an offset.
+"""
+
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+from tiny_fmu import SOURCE as TINY
+from tiny_fmu import _stubs
+
+SOURCE = (
+    TINY[: TINY.index("enum {")]
+    + r"""
+enum { I, J, D, FC, KT, GEAR, IDLE, CRASH_ABOVE, NAN_BELOW, HANG_BELOW, PLANTED, W, PHI, COUNT };
+typedef struct { double v[COUNT], late, before; char name[99]; void *log; } M;
+typedef void Log2(void *, const char *, int, const char *, const char *, ...);
+typedef void Log3(void *, int, const char *, const char *);
+enum { CHATTER = -1, END = -2, EARLY = -3, STATUS = IDLE };
+static M *make(void) { M *m = calloc(1, sizeof(M));
+  double start[COUNT] = {0, 0.02, 0.05, 0.1, 0.1, 2, 1, 1e9, -1e9, -1e9, BUILT, 0, 0};
+  memcpy(m->v, start, sizeof start); return m; }
+static int set(M *m, const unsigned *r, size_t n, const double *x) { while (n--) m->v[r[n]] = x[n]; return 0; }
+static int get(M *m, const unsigned *r, size_t n, double *x) {
+  while (n--) { double g = m->v[PLANTED] == 1 ? -1 : m->v[PLANTED] == 2 ? 1.05 : 1, o = m->v[PLANTED] == 5 ? .02 : 0;
+    x[n] = r[n] == W ? g * (m->v[PLANTED] == 4 ? m->late : m->v[W]) + o : m->v[r[n]]; }
+  return 0; }
+static int save(M *m, M **s) { if (!*s) *s = make(); **s = *m; return 0; }
+static double rate(M *m, double w) { double f = m->v[PLANTED] == 3 ? 0 : m->v[FC];
+  return (m->v[GEAR] * m->v[KT] * m->v[I] - m->v[D] * w - f * tanh(w / 0.05)) / m->v[J]; }
+static int step(M *m, double t, double h) {
+  if (m->v[J] > m->v[CRASH_ABOVE]) raise(SIGSEGV);
+  while (m->v[J] < m->v[HANG_BELOW]) sleep(1);
+  int n = (int)ceil(h / 1e-3 - 1e-9); double s = h / n;
+  m->late = m->v[W];
+  for (int k = 0; k < n; k++) { double w = m->v[W], a = rate(m, w), b = rate(m, w + s / 2 * a),
+    c = rate(m, w + s / 2 * b), e = rate(m, w + s * c), next = w + s / 6 * (a + 2 * b + 2 * c + e);
+    m->v[PHI] += s * (w + next) / 2; m->v[W] = next; }
+  if (m->v[J] < m->v[NAN_BELOW]) m->v[W] = NAN;
+  return 0; }
+"""
+    + TINY[TINY.index("#define API") :]
+)
+VARIABLES = (
+    ("i", "input", "A", "0", ""),
+    ("J", "parameter", "kg.m2", "0.02", 'min="1e-6" nominal="0.01"'),
+    ("d", "parameter", "N.m.s/rad", "0.05", 'min="0"'),
+    ("Fc", "parameter", "N.m", "0.1", 'min="0"'),
+    ("kt", "parameter", "N.m/A", "0.1", 'min="0"'),
+    ("gear", "parameter", "1", "2", 'min="0"'),
+    ("idle", "parameter", "1", "1", ""),
+    ("crash_above", "parameter", "kg.m2", "1e9", ""),
+    ("nan_below", "parameter", "kg.m2", "-1e9", ""),
+    ("hang_below", "parameter", "kg.m2", "-1e9", ""),
+    ("planted", "parameter", "1", "0", ""),
+    ("w", "output", "rad/s", "0", ""),
+    ("phi", "output", "rad", "0", ""),
+)
+
+
+def motor(directory: Path, version: int, planted: int = 0) -> Path:
+    """Compile and pack the motor for one FMI version, with an error planted in its binary."""
+    library = directory / f"motor{version}_{planted}{fmpy.sharedLibraryExtension}"
+    if not library.exists():
+        source = directory / f"motor{version}.c"
+        source.write_text(SOURCE + _stubs(version))
+        command = [sys.executable, "-m", "ziglang", "cc", "-shared", "-fPIC", "-O2", "-w", f"-DBUILT={planted}", "-o"]
+        subprocess.run([*command, str(library), str(source)], check=True)
+    platform = fmpy.platform if version == 2 else fmpy.platform_tuple
+    path = directory / f"motor{version}{f'_{planted}' if planted else ''}.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", description(version))
+        archive.write(library, f"binaries/{platform}/motor{fmpy.sharedLibraryExtension}")
+    return path
+
+
+def description(version: int) -> str:
+    """The XML of one FMI version."""
+    token = "guid" if version == 2 else "instantiationToken"
+    units = "".join(f'<Unit name="{unit}"/>' for unit in dict.fromkeys(row[2] for row in VARIABLES))
+    rows = []
+    for number, (name, causality, unit, start, more) in enumerate(VARIABLES):
+        variability = "tunable" if causality == "parameter" else "continuous"
+        exact = ' initial="exact"' if causality != "input" else ""
+        common = f'name="{name}" valueReference="{number}" causality="{causality}" variability="{variability}"{exact}'
+        value = f'unit="{unit}" start="{start}" {more}'
+        old = f"<ScalarVariable {common}><Real {value}/></ScalarVariable>"
+        rows.append(old if version == 2 else f"<Float64 {common} {value}/>")
+    if version == 2:
+        outputs = '<Outputs><Unknown index="12" dependencies=""/><Unknown index="13" dependencies=""/></Outputs>'
+    else:
+        outputs = '<Output valueReference="11" dependencies=""/><Output valueReference="12" dependencies=""/>'
+    saves = f'canGetAndSetFMU{"s" if version == 2 else "S"}tate="true" canHandleVariableCommunicationStepSize="true"'
+    return (
+        f'<fmiModelDescription fmiVersion="{version}.0" modelName="motor" {token}="t">'
+        f'<CoSimulation modelIdentifier="motor" {saves}/><UnitDefinitions>{units}</UnitDefinitions>'
+        f'<DefaultExperiment startTime="0" stopTime="2" stepSize="0.01"/>'
+        f"<ModelVariables>{''.join(rows)}</ModelVariables><ModelStructure>{outputs}</ModelStructure></fmiModelDescription>"
+    )
+
+
+def recorded(fmu: Path, truth: dict[str, float], seed: int = 1, rows: int = 400, noise: float = 0.02) -> dict:
+    """Columns of the motor with these numbers, with white noise on both outputs."""
+    from cosim.master.simulate import simulate
+    from cosim.system.system import System
+    from cosim.system.wire import Record, Wire
+
+    random = np.random.default_rng(seed)
+    t = 0.01 * np.arange(rows)
+    current = 3 * np.sin(2 * np.pi * (0.3 + 0.4 * t) * t) + random.choice([-1.0, 1.0]) * (t % 1.3 > 0.7)
+    system = System(
+        components={"m": fmu},
+        records={"w": Record("m.w"), "phi": Record("m.phi")},
+        wires=[Wire("i.value", "m.i")],
+        signals={"i": current},
+        parameters={"m": truth},
+        step=0.01,
+        ticks=rows - 1,
+        last=True,
+    )
+    table = simulate(system).recording.table
+    noisy = {name: table[name] + noise * random.standard_normal(rows) for name in ("w", "phi")}
+    return {"t": t, "i": current, **noisy}
