@@ -209,5 +209,6 @@ def _on_ticks(times: Array, values: Array, size: float, ticks: int, interpolatio
     """Input at each tick, which the model holds for a step."""
     at = size * np.arange(ticks + 1)
     if interpolation == "linear":
-        return np.interp(at + 0.5 * size, times, values)
-    return values[np.clip(np.searchsorted(times, at + ON_TICK * size, side="right") - 1, 0, None)]
+        return np.asarray(np.interp(at + 0.5 * size, times, values), np.float64)
+    held: Array = values[np.clip(np.searchsorted(times, at + ON_TICK * size, side="right") - 1, 0, None)]
+    return held
