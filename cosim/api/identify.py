@@ -4,13 +4,12 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import overload
+from typing import TypedDict, Unpack, overload
 
 from cosim.api.calibrate import CalibrateResult, calibrate, subject_of
 from cosim.api.recordings import Source, read_all
 from cosim.calibration.calibrate import Options as Calibration
 from cosim.calibration.fit import Loss
-from cosim.calibration.processes import TIMEOUT
 from cosim.estimation.identify import deliver
 from cosim.estimation.identify.identify import Identified, Options
 from cosim.estimation.identify.identify import identify as find
@@ -50,6 +49,33 @@ class IdentifyResult:
         return html_text(str(self))
 
 
+class ForModels(TypedDict, total=False):
+    """What is said of an FMU or a system, in place of a card."""
+
+    fmu: str | Path | None
+    """An FMU of anybody."""
+    system: str | Path | Scenario | None
+    """A scenario or SSP; its numbers are called "component.parameter"."""
+    heldout: Source | Sequence[Source] | None
+    """Recordings that are not fitted and show the error before and after."""
+    set: Mapping[str, float] | None
+    """Values of other parameters, or starts of free ones."""
+    bounds: Mapping[str, tuple[float, float]] | None
+    """(least, greatest) by name, in place of the variable's min and max."""
+    step: float | None
+    """Of the simulation [s]; None is that of the rows (FMU), or the system's own."""
+    interpolation: str
+    """Of inputs between rows: "hold" or "linear"."""
+    window: float | None
+    """Seconds after which a simulation starts anew from the recording; None: never."""
+    loss: Loss
+    """"linear", or "soft_l1" for recordings with outliers."""
+    workers: int | None
+    """Processes that simulate; None is one a core."""
+    timeout: float
+    """Seconds that the first simulation may take."""
+
+
 @overload
 def identify(
     recordings: Source | Sequence[Source],
@@ -75,23 +101,13 @@ def identify(
     out: str | Path | None = None,
     *,
     free: Sequence[str],
-    fmu: str | Path | None = None,
-    system: str | Path | Scenario | None = None,
-    heldout: Source | Sequence[Source] | None = None,
-    set: Mapping[str, float] | None = None,
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    step: float | None = None,
-    interpolation: str = "hold",
-    window: float | None = None,
-    loss: Loss = "linear",
-    workers: int | None = None,
-    timeout: float = 60.0,
     starts: int = 4,
     seed: int = 0,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
     force: bool = False,
     on_progress: Callable[[str], None] = ...,
+    **model: Unpack[ForModels],
 ) -> CalibrateResult: ...
 
 
@@ -100,18 +116,7 @@ def identify(
     card: str | Path | Card | None = None,
     out: str | Path | None = None,
     *,
-    fmu: str | Path | None = None,
-    system: str | Path | Scenario | None = None,
     free: Sequence[str] = (),
-    heldout: Source | Sequence[Source] | None = None,
-    set: Mapping[str, float] | None = None,  # the word of the option
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    step: float | None = None,
-    interpolation: str = "hold",
-    window: float | None = None,
-    loss: Loss = "linear",
-    workers: int | None = None,
-    timeout: float = TIMEOUT,
     cut: float | None = None,
     keep_inertia: bool = True,
     starts: int = 4,
@@ -120,65 +125,62 @@ def identify(
     units: Mapping[str, str] | None = None,
     force: bool = False,
     on_progress: Callable[[str], None] = lambda text: None,
+    **model: Unpack[ForModels],
 ) -> IdentifyResult | CalibrateResult:
-    """Identify numbers of a card, of a foreign FMU, or of a whole system, from recordings.
+    """Identify numbers of a card, of a foreign FMU (`fmu`) or of a whole system (`system`) from recordings.
 
     A card: friction map, presliding steps, output error in closed loop. An FMU or system: output error in open loop,
-    min sum (y - y_measured)^2 over the numbers in `free`; columns feed the inputs and are compared with the outputs of
-    the same names (docs/calibration.md).
+    min sum (y - y_measured)^2; columns feed inputs and are compared with outputs of their names (docs/calibration.md).
 
     Args:
         recordings: one or several, each a path, data frame, mapping of arrays or `Recording` (see `cosim.read`).
         card: the model as believed: its path, the name of a shipped one, or a `Card`.
         out: folder for the files; None writes nothing.
-        fmu: an FMU of anybody, in place of a card.
-        system: a scenario or SSP, in place of a card; its numbers are called "component.parameter".
         free: parameters to identify; of a card () for all of inertia and friction.
-        heldout: recordings that are not fitted and show the error before and after (FMU, system).
-        set: values of other parameters, or starts of free ones (FMU, system).
-        bounds: (least, greatest) by name, in place of the variable's min and max (FMU, system).
-        step: of the simulation [s]; None is that of the rows (FMU), or the system's own.
-        interpolation: of inputs between rows, "hold" or "linear" (FMU, system).
-        window: seconds after which a simulation starts anew from the recording; None: never (FMU, system).
-        loss: "linear", or "soft_l1" for recordings with outliers (FMU, system).
-        workers: processes that simulate; None is one a core (FMU, system).
-        timeout: seconds that the first simulation may take (FMU, system).
-        cut: slowest speed of the friction map [rad/s; m/s]; None chooses it (card).
-        keep_inertia: friction map of tau - J q'' (True) or of tau alone (card).
+        cut: slowest speed of a card's friction map [rad/s; m/s]; None chooses it.
+        keep_inertia: a card's friction map is of tau - J q'' (True) or of tau alone.
         starts: starts of the output-error fit, of which the best is kept.
         seed: of the random starts.
         columns: our name to the source's, as in `cosim.read`; of an FMU its variable to the source's column.
         units: our name to the unit in the source, as in `cosim.read`.
         force: overwrite what is there.
         on_progress: told in a few words what is being done.
+        model: `fmu` or `system` in place of a card, and what goes with them; see `ForModels`.
 
     Returns:
-        `IdentifyResult` of a card, `CalibrateResult` of an FMU or system. Standard errors are those of the
-        least-squares fits (Ljung 1999, chapter 9).
+        `IdentifyResult` of a card, `CalibrateResult` else. Standard errors: Ljung 1999, chapter 9.
 
     Raises:
-        InputError: the recordings tell nothing, a parameter or column is unknown, or the model cannot be simulated.
+        InputError: the recordings tell nothing, a name is unknown, or the model cannot be simulated.
         RecordingError, UnitError: as `cosim.read`.
         CardError, FmuError, ScenarioError: the model is not good.
         OutputError: a file is there already; nothing was fitted then.
     """
-    check_one(card, fmu, system)
+    check_one(card, model.get("fmu"), model.get("system"))
     folder = None if out is None else Path(out)
     if card is not None:
         given = Options(tuple(free), cut, keep_inertia, starts, seed)
         return _of_card(recordings, card, folder, given, columns, units, force, on_progress)
-    options = Calibration(
-        tuple(free), set or {}, bounds or {}, columns or {}, step, interpolation, window, starts, seed, loss
-    )
-    return calibrate(
-        recordings,
-        heldout,
-        subject_of(fmu, system, on_progress),
-        replace(options, workers=workers, timeout=timeout),
-        folder,
-        units=units,
-        force=force,
-        on_progress=on_progress,
+    options = _options(model, Calibration(tuple(free), columns=columns or {}, starts=starts, seed=seed))
+    subject, heldout = subject_of(model.get("fmu"), model.get("system"), on_progress), model.get("heldout")
+    return calibrate(recordings, heldout, subject, options, folder, units=units, force=force, on_progress=on_progress)
+
+
+def _options(model: ForModels, options: Calibration) -> Calibration:
+    """Join what is said of a model with what is said of any (TypeError for a name that there is not)."""
+    strange = set(model) - set(ForModels.__annotations__)
+    if strange:
+        raise TypeError(f"identify() got an unexpected keyword argument '{min(strange)}'")
+    return replace(
+        options,
+        given=model.get("set") or {},
+        bounds=model.get("bounds") or {},
+        step=model.get("step"),
+        interpolation=model.get("interpolation", options.interpolation),
+        window=model.get("window"),
+        loss=model.get("loss", options.loss),
+        workers=model.get("workers"),
+        timeout=model.get("timeout", options.timeout),
     )
 
 
