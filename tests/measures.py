@@ -1,7 +1,8 @@
 """Sizes of the house: python tests/measures.py [FOLDER OF A CHECKOUT]
 
 Lines of functions and files (docstrings counted), occurrences of `dict[str, Any]`, calls of `isinstance` in the
-diagnosis, public names without a docstring (a setter has its property's, an overload its function's), and the modules directly in `cosim/`.
+diagnosis, public names without a docstring (a setter has its property's, an overload its function's), and the modules
+directly in `cosim/`.
 """
 
 import ast
