@@ -38,7 +38,7 @@ FLOORS = (
     {"cosim.diagnosis"},
     {"cosim.report"},
     {"cosim.delivery"},
-    {"cosim.investigation", "cosim.checks"},
+    {"cosim.investigation", "cosim.checks", "cosim.simulators"},
     {"cosim.api", "cosim_studies"},
     {"cosim.serve"},
     {"cosim", "cosim.cli"},
@@ -51,7 +51,7 @@ ROOMS = {folder for floor in FLOORS for folder in floor if folder.count(".") == 
 KNOW_PHYSICS = (
     ROOMS | {"cosim.diagnosis", "cosim.report", "cosim.delivery", "cosim.investigation", "cosim.checks"} | HIGHEST
 )
-KNOW_PHYSICS |= {"cosim.models", "cosim.estimation"}
+KNOW_PHYSICS |= {"cosim.models", "cosim.estimation", "cosim.simulators"}
 NEED_HEAVY = KNOW_PHYSICS | {"cosim.plots"}
 """Folders that may import CasADi, the compiler or matplotlib: a run needs none of them."""
 STUDY_VERBS = {f"cosim.cli.{verb}" for verb in ("demo", "paper", "prove")}

@@ -21,6 +21,7 @@ FOR_USERS = {
     "mcap": "MCAP recordings",
     "serve": "the local page, cosim serve",
     "cluster": "sweeps on a Dask cluster",
+    "simulators": "reading the files that export writes for MuJoCo, URDF and USD",
     "ethercat": "drives on an EtherCAT bus",
     "alpaca": "ASCOM's own client, for tests",
     "proof": "baselines of cosim prove",

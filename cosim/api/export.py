@@ -1,12 +1,21 @@
-"""`cosim.export`: a card to FMUs, and on wish to an SSP and to Modelica text."""
+"""`cosim.export`: a card to FMUs, and on wish to an SSP, to Modelica text and to files of other simulators."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from cosim.api.recordings import Source
+from cosim.api.recordings import read as read_recording
+from cosim.reading import check_kind
+from cosim.simulators import FORMATS
+from cosim.simulators.deliver import Planned
+from cosim.simulators.deliver import planned as planned_files
+from cosim.simulators.measure import Held
+from cosim.simulators.table import table_text
 from cosim.support.files import check_free, directory
 from cosim.support.html import table as html_table
+from cosim.support.plain import JsonObject
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.export import export_fmu
 from pyfmi_models.export.platforms import platforms_of
@@ -19,19 +28,37 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written: the FMUs, the SSP and the Modelica package (None where they were not asked for)."""
+    """What was written: FMUs, SSP, Modelica package, files of simulators (None or empty where not asked for).
+
+    `held` says what each simulator holds of the card and what it loses, and `table` is the file that says so.
+    """
 
     fmus: tuple[Path, ...]
     ssp: Path | None = None
     modelica: Path | None = None
+    simulators: tuple[Path, ...] = ()
+    table: Path | None = None
+    held: tuple[Held, ...] = ()
 
     @property
     def paths(self) -> tuple[Path, ...]:
         """All files in the order in which they were written."""
-        return (*self.fmus, *(path for path in (self.ssp, self.modelica) if path))
+        return (*self.fmus, *(path for path in (self.ssp, self.modelica) if path), *self.simulators, *self._tables)
+
+    @property
+    def _tables(self) -> tuple[Path, ...]:
+        return (self.table,) if self.table else ()
+
+    def as_json(self) -> JsonObject:
+        """Return paths and tables as plain data."""
+        found: JsonObject = {"fmus": [str(path) for path in self.fmus]}
+        found |= {kind: str(path) for kind, path in (("ssp", self.ssp), ("modelica", self.modelica)) if path}
+        found |= {one.format.key: str(path) for one, path in zip(self.held, self.simulators, strict=True)}
+        return found | ({"table": str(self.table), "held": [one.as_json() for one in self.held]} if self.held else {})
 
     def __str__(self) -> str:
-        return "\n".join(map(str, self.paths))
+        paths = "\n".join(map(str, self.paths))
+        return f"{paths}\n\n{table_text(self.held)}".rstrip() if self.held else paths
 
     def _repr_html_(self) -> str:
         return html_table("Exported", [{"file": path, "bytes": f"{path.stat().st_size:,}"} for path in self.paths])
@@ -53,6 +80,10 @@ def export(
     platform: str = "host",
     ssp: bool = False,
     modelica: bool = False,
+    mujoco: bool = False,
+    urdf: bool = False,
+    isaac: bool = False,
+    recording: Source | None = None,
     force: bool = False,
     on_progress: Progress = lambda done, of: None,
 ) -> Exported:
@@ -65,6 +96,11 @@ def export(
         platform: "host", "all", or names with commas between ("x86_64-linux,aarch64-linux").
         ssp: also wire plant, controller and a set point as one SSP 1.0, NAME.ssp.
         modelica: also write the plant as a Modelica package.
+        mujoco: also write the joint for MuJoCo, NAME_mujoco.xml.
+        urdf: also write the joint as a robot description, NAME.urdf.
+        isaac: also write the joint for Isaac Sim, NAME_isaac.usda.
+        recording: along whose motion is measured what a simulator cannot hold (see `cosim.read`; columns as in the
+            card); None takes two sines that reach the speeds where the card's friction changes.
         force: overwrite what is there.
         on_progress: told how many FMUs are done, and of how many.
 
@@ -73,9 +109,13 @@ def export(
 
     Raises:
         CardError: the card is not good, or cannot have what is asked for.
+        RecordingError: the recording is not good.
         OutputError: a file is there already; nothing was written then.
     """
-    return planned(card, out, fmi, platform, ssp, modelica, force).write(on_progress)
+    asked = {"mujoco": mujoco, "urdf": urdf, "isaac": isaac}
+    simulators = [name for name, wanted in asked.items() if wanted]
+    plan = planned(card, out, fmi, platform, ssp, modelica, force, simulators=simulators, recording=recording)
+    return plan.write(on_progress)
 
 
 @dataclass(frozen=True)
@@ -86,6 +126,7 @@ class Plan:
     ssp: tuple[Path, Writer] | None
     modelica: tuple[Path, Writer] | None
     force: bool
+    simulators: Planned | None = None
 
     def write(self, on_progress: Progress = lambda done, of: None) -> Exported:
         """Write everything; `on_progress` is told how many FMUs are done, and of how many."""
@@ -96,11 +137,16 @@ class Plan:
         for path, write in self._others():
             write(path, self.force)
         ssp, modelica = (one[0] if one else None for one in (self.ssp, self.modelica))
-        return Exported(tuple(one.path for one in self.archives), ssp, modelica)
+        found = Exported(tuple(one.path for one in self.archives), ssp, modelica)
+        if self.simulators is None:
+            return found
+        held, files = self.simulators.write(self.force), tuple(path for _, path in self.simulators.files)
+        return replace(found, simulators=files, table=self.simulators.table, held=held)
 
     def check(self) -> None:
         """Refuse to write over what is there (raises OutputError)."""
-        for path in (*(one.path for one in self.archives), *(path for path, _ in self._others())):
+        files = self.simulators.paths if self.simulators else ()
+        for path in (*(one.path for one in self.archives), *(path for path, _ in self._others()), *files):
             check_free(path, self.force)
 
     def _others(self) -> list[tuple[Path, Writer]]:
@@ -115,6 +161,9 @@ def planned(
     ssp: bool,
     modelica: bool,
     force: bool,
+    *,
+    simulators: Sequence[str] = (),
+    recording: Source | None = None,
 ) -> Plan:
     """Check everything that `export` was given, and return what will be written; arguments and errors are its own."""
     platforms, folder = platforms_of(platform), Path(out)
@@ -126,9 +175,19 @@ def planned(
         ssp=(folder / f"{stem}.ssp", _system_writer(read, versions[0], platforms)) if ssp else None,
         modelica=_modelica_writer(read, folder, stem) if modelica else None,
         force=force,
+        simulators=_simulators(read, folder, stem, simulators, recording) if simulators else None,
     )
     plan.check()
     return plan
+
+
+def _simulators(card: Card, folder: Path, stem: str, simulators: Sequence[str], recording: Source | None) -> Planned:
+    """Name the files for simulators, and read the recording along which they are compared."""
+    taken = None if recording is None else read_recording(recording, columns=card.columns)
+    if taken is not None:
+        check_kind([taken], card.mount.motion)
+    formats = [FORMATS[name] for name in simulators]
+    return planned_files(card.plant(), card.path or stem, formats, folder, stem, taken)
 
 
 def _archives(

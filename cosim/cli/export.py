@@ -32,18 +32,22 @@ def export(
     platform: Annotated[str, typer.Option("--platform", help="host, all, or names with commas between.")] = "host",
     ssp: Annotated[bool, typer.Option("--ssp", help="Also wire plant, controller and a set point: NAME.ssp.")] = False,
     modelica: Annotated[bool, typer.Option("--modelica", help="Also write the plant as Modelica text.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the paths as JSON.")] = False,
+    mujoco: Annotated[bool, typer.Option("--mujoco", help="Also write the joint for MuJoCo.")] = False,
+    urdf: Annotated[bool, typer.Option("--urdf", help="Also write the joint as URDF.")] = False,
+    isaac: Annotated[bool, typer.Option("--isaac", help="Also write the joint for Isaac Sim.")] = False,
+    recording: Annotated[
+        Path | None, typer.Option("--recording", help="Measure along it what a simulator cannot hold.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print paths and tables as JSON.")] = False,
     force: Force = False,
 ) -> None:
-    """Write the plant of a card and, where it has one, its controller as FMUs."""
+    """Write the plant of a card and, where it has one, its controller as FMUs; also for other simulators."""
     out = out or default_out(Path(card).stem)
     from cosim.api.export import planned
 
-    plan = planned(card, out, VERSIONS[fmi], platform, ssp, modelica, force)
+    asked = {"mujoco": mujoco, "urdf": urdf, "isaac": isaac}
+    simulators = [name for name, wanted in asked.items() if wanted]
+    plan = planned(card, out, VERSIONS[fmi], platform, ssp, modelica, force, simulators=simulators, recording=recording)
     with stage(f"{Path(card).stem}: {len(plan.archives)} FMUs") as progress:
         done = plan.write(progress)
-    others = {"ssp": done.ssp, "modelica": done.modelica}
-    if as_json:
-        put_json({"fmus": list(map(str, done.fmus))} | {kind: str(path) for kind, path in others.items() if path})
-    else:
-        put(str(done))
+    put_json(done.as_json()) if as_json else put(str(done))

@@ -1,0 +1,10 @@
+"""One card in every simulator: the joint as each can hold it, and in N m what it cannot hold."""
+
+from cosim.simulators.isaac import ISAAC
+from cosim.simulators.mujoco import MUJOCO
+from cosim.simulators.urdf import URDF
+
+FORMATS = {one.key: one for one in (MUJOCO, URDF, ISAAC)}
+"""Simulators' files by the word that asks for them."""
+
+__all__ = ["FORMATS"]

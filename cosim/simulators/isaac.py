@@ -1,0 +1,112 @@
+"""Isaac Sim: the joint of a PhysX articulation as USD text; static, dynamic and viscous friction.
+
+Attributes of a rotary joint are per degree where they are per angle: the viscous coefficient is in N m s/deg.
+Reference: Omniverse physics, "PhysxJointAxisAPI"; PhysX 5.6, "Articulation Joint Friction" (2025); UsdPhysics.
+"""
+
+from math import pi
+
+import numpy as np
+
+from cosim.simulators.format import Format, on_rotary
+from cosim.simulators.weight import GRAVITY, off_axis
+from pyfmi_models.effects import GravityUnbalance
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.friction.base import each_way
+from pyfmi_models.mount import Mount
+
+
+def isaac_text(mount: Mount, card: Mount, title: str) -> str:
+    """Write a mount that PhysX holds as a whole; the break-away level is the card's."""
+    rotary = mount.motion == "rotary"
+    inertia, (along, across), mass = off_axis(mount, float(mount.axis.inertia))
+    about = (inertia / 2, inertia, inertia / 2) if rotary else (1.0, 1.0, 1.0)
+    law, way = mount.friction, "angular" if rotary else "linear"
+    level, viscous = (float(law.Fc), float(law.sigma2)) if isinstance(law, Coulomb) else (0.0, 0.0)
+    per_degree = viscous * (pi / 180 if rotary else 1)
+    joint = "PhysicsRevoluteJoint" if rotary else "PhysicsPrismaticJoint"
+    return f"""#usda 1.0
+(
+    doc = {_text(title)}
+    defaultPrim = "joint"
+    kilogramsPerUnit = 1
+    metersPerUnit = 1
+    upAxis = "Z"
+)
+
+def PhysicsScene "scene"
+{{
+    vector3f physics:gravityDirection = (0, 0, -1)
+    float physics:gravityMagnitude = {GRAVITY}
+}}
+
+def Xform "joint" (
+    prepend apiSchemas = ["PhysicsArticulationRootAPI", "PhysxArticulationAPI"]
+)
+{{
+    def Xform "base" (
+        prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"]
+    )
+    {{
+        float physics:mass = 1
+        float3 physics:diagonalInertia = (1, 1, 1)
+    }}
+
+    def Xform "moving" (
+        prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"]
+    )
+    {{
+        float physics:mass = {mass:.9g}
+        point3f physics:centerOfMass = ({-across:.9g}, 0, {-along:.9g})
+        float3 physics:diagonalInertia = ({about[0]:.9g}, {about[1]:.9g}, {about[2]:.9g})
+        quatf physics:principalAxes = (1, 0, 0, 0)
+    }}
+
+    def PhysicsFixedJoint "ground"
+    {{
+        rel physics:body1 = </joint/base>
+    }}
+
+    def {joint} "axis" (
+        prepend apiSchemas = ["PhysicsDriveAPI:{way}", "PhysxJointAxisAPI:{way}"]
+    )
+    {{
+        uniform token physics:axis = "{"Y" if rotary else "X"}"
+        rel physics:body0 = </joint/base>
+        rel physics:body1 = </joint/moving>
+        uniform token drive:{way}:physics:type = "force"
+        float drive:{way}:physics:stiffness = 0
+        float drive:{way}:physics:damping = 0
+        float drive:{way}:physics:maxForce = {float(mount.axis.torque_limit):.9g}
+        float physxJointAxis:{way}:armature = 0
+        float physxJointAxis:{way}:staticFrictionEffort = {max(level, break_away(card)):.9g}
+        float physxJointAxis:{way}:dynamicFrictionEffort = {level:.9g}
+        float physxJointAxis:{way}:viscousFrictionCoefficient = {per_degree:.9g}
+    }}
+}}
+"""
+
+
+def break_away(mount: Mount) -> float:
+    """Friction level of a mount at rest, the larger of both directions [N m; N]."""
+    from dataclasses import replace
+
+    at_rest = mount.at(0.0, 0.0, 0.0)
+    levels = [replace(mount, friction=law).level(at_rest) for law in each_way(mount.friction)]
+    return float(np.max([float(level) for level in levels]))
+
+
+def _text(words: str) -> str:
+    return '"' + words.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+ISAAC = Format(
+    key="isaac",
+    title="Isaac Sim (PhysX)",
+    suffix="_isaac.usda",
+    effects={GravityUnbalance: on_rotary("centerOfMass")},
+    friction={"coulomb": "staticFrictionEffort, dynamicFrictionEffort, viscousFrictionCoefficient"},
+    limit="drive maxForce",
+    bristle=False,
+    text=isaac_text,
+)

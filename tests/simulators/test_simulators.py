@@ -1,0 +1,202 @@
+"""A card in other simulators: what files hold moves as the FMU does, and what they lose is what the table says."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from joint_loops import PERIOD, apart, in_fmu, in_mujoco
+
+from cosim.api.export import export
+from cosim.cli import main
+from cosim.simulators import FORMATS
+from cosim.simulators.measure import Held, hold
+from cosim.simulators.motion import along_default
+from pyfmi_models.card import parse_card, read_card
+from pyfmi_models.mount import Mount
+
+BASE = """[mount]
+inertia = 30
+torque_limit = 50
+[friction]
+model = "lugre"
+sigma0 = 9.23e4
+sigma1 = 497
+sigma2 = 32.77
+Fc = 2.322
+Fs = 3.322
+Vs = 0.04129
+"""
+EFFECTS = {
+    "loads": """[[effects]]
+effect = "cogging"
+cycles_per_rev = 240
+amplitude = 0.5
+phase = 0.4
+[[effects]]
+effect = "gravity_unbalance"
+mgl = 3
+phase = 0.7
+[[effects]]
+effect = "torque_offset"
+torque = 1.2
+[[effects]]
+effect = "cable_wrap"
+stiffness = 20
+home = 0.1
+[[effects]]
+effect = "quadratic_drag"
+coefficient = 60
+""",
+    "drive": """[[effects]]
+effect = "delay"
+delay_ms = 3
+[[effects]]
+effect = "actuator_lag"
+time_constant_ms = 4
+""",
+    "play": '[[effects]]\neffect = "backlash"\ngap_rad = 2e-3\nload_friction = 0.3\n',
+    "spring": '[[effects]]\neffect = "compliance"\nresonance_hz = 60\nencoder_share = 0.5\n',
+}
+
+
+def mount(effects: str = "") -> Mount:
+    return parse_card(BASE + EFFECTS.get(effects, effects), "test.toml").plant()
+
+
+def held_by(simulator: str, plant: Mount) -> tuple[Held, str]:
+    held = hold(plant, FORMATS[simulator], along_default(plant))
+    return held, FORMATS[simulator].text(held.mount, plant, "a test")
+
+
+@pytest.mark.parametrize(
+    ("plant", "share"),
+    [
+        pytest.param(read_card("paper_mount").plant(), 0.002, id="lugre"),
+        pytest.param(read_card("emps").plant(), 0.02, id="coulomb, linear"),
+        pytest.param(mount("loads"), 0.002, id="loads"),
+        pytest.param(mount("drive"), 0.01, id="drive"),
+        pytest.param(mount("play"), 0.02, id="play"),
+        pytest.param(mount("spring"), 0.03, id="spring"),
+    ],
+)
+def test_what_mujoco_holds_moves_as_the_fmu(plant: Mount, share: float, tmp_path: Path) -> None:
+    """`share`: of the torque; MuJoCo's dry friction creeps, and its contact is of first order in the time step."""
+    pytest.importorskip("mujoco")
+    held, text = held_by("mujoco", plant)
+    assert held.lost == pytest.approx(0, abs=1e-9)
+    difference, size = apart(in_fmu(plant, tmp_path), in_mujoco(plant, text))
+    assert difference < share * size
+
+
+def test_what_mujoco_loses_in_a_loop_is_what_the_table_says(tmp_path: Path) -> None:
+    """Friction by direction becomes one law for both; the table measures that along another motion as fast."""
+    pytest.importorskip("mujoco")
+    plant = read_card("paper_mount_directional").plant()
+    held, text = held_by("mujoco", plant)
+    difference, _ = apart(in_fmu(plant, tmp_path), in_mujoco(plant, text))
+    assert held.lost == pytest.approx(difference, rel=0.15)
+    assert held.lost > 0.3
+
+
+def recorded(plant: Mount, folder: Path) -> dict[str, np.ndarray]:
+    rows = in_fmu(plant, folder)
+    noise = np.random.default_rng(1).normal(0, 0.1, len(rows))
+    return {"t": np.arange(len(rows)) * PERIOD, "tau": rows[:, 0] + noise, "q": rows[:, 1]}
+
+
+def test_the_error_on_a_recording_stands_beside_that_of_the_card(tmp_path: Path) -> None:
+    plant = mount()
+    table = recorded(plant, tmp_path)
+    card = tmp_path / "mine.toml"
+    card.write_text(BASE)
+    done = export(card, tmp_path / "out", fmi=3, mujoco=True, urdf=True, recording=table)
+    mujoco, urdf = done.held
+    assert mujoco.ratio == pytest.approx(1, abs=0.05)
+    assert urdf.ratio is not None
+    assert urdf.ratio > 1.5, "a level and a viscous coefficient are no Stribeck curve"
+    assert urdf.held_error == pytest.approx((urdf.card_error**2 + urdf.lost**2) ** 0.5, rel=0.1)
+    text = (tmp_path / "out" / "mine_simulators.txt").read_text()
+    assert f"({urdf.ratio - 1:+.1%})" in text
+
+
+def test_a_part_that_is_not_held_is_named_with_its_torque() -> None:
+    plant = mount('[[effects]]\neffect = "cogging"\ncycles_per_rev = 240\namplitude = 0.5\nharmonics = [0.5]\n')
+    lost = {one.part: one.lost for one in held_by("urdf", plant)[0].rows}
+    assert 0.2 < lost["cogging"] < 0.5, "the RMS of a wave of 0.5 N m, less what is faster than 30 Hz"
+    mujoco = {one.part: one for one in held_by("mujoco", plant)[0].rows}["cogging"]
+    assert 0 < mujoco.lost < lost["cogging"]
+    assert "harmonics" in mujoco.note
+
+
+def test_urdf_is_read_by_others_and_says_the_cards_numbers(tmp_path: Path) -> None:
+    yourdfpy = pytest.importorskip("yourdfpy")
+    plant = parse_card(read_text("emps"), "emps").plant()
+    path = tmp_path / "emps.urdf"
+    path.write_text(held_by("urdf", plant)[1])
+    (joint,) = yourdfpy.URDF.load(str(path), load_meshes=False).robot.joints
+    assert (joint.type, joint.limit.effort) == ("prismatic", 351.5)
+    assert (float(joint.dynamics.friction), float(joint.dynamics.damping)) == (20.3935, 203.5034)
+
+
+def read_text(card: str) -> str:
+    return (Path(__file__).parents[2] / "pyfmi_models" / "cards" / f"{card}.toml").read_text()
+
+
+@pytest.mark.parametrize(("simulator", "along"), [("urdf", 9.81), ("mujoco", None)])
+def test_an_unbalance_pulls_as_the_cards_at_every_position(simulator: str, along: float | None) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    plant = mount('[[effects]]\neffect = "gravity_unbalance"\nmgl = 3\nphase = 0.7\n')
+    _, text = held_by(simulator, plant)
+    model = mujoco.MjModel.from_xml_string(text)
+    if along:
+        model.opt.gravity[:] = (0, 0, -along)
+    data = mujoco.MjData(model)
+    for q in (-2.0, 0.0, 0.3, 1.5, 4.0):
+        data.qpos[0] = q
+        mujoco.mj_forward(model, data)
+        assert data.qfrc_bias[0] == pytest.approx(3 * np.sin(q + 0.7), abs=1e-6)
+    assert model.body_inertia[-1].max() + model.body_mass[-1] * (model.body_ipos[-1] ** 2).sum() == pytest.approx(30)
+
+
+def test_isaac_text_is_usd_with_friction_per_degree(tmp_path: Path) -> None:
+    usd = pytest.importorskip("pxr.Usd")
+    held, text = held_by("isaac", mount())
+    path = tmp_path / "joint.usda"
+    path.write_text(text)
+    stage = usd.Stage.Open(str(path))
+    joint = stage.GetPrimAtPath("/joint/axis")
+    assert joint.GetTypeName() == "PhysicsRevoluteJoint"
+    shown = [one for one in joint.GetAttributes() if "physxJoint" in one.GetName()]
+    numbers = {one.GetName().split(":")[-1]: one.Get() for one in shown}
+    assert numbers["staticFrictionEffort"] == pytest.approx(3.322)
+    law = held.mount.friction
+    assert numbers["dynamicFrictionEffort"] == pytest.approx(law.Fc)
+    assert numbers["viscousFrictionCoefficient"] == pytest.approx(law.sigma2 * np.pi / 180)
+
+
+def code_of(command: list[str]) -> object:
+    with pytest.raises(SystemExit) as left:
+        main(command)
+    return left.value.code
+
+
+def test_the_command_writes_files_and_a_table_and_overwrites_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ["export", "paper_mount", "--fmi", "3", "--mujoco", "--urdf", "--isaac", "--json", "--out", str(tmp_path)]
+    assert code_of(asked) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert {Path(told[name]).name for name in ("mujoco", "urdf", "isaac", "table")} <= {
+        one.name for one in tmp_path.iterdir()
+    }
+    assert [one["simulator"] for one in told["held"]] == ["mujoco", "urdf", "isaac"]
+    assert code_of(asked) == 2
+    assert "exists already" in capsys.readouterr().err
+
+
+def test_a_recording_that_is_none_is_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["export", "paper_mount", "--urdf", "--recording", str(tmp_path / "none.csv"), "--out", str(tmp_path / "o")]
+    assert code_of(asked) == 2
+    assert "none.csv" in capsys.readouterr().err
+    assert not (tmp_path / "o").exists()
