@@ -4,6 +4,7 @@ Attributes of a rotary joint are per degree where they are per angle: the viscou
 Reference: Omniverse physics, "PhysxJointAxisAPI"; PhysX 5.6, "Articulation Joint Friction" (2025); UsdPhysics.
 """
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -16,18 +17,9 @@ from pyfmi_models.friction.base import each_way
 from pyfmi_models.mount import Mount
 
 
-def isaac_text(mount: Mount, card: Mount, title: str) -> str:
-    """Write a mount that PhysX holds as a whole; the break-away level is the card's."""
-    rotary = mount.motion == "rotary"
-    inertia, (along, across), mass = off_axis(mount, float(mount.axis.inertia))
-    about = (inertia / 2, inertia, inertia / 2) if rotary else (1.0, 1.0, 1.0)
-    law, way = mount.friction, "angular" if rotary else "linear"
-    level, viscous = (float(law.Fc), float(law.sigma2)) if isinstance(law, Coulomb) else (0.0, 0.0)
-    per_degree = viscous * (pi / 180 if rotary else 1)
-    joint = "PhysicsRevoluteJoint" if rotary else "PhysicsPrismaticJoint"
-    return f"""#usda 1.0
+_USD = """#usda 1.0
 (
-    doc = {_text(title)}
+    doc = {title}
     defaultPrim = "joint"
     kilogramsPerUnit = 1
     metersPerUnit = 1
@@ -37,7 +29,7 @@ def isaac_text(mount: Mount, card: Mount, title: str) -> str:
 def PhysicsScene "scene"
 {{
     vector3f physics:gravityDirection = (0, 0, -1)
-    float physics:gravityMagnitude = {GRAVITY}
+    float physics:gravityMagnitude = {gravity}
 }}
 
 def Xform "joint" (
@@ -57,8 +49,8 @@ def Xform "joint" (
     )
     {{
         float physics:mass = {mass:.9g}
-        point3f physics:centerOfMass = ({-across:.9g}, 0, {-along:.9g})
-        float3 physics:diagonalInertia = ({about[0]:.9g}, {about[1]:.9g}, {about[2]:.9g})
+        point3f physics:centerOfMass = ({x:.9g}, 0, {z:.9g})
+        float3 physics:diagonalInertia = ({plate:.9g}, {about:.9g}, {plate:.9g})
         quatf physics:principalAxes = (1, 0, 0, 0)
     }}
 
@@ -71,26 +63,47 @@ def Xform "joint" (
         prepend apiSchemas = ["PhysicsDriveAPI:{way}", "PhysxJointAxisAPI:{way}"]
     )
     {{
-        uniform token physics:axis = "{"Y" if rotary else "X"}"
+        uniform token physics:axis = "{axis}"
         rel physics:body0 = </joint/base>
         rel physics:body1 = </joint/moving>
         uniform token drive:{way}:physics:type = "force"
         float drive:{way}:physics:stiffness = 0
         float drive:{way}:physics:damping = 0
-        float drive:{way}:physics:maxForce = {float(mount.axis.torque_limit):.9g}
+        float drive:{way}:physics:maxForce = {limit:.9g}
         float physxJointAxis:{way}:armature = 0
-        float physxJointAxis:{way}:staticFrictionEffort = {max(level, break_away(card)):.9g}
+        float physxJointAxis:{way}:staticFrictionEffort = {static:.9g}
         float physxJointAxis:{way}:dynamicFrictionEffort = {level:.9g}
-        float physxJointAxis:{way}:viscousFrictionCoefficient = {per_degree:.9g}
+        float physxJointAxis:{way}:viscousFrictionCoefficient = {viscous:.9g}
     }}
 }}
 """
 
 
+def isaac_text(mount: Mount, card: Mount, title: str) -> str:
+    """Write a mount that PhysX holds as a whole; the break-away level is the card's."""
+    rotary, law = mount.motion == "rotary", mount.friction
+    inertia, (along, across), mass = off_axis(mount, float(mount.axis.inertia))
+    level, viscous = (float(law.Fc), float(law.sigma2)) if isinstance(law, Coulomb) else (0.0, 0.0)
+    return _USD.format(
+        title=_text(title),
+        gravity=GRAVITY,
+        mass=mass,
+        x=-across,
+        z=-along,
+        plate=inertia / 2 if rotary else 1.0,
+        about=inertia if rotary else 1.0,
+        joint="PhysicsRevoluteJoint" if rotary else "PhysicsPrismaticJoint",
+        way="angular" if rotary else "linear",
+        axis="Y" if rotary else "X",
+        limit=float(mount.axis.torque_limit),
+        static=max(level, break_away(card)),
+        level=level,
+        viscous=viscous * (pi / 180 if rotary else 1),
+    )
+
+
 def break_away(mount: Mount) -> float:
     """Friction level of a mount at rest, the larger of both directions [N m; N]."""
-    from dataclasses import replace
-
     at_rest = mount.at(0.0, 0.0, 0.0)
     levels = [replace(mount, friction=law).level(at_rest) for law in each_way(mount.friction)]
     return float(np.max([float(level) for level in levels]))
