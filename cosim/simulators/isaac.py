@@ -16,7 +16,6 @@ from pyfmi_models.friction import Coulomb
 from pyfmi_models.friction.base import each_way
 from pyfmi_models.mount import Mount
 
-
 _USD = """#usda 1.0
 (
     doc = {title}
