@@ -86,6 +86,7 @@ def card(
     inertia: float | None = None,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
+    layout: Mapping[str, str] | None = None,
     force: bool = False,
     on_progress: Callable[[str], None] = lambda text: None,
 ) -> CardResult:
@@ -98,6 +99,7 @@ def card(
         inertia: where it is known [kg m2, kg]; it is not estimated then.
         columns: our name to the source's, as in `cosim.read`.
         units: our name to the unit in the source, as in `cosim.read`.
+        layout: how texts are written, as in `cosim.read`.
         force: overwrite what is there.
         on_progress: called with a few words on what is being done.
 
@@ -108,7 +110,7 @@ def card(
     file = None if out is None else Path(out)
     if file is not None:
         check_free(file, force)
-    taken = read_all(recordings, "recording", columns, units)
+    taken = read_all(recordings, "recording", columns, units, layout)
     kind, assumed = kind_of(taken, motion)
     check_kind(taken, kind)
     found = first_card(taken, kind, inertia, on_progress)

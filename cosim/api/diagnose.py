@@ -4,12 +4,13 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pandas as pd
 
 from cosim.api.defaults import estimated, split
-from cosim.api.recordings import Source, read_all
+from cosim.api.recordings import Source, Written, read_all
+from cosim.api.tables import findings_frame, missing_frame
 from cosim.api.why import frame
 from cosim.data.recording import Recording
 from cosim.delivery.closed_loop import Loops
@@ -24,6 +25,7 @@ from cosim.diagnosis.diagnose import diagnose as find
 from cosim.diagnosis.search.side_by_side import side_by_side
 from cosim.fmi.alias import Alias
 from cosim.reading import check_kind
+from cosim.report.answer_figure import answer_figure
 from cosim.report.terminal import summary
 from cosim.support.errors import InputError
 from cosim.support.files import check_directory
@@ -33,7 +35,7 @@ from cosim.support.plain import JsonObject
 from pyfmi_models.card import Card, read_card
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class DiagnosisResult:
     """The answer of a diagnosis, and the better card."""
 
@@ -62,6 +64,22 @@ class DiagnosisResult:
         """Every structure that was fitted, a row each: evidence, held-out gain, and the rule that refuses it."""
         return frame(self.diagnosis.ledger)
 
+    def frame(self) -> pd.DataFrame:
+        """Return the findings as a table, a row an effect, with answer, probability, size and its range."""
+        return findings_frame(self.findings)
+
+    @property
+    def missing_torque(self) -> pd.DataFrame:
+        """What the refitted card leaves (`missing`, `band`) and what the effects leave (`after`), a row a sample.
+
+        Torques in N.m (N on a linear axis); `band` is the half width of the 95 % band.
+        """
+        return missing_frame(self.diagnosis.traces)
+
+    def plot(self) -> Any:
+        """Return a matplotlib figure: the error on the validation run, and its missing torque before and after."""
+        return answer_figure(self.diagnosis)
+
     def as_json(self) -> JsonObject:
         """Return everything as plain data, as diagnosis.json holds it."""
         return as_json(self.diagnosis)
@@ -76,6 +94,11 @@ class DiagnosisResult:
             OutputError: the folder holds a proposal and `force` is not set, or effects are loaded from it.
         """
         return write_proposals(self.proposals, Path(folder), force)
+
+    def __repr__(self) -> str:
+        said = ", ".join(self.missing) or "nothing missing"
+        held = self.diagnosis.heldout
+        return f"DiagnosisResult({said}; validation RMS {held.before_rms:.3g} -> {held.after_rms:.3g})"
 
     def __str__(self) -> str:
         return summary(self.diagnosis)
@@ -98,6 +121,7 @@ def diagnose(
     motion: str = "",
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
+    layout: Mapping[str, str] | None = None,
     fmu: str | Path | None = None,
     variables: Mapping[str, str] | None = None,
     quick: bool = False,
@@ -120,6 +144,7 @@ def diagnose(
         motion: "rotary" or "linear", where there is neither a card nor a unit that says it.
         columns: our name to the source's, as in `cosim.read`; they come before the card's.
         units: our name to the unit in the source, as in `cosim.read`.
+        layout: how texts are written, as in `cosim.read`.
         fmu: anyone's plant FMU as the base; the card then says roughly what it is.
         variables: our name to the FMU's, where they differ: {"tau": "Motor.torque"}.
         quick: write diagnosis.json and card.toml alone, and close no loop.
@@ -140,7 +165,7 @@ def diagnose(
     if folder:
         check_out(folder, force, QUICK if quick else FILES)
         check_directory(folder)
-    given = _read(train, heldout, card, columns or {}, units, motion, on_progress)
+    given = _read(train, heldout, card, Written(columns, units, layout), motion, on_progress)
     if fmu is not None:
         given = _beside(_black_box(fmu, variables or {}), given, on_progress)
     before = _written(folder) if folder and force else {}
@@ -196,15 +221,14 @@ def _read(
     train: Source | Sequence[Source],
     heldout: Source | Sequence[Source],
     card: str | Path | Card | None,
-    columns: Mapping[str, str],
-    units: Mapping[str, str] | None,
+    written: Written,
     motion: str,
     on_progress: Callable[[str], None],
 ) -> _Given:
     """Read the card, and the recordings as it calls their columns; check that they belong together."""
     believed, notes = card if isinstance(card, Card) or card is None else read_card(card), []
-    names = (dict(believed.columns) if believed else {}) | dict(columns)
-    fitted, held = read_all(train, "train", names, units), read_all(heldout, "heldout", names, units)
+    written = written.beside(believed.columns if believed else {})
+    fitted, held = (read_all(some, kind, *written) for some, kind in ((train, "train"), (heldout, "heldout")))
     check_split(fitted, held)
     if not held:
         fitted, held, said = split(fitted)

@@ -4,13 +4,16 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypedDict, Unpack, overload
+from typing import Any, TypedDict, Unpack, overload
+
+import pandas as pd
 
 from cosim.api.calibrate import CalibrateResult, calibrate, subject_of
 from cosim.api.recordings import Source, read_all
 from cosim.calibration.calibrate import Options as Calibration
 from cosim.calibration.fit import Loss
 from cosim.estimation.identify import deliver
+from cosim.estimation.identify.figures import map_figure
 from cosim.estimation.identify.identify import Identified, Options
 from cosim.estimation.identify.identify import identify as find
 from cosim.reading import check_kind
@@ -21,7 +24,7 @@ from cosim.system.scenario import Scenario
 from pyfmi_models.card import Card, read_card
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class IdentifyResult:
     """What was identified: every estimate with its standard errors, and the card with the new numbers."""
 
@@ -41,6 +44,20 @@ class IdentifyResult:
     def as_json(self) -> JsonObject:
         """Return everything as plain data, as identify.json holds it."""
         return deliver.as_json(self.identified, self.given)
+
+    def frame(self) -> pd.DataFrame:
+        """Return the numbers as a table, a row a parameter: `parameter`, `given`, `value`, `unit`."""
+        before = {one.name: float(one.start) for one in self.given.plant().parameters()}
+        known = self.card.plant().parameters()
+        rows = [(one.name, before.get(one.name), float(one.start), one.unit) for one in known]
+        return pd.DataFrame(rows, columns=["parameter", "given", "value", "unit"])
+
+    def plot(self) -> Any:
+        """Return a matplotlib figure: friction over speed, samples and fits with their bands."""
+        return map_figure(self.identified, self.given)
+
+    def __repr__(self) -> str:
+        return f"IdentifyResult({self.card.mount.name!r}, {len(self.numbers)} numbers)"
 
     def __str__(self) -> str:
         return deliver.summary(self.identified, self.given)

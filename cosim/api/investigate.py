@@ -22,7 +22,7 @@ from cosim.support.plain import JsonObject
 from pyfmi_models.card import Card
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class InvestigateResult:
     """What an investigation did, its last diagnosis, and the better card."""
 
@@ -38,6 +38,9 @@ class InvestigateResult:
     def as_json(self) -> JsonObject:
         """Return the story as plain data, as story.json holds it."""
         return self.story.as_json()
+
+    def __repr__(self) -> str:
+        return f"InvestigateResult({', '.join(self.missing) or 'nothing missing'})"
 
     def __str__(self) -> str:
         return str(self.story)

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from cosim.data.recording import REQUIRED, Recording
 
@@ -47,15 +47,30 @@ def read(
     return Recording.of(_table(source), name, columns, units, required)
 
 
+class Written(NamedTuple):
+    """How sources are written: our name to theirs, our name to their unit, and of texts the layout."""
+
+    columns: Mapping[str, str] | None = None
+    units: Mapping[str, str] | None = None
+    layout: Mapping[str, str] | None = None
+
+    def beside(self, columns: Mapping[str, str]) -> "Written":
+        """The same with a card's columns, which come after those that are given."""
+        return self._replace(columns=dict(columns) | dict(self.columns or {}))
+
+
 def read_all(
     sources: Source | Sequence[Source],
     kind: str,
     columns: Mapping[str, str] | None,
     units: Mapping[str, str] | None,
+    layout: Mapping[str, str] | None = None,
 ) -> list[Recording]:
     """Read one recording or several; tables in memory are called "`kind` 1", "`kind` 2", ..."""
     several = sources if isinstance(sources, list | tuple) else [sources]
-    return [read(one, columns=columns, units=units, name=f"{kind} {k}") for k, one in enumerate(several, 1)]
+    return [
+        read(one, columns=columns, units=units, name=f"{kind} {k}", layout=layout) for k, one in enumerate(several, 1)
+    ]
 
 
 def _table(source: Any) -> dict[str, Any]:

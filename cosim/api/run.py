@@ -27,6 +27,7 @@ def run(
     set: Mapping[str, Value] | None = None,  # the word of the option
     stop: float | None = None,
     page: bool = True,
+    outside: bool = False,
     force: bool = False,
     compiled: bool = True,
     isolate: bool | None = None,
@@ -43,6 +44,7 @@ def run(
         set: other numbers for this run, by name: {"controller.kp": 400.0}; those that a sweep can vary.
         stop: time at which it ends instead [s].
         page: write run.html, the page of pictures.
+        outside: read files beside an SSP that it names outside of itself.
         force: overwrite what is there.
         compiled: False asks for the loop in Python, which is slow and gives the same bits.
         isolate: run in a process of its own, which may crash; None does so where there is a folder and the scenario
@@ -61,7 +63,7 @@ def run(
         StepError: a component failed; what was recorded before is in the file.
         LostComponentError: an isolated component ended, crashed or blocked its process.
     """
-    wanted = scenario if isinstance(scenario, Scenario) else read_scenario(str(scenario))
+    wanted = scenario if isinstance(scenario, Scenario) else read_scenario(str(scenario), outside)
     folder = None if out is None else Path(out)
     for path in files_of(folder, page).values():
         check_free(path, force)

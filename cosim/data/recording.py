@@ -25,9 +25,10 @@ from cosim.data.registers import at_an_end, continued
 from cosim.data.runs import named
 from cosim.data.speeds import with_speed
 from cosim.data.times import read_clock
-from cosim.support.errors import OutputError
+from cosim.support.errors import OutputError, RecordingError
 from cosim.support.files import replacing
 from cosim.support.html import table as html_table
+from cosim.support.pictures import picture
 from cosim.support.plain import JsonObject
 from cosim.support.statistics import rms
 from cosim.support.units import unit
@@ -49,7 +50,7 @@ class Gap:
     missing: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Recording:
     """Samples by column, float64 and of equal length, with units, origin and notes on what was left out.
 
@@ -271,6 +272,17 @@ class Recording:
         import pandas as pd
 
         return pd.DataFrame(self.table)
+
+    def plot(self, *columns: str) -> Any:
+        """Return a matplotlib figure of the columns over time (all where none is named)."""
+        for name in columns:
+            if name not in self.table:
+                text = f'{self.name} has no column "{name}"; columns are: {", ".join(self)}.'
+                raise RecordingError(text, culprit=name, choices=tuple(self))
+        return picture("recording", self, columns)
+
+    def __repr__(self) -> str:
+        return f"Recording({self.name!r}, {len(self):,} rows, {self.duration:.4g} s, {', '.join(self)})"
 
     def __str__(self) -> str:
         columns = ", ".join(f"{name} [{self.units.get(name, '?')}]" for name in self)

@@ -33,7 +33,7 @@ class Statistics(TypedDict):
     tracking: NotRequired[Sequence[Mapping[str, float | str]]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class RunResult:
     """What a run gave: its name, statistics as in run.json, and the files that were written, by kind."""
 
@@ -50,6 +50,13 @@ class RunResult:
     def frame(self) -> object:
         """Return the recording as a pandas `DataFrame`, a row a sample."""
         return self.recording.frame()
+
+    def plot(self, *columns: str) -> object:
+        """Return a matplotlib figure of the recording over time (all columns where none is named)."""
+        return self.recording.plot(*columns)
+
+    def __repr__(self) -> str:
+        return f"RunResult({self.name!r}, {self.statistics['steps']:,} steps, {self.statistics['rows']:,} rows)"
 
     def __str__(self) -> str:
         first, *more = [*_tracked(self.statistics), _speed(self.statistics)]

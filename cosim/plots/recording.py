@@ -112,7 +112,7 @@ def draw(recording: Recording, sources: Mapping[str, str], path: Path, force: bo
             one.plot(*thin(recording.t - recording.t[0], recording[name] * scale.factor, 1000), color=AFTER)
             source = sources.get(name, name)
             one.set_title(source if source == name else f"{name} = {source}", loc="left")
-            one.set_ylabel(scale.unit or "?")
+            one.set_ylabel(scale.unit or "no unit")
         axes[-1].set_xlabel("time [s]")
         kind = path.suffix.lstrip(".").lower()
         with replacing(path, force) as partial:

@@ -13,8 +13,8 @@ from cosim.estimation.identify.identify import Identified, is_step
 from cosim.estimation.identify.machine import Machine
 from cosim.estimation.identify.output_error import closed_loop, output_model, replay_of
 from cosim.estimation.identify.presliding import simulated
-from cosim.plots.sheet import figure, plain_logs
-from cosim.plots.style import AFTER, BEFORE, GREY, LINE, MEASURED
+from cosim.plots.sheet import SIZES, figure, plain_logs
+from cosim.plots.style import AFTER, BEFORE, GREY, LINE, MEASURED, STYLE
 from pyfmi_models.card import Card
 
 POINTS = 700
@@ -35,6 +35,38 @@ def draw_map(found: Identified, recordings: Sequence[Recording], card: Card, pat
         top = max(one.get_ylim()[1] for one in axes)
         for one in axes:
             one.set_ylim(min(other.get_ylim()[0] for other in axes), top)
+
+
+def map_figure(found: Identified, card: Card) -> Any:
+    """Return the figure of the friction map; without a map, of the numbers before and after."""
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context({**STYLE, **SIZES}):
+        if found.map is None:
+            return _numbers_figure(found, card)
+        sides = [name for name in ("positive", "negative") if name in found.map.fits]
+        speed, force, _ = UNITS[card.mount.motion]
+        sheet = Figure(figsize=(4.6 * len(sides), 3.6), layout="constrained")
+        for one, name in zip(sheet.subplots(1, len(sides), squeeze=False, sharey=True)[0], sides, strict=True):
+            _side(one, found.map, name)
+            one.set(xlabel=f"speed [{speed}]", ylabel=f"friction [{force}]")
+    return sheet
+
+
+def _numbers_figure(found: Identified, card: Card) -> Any:
+    """Each number that was identified relative to the given card's."""
+    from matplotlib.figure import Figure
+
+    before = {one.name: one.start for one in card.plant().parameters()}
+    after = {one.name: one.start for one in found.card.plant().parameters() if before.get(one.name)}
+    ratios = {name: value / before[name] for name, value in after.items() if value != before[name]}
+    sheet = Figure(figsize=(6, 1 + 0.35 * max(len(ratios), 1)), layout="constrained")
+    axes = sheet.subplots()
+    axes.barh(list(ratios), [ratio - 1 for ratio in ratios.values()], left=1, color=AFTER)
+    axes.axvline(1, color=GREY, lw=0.8)
+    axes.set_xlabel("identified number over the given one [1]")
+    return sheet
 
 
 def _side(axes: Any, found: FrictionMap, name: str) -> None:
