@@ -1,4 +1,4 @@
-"""`cosim.export`: a card to FMUs, and on wish to an SSP, to Modelica text and to files of other simulators."""
+"""`cosim.export`: a card to FMUs, and on wish to an SSP, to Modelica, C and files of other simulators."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -11,6 +11,7 @@ from cosim.reading import check_kind
 from cosim.simulators import FORMATS
 from cosim.simulators.deliver import Planned
 from cosim.simulators.deliver import planned as planned_files
+from cosim.simulators.format import Format
 from cosim.simulators.measure import Held
 from cosim.simulators.table import table_text
 from cosim.support.files import check_free, directory
@@ -28,7 +29,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written: FMUs, SSP, Modelica package, files of simulators (None or empty where not asked for).
+    """What was written: FMUs, SSP, Modelica packages, C, files of simulators (None or empty where not asked for).
 
     `held` says what each simulator holds of the card and what it loses, and `table` is the file that says so.
     """
@@ -36,23 +37,23 @@ class Exported:
     fmus: tuple[Path, ...]
     ssp: Path | None = None
     modelica: Path | None = None
+    flange: Path | None = None
+    c: Path | None = None
     simulators: tuple[Path, ...] = ()
     table: Path | None = None
     held: tuple[Held, ...] = ()
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """All files in the order in which they were written."""
-        return (*self.fmus, *(path for path in (self.ssp, self.modelica) if path), *self.simulators, *self._tables)
-
-    @property
-    def _tables(self) -> tuple[Path, ...]:
-        return (self.table,) if self.table else ()
+        """All files in the order in which they were written; of the C project its folder."""
+        others = (self.ssp, self.modelica, self.flange, self.c)
+        return (*self.fmus, *(one for one in (*others, *self.simulators, self.table) if one))
 
     def as_json(self) -> JsonObject:
         """Return paths and tables as plain data."""
+        others = {"ssp": self.ssp, "modelica": self.modelica, "modelica_flange": self.flange, "c": self.c}
         found: JsonObject = {"fmus": [str(path) for path in self.fmus]}
-        found |= {kind: str(path) for kind, path in (("ssp", self.ssp), ("modelica", self.modelica)) if path}
+        found |= {kind: str(path) for kind, path in others.items() if path}
         found |= {one.format.key: str(path) for one, path in zip(self.held, self.simulators, strict=True)}
         return found | ({"table": str(self.table), "held": [one.as_json() for one in self.held]} if self.held else {})
 
@@ -80,6 +81,8 @@ def export(
     platform: str = "host",
     ssp: bool = False,
     modelica: bool = False,
+    modelica_flange: bool = False,
+    c: bool = False,
     mujoco: bool = False,
     urdf: bool = False,
     isaac: bool = False,
@@ -96,6 +99,8 @@ def export(
         platform: "host", "all", or names with commas between ("x86_64-linux,aarch64-linux").
         ssp: also wire plant, controller and a set point as one SSP 1.0, NAME.ssp.
         modelica: also write the plant as a Modelica package.
+        modelica_flange: also write it with flanges of the Modelica Standard Library, acausal.
+        c: also write it as plain C99, NAME_c: a function that steps, its header, a small program.
         mujoco: also write the joint for MuJoCo, NAME_mujoco.xml.
         urdf: also write the joint as a robot description, NAME.urdf.
         isaac: also write the joint for Isaac Sim, NAME_isaac.usda.
@@ -112,19 +117,22 @@ def export(
         RecordingError: the recording is not good.
         OutputError: a file is there already; nothing was written then.
     """
-    asked = {"mujoco": mujoco, "urdf": urdf, "isaac": isaac}
-    simulators = [name for name, wanted in asked.items() if wanted]
-    plan = planned(card, out, fmi, platform, ssp, modelica, force, simulators=simulators, recording=recording)
-    return plan.write(on_progress)
+    asked = {"ssp": ssp, "modelica": modelica, "modelica_flange": modelica_flange, "c": c}
+    kinds = kinds_of(**asked, mujoco=mujoco, urdf=urdf, isaac=isaac)
+    return planned(card, out, fmi, platform, force, kinds, recording).write(on_progress)
+
+
+def kinds_of(**asked: bool) -> tuple[str, ...]:
+    """Names of what is asked for."""
+    return tuple(name for name, wanted in asked.items() if wanted)
 
 
 @dataclass(frozen=True)
 class Plan:
-    """What will be written, all of it checked."""
+    """What will be written, all of it checked; `others` are by kind: path, and what writes it."""
 
     archives: tuple[_Archive, ...]
-    ssp: tuple[Path, Writer] | None
-    modelica: tuple[Path, Writer] | None
+    others: dict[str, tuple[Path, Writer]]
     force: bool
     simulators: Planned | None = None
 
@@ -134,10 +142,10 @@ class Plan:
             on_progress(done, len(self.archives))
             directory(one.path.parent)
             export_fmu(one.model, one.path, fmi=one.fmi, force=self.force, platforms=one.machines)
-        for path, write in self._others():
+        for path, write in self.others.values():
             write(path, self.force)
-        ssp, modelica = (one[0] if one else None for one in (self.ssp, self.modelica))
-        found = Exported(tuple(one.path for one in self.archives), ssp, modelica)
+        ssp, modelica, flange, c = (self.others.get(one, (None,))[0] for one in ("ssp", *_OTHERS))
+        found = Exported(tuple(one.path for one in self.archives), ssp, modelica, flange, c)
         if self.simulators is None:
             return found
         held, files = self.simulators.write(self.force), tuple(path for _, path in self.simulators.files)
@@ -146,11 +154,8 @@ class Plan:
     def check(self) -> None:
         """Refuse to write over what is there (raises OutputError)."""
         files = self.simulators.paths if self.simulators else ()
-        for path in (*(one.path for one in self.archives), *(path for path, _ in self._others()), *files):
+        for path in (*(one.path for one in self.archives), *(path for path, _ in self.others.values()), *files):
             check_free(path, self.force)
-
-    def _others(self) -> list[tuple[Path, Writer]]:
-        return [one for one in (self.ssp, self.modelica) if one]
 
 
 def planned(
@@ -158,35 +163,37 @@ def planned(
     out: str | Path,
     fmi: Fmi | Literal["both"],
     platform: str,
-    ssp: bool,
-    modelica: bool,
     force: bool,
-    *,
-    simulators: Sequence[str] = (),
+    kinds: Sequence[str] = (),
     recording: Source | None = None,
 ) -> Plan:
-    """Check everything that `export` was given, and return what will be written; arguments and errors are its own."""
+    """Check everything that `export` was given, and return what will be written; arguments and errors are its own.
+
+    `kinds` are the words of what is wanted beside the FMUs: "ssp", "modelica", "mujoco", ...
+    """
     platforms, folder = platforms_of(platform), Path(out)
     read = card if isinstance(card, Card) else read_card(card)
     stem = Path(read.path).stem or read.plant().name
     versions: tuple[Fmi, ...] = (2, 3) if fmi == "both" else (fmi,)
+    formats = [FORMATS[kind] for kind in kinds if kind in FORMATS]
+    others = {kind: make(read, folder, stem) for kind, make in _OTHERS.items() if kind in kinds}
+    if "ssp" in kinds:
+        others = {"ssp": (folder / f"{stem}.ssp", _system_writer(read, versions[0], platforms))} | others
     plan = Plan(
         archives=tuple(_archives(read, folder, stem, versions, platforms)),
-        ssp=(folder / f"{stem}.ssp", _system_writer(read, versions[0], platforms)) if ssp else None,
-        modelica=_modelica_writer(read, folder, stem) if modelica else None,
+        others=others,
         force=force,
-        simulators=_simulators(read, folder, stem, simulators, recording) if simulators else None,
+        simulators=_simulators(read, folder, stem, formats, recording) if formats else None,
     )
     plan.check()
     return plan
 
 
-def _simulators(card: Card, folder: Path, stem: str, simulators: Sequence[str], recording: Source | None) -> Planned:
+def _simulators(card: Card, folder: Path, stem: str, formats: Sequence[Format], recording: Source | None) -> Planned:
     """Name the files for simulators, and read the recording along which they are compared."""
     taken = None if recording is None else read_recording(recording, columns=card.columns)
     if taken is not None:
         check_kind([taken], card.mount.motion)
-    formats = [FORMATS[name] for name in simulators]
     return planned_files(card.plant(), card.path or stem, formats, folder, stem, taken)
 
 
@@ -227,3 +234,29 @@ def _modelica_writer(card: Card, out: Path, stem: str) -> tuple[Path, Writer]:
     plant = card.plant()
     path = out / f"{package_name(stem)}.mo"
     return path, lambda path, force: export_modelica(plant.model(), path, derivation_of(plant), force=force)
+
+
+def _flange_writer(card: Card, out: Path, stem: str) -> tuple[Path, Writer]:
+    """The same of the package with flanges."""
+    from pyfmi_models.derivation import derivation_of
+    from pyfmi_models.export.flange import export_flange
+    from pyfmi_models.export.modelica import package_name
+
+    plant = card.plant()
+    path = out / f"{package_name(stem)}Flange.mo"
+    return path, lambda path, force: export_flange(plant.model(), path, derivation_of(plant), force=force)
+
+
+def _c_writer(card: Card, out: Path, stem: str) -> tuple[Path, Writer]:
+    """The same of the folder with the plant in C."""
+    from pyfmi_models.export.c_function import export_c
+
+    plant = card.plant()
+    return out / f"{stem}_c", lambda path, force: export_c(plant.model(), path, force=force)
+
+
+_OTHERS: dict[str, Callable[[Card, Path, str], tuple[Path, Writer]]] = {
+    "modelica": _modelica_writer,
+    "modelica_flange": _flange_writer,
+    "c": _c_writer,
+}

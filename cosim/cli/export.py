@@ -32,6 +32,8 @@ def export(
     platform: Annotated[str, typer.Option("--platform", help="host, all, or names with commas between.")] = "host",
     ssp: Annotated[bool, typer.Option("--ssp", help="Also wire plant, controller and a set point: NAME.ssp.")] = False,
     modelica: Annotated[bool, typer.Option("--modelica", help="Also write the plant as Modelica text.")] = False,
+    modelica_flange: Annotated[bool, typer.Option("--modelica-flange", help="Also with flanges, acausal.")] = False,
+    c: Annotated[bool, typer.Option("--c", help="Also write the plant as plain C99.")] = False,
     mujoco: Annotated[bool, typer.Option("--mujoco", help="Also write the joint for MuJoCo.")] = False,
     urdf: Annotated[bool, typer.Option("--urdf", help="Also write the joint as URDF.")] = False,
     isaac: Annotated[bool, typer.Option("--isaac", help="Also write the joint for Isaac Sim.")] = False,
@@ -43,11 +45,11 @@ def export(
 ) -> None:
     """Write the plant of a card and, where it has one, its controller as FMUs; also for other simulators."""
     out = out or default_out(Path(card).stem)
-    from cosim.api.export import planned
+    from cosim.api.export import kinds_of, planned
 
-    asked = {"mujoco": mujoco, "urdf": urdf, "isaac": isaac}
-    simulators = [name for name, wanted in asked.items() if wanted]
-    plan = planned(card, out, VERSIONS[fmi], platform, ssp, modelica, force, simulators=simulators, recording=recording)
+    asked = {"ssp": ssp, "modelica": modelica, "modelica_flange": modelica_flange, "c": c}
+    kinds = kinds_of(**asked, mujoco=mujoco, urdf=urdf, isaac=isaac)
+    plan = planned(card, out, VERSIONS[fmi], platform, force, kinds, recording)
     with stage(f"{Path(card).stem}: {len(plan.archives)} FMUs") as progress:
         done = plan.write(progress)
     put_json(done.as_json()) if as_json else put(str(done))

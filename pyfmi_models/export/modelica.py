@@ -8,7 +8,7 @@ part needs from others are its inputs, bound where it is instantiated. Nothing o
 import math
 import re
 import textwrap
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from pyfmi_models.errors import ExportError
@@ -40,16 +40,21 @@ def export_modelica(model: Model, path: Path, derivation: Derivation | None = No
     return path
 
 
-def modelica_text(model: Model, package: str, derivation: Derivation | None = None) -> str:
-    """Write the package; without a derivation its parts have no text and their equations no quantities between."""
+def modelica_text(
+    model: Model, package: str, derivation: Derivation | None = None, around: Sequence[str] = (), uses: str = ""
+) -> str:
+    """Write the package; without a derivation its parts have no text and their equations no quantities between.
+
+    `around` are the lines of a further class behind `Plant`, and `uses` is the annotation of what that needs.
+    """
     if not re.fullmatch(r"[A-Za-z]\w*", package, re.ASCII):
         raise ExportError(f'"{package}" is no name of a Modelica package: letters, digits and "_", a letter first')
     if model.period is not None:
         raise ExportError(f'model "{model.name}" is sampled, and only continuous models are written in Modelica')
     book = Book(model, derivation)
     inside = [line for part in book.parts.values() if part.prefix for line in (*_class(book, part), "")]
-    inside += [*_class(book, book.parts[""]), "", *_documentation(_HEAD)]
-    return "\n".join([f"package {package} {_string(model.description)}", *_indented(inside), f"end {package};"]) + "\n"
+    inside += [*_class(book, book.parts[""]), "", *around, *([""] if around else []), *_documentation(_HEAD, uses)]
+    return "\n".join([f"package {package} {quoted(model.description)}", *_indented(inside), f"end {package};"]) + "\n"
 
 
 def package_name(name: str) -> str:
@@ -60,7 +65,7 @@ def package_name(name: str) -> str:
 
 def _class(book: Book, part: Part) -> Iterator[str]:
     kind = "model" if part.definitions else "record"
-    yield f"{kind} {part.title} {_string(_first_line(part.text))}"
+    yield f"{kind} {part.title} {quoted(_first_line(part.text))}"
     yield from _indented([*_declarations(part), *([] if part.prefix else _instances(book))])
     if part.definitions:
         yield "equation"
@@ -76,7 +81,7 @@ def _instances(book: Book) -> Iterator[str]:
         if prefix:
             bound = ", ".join(f"{one.local} = {book.reference(one.name, whole)}" for one in part.needed.values())
             inputs = f"({bound})" if bound else ""
-            yield from _wrapped(f"{part.title} {prefix}{inputs} {_string(_first_line(part.text))};")
+            yield from _wrapped(f"{part.title} {prefix}{inputs} {quoted(_first_line(part.text))};")
 
 
 def _declarations(part: Part) -> Iterator[str]:
@@ -104,7 +109,7 @@ def _declared(kind: str, one: Named, value: str = "", start: str = "") -> Iterat
     facts += [f"nominal = {number_text(variable.nominal)}"] if variable.nominal != 1 else []
     facts += [start] if start else []
     about = f"({', '.join(facts)})" if facts else ""
-    yield from _wrapped(f"{kind} {one.local}{about}{value} {_string(variable.description)};")
+    yield from _wrapped(f"{kind} {one.local}{about}{value} {quoted(variable.description)};")
 
 
 def _equations(definitions: Iterable[Definition]) -> Iterator[str]:
@@ -112,18 +117,19 @@ def _equations(definitions: Iterable[Definition]) -> Iterator[str]:
         yield from _wrapped(f"{one.left} = {one.right};")
 
 
-def _documentation(text: str) -> Iterator[str]:
+def _documentation(text: str, uses: str = "") -> Iterator[str]:
     if text:
         yield 'annotation(Documentation(info = "<html>'
         yield from (line.replace("\\", "\\\\").replace('"', '\\"') for line in prose(text).splitlines())
-        yield '</html>"));'
+        yield f'</html>"){f", {uses}" if uses else ""});'
 
 
 def _first_line(text: str) -> str:
     return text.partition("\n")[0].strip()
 
 
-def _string(text: str) -> str:
+def quoted(text: str) -> str:
+    """Write a string in Modelica."""
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 

@@ -1,0 +1,134 @@
+"""The Modelica component with flanges: parsed by another tool, it has the motion of a hand-written DAE."""
+
+from pathlib import Path
+
+import pymoca.ast as ast
+import pymoca.parser
+import pytest
+from pymoca.tree import flatten
+from test_modelica import Flat, at_random, in_modelica
+
+from cosim.api.export import export
+from pyfmi_models.card import parse_card, read_card
+from pyfmi_models.derivation import derivation_of
+from pyfmi_models.errors import ExportError
+from pyfmi_models.export.flange import export_flange, flange_text
+from pyfmi_models.mount import Mount
+
+LIBRARY = """
+package Modelica
+  package Blocks
+    package Interfaces
+      connector RealInput = input Real;
+      connector RealOutput = output Real;
+    end Interfaces;
+  end Blocks;
+  package Mechanics
+    package Rotational
+      package Interfaces
+        connector Flange_a
+          Real phi(unit = "rad");
+          flow Real tau(unit = "N.m");
+        end Flange_a;
+        connector Flange_b
+          Real phi(unit = "rad");
+          flow Real tau(unit = "N.m");
+        end Flange_b;
+      end Interfaces;
+    end Rotational;
+    package Translational
+      package Interfaces
+        connector Flange_a
+          Real s(unit = "m");
+          flow Real f(unit = "N");
+        end Flange_a;
+        connector Flange_b
+          Real s(unit = "m");
+          flow Real f(unit = "N");
+        end Flange_b;
+      end Interfaces;
+    end Translational;
+  end Mechanics;
+end Modelica;
+"""
+"""The connectors that are used, as the Modelica Standard Library 4.0 declares them."""
+
+
+class FlatJoint(Flat):
+    """The flattened class `Joint`."""
+
+    def __init__(self, text: str, package: str) -> None:
+        tree = pymoca.parser.parse(text + LIBRARY)
+        assert tree is not None, text
+        place = ast.ComponentRef(name=package, child=[ast.ComponentRef(name="Joint")])
+        (flat,) = flatten(tree, place).classes.values()
+        self.symbols = flat.symbols
+        # That nothing is connected outside, so that a flow is zero, is said of the symbol itself: it is left out here.
+        self.equations = dict(self._solved(one) for one in flat.equations if not isinstance(one.left, ast.Symbol))
+
+
+BRAKED = """[mount]
+inertia = 2
+torque_limit = 5
+[friction]
+model = "coulomb"
+Fc = 0.5
+sigma2 = 3
+[[effects]]
+effect = "gravity_unbalance"
+mgl = 1.5
+phase = 0.3
+"""
+
+
+def text_of(plant: Mount) -> str:
+    return flange_text(plant.model(), "Mine", derivation_of(plant))
+
+
+def test_a_flanged_joint_moves_as_the_hand_written_equation() -> None:
+    """J phi'' = min(tau, limit) + tau_a + tau_b - Fc sign(w) - sigma2 w - mgl sin(phi + phase)."""
+    from math import sin
+
+    flat = FlatJoint(text_of(parse_card(BRAKED, "braked").plant()), "Mine")
+    for phi, w, tau, a, b in ((0.2, 0.4, 1.0, 0.7, -0.2), (-1.0, -0.3, -9.0, 2.0, 3.0)):
+        given = {"plant.position": phi, "plant.speed": w, "tau": tau, "flange_a.tau": a, "flange_b.tau": b, "time": 0.0}
+        found = flat.values(given)
+        applied = max(-5.0, min(5.0, tau))
+        friction = 0.5 * (1 if w > 0 else -1) + 3 * w
+        wanted = (applied + a + b - friction - 1.5 * sin(phi + 0.3)) / 2
+        assert found["der(plant.speed)"] == pytest.approx(wanted, rel=1e-9)
+        assert found["der(plant.position)"] == w
+        assert (found["flange_a.phi"], found["flange_b.phi"]) == (phi, phi)
+
+
+@pytest.mark.parametrize("card", ["paper_mount_directional", "altaz_altitude", "emps"])
+def test_with_free_flanges_it_is_the_causal_plant(card: str) -> None:
+    plant = read_card(card).plant()
+    model, flat = plant.model(), FlatJoint(text_of(plant), "Mine")
+    push = "f" if plant.motion == "linear" else "tau"
+    t, (states, inputs, _) = at_random(model, 3)
+    given = {
+        f"plant.{in_modelica(model, one.name)}": x for one, x in zip(model.states, map(float, states), strict=True)
+    }
+    given |= {one.name: float(u) for one, u in zip(model.inputs, inputs, strict=True)}
+    pushed = -given.pop("disturbance")
+    found = flat.values(given | {f"flange_a.{push}": pushed, f"flange_b.{push}": 0.0, "time": t})
+    parameters = [one.start for one in model.parameters]
+    own = model.equations(t, states, inputs, parameters)[0].full().ravel()
+    for state, rate in zip(model.states, own, strict=True):
+        assert found[f"der(plant.{in_modelica(model, state.name)})"] == pytest.approx(rate, rel=1e-9, abs=1e-12)
+
+
+def test_the_file_is_a_package_of_its_own_beside_the_causal_one(tmp_path: Path) -> None:
+    done = export("emps", tmp_path, fmi=3, modelica=True, modelica_flange=True)
+    assert done.flange == tmp_path / "EmpsFlange.mo"
+    text = done.flange.read_text()
+    assert "Modelica.Mechanics.Translational.Interfaces.Flange_a" in text
+    assert text.rstrip().endswith("end EmpsFlange;")
+    assert 'uses(Modelica(version = "4.0.0"))' in text
+
+
+def test_a_model_without_a_torque_from_outside_has_no_flange(tmp_path: Path) -> None:
+    controller = read_card("paper_mount").controller_model()
+    with pytest.raises(ExportError, match="disturbance"):
+        export_flange(controller, tmp_path / "C.mo")
