@@ -9,6 +9,7 @@
     card        recordings                            ->  CardResult: a first card, with ranges
     identify    recordings and a card                 ->  IdentifyResult: the card's numbers with standard errors
                 recordings and an FMU, or a system    ->  CalibrateResult: its numbers with standard errors
+    check       an FMU                                ->  CheckResult: whether it runs as its maker meant
     export      a card                                ->  Exported: FMUs, SSP, Modelica
     sweep       a sweep file                          ->  SweepResult: a table, a row a run, and the best
     check_effect, check_law   a class of your own physics  ->  Checks that it must pass
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
 
     from cosim.api.calibrate import CalibrateResult
     from cosim.api.card import CardResult, card
+    from cosim.api.check import CheckResult, check
     from cosim.api.checks import check_effect, check_law
     from cosim.api.compare import Comparison, compare
     from cosim.api.diagnose import DiagnosisResult, diagnose
@@ -54,6 +56,7 @@ _HOMES = {
     "cosim.api.calibrate": ("CalibrateResult",),
     "cosim.api.card": ("CardResult", "card"),
     "cosim.api.checks": ("check_effect", "check_law"),
+    "cosim.api.check": ("CheckResult", "check"),
     "cosim.api.compare": ("Comparison", "compare"),
     "cosim.api.diagnose": ("DiagnosisResult", "diagnose"),
     "cosim.api.export": ("Exported", "export"),
@@ -78,6 +81,7 @@ __all__ = [
     "CalibrateResult",
     "Card",
     "CardResult",
+    "CheckResult",
     "CheckError",
     "Checks",
     "Comparison",
@@ -95,6 +99,7 @@ __all__ = [
     "SweepResult",
     "__version__",
     "card",
+    "check",
     "check_effect",
     "check_law",
     "compare",

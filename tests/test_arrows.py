@@ -26,7 +26,7 @@ FLOORS = (
     {"cosim.system"},
     {"cosim.master", "cosim.plots"},
     {"cosim.hardware", "cosim.observatory", "cosim.sweeps", "cosim.models", "cosim.estimation"},
-    {"cosim.calibration"},
+    {"cosim.calibration", "cosim.experiments"},
     {"cosim.diagnosis.answer"},
     {"cosim.diagnosis.decide"},
     {"cosim.diagnosis.effects"},

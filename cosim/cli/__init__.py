@@ -46,6 +46,7 @@ VERBS = (
     "compare",
     "card",
     "identify",
+    "check",
     "diagnose",
     "why",
     "investigate",

@@ -96,6 +96,7 @@ def description(version: int) -> str:
     if version == 2:
         outputs = '<Outputs><Unknown index="12" dependencies=""/><Unknown index="13" dependencies=""/></Outputs>'
     else:
+        rows.append('<Float64 name="time" valueReference="99" causality="independent" variability="continuous"/>')
         outputs = '<Output valueReference="11" dependencies=""/><Output valueReference="12" dependencies=""/>'
     saves = f'canGetAndSetFMU{"s" if version == 2 else "S"}tate="true" canHandleVariableCommunicationStepSize="true"'
     return (

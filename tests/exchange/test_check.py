@@ -1,0 +1,145 @@
+"""An FMU runs as its maker meant, or it is said by how much not; planted errors are found."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from experiment_archives import bundle, experiments, manifest, with_files
+from motor_fmu import motor
+
+import cosim
+from cosim.cli import main
+from cosim.master.simulate import simulate
+from cosim.system.system import System
+from cosim.system.wire import Record, Wire
+
+ROWS = 201
+T = 0.01 * np.arange(ROWS)
+CURRENT = 3 * np.sin(2 * np.pi * (0.5 + T) * T) * (T > 0.1)
+CAUSES = {1: "the sign is the other one", 2: "a gain of 1.05", 3: "w", 4: "1 row (0.01 s) late", 5: "an offset of 0.02"}
+SET = '<ParameterSet xmlns="x"><Parameter name="{}"><Real value="{}"/></Parameter></ParameterSet>'
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("check")
+
+
+@pytest.fixture(scope="module")
+def made(folder) -> dict[str, dict]:
+    system = System(
+        components={"m": motor(folder, 3)},
+        records={"w": Record("m.w"), "phi": Record("m.phi")},
+        wires=[Wire("i.value", "m.i")],
+        signals={"i": CURRENT},
+        step=0.01,
+        ticks=ROWS - 1,
+        last=True,
+    )
+    table = simulate(system).recording.table
+    return {"stimulus": {"time": T, "i": CURRENT}, "reference": {"time": T, "w": table["w"], "phi": table["phi"]}}
+
+
+def verb(*arguments: object) -> int:
+    with pytest.raises(SystemExit) as ended:
+        main([str(one) for one in arguments])
+    return int(ended.value.code or 0)
+
+
+@pytest.mark.parametrize("version", ["1.0.0-alpha.1", "1.0.0-beta.1"])
+def test_an_fmu_that_runs_as_meant_passes(folder, made, version, capsys):
+    fmu = with_files(motor(folder, 3), folder / f"good{version}.fmu", bundle(**made, version=version))
+    assert verb("check", fmu, "--json", "--out", folder / version) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["passed"]
+    assert told["standard"] == f"FMI-LS-REF {version}"
+    assert {one["variable"] for one in told["experiments"][0]["variables"]} == {"w", "phi"}
+    assert (folder / version / "experiment_1.svg").exists()
+    assert verb("check", fmu, "--out", folder / version) == 2
+
+
+@pytest.mark.parametrize("planted", CAUSES)
+def test_a_planted_error_is_found_and_said(folder, made, planted, capsys):
+    fmu = with_files(motor(folder, 3, planted), folder / f"planted{planted}.fmu", bundle(**made))
+    assert verb("check", fmu) == 1
+    said = capsys.readouterr().out
+    assert CAUSES[planted] in said
+    assert "FAIL  chirp" in said
+
+
+def test_an_event_that_is_missed_is_said_with_its_time(folder, made):
+    reference = dict(made["reference"])
+    reference["w"] = np.where(T >= 1.2, -reference["w"], reference["w"])
+    fmu = with_files(motor(folder, 3), folder / "event.fmu", bundle(made["stimulus"], reference))
+    done = cosim.check(fmu)
+    assert not done.passed
+    assert "right up to 1.19 s and wrong from 1.2 s on" in str(done)
+
+
+def test_the_later_draft_with_its_kind_of_analysis_is_read_and_other_kinds_are_not_run(folder, made):
+    inside = '<TransientSimulation startTime="0" stopTime="2" stepSize="0.01"/>'
+    fmu = with_files(motor(folder, 3), folder / "later.fmu", bundle(**made, inside=inside, times=""))
+    assert cosim.check(fmu).passed
+    other = with_files(motor(folder, 3), folder / "steady.fmu", bundle(**made, inside="<SteadyState/>", times=""))
+    done = cosim.check(other)
+    assert "not run  chirp" in str(done)
+    assert "SteadyState" in str(done)
+
+
+def test_a_parameter_set_of_an_experiment_is_applied(folder, made):
+    files = bundle(**made, inside='<Parameters source="p.ssv"/>')
+    fmu = with_files(motor(folder, 3), folder / "set.fmu", files | {"p.ssv": SET.format("J", 0.05)})
+    assert not cosim.check(fmu).passed
+    same = with_files(motor(folder, 3), folder / "same.fmu", files | {"p.ssv": SET.format("J", 0.02)})
+    assert cosim.check(same).passed
+    wrong = with_files(motor(folder, 3), folder / "wrong.fmu", files | {"p.ssv": SET.format("jj", 0.02)})
+    assert 'sets "jj", which the FMU does not have' in str(cosim.check(wrong))
+
+
+def test_a_version_that_is_not_known_is_refused_by_name(folder, made, capsys):
+    fmu = with_files(motor(folder, 3), folder / "future.fmu", bundle(**made, version="2.0.0"))
+    assert verb("check", fmu) == 2
+    assert 'FMI-LS-REF "2.0.0"; known here are: 1.0.0-alpha.1, 1.0.0-beta.1' in capsys.readouterr().err
+
+
+def test_a_reference_outside_the_experiment_and_files_that_are_not_there_are_sentences(folder, made):
+    times = 'startTime="0" stopTime="1" stepSize="0.01"'
+    fmu = with_files(motor(folder, 3), folder / "long.fmu", bundle(**made, times=times))
+    assert "The reference is from 0 to 2 s, and the experiment from 0 to 1 s: it must lie within." in str(
+        cosim.check(fmu)
+    )
+    listed = {"fmi-ls-manifest.xml": manifest(("application/x-ma-hs-experiments", "b.exp", "experiment"))}
+    fmu = with_files(motor(folder, 3), folder / "absent.fmu", listed)
+    assert 'names "b.exp" (experiment), which is not in the archive' in str(cosim.check(fmu))
+    files = bundle(**made)
+    files["a.exp"] = experiments().replace("test-ref.csv", "nothing.csv")
+    fmu = with_files(motor(folder, 3), folder / "no_reference.fmu", files)
+    assert not cosim.check(fmu).passed
+
+
+def test_an_fmu_without_experiments_runs_its_default_experiment(folder, capsys):
+    assert verb("check", motor(folder, 2)) == 0
+    said = capsys.readouterr().out
+    assert "a second run after a reset gives the same bits" in said
+    assert "0 to 2 s in 200 steps" in said
+
+
+def test_an_fmu_that_crashes_fails_its_check(folder, made):
+    files = bundle(**made, inside='<Parameters source="p.ssv"/>') | {"p.ssv": SET.format("crash_above", 0.001)}
+    done = cosim.check(with_files(motor(folder, 3), folder / "crash.fmu", files))
+    assert not done.passed
+    assert "The FMU crashed" in str(done)
+
+
+def test_nonsense_is_a_sentence(folder, capsys):
+    for path, words in (
+        (folder / "nowhere.fmu", "does not exist"),
+        (Path(__file__), "it is not a zip archive"),
+    ):
+        assert verb("check", path) == 2
+        assert words in capsys.readouterr().err
+    assert verb("check", motor(folder, 3), "--rtol", "-1") == 2
+    assert verb("check", motor(folder, 3), "--interface", "both") == 2
+    broken = with_files(motor(folder, 3), folder / "broken.fmu", {"fmi-ls-manifest.xml": "<fmiReferences"})
+    assert verb("check", broken) == 2
