@@ -7,7 +7,6 @@ opened anew each time. The process keeps what is simulated, so that only numbers
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from cosim.fmi.component import Component
 from cosim.master.opening import open_source
 from cosim.master.simulate import simulate
 from cosim.system.scenario import Scenario
-from cosim.system.system import Fmu
+from cosim.system.system import Fmu, Source
 
 Point = Mapping[str, float]
 
@@ -73,7 +72,7 @@ class Bench:
         system = self.job.scenario(point, experiment).system()
         if self._keeps is False:
             self.close()
-        components: dict[str, Any] = {
+        components: dict[str, Source] = {
             name: self._opened(name, source) if isinstance(source, Fmu) else source
             for name, source in system.components.items()
         }

@@ -1,6 +1,6 @@
 """`cosim identify`: recordings and a card, an FMU or a system to the same with identified numbers."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -78,7 +78,7 @@ def _card(
     recordings: list[Path],
     card: str,
     out: Path,
-    given: dict[str, Any],
+    given: Mapping[str, Any],
     columns: Sequence[str] | None,
     units: Sequence[str] | None,
     layout: Sequence[str] | None,
@@ -108,7 +108,7 @@ def _model(
     recordings: list[Path],
     heldout: list[Path],
     out: Path,
-    given: dict[str, Any],
+    given: Mapping[str, Any],
     pairs: tuple[Sequence[str] | None, ...],
     as_json: bool,
     force: bool,

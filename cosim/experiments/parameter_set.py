@@ -11,19 +11,20 @@ from xml.etree import ElementTree
 from cosim.experiments.xml_member import plain, xml_in
 from cosim.fmi.component import Port
 from cosim.support.errors import FmuError, UnitError
+from cosim.support.plain import Parsed
 from cosim.support.units import conversion
 
 _NUMBERS = ("Real", "Float64", "Float32")
 _INTEGERS = ("Integer", *(f"{sign}Int{bits}" for bits in (8, 16, 32, 64) for sign in ("", "U")))
 
 
-def values_in(path: Path, member: str, ports: Mapping[str, Port]) -> dict[str, Any]:
+def values_in(path: Path, member: str, ports: Mapping[str, Port]) -> Parsed:
     """Read a parameter set of an FMU's archive; numbers are converted to the units of the variables.
 
     Raises:
         FmuError: it cannot be read, or sets what the FMU does not have.
     """
-    found: dict[str, Any] = {}
+    found: Parsed = {}
     for parameter in (one for one in xml_in(path, member).iter() if plain(one) == "Parameter"):
         name, kind = parameter.get("name", ""), next(iter(parameter), None)
         if name not in ports:
