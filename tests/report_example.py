@@ -62,7 +62,7 @@ FOUND = (
         units={"amplitude": "N·m", "phase": "rad"},
         standard_errors={"amplitude": 0.015, "phase": 0.03}, ranges={"amplitude": (0.39, 0.45), "phase": (0.34, 0.46)},
         size="0.42 N·m", size_range="0.39 to 0.45", visible_from=0.05,
-        statement="The motor tugs 24 times per turn, 0.42 N·m; it has 24 slots, nothing needs repair",
+        statement="The motor torque ripples 24 times per turn, by 0.42 N·m; it has 24 slots, nothing needs repair",
         where=Where(axis="position", description="the whole turn, same phase at all six speeds"),
         ruled_out=("gear mesh (40 per turn)", "current-loop resonance (fixed in Hz)"),
         evidence="24 per turn equals the slot count in the model card", action="Use the improved FMU",

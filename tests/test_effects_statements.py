@@ -18,7 +18,7 @@ TURNING = {
     "BoucWen": "A belt or gear goes round a loop of 1.79 N·m either way, within 0.05 rad.",
     "CableWrap": "A cable or spring pulls towards 0.2 rad with 3 N·m per rad.",
     "ClockSkew": "The clock of the encoder is 4 ms ahead of the torque and drifts by 100 ppm. Nothing mechanical.",
-    "Cogging": "The motor tugs 24 times per turn, 0.5 N·m each way.",
+    "Cogging": "The motor torque ripples 24 times per turn, by 0.5 N·m each way.",
     "Compliance": "36 % of the inertia hangs on a spring that rings at 25 Hz.",
     "LoadSideCompliance": "The motor turns the axis through a spring: both ring against each other at 60 Hz.",
     "ConcaveViscous": "Above 0.3 rad/s viscous friction falls: the grease thins.",

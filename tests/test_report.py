@@ -94,7 +94,7 @@ def test_nothing_missing_has_its_own_first_screen() -> None:
 
 def test_unknown_says_where_to_look_and_names_no_effect() -> None:
     html = page("unknown")
-    assert "<h1>Something is missing, and it is none of the effects cosim knows</h1>" in html
+    assert "<h1>Something is missing that no known effect explains on unseen runs</h1>" in html
     assert re.search(r"position .*20\d to 2\d\d°.*forward only", html)
     assert "position, direction of motion" in html
 

@@ -55,13 +55,15 @@ def test_a_ripple_is_folded_over_a_part_of_a_turn_or_of_a_metre(motion: str, pit
 
 
 def test_no_effect_that_the_model_lacks_is_sent_to_it() -> None:
-    for kind in {form for forms in CATALOGUE.values() for form in forms if form.action}:
-        given = kind.action
-        without = advice(kind, False)  # type: ignore[arg-type]
+    kinds = {form for forms in CATALOGUE.values() for form in forms if form.action}
+    both = [(kind, motion) for kind in kinds for motion in ("rotary", "linear")]
+    for kind, motion in both:
+        given = kind.action_linear if motion == "linear" and kind.action_linear else kind.action
+        without = advice(kind, False, motion)  # type: ignore[arg-type]
         assert "improved model" not in without
         assert without.endswith(".")
         assert given.startswith(without.removesuffix("."))
-        assert advice(kind, True) == given  # type: ignore[arg-type]
+        assert advice(kind, True, motion) == given  # type: ignore[arg-type]
 
 
 def test_stribeck_friction_is_drawn_at_its_own_speeds() -> None:
@@ -286,3 +288,10 @@ def test_a_limit_is_of_the_number_that_is_told_as_the_size() -> None:
         {"level_asymmetry": 0.07, "viscous_asymmetry": -0.18}, {"level_asymmetry": 0.064, "viscous_asymmetry": 0.006}
     )
     assert visible_from(effect, numbers) == pytest.approx(3 * 200 * 0.006)
+
+
+@pytest.mark.parametrize("word", ["brake", "seal", "counterweight", "disc", "pier", "tube"])
+def test_no_part_of_a_rotary_axis_is_named_for_a_linear_one(word: str) -> None:
+    """A ball screw has no shaft seal to look at."""
+    for kind in {form for forms in CATALOGUE.values() for form in forms if form.action_linear}:
+        assert word not in kind.action_linear

@@ -84,27 +84,27 @@ def keep_turning(finding: Finding, chosen: Samples, scales: Scales) -> Picture |
     which it falls.
     """
     falls = float(finding.parameters.get("Vs", 0.0)) if finding.effect == "stribeck" else 0.0
-    steady = chosen.where(_steady(chosen, 0.1 * falls))
-    if steady.v.size < 200:
+    calm = chosen.where(steady(chosen, 0.1 * falls))
+    if calm.v.size < 200:
         return None
     sheet = blank(finding)
     axes = sheet.axes()
-    edges = _speeds(steady, falls) * scales.speed.factor
+    edges = speeds(calm, falls) * scales.speed.factor
     for sign, mark, fill in ((1.0, "^", MEASURED), (-1.0, "v", "white")):
-        _side(axes, steady.where(steady.v * sign > 0), sign, (mark, fill), edges, scales)
+        _side(axes, calm.where(calm.v * sign > 0), sign, (mark, fill), edges, scales)
     axes.set_xlabel(f"speed [{scales.speed.unit}]")
     axes.set_xlim(edges[0], edges[-1])
     if falls:
-        _logarithmic(axes, falls * scales.speed.factor)
+        logarithmic(axes, falls * scales.speed.factor)
     heading(axes, f"to keep moving [{scales.torque.unit}]")
     caption = "▲ measured forward, ▽ backward, bars 95 %. Dashed: model before; solid: after. Steady motion only."
     caption += f" Dotted: {scales.speed.text(falls)}, over which friction falls." if falls else ""
     return sheet.picture(f"{finding.title}. {caption}", caption)
 
 
-def _speeds(steady: Samples, falls: float) -> Array:
+def speeds(calm: Samples, falls: float) -> Array:
     """Return edges of bins of speed [rad/s, m/s]; in equal ratios where friction falls over a small speed."""
-    speed = np.abs(steady.v)
+    speed = np.abs(calm.v)
     top = float(np.quantile(speed, 0.995))
     if not falls:
         return np.linspace(0, top, 10)
@@ -112,7 +112,8 @@ def _speeds(steady: Samples, falls: float) -> Array:
     return np.geomspace(min(low, 0.5 * top), max(top, 3 * falls), 12)
 
 
-def _logarithmic(axes: "Axes", falls: float) -> None:
+def logarithmic(axes: "Axes", falls: float) -> None:
+    """Make the axis of speed logarithmic, with a mark at the speed over which friction falls."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axes.set_xscale("log")
@@ -122,7 +123,7 @@ def _logarithmic(axes: "Axes", falls: float) -> None:
     axes.axvline(falls, color=GREY, lw=1, ls=(0, (1, 2)))
 
 
-def _steady(chosen: Samples, least: float) -> Mask:
+def steady(chosen: Samples, least: float) -> Mask:
     """Return where the machine moves and hardly accelerates; gaps between recordings count as acceleration.
 
     `least`, where given, is the speed from which it counts as moving.
@@ -148,14 +149,14 @@ def _side(axes: "Axes", side: Samples, sign: float, mark: tuple[str, str], edges
         "elinewidth": 1.4,
         "zorder": 4,
     }
-    measured = _over_speed(speed, side.tau * unit, edges)
+    measured = over_speed(speed, side.tau * unit, edges)
     axes.errorbar(measured.x, measured.mean, yerr=measured.half, **style)
     for error, colour, dashes in ((side.before, BEFORE, (4, 2)), (side.after, AFTER, (None, None))):
-        model = _over_speed(speed, (side.tau - error) * unit, edges)
+        model = over_speed(speed, (side.tau - error) * unit, edges)
         axes.plot(model.x, model.mean, color=colour, dashes=dashes, lw=1.5)
 
 
-def _over_speed(speed: Array, y: Array, edges: Array) -> Curve:
+def over_speed(speed: Array, y: Array, edges: Array) -> Curve:
     """Bin over speed, in equal steps or, where the first edge is above zero, in equal ratios."""
     if edges[0] <= 0:
         return curve(speed, y, edges)

@@ -2,7 +2,7 @@
 
 from math import nan
 
-from cosim.diagnosis.answer.result import Diagnosis, HeldOut
+from cosim.diagnosis.answer.result import Diagnosis, Finding, HeldOut
 from cosim.diagnosis.decide.calibration import LIKELY, SURE
 from cosim.plots.quantities import joined
 from cosim.report.quantities import Scales
@@ -19,13 +19,23 @@ def heading(diagnosis: Diagnosis, model: str = "the model") -> str:
         case "withheld":
             return "Check the recordings first: no effect can be named"
         case "unknown":
-            return f"{_open(diagnosis, model)}, and something unknown" if _named(diagnosis) else _UNKNOWN
+            return (
+                f"{_open(diagnosis, model)}, and something unknown"
+                if _named(diagnosis)
+                else _unknown_heading(diagnosis)
+            )
         case "none":
             return f"Nothing missing that {_these(diagnosis)} can show"
     return _open(diagnosis, model)
 
 
 _UNKNOWN = "Something is missing, and it is none of the effects cosim knows"
+_NOT_CONFIRMED = "Something is missing that no known effect explains on unseen runs"
+
+
+def _unknown_heading(diagnosis: Diagnosis) -> str:
+    """Claim that it is no known effect only where none of them is left to be confirmed."""
+    return _NOT_CONFIRMED if any(one.answer == "not_proven" for one in diagnosis.findings) else _UNKNOWN
 
 
 def _named(diagnosis: Diagnosis) -> bool:
@@ -35,16 +45,30 @@ def _named(diagnosis: Diagnosis) -> bool:
 
 def _open(diagnosis: Diagnosis, model: str) -> str:
     """Count what was found apart from what is only possible: a cause alone, or several of which one is true."""
-    found = sum(finding.answer == "found" for finding in diagnosis.findings)
+    found = [finding for finding in diagnosis.findings if finding.answer == "found"]
     asked = _ambiguous(diagnosis)
     if found:
         alone = sum(len(block.findings) == 1 for block in asked)
         more = f", perhaps {count(alone).lower()} more" if alone else ""
-        return f"{count(found)} effect{'s are' if found != 1 else ' is'} missing from {model}{more}"
+        return f"{_missing(found, model)}{more}"
     if any(len(block.findings) > 1 for block in asked):
         return "Something is missing, with more than one possible cause"
     many = count(len(asked))
     return f"{many} effect{'s' if len(asked) != 1 else ''} may be missing from {model}"
+
+
+def _missing(found: list[Finding], model: str) -> str:
+    """Say how many effects are missing, and which of them only likely: those with their probability."""
+    likely = [f"{one.probability:.2f}" for one in found if one.probability < SURE]
+    sure = len(found) - len(likely)
+    told = f"probability {' and '.join([', '.join(likely[:-1]), likely[-1]] if likely[1:] else likely)}"
+    if not likely:
+        return f"{count(sure)} effect{'s are' if sure != 1 else ' is'} missing from {model}"
+    if not sure:
+        many = f"{count(len(likely))} effects are" if likely[1:] else "One effect is"
+        return f"{many} likely missing from {model} ({told})"
+    more = f"{count(len(likely)).lower()} more {'are' if likely[1:] else 'is'} likely ({told})"
+    return f"{count(sure)} effect{'s are' if sure != 1 else ' is'} missing from {model}, {more}"
 
 
 def _ambiguous(diagnosis: Diagnosis) -> list[Block]:

@@ -5,13 +5,15 @@ from importlib.resources import files as resources
 
 import numpy as np
 
-from cosim.diagnosis.answer.result import Diagnosis, Trace
+from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
+from cosim.diagnosis.effects import named
 from cosim.diagnosis.measure.breakdown import Samples, bars, samples, worst
 from cosim.plots.explorer import script_of_page
 from cosim.plots.quantities import joined
 from cosim.report import tables, unknown, words
 from cosim.report.explorer import payload
 from cosim.report.figures_dynamic import effect
+from cosim.report.figures_friction import friction
 from cosim.report.figures_proof import looked_for, proof
 from cosim.report.figures_time import WIDE, overlay, recording
 from cosim.report.figures_where import plane, region, strongest
@@ -100,8 +102,14 @@ def _box(diagnosis: Diagnosis, worse: list[str], scales: Scales) -> dict[str, st
 
 def _findings(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
     found = [one for one in words.blocks(diagnosis) if one.first.effect != "unknown"]
-    blocks = [block(one, diagnosis, scales, effect(one.first, chosen, scales)) for one in found]
+    blocks = [block(one, diagnosis, scales, _picture(one.first, diagnosis, scales, chosen)) for one in found]
     return {"blocks": blocks, "experiment": next_experiment(diagnosis, scales)}
+
+
+def _picture(finding: Finding, diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> Picture | None:
+    """Draw the view in which an effect shows; friction over speed as curves where the numbers of its law are known."""
+    curved = friction(finding, diagnosis, chosen, scales) if named(finding.effect).view == "keep turning" else None
+    return curved or effect(finding, chosen, scales)
 
 
 def _middle(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:

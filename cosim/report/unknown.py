@@ -76,6 +76,27 @@ def _action(diagnosis: Diagnosis, own: Finding | None) -> str:
     on = diagnosis.depends_on[0] if diagnosis.depends_on else ""
     if on == IN_BURSTS:
         return "record at rest, with all around it off and on, and look for what shakes it: floor, pump, another axis"
-    if on.endswith("time"):
-        return "repeat the same run, cold and warm, and compare"
-    return f"{f'vary {on} alone' if on else 'look at the machine there'}, then repeat the run"
+    return _vary(on, diagnosis)
+
+
+SETTABLE = {
+    "position": "repeat the run over another range of positions, and compare",
+    "speed": "repeat the run at half and at twice the speed, and compare",
+    "direction": "repeat the run mirrored, and compare",
+    "acceleration": "repeat the run with softer and with harder starts, and compare",
+    "temperature": "repeat the same run, cold and warm, and compare",
+    "time": "repeat the same run, cold and warm, and compare",
+}
+"""What somebody can do about what an error goes with."""
+
+
+def _vary(on: str, diagnosis: Diagnosis) -> str:
+    """Say how to change what an error goes with: a column that was recorded can be varied, of the rest what it is."""
+    columns = {name for trace in diagnosis.traces for name in trace.extras}
+    if on in columns:
+        return f"vary {on} and keep the motion, then compare"
+    if not on:
+        return "look at the machine there, then repeat the run"
+    words = ("time", "temperature", "acceleration", "direction", "position", "speed")
+    known = next((word for word in words if word in on), "")
+    return SETTABLE.get(known, "look at the machine there, then repeat the run")

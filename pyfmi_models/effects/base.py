@@ -84,6 +84,8 @@ class Effect(Part):
     rivals: ClassVar[tuple[str, ...]] = ()
     told_apart_by: ClassVar[str] = ""
     action: ClassVar[str] = ""
+    action_linear: ClassVar[str] = ""
+    """The same for an axis that moves along, where the parts that a mechanic looks at are others."""
     to_record: ClassVar[str] = ""
     """What to record where recordings cannot test the effect."""
     special_case_of: ClassVar[tuple[str, ...]] = ()

@@ -23,6 +23,7 @@ class CableWrap(LoadEffect):
     rivals: ClassVar[tuple[str, ...]] = ("gravity_unbalance", "torque_offset")
     told_apart_by: ClassVar[str] = "a cable pulls harder turn after turn; an unbalance repeats once per turn"
     action: ClassVar[str] = "Give the cable more slack, or bring home to the middle of its travel."
+    action_linear: ClassVar[str] = "Give the cable chain more slack, or turn it round; look at bellows and hoses."
     stiffness: Scalar = parameter("N.m/rad", "Stiffness at home", low=0)
     home: Scalar = parameter("rad", "Position without torque", default=0.0)
     hardening: Scalar = parameter(

@@ -47,7 +47,9 @@ class Cogging(LoadEffect):
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         per = "metre" if unit == "N" else "turn"
-        return f"The motor tugs {times(self.cycles_per_rev)} per {per}, {self.amplitude:.3g} {unit} each way."
+        return (
+            f"The motor torque ripples {times(self.cycles_per_rev)} per {per}, by {self.amplitude:.3g} {unit} each way."
+        )
 
 
 def _wave(turn: Scalar, harmonics: tuple[float, ...]) -> Scalar:

@@ -26,7 +26,8 @@ class _Compliance(Effect):
     to_record: ClassVar[str] = "record fast sweeps up to 40 Hz"
     rivals: ClassVar[tuple[str, ...]] = ("delay", "actuator_lag", "backlash", "periodic_disturbance")
     told_apart_by: ClassVar[str] = "it resonates at one frequency and scales with acceleration; lag and delay do not"
-    action: ClassVar[str] = "Stiffen couplings, pinion and pier; keep the controller well below the resonance."
+    action: ClassVar[str] = "Stiffen coupling, gear and frame; keep the controller well below the resonance."
+    action_linear: ClassVar[str] = "Stiffen coupling, screw bearings and nut; keep the controller below the resonance."
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,6 +28,7 @@ class EncoderEccentricity(SensorEffect):
     rivals: ClassVar[tuple[str, ...]] = ("cogging", "inertia_variation", "gravity_unbalance")
     told_apart_by: ClassVar[str] = "its torque grows with the square of the speed; that of cogging does not"
     action: ClassVar[str] = "Centre the encoder disc, or add a second read head opposite the first."
+    action_linear: ClassVar[str] = "Check how the encoder sits on the screw or motor shaft, or read a linear scale."
     cycles_per_rev: Scalar = parameter(
         "1", "Encoder turns per axis turn (per metre of a linear axis)", low=0, fitted=False
     )

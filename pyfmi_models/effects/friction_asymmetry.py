@@ -21,7 +21,8 @@ class FrictionAsymmetry(FrictionEffect):
     to_record: ClassVar[str] = "record the same speeds in both directions"
     rivals: ClassVar[tuple[str, ...]] = ("torque_offset", "gravity_unbalance")
     told_apart_by: ClassVar[str] = "an offset also acts at standstill and does not grow with speed"
-    action: ClassVar[str] = "Check the clamp brake for drag, and the lip seal and bearing preload for tilt."
+    action: ClassVar[str] = "Check brake and shaft seal for drag one way, and the bearing preload for tilt."
+    action_linear: ClassVar[str] = "Check wipers and covers for drag one way, and the preload of nut and carriages."
     level_asymmetry: Scalar = parameter("1", "Half the relative difference of the friction level", low=-0.95, high=0.95)
     viscous_asymmetry: Scalar = parameter(
         "1", "Half the relative difference of viscous friction", default=0.0, low=-0.95, high=0.95

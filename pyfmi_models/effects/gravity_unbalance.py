@@ -22,7 +22,8 @@ class GravityUnbalance(PayloadEffect):
     told_apart_by: ClassVar[str] = (
         "an off-centre load needs holding torque at standstill; an off-centre encoder does not"
     )
-    action: ClassVar[str] = "Move the counterweight until the axis stays where it is left."
+    action: ClassVar[str] = "Balance the axis until it stays where it is left; otherwise use the improved model."
+    action_linear: ClassVar[str] = "Look for what hangs on the carriage; otherwise use the improved model."
     mgl: Scalar = parameter("N.m", "Weight times lever arm", low=0)
     phase: Scalar = parameter("rad", "Phase at position zero", default=0.0)
 

@@ -26,6 +26,7 @@ class InertiaVariation(InertiaEffect):
     rivals: ClassVar[tuple[str, ...]] = ("encoder_eccentricity", "compliance", "torque_saturation")
     told_apart_by: ClassVar[str] = "it scales with the acceleration at a place; an eccentric encoder with speed squared"
     action: ClassVar[str] = "Nothing needs repair: a payload off the axis does this. Use the improved model."
+    action_linear: ClassVar[str] = "Nothing needs repair: a linkage does this. Use the improved model."
     relative_amplitude: Scalar = parameter("1", "Relative amplitude of the inertia", low=0, high=0.95)
     cycles_per_rev: Scalar = parameter(
         "1", "Cycles per turn (per metre of a linear axis)", default=1.0, low=0, fitted=False

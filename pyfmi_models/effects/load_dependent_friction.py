@@ -27,6 +27,7 @@ class LoadDependentFriction(FrictionEffect):
     rivals: ClassVar[tuple[str, ...]] = ("position_friction", "gravity_unbalance")
     told_apart_by: ClassVar[str] = "it follows the load when the load is changed; a rough track stays where it is"
     action: ClassVar[str] = "Balance the axis; a bearing or gear that is loaded less rubs less."
+    action_linear: ClassVar[str] = "Relieve the guides; a guide or nut that is loaded less rubs less."
     coulomb_per_Nm: Scalar = parameter("1", "Rise of the friction level per N m of load", low=0, high=10)
 
     def level(self, level: Scalar, motion: Motion) -> Scalar:

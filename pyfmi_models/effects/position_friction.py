@@ -26,6 +26,7 @@ class PeriodicFriction(_PositionFriction):
     """Friction level times 1 + r cos(cycles angle + phase)."""
 
     action: ClassVar[str] = "Check the bearing ring and the gear for run-out."
+    action_linear: ClassVar[str] = "Check screw or belt pulley for run-out, and the rail for its joints."
     cycles_per_rev: Scalar = parameter("1", "Cycles per turn (per metre of a linear axis)", low=0, fitted=False)
     relative_amplitude: Scalar = parameter("1", "Relative amplitude of the level", low=0, high=0.95)
     phase: Scalar = parameter("rad", "Phase at position zero", default=0.0)
@@ -46,6 +47,7 @@ class LocalFriction(_PositionFriction):
     """A rough spot: friction level times 1 + r exp(-((q - q_center)/width)^2 / 2)."""
 
     action: ClassVar[str] = "Look at the track there: dirt, a dent, a damaged seal or a stiff cable."
+    action_linear: ClassVar[str] = "Look at the rail and the screw there: dirt, a dent, a joint or a stiff cable."
     q_center: Scalar = parameter("rad", "Position of the rough spot")
     width: Scalar = parameter("rad", "Width (standard deviation) of the rough spot", low=1e-6)
     relative_amplitude: Scalar = parameter("1", "Relative rise of the level", low=-0.95, high=20)

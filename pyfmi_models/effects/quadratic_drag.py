@@ -24,6 +24,7 @@ class QuadraticDrag(LoadEffect):
     rivals: ClassVar[tuple[str, ...]] = ("thermal_viscosity", "stribeck")
     told_apart_by: ClassVar[str] = "drag is the same early and late; friction that warms up is not"
     action: ClassVar[str] = "Look at covers, fans and oil that is churned; at high speed use the improved model."
+    action_linear: ClassVar[str] = "Look at bellows and covers that pump air; at high speed use the improved model."
     coefficient: Scalar = parameter("N.m.s2/rad2", "Torque per square of the speed", low=0)
 
     def load(self, motion: Motion) -> Scalar:

@@ -152,8 +152,11 @@ class Hypothesis(Generic[Form]):
         return EVERYWHERE
 
     def further(self, waves: Sequence[Form]) -> str:
-        """A sentence on the further waves of a ripple."""
-        return ""
+        """A sentence on the further waves of a ripple: each with its cycles and size, largest first."""
+        told = [wave for wave in waves if hasattr(wave, "cycles_per_rev")]
+        told.sort(key=lambda wave: -abs(_size(wave)))
+        said = ", ".join(f"{wave.cycles_per_rev:.4g} ({_size(wave):.2g})" for wave in told)
+        return f" Further waves, cycles (size): {said}." if said else ""
 
     def card_note(self, first: str) -> str:
         """What the improved card must say beside the effect; `first` names the first recording."""
@@ -186,6 +189,11 @@ class Hypothesis(Generic[Form]):
         if mount.friction.key == "none" and any(form.place == "Friction" for form in self.forms):
             return NO_FRICTION
         return NO_POSITION if self.needs_position and not prepared.has_position else UNSEEN
+
+
+def _size(wave: Effect) -> float:
+    main = wave.leading()
+    return float(main.factor * getattr(wave, main.parameter))
 
 
 EVERYWHERE = Where(axis="everywhere", description="everywhere", regions=())

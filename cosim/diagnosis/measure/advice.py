@@ -7,8 +7,8 @@ from pyfmi_models.effects import Effect
 NAMES_MODEL = re.compile(r"(?:(?P<clause>[;,])|(?<=\.))[^.;,]*\buse the improved model\b[^.;,]*\.?$", re.IGNORECASE)
 
 
-def advice(effect: Effect, in_model: bool) -> str:
-    """Return the action of an effect; one that the improved model lacks is not sent to that model."""
-    if in_model:
-        return effect.action
-    return NAMES_MODEL.sub(lambda found: "." if found["clause"] else "", effect.action)
+def advice(effect: Effect, in_model: bool, motion: str) -> str:
+    """Return the action on a "rotary" or "linear" axis; an effect that the improved model lacks is not sent to it."""
+    linear = motion == "linear" and effect.action_linear
+    action = effect.action_linear if linear else effect.action
+    return action if in_model else NAMES_MODEL.sub(lambda found: "." if found["clause"] else "", action)

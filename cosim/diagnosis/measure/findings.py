@@ -61,7 +61,7 @@ def accepted(
         ruled_out=tuple(_behind(one, members, True)),
         less_likely=tuple(_behind(one, members, False)),
         told_apart_by=effect.told_apart_by,
-        action=effect.action,
+        action=advice(effect, True, mount.motion),
         evidence=f"removes {100 * one.own.plain_gain:.0f} % of the error energy in training "
         f"(evidence {one.own.evidence:.0f} nats; {predicted:.0f} nats on the held-out recordings){own.caveat}",
         visible_from=visible_from(effect, numbers),
@@ -107,7 +107,7 @@ def rival_finding(rival: CandidateFit, probability: float, mount: Mount) -> Find
         size=size,
         statement=effect.statement("N" if mount.motion == "linear" else "N·m"),
         told_apart_by=effect.told_apart_by,
-        action=advice(effect, False),
+        action=advice(effect, False, mount.motion),
     )
 
 
