@@ -73,7 +73,7 @@ def test_a_black_box_learns_what_depends_on_position_and_is_quiet_on_noise(name:
     wave, noise = ([Shown(name, k, size) for k, name in enumerate(names)] for size in (1.0, 0.0))
     learned, quiet = (baselines.compared(traces, names=("refit", name)) for traces in (wave, noise))
     if "skipped" in learned[name]:
-        assert "scikit-learn is not installed; pip install 'mount-cosim[proof]'" in learned[name]["skipped"]
+        assert "scikit-learn is not installed: pip install" in learned[name]["skipped"]
         pytest.skip("scikit-learn comes with the extra `proof`")
     assert learned[name]["heldout_rms"] < 0.3 * learned["refit"]["heldout_rms"]
     assert (learned[name]["alarm"], quiet[name]["alarm"]) == (True, False)
@@ -84,7 +84,7 @@ def test_sparse_regression_finds_a_term_of_its_library_or_says_that_it_is_not_in
     traces = [Shown(name, k, 1.0) for k, name in enumerate(("train_1", "train_2", "heldout"))]
     found = baselines.compared(traces, names=("sindy",))["sindy"]
     if "skipped" in found:
-        assert "pip install 'mount-cosim[proof]'" in found["skipped"]
+        assert "pip install" in found["skipped"]
         return
     assert found["alarm"]
     assert found["heldout_rms"] < 0.3 * baselines.rms(traces[2].missing)

@@ -152,7 +152,7 @@ def test_without_its_extra_one_sentence_says_how_to_get_it(tmp_path: Path) -> No
     code = "import sys; sys.modules['starlette'] = None; from cosim.cli import main; main(['serve'])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=HERE.parent, check=False)
     assert done.returncode == 2
-    assert "pip install 'mount-cosim[serve]'" in done.stderr
+    assert 'pip install "starlette' in done.stderr
     assert "Traceback" not in done.stderr
 
 

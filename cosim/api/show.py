@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from cosim.api.show_results import result, sweep_file
 from cosim.data.preview import preview
 from cosim.data.recording import Recording
 from cosim.data.runs import Run, taken
@@ -76,6 +77,8 @@ def show(
     """
     if isinstance(source, Recording):
         return _of_recording(source, picture, force)
+    if (own := result(Path(source))) is not None:
+        return Shown(*own)
     if Path(source).suffix in NO_RECORDINGS or ssp_of(source)[0] is not None:
         facts, tables = describe(str(source))
         return Shown(facts, tables, tuple(drawing(str(source))) if WIRES in tables else ())
@@ -214,13 +217,16 @@ def _toml(file: str) -> tuple[Facts, Tables]:
             keys = parsed(path.read_text("utf-8"))
         except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
             raise InputError(f"{file} is not valid TOML: {error}.", culprit=file) from error
+        if "vary" in keys:
+            return sweep_file(path)
         return _card(file) if "mount" in keys else _scenario(file)
     from pyfmi_models.card import shipped_cards
 
     if file in shipped_cards():
         return _card(file)
     if path.exists():
-        raise InputError(f"{file} is nothing that can be shown: a recording, FMU, scenario or card.", culprit=file)
+        kinds = "a recording, FMU, SSP, scenario, card, sweep, or a folder of a run, diagnosis or sweep"
+        raise InputError(f"{file} is nothing that can be shown: {kinds}.", culprit=file)
     choices = (*shipped_scenarios(), *shipped_cards())
     raise InputError(f"{file} does not exist; shipped are: {', '.join(choices)}.", culprit=file, choices=choices)
 

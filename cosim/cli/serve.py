@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from cosim.support.errors import MissingPackageError
+from cosim.support.extras import install
 from cosim.support.terminal import put, say
 
 
@@ -22,7 +23,7 @@ def serve(
         from cosim.serve.folder import open_to
         from cosim.serve.server import serve as run
     except ModuleNotFoundError as error:
-        text = f"cosim serve needs the package {error.name}: pip install 'mount-cosim[serve]'"
+        text = f"cosim serve needs the package {error.name}: {install('serve')}"
         raise MissingPackageError(text) from error
     from platformdirs import user_data_path
 

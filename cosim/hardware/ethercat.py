@@ -15,6 +15,7 @@ from cosim.hardware.machine import Machine
 from cosim.hardware.mapping import Entry, Layout
 from cosim.hardware.python_adapter import Order, PythonAdapter, Reading
 from cosim.support.errors import HardwareError, MissingPackageError
+from cosim.support.extras import install
 
 TORQUE_MODE = 10
 """Cyclic synchronous torque, object 0x6060."""
@@ -176,6 +177,6 @@ def _pysoem() -> Any:
     try:
         import pysoem
     except ImportError as error:
-        message = "EtherCAT needs the package pysoem: pip install 'mount-cosim[ethercat]'."
+        message = f"EtherCAT needs the package pysoem: {install('ethercat')}"
         raise MissingPackageError(message) from error
     return pysoem

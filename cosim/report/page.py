@@ -1,5 +1,6 @@
 """Everything the template prints, put together from a diagnosis."""
 
+import re
 from collections.abc import Iterator
 from importlib.resources import files as resources
 
@@ -43,7 +44,7 @@ def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, o
     return {
         "heading": heading(diagnosis),
         "mount": diagnosis.mount,
-        "careful": [one.statement for one in diagnosis.sanity],
+        **_doubts(diagnosis),
         "identity": identity(diagnosis),
         "lead": lead(diagnosis, scales),
         "facts": unknown.facts(diagnosis, scales) if kind == "unknown" else None,
@@ -55,6 +56,20 @@ def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, o
         "with_effects": _with_effects(diagnosis),
         "box": _box(diagnosis, [row.label for row in rows if row.change == "worse"], scales),
         "noun": "torque" if diagnosis.motion == "rotary" else "force",
+    }
+
+
+SAID = 2
+"""Sentences of a doubt that stand open; what more there is to it is folded."""
+
+
+def _doubts(diagnosis: Diagnosis) -> dict[str, object]:
+    """Return alarms, which keep effects from being named, each with what is folded; and remarks, all folded."""
+    alarms = [one.statement for one in diagnosis.sanity if one.blocks_naming]
+    cut = [re.split(r"(?<=[.!?]) (?=[A-Z])", text) for text in alarms]
+    return {
+        "careful": [(" ".join(parts[:SAID]), " ".join(parts[SAID:])) for parts in cut],
+        "remarks": [one.statement for one in diagnosis.sanity if not one.blocks_naming],
     }
 
 

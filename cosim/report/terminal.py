@@ -46,7 +46,11 @@ def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -
     title = printable(_title(diagnosis))
     parts = [
         [f"\033[1m{line}\033[0m" if bold else line for line in textwrap.wrap(title, WIDTH)],
-        [line for one in diagnosis.sanity for line in _ordered("Careful", one.statement)],
+        [
+            line
+            for one in sorted(diagnosis.sanity, key=lambda one: not one.blocks_naming)
+            for line in _ordered("Careful" if one.blocks_naming else "Note", one.statement)
+        ],
         [line for block in blocks(diagnosis) for line in _to_do(block, diagnosis)],
         _files(diagnosis, scales, out),
         [""],

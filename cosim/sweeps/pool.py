@@ -11,6 +11,7 @@ from typing import Any
 
 from cosim.support.cell import Cell, LostError, cores
 from cosim.support.errors import MissingPackageError, SweepError
+from cosim.support.extras import install
 from cosim.sweeps.design import Point
 from cosim.sweeps.job import Job, Row, work
 from cosim.sweeps.portable_job import PortableJob
@@ -157,7 +158,7 @@ def _client(address: str) -> Any:
     try:
         from dask.distributed import Client
     except ImportError as error:
-        message = "--cluster needs Dask: install it with pip install 'mount-cosim[cluster]'."
+        message = f"--cluster needs Dask: {install('cluster')}"
         raise MissingPackageError(message) from error
     try:
         return Client(address, timeout=PATIENCE, set_as_default=False)

@@ -4,8 +4,10 @@ A delay counts from where the source takes its inputs to where the target takes 
 """
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
+from cosim.support.files import cache_home
 from cosim.system.algorithm import GaussSeidel
 from cosim.system.scenario import Scenario
 from cosim.system.schedule import Delay, delays, order_of
@@ -113,7 +115,15 @@ def _what(scenario: Scenario, owner: str) -> str:
 def origin(component: Any) -> str:
     """Say where a component comes from; what was built from a card or model is told by that, not by its place here."""
     built = component.model or (f"the {component.part} of {component.card}" if component.card else "")
-    return str(built or component.fmu or component.python)
+    return str(built or _told(component.fmu) or component.python)
+
+
+def _told(fmu: Any) -> str:
+    """Name an FMU; one that was unpacked into the cache by its place in the archive that it came from."""
+    if fmu is None or not Path(fmu).is_relative_to(cache_home()):
+        return str(fmu or "")
+    parts = Path(fmu).relative_to(cache_home()).parts
+    return "/".join(parts[parts.index("resources") :] if "resources" in parts else parts[-1:])
 
 
 def in_short(scenario: Scenario) -> str:

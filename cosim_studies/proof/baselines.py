@@ -26,6 +26,7 @@ import numpy.typing as npt
 from cosim.diagnosis.answer.result import Trace
 from cosim.diagnosis.measure.regression import EVERY, Model, features, kernel
 from cosim.support.errors import MissingPackageError
+from cosim.support.extras import install
 from cosim.support.plain import Parsed
 from cosim.support.statistics import rms
 
@@ -144,7 +145,7 @@ def _stlsq() -> Any:
 
 
 def _missing(package: str) -> MissingPackageError:
-    return MissingPackageError(f"{package} is not installed; pip install 'mount-cosim[proof]' brings it.")
+    return MissingPackageError(f"{package} is not installed: {install('proof')}")
 
 
 def _regression(train: Sequence[Trace], held: Trace, look: Callable[[Trace], Array], fit: Fitter) -> Parsed:

@@ -10,6 +10,7 @@ import numpy as np
 
 from cosim.data.limits import check_cells, listed
 from cosim.support.errors import MissingPackageError, RecordingError
+from cosim.support.extras import install
 
 
 def package(name: str, extra: str, path: Path) -> Any:
@@ -17,9 +18,8 @@ def package(name: str, extra: str, path: Path) -> Any:
     try:
         return import_module(name)
     except ImportError as error:
-        install = f"pip install 'mount-cosim[{extra}]'"
         root = name.partition(".")[0]
-        raise MissingPackageError(f"{path} needs the package {root} to be read: {install}") from error
+        raise MissingPackageError(f"{path} needs the package {root} to be read: {install(extra)}") from error
 
 
 MOST_BESIDE = 100

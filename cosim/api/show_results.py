@@ -1,0 +1,133 @@
+"""What this project wrote itself, on one screen: folders of runs, diagnoses, sweeps, and their files."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from cosim.plots.sweep import Results, read_results
+from cosim.support.errors import InputError
+from cosim.support.plain import Json
+
+Told = tuple[dict[str, Json], dict[str, Sequence[Mapping[str, Json]]]]
+DIAGNOSIS, RUN, TABLE = "diagnosis.json", "run.json", "table.parquet"
+FIRST = 20
+"""Runs of a sweep that are listed, the best first."""
+
+
+def result(path: Path) -> Told | None:
+    """Return facts and tables of a folder or file that a verb wrote; None for anything else.
+
+    Raises:
+        InputError: the file is one of ours by its name, and cannot be read.
+    """
+    if path.is_dir():
+        found = [name for name in _READERS if (path / name).is_file()]
+        return _READERS[found[0]](path / found[0]) if found else None
+    reader = _READERS.get(path.name) if path.is_file() else None
+    return reader(path) if reader and (path.name != TABLE or _is_sweep(path)) else None
+
+
+def _document(path: Path, *keys: str) -> dict[str, Any]:
+    try:
+        told = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise InputError(f"{path} cannot be read: {error}.", culprit=str(path)) from error
+    if not isinstance(told, dict) or not set(keys) <= set(told):
+        text = f"{path} is named as a file of this project, and lacks {' and '.join(keys)}."
+        raise InputError(text, culprit=str(path))
+    return told
+
+
+def _diagnosis(path: Path) -> Told:
+    told = _document(path, "verdict", "effects", "heldout")
+    held = told["heldout"]
+    facts: dict[str, Json] = {
+        "diagnosis": str(path),
+        "missing": ", ".join(told["verdict"]) or "nothing that these recordings can show",
+        "validation RMS error": f"{_short(held, 'before_rms')} (refitted card) -> {_short(held, 'after_rms')} "
+        f"(improved card); noise floor {_short(held, 'floor_rms')}",
+        "made by": str(told.get("provenance", {}).get("command", "")),
+    }
+    report = path.with_name("report.html")
+    facts |= {"open": str(report)} if report.is_file() else {}
+    words = {"found": "detected", "ambiguous": "possible", "not_proven": "not confirmed", "not_seen": "not detected"}
+    rows: list[Mapping[str, Json]] = [
+        {
+            "effect": one["effect"],
+            "answer": words.get(one["answer"], str(one["answer"]).replace("_", " ")),
+            "probability": f"{one.get('probability', 0.0):.2f}" if one["answer"] in ("found", "ambiguous") else "",
+            "statement": one.get("statement", ""),
+        }
+        for one in told["effects"]
+    ]
+    return {name: value for name, value in facts.items() if value}, {"effects": rows}
+
+
+def _short(held: Mapping[str, Any], name: str) -> str:
+    value = held.get(name)
+    return f"{value:.3g}" if isinstance(value, float | int) else "?"
+
+
+def _run(path: Path) -> Told:
+    told = _document(path, "steps", "seconds")
+    facts: dict[str, Json] = {"run": str(path.parent), "scenario": str(told.get("scenario", ""))}
+    tracked = [str(one["statement"]) for one in told.get("tracking", ()) if "statement" in one]
+    facts |= {f"tracking {k}" if tracked[1:] else "tracking": text for k, text in enumerate(tracked, 1)}
+    facts |= {"simulated": f"{told.get('simulated_seconds', 0.0):.6g} s in {told['steps']:,} steps"}
+    facts |= {f"note {k}": str(note) for k, note in enumerate(told.get("notes", ()), 1)}
+    beside = {"recording": "recording.parquet", "pictures": "run.html"}
+    found = {kind: str(path.with_name(name)) for kind, name in beside.items() if path.with_name(name).is_file()}
+    return facts | dict(found), {}
+
+
+def _is_sweep(path: Path) -> bool:
+    from pyarrow import parquet
+
+    from cosim.data.formats import ORIGIN_KEY
+
+    try:
+        held = parquet.read_schema(path).metadata or {}
+        return "sweep" in json.loads(held.get(ORIGIN_KEY, b"{}"))
+    except (OSError, ValueError):
+        return False
+
+
+def _sweep(path: Path) -> Told:
+    if not _is_sweep(path):
+        raise InputError(f"{path} is no table of a sweep.", culprit=str(path))
+    results = read_results(path)
+    facts: dict[str, Json] = {"sweep": results.title, "table": str(path)}
+    if row := results.best_row():
+        facts["best"] = ", ".join(f"{name} = {value:.5g}" for name, value in row.items())
+    picture = path.with_name("sweep.svg")
+    facts |= {"picture": str(picture)} if picture.is_file() else {}
+    return facts, {"runs, the best first": _ranked(results)}
+
+
+def _ranked(results: Results) -> list[Mapping[str, Json]]:
+    import numpy as np
+
+    columns = {**results.varied, **results.statistics}
+    first = np.abs(next(iter(results.statistics.values())))
+    order = np.argsort(np.where(np.isfinite(first), first, np.inf))[:FIRST]
+    return [
+        {"run": int(k)} | {results.label(name): f"{values[k]:.5g}" for name, values in columns.items()} for k in order
+    ]
+
+
+def sweep_file(path: Path) -> Told:
+    """Return what a sweep file asks for."""
+    from cosim.sweeps import read_sweep
+
+    wanted = read_sweep(path)
+    facts: dict[str, Json] = {
+        "sweep": str(path),
+        "scenario": str(wanted.scenario),
+        "runs": wanted.design.runs,
+        "run it": f"cosim sweep {path}",
+    }
+    return facts, {}
+
+
+_READERS: dict[str, Callable[[Path], Told]] = {DIAGNOSIS: _diagnosis, RUN: _run, TABLE: _sweep}
