@@ -132,6 +132,7 @@ def calibrate(
         residuals = Residuals(processes, free, rows, 1 / rows.spread, part)
         found = fit(residuals, start, options.starts, options.seed, options.loss, say)
         values = residuals.point(found.x)
+        notes += _on_roughness(residuals.rough)
         (new,) = processes.at([values], all_)
         evaluations, lost = processes.evaluations, tuple(processes.reasons)
     if new is None:
@@ -153,6 +154,14 @@ def _check(options: Options) -> None:
     for name, number in (("--step", options.step), ("--window", options.window), ("--timeout", options.timeout)):
         if number is not None and not 0 < number < float("inf"):
             raise InputError(f"{name} {number:g}: it must be above 0.", culprit=name, value=number)
+
+
+def _on_roughness(names: Sequence[str]) -> tuple[str, ...]:
+    """A note on numbers for which differences over no two steps agreed; none where there are none."""
+    if not names:
+        return ()
+    said = "what was recorded does not change smoothly (an output jumps, or events fall on steps of the model)"
+    return (f"With {', '.join(names)} {said}: standard errors may be too small there.",)
 
 
 def _check_numbers(subject: Subject, experiments: Sequence[Experiment], outputs: Outputs) -> None:

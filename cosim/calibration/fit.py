@@ -69,6 +69,7 @@ def fit(residuals: Residuals, x: Array, starts: int, seed: int, loss: Loss, say:
     residuals.weights = 1 / spread
     z = residuals.at(x)
     residuals.bad = BAD * max(float(np.sqrt(np.mean(z**2))), 1.0)
+    residuals.settle(x)
     found: list[tuple[float, Array]] = []
     for k, one in enumerate(_starts(residuals, x, starts, seed)):
         say(f"start {k + 1} of {starts}")
@@ -77,6 +78,7 @@ def fit(residuals: Residuals, x: Array, starts: int, seed: int, loss: Loss, say:
             break
     best = min(found, key=lambda pair: pair[0])[1]
     agreeing = _agreeing(found)
+    residuals.settle(best)
     best, outlier = _weighted(residuals, best, loss, say)
     jacobian = residuals.jacobian(best)
     jacobian = residuals.jacobian(best)  # again, with steps that fit the noise

@@ -113,16 +113,17 @@ def _check(subject: Subject, name: str, port: Port | None) -> None:
 def _start(subject: Subject, name: str, port: Port | None, given: float | None) -> float:
     if given is not None:
         return float(given)
-    scenario, _, key = name.rpartition(".")
-    section = subject.scenario.components.get(name.partition(".")[0])
-    if not subject.alone and section is not None:
-        own = section.parameters.get(name.partition(".")[2])
-        if isinstance(own, int | float):
-            return float(own)
-    if port is not None and isinstance(port.start, int | float):
-        return float(port.start)
-    value = getattr(subject.scenario.signals.get(scenario), key, None)
-    if isinstance(value, int | float):
-        return float(value)
+    at, scenario = subject.known[name], subject.scenario
+    section = scenario.components.get(at.owner)
+    wire = next((one for one in scenario.wires if one.target == at.owner), None)
+    holders = (
+        section.parameters.get(at.key) if section else None,
+        port.start if port else None,
+        getattr(scenario.signals.get(at.owner), at.key, None),
+        getattr(wire, at.key, None),
+    )
+    for value in holders:
+        if isinstance(value, int | float):
+            return float(value)
     text = f'{OPTION} "{name}" has no start value in {subject.source}; --set {name}=... gives one.'
     raise InputError(text, culprit=name)

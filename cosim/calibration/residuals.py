@@ -4,7 +4,9 @@
 
 The step of a difference is chosen by noise: it moves the rows by `SHARE` of what one standard error would, so that the
 model is as good as linear over it, but by no less than `FLOOR` of an output's spread, far above what a solver's
-tolerance makes of two runs. Differences are central, one-sided at a bound or beside a point that cannot be simulated.
+tolerance makes of two runs. A model whose events fall on steps of its own is a staircase at small scales: `settle`
+looks for the widest step over which it is as good as linear, below which none is taken. Differences are central,
+one-sided at a bound or beside a point that cannot be simulated.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,6 +23,10 @@ SHARE = 0.3
 FLOOR = 1e-4
 FIRST, LEAST, MOST = 1e-3, 1e-9, 0.1
 """Steps relative to a number's size: the first one, and the least and greatest."""
+AGREE = 0.2
+"""Share by which slopes at two scales may differ where the model is smooth."""
+WIDER = 4.0
+"""Factor from one scale to the next."""
 KEPT = 4
 """Simulations that are kept, for each number."""
 
@@ -75,6 +81,8 @@ class Residuals:
     def __post_init__(self) -> None:
         self.scales = np.array([one.scale for one in self.free])
         self.steps = FIRST * np.ones(len(self.free))
+        self.least = LEAST * np.ones(len(self.free))
+        self.rough: tuple[str, ...] = ()
         self._known: dict[bytes, Array | None] = {}
 
     def point(self, x: Array) -> Mapping[str, float]:
@@ -111,10 +119,38 @@ class Residuals:
 
     def jacobian(self, x: Array) -> Array:
         """Derivatives d z / d x at a point, shape (rows, numbers)."""
+        columns, here = self._differences(x, self.steps)
+        if here is not None:
+            self._learn(columns, self._residual(here), np.maximum(np.abs(x), 1.0))
+        return columns
+
+    def settle(self, x: Array) -> None:
+        """Find for each number the widest step near a point over which the model is as good as linear.
+
+        Slopes over a step and over a quarter of it agree there; a central difference over the quarter is then wrong by
+        a sixteenth of that. `rough` are numbers for which no two steps agree.
+        """
+        steps = MOST * np.ones(len(self.free))
+        wide, here = self._differences(x, steps)
+        if here is None:
+            return
+        floor = np.minimum(self._wanted(wide, 0.0, np.maximum(np.abs(x), 1.0)), FIRST)
+        agree = np.zeros(len(x), bool)
+        while np.any(~agree & (steps > floor)):
+            narrow = np.where(agree, steps, np.maximum(steps / WIDER, floor))
+            fine = self._differences(x, narrow)[0]
+            slopes = np.linalg.norm(fine, axis=0)
+            agree |= np.linalg.norm(fine - wide, axis=0) <= AGREE * slopes
+            steps, wide = narrow, fine
+        self.least = steps
+        self.rough = tuple(one.name for one, is_smooth in zip(self.free, agree, strict=True) if not is_smooth)
+
+    def _differences(self, x: Array, steps: Array) -> tuple[Array, Array | None]:
+        """Derivatives with these relative steps, and the outputs at the point."""
         size = np.maximum(np.abs(x), 1.0)
         low = np.array([one.low for one in self.free]) / self.scales
         high = np.array([one.high for one in self.free]) / self.scales
-        up, down = np.minimum(x + self.steps * size, high), np.maximum(x - self.steps * size, low)
+        up, down = np.minimum(x + steps * size, high), np.maximum(x - steps * size, low)
         points = [_moved(x, k, value) for values in (up, down) for k, value in enumerate(values)]
         here, *found = self.simulated([x, *points])
         columns = np.zeros((len(self.rows.measured), len(x)))
@@ -124,18 +160,20 @@ class Residuals:
             if len(good) > 1 and good[0][0] != good[1][0]:
                 (first, above), (second, below) = good[:2]
                 columns[:, k] = self.weights[self.rows.output] * (above - below) / (first - second)
-        if here is not None:
-            self._learn(columns, self._residual(here), size)
-        return columns
+        return columns, here
 
     def _learn(self, columns: Array, z: Array, size: Array) -> None:
         """Choose the next steps."""
-        noise = SHARE * float(np.sqrt(np.mean(z**2)))
+        self.steps = np.maximum(self._wanted(columns, SHARE * float(np.sqrt(np.mean(z**2))), size), self.least)
+
+    def _wanted(self, columns: Array, noise: float, size: Array) -> Array:
+        """Relative steps that move the rows by a norm of `noise`, and by no less than `FLOOR` asks for."""
         least = FLOOR * self.weights * self.rows.spread
         floor = float(np.sqrt(np.sum(least[self.rows.output] ** 2)))
         slopes = np.linalg.norm(columns, axis=0)
         wanted = np.divide(max(noise, floor), slopes, out=np.full(len(slopes), np.inf), where=slopes > 0)
-        self.steps = np.clip(wanted / size, LEAST, MOST)
+        steps: Array = np.clip(wanted / size, LEAST, MOST)
+        return steps
 
 
 def _moved(x: Array, k: int, value: float) -> Array:
