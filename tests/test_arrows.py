@@ -25,7 +25,7 @@ FLOORS = (
     {"cosim.fmi", "cosim.reading"},
     {"cosim.system"},
     {"cosim.master", "cosim.plots"},
-    {"cosim.hardware", "cosim.observatory", "cosim.sweeps", "cosim.models", "cosim.estimation"},
+    {"cosim.nesting", "cosim.hardware", "cosim.observatory", "cosim.sweeps", "cosim.models", "cosim.estimation"},
     {"cosim.calibration", "cosim.experiments"},
     {"cosim.diagnosis.answer"},
     {"cosim.diagnosis.decide"},
@@ -51,7 +51,7 @@ ROOMS = {folder for floor in FLOORS for folder in floor if folder.count(".") == 
 KNOW_PHYSICS = (
     ROOMS | {"cosim.diagnosis", "cosim.report", "cosim.delivery", "cosim.investigation", "cosim.checks"} | HIGHEST
 )
-KNOW_PHYSICS |= {"cosim.models", "cosim.estimation", "cosim.simulators"}
+KNOW_PHYSICS |= {"cosim.models", "cosim.estimation", "cosim.simulators", "cosim.nesting"}
 NEED_HEAVY = KNOW_PHYSICS | {"cosim.plots"}
 """Folders that may import CasADi, the compiler or matplotlib: a run needs none of them."""
 STUDY_VERBS = {f"cosim.cli.{verb}" for verb in ("demo", "paper", "prove")}

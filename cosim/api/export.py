@@ -14,6 +14,7 @@ from cosim.simulators.deliver import planned as planned_files
 from cosim.simulators.format import Format
 from cosim.simulators.measure import Held
 from cosim.simulators.table import table_text
+from cosim.support.errors import InputError
 from cosim.support.files import check_free, directory
 from cosim.support.html import table as html_table
 from cosim.support.plain import JsonObject
@@ -87,13 +88,14 @@ def export(
     urdf: bool = False,
     isaac: bool = False,
     recording: Source | None = None,
+    as_fmu: bool = False,
     force: bool = False,
     on_progress: Progress = lambda done, of: None,
 ) -> Exported:
     """Write the plant of a card and, where it has one, its controller as FMUs for co-simulation and model exchange.
 
     Args:
-        card: a model card: its path, the name of a shipped one ("paper_mount"), or a `Card`.
+        card: a model card: its path, the name of a shipped one ("paper_mount"), or a `Card`; with `as_fmu` a scenario.
         out: folder for the files, NAME_plant_fmi3.fmu and so on; it is made where it is not there.
         fmi: version of the standard: 2, 3 or "both".
         platform: "host", "all", or names with commas between ("x86_64-linux,aarch64-linux").
@@ -106,6 +108,7 @@ def export(
         isaac: also write the joint for Isaac Sim, NAME_isaac.usda.
         recording: along whose motion is measured what a simulator cannot hold (see `cosim.read`; columns as in the
             card); None takes two sines that reach the speeds where the card's friction changes.
+        as_fmu: `card` is a scenario or SSP, which becomes one FMU for co-simulation, NAME_fmi3.fmu (Linux).
         force: overwrite what is there.
         on_progress: told how many FMUs are done, and of how many.
 
@@ -113,13 +116,36 @@ def export(
         `Exported`: the paths.
 
     Raises:
-        CardError: the card is not good, or cannot have what is asked for.
-        RecordingError: the recording is not good.
+        CardError, RecordingError: the card or recording is not good, or the card cannot have what is asked for.
+        ScenarioError, WiringError, FmuError, SignalError: the system is not good, or cannot become one FMU.
         OutputError: a file is there already; nothing was written then.
     """
     asked = {"ssp": ssp, "modelica": modelica, "modelica_flange": modelica_flange, "c": c}
     kinds = kinds_of(**asked, mujoco=mujoco, urdf=urdf, isaac=isaac)
+    if as_fmu:
+        return system_as_fmu(card, out, fmi, platform, force, kinds)
     return planned(card, out, fmi, platform, force, kinds, recording).write(on_progress)
+
+
+def system_as_fmu(
+    scenario: str | Path | Card,
+    out: str | Path,
+    fmi: Fmi | Literal["both"],
+    platform: str,
+    force: bool,
+    kinds: Sequence[str],
+) -> Exported:
+    """Write a system as one FMU; arguments and errors are those of `export`."""
+    from cosim.api.export_system import export_system
+
+    if isinstance(scenario, Card):
+        raise InputError("A card is no system: give a scenario (.toml) or an SSP, or leave --as-fmu out.")
+    if kinds:
+        option = f"--{kinds[0].replace('_', '-')}"
+        raise InputError(f"{option} is of a card, and --as-fmu of a system; give one of them.", culprit=option)
+    if platform != "host":
+        raise InputError(f'--as-fmu builds for this computer; --platform "{platform}" is not there.', culprit=platform)
+    return Exported(export_system(scenario, out, fmi, force))
 
 
 def kinds_of(**asked: bool) -> tuple[str, ...]:

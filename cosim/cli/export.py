@@ -37,6 +37,7 @@ def export(
     mujoco: Annotated[bool, typer.Option("--mujoco", help="Also write the joint for MuJoCo.")] = False,
     urdf: Annotated[bool, typer.Option("--urdf", help="Also write the joint as URDF.")] = False,
     isaac: Annotated[bool, typer.Option("--isaac", help="Also write the joint for Isaac Sim.")] = False,
+    as_fmu: Annotated[bool, typer.Option("--as-fmu", help="CARD is a scenario or SSP: make one FMU of it.")] = False,
     recording: Annotated[
         Path | None, typer.Option("--recording", help="Measure along it what a simulator cannot hold.")
     ] = None,
@@ -45,10 +46,14 @@ def export(
 ) -> None:
     """Write the plant of a card and, where it has one, its controller as FMUs; also for other simulators."""
     out = out or default_out(Path(card).stem)
-    from cosim.api.export import kinds_of, planned
+    from cosim.api.export import kinds_of, planned, system_as_fmu
 
     asked = {"ssp": ssp, "modelica": modelica, "modelica_flange": modelica_flange, "c": c}
     kinds = kinds_of(**asked, mujoco=mujoco, urdf=urdf, isaac=isaac)
+    if as_fmu:
+        done = system_as_fmu(card, out, VERSIONS[fmi], platform, force, kinds)
+        put_json(done.as_json()) if as_json else put(str(done))
+        return
     plan = planned(card, out, VERSIONS[fmi], platform, force, kinds, recording)
     with stage(f"{Path(card).stem}: {len(plan.archives)} FMUs") as progress:
         done = plan.write(progress)

@@ -58,6 +58,15 @@ class Aliased:
         """Start the component with parameters under either name."""
         self._component.enter_initialisation({self._own(name): value for name, value in parameters.items()}, time)
 
+    @property
+    def behind(self) -> Component:
+        """The component itself."""
+        return self._component
+
+    def settings(self, parameters: Mapping[str, Any]) -> Any:
+        """What parameters under either name set."""
+        return self._component.settings({self._own(name): value for name, value in parameters.items()})  # type: ignore[attr-defined]
+
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)

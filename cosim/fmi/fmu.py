@@ -120,13 +120,17 @@ class FmuComponent:
         """
         if self._worst == FATAL:
             raise FmuError(f"{self.name} ({self.path}) failed for good and cannot start again; open it anew.")
-        self.configure(parameters)
-        settings = settings_of(self.ports, self.name, {**self._starts, **parameters})
+        settings = self.settings(parameters)
         with self._starting():
             if self._started:
                 self._fmu.reset()
                 self._worst = OK
             self._enter_initialisation(settings, time)
+
+    def settings(self, parameters: Mapping[str, Any]) -> list[Setting]:
+        """What these parameters and start values set, beside start values of the FMU that its binary does not know."""
+        self.configure(parameters)
+        return settings_of(self.ports, self.name, {**self._starts, **parameters})
 
     def _enter_initialisation(self, settings: Sequence[Setting], time: float) -> None:
         structural = [one for one in settings if one.port.causality == STRUCTURAL]
