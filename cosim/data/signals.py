@@ -130,6 +130,11 @@ class Samples:
             )
             raise SignalError(message, culprit=name, value=self._values.shape)
 
+    @property
+    def constant(self) -> bool:
+        """Whether it is a number, the same in every tick."""
+        return self._values.ndim == 0
+
     def stream(self, step: float) -> Stream:
         """Make a stream of the array."""
         return self._take

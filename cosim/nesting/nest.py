@@ -24,8 +24,9 @@ _INCLUDED = {"loop.inc": LOOP / "loop.c", "part.inc": LOOP / "part.c", "coupling
 _INCLUDED |= {"instance.inc": SHIM / "instance.c"}
 _AS_THEY_ARE = [LOOP / "loop.h", LOOP / "foreign.h"]
 _AS_THEY_ARE += [SHIM / name for name in ("core.h", "model.h", "fmi2.c", "fmi3.c", "fmi3_unused.c")]
-FLAGS = ("-std=c11", "-O2", "-g0", "-s", "-ffp-contract=off", "-fvisibility=hidden", "-shared", "-fPIC", "-ldl", "-lm")
+FLAGS = ("-std=c11", "-O2", "-g0", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC")
 """As of the loop of a run (build_hook.py): one rounding an operation."""
+LIBRARIES = ("-ldl", "-lm")
 
 
 def nest(system: System, paths: dict[Literal[2, 3], Path]) -> tuple[Path, ...]:
@@ -54,12 +55,23 @@ def _files(prepared: Prepared, shown: Sequence[Shown], version: Literal[2, 3], s
     identifier = identifier if identifier[:1].isalpha() else f"system_{identifier}"
     sources = _sources() | {"system.c": plan.encode(), "model.c": model_c(prepared, shown, token).encode()}
     platform = PLATFORMS[host()]
-    library = compile_shared(sources, f"{identifier}.so", platform.target, FLAGS).read_bytes()
+    library = _built(sources, f"{identifier}.so", platform.target).read_bytes()
     folder = platform.fmi2 if version == 2 else platform.name
     files = {f"binaries/{folder}/{identifier}.so": library} | parts
     files |= {"resources/signals.bin": content} if content else {}
     files |= {f"sources/{name}": text for name, text in sources.items()}
     return files | {"modelDescription.xml": description(prepared, shown, token, identifier, version)}
+
+
+def _built(sources: dict[str, bytes], name: str, target: str) -> Path:
+    """Compile and link; what is the same in every system is kept as objects, which takes most of the time."""
+    own = ("system.c", "model.c")
+    others = {file: text for file, text in sources.items() if not file.endswith(".c")}
+    units = [file for file in sources if file.endswith(".c") and file not in own]
+    flags = (*FLAGS, "-c")
+    objects = [compile_shared(others | {unit: sources[unit]}, f"{unit[:-2]}.o", target, flags) for unit in units]
+    written = others | {unit: sources[unit] for unit in own}
+    return compile_shared(written, name, target, (*FLAGS, "-s", "-shared", *map(str, objects), *LIBRARIES))
 
 
 def _sources() -> dict[str, bytes]:

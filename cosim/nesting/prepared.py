@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from cosim.data.signals import Constant, Samples
 from cosim.fmi.description import describe
 from cosim.fmi.fmu import FmuComponent
 from cosim.fmi.settings import STRUCTURAL, Setting
@@ -18,6 +19,7 @@ from cosim.master.planning import make_plan
 from cosim.master.typed import TypedComponent
 from cosim.support.errors import WiringError
 from cosim.system.plan import Part, Plan
+from cosim.system.ports import PortRef
 from cosim.system.system import Fmu, Function, System
 from cosim.system.wiring import Wiring
 
@@ -69,6 +71,8 @@ class Prepared:
     starts: tuple[Start, ...]
     given: tuple[Told, ...]
     binaries: tuple[Binary, ...]
+    limited: bool
+    """Whether signals say nothing beyond the end of the run: all but constants do."""
 
     @property
     def components(self) -> tuple[FmuComponent, ...]:
@@ -104,7 +108,15 @@ def prepare(stack: ExitStack, system: System) -> Prepared:
         starts=tuple(noted.starts),
         given=tuple(_given(plan, settings)),
         binaries=tuple(_binary(_plain(part)) for part in plan.parts),
+        limited=any(not _is_constant(name, wiring) for name in wiring.sources()),
     )
+
+
+def _is_constant(name: str, wiring: Wiring) -> bool:
+    """Whether a signal is one number for ever, and no fault changes that."""
+    signal = wiring.sources()[name]
+    faulty = any(PortRef(fault.on).owner == name for fault in wiring.faults)
+    return not faulty and (isinstance(signal, Constant) or (isinstance(signal, Samples) and signal.constant))
 
 
 def _binary(fmu: FmuComponent) -> Binary:

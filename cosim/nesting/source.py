@@ -28,6 +28,7 @@ def system_c(prepared: Prepared, shown: Sequence[Shown], columns: Sequence[int])
     tables["column"] = "int", list(map(str, columns))
     tables["meaning"] = "Meaning", [f"{{{one.part}, {one.reference}}}" for one in shown]
     numbers = {"ticks": prepared.ticks, "signals": len(columns), "varying": sum(one >= 0 for one in columns)}
+    numbers["limited"] = int(prepared.limited)
     numbers |= {"bus": len(prepared.bus), "signal": prepared.plan.signal}
     numbers |= {count: len(tables[table][1]) for count, table in _COUNTED.items()}
     fields = [f"    .step = {number(prepared.plan.step)},", *(f"    .{name} = {n}," for name, n in numbers.items())]

@@ -58,7 +58,7 @@ Status do_step(Instance *instance, double time, double length) {
                     nested.step);
     if (!(fabs(time - now) <= slack * nested.step))
         return fail(instance, FAILED, "a step from t = %.17g s: the system is at t = %.17g s", time, now);
-    if (nested.varying && nest->loop.tick + (int64_t)whole > nested.ticks)
+    if (nested.limited && nest->loop.tick + (int64_t)whole > nested.ticks)
         return fail(instance, FAILED, "a step to t = %.17g s passes %.17g s, where the signals of the system end",
                     time + length, (double)nested.ticks * nested.step);
     Status status = run(instance, (int64_t)whole);

@@ -56,6 +56,7 @@ typedef struct {
 typedef struct {
     double step;
     int64_t ticks; /* for which there are signals */
+    int limited;   /* whether signals say nothing beyond them */
     int parts, wires, stages, signals, varying, bus, signal, settings, starts;
     const Piece *piece;
     const Wire *wire; /* their faults are shared: what is held there is kept by the instance */

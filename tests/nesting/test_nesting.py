@@ -1,0 +1,227 @@
+"""A system as one FMU has the bits of its run, takes inputs and parameters from outside, and refuses what it cannot."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+from nested_runs import assert_same_bits, both, nested
+from tiny_fmu import described, description, tiny
+
+from cosim.api.export import export
+from cosim.cli import main
+from cosim.data.signals import Noise, Steps
+from cosim.master.simulate import simulate
+from cosim.models.cache import with_fmus
+from cosim.support.errors import WiringError
+from cosim.system.algorithm import Energy, GaussSeidel, Iterated, Jacobi
+from cosim.system.faults import Freeze
+from cosim.system.scenario import read_scenario
+from cosim.system.system import Fmu, Function, System
+from cosim.system.wire import Record, Wire
+
+__all__ = ["tiny"]
+
+Tiny = dict[int, Path]
+STEP, TICKS = 0.05, 120
+
+
+def oscillator(fmu: Path, **changes: Any) -> System:
+    """V' = r - x and x' = v as two FMUs."""
+    system = System(
+        components={"mass": fmu, "spring": fmu},
+        wires=[Wire("r", "mass.a"), Wire("spring.y", "mass.b"), Wire("mass.y", "spring.a")],
+        records={"v": Record("mass.y"), "x": Record("spring.y")},
+        step=STEP,
+        ticks=TICKS,
+        signals={"r": 1.0},
+    )
+    return replace(system, **changes)
+
+
+@pytest.fixture(scope="module")
+def plain(tiny: Tiny, tmp_path_factory: pytest.TempPathFactory) -> Tiny:
+    """The tiny FMU without units, so that a bond may be anything."""
+    folder = tmp_path_factory.mktemp("plain")
+    texts = {version: description(version).replace(' unit="rad"', "") for version in tiny}
+    return {version: described(tiny[version], folder / f"plain{version}.fmu", texts[version]) for version in tiny}
+
+
+ALGORITHMS = {
+    "jacobi": Jacobi(kind="jacobi"),
+    "gauss-seidel": GaussSeidel(kind="gauss-seidel", order=["spring", "mass"]),
+    "iterated": Iterated(kind="iterated", components=["mass", "spring"]),
+    "energy": Energy(kind="energy", bonds=[("mass.y", "spring.y")]),
+}
+
+
+PAIRS = [("jacobi", 2), ("jacobi", 3), ("gauss-seidel", 3), ("iterated", 2), ("energy", 3)]
+
+
+@pytest.mark.parametrize(("algorithm", "fmi"), PAIRS)
+def test_each_algorithm_has_the_bits_of_the_run(algorithm: str, fmi: int, plain: Tiny, tmp_path: Path) -> None:
+    """Components of the other FMI version than the whole."""
+    system = oscillator(plain[5 - fmi], algorithm=ALGORITHMS[algorithm])
+    assert_same_bits(*both(system, tmp_path, fmi))
+
+
+def test_rates_gains_quanta_noise_and_faults_go_along(tiny: Tiny, tmp_path: Path) -> None:
+    system = oscillator(
+        tiny[3],
+        every={"spring": 3},
+        wires=[
+            Wire("r", "mass.a"),
+            Wire("spring.y", "mass.b", gain=0.9, offset=0.01, noise="hiss"),
+            Wire("mass.y", "spring.a", quantum=1e-3),
+        ],
+        signals={
+            "r": Steps(kind="steps", times=[1.0, 3.0], values=[1.0, -2.0]),
+            "hiss": Noise(kind="noise", rms=1e-3, seed=7),
+        },
+        parameters={"mass": {"k": 1.3}, "spring": {"k": 0.7}},
+        faults=[Freeze.model_validate({"on": "spring.a", "kind": "freeze", "from": 2.0, "until": 2.5})],
+    )
+    assert_same_bits(*both(system, tmp_path, 3))
+
+
+def test_a_longer_step_of_the_importer_is_several_ticks(tiny: Tiny, tmp_path: Path) -> None:
+    assert_same_bits(*both(oscillator(tiny[2]), tmp_path, 2, every=4))
+
+
+@pytest.mark.parametrize("name", ["sidereal", "two_axis"])
+def test_shipped_scenarios_have_the_bits_of_their_run(name: str, tmp_path: Path) -> None:
+    scenario = with_fmus(read_scenario(name))
+    system = replace(scenario.system(), ticks=3000, decimation=1)
+    outputs = {n: one for n, one in system.records.items() if is_output(scenario, one)}
+    assert len(outputs) > 3
+    ours, theirs = both(replace(system, records=outputs), tmp_path, 3)
+    for column, values in ours.items():
+        np.testing.assert_array_equal(values, theirs[column], err_msg=column)
+
+
+def is_output(scenario: Any, record: Record) -> bool:
+    """Whether a column is what a component or signal gives: an input acts in the tick after its time."""
+    fed = {str(wire.target) for wire in scenario.wires}
+    return record.mode == "sample" and str(record.signal) not in fed
+
+
+def test_an_ssp_becomes_one_fmu_that_is_valid_and_runs_in_our_master_too(tmp_path: Path) -> None:
+    ssp = export("paper_mount", tmp_path / "a", fmi=3, ssp=True).ssp
+    assert ssp is not None
+    done = export(ssp, tmp_path / "b", as_fmu=True)
+    assert [one.name for one in done.fmus] == ["paper_mount_fmi2.fmu", "paper_mount_fmi3.fmu"]
+    assert not [problem for path in done.fmus for problem in validate_fmu(path)]
+    scenario = read_scenario(ssp)
+    names = {"q": Record("mount.q"), "tau": Record("controller.tau")}
+    inside = replace(scenario.system(), ticks=2000, records=names)
+    whole = System(
+        components={"all": Fmu(done.fmus[1])},
+        records={"q": Record("all.mount.q"), "tau": Record("all.controller.tau")},
+        step=inside.step,
+        ticks=inside.ticks,
+    )
+    one, other = simulate(inside).recording, simulate(whole).recording
+    assert one is not None
+    assert other is not None
+    for column in names:
+        np.testing.assert_array_equal(one[column], other[column])
+
+
+def test_inputs_and_parameters_come_from_outside(tiny: Tiny, tmp_path: Path) -> None:
+    """What no wire feeds is an input of the whole; a parameter may be another one than the scenario's."""
+    free = oscillator(tiny[3], wires=[Wire("spring.y", "mass.b"), Wire("mass.y", "spring.a")], signals={})
+    push = np.cos(0.3 * np.arange(TICKS))
+    fmu = nested(free, tmp_path, 3)
+    fmu.start({"mass.k": 1.5, "mass.a": float(push[0])})
+    rows = fmu.run(["mass.y", "spring.y"], TICKS, inputs={"mass.a": push})
+    fmu.close()
+    recording = simulate(oscillator(tiny[3], signals={"r": push}, parameters={"mass": {"k": 1.5}})).recording
+    assert recording is not None
+    np.testing.assert_array_equal(recording["v"], rows["mass.y"][:TICKS])
+    np.testing.assert_array_equal(recording["x"], rows["spring.y"][:TICKS])
+
+
+def test_several_instances_and_a_reset_begin_anew(tiny: Tiny, tmp_path: Path) -> None:
+    one = nested(oscillator(tiny[2]), tmp_path, 2)
+    one.start()
+    first = one.run(["spring.y"], 50)
+    one.fmu.reset()
+    one.start()
+    again = one.run(["spring.y"], 50)
+    one.close()
+    np.testing.assert_array_equal(first["spring.y"], again["spring.y"])
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_steps_that_do_not_fit_are_refused(fmi: int, tiny: Tiny, tmp_path: Path) -> None:
+    moving = oscillator(tiny[3], signals={"r": Steps(kind="steps", times=[9.0], values=[1.0])}, ticks=10)
+    fmu = nested(moving, tmp_path, fmi)
+    fmu.start()
+    for time, size in ((0.0, 0.4 * STEP), (STEP, STEP), (0.0, 11 * STEP)):
+        with pytest.raises(Exception, match="DoStep"):
+            fmu.fmu.doStep(time, size)
+    fmu.fmu.doStep(0.0, 10 * STEP)
+    fmu.fmu.freeInstance()
+
+
+def test_a_component_that_fails_ends_the_step(tiny: Tiny, tmp_path: Path) -> None:
+    fmu = nested(oscillator(tiny[3], parameters={"spring": {"fail_at": 1.0}}), tmp_path, 3)
+    fmu.start()
+    with pytest.raises(Exception, match="DoStep"):
+        fmu.run(["spring.y"], TICKS)
+    fmu.fmu.freeInstance()
+
+
+def refusal(system: System, folder: Path) -> str:
+    with pytest.raises(WiringError) as refused:
+        nested(system, folder, 3)
+    return str(refused.value)
+
+
+def test_what_cannot_be_nested_is_said_in_a_sentence(tiny: Tiny, tmp_path: Path) -> None:
+    python = Function("file.py:f", {"a": "rad"}, {"y": "rad"}, "here")
+    assert '"mass" is a Python function' in refusal(
+        oscillator(tiny[3], components={"mass": python, "spring": tiny[3]}), tmp_path
+    )
+    exchange = Fmu(tiny[3], "model-exchange")
+    said = refusal(oscillator(tiny[3], components={"mass": exchange, "spring": tiny[3]}), tmp_path)
+    assert "model-exchange" in said
+    assert "starts at 2 s" in refusal(oscillator(tiny[3], start=2.0), tmp_path)
+    direct = described(tiny[3], tmp_path / "direct.fmu", description(3, direct=True))
+    ring = oscillator(direct, parameters={"mass": {"mode": 2.0, "k": 0.5}, "spring": {"mode": 2.0, "k": 0.5}})
+    assert "ring" in refusal(ring, tmp_path)
+    assert not list(tmp_path.glob("system*.fmu"))
+
+
+def code_of(command: list[str]) -> object:
+    with pytest.raises(SystemExit) as left:
+        main(command)
+    return left.value.code
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (["sidereal", "--as-fmu", "--mujoco"], "--mujoco is of a card"),
+        (["paper_mount", "--as-fmu"], "no such scenario"),
+        (["sidereal", "--as-fmu", "--platform", "all"], "builds for this computer"),
+        (["nothing.ssp", "--as-fmu"], "nothing.ssp"),
+    ],
+)
+def test_wrong_use_of_the_command_is_a_sentence(
+    words: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert code_of(["export", *words, "--out", str(tmp_path)]) == 2
+    assert sentence in capsys.readouterr().err
+
+
+def test_the_command_prints_the_path_and_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ["export", "sidereal", "--as-fmu", "--fmi", "3", "--json", "--out", str(tmp_path)]
+    assert code_of(asked) == 0
+    (path,) = json.loads(capsys.readouterr().out)["fmus"]
+    assert Path(path).is_file()
+    assert code_of(asked) == 2
+    assert "exists already" in capsys.readouterr().err
