@@ -56,6 +56,7 @@ def show(
     units: Mapping[str, str] | None = None,
     layout: Mapping[str, str] | None = None,
     picture: str | Path | None = None,
+    schedule: bool = False,
     force: bool = False,
 ) -> Shown:
     """Tell what a recording, FMU, SSP, scenario or card holds; one that is shipped is given by its name.
@@ -66,6 +67,7 @@ def show(
         units: of a recording's file, our name to the unit in it.
         layout: how a text is written; see `Recording.read`.
         picture: an SVG or PNG file into which a recording is drawn.
+        schedule: of a scenario or SSP, what happens in a step: order, age of inputs, what FMUs offer besides.
         force: overwrite the picture.
 
     Returns:
@@ -75,6 +77,8 @@ def show(
     Raises:
         InputError: the file is nothing that can be shown, or breaks its own rules.
     """
+    if schedule:
+        return _of_schedule(source)
     if isinstance(source, Recording):
         return _of_recording(source, picture, force)
     if (own := result(Path(source))) is not None:
@@ -84,6 +88,14 @@ def show(
         return Shown(facts, tables, tuple(drawing(str(source))) if WIRES in tables else ())
     options = {"columns": columns or {}, "units": units or {}, "layout": layout or {}}
     return _of_file(Path(source), options, picture, force)
+
+
+def _of_schedule(source: str | Path | Recording) -> Shown:
+    from cosim.api.schedule import schedule
+
+    if isinstance(source, Recording):
+        raise InputError("A recording has no schedule: give a scenario (.toml) or an SSP.")
+    return Shown(*schedule(str(source)))
 
 
 def _lines(rows: Sequence[Row]) -> list[str]:

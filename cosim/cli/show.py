@@ -28,6 +28,7 @@ def show(
     units: Annotated[list[str] | None, typer.Option("--units", help="Recording: units in the file.")] = None,
     layout: Annotated[list[str] | None, typer.Option("--layout", help="Recording: how the text is written.")] = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Recording: a picture of it, .svg or .png.")] = None,
+    schedule: Annotated[bool, typer.Option("--schedule", help="Scenario: what happens in a step.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print it as JSON.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the picture.")] = False,
 ) -> None:
@@ -37,7 +38,7 @@ def show(
     from cosim.reading import options_of
 
     options = options_of(Path(file), columns, units, layout)
-    shown = shown_of(file, **options, picture=out, force=force)
+    shown = shown_of(file, **options, picture=out, schedule=schedule, force=force)
     if as_json:
         put_json({**shown.facts, **shown.tables})
         return

@@ -1,10 +1,13 @@
 """A system as one FMU has the bits of its run, takes inputs and parameters from outside, and refuses what it cannot."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import fmu_tools
 import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
@@ -27,6 +30,7 @@ __all__ = ["tiny"]
 
 Tiny = dict[int, Path]
 STEP, TICKS = 0.05, 120
+STEP_OF_TOOLS = fmu_tools.STEP
 
 
 def oscillator(fmu: Path, **changes: Any) -> System:
@@ -173,6 +177,22 @@ def test_a_component_that_fails_ends_the_step(tiny: Tiny, tmp_path: Path) -> Non
     with pytest.raises(Exception, match="DoStep"):
         fmu.run(["spring.y"], TICKS)
     fmu.fmu.freeInstance()
+
+
+def test_another_importer_has_the_same_bits(tiny: Tiny, tmp_path: Path) -> None:
+    pytest.importorskip("libcosimpy.CosimExecution")
+    wires = [*oscillator(tiny[3]).wires, Wire("zero", "spring.b")]
+    fmu = nested(oscillator(tiny[3], wires=wires, signals={"r": 1.0, "zero": 0.0}, step=STEP_OF_TOOLS), tmp_path, 2)
+    fmu.start()
+    ours = fmu.run(["mass.y", "spring.y"], 40)
+    fmu.close()
+    out, path = tmp_path / "rows.npz", tmp_path / "system2.fmu"
+    command = [sys.executable, fmu_tools.__file__, "libcosim", str(path), "40", str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    theirs = dict(zip(fmu_tools.names_of(str(path))[0], np.load(out)["rows"].T, strict=True))
+    for name, values in ours.items():
+        np.testing.assert_array_equal(values[1:], theirs[name])
 
 
 def refusal(system: System, folder: Path) -> str:
