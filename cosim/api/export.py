@@ -18,6 +18,7 @@ from cosim.support.errors import InputError
 from cosim.support.files import check_free, directory
 from cosim.support.html import table as html_table
 from cosim.support.plain import JsonObject
+from cosim.support.toml import parsed
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.export import export_fmu
 from pyfmi_models.export.platforms import platforms_of
@@ -197,6 +198,8 @@ def planned(
 
     `kinds` are the words of what is wanted beside the FMUs: "ssp", "modelica", "mujoco", ...
     """
+    if isinstance(card, str | Path) and _is_system(Path(card)):
+        raise InputError(f"{card} is a system, not a card; with --as-fmu it becomes one FMU.", culprit=str(card))
     platforms, folder = platforms_of(platform), Path(out)
     read = card if isinstance(card, Card) else read_card(card)
     stem = Path(read.path).stem or read.plant().name
@@ -213,6 +216,16 @@ def planned(
     )
     plan.check()
     return plan
+
+
+def _is_system(path: Path) -> bool:
+    """Whether a file is an SSP or a scenario, which has components."""
+    if path.suffix == ".ssp":
+        return True
+    try:
+        return path.suffix == ".toml" and path.is_file() and "components" in parsed(path.read_text("utf-8"))
+    except (ValueError, OSError):
+        return False
 
 
 def _simulators(card: Card, folder: Path, stem: str, formats: Sequence[Format], recording: Source | None) -> Planned:

@@ -81,18 +81,13 @@ def _sources() -> dict[str, bytes]:
 
 
 def _parts(prepared: Prepared) -> dict[str, bytes]:
-    """Of each component its binaries for this platform and its resources, unpacked, in a folder of its own."""
+    """Each component unpacked in a folder of its own, without the binaries of other platforms and its sources."""
     found: dict[str, bytes] = {}
     for index, (fmu, binary) in enumerate(zip(prepared.components, prepared.binaries, strict=True)):
-        binaries = f"binaries/{binary.folder}/"
+        kept = (binary.folder, "resources/", "modelDescription.xml", "extra/")
         with zipfile.ZipFile(fmu.path) as archive:
-            for name in archive.namelist():
-                if name.endswith("/"):
-                    continue
-                if name.startswith(binaries):
-                    found[f"{folder_of(index)}/{name.removeprefix(binaries)}"] = archive.read(name)
-                elif name.startswith("resources/"):
-                    found[f"{folder_of(index)}/{name}"] = archive.read(name)
+            names = [name for name in archive.namelist() if name.startswith(kept) and not name.endswith("/")]
+            found |= {f"{folder_of(index)}/{name}": archive.read(name) for name in names}
     return found
 
 

@@ -51,11 +51,16 @@ class Told:
 
 @dataclass(frozen=True)
 class Binary:
-    """Where an FMU has its library: folder in binaries/, name without suffix; and its token (FMI 2: GUID)."""
+    """Where an FMU has its library for this platform, with those beside it; and its token (FMI 2: GUID)."""
 
     folder: str
-    identifier: str
+    name: str
     token: str
+
+    @property
+    def path(self) -> str:
+        """In the archive."""
+        return f"{self.folder}{self.name}"
 
 
 @dataclass(frozen=True)
@@ -123,8 +128,9 @@ def _binary(fmu: FmuComponent) -> Binary:
     import fmpy
 
     said = describe(fmu.path)
-    folder = fmpy.platform if fmu.version == 2 else fmpy.platform_tuple
-    return Binary(folder, said.coSimulation.modelIdentifier, said.guid if fmu.version == 2 else said.instantiationToken)
+    folder = f"binaries/{fmpy.platform if fmu.version == 2 else fmpy.platform_tuple}/"
+    name = f"{said.coSimulation.modelIdentifier}{fmpy.sharedLibraryExtension}"
+    return Binary(folder, name, said.guid if fmu.version == 2 else said.instantiationToken)
 
 
 def _check_sources(system: System) -> None:

@@ -124,7 +124,7 @@ def _array(kind: str, name: str, items: Iterable[str]) -> str:
 
 def _piece(prepared: Prepared, index: int, part: Part, first: int) -> str:
     fmu, binary = prepared.components[index], prepared.binaries[index]
-    words = (part.name, folder_of(index), binary.identifier, binary.token)
+    words = (part.name, folder_of(index), binary.path, binary.token)
     texts = ", ".join(map(json.dumps, words))
     numbers = [fmu.version, int(fmu.can_get_and_set_state), part.every, part.input, len(part.input_references)]
     numbers += [part.output, len(part.output_references), first, len(part.links)]

@@ -19,7 +19,8 @@ from cosim.cli import main
 from cosim.data.signals import Noise, Steps
 from cosim.master.simulate import simulate
 from cosim.models.cache import with_fmus
-from cosim.support.errors import WiringError
+from cosim.nesting.nest import nest
+from cosim.support.errors import StepError, WiringError
 from cosim.system.algorithm import Energy, GaussSeidel, Iterated, Jacobi
 from cosim.system.faults import Freeze
 from cosim.system.scenario import read_scenario
@@ -148,6 +149,19 @@ def test_inputs_and_parameters_come_from_outside(tiny: Tiny, tmp_path: Path) -> 
     np.testing.assert_array_equal(recording["x"], rows["spring.y"][:TICKS])
 
 
+def test_an_fmu_of_a_system_is_a_component_of_another(tiny: Tiny, tmp_path: Path) -> None:
+    inner = tmp_path / "inner.fmu"
+    nest(oscillator(tiny[3]), {2: inner})
+    system = System(
+        components={"one": inner, "two": inner},
+        records={"x": Record("one.spring.y"), "v": Record("two.mass.y")},
+        step=2 * STEP,
+        ticks=50,
+    )
+    (tmp_path / "outer").mkdir()
+    assert_same_bits(*both(system, tmp_path / "outer", 3))
+
+
 def test_several_instances_and_a_reset_begin_anew(tiny: Tiny, tmp_path: Path) -> None:
     one = nested(oscillator(tiny[2]), tmp_path, 2)
     one.start()
@@ -171,12 +185,13 @@ def test_steps_that_do_not_fit_are_refused(fmi: int, tiny: Tiny, tmp_path: Path)
     fmu.fmu.freeInstance()
 
 
-def test_a_component_that_fails_ends_the_step(tiny: Tiny, tmp_path: Path) -> None:
-    fmu = nested(oscillator(tiny[3], parameters={"spring": {"fail_at": 1.0}}), tmp_path, 3)
-    fmu.start()
-    with pytest.raises(Exception, match="DoStep"):
-        fmu.run(["spring.y"], TICKS)
-    fmu.fmu.freeInstance()
+def test_a_component_that_fails_ends_the_step_and_its_name_is_said(tiny: Tiny, tmp_path: Path) -> None:
+    nest(oscillator(tiny[3], parameters={"spring": {"fail_at": 1.0}}), {3: tmp_path / "system.fmu"})
+    whole = System(
+        components={"all": tmp_path / "system.fmu"}, records={"x": Record("all.spring.y")}, step=STEP, ticks=TICKS
+    )
+    with pytest.raises(StepError, match=r"spring failed at 0\.95 s with status 3"):
+        simulate(whole)
 
 
 def test_another_importer_has_the_same_bits(tiny: Tiny, tmp_path: Path) -> None:
@@ -229,6 +244,7 @@ def code_of(command: list[str]) -> object:
         (["paper_mount", "--as-fmu"], "no such scenario"),
         (["sidereal", "--as-fmu", "--platform", "all"], "builds for this computer"),
         (["nothing.ssp", "--as-fmu"], "nothing.ssp"),
+        (["theirs.ssp"], "theirs.ssp is a system, not a card; with --as-fmu"),
     ],
 )
 def test_wrong_use_of_the_command_is_a_sentence(

@@ -8,6 +8,7 @@
 #include "nest.h"
 
 #include <dlfcn.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -36,32 +37,47 @@ static Any function(const Nest *nest, int part, const char *name) {
     return typed;
 }
 
+/* What a component says of warnings and errors is passed on, where it says whose it is. */
 static void hear2(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status, fmi2String category,
                   fmi2String message, ...) {
-    (void)environment, (void)name, (void)status, (void)category, (void)message;
+    (void)category;
+    char text[400];
+    if (!environment || status == fmi2OK || !message) return;
+    va_list arguments;
+    va_start(arguments, message);
+    vsnprintf(text, sizeof text, message, arguments);
+    va_end(arguments);
+    fail(environment, (Status)status, "%s: %s", name ? name : "component", text);
 }
 
 static void hear3(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message) {
-    (void)environment, (void)status, (void)category, (void)message;
+    (void)category;
+    if (environment && status != fmi3OK && message) fail(environment, (Status)status, "%s", message);
 }
 
-static const fmi2CallbackFunctions callbacks = {hear2, calloc, free, NULL, NULL};
-
-static void *start2(const Nest *nest, int part, const char *resources) {
+static void *start2(Instance *instance, int part, const char *resources) {
+    Nest *nest = nest_of(instance);
+    if (!nest->callbacks) {
+        fmi2CallbackFunctions callbacks = {hear2, calloc, free, NULL, instance};
+        nest->callbacks = malloc(sizeof callbacks);
+        if (!nest->callbacks) return NULL;
+        memcpy(nest->callbacks, &callbacks, sizeof callbacks);
+    }
     char uri[4200];
     const Piece *piece = &nested.piece[part];
     fmi2InstantiateTYPE *instantiate = (fmi2InstantiateTYPE *)function(nest, part, "Instantiate");
     snprintf(uri, sizeof uri, "file://%s", resources);
-    return instantiate ? instantiate(piece->name, fmi2CoSimulation, piece->token, uri, &callbacks, fmi2False, fmi2False)
+    return instantiate ? instantiate(piece->name, fmi2CoSimulation, piece->token, uri, nest->callbacks, fmi2False, fmi2False)
                        : NULL;
 }
 
-static void *start3(const Nest *nest, int part, const char *resources) {
+static void *start3(Instance *instance, int part, const char *resources) {
+    const Nest *nest = nest_of(instance);
     const Piece *piece = &nested.piece[part];
     fmi3InstantiateCoSimulationTYPE *instantiate =
         (fmi3InstantiateCoSimulationTYPE *)function(nest, part, "InstantiateCoSimulation");
     return instantiate ? instantiate(piece->name, piece->token, resources, fmi3False, fmi3False, fmi3False, fmi3False,
-                                     NULL, 0, NULL, hear3, NULL)
+                                     NULL, 0, instance, hear3, NULL)
                        : NULL;
 }
 
@@ -94,10 +110,10 @@ static int open_part(Instance *instance, int number, const char *resources) {
     const Piece *piece = &nested.piece[number];
     char path[4400], own[4200];
     snprintf(own, sizeof own, "%sparts/%s/resources/", resources, piece->folder);
-    snprintf(path, sizeof path, "%sparts/%s/%s.so", resources, piece->folder, piece->identifier);
+    snprintf(path, sizeof path, "%sparts/%s/%s", resources, piece->folder, piece->library);
     nest->library[number] = dlopen(path, RTLD_NOW | RTLD_LOCAL);
     if (!nest->library[number]) return fail(instance, FAILED, "%s does not load: %s", piece->name, dlerror()) != OK;
-    nest->instance[number] = piece->version == 2 ? start2(nest, number, own) : start3(nest, number, own);
+    nest->instance[number] = piece->version == 2 ? start2(instance, number, own) : start3(instance, number, own);
     after(NULL, 0);
     if (!nest->instance[number]) return fail(instance, FAILED, "%s cannot be instantiated", piece->name) != OK;
     return describe(instance, number);

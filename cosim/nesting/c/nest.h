@@ -21,9 +21,9 @@
 #undef NOT_FINITE
 #undef STEP
 
-/* A component: its folder in resources/parts, and its places on the bus, see Part in loop.h. */
+/* A component: its folder in resources/parts, which is an unpacked FMU, and its places on the bus, see Part in loop.h. */
 typedef struct {
-    const char *name, *folder, *identifier, *token;
+    const char *name, *folder, *library, *token; /* library: its path in the folder */
     int version, can_save;
     int64_t every, input, inputs, output, outputs, wire, wires;
     const uint32_t *input_references, *output_references;
@@ -85,6 +85,7 @@ typedef struct {
     char *touched;    /* by value reference: set by the importer */
     double *table;    /* varying signals, tick by tick */
     double *chunk;    /* signals of CHUNK ticks, signal by signal */
+    void *callbacks;  /* of FMI 2.0, with the instance as environment */
     Loop loop;
 } Nest;
 

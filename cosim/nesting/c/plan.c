@@ -87,6 +87,7 @@ void clear_plan(Nest *nest) {
     }
     free(loop->part), free(loop->wire), free(loop->stage), free(loop->bus);
     free(nest->library), free(nest->instance), free(nest->state), free(nest->touched), free(nest->chunk), free(nest->table);
+    free(nest->callbacks);
     memset(nest, 0, sizeof *nest);
 }
 
