@@ -17,10 +17,13 @@ from importlib import import_module
 from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any, NoReturn
 
 import typer
 
+from cosim.cli.help import epilog, group_of, listed
+from cosim.cli.settings import PAIRS, Settings, read_settings
 from cosim.support.errors import CosimError, InputError
 from cosim.support.interrupts import Terminated, end_well, is_interrupted, is_terminated
 from cosim.support.system_errors import surroundings
@@ -39,6 +42,7 @@ SUFFIXES = (
 """Suffixes of recordings, which no name of a parameter has."""
 INTERRUPTED, TERMINATED = 130, 143
 """Exit codes."""
+NONE = Settings()
 VERBS = (
     "demo",
     "export",
@@ -69,8 +73,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         keep_stdout()
         one_thread()
         check_given(given)
-        rest = repeated(plugged([argument for argument in given if argument != "--debug"]))
-        application(rest, debug)(rest, prog_name="cosim")
+        settings = settled()
+        rest = repeated(plugged([argument for argument in given if argument != "--debug"], settings.paths))
+        application(rest, debug, settings)(rest, prog_name="cosim")
     except KeyboardInterrupt as error:  # while a verb was loaded, or after it had ended
         if debug:
             raise
@@ -104,9 +109,23 @@ def check_given(arguments: Sequence[str]) -> None:
             sys.exit(2)
 
 
-def plugged(arguments: Sequence[str]) -> list[str]:
+def settled() -> Settings:
+    """Read the defaults of the folder that one stands in; what is wrong with them ends the command in a sentence."""
+    try:
+        found = read_settings(VERBS)
+    except InputError as error:
+        say(f"cosim: {error}")
+        sys.exit(2)
+    if "out" in found.paths:
+        os.environ["COSIM_OUT"] = found.paths["out"]
+    return found
+
+
+def plugged(arguments: Sequence[str], paths: Mapping[str, str] = MappingProxyType({})) -> list[str]:
     """Take `--plugins DIR` out of the arguments, wherever it is, and put the folder where plugins are looked for."""
     rest, folders, values = [], [], iter(arguments)
+    if "plugins" in paths and "--plugins" not in {argument.partition("=")[0] for argument in arguments}:
+        values = iter([*arguments, "--plugins", paths["plugins"]])
     for argument in values:
         option, assigned, value = argument.partition("=")
         if option != "--plugins":
@@ -153,35 +172,43 @@ def is_file(argument: str) -> bool:
     return os.path.exists(path) or os.sep in argument or path.lower().endswith(SUFFIXES)
 
 
-def application(arguments: Sequence[str], debug: bool = False) -> typer.Typer:
+def application(arguments: Sequence[str], debug: bool = False, settings: Settings = NONE) -> typer.Typer:
     """Make the command with the verb that is called, or with all that there are."""
     app = typer.Typer(
         name="cosim",
         no_args_is_help=True,
         pretty_exceptions_enable=False,
-        context_settings={"help_option_names": ["-h", "--help"]},
+        context_settings={
+            "help_option_names": ["-h", "--help"],
+            "default_map": {verb: settings.of_verb(verb) for verb in VERBS},
+        },
     )
     app.callback()(_options)
-    present = [verb for verb in VERBS if find_spec(f"cosim.cli.{verb}")]
+    present = listed([verb for verb in VERBS if find_spec(f"cosim.cli.{verb}")])
     called = [argument for argument in arguments if not argument.startswith("-")][:1]
     for verb in [verb for verb in present if [verb] == called] or present:
         module = import_module(f"cosim.cli.{verb}")
         if isinstance(getattr(module, "app", None), typer.Typer):
             for command in module.app.registered_commands:
                 command.callback = guarded(command.callback, debug) if command.callback else None
-            app.add_typer(module.app, name=verb)
+            app.add_typer(module.app, name=verb, rich_help_panel=group_of(verb), epilog=epilog(verb))
         else:
-            app.command(verb)(guarded(getattr(module, verb), debug))
+            command = app.command(verb, rich_help_panel=group_of(verb), epilog=epilog(verb))
+            command(guarded(getattr(module, verb), debug, settings))
     return app
 
 
-def guarded(verb: Callable[..., Any], debug: bool) -> Callable[..., Any]:
+def guarded(verb: Callable[..., Any], debug: bool, settings: Settings = NONE) -> Callable[..., Any]:
     """Turn what this project raises on purpose, and what the system refuses, into one sentence; Ctrl-C into 130."""
 
     @functools.wraps(verb)
     def call(*args: Any, **kwargs: Any) -> Any:
         try:
             check_finite(kwargs)
+            settings.check(verb.__name__, tuple(kwargs))
+            for name in PAIRS:
+                if name in kwargs and (known := settings.listed(name)):
+                    kwargs[name] = [*known, *(kwargs[name] or [])]
             done = verb(*args, **kwargs)
             finish_stdout()
             return done

@@ -1,8 +1,9 @@
 """`cosim diagnose`: recordings and a card to what the card lacks, and a better card and FMU."""
 
+import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -13,12 +14,16 @@ from cosim.support.memory import keep_freed_memory
 from cosim.support.terminal import put, put_json, say, stage
 
 if TYPE_CHECKING:
+    from cosim.api.fleet import Machine
     from cosim.data.recording import Recording
     from pyfmi_models.card import Card
 
 
 def diagnose(
-    train: Annotated[list[Path], typer.Argument(help="Recordings that may be fitted.", metavar="TRAIN...")],
+    train: Annotated[
+        list[Path],
+        typer.Argument(help="Recordings that may be fitted; or a folder of several machines.", metavar="TRAIN..."),
+    ],
     heldout: Annotated[
         list[Path] | None,
         typer.Option("--heldout", help="Recordings that prove the result; the last of TRAIN where not given."),
@@ -48,10 +53,18 @@ def diagnose(
         Path | None,
         typer.Option("--propose", help="Folder for the formula of what has no name, as an effect to review."),
     ] = None,
+    workers: Annotated[
+        int | None, typer.Option("--workers", help="A folder of several machines: so many at a time.", min=1)
+    ] = None,
     force: Force = False,
 ) -> None:
     """Say which physics a card lacks, and prove it on a recording that was never fitted."""
     out = out or default_out(Path(train[0]).stem)
+    if len(train) == 1 and train[0].is_dir() and (machines := _machines(train[0], heldout, propose)):
+        options: dict[str, object] = {"--columns": columns, "--units": units, "--layout": layout, "--motion": motion}
+        options |= {"--fmu": fmu, "--variables": variables, "--quick": quick}
+        _all(machines, Together(out, card, command_of("", [], options), workers, force, as_json, check))
+        return
     from cosim.api.diagnose import diagnose as find
     from cosim.report.terminal import proposed, summary
 
@@ -78,6 +91,58 @@ def diagnose(
     if propose:
         say(proposed(found.diagnosis, found.propose(propose, force)))
     if check and found.missing:
+        sys.exit(1)
+
+
+class Together(NamedTuple):
+    """How the machines of a folder are diagnosed."""
+
+    out: Path
+    card: str
+    options: str
+    workers: int | None
+    force: bool
+    as_json: bool
+    check: bool
+
+
+def _machines(folder: Path, heldout: list[Path] | None, propose: Path | None) -> "list[Machine]":
+    """List the machines of a folder; options that are of one machine alone are refused (InputError)."""
+    from cosim.api.fleet import machines_in
+    from cosim.support.errors import InputError
+
+    found = machines_in(folder)
+    for option, given in (("--heldout", heldout), ("--propose", propose)):
+        if found and given:
+            names = ", ".join(one.name for one in found)
+            raise InputError(f"{option} is of one machine, and {folder} holds several: {names}.", culprit=option)
+    return found
+
+
+def _all(machines: "list[Machine]", how: Together) -> None:
+    """Diagnose machine by machine; print a line of each as it comes."""
+    import shlex
+    import time
+
+    from cosim.api.fleet import diagnose_all
+
+    say(f"{len(machines)} machines: {', '.join(one.name for one in machines)}")
+    began, fresh, missing, lost = time.monotonic(), 0, False, 0
+    options = shlex.split(how.options)[1:]
+    for number, one in enumerate(
+        diagnose_all(machines, how.out, options, card=how.card, workers=how.workers, force=how.force), 1
+    ):
+        put(json.dumps(one.as_json())) if how.as_json else put(str(one))
+        fresh, lost = fresh + (not one.earlier), lost + bool(one.error)
+        missing = missing or bool(one.document.get("verdict"))
+        left = (len(machines) - number) * (time.monotonic() - began) / max(fresh, 1)
+        if number < len(machines) and fresh:
+            say(f"{number} of {len(machines)} machines, about {left:.0f} s left")
+    if lost:
+        say(f"{lost} of {len(machines)} machines could not be diagnosed; the same command goes on with them")
+    if lost == len(machines):
+        sys.exit(2)
+    if how.check and missing:
         sys.exit(1)
 
 

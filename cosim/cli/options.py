@@ -30,7 +30,7 @@ Force = Annotated[bool, typer.Option("--force", help="Overwrite what is there.")
 def default_out(name: str) -> Path:
     """Return a folder that is not there yet, for results of `name`, and say so: cosim_out/NAME-1, -2, ..."""
     stem = "".join(c if c.isalnum() or c in "._-" else "_" for c in name).strip("._") or "results"
-    free = (Path(RESULTS) / f"{stem}-{k}" for k in count(1))
+    free = (Path(os.environ.get("COSIM_OUT") or RESULTS) / f"{stem}-{k}" for k in count(1))
     found = next(path for path in free if not path.exists())
     say(f"results go to {found}")
     return found

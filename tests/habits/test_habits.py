@@ -1,0 +1,142 @@
+"""Habits: defaults of a folder, help in groups with examples that parse, a folder of machines diagnosed and resumed."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from test_cli_run import call
+from typer.main import get_command
+
+from cosim.cli import VERBS, application
+from cosim.cli.help import EXAMPLES, GROUPS
+from cosim.cli.settings import read_settings
+from cosim.support.errors import InputError
+
+
+def test_every_verb_has_a_group_and_two_examples() -> None:
+    assert sorted(verb for several in GROUPS.values() for verb in several) == sorted(VERBS)
+    assert {verb: len(lines) for verb, lines in EXAMPLES.items()} == dict.fromkeys(VERBS, 2)
+
+
+@pytest.mark.parametrize("line", [line for lines in EXAMPLES.values() for line in lines])
+def test_every_example_of_the_help_parses(line: str) -> None:
+    from cosim.cli import repeated
+
+    words = repeated(line.split()[1:])
+    command = get_command(application(words))
+    helped = [word for word in words if word == "--help"]
+    plain = [word for word in words if word not in helped]
+    with command.make_context("cosim", list(plain)) as context:
+        verb = command.get_command(context, plain[0])  # type: ignore[attr-defined]
+        assert verb is not None
+        with verb.make_context(plain[0], plain[1:], parent=context):
+            pass
+
+
+def test_help_lists_groups_in_their_order(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("--help") == 0
+    told = capsys.readouterr().out
+    places = [told.index(f"─ {group} ─") for group in GROUPS]
+    assert places == sorted(places)
+
+
+SETTINGS = """
+out = "results"
+card = "axis.toml"
+[columns]
+tau = "force"
+[units]
+q = "arcsec"
+[run]
+stop = 0.02
+"""
+
+
+@pytest.mark.parametrize("name", ["cosim.toml", "pyproject.toml"])
+def test_the_nearest_file_of_defaults_is_read(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = SETTINGS if name == "cosim.toml" else "[tool.cosim]\n" + SETTINGS.replace("\n[", "\n[tool.cosim.")
+    (tmp_path / name).write_text(text, "utf-8")
+    (tmp_path / "axis.toml").touch()
+    (below := tmp_path / "day").mkdir()
+    monkeypatch.chdir(below)
+    found = read_settings(VERBS)
+    assert found.listed("columns") == ["tau=force"]
+    assert found.of_verb("run") == {"card": str(Path("..") / "axis.toml"), "stop": 0.02}
+    assert found.paths["out"] == str(Path("..") / "results")
+
+
+def test_another_tool_s_project_file_says_nothing(tmp_path: Path) -> None:
+    (tmp_path / "pyproject.toml").write_text("[tool.other]\nx = 1\n", "utf-8")
+    assert read_settings(VERBS, tmp_path).pairs == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("columms = 1", '"columms" is no key; keys there are: card, plugins, out, columns'),
+        ("columns = 1", "columns = 1 is wrong; it must be a section"),
+        ("card = 1", "card = 1 is wrong; it must be text in quotes"),
+        ("x = [", "is not valid TOML"),
+    ],
+)
+def test_a_wrong_file_of_defaults_is_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+    (tmp_path / "cosim.toml").write_text(text, "utf-8")
+    with pytest.raises(InputError) as refused:
+        read_settings(VERBS, tmp_path)
+    assert sentence in str(refused.value)
+
+
+def test_a_run_takes_its_defaults_and_the_command_line_comes_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COSIM_OUT", "")
+    Path("cosim.toml").write_text('out = "results"\n[run]\nstop = 0.02\n', "utf-8")
+    assert call("run", "sidereal", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["steps"] == 200
+    assert Path("results/sidereal-1/run.json").is_file()
+    assert call("run", "sidereal", "--stop", "0.01", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["steps"] == 100
+    Path("cosim.toml").write_text("[run]\nstopp = 1\n", "utf-8")
+    assert call("run", "sidereal") == 2
+    assert "[run] stopp is no option of it" in capsys.readouterr().err
+
+
+def write(path: Path, level: float, seed: int) -> None:
+    t = np.arange(2400) / 200
+    q = 0.4 * np.sin(2 * t + seed) + 0.1 * np.sin(5 * t)
+    v, a = np.gradient(q, t), np.gradient(np.gradient(q, t), t)
+    tau = 3.0 * a + level * np.sign(v) + v + 0.02 * np.random.default_rng(seed).standard_normal(len(t))
+    pd.DataFrame({"t": t, "tau": tau, "q": q}).to_csv(path, index=False)
+
+
+@pytest.fixture
+def fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "all").mkdir()
+    for machine, level in (("north", 2.0), ("south", 3.0)):
+        for run in (1, 2):
+            write(tmp_path / "all" / f"{machine}_{run}.csv", level, run)
+    return tmp_path
+
+
+def test_a_folder_of_machines_is_diagnosed_line_by_line_and_gone_on_with(
+    fleet: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ("diagnose", "all", "--out", "found", "--quick", "--json", "--workers", "2")
+    assert call(*arguments) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert sorted(one["machine"] for one in lines) == ["north", "south"]
+    assert all(one["after_rms"] <= one["before_rms"] < 0.1 for one in lines)
+    kept = (fleet / "found" / "south" / "diagnosis.json").stat().st_mtime_ns
+    (fleet / "found" / "north" / "diagnosis.json").unlink()
+    write(fleet / "all" / "north_1.csv", 2.0, 1)
+    (fleet / "all" / "north_2.csv").write_text("t,tau,q\n1,2,3\n", "utf-8")
+    assert call(*arguments) == 0
+    again = {one["machine"]: one for one in map(json.loads, capsys.readouterr().out.splitlines())}
+    assert (fleet / "found" / "south" / "diagnosis.json").stat().st_mtime_ns == kept
+    assert "north_2.csv" in again["north"]["error"]
+    assert call("diagnose", "all", "--heldout", "all/north_1.csv", "--out", "x") == 2
+    assert "holds several: north, south" in capsys.readouterr().err
