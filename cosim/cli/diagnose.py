@@ -3,7 +3,7 @@
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -14,6 +14,7 @@ from cosim.support.memory import keep_freed_memory
 from cosim.support.terminal import put, put_json, say, stage
 
 if TYPE_CHECKING:
+    from cosim.api.diagnose import DiagnosisResult
     from cosim.api.fleet import Machine
     from cosim.data.recording import Recording
     from pyfmi_models.card import Card
@@ -60,38 +61,58 @@ def diagnose(
 ) -> None:
     """Say which physics a card lacks, and prove it on a recording that was never fitted."""
     out = out or default_out(Path(train[0]).stem)
+    shared: dict[str, object] = {"--motion": motion, "--columns": columns, "--units": units, "--layout": layout}
+    shared |= {"--fmu": fmu, "--variables": variables, "--quick": quick}
     if len(train) == 1 and train[0].is_dir() and (machines := _machines(train[0], heldout, propose)):
-        options: dict[str, object] = {"--columns": columns, "--units": units, "--layout": layout, "--motion": motion}
-        options |= {"--fmu": fmu, "--variables": variables, "--quick": quick}
-        _all(machines, Together(out, card, command_of("", [], options), workers, force, as_json, check))
+        _all(machines, Together(out, card, command_of("", [], shared), workers, force, as_json, check))
         return
-    from cosim.api.diagnose import diagnose as find
-    from cosim.report.terminal import proposed, summary
-
-    keep_freed_memory()
-    _check_folders(out, propose, quick, force)
-    believed, recordings = _read(train, heldout or [], card, motion, (columns, units, layout))
-    given: dict[str, object] = {"--heldout": heldout, "--card": card, "--motion": motion, "--out": out}
-    given |= {"--columns": columns, "--units": units, "--layout": layout}
-    given |= {"--fmu": fmu, "--variables": variables, "--propose": propose, "--quick": quick}
-    with stage("looking for what the model lacks") as progress:
-        found = find(
-            *(recordings[: len(train)], recordings[len(train) :], believed, out),
-            motion=motion,
-            fmu=fmu,
-            variables=pairs_of("--variables", variables),
-            quick=quick,
-            force=force,
-            command=command_of("diagnose", train, given),
-            on_progress=progress.tell,
-        )
+    one = One(train, heldout or [], card, out, propose, force, shared)
+    found = _found(one, variables)
     for note in found.notes:
         say(note)
+    from cosim.report.terminal import proposed, summary
+
     put_json(found.as_json()) if as_json else put(summary(found.diagnosis, out=out))
     if propose:
         say(proposed(found.diagnosis, found.propose(propose, force)))
     if check and found.missing:
         sys.exit(1)
+
+
+class One(NamedTuple):
+    """What is diagnosed of one machine; `options` by the words of the command line."""
+
+    train: list[Path]
+    heldout: list[Path]
+    card: str
+    out: Path
+    propose: Path | None
+    force: bool
+    options: dict[str, object]
+
+
+def _found(one: One, variables: list[str] | None) -> "DiagnosisResult":
+    """Read, diagnose and write, and show how it goes."""
+    from cosim.api.diagnose import diagnose as find
+
+    keep_freed_memory()
+    quick, motion = bool(one.options["--quick"]), str(one.options["--motion"])
+    _check_folders(one.out, one.propose, quick, one.force)
+    how: Any = tuple(one.options[name] for name in ("--columns", "--units", "--layout"))
+    believed, recordings = _read(one.train, one.heldout, one.card, motion, how)
+    given = {"--heldout": one.heldout, "--card": one.card, "--out": one.out, "--propose": one.propose, **one.options}
+    fmu: Any = one.options["--fmu"]
+    with stage("looking for what the model lacks") as progress:
+        return find(
+            *(recordings[: len(one.train)], recordings[len(one.train) :], believed, one.out),
+            motion=motion,
+            fmu=fmu,
+            variables=pairs_of("--variables", variables),
+            quick=quick,
+            force=one.force,
+            command=command_of("diagnose", one.train, given),
+            on_progress=progress.tell,
+        )
 
 
 class Together(NamedTuple):
