@@ -14,11 +14,10 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
 from os import cpu_count
 from pathlib import Path
-from typing import Any
 
 from cosim.data.formats import is_recording
 from cosim.support.errors import InputError
-from cosim.support.plain import JsonObject
+from cosim.support.plain import JsonObject, Parsed
 
 HELD = re.compile(r"(held[ _-]?out|validation|valid|check|test|proof)", re.IGNORECASE)
 SEPARATED = re.compile(r"[_\-. ]+[^_\-. ]*$")
@@ -43,7 +42,7 @@ class Outcome:
 
     name: str
     out: Path
-    document: dict[str, Any]
+    document: Parsed
     error: str = ""
     earlier: bool = False
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from cosim.plots.sweep import Results, read_results
 from cosim.support.errors import InputError
-from cosim.support.plain import Json
+from cosim.support.plain import Json, Parsed
 
 Told = tuple[dict[str, Json], dict[str, Sequence[Mapping[str, Json]]]]
 DIAGNOSIS, RUN, TABLE = "diagnosis.json", "run.json", "table.parquet"
@@ -28,7 +28,7 @@ def result(path: Path) -> Told | None:
     return reader(path) if reader and (path.name != TABLE or _is_sweep(path)) else None
 
 
-def _document(path: Path, *keys: str) -> dict[str, Any]:
+def _document(path: Path, *keys: str) -> Parsed:
     try:
         told = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.support.errors import InputError
+from cosim.support.plain import Parsed
 
 FILE, PROJECT = "cosim.toml", "pyproject.toml"
 PAIRS = ("columns", "units", "layout")
@@ -32,14 +33,14 @@ class Settings:
     """Columns, units, layout: our name to the value."""
     paths: dict[str, str] = field(default_factory=dict)
     """Card, plugins and folder of results, found from the folder of the file."""
-    verbs: dict[str, dict[str, Any]] = field(default_factory=dict)
+    verbs: dict[str, Parsed] = field(default_factory=dict)
     """Options of each verb."""
 
     def listed(self, name: str) -> list[str]:
         """Pairs as an option would have them: ["tau=force"]."""
         return [f"{key}={value}" for key, value in self.pairs.get(name, {}).items()]
 
-    def of_verb(self, verb: str) -> dict[str, Any]:
+    def of_verb(self, verb: str) -> Parsed:
         """Defaults of a verb's options, by the names of its parameters."""
         shared = {name: value for name, value in self.paths.items() if name == "card"}
         return shared | self.verbs.get(verb, {})
@@ -70,7 +71,7 @@ def read_settings(verbs: Sequence[str], here: Path | None = None) -> Settings:
     return Settings()
 
 
-def _parsed(path: Path) -> dict[str, Any]:
+def _parsed(path: Path) -> Parsed:
     import tomllib
 
     try:
