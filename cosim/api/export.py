@@ -7,6 +7,7 @@ from typing import Literal
 
 from cosim.api.recordings import Source
 from cosim.api.recordings import read as read_recording
+from cosim.delivery.experiment import sines, with_experiment
 from cosim.reading import check_kind
 from cosim.simulators import FORMATS
 from cosim.simulators.deliver import Planned
@@ -22,6 +23,7 @@ from cosim.support.toml import parsed
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.export import export_fmu
 from pyfmi_models.export.platforms import platforms_of
+from pyfmi_models.export.related import Related
 from pyfmi_models.model import Model
 
 Fmi = Literal[2, 3]
@@ -168,7 +170,7 @@ class Plan:
         for done, one in enumerate(self.archives):
             on_progress(done, len(self.archives))
             directory(one.path.parent)
-            export_fmu(one.model, one.path, fmi=one.fmi, force=self.force, platforms=one.machines)
+            _write(one, self.force)
         for path, write in self.others.values():
             write(path, self.force)
         ssp, modelica, flange, c = (self.others.get(one, (None,))[0] for one in ("ssp", *_OTHERS))
@@ -183,6 +185,16 @@ class Plan:
         files = self.simulators.paths if self.simulators else ()
         for path in (*(one.path for one in self.archives), *(path for path, _ in self.others.values()), *files):
             check_free(path, self.force)
+
+
+def _write(one: _Archive, force: bool) -> None:
+    """Write an FMU with the experiment by which it can be checked elsewhere."""
+
+    def export(related: Sequence[Related]) -> Path:
+        more = force or bool(related)  # the second time it is our own
+        return export_fmu(one.model, one.path, fmi=one.fmi, force=more, platforms=one.machines, related=related)
+
+    with_experiment(export, sines(one.model), one.machines)
 
 
 def planned(

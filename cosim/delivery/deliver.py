@@ -14,6 +14,7 @@ import numpy as np
 
 from cosim.data.recording import Recording
 from cosim.delivery.closed_loop import Loops
+from cosim.delivery.experiment import of_recording, with_experiment
 from cosim.delivery.missing_torque import write_missing_torque
 from cosim.diagnosis.answer.entries import CardSource, Improved, Provenance, Source
 from cosim.diagnosis.answer.result import Diagnosis, Finding, HeldOut
@@ -91,7 +92,9 @@ def deliver(
     _write_card(better, found, out)
     if found.adds_physics:
         on_progress("building the improved FMU")
-        improved = Improved(card=CARD) | _fmus(better, found, out) | _proven_range(found) | more(better, out)
+        improved = (
+            Improved(card=CARD) | _fmus(better, found, heldout[0], out) | _proven_range(found) | more(better, out)
+        )
         found = replace(found, improved=improved)
     loops.close("after", outcome.card.plant(), out / found.improved["fmu"] if "fmu" in found.improved else None)
     if outcome.experiment and better.controller:
@@ -283,11 +286,13 @@ def _proven_range(found: Diagnosis) -> Improved:
     return Improved(speed=[float(v.min()), float(v.max())], position=[float(q.min()), float(q.max())])
 
 
-def _fmus(card: Card, found: Diagnosis, out: Path) -> Improved:
+def _fmus(card: Card, found: Diagnosis, heldout: Recording, out: Path) -> Improved:
     span, unit = _proven_range(found)["speed"], "m/s" if found.motion == "linear" else "rad/s"
     model = card.plant().model()
     proven = f"{model.description}; proven on a held-out recording for speeds {span[0]:.3g} to {span[1]:.3g} {unit}"
     model = replace(model, description=proven, name=f"{card.plant().name}_improved")
-    export_fmu(model, out / f"{model.name}.fmu", fmi=3, force=True)
-    export_fmu(model, out / f"{model.name}_fmi2.fmu", fmi=2, force=True)
+    stimulus = of_recording(heldout, model)
+    three, two = out / f"{model.name}.fmu", out / f"{model.name}_fmi2.fmu"
+    with_experiment(lambda related: export_fmu(model, three, fmi=3, force=True, related=related), stimulus)
+    with_experiment(lambda related: export_fmu(model, two, fmi=2, force=True, related=related), stimulus)
     return Improved(fmu=f"{model.name}.fmu", fmu_fmi2=f"{model.name}_fmi2.fmu")

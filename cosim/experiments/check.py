@@ -85,8 +85,9 @@ def check(
 
 
 def _experiments(path: Path, manifest: Manifest | None) -> list[Experiment]:
-    """The experiments of a manifest, and its default experiment with the result that is given for it."""
+    """The experiments of a manifest; where it names none, the default experiment with the results that it gives."""
     found: list[Experiment] = []
+    brings = manifest is not None and any(one.main_role == "experiment" for one in manifest.related)
     for one in manifest.related if manifest else ():
         if one.main_role == "experiment" and one.kind in KINDS:
             found += experiments_in(path, one)
@@ -94,7 +95,7 @@ def _experiments(path: Path, manifest: Manifest | None) -> list[Experiment]:
             name = one.member.rpartition("/")[2]
             not_run = f"{name} is of type {one.kind}, and read here are: {', '.join(KINDS)}"
             found.append(Experiment(name, one.description, not_run=not_run))
-        elif one.role == "result" and one.kind == CSV:
+        elif one.role == "result" and one.kind == CSV and not brings:
             found.append(Experiment(DEFAULT, one.description, "result", references=one.member))
     return found
 
