@@ -259,7 +259,7 @@ def test_the_line_of_a_signal_keeps_its_peaks_and_fits_its_picture() -> None:
 def test_what_is_missing_is_said_in_one_sentence_each(client: TestClient) -> None:
     job = new(client)
     answer = act(client, job, "start")
-    for text in ("at least one recording to fit", "to keep for the proof", "Give a model card"):
+    for text in ("at least one recording to fit", "Give a model card, or let it be estimated"):
         assert text in answer.text
     put(client, job, "empty.csv", b"")
     assert "empty.csv cannot be used as it is read now" in act(client, job, "start").text

@@ -43,6 +43,12 @@ def card(desk: Desk, name: str, form: Form) -> str:
     return f"/jobs/{name}"
 
 
+def estimate(desk: Desk, name: str, form: Form) -> str:
+    """Take a card that is estimated from the recordings (InputError: they do not tell it)."""
+    desk.estimate_card(name)
+    return f"/jobs/{name}"
+
+
 def write(desk: Desk, name: str, form: Form) -> str:
     """Write a card from the fields of a form (InputError: a field is wrong, or the card is)."""
     desk.give_card(name, card_of(form), desk.store.get(name).card or "card.toml")
@@ -74,8 +80,8 @@ def remove(desk: Desk, name: str, form: Form) -> str:
     return "/"
 
 
-LOOKING = ("correct", "accept", "card", "write")
+LOOKING = ("correct", "accept", "card", "estimate", "write")
 """Actions that look at files, which takes long."""
 ACTIONS: dict[str, Action] = {
-    one.__name__: one for one in (correct, role, accept, drop, card, write, start, cancel, again, remove)
+    one.__name__: one for one in (correct, role, accept, drop, card, estimate, write, start, cancel, again, remove)
 }

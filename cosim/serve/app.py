@@ -59,6 +59,7 @@ def make_app(desk: Desk, token: str, port: int) -> Starlette:
     routes = [
         Route("/", there.home),
         Route("/jobs", there.new, methods=["POST"]),
+        Route("/example", there.example, methods=["POST"]),
         Route("/jobs/{id}", there.job),
         Route("/jobs/{id}/files", there.upload, methods=["PUT"]),
         Route("/jobs/{id}/result/{name}", there.result),
@@ -91,6 +92,11 @@ class Addresses:
     def new(self, request: Request) -> Response:
         """Make a draft."""
         return RedirectResponse(f"/jobs/{self._desk.store.new().id}", 303)
+
+    async def example(self, request: Request) -> Response:
+        """Make a draft of the example's files."""
+        job = await self._looked(self._desk.example)
+        return RedirectResponse(f"/jobs/{job.id}", 303)
 
     def job(self, request: Request) -> Response:
         """Show a job as far as it is."""

@@ -11,6 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from cosim.reading import LAYOUT
+from cosim.serve import example
 from cosim.serve.arrivals import Arrival, Arrivals
 from cosim.serve.folder import read_plain
 from cosim.serve.job import ROLES, Job, Options, Role, Upload, role_of
@@ -201,6 +202,33 @@ class Desk:
         """Take a card that comes with the package (InputError)."""
         self.give_card(name, shipped_card(card), f"{card}.toml")
 
+    def estimate_card(self, name: str) -> None:
+        """Take a card that is estimated from the recordings that may be fitted (InputError: they do not tell it)."""
+        job, renamed = self.draft(name), self._renamed(name)
+        fitted = [one for one in job.uploads if one.role == "train"]
+        if not fitted:
+            raise InputError("A card is estimated from recordings to fit; there is none yet.", culprit=name)
+        folder = self.store.folder(name) / RECORDINGS
+        given = [
+            (str(folder / one.name), one.options | {"columns": {**renamed, **one.options.get("columns", {})}})
+            for one in fitted
+        ]
+        told = self.reader.estimate(given)
+        if problem := told.get("problem"):
+            raise InputError(f"No card can be estimated: {problem}", culprit=name)
+        self.give_card(name, told["text"], "estimated.toml")
+
+    def example(self) -> Job:
+        """Make a job of the example's recordings and card."""
+        job = self.store.new()
+        for file, text in example.recordings().items():
+            data = text.encode()
+            with self.arriving(job.id, file, len(data)) as arrival:
+                arrival.path.write_bytes(data)
+                self.received(arrival, len(data))
+        self.give_card(job.id, example.CARD, example.CARD_NAME)
+        return self.store.get(job.id)
+
     def card_text(self, job: Job) -> str:
         """Return the text of the card."""
         with suppress(OSError, ValueError):
@@ -216,9 +244,8 @@ class Desk:
     def lacking(self, job: Job) -> list[str]:
         """Say what is missing before a job can be diagnosed."""
         told = []
-        for role, what in (("train", "to fit"), ("heldout", "to keep for the proof")):
-            if not any(one.role == role for one in job.uploads):
-                told.append(f"Choose at least one recording {what}.")
+        if not any(one.role == "train" for one in job.uploads):
+            told.append("Choose at least one recording to fit.")
         for one in job.uploads:
             seen = self.store.view(job.id, view_key(one.name))
             if one.role != "out" and (seen["problem"] or seen["refused"]):
@@ -226,7 +253,7 @@ class Desk:
             elif one.role != "out" and seen["undecided"]:
                 told.append(f"{one.name} can be read in more than one way; answer its question.")
         if not job.card:
-            told.append("Give a model card.")
+            told.append("Give a model card, or let it be estimated from the recordings.")
         elif self.card_view(job)["problem"]:
             told.append("Correct the model card.")
         return told

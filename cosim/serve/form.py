@@ -28,20 +28,29 @@ class Field:
     rotary: str
     linear: str
     needed: bool = False
+    laws: tuple[str, ...] = ()
+    """Laws of friction that have it; () where it has nothing to do with friction."""
+
+    @property
+    def shown(self) -> str:
+        """Classes by which the page shows it only beside a law that has it."""
+        return " ".join(["of-law", *(f"law-{law}" for law in self.laws)]) if self.laws else ""
 
     def si(self, motion: str) -> str:
         """Return the unit in which the card keeps it."""
         return self.linear if motion == "linear" else self.rotary
 
 
+SLIDING = ("coulomb", "static", "lugre")
+"""Laws of the form that have friction while sliding."""
 FIELDS = (
     Field("inertia", "mount", "Inertia, or moved mass", "kg.m2", "kg", True),
+    Field("Fc", "friction", "Friction while sliding", "N.m", "N", laws=SLIDING),
+    Field("sigma2", "friction", "Viscous friction per speed", "N.m.s/rad", "N.s/m", laws=SLIDING),
+    Field("Fs", "friction", "Break-away friction", "N.m", "N", laws=("static", "lugre")),
+    Field("Vs", "friction", "Speed at which it has fallen (Stribeck)", "rad/s", "m/s", laws=("static", "lugre")),
+    Field("sigma0", "friction", "Stiffness before break-away", "N.m/rad", "N/m", laws=("lugre",)),
     Field("torque_limit", "mount", "Largest torque, or force, of the drive", "N.m", "N"),
-    Field("Fc", "friction", "Friction while sliding", "N.m", "N"),
-    Field("sigma2", "friction", "Viscous friction per speed", "N.m.s/rad", "N.s/m"),
-    Field("Fs", "friction", "Break-away friction", "N.m", "N"),
-    Field("Vs", "friction", "Speed at which it has fallen (Stribeck)", "rad/s", "m/s"),
-    Field("sigma0", "friction", "Stiffness before break-away", "N.m/rad", "N/m"),
 )
 LONGEST = 60
 """Characters of a value that a message repeats."""

@@ -57,6 +57,22 @@ def look_at_card(text: str, name: str) -> Parsed:
     return {"facts": told, "columns": card.columns, "notes": list(card.remarks())}
 
 
+def estimated_card(given: list[tuple[str, Options]]) -> Parsed:
+    """Estimate a card from recordings; {"problem": sentence} if they do not tell it."""
+    from cosim.api.card import card
+
+    files = [Path(path) for path, _ in given]
+    try:
+        read = [
+            Recording.read(path, options.get("columns", {}), options.get("units", {}), layout=options.get("layout", {}))
+            for path, (_, options) in zip(files, given, strict=True)
+        ]
+        found = card(read)
+    except (CosimError, ModelError) as error:
+        return {"problem": str(error).replace(f"{files[0].parent}/", "")}
+    return {"text": "".join(f"# {note}\n" for note in found.notes) + found.text()}
+
+
 def shipped_card(name: str) -> str:
     """Return the text of a card that comes with the package (InputError)."""
     from importlib.resources import files

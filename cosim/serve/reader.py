@@ -28,6 +28,10 @@ class Reader:
         """Tell what a card says, or its problem."""
         return self._call(looks.look_at_card, text, name)
 
+    def estimate(self, given: list[tuple[str, Options]]) -> Parsed:
+        """Estimate a card from recordings: {"text": ...}, or its problem."""
+        return self._call(looks.estimated_card, given)
+
     def warm(self) -> None:
         """Start the process before the first file comes."""
         with self._lock:

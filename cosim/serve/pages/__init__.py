@@ -116,6 +116,7 @@ def _draft(desk: Desk, job: Job) -> Parsed:
         "start_card": CARD,
         "card_text": desk.card_text(job),
         "lacking": desk.lacking(job) if job.uploads or job.card else [],
+        "with_proof": _proof(job),
         "shipped": _shipped(),
         "roles": ROLES,
         "fields": FIELDS,
@@ -126,6 +127,16 @@ def _draft(desk: Desk, job: Job) -> Parsed:
         "suffixes": SUFFIXES,
         "size": in_bytes,
     }
+
+
+def _proof(job: Job) -> str:
+    """Say what proves the result where no recording was chosen for it."""
+    used = [one.name for one in job.uploads if one.role != "out"]
+    if not used or any(one.role == "heldout" for one in job.uploads):
+        return ""
+    if used[1:]:
+        return f"{used[-1]}, the last one, is kept out of the fit and proves the result; choose another one above."
+    return "Of the only recording the end is kept out of the fit and proves the result: a second recording proves more."
 
 
 def _begun(desk: Desk, job: Job) -> Parsed:
