@@ -15,7 +15,7 @@ from cosim.estimation.fit import with_values
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Piece
 from cosim.simulators.motion import top_speed
-from pyfmi_models.effects import FrictionEffect
+from pyfmi_models.effects import Effect, FrictionEffect, TorqueOffset
 from pyfmi_models.effects.stribeck import StribeckEffect
 from pyfmi_models.friction import Coulomb, Dahl, FrictionLaw, Frictionless, LuGre
 from pyfmi_models.friction.base import each_way
@@ -36,6 +36,8 @@ class HeldFriction:
 
     law: FrictionLaw
     exact: bool
+    beside: tuple[Effect, ...] = ()
+    """A constant torque that stands for the difference of the directions."""
 
 
 def torque(mount: Mount, pieces: Sequence[Piece]) -> Array:
@@ -49,15 +51,24 @@ def without_friction_effects(mount: Mount) -> Mount:
     return replace(mount, effects=tuple(one for one in mount.effects if not isinstance(one, FrictionEffect)))
 
 
-def held_friction(mount: Mount, bristle: bool, pieces: Sequence[Piece]) -> HeldFriction:
-    """The law nearest to the friction of a mount along a motion; `bristle`: LuGre's bristles are there too."""
+def held_friction(mount: Mount, bristle: bool, constant: bool, pieces: Sequence[Piece]) -> HeldFriction:
+    """The law nearest to the friction of a mount along a motion.
+
+    `bristle`: LuGre's bristles are there too; `constant`: a constant torque is, which can do what a level does that
+    differs by direction, F (1 + a sign v) sign v = F sign v + a F.
+    """
     plain = without_friction_effects(mount)
     if len(plain.effects) == len(mount.effects) and (same := _same(mount.friction, bristle)):
         return HeldFriction(same, True)
     start = _bristles(mount, pieces) if bristle and type(mount.friction) is not Frictionless else _coulomb(mount)
     # How short bristles are that stand for a jump is no matter of a fit: its answer would be none at all.
     free = [name for name in FREE[type(start)] if name != "sigma0" or hasattr(mount.law, "sigma0")]
-    return HeldFriction(_fitted(replace(plain, friction=start), free, torque(mount, pieces), pieces), False)
+    beside = (TorqueOffset(torque=0.0),) if constant else ()
+    tried = replace(plain, friction=start, effects=(*plain.effects, *beside))
+    names = [f"friction.{name}" for name in free]
+    names += [f"{list(tried.components())[-1]}.torque"] if constant else []
+    found = _fitted(tried, names, torque(mount, pieces), pieces)
+    return HeldFriction(found.friction, False, found.effects[len(plain.effects) :])
 
 
 def _same(law: FrictionLaw, bristle: bool) -> FrictionLaw | None:
@@ -101,13 +112,15 @@ def _bristles(mount: Mount, pieces: Sequence[Piece]) -> LuGre:
     )
 
 
-def _fitted(mount: Mount, names: Sequence[str], target: Array, pieces: Sequence[Piece]) -> FrictionLaw:
-    """The law of a mount with the numbers that leave least of `target`."""
-    free = tuple(f"friction.{name}" for name in names)
-    inverse = Inverse(mount, free)
+def _fitted(mount: Mount, free: Sequence[str], target: Array, pieces: Sequence[Piece]) -> Mount:
+    """The mount with the numbers that leave least of `target`."""
+    inverse = Inverse(mount, tuple(free))
     coulomb, start = isinstance(mount.friction, Coulomb), inverse.present
     scale = np.maximum(np.abs(start), 1e-3 * float(np.max(np.abs(target))))
     first = np.maximum(start / scale, 1e-3)
+    constant = np.array([name.endswith(".torque") for name in free])
+    low = np.where(constant, -np.inf, 0.0 if coulomb else first / FAR)
+    high = np.where(constant | coulomb, np.inf, first * FAR)
 
     def misfit(x: Array) -> Array:
         return np.asarray(stacked(inverse, pieces, x * scale)[0] - target)
@@ -119,8 +132,7 @@ def _fitted(mount: Mount, names: Sequence[str], target: Array, pieces: Sequence[
         misfit,
         first,
         jac=slopes,
-        bounds=(np.zeros(len(free)) if coulomb else first / FAR, np.inf if coulomb else first * FAR),
+        bounds=(low, high),
         max_nfev=60,
     )
-    law: FrictionLaw = with_values(mount, free, found.x * scale).friction
-    return law
+    return with_values(mount, free, found.x * scale)

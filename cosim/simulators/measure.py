@@ -14,7 +14,7 @@ from cosim.simulators.friction import HeldFriction, held_friction, torque, witho
 from cosim.simulators.motion import Compared
 from cosim.support.plain import JsonObject
 from cosim.support.statistics import rms
-from pyfmi_models.effects import Effect, FrictionEffect
+from pyfmi_models.effects import Effect, FrictionEffect, TorqueOffset
 from pyfmi_models.mount import Mount
 
 
@@ -74,9 +74,9 @@ def hold(mount: Mount, form: Format, compared: Compared) -> Held:
     pieces = compared.prepared.pieces
     told = replace(mount, effects=tuple(one for one in mount.effects if one.is_determined))
     written = {name: _written(form, one, told) for name, one in told.of_kind(Effect)}
-    friction = held_friction(told, form.bristle, pieces)
+    friction = held_friction(told, form.bristle, TorqueOffset in form.effects, pieces)
     kept = tuple(one.effect for one in written.values() if one)
-    held = replace(told, friction=friction.law, effects=kept)
+    held = replace(told, friction=friction.law, effects=(*kept, *friction.beside))
     needed, has = torque(told, pieces), torque(held, pieces)
     rows = (
         Row("inertia", "inertia", 0.0),
@@ -119,9 +119,12 @@ def _friction_row(form: Format, mount: Mount, held: HeldFriction, needed: Array,
     where = form.friction[held.law.key]
     if held.exact:
         return Row(name, where, 0.0)
-    other = replace(without_friction_effects(mount), friction=held.law)
+    plain = without_friction_effects(mount)
+    other = replace(plain, friction=held.law, effects=(*plain.effects, *held.beside))
     lost = rms(needed - torque(other, compared.prepared.pieces))
-    return Row(name, where, lost, f"nearest {held.law.key} law along the motion")
+    return Row(
+        name, where, lost, f"nearest {held.law.key} law{' and a constant' if held.beside else ''} along the motion"
+    )
 
 
 def _effect_rows(
