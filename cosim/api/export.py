@@ -9,7 +9,7 @@ from cosim.api.recordings import Source
 from cosim.api.recordings import read as read_recording
 from cosim.delivery.experiment import sines, with_experiment
 from cosim.reading import check_kind
-from cosim.simulators import FORMATS
+from cosim.simulators import FORMATS, WHOLE
 from cosim.simulators.deliver import Planned
 from cosim.simulators.deliver import planned as planned_files
 from cosim.simulators.format import Format
@@ -58,7 +58,7 @@ class Exported:
         others = {"ssp": self.ssp, "modelica": self.modelica, "modelica_flange": self.flange, "c": self.c}
         found: JsonObject = {"fmus": [str(path) for path in self.fmus]}
         found |= {kind: str(path) for kind, path in others.items() if path}
-        found |= {one.format.key: str(path) for one, path in zip(self.held, self.simulators, strict=True)}
+        found |= {one.format.key: str(path) for one, path in zip(self.held, self.simulators, strict=False)}
         return found | ({"table": str(self.table), "held": [one.as_json() for one in self.held]} if self.held else {})
 
     def __str__(self) -> str:
@@ -216,7 +216,8 @@ def planned(
     read = card if isinstance(card, Card) else read_card(card)
     stem = Path(read.path).stem or read.plant().name
     versions: tuple[Fmi, ...] = (2, 3) if fmi == "both" else (fmi,)
-    formats = [FORMATS[kind] for kind in kinds if kind in FORMATS]
+    known = FORMATS | WHOLE
+    formats = [form for kind, form in known.items() if kind in kinds]
     others = {kind: make(read, folder, stem) for kind, make in _OTHERS.items() if kind in kinds}
     if "ssp" in kinds:
         others = {"ssp": (folder / f"{stem}.ssp", _system_writer(read, versions[0], platforms))} | others

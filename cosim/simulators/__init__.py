@@ -1,5 +1,6 @@
 """One card in every simulator: the joint as each can hold it, and in N m what it cannot hold."""
 
+from cosim.simulators.format import FLANGE, C
 from cosim.simulators.isaac import ISAAC
 from cosim.simulators.mujoco import MUJOCO
 from cosim.simulators.urdf import URDF
@@ -7,4 +8,7 @@ from cosim.simulators.urdf import URDF
 FORMATS = {one.key: one for one in (MUJOCO, URDF, ISAAC)}
 """Simulators' files by the word that asks for them."""
 
-__all__ = ["FORMATS"]
+WHOLE = {one.key: one for one in (FLANGE, C)}
+"""What has the equations of the FMU, and is written by the export of models."""
+
+__all__ = ["FORMATS", "WHOLE"]

@@ -22,6 +22,8 @@ class Planned:
     files: tuple[tuple[Format, Path], ...]
     table: Path
     recording: Recording | None = None
+    whole: tuple[Format, ...] = ()
+    """Formats whose files others write, which are in the table too."""
 
     @property
     def paths(self) -> tuple[Path, ...]:
@@ -32,9 +34,9 @@ class Planned:
         """Write the files and the table; return what each simulator holds."""
         directory(self.table.parent)
         compared = along_recording(self.recording, self.mount) if self.recording else along_default(self.mount)
-        held = tuple(hold(self.mount, form, compared) for form, _ in self.files)
+        held = tuple(hold(self.mount, form, compared) for form in (*(form for form, _ in self.files), *self.whole))
         title = f"Written by mount-cosim from {self.origin}; what is lost is in {self.table.name}"
-        for one, (form, path) in zip(held, self.files, strict=True):
+        for one, (form, path) in zip(held, self.files, strict=False):
             _write(path, form.text(one.mount, self.mount, title), force)
         _write(self.table, table_text(held), force)
         return held
@@ -49,5 +51,6 @@ def planned(
     mount: Mount, origin: str, formats: Sequence[Format], folder: Path, stem: str, recording: Recording | None
 ) -> Planned:
     """Name the files of some simulators in a folder."""
-    files = tuple((form, folder / f"{stem}{form.suffix}") for form in formats)
-    return Planned(mount, origin, files, folder / f"{stem}_simulators.txt", recording)
+    files = tuple((form, folder / f"{stem}{form.suffix}") for form in formats if not form.whole)
+    whole = tuple(form for form in formats if form.whole)
+    return Planned(mount, origin, files, folder / f"{stem}_simulators.txt", recording, whole)

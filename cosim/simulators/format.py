@@ -42,6 +42,8 @@ class Format:
     limit: str
     bristle: bool
     text: Callable[[Mount, Mount, str], str]
+    whole: bool = False
+    """Whether the file has the equations of the FMU, so that nothing is lost; then it is written elsewhere."""
 
 
 def whole(where: str) -> Holding:
@@ -52,3 +54,11 @@ def whole(where: str) -> Holding:
 def on_rotary(where: str) -> Holding:
     """The effect as it is on a rotary axis; nothing of it on a linear one, where angles mean something else."""
     return lambda effect, mount: Written(effect, where) if mount.motion == "rotary" else None
+
+
+def _elsewhere(mount: Mount, card: Mount, title: str) -> str:
+    raise TypeError("a file with the equations of the FMU is written by the export of models")
+
+
+FLANGE = Format("modelica_flange", "Modelica with flanges", ".mo", {}, {}, "equations", True, _elsewhere, whole=True)
+C = Format("c", "C", "_c", {}, {}, "equations", True, _elsewhere, whole=True)

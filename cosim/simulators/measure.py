@@ -71,6 +71,8 @@ class Held:
 
 def hold(mount: Mount, form: Format, compared: Compared) -> Held:
     """Reduce a mount to what a simulator holds, and measure what is lost along a motion."""
+    if form.whole:
+        return _whole(mount, form, compared)
     pieces = compared.prepared.pieces
     told = replace(mount, effects=tuple(one for one in mount.effects if one.is_determined))
     written = {name: _written(form, one, told) for name, one in told.of_kind(Effect)}
@@ -85,9 +87,27 @@ def hold(mount: Mount, form: Format, compared: Compared) -> Held:
         *_effect_rows(told, written, needed, compared),
         *(Row(one.id, "", None, "by chance or with a memory: no torque to compare") for one in _untold(mount)),
     )
-    unit = "N m" if mount.motion == "rotary" else "N"
-    found = Held(form, held, unit, compared.name, rows, rms(needed - has), rms(needed))
+    found = Held(form, held, _unit(mount), compared.name, rows, rms(needed - has), rms(needed))
     return _with_errors(found, compared, needed, has)
+
+
+def _whole(mount: Mount, form: Format, compared: Compared) -> Held:
+    """What has the equations of the FMU: nothing is lost."""
+    told = replace(mount, effects=tuple(one for one in mount.effects if one.is_determined))
+    needed = torque(told, compared.prepared.pieces)
+    parts = [
+        "inertia",
+        "torque limit",
+        f"friction ({mount.friction.key})",
+        *(name for name, _ in mount.of_kind(Effect)),
+    ]
+    rows = tuple(Row(part, "equations of the FMU", 0.0) for part in parts)
+    found = Held(form, mount, _unit(mount), compared.name, rows, 0.0, rms(needed))
+    return _with_errors(found, compared, needed, needed)
+
+
+def _unit(mount: Mount) -> str:
+    return "N m" if mount.motion == "rotary" else "N"
 
 
 def _with_errors(held: Held, compared: Compared, needed: Array, has: Array) -> Held:

@@ -132,3 +132,15 @@ def test_a_model_without_a_torque_from_outside_has_no_flange(tmp_path: Path) -> 
     controller = read_card("paper_mount").controller_model()
     with pytest.raises(ExportError, match="disturbance"):
         export_flange(controller, tmp_path / "C.mo")
+
+
+def test_what_has_the_equations_of_the_fmu_loses_nothing_and_is_in_the_table(tmp_path: Path) -> None:
+    done = export("altaz_altitude", tmp_path, fmi=3, modelica_flange=True, c=True, urdf=True)
+    by_key = {one.format.key: one for one in done.held}
+    assert list(by_key) == ["urdf", "modelica_flange", "c"]
+    assert {row.part for row in by_key["c"].rows} >= {"inertia", "gravity_unbalance", "azimuth_centrifugal"}
+    assert by_key["c"].lost == by_key["modelica_flange"].lost == 0 < by_key["urdf"].lost
+    said = done.as_json()
+    assert Path(str(said["c"])).is_dir()
+    assert Path(str(said["modelica_flange"])).is_file()
+    assert "equations of the FMU" in (tmp_path / "altaz_altitude_simulators.txt").read_text()

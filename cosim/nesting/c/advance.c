@@ -5,7 +5,8 @@
 
 int64_t loop_run(Loop *loop, int64_t ticks, const double *signals, double *rows, int64_t capacity);
 
-static const double slack = 1e-6;
+/* For the rounding of the importer, in steps of the system. */
+static const double slack = 0.01;
 
 double next_tick_time(const Instance *instance) { return instance->values[0]; }
 
