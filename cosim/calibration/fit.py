@@ -9,6 +9,7 @@ least squares those of greatest likelihood for independent noise of the outputs.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from math import sqrt
 from typing import Literal, get_args
 
 import numpy as np
@@ -31,8 +32,16 @@ AGREE = 1e-3
 """Share by which the sums of two starts may differ to have found the same minimum."""
 ROUNDS = 3
 """Rounds in which the weights of outputs are found."""
+SETTLED = 0.1
+"""Share by which a weight may still change: standard errors follow it, the numbers hardly."""
 EXACT = 1e-6
 """Least residual of an output relative to its spread: no solver is more exact."""
+WIDTHS = (3.0, 1.5, 0.8, 0.8)
+"""Standard errors over which points are drawn on a staircase, round by round."""
+DRAWN = 25
+"""Points of a round for each number."""
+REACH = 0.1
+"""Greatest deviation that is drawn, relative to a number's scale."""
 BAD = 10.0
 """Rows of a point that cannot be simulated, times the RMS at the start."""
 OUTLIER = 1.4826
@@ -69,7 +78,6 @@ def fit(residuals: Residuals, x: Array, starts: int, seed: int, loss: Loss, say:
     residuals.weights = 1 / spread
     z = residuals.at(x)
     residuals.bad = BAD * max(float(np.sqrt(np.mean(z**2))), 1.0)
-    residuals.settle(x)
     found: list[tuple[float, Array]] = []
     for k, one in enumerate(_starts(residuals, x, starts, seed)):
         say(f"start {k + 1} of {starts}")
@@ -80,8 +88,10 @@ def fit(residuals: Residuals, x: Array, starts: int, seed: int, loss: Loss, say:
     agreeing = _agreeing(found)
     residuals.settle(best)
     best, outlier = _weighted(residuals, best, loss, say)
+    if residuals.stairs:
+        say("searching among the steps of the model")
+        best = _searched(residuals, best, loss, outlier, seed)
     jacobian = residuals.jacobian(best)
-    jacobian = residuals.jacobian(best)  # again, with steps that fit the noise
     return Fit(best, residuals.at(best), jacobian, loss, outlier, tuple(one for one, _ in found), agreeing)
 
 
@@ -94,7 +104,7 @@ def _weighted(residuals: Residuals, best: Array, loss: Loss, say: Callable[[str]
         weights = 1 / np.maximum(noise, EXACT * rows.spread)
         change = float(np.abs(weights / residuals.weights - 1).max())
         residuals.weights, outlier = weights, 1.0
-        if k and change < 0.02:
+        if len(noise) == 1 or (k and change < SETTLED):
             break
         say(f"weights of outputs, round {k + 1}")
         residuals.bad = BAD * max(float(np.sqrt(np.mean(residuals.at(best) ** 2))), 1.0)
@@ -123,6 +133,33 @@ def _minimum(residuals: Residuals, x: Array, loss: Loss, outlier: float) -> tupl
         max_nfev=EVALUATIONS,
     )
     return float(done.cost), np.asarray(done.x, np.float64)
+
+
+def _searched(residuals: Residuals, x: Array, loss: Loss, outlier: float, seed: int) -> Array:
+    """Search around a minimum of a staircase, which has many: points drawn from the normal distribution of its errors.
+
+    Each round is narrower than the one before and begins at the best point so far.
+    """
+    random = np.random.default_rng(seed)
+    best, least = x, _cost(residuals.at(x), loss, outlier)
+    for width in WIDTHS:
+        slopes = residuals.jacobian(best)
+        noise = sqrt(2 * least / max(1, len(slopes) - len(best)))
+        spans, turns = np.linalg.svd(slopes, full_matrices=False)[1:]
+        errors = noise / np.maximum(spans, np.finfo(float).eps * max(float(spans[0]), 1e-300))
+        reach = np.minimum(errors, REACH)
+        points = [best + width * (reach * random.standard_normal(len(best))) @ turns for _ in range(DRAWN * len(best))]
+        costs = [_cost(z, loss, outlier) for z in residuals.many([residuals.inside(one) for one in points])]
+        k = int(np.argmin(costs))
+        if costs[k] < least:
+            best, least = residuals.inside(points[k]), costs[k]
+    return best
+
+
+def _cost(z: Array, loss: Loss, outlier: float) -> float:
+    """Half the sum of rho(z^2), as the solver has it."""
+    u = (z / outlier) ** 2
+    return 0.5 * outlier**2 * float(np.sum(u if loss == "linear" else 2 * (np.sqrt(1 + u) - 1)))
 
 
 def _starts(residuals: Residuals, x: Array, count: int, seed: int) -> list[Array]:

@@ -25,6 +25,10 @@ FIRST, LEAST, MOST = 1e-3, 1e-9, 0.1
 """Steps relative to a number's size: the first one, and the least and greatest."""
 AGREE = 0.2
 """Share by which slopes at two scales may differ where the model is smooth."""
+NEARLY = 0.5
+"""Share from which on narrower slopes that differ more than wider ones are those of a staircase."""
+STAIRS = 0.5
+"""Share by which slopes at the smallest scale differ from those at the settled one where a model is a staircase."""
 WIDER = 4.0
 """Factor from one scale to the next."""
 KEPT = 4
@@ -82,6 +86,7 @@ class Residuals:
         self.scales = np.array([one.scale for one in self.free])
         self.steps = FIRST * np.ones(len(self.free))
         self.least = LEAST * np.ones(len(self.free))
+        self.stairs = False
         self.rough: tuple[str, ...] = ()
         self._known: dict[bytes, Array | None] = {}
 
@@ -89,6 +94,12 @@ class Residuals:
         """Values by name."""
         inside = ((one, float(np.clip(v * one.scale, one.low, one.high))) for one, v in zip(self.free, x, strict=True))
         return {one.name: value for one, value in inside}
+
+    def inside(self, x: Array) -> Array:
+        """The nearest point within the bounds."""
+        low = np.array([one.low for one in self.free]) / self.scales
+        high = np.array([one.high for one in self.free]) / self.scales
+        return np.asarray(np.clip(x, low, high), np.float64)
 
     def simulated(self, points: Sequence[Array]) -> list[Array | None]:
         """Outputs at points, in rows."""
@@ -127,22 +138,27 @@ class Residuals:
     def settle(self, x: Array) -> None:
         """Find for each number the widest step near a point over which the model is as good as linear.
 
-        Slopes over a step and over a quarter of it agree there; a central difference over the quarter is then wrong by
-        a sixteenth of that. `rough` are numbers for which no two steps agree.
+        Slopes over a step and over a quarter of it agree there, or at narrower steps differ more. Where they agree, a
+        central difference over the quarter is wrong by a sixteenth of that. `rough` are numbers for which no two steps
+        agree; `stairs` says that the smallest steps see other slopes: a staircase around a smooth course.
         """
         steps = MOST * np.ones(len(self.free))
         wide, here = self._differences(x, steps)
         if here is None:
             return
         floor = np.minimum(self._wanted(wide, 0.0, np.maximum(np.abs(x), 1.0)), FIRST)
-        agree = np.zeros(len(x), bool)
+        agree, before = np.zeros(len(x), bool), np.full(len(x), np.inf)
         while np.any(~agree & (steps > floor)):
             narrow = np.where(agree, steps, np.maximum(steps / WIDER, floor))
             fine = self._differences(x, narrow)[0]
-            slopes = np.linalg.norm(fine, axis=0)
-            agree |= np.linalg.norm(fine - wide, axis=0) <= AGREE * slopes
-            steps, wide = narrow, fine
+            gap = _apart(fine, wide)
+            worse = ~agree & (before < NEARLY) & (gap > before)
+            steps, wide = np.where(worse, steps, narrow), np.where(worse, wide, fine)
+            agree |= worse | (gap <= AGREE)
+            before = gap
         self.least = steps
+        fine = self._differences(x, np.minimum(floor, steps))[0]
+        self.stairs = bool(np.any(agree & (_apart(fine, wide) > STAIRS)))
         self.rough = tuple(one.name for one, is_smooth in zip(self.free, agree, strict=True) if not is_smooth)
 
     def _differences(self, x: Array, steps: Array) -> tuple[Array, Array | None]:
@@ -180,6 +196,13 @@ def _moved(x: Array, k: int, value: float) -> Array:
     moved = x.copy()
     moved[k] = value
     return moved
+
+
+def _apart(one: Array, other: Array) -> Array:
+    """How far apart columns are, relative to the larger of both."""
+    size = np.maximum(np.linalg.norm(one, axis=0), np.linalg.norm(other, axis=0))
+    gap = np.linalg.norm(one - other, axis=0)
+    return np.asarray(np.divide(gap, size, out=np.zeros(len(size)), where=size > 0), np.float64)
 
 
 def _spread(values: Array) -> float:

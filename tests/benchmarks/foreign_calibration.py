@@ -119,7 +119,7 @@ def by_hand(plant: Plant, fmu: Path, seed: int) -> tuple[float, float]:
     plant = replace(plant, rows=LONG)
     table = recorded(plant, fmu, truth, seed)
     begun = perf_counter()
-    cosim.identify(table, fmu=fmu, free=list(truth), starts=1, workers=1)
+    cosim.identify(table, fmu=fmu, free=list(truth), starts=1)
     ours = perf_counter() - begun
     begun = perf_counter()
     description, folder = read_model_description(str(fmu)), extract(str(fmu))
