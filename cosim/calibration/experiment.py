@@ -92,6 +92,7 @@ def matching(subject: Subject, recording: Recording, columns: Mapping[str, str])
     for name, column in columns.items():
         if name == "t":
             continue
+        _check_left_out(subject, recording, columns)
         if column not in recording and name not in recording:
             have = ", ".join(one for one in recording.columns if one != "t")
             text = f'--columns {name}={column}: {recording.name} has no column "{column}"; it has: {have}.'
@@ -105,12 +106,22 @@ def matching(subject: Subject, recording: Recording, columns: Mapping[str, str])
         have, need = ", ".join(recording.columns), ", ".join(_outputs(subject)) or "none"
         text = f"{recording.name}: none of its columns ({have}) is an output of {subject.source} ({need})"
         raise InputError(f"{text}; --columns OUTPUT=COLUMN says which is.", culprit=recording.name)
+    _check_left_out(subject, recording, columns)
     used = {"t", *inputs.values(), *outputs.values()}
     silent = [name for name in _inputs(subject) if name not in inputs and name not in subject.scenario.signals]
     rest = [name for name in recording.columns if name not in used]
     notes = [f"{recording.name}: no column for the input {', '.join(silent)}; it stays at its start."] if silent else []
     notes += [f"{recording.name}: not used: {', '.join(rest)}."] if rest else []
-    return Matching(inputs, outputs, tuple(notes))
+    return Matching(inputs, outputs, (*recording.notes, *notes))
+
+
+def _check_left_out(subject: Subject, recording: Recording, columns: Mapping[str, str]) -> None:
+    """Refuse a recording of which a column that feeds an input was left out as it was read."""
+    for name in _inputs(subject):
+        column = columns.get(name, name)
+        note = next((one for one in recording.notes if f'column "{column}" was left out' in one), "")
+        if note and column not in recording:
+            raise InputError(f"{note} It feeds the input {name}, which needs a number in each row.", culprit=column)
 
 
 def experiment_of(

@@ -165,3 +165,20 @@ def test_outliers_move_a_robust_fit_less(fmus):
         )
         off[loss] = abs(done.numbers["d"] - TRUTH["d"])
     assert off["soft_l1"] < 0.3 * off["linear"]
+
+
+def test_an_input_without_a_number_in_a_row_is_a_sentence_and_notes_of_the_reading_are_kept(fmus, folder):
+    table = recorded(fmus[3], TRUTH)
+    table["i"] = np.where(table["t"] == table["t"][5], np.nan, table["i"])
+    with pytest.raises(cosim.InputError, match='column "i" was left out'):
+        found(table, fmu=fmus[3], free=["J"])
+    with pytest.raises(cosim.InputError, match="It feeds the input i"):
+        found(
+            {("other" if name == "i" else name): one for name, one in table.items()},
+            fmu=fmus[3],
+            free=["J"],
+            columns={"i": "other"},
+        )
+    table = recorded(fmus[3], TRUTH) | {"more": np.full(400, np.nan)}
+    done = found(table, fmu=fmus[3], free=["J"], starts=1)
+    assert any("more" in note for note in done.calibrated.notes)
