@@ -17,13 +17,13 @@ TURNING = {
     "Backlash": "There is play of 0.01 rad in the drive.",
     "BoucWen": "A belt or gear goes round a loop of 1.79 N·m either way, within 0.05 rad.",
     "CableWrap": "A cable or spring pulls towards 0.2 rad with 3 N·m per rad.",
-    "ClockSkew": "The clock of the encoder is 4 ms ahead of the torque and drifts by 100 ppm. Nothing mechanical.",
+    "ClockSkew": "The clock of the encoder is 4 ms ahead of the torque and drifts by 100 ppm; not mechanical.",
     "Cogging": "The motor torque ripples 24 times per turn, by 0.5 N·m each way.",
     "Compliance": "36 % of the inertia hangs on a spring that rings at 25 Hz.",
     "LoadSideCompliance": "The motor turns the axis through a spring: both ring against each other at 60 Hz.",
     "ConcaveViscous": "Above 0.3 rad/s viscous friction falls: the grease thins.",
     "DeadBand": "The drive gives next to nothing for commands below 0.5 N·m, and less by that above.",
-    "Delay": "The machine answers 4 ms later than the simulation. Nothing mechanical.",
+    "Delay": "Actuation delay of 4 ms (drive or bus, not mechanical).",
     "DwellBreakaway": "The longer the axis rests the harder it starts: "
     f"{0.3 * log(10):.2g} N·m more for ten times the rest.",
     "EncoderEccentricity": "The encoder errs by 0.001 rad either way, 8 times per turn.",
@@ -82,9 +82,9 @@ def test_the_sentence_of_an_axis_that_slides_differs_in_its_units_alone(effect: 
 @pytest.mark.parametrize(
     ("name", "numbers", "expected"),
     [
-        ("ClockSkew", {"offset_ms": -4.0}, "The clock of the encoder is 4 ms behind the torque. Nothing mechanical."),
-        ("ClockSkew", {"drift_ppm": -50.0}, "The clock of the encoder drifts by -50 ppm. Nothing mechanical."),
-        ("ClockSkew", {}, "The clock of the encoder is right. Nothing mechanical."),
+        ("ClockSkew", {"offset_ms": -4.0}, "The clock of the encoder is 4 ms behind the torque; not mechanical."),
+        ("ClockSkew", {"drift_ppm": -50.0}, "The clock of the encoder drifts by -50 ppm; not mechanical."),
+        ("ClockSkew", {}, "The clock of the encoder is right; not mechanical."),
         ("TorqueOffset", {"torque": -0.7}, "A constant 0.7 N·m pushes the axis forward, moving or not."),
         ("TorqueSaturation", {"knee_torque": 5.0}, "The drive saturates at 5 N·m: no more arrives."),
         (

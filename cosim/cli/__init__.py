@@ -274,4 +274,4 @@ def _options(
     ] = None,
     debug: Annotated[bool, typer.Option("--debug", help="Show tracebacks; may be anywhere.")] = False,
 ) -> None:
-    """Co-simulation of a telescope mount that finds the physics its model left out."""
+    """Co-simulation of a telescope mount that finds missing physics in the model."""

@@ -52,7 +52,7 @@ def block(one: words.Block, diagnosis: Diagnosis, scales: Scales, picture: Pictu
     said = [words.stated(finding) for finding in one.findings if finding.effect not in led(diagnosis)]
     if one.answer == "ambiguous":
         said = [*words.either(said), _in_model(diagnosis, *one.findings)]
-    rows = [("Where", where(first, scales)), ("Tell apart", _apart(one))]
+    rows = [("Where", where(first, scales)), ("How to distinguish", _apart(one))]
     rows += [("Ruled out", _plainly(first.ruled_out)), ("Less likely", _plainly(first.less_likely))]
     closed = tuple(_numbers(finding) for finding in one.findings)
     filled = tuple((name, text) for name, text in rows if text)

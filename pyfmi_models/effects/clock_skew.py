@@ -27,7 +27,7 @@ class ClockSkew(ClockEffect):
     told_apart_by: ClassVar[str] = (
         "a clock may drift, or run ahead, or trail the set point; a delay is constant, and the loop makes up for it"
     )
-    action: ClassVar[str] = "Nothing mechanical. Take time stamps of torque and encoder from one clock."
+    action: ClassVar[str] = "No repair: take time stamps of torque and encoder from one clock."
     drift_ppm: Scalar = parameter(
         "1", "Drift of the reading's clock, parts per million", default=0.0, low=-1e5, high=1e5
     )
@@ -44,6 +44,4 @@ class ClockSkew(ClockEffect):
         way = "ahead of" if self.offset_ms > 0 else "behind"
         offset = f"is {abs(self.offset_ms):.2g} ms {way} the torque" if self.offset_ms else ""
         drift = f"drifts by {self.drift_ppm:.3g} ppm" if self.drift_ppm else ""
-        return (
-            f"The clock of the encoder {' and '.join(filter(None, (offset, drift))) or 'is right'}. Nothing mechanical."
-        )
+        return f"The clock of the encoder {' and '.join(filter(None, (offset, drift))) or 'is right'}; not mechanical."

@@ -34,7 +34,7 @@ class Delay(DriveEffect):
     told_apart_by: ClassVar[str] = (
         "a delay turns phase only; a lag also takes amplitude away at high frequency; a late clock trails the set point"
     )
-    action: ClassVar[str] = "Nothing mechanical. Shorten the bus cycle, or use the improved model for tuning."
+    action: ClassVar[str] = "No repair: shorten the bus cycle, or use the improved model for tuning."
     delay_ms: Scalar = parameter(
         "ms", "Dead time between commanded and applied torque", low=0.02, high=50, tunable=False
     )
@@ -62,4 +62,4 @@ class Delay(DriveEffect):
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        return f"The machine answers {self.delay_ms:.2g} ms later than the simulation. Nothing mechanical."
+        return f"Actuation delay of {self.delay_ms:.2g} ms (drive or bus, not mechanical)."

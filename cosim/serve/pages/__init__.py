@@ -28,7 +28,7 @@ STATES = {
     "cancelled": "cancelled",
     "interrupted": "interrupted",
 }
-ROLES = {"train": "fit the model", "heldout": "keep for the proof", "out": "leave out"}
+ROLES = {"train": "fit the model", "heldout": "use for validation (never fitted)", "out": "leave out"}
 MEANINGS = {"t": "time", "tau": "torque", "q": "position", "v": "speed", "q_d": "set point"}
 HINTS = {
     "separator": "comma, semicolon, tab, space",
