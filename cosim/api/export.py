@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+from cosim.api.maps import related_maps
 from cosim.api.recordings import Source
 from cosim.api.recordings import read as read_recording
 from cosim.delivery.experiment import sines, with_experiment
@@ -75,6 +76,7 @@ class _Archive:
     model: Model
     fmi: Fmi
     machines: tuple[str, ...]
+    related: tuple[Related, ...] = ()
 
 
 def export(
@@ -192,7 +194,8 @@ def _write(one: _Archive, force: bool) -> None:
 
     def export(related: Sequence[Related]) -> Path:
         more = force or bool(related)  # the second time it is our own
-        return export_fmu(one.model, one.path, fmi=one.fmi, force=more, platforms=one.machines, related=related)
+        files = (*one.related, *related)
+        return export_fmu(one.model, one.path, fmi=one.fmi, force=more, platforms=one.machines, related=files)
 
     with_experiment(export, sines(one.model), one.machines)
 
@@ -255,8 +258,9 @@ def _archives(
     models = {"plant": card.plant().model()}
     if card.controller is not None:
         models["controller"] = card.controller_model()
+    beside = {"plant": related_maps(card)}
     return [
-        _Archive(out / folder / f"{stem}_{part}_fmi{version}.fmu", model, version, machines)
+        _Archive(out / folder / f"{stem}_{part}_fmi{version}.fmu", model, version, machines, beside.get(part, ()))
         for part, model in models.items()
         for version in versions
         for folder, machines in _folders(version, platforms).items()

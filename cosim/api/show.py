@@ -275,6 +275,7 @@ def _scenario(file: str) -> tuple[Facts, Tables]:
 
 
 def _card(file: str) -> tuple[Facts, Tables]:
+    from cosim.api.maps import curves, maps_of
     from pyfmi_models.card import read_card
 
     card = read_card(file)
@@ -292,4 +293,5 @@ def _card(file: str) -> tuple[Facts, Tables]:
         {"parameter": v.name, "value": f"{v.start:.6g}", "unit": v.unit, "description": v.description}
         for v in model.parameters
     ]
-    return facts, {"parameters": parameters}
+    drawn = curves(maps_of(card))
+    return facts, {"parameters": parameters} | ({"learned maps": drawn} if drawn else {})

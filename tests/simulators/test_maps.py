@@ -1,0 +1,72 @@
+"""Learned terms are shown as curves and go along with an FMU as maps with breakpoints and units."""
+
+import json
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy.validation import validate_fmu
+
+from cosim.api.export import export
+from cosim.api.maps import curve, maps_of
+from cosim.api.show import show
+from pyfmi_models.card import read_card
+
+CARD = """[mount]
+inertia = 2
+[friction]
+model = "coulomb"
+Fc = 0.5
+sigma2 = 3
+[[effects]]
+effect = "learned"
+over = "position"
+seen = [-1.0, 1.0]
+torque = [0.0, 0.2]
+[[effects]]
+effect = "learned"
+over = "position"
+seen = [-1.0, 1.0]
+by = "speed"
+by_seen = [0.0, 2.0]
+waves = [1, 1]
+torque = [0.1, 0.0, 0.0, 0.3]
+"""
+
+
+@pytest.fixture
+def card(tmp_path: Path) -> Path:
+    path = tmp_path / "learned.toml"
+    path.write_text(CARD)
+    return path
+
+
+def test_a_map_has_the_values_of_the_term_at_its_breakpoints(card: Path) -> None:
+    first, second = maps_of(read_card(card))
+    np.testing.assert_allclose(first["value"], 0.2 * np.cos(np.pi * (np.array(first["at"]) + 1) / 2), atol=1e-12)
+    assert (first["unit"], first["kind"]) == ("N.m", "torque")
+    assert np.shape(second["value"]) == (len(second["at"]), len(second["by_at"]))
+
+
+def test_a_card_is_shown_with_its_maps_as_curves(card: Path) -> None:
+    rows = show(card).tables["learned maps"]
+    assert rows[0]["curve"][0] == "█"
+    assert rows[0]["curve"][-1] == "▁"
+    assert rows[0]["values"] == "-0.2 to 0.2 N.m"
+    assert len(rows) == 1 + 5, "the map of two quantities at five values of the second"
+    assert "learned maps" not in show("emps").tables
+
+
+def test_an_fmu_carries_its_maps_and_stays_valid(card: Path, tmp_path: Path) -> None:
+    (path,) = export(card, tmp_path / "out", fmi=3).fmus
+    assert not validate_fmu(path)
+    with zipfile.ZipFile(path) as archive:
+        folder = "extra/org.fmi-standard.fmi-ls-ref/"
+        told = json.loads(archive.read(f"{folder}maps.json"))
+        assert b"maps.json" in archive.read(f"{folder}fmi-ls-manifest.xml")
+    assert [one["name"] for one in told["maps"]] == ["learned", "learned2"]
+
+
+def test_a_flat_map_is_drawn_too() -> None:
+    assert curve([2.0, 2.0]) == "▁▁"
