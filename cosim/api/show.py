@@ -10,7 +10,7 @@ from cosim.data.preview import preview
 from cosim.data.recording import Recording
 from cosim.data.runs import Run, taken
 from cosim.plots import recording as told
-from cosim.support.errors import InputError, ManyRecordingsError
+from cosim.support.errors import FmuError, InputError, ManyRecordingsError
 from cosim.support.html import facts as html_facts
 from cosim.support.html import table as html_table
 from cosim.support.html import text as html_text
@@ -180,6 +180,7 @@ def _fmu(path: Path) -> tuple[Facts, Tables]:
         "kinds": ", ".join(name for name, kind in kinds.items() if kind is not None),
         "made by": description.generationTool or "?",
     }
+    facts |= _carried(path)
     facts |= {f"note {number}": f"{doubt}." for number, doubt in enumerate(doubts_of(description), 1)}
     order = ("input", "output", "parameter", "structuralParameter", "calculatedParameter", "local", "independent")
     with many_objects():
@@ -196,6 +197,22 @@ def _fmu(path: Path) -> tuple[Facts, Tables]:
             for port in ports
         ]
     return facts, {"variables": variables}
+
+
+def _carried(path: Path) -> dict[str, str]:
+    """What an FMU brings along (FMI-LS-REF): where it is proven, and experiments that `cosim check` runs."""
+    from cosim.experiments.domain import domains_in
+    from cosim.experiments.manifest import manifest_of
+
+    try:
+        manifest = manifest_of(path)
+    except FmuError as error:
+        return {"brings along": str(error)}
+    if manifest is None:
+        return {}
+    found = {"brings along": ", ".join(dict.fromkeys(one.role for one in manifest.related))}
+    domains = domains_in(path, manifest)
+    return found | ({"proven for": "; ".join(map(str, domains))} if domains else {})
 
 
 def _first_values(start: Any) -> str:

@@ -21,12 +21,14 @@ from cosim.diagnosis.answer.result import Diagnosis, Finding, HeldOut
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.effects import named
 from cosim.diagnosis.measure.experiment import SCENARIO, scenario
+from cosim.experiments.domain import KEY, Domain, entries_of
 from cosim.support.files import check_free, directory, replacing, sha256
 from cosim.support.plain import JsonObject
 from cosim.support.version import __version__
 from pyfmi_models.card import Card
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.export import export_fmu
+from pyfmi_models.export.related import Related, identified
 
 DOCUMENT, CARD = "diagnosis.json", "card.toml"
 MISSING, REPORT = "missing_torque.parquet", "report.html"
@@ -291,8 +293,16 @@ def _fmus(card: Card, found: Diagnosis, heldout: Recording, out: Path) -> Improv
     model = card.plant().model()
     proven = f"{model.description}; proven on a held-out recording for speeds {span[0]:.3g} to {span[1]:.3g} {unit}"
     model = replace(model, description=proven, name=f"{card.plant().name}_improved")
-    stimulus = of_recording(heldout, model)
+    stimulus, told = of_recording(heldout, model), _identification(card, found, model.name)
     three, two = out / f"{model.name}.fmu", out / f"{model.name}_fmi2.fmu"
-    with_experiment(lambda related: export_fmu(model, three, fmi=3, force=True, related=related), stimulus)
-    with_experiment(lambda related: export_fmu(model, two, fmi=2, force=True, related=related), stimulus)
+    with_experiment(lambda related: export_fmu(model, three, fmi=3, force=True, related=(*told, *related)), stimulus)
+    with_experiment(lambda related: export_fmu(model, two, fmi=2, force=True, related=(*told, *related)), stimulus)
     return Improved(fmu=f"{model.name}.fmu", fmu_fmi2=f"{model.name}_fmi2.fmu")
+
+
+def _identification(card: Card, found: Diagnosis, name: str) -> tuple[Related, ...]:
+    """What the improved FMU says of where it comes from, and within which range it is proven."""
+    position, speed = ("m", "m/s") if found.motion == "linear" else ("rad", "rad/s")
+    (slow, fast), (left, right) = _proven_range(found)["speed"], _proven_range(found)["position"]
+    domains = (Domain("speed", slow, fast, speed), Domain("position", left, right, position))
+    return identified(name, {**card.origin, KEY: entries_of(domains)}, b"")

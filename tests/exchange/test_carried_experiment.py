@@ -9,8 +9,10 @@ import pytest
 import cosim
 from cosim.data.recording import Recording
 from cosim.delivery.experiment import of_recording, with_experiment
+from cosim.experiments.domain import KEY, Domain, entries_of
 from pyfmi_models.card import read_card
 from pyfmi_models.export import export_fmu
+from pyfmi_models.export.related import identified
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 
@@ -51,3 +53,12 @@ def test_the_torque_of_a_recording_is_the_stimulus_and_what_was_measured_lies_be
         assert measured[0] == "time,q"
         assert len(measured) == 2001
         assert "tau" in archive.read(f"{FOLDER}/stimulus.csv").decode().splitlines()[0]
+
+
+def test_the_range_in_which_a_model_is_proven_is_shown(tmp_path):
+    domains = (Domain("speed", -2.6, 3.6, "rad/s"), Domain("position", 0.1, 0.5, "rad"))
+    told = identified("improved", {"version": "1", KEY: entries_of(domains)}, b"")
+    path = export_fmu(read_card("paper_mount").plant().model(), tmp_path / "a.fmu", related=told)
+    facts = cosim.show(path).facts
+    assert facts["proven for"] == "speed -2.6 to 3.6 rad/s; position 0.1 to 0.5 rad"
+    assert "meta-data" in facts["brings along"]
