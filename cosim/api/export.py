@@ -5,10 +5,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from cosim.api.maps import related_maps
 from cosim.api.recordings import Source
 from cosim.api.recordings import read as read_recording
 from cosim.delivery.experiment import sines, with_experiment
+from cosim.models.maps import related_maps
 from cosim.reading import check_kind
 from cosim.simulators import FORMATS, WHOLE
 from cosim.simulators.deliver import Planned

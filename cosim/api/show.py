@@ -292,7 +292,7 @@ def _scenario(file: str) -> tuple[Facts, Tables]:
 
 
 def _card(file: str) -> tuple[Facts, Tables]:
-    from cosim.api.maps import curves, maps_of
+    from cosim.models.maps import curves, maps_of
     from pyfmi_models.card import read_card
 
     card = read_card(file)

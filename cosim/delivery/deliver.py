@@ -22,6 +22,7 @@ from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.effects import named
 from cosim.diagnosis.measure.experiment import SCENARIO, scenario
 from cosim.experiments.domain import KEY, Domain, entries_of
+from cosim.models.maps import related_maps
 from cosim.support.files import check_free, directory, replacing, sha256
 from cosim.support.plain import JsonObject
 from cosim.support.version import __version__
@@ -295,6 +296,7 @@ def _fmus(card: Card, found: Diagnosis, heldout: Recording, out: Path) -> Improv
     model = replace(model, description=proven, name=f"{card.plant().name}_improved")
     stimulus, told = of_recording(heldout, model), _identification(card, found, model.name)
     three, two = out / f"{model.name}.fmu", out / f"{model.name}_fmi2.fmu"
+    told = (*told, *related_maps(card))
     with_experiment(lambda related: export_fmu(model, three, fmi=3, force=True, related=(*told, *related)), stimulus)
     with_experiment(lambda related: export_fmu(model, two, fmi=2, force=True, related=(*told, *related)), stimulus)
     return Improved(fmu=f"{model.name}.fmu", fmu_fmi2=f"{model.name}_fmi2.fmu")

@@ -9,8 +9,8 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from cosim.api.export import export
-from cosim.api.maps import curve, maps_of
 from cosim.api.show import show
+from cosim.models.maps import curve, maps_of
 from pyfmi_models.card import read_card
 
 CARD = """[mount]
