@@ -3,7 +3,8 @@
     J w' = gear kt i - d w - Fc tanh(w / 0.05),   phi' = w;   outputs w and phi, input i
 
 `idle` does nothing. Beyond |J| = `crash_above` it crashes, below `nan_below` it gives NaN, below `hang_below` it hangs.
-`planted` changes what it does: 1 the sign, 2 a gain of 1.05, 3 no friction, 4 one sample late, 5 an offset.
+`planted` changes what it does: 1 the sign, 2 a gain of 1.05, 3 no friction, 4 one sample late, 5 an offset, 6 an
+inertia 2 % larger, 7 a speed that ends at 2, 8 an angle by Euler's rule, 9 degrees, 10 an input one step late.
 """
 
 import subprocess
@@ -29,12 +30,15 @@ static M *make(void) { M *m = calloc(1, sizeof(M));
   memcpy(m->v, start, sizeof start); return m; }
 static int set(M *m, const unsigned *r, size_t n, const double *x) { while (n--) m->v[r[n]] = x[n]; return 0; }
 static int get(M *m, const unsigned *r, size_t n, double *x) {
-  while (n--) { double g = m->v[PLANTED] == 1 ? -1 : m->v[PLANTED] == 2 ? 1.05 : 1, o = m->v[PLANTED] == 5 ? .02 : 0;
-    x[n] = r[n] == W ? g * (m->v[PLANTED] == 4 ? m->late : m->v[W]) + o : m->v[r[n]]; }
+  int p = (int)m->v[PLANTED];
+  while (n--) { double g = p == 1 ? -1 : p == 2 ? 1.05 : p == 9 ? 57.29578 : 1, o = p == 5 ? .02 : 0;
+    double w = p == 4 ? m->late : p == 7 ? fmin(m->v[W], 2) : m->v[W];
+    x[n] = r[n] == W ? g * w + o : m->v[r[n]]; }
   return 0; }
 static int save(M *m, M **s) { if (!*s) *s = make(); **s = *m; return 0; }
 static double rate(M *m, double w) { double f = m->v[PLANTED] == 3 ? 0 : m->v[FC];
-  return (m->v[GEAR] * m->v[KT] * m->v[I] - m->v[D] * w - f * tanh(w / 0.05)) / m->v[J]; }
+  double i = m->v[PLANTED] == 10 ? m->before : m->v[I];
+  return (m->v[GEAR] * m->v[KT] * i - m->v[D] * w - f * tanh(w / 0.05)) / m->v[J] / (m->v[PLANTED] == 6 ? 1.02 : 1); }
 static int step(M *m, double t, double h) {
   if (m->v[J] > m->v[CRASH_ABOVE]) raise(SIGSEGV);
   while (m->v[J] < m->v[HANG_BELOW]) sleep(1);
@@ -42,7 +46,8 @@ static int step(M *m, double t, double h) {
   m->late = m->v[W];
   for (int k = 0; k < n; k++) { double w = m->v[W], a = rate(m, w), b = rate(m, w + s / 2 * a),
     c = rate(m, w + s / 2 * b), e = rate(m, w + s * c), next = w + s / 6 * (a + 2 * b + 2 * c + e);
-    m->v[PHI] += s * (w + next) / 2; m->v[W] = next; }
+    m->v[PHI] += m->v[PLANTED] == 8 ? s * w : s * (w + next) / 2; m->v[W] = next; }
+  m->before = m->v[I];
   if (m->v[J] < m->v[NAN_BELOW]) m->v[W] = NAN;
   return 0; }
 """

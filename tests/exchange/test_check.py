@@ -17,7 +17,19 @@ from cosim.system.wire import Record, Wire
 ROWS = 201
 T = 0.01 * np.arange(ROWS)
 CURRENT = 3 * np.sin(2 * np.pi * (0.5 + T) * T) * (T > 0.1)
-CAUSES = {1: "the sign is the other one", 2: "a gain of 1.05", 3: "w", 4: "1 row (0.01 s) late", 5: "an offset of 0.02"}
+CAUSES = {
+    1: "the sign is the other one",
+    2: "a gain of 1.05",
+    3: "w is",
+    4: "1 row (0.01 s) late",
+    5: "an offset of 0.02",
+    6: "w is",
+    7: "w is",
+    8: "phi is",
+    9: "a gain of 57.3",
+    10: "w is",
+}
+"""What is planted, see `motor_fmu`, and what is said of it."""
 SET = '<ParameterSet xmlns="x"><Parameter name="{}"><Real value="{}"/></Parameter></ParameterSet>'
 
 
