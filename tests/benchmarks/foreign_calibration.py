@@ -196,7 +196,8 @@ def write(out: Path, rows: list[dict], named: list[bool], times: list[tuple[floa
         "",
     ]
     lines += [
-        "The ball bounces on its own steps of 1 ms: its height is a staircase over g and e, which no standard error knows of.",
+        "The ball bounces on its own steps of 1 ms: its height is a staircase over g and e, which no standard error",
+        "knows of.",
         "",
         f"The motor, {LONG:,} rows, from one start: {ours:.1f} s; FMPy and SciPy by hand {hand:.1f} s",
         f"(ratio {ours / hand:.2f}).",
