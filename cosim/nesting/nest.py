@@ -41,6 +41,10 @@ def nest(system: System, paths: dict[Literal[2, 3], Path]) -> tuple[Path, ...]:
     with ExitStack() as stack:
         prepared = prepare(stack, system)
         shown = shown_of(prepared)
+        if not shown:
+            raise WiringError(
+                f'"{system.name}" cannot become one FMU: it would show doubles only, and has none to show.'
+            )
         for version, path in paths.items():
             write_zip(path, _files(prepared, shown, version, path.stem))
     return tuple(paths.values())

@@ -228,6 +228,8 @@ def test_what_cannot_be_nested_is_said_in_a_sentence(tiny: Tiny, tmp_path: Path)
     direct = described(tiny[3], tmp_path / "direct.fmu", description(3, direct=True))
     ring = oscillator(direct, parameters={"mass": {"mode": 2.0, "k": 0.5}, "spring": {"mode": 2.0, "k": 0.5}})
     assert "ring" in refusal(ring, tmp_path)
+    whole = described(tiny[3], tmp_path / "whole.fmu", description(3).replace("Float64", "Int32").replace("1e9", "9"))
+    assert "doubles only" in refusal(System(components={"it": whole}, records={}, step=STEP, ticks=3), tmp_path)
     assert not list(tmp_path.glob("system*.fmu"))
 
 
