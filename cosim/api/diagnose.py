@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import pandas as pd
 
 from cosim.api.defaults import estimated, split
+from cosim.api.progress import Staged, stages_of
 from cosim.api.recordings import Source, Written, read_all
 from cosim.api.tables import findings_frame, missing_frame
 from cosim.api.why import frame
@@ -149,7 +150,7 @@ def diagnose(
         variables: our name to the FMU's, where they differ: {"tau": "Motor.torque"}.
         quick: write diagnosis.json and card.toml alone, and close no loop.
         force: overwrite what is there.
-        on_progress: told in a few words what is being done.
+        on_progress: told in a line what is being done, the stage of how many, and about how long it takes still.
         on_answer: told the answer as soon as it stands, before FMUs and report are made from it.
         command: what the files shall name as what made them.
 
@@ -165,6 +166,7 @@ def diagnose(
     if folder:
         check_out(folder, force, QUICK if quick else FILES)
         check_directory(folder)
+    on_progress = Staged(on_progress, stages_of(card is not None, folder is not None and not quick))
     given = _read(train, heldout, card, Written(columns, units, layout), motion, on_progress)
     if fmu is not None:
         given = _beside(_black_box(fmu, variables or {}), given, on_progress)
