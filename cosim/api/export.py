@@ -139,8 +139,9 @@ def system_as_fmu(
     platform: str,
     force: bool,
     kinds: Sequence[str],
+    on_build: Callable[[str], None] = lambda text: None,
 ) -> Exported:
-    """Write a system as one FMU; arguments and errors are those of `export`."""
+    """Write a system as one FMU; arguments and errors are those of `export`, `on_build` is told of FMUs of cards."""
     from cosim.api.export_system import export_system
 
     if isinstance(scenario, Card):
@@ -150,7 +151,7 @@ def system_as_fmu(
         raise InputError(f"{option} is of a card, and --as-fmu of a system; give one of them.", culprit=option)
     if platform != "host":
         raise InputError(f'--as-fmu builds for this computer; --platform "{platform}" is not there.', culprit=platform)
-    return Exported(export_system(scenario, out, fmi, force))
+    return Exported(export_system(scenario, out, fmi, force, on_build))
 
 
 def kinds_of(**asked: bool) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ import typer
 
 from cosim.cli.complete import cards
 from cosim.cli.options import Force, Out, default_out
-from cosim.support.terminal import put, put_json, stage
+from cosim.support.terminal import put, put_json, say, stage
 
 
 class Fmi(StrEnum):
@@ -51,7 +51,7 @@ def export(
     asked = {"ssp": ssp, "modelica": modelica, "modelica_flange": modelica_flange, "c": c}
     kinds = kinds_of(**asked, mujoco=mujoco, urdf=urdf, isaac=isaac)
     if as_fmu:
-        done = system_as_fmu(card, out, VERSIONS[fmi], platform, force, kinds)
+        done = system_as_fmu(card, out, VERSIONS[fmi], platform, force, kinds, say)
         put_json(done.as_json()) if as_json else put(str(done))
         return
     plan = planned(card, out, VERSIONS[fmi], platform, force, kinds, recording)
