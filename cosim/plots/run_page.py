@@ -1,4 +1,4 @@
-"""One page of pictures of a run: self-contained HTML, without script and without network.
+"""One page of pictures of a run: self-contained HTML without network; its one script is the explorer.
 
 For each axis in the recording (see `digest`): set point, error, torque, speed and friction over time, friction over
 speed, spectrum of the error; then every other column over time, a table of all, and what the run was.
@@ -18,6 +18,7 @@ from cosim.data.formats import ORIGIN_KEY
 from cosim.plots.chart import Chart
 from cosim.plots.digest import ERROR, Axis, Digest, Line, digest, in_words
 from cosim.plots.quantities import Scale, number, scale_of
+from cosim.plots.run_explorer import explorer, policy
 from cosim.plots.style import AFTER, BEFORE, MEASURED
 from cosim.support.files import replacing
 from cosim.system.diagram import draw as diagram
@@ -36,10 +37,12 @@ def write_page(path: Path, recording: Path, scenario: Scenario, statistics: Fact
         OutputError: the page exists and `force` is not set.
     """
     origin = _origin(recording)
-    parts = [*_head(scenario, statistics, origin), *_pictures(digest(recording)), *_foot(scenario, statistics, origin)]
-    style = (files("cosim") / "plots" / "run_page.css").read_text("utf-8")
+    small = digest(recording)
+    closer, more, script = explorer(recording, small)
+    parts = [*_head(scenario, statistics, origin), *_pictures(small), closer, *_foot(scenario, statistics, origin)]
+    style = more + (files("cosim") / "plots" / "run_page.css").read_text("utf-8")
     head = '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
-    head += f"<style>{style}</style>"
+    head += (policy(script) if script else "") + f"<style>{style}</style>"
     title = f"<title>{escape(scenario.name)}</title>"
     with replacing(path, force) as partial:
         text = f'<!doctype html><html lang="en">{head}{title}<body><main>{"".join(parts)}</main></body></html>\n'
