@@ -24,6 +24,9 @@ from cosim.data.recording import Recording
 from cosim.support.errors import InputError
 
 INTERPOLATIONS = ("hold", "linear")
+OF_WINDOWS = (
+    "Each window starts from single readings: their noise is not in the standard errors, and moves the numbers."
+)
 
 
 @dataclass(frozen=True)
@@ -118,9 +121,10 @@ def calibrate(
     whole, fitted = tuple(laid), laid[: len(train)]
     if options.window is not None:
         fitted = [part for one in fitted for part in windows_of(subject, one, options.window, options.free)]
+    noted = () if options.window is None else (OF_WINDOWS,)
     start = np.array([one.start / one.scale for one in free])
     before = {one.name: one.start for one in free}
-    notes = tuple(dict.fromkeys(note for match in matched for note in match.notes))
+    notes = (*dict.fromkeys(note for match in matched for note in match.notes), *noted)
     job = Job(subject, (*whole, *fitted), options.given)
     all_, part = slice(0, len(whole)), slice(len(whole), None)
     with Processes(job, options.workers, options.timeout) as processes:
@@ -139,6 +143,7 @@ def calibrate(
         text = f"{subject.source} cannot be simulated on all recordings with the numbers that were found"
         raise InputError(f"{text}: {lost[-1]}", culprit="heldout")
     uncertainty = uncertainty_of(found, free, residuals.scales, rows)
+    values = {**values, **{name: before[name] for one in uncertainty.not_determined if one.idle for name in one.parts}}
     traces = _traces(subject, whole, len(train), old, new)
     return Calibrated(subject, free, values, uncertainty, traces, found, evaluations, lost, notes)
 

@@ -41,6 +41,8 @@ class Direction:
 
     parts: dict[str, float]
     statement: str
+    idle: bool = False
+    """Whether it is one number that changes nothing at all."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,7 @@ def _forgetting(z: Array) -> float:
 
 def _alone(name: str, slope: float, largest: float) -> Direction:
     if slope <= NOTHING * largest:
-        return Direction({name: 1.0}, f"{name} changes nothing that was recorded.")
+        return Direction({name: 1.0}, f"{name} changes nothing that was recorded.", True)
     said = f"The recordings do not determine {name}: doubling it moves what was recorded by less than its noise."
     return Direction({name: 1.0}, said)
 

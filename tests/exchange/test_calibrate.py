@@ -71,12 +71,13 @@ def test_the_verb_writes_numbers_an_fmu_that_has_them_and_a_report(fmus, folder,
 
 
 def test_a_parameter_that_changes_nothing_and_a_pair_that_acts_as_a_product_are_named(fmus):
-    done = found(recorded(fmus[3], TRUTH), fmu=fmus[3], free=["J", "kt", "gear", "idle"], starts=1)
+    done = found(recorded(fmus[3], TRUTH), fmu=fmus[3], free=["J", "kt", "gear", "idle"], starts=2)
     assert "idle changes nothing that was recorded." in done.not_determined
     assert any("kt" in one and "gear" in one and "product" in one for one in done.not_determined)
     assert math.isinf(done.standard_errors["idle"])
     assert math.isinf(done.standard_errors["kt"])
     assert math.isfinite(done.standard_errors["J"])
+    assert done.numbers["idle"] == 1, "it stays as it was"
 
 
 def test_residuals_that_hang_together_widen_the_standard_errors(fmus):
