@@ -67,7 +67,7 @@ def _text(value: float, error: float) -> str:
     """A value with as many digits as its standard error says, two more than are sure at most."""
     if not isfinite(error) or error <= 0 or value == 0:
         return number(value, 4)
-    return number(value, int(np.clip(np.ceil(np.log10(abs(value) / error)) + 2, 2, 12)))
+    return number(value, int(np.clip(np.ceil(np.log10(abs(value) / error)) + 2, 2, 7)))
 
 
 def _lead(done: Calibrated) -> str:

@@ -67,7 +67,7 @@ def uncertainty_of(found: Fit, free: Sequence[Free], scales: Array, rows: Rows) 
     samples = {name: float(np.sum(1 / inflation[rows.output == k])) for k, name in enumerate(rows.names)}
     size = np.maximum(np.abs(found.x), LEAST)
     relative = found.jacobian * size / np.sqrt(inflation)[:, None]
-    noise = _noise(found, len(free))
+    noise = max(_noise(found, len(free)), LEAST)  # weights count in units of no less than a solver's exactness
     directions, covariance = _judged(relative, noise, [one.name for one in free])
     lost = {name for one in directions for name in one.parts}
     deviations = np.sqrt(np.maximum(np.diag(covariance), 0))

@@ -117,3 +117,11 @@ def test_outliers_move_a_robust_fit_less(fmus):
         )
         off[loss] = abs(done.numbers["d"] - TRUTH["d"])
     assert off["soft_l1"] < 0.3 * off["linear"]
+
+
+def test_recordings_without_noise_that_the_start_values_follow_exactly_still_name_what_is_idle(fmus):
+    table = recorded(fmus[3], {}, noise=0.0)
+    done = found(table, fmu=fmus[3], free=["J", "idle"], starts=1)
+    assert done.not_determined == ("idle changes nothing that was recorded.",)
+    assert done.numbers["J"] == pytest.approx(0.02, rel=1e-6)
+    assert 0 < done.standard_errors["J"] < 1e-6
