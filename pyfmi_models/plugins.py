@@ -128,7 +128,7 @@ def _module(path: Path) -> ModuleType:
         raise PluginError(f'{path}: "{path.stem}" is no name of a Python module; use letters, digits and underscores.')
     try:
         found = import_module(path.stem)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise PluginError(f"{path} cannot be loaded: {type(error).__name__}: {error}.") from error
     if Path(getattr(found, "__file__", None) or "").absolute() != path.absolute():
         raise PluginError(f'{path}: another module is called "{path.stem}" already; give the file another name.')

@@ -23,9 +23,19 @@ def result(path: Path) -> Told | None:
     """
     if path.is_dir():
         found = [name for name in _READERS if (path / name).is_file()]
-        return _READERS[found[0]](path / found[0]) if found else None
-    reader = _READERS.get(path.name) if path.is_file() else None
-    return reader(path) if reader and (path.name != TABLE or _is_sweep(path)) else None
+        return _told(path / found[0]) if found else None
+    if path.name not in _READERS or not path.is_file() or (path.name == TABLE and not _is_sweep(path)):
+        return None
+    return _told(path)
+
+
+def _told(path: Path) -> Told:
+    """Read a file of ours; what in it is not as we write it is a sentence (InputError)."""
+    try:
+        return _READERS[path.name](path)
+    except (TypeError, ValueError, KeyError, AttributeError) as error:
+        text = f"{path} is named as a file of this project, and is not as it was written: {error}."
+        raise InputError(text, culprit=str(path)) from error
 
 
 def _document(path: Path, *keys: str) -> Parsed:

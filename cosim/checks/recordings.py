@@ -109,7 +109,7 @@ def found_where_concealed(effect: Effect) -> None:
     found = diagnose(train, [heldout], bare).diagnosis
     answer = {one.effect: one for one in found.findings}.get(effect.id)
     told = ", ".join(found.verdict) or "none"
-    why = f"; of it: {answer.statement}" if answer else ""
+    why = f"; of it: {answer.statement}" if answer and answer.statement else ""
     require(effect.id in found.verdict, f"concealed, it is not found: the answer is {told}{why}")
 
 

@@ -283,6 +283,7 @@ def test_a_folder_of_plugins_brings_words_to_cards(own: Path) -> None:
     [
         ("import nonsense_that_is_nowhere\n", "nonsense_that_is_nowhere"),
         ("def (:\n", "SyntaxError"),
+        ("import sys\nsys.exit(3)\n", "SystemExit"),
         (OWN.replace("stiff_hose", "cogging"), "that of an effect of this package"),
     ],
 )

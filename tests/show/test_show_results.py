@@ -42,7 +42,7 @@ def test_a_diagnosis_is_shown_from_its_folder_and_its_file(answered: Path, name:
     assert "not_seen" not in rows.values()
 
 
-@pytest.mark.parametrize("text", ["[1]", "{}", "{", "[" * 100_000])
+@pytest.mark.parametrize("text", ["[1]", "{}", "{", "[" * 100_000, '{"verdict": 5, "effects": 3, "heldout": []}'])
 def test_a_broken_diagnosis_is_one_sentence(tmp_path: Path, text: str) -> None:
     (tmp_path / "diagnosis.json").write_text(text, "utf-8")
     with pytest.raises(cosim.InputError) as refused:
