@@ -206,7 +206,7 @@ def test_a_mapping_that_is_none_is_refused(
 
 def test_without_pysoem_a_sentence_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pysoem", None)
-    with pytest.raises(MissingPackageError, match=r"pip install "pysoem"):
+    with pytest.raises(MissingPackageError, match='pip install "pysoem'):
         session(tmp_path)
 
 
