@@ -169,10 +169,10 @@ def test_it_is_used_by_keyboard_alone(browser: Any, files: list[Path], tmp_path:
         to(page, "files")
         page.set_input_files("#files", files)  # Space opens the browser's own window: headless, it cannot be closed
         page.wait_for_selector("#start")
-        to(page, "role-2")
+        to(page, "role-1")
         page.keyboard.press("ArrowDown")
         holds(page, "document.querySelector('.lacking')")
-        assert page.evaluate("document.activeElement.id") == "role-2"
+        assert page.evaluate("document.activeElement.id") == "role-1"
         page.keyboard.press("ArrowUp")
         holds(page, "!document.querySelector('.lacking')")
         to(page, "start")
