@@ -25,6 +25,7 @@ from cosim_studies.proof.families import AT_THE_AXIS
 from cosim_studies.proof.machines import MACHINES
 from cosim_studies.proof.outside import OUTSIDE_EFFECTS
 from cosim_studies.proof.recorder import columns_of, decoys, oracle
+from cosim_studies.proof.rough import roughen
 from cosim_studies.proof.simulated_axis import FRICTIONS, RECORDINGS, SimulatedAxis, draw_axis, stream
 from cosim_studies.proof.truth import TICK, Array, simulate
 from cosim_studies.proof.workshop import draw_workshop
@@ -61,13 +62,15 @@ def make_case(
     duration: float = 60.0,
     decoy_columns: bool = True,
     machine: str = "",
+    rough: bool = False,
 ) -> Case:
     """Draw a machine from `seed`, conceal `effects` of relative `size` in it (none: a null) and record it three times.
 
     Without `machine` it is a telescope mount with a LuGre card: `friction` is then the truth at contact level, "lugre"
     (a bristle), "maxwell_slip" (a row of slip blocks) or "mixed" (30 to 60 % slip blocks in half of the seeds); `noise`
     scales every disturbance; `rate_hz` must divide 10 kHz. A class of machines.py, or "any", draws all of these, the
-    card, the loop and the set points too, and recordings of half to all of the duration.
+    card, the loop and the set points too, and recordings of half to all of the duration. `rough`: a machine that is not
+    quite what equations say, see rough.py.
     """
     _check(effects or (), friction, rate_hz, machine)
     if machine:
@@ -75,6 +78,8 @@ def make_case(
     else:
         bench = draw_axis(seed, friction, noise, rate_hz, duration)
     found = [conceal(bench, name, seed, size) for name in effects or ()]
+    if rough:
+        roughen(bench, seed)
     extra = decoys(stream(seed, "decoy"), bench, bench.rate_hz) if decoy_columns else {}
     return assemble(bench, found, seed, bench.rate_hz, extra)
 

@@ -55,6 +55,11 @@ struct mount {
     double viscous_swing, viscous_cycles, viscous_phase;            /* viscous friction over position */
     double dead_band, gain_swing, gain_cycles, gain_phase, gain_fade; /* what the drive makes of the command */
     double shift, shift_phase, shift_time;                          /* a payload that comes at a moment */
+    double warp_place, warp_place_cycles, warp_place_phase;         /* what is concealed is not quite its equation: ... */
+    double warp_speed, warp_speed_scale, warp_time, warp_time_rate, warp_time_phase, warp_way; /* ... times 1 + warp */
+    double edge;                                                    /* N m, rounds the corner of load friction */
+    double bend, bend_rate, bend_phase;                             /* level over speed: another curve, rad s/rad */
+    double mottle, mottle_cycles, mottle_phase;                     /* level over position, as on any machine */
     double block_weight[BLOCKS], block_reach[BLOCKS];               /* share of level, rad to break away */
 };
 
@@ -73,6 +78,7 @@ struct outputs {
 struct contact {
     double bristle, block[BLOCKS], age, load_block, lagged_speed, way;
     double force, viscous;  /* elastic-plastic torque; viscous coefficient now in force */
+    double clock;           /* s */
 };
 
 struct motion {
@@ -94,6 +100,20 @@ static double payload_torque(const struct mount *m, double q) {
     return m->payload != 0 ? m->payload * sin(q + m->payload_phase) : 0;
 }
 
+/* By what a concealed torque is more than its equation says, at this place, speed, time and direction. */
+static double warp(const struct mount *m, double q, double v, double clock) {
+    double more = m->warp_way * sign(v);
+    if (m->warp_place != 0) more += m->warp_place * sin(m->warp_place_cycles * q + m->warp_place_phase);
+    if (m->warp_speed != 0) more += m->warp_speed * (1 - 2 / (1 + fabs(v) / m->warp_speed_scale));
+    if (m->warp_time != 0) more += m->warp_time * sin(m->warp_time_rate * clock + m->warp_time_phase);
+    return more;
+}
+
+static double load_friction_of(const struct mount *m, double q) {
+    double load = payload_torque(m, q);
+    return m->load_sensitivity * (m->edge > 0 ? sqrt(load * load + m->edge * m->edge) - m->edge : fabs(load));
+}
+
 /* Sliding level at this speed, place, temperature, load and contact age. */
 static double sliding_level(const struct mount *m, const struct contact *c, double q, double v, double degrees) {
     double ratio = (m->friction_lag > 0 ? c->lagged_speed : fabs(v)) / m->stribeck_speed, level = m->coulomb;
@@ -102,6 +122,9 @@ static double sliding_level(const struct mount *m, const struct contact *c, doub
     else if (m->breakaway != m->coulomb && ratio < 40)
         level += (m->breakaway - m->coulomb) *
                  exp(-(m->stribeck_power == 1 ? ratio : m->stribeck_power == 2 ? ratio * ratio : pow(ratio, m->stribeck_power)));
+    if (m->bend != 0) level *= 1 + m->bend * sin(m->bend_rate * fabs(v) + m->bend_phase);
+    if (m->mottle != 0) level *= 1 + m->mottle * sin(m->mottle_cycles * q + m->mottle_phase);
+    double plain = level;
     level *= 1 + m->level_asymmetry * sign(v);
     if (m->rough_relative != 0) level *= 1 + m->rough_relative * sin(m->rough_cycles * q + m->rough_phase);
     if (m->spot_relative != 0) {
@@ -110,10 +133,11 @@ static double sliding_level(const struct mount *m, const struct contact *c, doub
     }
     if (m->thermal_level != 0) level *= exp(m->thermal_level * (degrees - 20));
     if (m->thermal_tilt != 0) level *= fmax(0.2, 1 + m->thermal_tilt * (degrees - 20) * (q - m->home));
-    if (m->load_sensitivity != 0) level += m->load_sensitivity * fabs(payload_torque(m, q));
+    if (m->load_sensitivity != 0) level += load_friction_of(m, q);
     if (m->dwell_torque != 0) level += m->dwell_torque * log1p(c->age / m->dwell_time);
     if (m->run_in != 0) level *= 1 + m->run_in * exp(-c->way / m->run_in_length);
-    return level;
+    double more = warp(m, q, v, c->clock);
+    return more == 0 ? level : plain + (level - plain) * (1 + more);
 }
 
 /* Advance the friction memory by the path `dq` travelled in `h` seconds under sliding level `level`. */
@@ -151,6 +175,7 @@ static void friction_step(const struct mount *m, struct contact *c, double q, do
     rub(m, c, dq, h, fmax(1e-9, wander * sliding_level(m, c, q, v, degrees)));
     if (m->friction_lag > 0) c->lagged_speed += -expm1(-h / m->friction_lag) * (fabs(v) - c->lagged_speed);
     c->way += fabs(dq);
+    c->clock += h;
     c->viscous = m->viscous * (1 + m->viscous_asymmetry * sign(v));
     if (m->viscous_swing != 0) c->viscous *= 1 + m->viscous_swing * sin(m->viscous_cycles * q + m->viscous_phase);
     if (m->thermal_viscous != 0) c->viscous *= exp(m->thermal_viscous * (degrees - 20));
@@ -172,7 +197,8 @@ static double extra_torque(const struct mount *m, const struct motion *s) {
     torque += m->remanence * s->magnet;
     if (m->shift != 0 && s->clock >= m->shift_time) torque += m->shift * sin(q + m->shift_phase);
     if (m->kick != 0) torque += m->kick * s->direction * exp(-s->since_reversal / m->kick_time);
-    return torque;
+    double more = warp(m, q, v, s->clock);
+    return more == 0 ? torque : m->offset + (torque - m->offset) * (1 + more);
 }
 
 /* Slow memories of the outside effects: magnet, reversal clock. */

@@ -26,6 +26,8 @@ _SCALARS = """
     controller ki speed_filter loop_every regular lorentz friction_lag run_in run_in_length
     viscous_swing viscous_cycles viscous_phase dead_band gain_swing gain_cycles gain_phase gain_fade
     shift shift_phase shift_time
+    warp_place warp_place_cycles warp_place_phase warp_speed warp_speed_scale warp_time warp_time_rate warp_time_phase
+    warp_way edge bend bend_rate bend_phase mottle mottle_cycles mottle_phase
 """  # the order of `struct mount`
 ROWS = ("block_weight", "block_reach")
 INPUTS = ("target", "target_speed", "target_acceleration", "push", "level", "noise", "ambient")

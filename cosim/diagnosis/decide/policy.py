@@ -15,6 +15,9 @@ class Policy:
     coarsening: float = 400.0
     """Independent rows of a band beyond which more say nothing new: there the model's own misfit, not noise, limits
     what may be concluded. Unit: rows. Miller and Dunson, J. Am. Stat. Assoc. 114 (2019) 1113."""
+    form_ways: float = 20.0
+    """In how many independent ways an equation may be wrong in a band: so much evidence counts between two names.
+    Unit: 1."""
     accuracy: float = 0.001
     """Least noise of a band relative to the torque in it: no model of friction is better. Unit: 1."""
     fast_hz: float = 8.0

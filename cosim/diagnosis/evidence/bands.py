@@ -39,6 +39,8 @@ class Bands:
     """Independent rows of each band, coarsened."""
     count: Array
     """Transformed rows of each band that weighted rows fill."""
+    of_forms: Array
+    """Independent ways of each band in which an equation may be wrong, see `Policy.form_ways`."""
 
     @classmethod
     def of(cls, prepared: Prepared, weight: Array, scale: Array, policy: Policy) -> "Bands":
@@ -61,8 +63,8 @@ class Bands:
         names, index = np.unique(owner[owner >= 0], return_inverse=True)
         owner[owner >= 0] = index
         count = np.bincount(index, minlength=len(names)) * float(np.mean(weight > 0))
-        effective = count / (1 + count / policy.coarsening)
-        parts = (np.asarray(one, float) for one in (weight / scale, effective, count))
+        effective, of_forms = (count / (1 + count / limit) for limit in (policy.coarsening, policy.form_ways))
+        parts = (np.asarray(one, float) for one in (weight / scale, effective, count, of_forms))
         return cls(tuple(slices), owner, np.concatenate(fast), *parts)
 
     def transform(self, columns: Array) -> Array:

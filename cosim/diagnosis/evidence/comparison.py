@@ -108,19 +108,24 @@ class Comparison:
         return self.bands.grams(self._nuisances)
 
     @cached_property
-    def _evidence(self) -> WeakKeyDictionary[Fit, dict[Aside, float]]:
+    def _evidence(self) -> WeakKeyDictionary[Fit, dict[tuple[Aside, bool], float]]:
         return WeakKeyDictionary()
 
-    def evidence(self, found: Fit, aside: Aside = NONE) -> float:
-        """Log marginal likelihood of a fitted structure, phases that each recording tells priced; computed once."""
-        known = self._evidence.setdefault(found, {})
-        if aside not in known:
-            known[aside] = self._marginal(found, aside).log_likelihood - self.policy.phase_price * found.phases
-        return known[aside]
+    def evidence(self, found: Fit, aside: Aside = NONE, of_forms: bool = False) -> float:
+        """Log marginal likelihood of a fitted structure, phases that each recording tells priced; computed once.
 
-    def _marginal(self, found: Fit, aside: Aside) -> Marginal:
+        `of_forms`: with the few ways of each band in which an equation may be wrong in place of its independent rows.
+        """
+        known = self._evidence.setdefault(found, {})
+        if (aside, of_forms) not in known:
+            likelihood = self._marginal(found, aside, of_forms).log_likelihood
+            known[aside, of_forms] = likelihood - self.policy.phase_price * found.phases
+        return known[aside, of_forms]
+
+    def _marginal(self, found: Fit, aside: Aside, of_forms: bool = False) -> Marginal:
         grams, groups = self._joined(found, self._own(found), aside)
-        return marginal(grams, self._free(found, grams), groups, self.bands.count, self.bands.effective, self.floor)
+        rows = self.bands.of_forms if of_forms else self.bands.effective
+        return marginal(grams, self._free(found, grams), groups, self.bands.count, rows, self.floor)
 
     def enter(self, effect: str, found: Fit, share: float) -> None:
         """Enter a structure into the ledger, looked at for one of its effects that removes this share of the energy."""

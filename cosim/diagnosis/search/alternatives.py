@@ -13,7 +13,7 @@ from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.search.instrumental_variable import misfits_of
 from cosim.diagnosis.search.proof import Proof, prove
 from cosim.diagnosis.search.rivals import AcceptedEffect, Examined, margins
-from cosim.diagnosis.search.stages import CandidateFit
+from cosim.diagnosis.search.stages import CandidateFit, contest
 
 
 def prove_sets(comparison: Comparison, examined: Examined, held: Predictive) -> tuple[Examined, Proof]:
@@ -50,6 +50,7 @@ def _in_place(comparison: Comparison, examined: Examined, out: AcceptedEffect, r
         out.without,
         others,
         {one.effect.id: out.margin(one) - out.margin(rival) for one in others},
+        {one.effect.id: contest(comparison, rival, one) for one in others},
         misfits_of(comparison.problem.prepared, mount, rival.effect),
     )
     effects = tuple(accepted if one is out else one for one in examined.effects)

@@ -15,6 +15,7 @@ from cosim.diagnosis.search.stages import (
     Stage,
     admission,
     best_of,
+    contest,
     is_full,
     is_small,
     margin,
@@ -38,7 +39,9 @@ class AcceptedEffect:
     rivals: tuple[CandidateFit, ...]
     """One of each kind, the closest first."""
     margins: Mapping[str, float]
-    """Nats by which this effect is better than each rival."""
+    """Nats by which this effect is better than each rival as a fit."""
+    contests: Mapping[str, float]
+    """Nats by which its name beats that of each rival, see `stages.contest`."""
     misfits: Misfits = field(default_factory=dict)
 
     @property
@@ -154,7 +157,8 @@ def _challenged(
     misfits = misfits_of(problem.prepared, chosen.mount, group[0])
     margins = {rival.effect.id: margin(comparison, own, rival) for rival in best.values()}
     ranked = sorted(best.values(), key=lambda rival: margins[rival.effect.id])
-    found = AcceptedEffect(group, own, beside.current, tuple(ranked), margins, misfits)
+    contests = {rival.effect.id: contest(comparison, own, rival) for rival in ranked}
+    found = AcceptedEffect(group, own, beside.current, tuple(ranked), margins, contests, misfits)
     _enter(comparison, found)
     return found
 
@@ -173,7 +177,7 @@ def _enter(comparison: Comparison, found: AcceptedEffect) -> None:
     comparison.judge(name, own.fit, [kept, *(_ahead(found, rival, policy) for rival in found.rivals)])
     for rival in found.rivals:
         comparison.enter(rival.effect.id, rival.fit, rival.plain_gain)
-        behind = found.margin(rival)
+        behind = found.contests[rival.effect.id]
         rule = Rule(
             f"less than the margin of a set behind {name}",
             behind < policy.set_margin,
@@ -185,7 +189,7 @@ def _enter(comparison: Comparison, found: AcceptedEffect) -> None:
 
 
 def _ahead(found: AcceptedEffect, rival: CandidateFit, policy: Policy) -> Rule:
-    return at_least(f"ahead of {rival.effect.id}", found.margin(rival), policy.set_margin, "nats")
+    return at_least(f"ahead of {rival.effect.id}", found.contests[rival.effect.id], policy.set_margin, "nats")
 
 
 def _names(found: Fit) -> tuple[str, ...]:
@@ -194,9 +198,9 @@ def _names(found: Fit) -> tuple[str, ...]:
 
 
 def margins(one: AcceptedEffect) -> dict[str, float]:
-    """Nats by which an effect is better than each rival; where the set point speaks of both, by that."""
+    """Nats by which a name beats that of each rival; where the set point speaks of both, by that."""
     told = {rival.effect.id: excludes(one.misfits, one.effect, rival.effect) for rival in one.rivals}
-    return {name: one.margins[name] if by is None else by / 2 for name, by in told.items()}
+    return {name: one.contests[name] if by is None else by / 2 for name, by in told.items()}
 
 
 def explains(one: AcceptedEffect) -> dict[str, float]:

@@ -259,6 +259,26 @@ def margin(comparison: Comparison, one: CandidateFit, other: CandidateFit) -> fl
     return comparison.evidence(one.fit, aside) - one.price - comparison.evidence(other.fit, aside) + other.price
 
 
+def contest(comparison: Comparison, one: CandidateFit, other: CandidateFit) -> float:
+    """Nats by which one name beats another, where neither equation is quite the machine's.
+
+        D = L(one) - L(other),    margin = sign(D) min(|D|, max(sign(D) D_K, 0))
+
+    D_K is D with K independent ways of each band in which an equation is wrong (`Policy.form_ways`): what an equation
+    misses is the same in every stroke, so rows say again and again what they said in the first one.
+
+    Reference: coarsened posterior, Miller and Dunson, J. Am. Stat. Assoc. 114 (2019) 1113.
+    """
+    aside = aside_for(one.effect.id, other.effect.id)
+    price = one.price - other.price
+    rows, forms = (
+        comparison.evidence(one.fit, aside, few) - comparison.evidence(other.fit, aside, few) - price
+        for few in (False, True)
+    )
+    way = 1.0 if rows >= 0 else -1.0
+    return way * min(abs(rows), max(way * forms, 0.0))
+
+
 def is_minor(one: CandidateFit, policy: Policy) -> bool:
     """Whether an effect explains little, and not surely, or what laws lack of any machine."""
     return is_small(one, policy) or is_common(one, policy)
