@@ -52,7 +52,8 @@ class Effect:
 
 def asked(monkeypatch: pytest.MonkeyPatch, at_bound: bool = False, **said: Any) -> None:
     monkeypatch.setattr(admissibility, "hypothesis_of", lambda effect: Hypothesis(**said))
-    monkeypatch.setattr(admissibility, "at_bound", lambda effect, sizes: at_bound)
+    monkeypatch.setattr(admissibility, "at_bound", lambda *_: at_bound)
+    monkeypatch.setattr(admissibility, "recorded_by", lambda pieces: None)
 
 
 def to_and_fro(*reach: float) -> Motion:

@@ -221,11 +221,15 @@ def _filled(part: Any, prefix: str, numbers: dict[str, float]) -> Any:
     return replace(part, **changes)
 
 
+def recorded_by(pieces: Sequence[Piece]) -> Recorded:
+    """What some pieces reach."""
+    top = max(float(np.abs(piece.v).max()) for piece in pieces)
+    return Recorded(top, float(np.quantile(np.abs(np.concatenate([piece.tau for piece in pieces])), 0.98)))
+
+
 def _edges(mount: Mount, variables: Sequence[Variable], pieces: Sequence[Piece]) -> tuple[Array, Array]:
     """Lowest and highest values of some parameters in a fit to these pieces, as their parts declare them."""
-    top = max(float(np.abs(piece.v).max()) for piece in pieces)
-    asked = float(np.quantile(np.abs(np.concatenate([piece.tau for piece in pieces])), 0.98))
-    parts, recorded = mount.components(), Recorded(top, asked)
+    parts, recorded = mount.components(), recorded_by(pieces)
     edges = []
     for variable in variables:
         prefix, _, name = variable.name.partition(".")

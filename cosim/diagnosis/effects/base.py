@@ -103,6 +103,8 @@ class Hypothesis(Generic[Form]):
     """The parameter by which what is concealed differs: cycles, a frequency, a width."""
     sizes: ClassVar[tuple[str, ...]] = ()
     """Parameters of which one must differ from none, where that is not the main number alone."""
+    may_end: ClassVar[tuple[str, ...]] = ()
+    """Parameters whose least value is a machine's too: a drive that gives nothing beyond its knee."""
     caveat: ClassVar[str] = ""
     """What must be said beside the evidence."""
 

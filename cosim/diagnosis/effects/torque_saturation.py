@@ -23,6 +23,7 @@ class Saturation(Hypothesis[TorqueSaturation]):
     forms = (TorqueSaturation,)
     tables = ("torque",)
     easiest: ClassVar[int] = -1
+    may_end: ClassVar[tuple[str, ...]] = ("slope",)
     rank: ClassVar[float] = 15
     needs_position: ClassVar[bool] = False
     view = "load"

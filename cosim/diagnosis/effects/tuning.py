@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -10,10 +11,12 @@ from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.priors import is_linear
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Effect
-from pyfmi_models.model import parameters_of
+from pyfmi_models.model import Recorded, parameters_of
 
 LEAST_GAIN = 0.01
 """A whole number of cycles is taken if the residual grows by less than this share, a free shape if it falls by more."""
+ANY = Recorded(inf, inf)
+"""Where no recording limits what a fit may find."""
 DEAD = 0.1
 """Share of the card's number below which a friction parameter is tried at the card's number again."""
 
@@ -68,12 +71,15 @@ def freed(problem: Problem, found: Fit, name: str) -> Fit:
     return problem.fit(found.mount, 30, (name,))
 
 
-def at_bound(effect: Effect, sizes: Sequence[str] = ()) -> bool:
-    """Whether a parameter of an effect is at an end of its range; of several `sizes` all that are not nothing.
+def at_bound(effect: Effect, sizes: Sequence[str] = (), recorded: Recorded = ANY, may_end: Sequence[str] = ()) -> bool:
+    """Whether a parameter of an effect is at an end of its range in a fit; of several `sizes` all that are not nothing.
 
-    A range from 0 on ends at nothing, which is no bound: there an effect is small.
+    A range from 0 on ends at nothing, which is no bound: there an effect is small. Nor is it one for `may_end`.
     """
-    variables = parameters_of(effect)
-    ends = {one.name: one.start >= one.high or (one.low < 0 and one.start <= one.low) for one in variables}
+    variables = [one for one in parameters_of(effect) if one.name not in may_end]
+    ends = {}
+    for one in variables:
+        low, high = effect.fit_bounds(one, recorded)
+        ends[one.name] = one.start >= high or (low != 0 and one.start <= low)
     own = [ends.pop(one.name) for one in variables if one.name in sizes and one.start]
     return any(ends.values()) or (bool(own) and all(own))

@@ -8,7 +8,7 @@ import numpy as np
 from cosim.diagnosis.answer.ledger import Rule, at_least
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.effects.tuning import at_bound
-from cosim.estimation.fit import Fit
+from cosim.estimation.fit import Fit, recorded_by
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Effect
@@ -47,7 +47,8 @@ def name_rules(problem: Problem, one: Fitted) -> Iterator[Rule]:
 def is_degenerate(problem: Problem, effect: Effect) -> bool:
     """Whether an effect is really something else, lies at a bound, or is what no card may hold."""
     own = hypothesis_of(effect)
-    if effect.broken_rule() or at_bound(effect, own.sizes):
+    recorded = recorded_by(problem.prepared.pieces)
+    if effect.broken_rule() or at_bound(effect, own.sizes, recorded, own.may_end):
         return True
     return own.is_degenerate(problem, effect)
 
