@@ -17,6 +17,7 @@ class Hypothesis:
     """What an effect declares, as a table."""
 
     sizes = ()
+    may_end = ()
 
     def __init__(
         self,

@@ -18,6 +18,10 @@ class Policy:
     form_ways: float = 20.0
     """In how many independent ways an equation may be wrong in a band: so much evidence counts between two names.
     Unit: 1."""
+    form: float = 0.1
+    """How far a machine is from the equation of a named effect, relative to its torque (half-normal): beside others an
+    effect must explain more than that. Unit: 1. Friction and loads of machines repeat their laws to 5 to 20 %
+    (Armstrong-Helouvry, Control of Machines with Friction, 1991)."""
     accuracy: float = 0.001
     """Least noise of a band relative to the torque in it: no model of friction is better. Unit: 1."""
     fast_hz: float = 8.0

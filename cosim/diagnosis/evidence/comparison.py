@@ -19,6 +19,7 @@ from cosim.diagnosis.effects import candidates, named
 from cosim.diagnosis.effects.candidates import Candidate, columns_of
 from cosim.diagnosis.evidence.bands import Bands, NoiseOverSpeed, noise_over_speed
 from cosim.diagnosis.evidence.discrepancy import Discrepancy, Shapes, discrepancy
+from cosim.diagnosis.evidence.forms import Forms, forms
 from cosim.diagnosis.evidence.marginal import Group, Marginal, marginal
 from cosim.diagnosis.evidence.structure import Structure, key_of, structure_of
 from cosim.estimation.blocks import Blocks
@@ -108,23 +109,44 @@ class Comparison:
         return self.bands.grams(self._nuisances)
 
     @cached_property
-    def _evidence(self) -> WeakKeyDictionary[Fit, dict[tuple[Aside, bool], float]]:
+    def _evidence(self) -> WeakKeyDictionary[Fit, dict[tuple[Aside, bool, Forms | None], float]]:
         return WeakKeyDictionary()
 
-    def evidence(self, found: Fit, aside: Aside = NONE, of_forms: bool = False) -> float:
+    @cached_property
+    def _forms(self) -> WeakKeyDictionary[Fit, Forms | None]:
+        return WeakKeyDictionary()
+
+    def evidence(self, found: Fit, aside: Aside = NONE, few: bool = False, beside: Fit | None = None) -> float:
         """Log marginal likelihood of a fitted structure, phases that each recording tells priced; computed once.
 
-        `of_forms`: with the few ways of each band in which an equation may be wrong in place of its independent rows.
+        Args:
+            found: the structure.
+            aside: nuisances that stand aside.
+            few: count the few ways of each band in which an equation may be wrong, not its independent rows.
+            beside: a structure whose effects may miss something of their machine's, see `forms.py`.
         """
-        known = self._evidence.setdefault(found, {})
-        if (aside, of_forms) not in known:
-            likelihood = self._marginal(found, aside, of_forms).log_likelihood
-            known[aside, of_forms] = likelihood - self.policy.phase_price * found.phases
-        return known[aside, of_forms]
+        known, missed = self._evidence.setdefault(found, {}), self.missed_by(beside)
+        if (aside, few, missed) not in known:
+            likelihood = self._marginal(found, aside, few, missed).log_likelihood
+            known[aside, few, missed] = likelihood - self.policy.phase_price * found.phases
+        return known[aside, few, missed]
 
-    def _marginal(self, found: Fit, aside: Aside, of_forms: bool = False) -> Marginal:
-        grams, groups = self._joined(found, self._own(found), aside)
-        rows = self.bands.of_forms if of_forms else self.bands.effective
+    def missed_by(self, beside: Fit | None) -> Forms | None:
+        """What the effects of a structure may miss; computed once."""
+        if beside is None:
+            return None
+        if beside not in self._forms:
+            self._forms[beside] = forms(beside, len(self.problem.mount.effects), self.problem.prepared)
+        return self._forms[beside]
+
+    def _marginal(self, found: Fit, aside: Aside, few: bool = False, missed: Forms | None = None) -> Marginal:
+        own = self._own(found)
+        grams, groups = self._joined(found, own, aside)
+        if missed:
+            first = grams.shape[1] - 1
+            grams = self._grown(grams, own, aside, self.bands.transform(missed.columns))
+            groups = [*groups, *(Group(first + np.array(one), self.policy.form) for one in missed.groups)]
+        rows = self.bands.of_forms if few else self.bands.effective
         return marginal(grams, self._free(found, grams), groups, self.bands.count, rows, self.floor)
 
     def enter(self, effect: str, found: Fit, share: float) -> None:

@@ -135,8 +135,12 @@ def refitted(comparison: Comparison, current: Fit, effect: Effect, many: int) ->
     problem = comparison.problem
     grown = replace(current.mount, effects=(*current.mount.effects, effect))
     found, aside = problem.fit(grown, 36), aside_for(effect.id)
-    before = comparison.evidence(current, aside)
-    found = hypothesis_of(effect).tuned(problem, found, effect, lambda fit: comparison.evidence(fit, aside) - before)
+    before = comparison.evidence(current, aside, beside=current)
+
+    def gain(fit: Fit) -> float:
+        return comparison.evidence(fit, aside, beside=current) - before
+
+    found = hypothesis_of(effect).tuned(problem, found, effect, gain)
     return weighed(comparison, found, current, many)
 
 
@@ -147,12 +151,13 @@ def weighed(
     effect = effect or found.mount.effects[-1]
     aside = aside_for(effect.id)
     price = log(max(many, 1)) + owed_to_base(comparison, found, current, aside)
-    gain = comparison.evidence(found, aside) - comparison.evidence(current, aside) - price
+    with_it, without = (comparison.evidence(one, aside, beside=current) for one in (found, current))
+    gain = with_it - without - price
     own, problem = hypothesis_of(effect), comparison.problem
     loud = comparison.above_noise(found, current) if own.must_stand_out else inf
-    left, without = (problem.weight * one.residual for one in (found, current))
-    away = away_from_turns(problem, left, without) if own.is_timing else 1.0
-    share = 1 - float(left @ left) / max(float(without @ without), 1e-300)
+    left, before = (problem.weight * one.residual for one in (found, current))
+    away = away_from_turns(problem, left, before) if own.is_timing else 1.0
+    share = 1 - float(left @ left) / max(float(before @ before), 1e-300)
     remembers = gets_memory(found.mount, current.mount)
     rest = removed_at_rest(problem.weight, found.residual, current.residual) if remembers else 1.0
     return CandidateFit(effect, found, gain, price, share, loud, away, rest)

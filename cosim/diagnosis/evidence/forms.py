@@ -1,0 +1,91 @@
+"""What the equations of named effects may miss, beside which a further effect must earn its name.
+
+    y = ... + sum_j f_j (sum_k u_jk phi_k),    u_jk ~ N(0, s_j^2 / K),    s_j half-normal(`Policy.form`)
+
+f_j is the torque of a named effect, phi_k the K lowest cosines over position, speed, time and recording, direction too
+for an effect of friction: a machine is 5 to 20 % off any equation, in its own slow way, and what is off repeats in
+every stroke and on every day, so that neither rows nor held-out recordings tell it from another effect. Forms of the
+others only, never of the effect that is weighed: that one stands by its word.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from math import pi, sqrt
+
+import numpy as np
+
+from cosim.diagnosis.effects import hypothesis_of
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.residuals import residuals
+from pyfmi_models.effects import Effect
+from pyfmi_models.mount import Mount
+
+WAVES = 2
+"""Cosines over each quantity: one that bends it, one that bends it twice; finer ones are effects of their own."""
+
+
+@dataclass(frozen=True, eq=False)
+class Forms:
+    """Columns (rows, n) in N m per unit of relative size, and which of them belong to one effect."""
+
+    columns: Array
+    groups: tuple[tuple[int, ...], ...]
+
+
+def forms(found: Fit, own: int, prepared: Prepared) -> Forms | None:
+    """The forms of the effects that a structure adds to its first `own` ones; None where it adds none."""
+    mount = found.mount
+    groups: dict[str, list[Effect]] = {}
+    for effect in mount.effects[own:]:
+        groups.setdefault(effect.id, []).append(effect)
+    if not groups:
+        return None
+    columns, placed, first = [], [], 0
+    with_all = np.concatenate(
+        [one[piece.kept] for one, piece in zip(residuals(prepared, mount), prepared.pieces, strict=True)]
+    )
+    for group in groups.values():
+        rest = tuple(one for one in mount.effects if not any(one is other for other in group))
+        torque = _left(prepared, replace(mount, effects=rest)) - with_all
+        shapes = np.column_stack([*_shapes(group[0], prepared)])
+        columns.append(torque[:, None] * shapes / sqrt(shapes.shape[1]))
+        placed.append(tuple(range(first, first + shapes.shape[1])))
+        first += shapes.shape[1]
+    return Forms(np.column_stack(columns), tuple(placed))
+
+
+def _left(prepared: Prepared, mount: Mount) -> Array:
+    """What a mount leaves at the kept rows."""
+    pieces = zip(residuals(prepared, mount), prepared.pieces, strict=True)
+    return np.concatenate([one[piece.kept] for one, piece in pieces])
+
+
+def _shapes(effect: Effect, prepared: Prepared) -> Iterator[Array]:
+    """The cosines of an effect, each of unit RMS or so at the kept rows."""
+    if prepared.has_position:
+        yield from _cosines(prepared.stacked("q"))
+    if not _is_load(effect):
+        yield from _cosines(np.abs(prepared.stacked("v")))
+    owner = prepared.recording_of
+    yield from _cosines(np.concatenate([_along(piece.t[piece.kept]) for piece in prepared.pieces]))
+    for number in range(1, int(owner.max()) + 1):
+        yield sqrt(2) * (owner == number)
+    if effect.place == "Friction":
+        yield np.sign(prepared.stacked("v"))
+
+
+def _is_load(effect: Effect) -> bool:
+    """Whether an effect is a torque of the position alone: how fast it is passed is nothing to it."""
+    return "position" in hypothesis_of(effect).tables
+
+
+def _along(t: Array) -> Array:
+    """Time of each row within its piece, from 0 to 1."""
+    return np.asarray((t - t[0]) / max(float(t[-1] - t[0]), 1e-9)) if len(t) else t
+
+
+def _cosines(x: Array) -> Iterator[Array]:
+    low, high = float(x.min()), float(x.max())
+    share = (x - low) / max(high - low, 1e-300)
+    yield from (sqrt(2) * np.cos(pi * k * share) for k in range(1, WAVES + 1))
