@@ -15,9 +15,9 @@ from pyfmi_models.effects import Effect
 from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.mount import Mount
 
-BESIDE = 1.0
-"""A cable whose home lies further beside the visited positions than this share of their range is an offset: of its
-energy its change over the range has less than about 1 - `TIE`."""
+BESIDE = 0.25
+"""A cable's home lies in the visited positions or beside them, by this share of their range at most: there it was
+wound. Further away it pulls one way all along, as a weight does that a slope stands beside. Unit: 1."""
 
 
 class Cable(Hypothesis[CableWrap]):
@@ -55,5 +55,5 @@ class Cable(Hypothesis[CableWrap]):
 
 
 def _beside(span: Span) -> tuple[float, float]:
-    """Positions visited, and as much again on either side."""
-    return float(span.q.min()) - span.reach, float(span.q.max()) + span.reach
+    """Positions where a home may be."""
+    return float(span.q.min()) - BESIDE * span.reach, float(span.q.max()) + BESIDE * span.reach
