@@ -138,7 +138,7 @@ class Hypothesis(Generic[Form]):
         return True
 
     def bends(self, effect: Form, mount: Mount, prepared: Prepared) -> float:
-        """By how much a fitted effect of friction is another curve than the law, relative to the level; 0 if unknown."""
+        """By how much a fitted effect of friction is another curve than the law, relative to the level."""
         return 0.0
 
     def shows(self, effect: Form, mount: Mount, prepared: Prepared) -> bool:

@@ -300,7 +300,7 @@ def is_small(one: CandidateFit, policy: Policy) -> bool:
 def is_common(one: CandidateFit, policy: Policy) -> bool:
     """Whether an effect is no more than what laws of friction lack of any machine: not sure, nor large."""
     common = hypothesis_of(one.effect).is_common_misfit
-    return common and one.evidence < policy.least_bent and one.bends < policy.form
+    return common and one.evidence < policy.least_bent and one.bends < policy.law_repeats
 
 
 def admission(comparison: Comparison, one: CandidateFit) -> Iterator[Rule]:
