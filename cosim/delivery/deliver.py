@@ -219,6 +219,7 @@ def _heldout(held: HeldOut) -> JsonObject:
         "cutoff_hz": held.cutoff_hz,
         "motion_hz": held.motion_hz,
         "unvetoed_rms": held.unvetoed_rms,
+        "possible_rms": held.possible_rms,
         "confidence_interval": list(held.confidence_interval),
         "clear_motion": held.sliding,
         "black_box_rms": held.black_box_rms,

@@ -27,7 +27,7 @@ from cosim.diagnosis.measure.regression import black_box_rms
 from cosim.diagnosis.measure.withheld import without_names
 from cosim.diagnosis.search.alternatives import prove_sets
 from cosim.diagnosis.search.bookkeeping import enter_answer, finished
-from cosim.diagnosis.search.delivered import standing
+from cosim.diagnosis.search.delivered import detected, standing, with_only
 from cosim.diagnosis.search.global_test import global_test
 from cosim.diagnosis.search.nameless import Nameless, nameless
 from cosim.diagnosis.search.proof import Proof
@@ -72,13 +72,18 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a diagnosis ends with: the comparison, what stands and what does not, what is left, what is decided."""
+    """What a diagnosis ends with: the comparison, what stands and what does not, what is left, what is decided.
+
+    Delivered is the base with what is detected; what is only possible is told.
+    """
 
     comparison: Comparison
     base: Fit
     held: Predictive
     found: Nameless
     scores: Scores
+    detected: frozenset[str] = frozenset()
+    delivered: Fit | None = None
 
     @property
     def decision(self) -> Decision:
@@ -92,8 +97,8 @@ class Answer:
 
     @property
     def chosen(self) -> Fit:
-        """The structure that is delivered."""
-        return self.proof.chosen
+        """The structure that is delivered; before that is known, all that stands."""
+        return self.delivered or self.proof.chosen
 
     def models(self, after: Mount | None = None) -> Structures:
         """The three models as cards hold them; the last is `after`, or what is delivered without a learned term."""
@@ -147,7 +152,7 @@ def diagnose(
     if any(one.blocks_naming for one in sanity):
         return _refused(refitted, without_names(problem, base.mount, train, heldout, sanity, started))
     on_progress("proving on the recording that was not fitted")
-    answer, tried = _learned(_answer(comparison, examined, heldout), heldout)
+    answer, tried = _delivered(_answer(comparison, examined, heldout), heldout)
     learned = tried if tried and tried.helps else None
     mounts = (learned.mount if learned else answer.chosen.mount, examined.chosen.mount, answer.chosen.mount)
     delivered, first, named = (_improved(card, limited(problem, one)[0]) for one in mounts)
@@ -193,9 +198,11 @@ def _with_search(described: Diagnosis, answer: Answer, examined: Examined, heldo
     """
     held, many = described.heldout, 2 ** len(examined.effects)
     interval = of_the_best(held.confidence_interval, held.before_rms - held.after_rms, many)
-    unvetoed = heldout_rms(heldout, examined.chosen.mount, Band(held.cutoff_hz, held.motion_hz))
+    band, whole = Band(held.cutoff_hz, held.motion_hz), answer.proof.chosen
+    unvetoed = heldout_rms(heldout, examined.chosen.mount, band)
+    possible = None if whole is answer.chosen else heldout_rms(heldout, whole.mount, band)
     tested = global_test(answer.comparison, examined.base).as_json()
-    held = replace(held, unvetoed_rms=unvetoed, confidence_interval=interval)
+    held = replace(held, unvetoed_rms=unvetoed, possible_rms=possible, confidence_interval=interval)
     return replace(described, global_test=tested, heldout=held)
 
 
@@ -224,7 +231,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
     found = _findings(answer, signals)
     bias = loop_bias(prepared, answer.chosen, problem.weight)
     rest = rest_rules(answer.scores.effects, answer.scores.rest, answer.comparison.policy)
-    enter_answer(answer.comparison, answer.chosen, found, tuple(rest), decision.is_unknown)
+    enter_answer(answer.comparison, answer.proof.chosen, found, tuple(rest), decision.is_unknown)
     return Diagnosis(
         verdict=_verdict(found, decision),
         findings=tuple(found),
@@ -241,7 +248,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         friction_law=proposed_law(problem, answer.chosen),
         loop_bias=bias.as_json() if bias else {},
         base_parameters=models.base_parameters(),
-        ledger=finished(answer.comparison, answer.held, answer.chosen),
+        ledger=finished(answer.comparison, answer.held, answer.proof.chosen),
         scores=answer.scores,
     )
 
@@ -263,6 +270,19 @@ def _with_learned(
         regions_after=regions(signals, True, problem.mount.motion == "linear"),
         base_parameters=models.base_parameters(),
     )
+
+
+def _delivered(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Learned | None]:
+    """The answer with what it delivers, and what is learned beside that; never worse held out than the base."""
+    answer, tried = _learned(answer, heldout)
+    names = detected(answer.comparison, answer.proof, answer.decision)
+    fit = with_only(answer.comparison, answer.proof, names)
+    models = Structures(answer.base.mount, answer.base.mount, fit.mount)
+    found = judge(heldout, models, answer.comparison.problem.prepared.band)
+    if found.after_rms > found.before_rms:
+        names, fit = frozenset(), answer.base
+    whole = replace(answer, detected=names, delivered=fit)
+    return (whole, tried) if fit is answer.proof.chosen else (whole, _learned(whole, heldout)[1])
 
 
 def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Learned | None]:
@@ -293,14 +313,17 @@ def _experiment(answer: Answer) -> Experiment | None:
 
 
 def _findings(answer: Answer, signals: Sequence[Trace]) -> list[Finding]:
-    comparison, decision, mount = answer.comparison, answer.decision, answer.chosen.mount
-    errors = standard_errors(answer.chosen, Blocks.of(comparison.problem.prepared), comparison.problem.weight)
+    comparison, decision, mount = answer.comparison, answer.decision, answer.proof.chosen.mount
+    blocks, weight = Blocks.of(comparison.problem.prepared), comparison.problem.weight
+    fits = {True: answer.chosen, False: answer.proof.chosen}
+    errors = {kept: standard_errors(fit, blocks, weight) for kept, fit in fits.items()}
     found, rivals = [], []
     for one in standing(comparison, answer.proof):
         name = one.effect.id
         shares, members, predicted = decision.probabilities[name], decision.sets[name], answer.proof.predicted[name]
-        one_found = accepted(one, mount, errors, signals, members, shares[name], predicted)
-        found.append(replace(one_found, answer="ambiguous") if name in decision.doubtful else one_found)
+        kept = name in answer.detected
+        own = fits[kept].mount, errors[kept], signals
+        found.append(accepted(one, *own, members, shares[name], predicted, kept))
         rivals += [rival_finding(r, shares[r.effect.id], mount) for r in one.rivals if r.effect.id in members]
     named = {finding.effect for finding in found}
     rivals = [finding for finding in rivals if finding.effect not in named]
@@ -308,7 +331,7 @@ def _findings(answer: Answer, signals: Sequence[Trace]) -> list[Finding]:
     lost += [taken_finding(one.own, term.name, mount) for one, term in answer.found.taken]
     named |= {finding.effect for finding in (*rivals, *lost)}
     largest = max((one.own.evidence for one in answer.proof.standing), default=0.0)
-    return [*found, *rivals, *lost, *not_found(comparison, answer.chosen, sorted(named), largest)]
+    return [*found, *rivals, *lost, *not_found(comparison, answer.proof.chosen, sorted(named), largest)]
 
 
 def _verdict(found: Sequence[Finding], decision: Decision) -> tuple[str, ...]:

@@ -117,6 +117,8 @@ class HeldOut:
     """Cutoff of the low-pass in front of these RMS values [Hz]."""
     unvetoed_rms: float | None = None
     """RMS with all effects that training alone proposed, before this recording's veto."""
+    possible_rms: float | None = None
+    """RMS with the effects that are only possible too, where there are some that stand; they are not delivered."""
     black_box_rms: float | None = None
     """RMS that the refitted base leaves with a smooth black box beside it, learnt on the training recordings."""
     position: dict[str, float] = field(default_factory=dict)

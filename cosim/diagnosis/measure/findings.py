@@ -6,13 +6,12 @@ from math import ceil, floor, log10
 
 import numpy as np
 
-from cosim.diagnosis.answer.result import Answer, Finding, Trace
-from cosim.diagnosis.decide.calibration import LIKELY
+from cosim.diagnosis.answer.result import Finding, Trace
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.measure.advice import advice
 from cosim.diagnosis.measure.locate import where
 from cosim.diagnosis.search.rivals import AcceptedEffect
-from cosim.diagnosis.search.sizes import Z95, Numbers, is_told, numbers_of
+from cosim.diagnosis.search.sizes import Z95, Numbers, numbers_of
 from cosim.diagnosis.search.stages import CandidateFit
 from pyfmi_models.effects import Effect
 from pyfmi_models.model import parameters_of
@@ -34,6 +33,7 @@ def accepted(
     members: Sequence[str],
     probability: float,
     predicted: float,
+    is_detected: bool,
 ) -> Finding:
     """Describe an effect that stands, with the further waves of a ripple; `members` are rivals that stay open."""
     alike = [effect for effect in mount.effects if effect.id == one.effect.id][-len(one.effects) :]
@@ -46,7 +46,7 @@ def accepted(
     return Finding(
         effect=effect.id,
         title=effect.title,
-        answer=answered(probability, members, is_told(effect, numbers, mount)),
+        answer="found" if is_detected else "ambiguous",
         probability=probability,
         gain=one.own.plain_gain,
         parameters=numbers.values,
@@ -66,11 +66,6 @@ def accepted(
         f"(evidence {one.own.evidence:.0f} nats; {predicted:.0f} nats on the held-out recordings){own.caveat}",
         visible_from=visible_from(effect, numbers),
     )
-
-
-def answered(probability: float, members: Sequence[str], is_told: bool) -> Answer:
-    """Found is what no rival of the set can be, is more likely there than not, and has a size that is told."""
-    return "found" if not members and probability >= LIKELY and is_told else "ambiguous"
 
 
 def _behind(one: AcceptedEffect, members: Sequence[str], far: bool) -> Iterator[str]:

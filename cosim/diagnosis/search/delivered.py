@@ -1,12 +1,36 @@
-"""What each effect is worth in the model that is delivered, where others were taken out of the one it was found in."""
+"""What is delivered: effects that are detected, and what each is worth where others were taken out."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
+from cosim.diagnosis.decide.calibration import LIKELY
+from cosim.diagnosis.decide.decision import Decision
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.search.proof import Proof
 from cosim.diagnosis.search.rivals import AcceptedEffect
+from cosim.diagnosis.search.sizes import tells
 from cosim.diagnosis.search.stages import weighed
+from cosim.estimation.fit import Fit
+
+
+def detected(comparison: Comparison, proof: Proof, decision: Decision) -> frozenset[str]:
+    """Effects that no rival can be, that are more likely there than not, and whose size is told."""
+    told = {one.effect.id: decision.probabilities[one.effect.id][one.effect.id] for one in proof.standing}
+    likely = {name for name, p in told.items() if p >= LIKELY and not decision.sets[name]}
+    sure = [one for one in proof.standing if one.effect.id in likely - {*decision.doubtful}]
+    return frozenset(
+        one.effect.id for one in sure if tells(comparison.problem, proof.chosen, one.within(proof.chosen.mount))
+    )
+
+
+def with_only(comparison: Comparison, proof: Proof, names: Collection[str]) -> Fit:
+    """The structure that stands with just some of its effects, refitted where others go."""
+    problem, chosen = comparison.problem, proof.chosen
+    own = len(problem.mount.effects)
+    kept = tuple(one for k, one in enumerate(chosen.mount.effects) if k < own or one.id in names)
+    if len(kept) == len(chosen.mount.effects):
+        return chosen
+    return problem.fit(replace(chosen.mount, effects=kept), 45)
 
 
 def standing(comparison: Comparison, proof: Proof) -> Sequence[AcceptedEffect]:
