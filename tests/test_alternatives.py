@@ -17,6 +17,7 @@ def all_are_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:
     """Effects that are only their names are never anything else in disguise, and their sizes are told."""
     monkeypatch.setattr("cosim.diagnosis.search.proof.is_degenerate", lambda *_: False)
     monkeypatch.setattr("cosim.diagnosis.search.proof.tells", lambda *_: True)
+    monkeypatch.setattr("cosim.diagnosis.search.alternatives.contest", lambda _, one, two: one.evidence - two.evidence)
 
 
 class Recorded(Tables):
@@ -34,7 +35,7 @@ def accepted(name: str, beside: str = "", **margins: float) -> AcceptedEffect:
     """An effect beside others, and by how many nats its rivals are behind it."""
     rivals = tuple(candidate(beside + one, 100.0 - by) for one, by in margins.items())
     without = structure("b" + beside, left=1.0)
-    return AcceptedEffect((Named(name),), candidate(beside + name, 100.0), without, rivals, margins)  # type: ignore[arg-type]
+    return AcceptedEffect((Named(name),), candidate(beside + name, 100.0), without, rivals, margins, margins)  # type: ignore[arg-type]
 
 
 def proven(nats: Mapping[str, float], *effects: AcceptedEffect) -> tuple[Examined, Proof, str]:

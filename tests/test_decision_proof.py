@@ -115,7 +115,7 @@ def proven(tables: Tables, names: str, removed: float = 0.5, evidence: float = 1
     for place, name in enumerate(names):
         own = Candidate(evidence - place, structure("b" + names, left=np.sqrt(1 - removed)), removed)
         without = structure("b" + names.replace(name, ""), left=1.0)
-        effects.append(AcceptedEffect((Named(name),), own, without, (), {}))  # type: ignore[arg-type]
+        effects.append(AcceptedEffect((Named(name),), own, without, (), {}, {}))  # type: ignore[arg-type]
     examined = Examined(structure("b", left=1.0), whole, tuple(reversed(effects)), None)  # type: ignore[arg-type]
     return prove(tables, examined, tables)  # type: ignore[arg-type]
 

@@ -109,6 +109,7 @@ def play(monkeypatch: pytest.MonkeyPatch) -> Play:
         monkeypatch.setattr(rivals, "stage", stage)
         monkeypatch.setattr(rivals, "weighed", weighed)
         monkeypatch.setattr(rivals, "margin", lambda _, own, other: own.evidence - other.evidence)
+        monkeypatch.setattr(rivals, "contest", lambda _, own, other: own.evidence - other.evidence)
         monkeypatch.setattr(rivals, "_is_admissible", lambda _, one: not one.effect.id.isupper())
         monkeypatch.setattr(rivals, "misfits_of", lambda *_: misfits or {})
         monkeypatch.setattr(rivals, "best_of", lambda _, beside, __: next(filter(adds, beside.tried), None))
@@ -187,7 +188,8 @@ def accepted(**more: Any) -> AcceptedEffect:
     told = {"effects": (Named("x"),), "own": Candidate(Named("x"), fitted("bx"), 50.0, 0.4), "without": fitted("b")}
     told |= {
         "rivals": (rival("r", 20.0), replace(rival("s", 10.0), plain_gain=-0.2)),
-        "margins": {"r": 30.0, "s": 40.0},
+        "margins": {"r": 90.0, "s": 90.0},
+        "contests": {"r": 30.0, "s": 40.0},
     }
     return AcceptedEffect(**(told | more))  # type: ignore[arg-type]
 

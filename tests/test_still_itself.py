@@ -9,6 +9,7 @@ import pytest
 from cosim.diagnosis.answer.ledger import all_pass
 from cosim.diagnosis.decide.decision import Gain
 from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.effects.tuning import ANY
 from cosim.diagnosis.search.proof import _validation
 from cosim.diagnosis.search.rivals import AcceptedEffect
 from pyfmi_models.effects import Cogging, Effect
@@ -30,12 +31,17 @@ def left(size: float, *effects: Effect) -> Any:
 
 def accepted(*effects: Effect) -> AcceptedEffect:
     own: Any = SimpleNamespace(fit=left(0.1, *effects), effect=effects[0], evidence=200.0, plain_gain=0.9)
-    return AcceptedEffect(effects, own, left(1.0), (), {})
+    return AcceptedEffect(effects, own, left(1.0), (), {}, {})
 
 
 @pytest.mark.parametrize(("damping", "stands"), [(0.1, True), (0.3, False)])
-def test_a_spring_that_is_refitted_to_spring_no_more_falls(damping: float, stands: bool) -> None:
-    one, problem = accepted(spring(0.1)), SimpleNamespace(weight=np.ones(4), mount=left(1.0).mount)
+def test_a_spring_that_is_refitted_to_spring_no_more_falls(
+    damping: float, stands: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("cosim.diagnosis.search.admissibility.recorded_by", lambda _: ANY)
+    prepared = SimpleNamespace(pieces=())
+    problem = SimpleNamespace(weight=np.ones(4), mount=left(1.0).mount, prepared=prepared)
+    one = accepted(spring(0.1))
     comparison: Any = SimpleNamespace(problem=problem, policy=POLICY)
     examined: Any = SimpleNamespace(effects=(one,), base=left(1.0))
     assert all_pass(_validation(comparison, examined, left(0.1, spring(damping)), one, SURE)) is stands

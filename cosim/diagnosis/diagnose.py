@@ -279,8 +279,7 @@ def _delivered(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Le
     fit = with_only(answer.comparison, answer.proof, names)
     models = Structures(answer.base.mount, answer.base.mount, fit.mount)
     found = judge(heldout, models, answer.comparison.problem.prepared.band)
-    if found.after_rms > found.before_rms:
-        names, fit = frozenset(), answer.base
+    fit = answer.base if found.after_rms > found.before_rms else fit
     whole = replace(answer, detected=names, delivered=fit)
     return (whole, tried) if fit is answer.proof.chosen else (whole, _learned(whole, heldout)[1])
 
@@ -315,15 +314,15 @@ def _experiment(answer: Answer) -> Experiment | None:
 def _findings(answer: Answer, signals: Sequence[Trace]) -> list[Finding]:
     comparison, decision, mount = answer.comparison, answer.decision, answer.proof.chosen.mount
     blocks, weight = Blocks.of(comparison.problem.prepared), comparison.problem.weight
-    fits = {True: answer.chosen, False: answer.proof.chosen}
-    errors = {kept: standard_errors(fit, blocks, weight) for kept, fit in fits.items()}
+    fits = [answer.chosen, answer.proof.chosen]
+    errors = [standard_errors(fit, blocks, weight) for fit in fits]
     found, rivals = [], []
     for one in standing(comparison, answer.proof):
         name = one.effect.id
         shares, members, predicted = decision.probabilities[name], decision.sets[name], answer.proof.predicted[name]
-        kept = name in answer.detected
-        own = fits[kept].mount, errors[kept], signals
-        found.append(accepted(one, *own, members, shares[name], predicted, kept))
+        which = 0 if any(effect.id == name for effect in fits[0].mount.effects) else 1
+        own = fits[which].mount, errors[which], signals
+        found.append(accepted(one, *own, members, shares[name], predicted, name in answer.detected))
         rivals += [rival_finding(r, shares[r.effect.id], mount) for r in one.rivals if r.effect.id in members]
     named = {finding.effect for finding in found}
     rivals = [finding for finding in rivals if finding.effect not in named]
