@@ -128,7 +128,8 @@ def diagnosis(kind: str = "two", motion: Any = "rotary", mount: str = "C1 rotary
     findings = {"two": FOUND + RIVALS + REST, "none": REST[:2] + REST[3:], "unknown": REST}[kind]
     return Diagnosis(
         verdict={"two": ("cogging", "friction_asymmetry"), "none": (), "unknown": ("unknown",)}[kind],
-        findings=findings, traces=traces, parts=parts(traces), mount=mount, motion=motion,
+        findings=findings, delivered=tuple(one.effect for one in findings if one.where),
+        traces=traces, parts=parts(traces), mount=mount, motion=motion,
         heldout=HeldOut(
             name="run3", nominal_rms=0.52, before_rms=rms[0], after_rms=rms[1], floor_rms=FLOOR,
             confidence_interval=(0.15, 0.22) if kind == "two" else (-0.01, 0.01),

@@ -6,7 +6,6 @@ import pytest
 from report_example import FOUND, REST, RIVALS, diagnosis
 
 from cosim.diagnosis.answer.result import Diagnosis, Finding
-from cosim.diagnosis.measure.findings import answered
 from cosim.report import lead, words
 from cosim.report.quantities import Scales
 from cosim.report.terminal import summary
@@ -19,26 +18,12 @@ MAYBE = replace(FOUND[1], effect="cable_wrap", title="Cable wrap", answer="ambig
 def of(*findings: Finding, unknown: bool = False) -> Diagnosis:
     named = tuple(finding.effect for finding in findings if finding.answer in ("found", "ambiguous"))
     verdict = (*named, "unknown") if unknown else named
-    return replace(diagnosis("two"), findings=(*findings, *REST), verdict=verdict)
+    held = tuple(finding.effect for finding in findings if finding.where)
+    return replace(diagnosis("two"), findings=(*findings, *REST), verdict=verdict, delivered=held)
 
 
 def said(whole: Diagnosis) -> str:
     return " ".join(lead.lead(whole, Scales.of(whole)))
-
-
-@pytest.mark.parametrize(
-    ("probability", "members", "is_told", "answer"),
-    [
-        (0.50, (), True, "found"),
-        (0.49, (), True, "ambiguous"),
-        (0.97, ("backlash",), True, "ambiguous"),
-        (0.97, (), False, "ambiguous"),
-    ],
-)
-def test_found_is_what_is_alone_more_likely_than_not_and_of_a_size_that_is_told(
-    probability: float, members: tuple[str, ...], is_told: bool, answer: str
-) -> None:
-    assert answered(probability, members, is_told) == answer
 
 
 @pytest.mark.parametrize(

@@ -199,10 +199,11 @@ def test_the_overview_draws_only_what_has_a_size() -> None:
 
 
 def held(first: Finding, *others: Finding) -> Diagnosis:
-    """Two possible causes, the first of which is in the delivered model."""
+    """Two possible causes, the first of which was asked for in the delivered model."""
     first = replace(first, where=Where(axis="position", description="everywhere"))
     improved = {"card": "card.toml", "fmu": "axis_improved.fmu"}
-    return replace(diagnosis("two"), verdict=(first.effect,), findings=(first, *others, *REST), improved=improved)
+    told = {"verdict": (first.effect,), "delivered": (first.effect,), "improved": improved}
+    return replace(diagnosis("two"), findings=(first, *others, *REST), **told)
 
 
 def test_the_first_of_several_possible_causes_is_said_to_be_in_the_model() -> None:

@@ -126,6 +126,7 @@ def diagnose(
     fmu: str | Path | None = None,
     variables: Mapping[str, str] | None = None,
     quick: bool = False,
+    with_possible: bool = False,
     force: bool = False,
     on_progress: Callable[[str], None] = lambda text: None,
     on_answer: Callable[[Diagnosis], None] = lambda found: None,
@@ -149,6 +150,7 @@ def diagnose(
         fmu: anyone's plant FMU as the base; the card then says roughly what it is.
         variables: our name to the FMU's, where they differ: {"tau": "Motor.torque"}.
         quick: write diagnosis.json and card.toml alone, and close no loop.
+        with_possible: let the card hold effects that are only possible too; else it holds those that are detected.
         force: overwrite what is there.
         on_progress: told in a line what is being done, the stage of how many, and about how long it takes still.
         on_answer: told the answer as soon as it stands, before FMUs and report are made from it.
@@ -168,6 +170,7 @@ def diagnose(
         check_directory(folder)
     on_progress = Staged(on_progress, stages_of(card is not None, folder is not None and not quick))
     given = _read(train, heldout, card, Written(columns, units, layout), motion, on_progress)
+    given = replace(given, with_possible=with_possible)
     if fmu is not None:
         given = _beside(_black_box(fmu, variables or {}), given, on_progress)
     before = _written(folder) if folder and force else {}
@@ -210,6 +213,7 @@ class _Given:
     base: str = ""
     notes: tuple[str, ...] = ()
     """What was chosen where less was given."""
+    with_possible: bool = False
 
 
 class _Listeners(NamedTuple):
@@ -246,12 +250,20 @@ def _beside(box: BlackBox, given: _Given, on_progress: Callable[[str], None]) ->
     """Put the card that is most like an FMU in its place."""
     base = as_base(box, given.train, given.heldout, given.card, on_progress)
     correction = Correction(box, base.card, *motion_of(given.train[0]))
-    return _Given(base.train, base.heldout, base.card, correction.deliver, box.told, given.notes)
+    return replace(
+        given,
+        train=base.train,
+        heldout=base.heldout,
+        card=base.card,
+        more=correction.deliver,
+        base=box.told,
+    )
 
 
 def _found(given: _Given, out: Path | None, command: str, listeners: _Listeners) -> DiagnosisResult:
     """Diagnose, and write the answer and the card where there is a folder."""
-    outcome = _noted(find(given.train, given.heldout, given.card, listeners.on_progress), given.notes)
+    found = find(given.train, given.heldout, given.card, listeners.on_progress, with_possible=given.with_possible)
+    outcome = _noted(found, given.notes)
     listeners.on_answer(outcome.diagnosis)
     done = without_files(outcome.diagnosis)
     if out:
@@ -265,7 +277,8 @@ def _delivered(given: _Given, out: Path | None, command: str, listeners: _Listen
     train, heldout, card = given.train, given.heldout, given.card
     with Loops(card, heldout) as loops, side_by_side(listeners.on_progress) as refits:
         loops.close("nominal", card.plant())
-        outcome = _noted(find(train, heldout, card, listeners.on_progress, loops.close, refits), given.notes)
+        found = find(train, heldout, card, listeners.on_progress, loops.close, refits, given.with_possible)
+        outcome = _noted(found, given.notes)
         listeners.on_answer(outcome.diagnosis)
         done = deliver(
             outcome, train, heldout, card, out, command, loops, listeners.on_progress, given.more, given.base

@@ -50,6 +50,9 @@ def diagnose(
     as_json: Annotated[bool, typer.Option("--json", help="Print diagnosis.json instead of the summary.")] = False,
     check: Annotated[bool, typer.Option("--check", help="Exit with 1 if something is missing.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="The answer and the card alone: no FMU, no report.")] = False,
+    with_possible: Annotated[
+        bool, typer.Option("--with-possible", help="The card holds effects that are only possible too.")
+    ] = False,
     propose: Annotated[
         Path | None,
         typer.Option("--propose", help="Folder for the formula of what has no name, as an effect to review."),
@@ -62,7 +65,7 @@ def diagnose(
     """Say which physics a card lacks, and prove it on a recording that was never fitted."""
     out = out or default_out(Path(train[0]).stem)
     shared: dict[str, object] = {"--motion": motion, "--columns": columns, "--units": units, "--layout": layout}
-    shared |= {"--fmu": fmu, "--variables": variables, "--quick": quick}
+    shared |= {"--fmu": fmu, "--variables": variables, "--quick": quick, "--with-possible": with_possible}
     if len(train) == 1 and train[0].is_dir() and (machines := _machines(train[0], heldout, propose)):
         _all(machines, Together(out, card, command_of("", [], shared), workers, force, as_json, check))
         return
@@ -109,6 +112,7 @@ def _found(one: One, variables: list[str] | None) -> "DiagnosisResult":
             fmu=fmu,
             variables=pairs_of("--variables", variables),
             quick=quick,
+            with_possible=bool(one.options["--with-possible"]),
             force=one.force,
             command=command_of("diagnose", one.train, given),
             on_progress=progress.tell,

@@ -141,6 +141,7 @@ def as_json(found: Diagnosis) -> JsonObject:
         "verdict": list(found.verdict),
         "effects": [_effect(finding) for finding in found.findings],
         "friction_law": found.friction_law,
+        "delivered": list(found.delivered),
         "ambiguous_with": [list(group) for group in found.ambiguous_with],
         "next_experiment": found.next_experiment,
         "heldout": _heldout(held),

@@ -114,6 +114,7 @@ def diagnose(
     on_progress: OnProgress = lambda _: None,
     on_model_ready: Callable[[str, Mount], None] = lambda *_: None,
     refits: InTurn | None = None,
+    with_possible: bool = False,
 ) -> Outcome:
     """Find what physics a card lacks.
 
@@ -127,6 +128,7 @@ def diagnose(
         on_model_ready: told the refitted base ("before") and the model it ends with ("after") as soon as they stand, so
             that something can be done with them meanwhile.
         refits: what refits structures (default: one after the other); the answer is the same.
+        with_possible: whether the card holds effects that stand but are only possible too.
 
     Raises:
         InputError: the card holds an effect that a diagnosis cannot take into account yet.
@@ -152,7 +154,7 @@ def diagnose(
     if any(one.blocks_naming for one in sanity):
         return _refused(refitted, without_names(problem, base.mount, train, heldout, sanity, started))
     on_progress("proving on the recording that was not fitted")
-    answer, tried = _delivered(_answer(comparison, examined, heldout), heldout)
+    answer, tried = _delivered(_answer(comparison, examined, heldout), heldout, with_possible)
     learned = tried if tried and tried.helps else None
     mounts = (learned.mount if learned else answer.chosen.mount, examined.chosen.mount, answer.chosen.mount)
     delivered, first, named = (_improved(card, limited(problem, one)[0]) for one in mounts)
@@ -242,6 +244,9 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         regions_after=regions(signals, True, linear),
         mount=card.mount.name,
         motion=problem.mount.motion,
+        delivered=tuple(
+            dict.fromkeys(effect.id for effect in answer.chosen.mount.effects[len(problem.mount.effects) :])
+        ),
         ambiguous_with=tuple((name, *members) for name, members in decision.sets.items() if members),
         depends_on=decision.depends_on,
         data_quality=(*card.remarks(), *(n for one in (*train, *heldout) for n in quality(one, prepared.cutoff))),
@@ -272,11 +277,12 @@ def _with_learned(
     )
 
 
-def _delivered(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Learned | None]:
+def _delivered(answer: Answer, heldout: Sequence[Recording], with_possible: bool) -> tuple[Answer, Learned | None]:
     """The answer with what it delivers, and what is learned beside that; never worse held out than the base."""
     answer, tried = _learned(answer, heldout)
     names = detected(answer.comparison, answer.proof, answer.decision)
-    fit = with_only(answer.comparison, answer.proof, names)
+    every = {one.effect.id for one in answer.proof.standing}
+    fit = with_only(answer.comparison, answer.proof, every if with_possible else names)
     models = Structures(answer.base.mount, answer.base.mount, fit.mount)
     found = judge(heldout, models, answer.comparison.problem.prepared.band)
     fit = answer.base if found.after_rms > found.before_rms else fit

@@ -94,8 +94,10 @@ def _found(diagnosis: Diagnosis, scales: Scales) -> list[str]:
 
 def _rival(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     held, unit = diagnosis.heldout, scales.torque
-    before, after, noise = (unit.number(value) for value in (held.before_rms, held.after_rms, held.floor_rms))
-    error = f"On unseen runs the error is {joined(before, unit.unit)}, with the likeliest cause {after}, noise {noise}."
+    before, noise = (unit.number(value) for value in (held.before_rms, held.floor_rms))
+    likeliest = unit.number(held.after_rms if held.possible_rms is None else held.possible_rms)
+    would = "with the likeliest cause" if held.possible_rms is None else "with the likeliest cause it would be"
+    error = f"On unseen runs the error is {joined(before, unit.unit)}, {would} {likeliest}, noise {noise}."
     return [_either(diagnosis, "The error"), error, _written(diagnosis)]
 
 

@@ -176,7 +176,8 @@ def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     added = len({finding.effect for finding in diagnosis.in_model})
     improved = f" → {after} (with the effect{'s' if added > 1 else ''})" if added else ""
     improved = f" → {after} (with what was learned)" if diagnosis.learned else improved
-    text = f"Validation RMS error [{unit.unit}]: {before} (refitted card){improved}; noise floor {noise}"
+    possible = f"; {unit.number(held.possible_rms)} with what is only possible" if held.possible_rms is not None else ""
+    text = f"Validation RMS error [{unit.unit}]: {before} (refitted card){improved}{possible}; noise floor {noise}"
     return _wrapped(text, 0)
 
 

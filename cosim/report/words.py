@@ -27,12 +27,14 @@ MEANINGS = (
     (
         "ambiguous",
         "Possible",
-        "The error on unseen runs falls, but its probability is below 0.5 or its size is not determined.",
+        "The error on unseen runs falls, but its probability is below 0.5 or its size is not determined. The improved "
+        "model does not hold it, unless you ask with --with-possible.",
     ),
     (
         "ambiguous",
         "Two possible causes",
-        "The rivals are too close to separate. The improved model holds the one named first, which is the likelier.",
+        "The rivals are too close to separate. The improved model holds none of them, unless you ask for the likelier "
+        "with --with-possible.",
     ),
     (
         "not_proven",

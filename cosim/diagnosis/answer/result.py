@@ -193,6 +193,8 @@ class Diagnosis:
     regions_after: tuple[Region, ...]
     mount: str
     motion: Literal["rotary", "linear"]
+    delivered: tuple[str, ...] = ()
+    """Effects that the delivered card holds beside its base."""
     ambiguous_with: tuple[tuple[str, ...], ...] = ()
     next_experiment: NextExperiment = field(default_factory=NextExperiment)
     depends_on: tuple[str, ...] = ()
@@ -224,8 +226,8 @@ class Diagnosis:
 
     @property
     def in_model(self) -> tuple[Finding, ...]:
-        """Effects that the delivered model holds: those found, and the first member of each set."""
-        return tuple(one for one in self.findings if one.answer in ("found", "ambiguous") and one.where is not None)
+        """Effects that the delivered model holds: those detected, or what was asked for."""
+        return tuple(one for one in self.findings if one.effect in self.delivered)
 
     @property
     def adds_physics(self) -> bool:

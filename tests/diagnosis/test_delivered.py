@@ -1,0 +1,64 @@
+"""What counts as detected, and what the delivered structure holds."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from cosim.diagnosis.decide.decision import Decision
+from cosim.diagnosis.search import delivered
+from pyfmi_models.effects import Cogging, Delay, TorqueOffset
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+BARE = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=1.0), effects=(Delay(delay_ms=1.0),))
+ADDED = (
+    TorqueOffset(torque=1.0),
+    Cogging(amplitude=0.1, cycles_per_rev=8.0),
+    Cogging(amplitude=0.1, cycles_per_rev=16.0),
+)
+
+
+class Problem:
+    mount = BARE
+
+    def fit(self, mount: Mount, _: int) -> Any:
+        return SimpleNamespace(mount=mount)
+
+
+@pytest.mark.parametrize(
+    ("probability", "members", "doubtful", "is_told", "found"),
+    [
+        (0.5, (), (), True, True),
+        (0.49, (), (), True, False),
+        (0.9, ("cable_wrap",), (), True, False),
+        (0.9, (), ("torque_offset",), True, False),
+        (0.9, (), (), False, False),
+    ],
+)
+def test_detected_is_what_is_alone_more_likely_than_not_and_of_a_size_that_is_told(
+    probability: float,
+    members: tuple[str, ...],
+    doubtful: tuple[str, ...],
+    is_told: bool,
+    found: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(delivered, "tells", lambda *_: is_told)
+    name = "torque_offset"
+    decision = Decision({name: members}, {name: {name: probability}}, bool(doubtful), (), doubtful)
+    one = SimpleNamespace(effect=ADDED[0], within=lambda mount: ADDED[0])
+    proof: Any = SimpleNamespace(standing=(one,), chosen=SimpleNamespace(mount=BARE))
+    comparison: Any = SimpleNamespace(problem=Problem())
+    assert delivered.detected(comparison, proof, decision) == ({name} if found else set())
+
+
+def test_what_is_not_detected_leaves_the_structure_and_the_cards_own_effects_stay() -> None:
+    whole = SimpleNamespace(mount=replace(BARE, effects=(*BARE.effects, *ADDED)))
+    comparison: Any = SimpleNamespace(problem=Problem())
+    proof: Any = SimpleNamespace(chosen=whole)
+    assert delivered.with_only(comparison, proof, {"torque_offset", "cogging"}) is whole, "nothing is fitted again"
+    kept = delivered.with_only(comparison, proof, {"cogging"}).mount.effects
+    assert kept == (*BARE.effects, *ADDED[1:]), "a ripple with all its waves"
+    assert delivered.with_only(comparison, proof, ()).mount.effects == BARE.effects
