@@ -176,6 +176,7 @@ def _effect(finding: Finding) -> JsonObject:
         "visible_from": finding.visible_from,
         "bound": _bound(finding),
         "ruled_out": list(finding.ruled_out),
+        "rival": finding.rival,
         "less_likely": list(finding.less_likely),
         "action": finding.action,
         "parameters": {**finding.parameters, **({"harmonics": [*finding.harmonics]} if finding.harmonics else {})},

@@ -15,7 +15,7 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.band import in_band
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
-from cosim.diagnosis.measure.absent import not_found
+from cosim.diagnosis.measure.absent import not_found, undecided
 from cosim.diagnosis.measure.breakdown import parts
 from cosim.diagnosis.measure.experiment import Experiment, best, told
 from cosim.diagnosis.measure.findings import accepted, rival_finding, taken_finding
@@ -336,7 +336,9 @@ def _findings(answer: Answer, signals: Sequence[Trace]) -> list[Finding]:
     lost += [taken_finding(one.own, term.name, mount) for one, term in answer.found.taken]
     named |= {finding.effect for finding in (*rivals, *lost)}
     largest = max((one.own.evidence for one in answer.proof.standing), default=0.0)
-    return [*found, *rivals, *lost, *not_found(comparison, answer.proof.chosen, sorted(named), largest)]
+    absent = not_found(comparison, answer.proof.chosen, sorted(named), largest)
+    absent = [undecided(one, answer.proof.standing, comparison.policy) for one in absent]
+    return [*found, *rivals, *lost, *absent]
 
 
 def _verdict(found: Sequence[Finding], decision: Decision) -> tuple[str, ...]:

@@ -35,7 +35,7 @@ def _from(finding: Finding, least: str) -> str:
     """Say from which size an effect shows; where its own number is no size, from which torque."""
     if finding.answer in ("found", "ambiguous", "not_proven"):
         return shows_from(finding)
-    if finding.answer != "not_testable":
+    if finding.answer == "not_seen":
         return limit(finding) or f"a torque of {least}" * bool(least)
     return "; ".join(text.rstrip(".") for text in (finding.evidence, finding.action) if text)
 
@@ -47,7 +47,7 @@ def limits(diagnosis: Diagnosis, scales: Scales) -> Table:
     """
     least = unseen_torque(diagnosis, scales)
     groups: dict[tuple[str, str], list[Finding]] = {}
-    for answer in ("not_seen", "not_testable"):
+    for answer in ("not_seen", "not_decided", "not_testable"):
         for finding in (one for one in diagnosis.findings if one.answer == answer):
             groups.setdefault((answer, _from(finding, least)), []).append(finding)
     rows = [(_titles(group), ANSWERS[answer], said) for (answer, said), group in groups.items()]
@@ -169,7 +169,12 @@ def files(diagnosis: Diagnosis) -> Table:
 def unseen(diagnosis: Diagnosis) -> str:
     """Return the one line on what was not seen and what these recordings cannot show."""
     said = []
-    for answer, start in (("not_seen", "Not detected"), ("not_testable", "Not testable with these recordings")):
+    starts = {
+        "not_seen": "Not detected",
+        "not_decided": "Not decided",
+        "not_testable": "Not testable with these recordings",
+    }
+    for answer, start in starts.items():
         names = [lowered(finding.title) for finding in diagnosis.findings if finding.answer == answer]
         rest = f" and {len(names) - 5} more" if len(names) > 6 else ""
         if names:

@@ -164,7 +164,8 @@ def proposed(diagnosis: Diagnosis, files: Sequence[Path]) -> str:
 def _rest(diagnosis: Diagnosis) -> list[str]:
     """Return how many other effects were not detected, how many could not be tested, and where their limits are."""
     answers = [one.answer for one in diagnosis.findings]
-    counts = (answers.count("not_seen"), "not detected"), (answers.count("not_testable"), "not testable here")
+    told = {"not_seen": "not detected", "not_decided": "not decided", "not_testable": "not testable here"}
+    counts = [(sum(one == answer for one in answers), words) for answer, words in told.items()]
     said = [f"{number} {words}" for number, words in counts if number]
     where_ = REPORT if REPORT in diagnosis.files else "diagnosis.json"
     return _wrapped(f"Other effects: {', '.join(said)}; upper limits and reasons in {where_}", 2) if said else []

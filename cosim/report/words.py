@@ -14,10 +14,13 @@ ANSWERS = {
     "found": "Detected",
     "ambiguous": "Possible",
     "not_proven": "Not confirmed",
+    "not_decided": "Not decided",
     "not_seen": "Not detected",
     "not_testable": "Not testable",
     "unknown": "Unknown",
 }
+ABSENT = ("not_decided", "not_seen", "not_testable")
+"""Answers about effects of which nothing is shown."""
 MEANINGS = (
     (
         "found",
@@ -41,6 +44,7 @@ MEANINGS = (
         "Not confirmed",
         "It fits better, but not on runs the fit never saw, or something without a name fits better still.",
     ),
+    ("not_decided", "Not decided", "Another effect stands in its place and explains more."),
     ("not_seen", "Not detected", "It would have been detected from the size given (upper limit)."),
     ("not_testable", "Not testable", "The recordings lack the condition given; it says how to record it."),
     ("unknown", "Unknown", "Error above the noise that no known effect lowers."),
@@ -107,7 +111,7 @@ def blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     grouped: list[Block] = []
     taken: set[str] = set()
     for finding in diagnosis.findings:
-        if finding.answer in ("not_seen", "not_testable") or finding.effect in taken:
+        if finding.answer in ABSENT or finding.effect in taken:
             continue
         rivals = (finding,) if finding.answer != "ambiguous" else _rivals(finding, diagnosis)
         taken |= {rival.effect for rival in rivals}

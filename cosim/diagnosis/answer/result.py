@@ -27,7 +27,7 @@ from cosim.estimation.not_determined import NotDetermined
 from pyfmi_models.effects import CATALOGUE, Effect
 
 Array = npt.NDArray[np.float64]
-Answer = Literal["found", "ambiguous", "not_proven", "not_seen", "not_testable"]
+Answer = Literal["found", "ambiguous", "not_proven", "not_decided", "not_seen", "not_testable"]
 POLICY_VERSION = "2"
 """Of the constants by which is decided; it is raised when one of them changes."""
 POLICY = f"evidence {POLICY_VERSION}"
@@ -91,6 +91,8 @@ class Finding:
     less_likely: tuple[str, ...] = ()
     """... and those that the evidence is against, but that remove nearly as much."""
     told_apart_by: str = ""
+    rival: str = ""
+    """Of an effect that is not decided: the one that stands in its place."""
     action: str = ""
     evidence: str = ""
     visible_from: float | None = None

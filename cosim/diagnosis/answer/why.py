@@ -13,6 +13,7 @@ WORDS = {
     "found": "detected",
     "ambiguous": "possible",
     "not_proven": "not confirmed by held-out recordings",
+    "not_decided": "not decided",
     "not_seen": "not detected",
     "not_testable": "not testable",
 }
@@ -110,7 +111,7 @@ def delivered_of(trials: Sequence[Trial]) -> tuple[str, ...]:
 def _reason(entry: Mapping[str, Any], one: Trial | None) -> str:
     answer = entry["answer"]
     word, refused = WORDS.get(answer, answer), one.refused_by if one else None
-    if answer == "not_testable":
+    if answer in ("not_decided", "not_testable"):
         return f"{word}: {(entry.get('bound') or {}).get('reason') or 'these recordings do not excite it'}."
     if one is None:
         return f"{word}: not fitted, as no linear step towards it has evidence."

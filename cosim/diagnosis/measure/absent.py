@@ -1,13 +1,16 @@
 """Findings of effects that are not named: not seen from which size, for what, or why that cannot be tested."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from cosim.diagnosis.answer.result import Bound, Finding
+from cosim.diagnosis.decide.policy import Policy
 from cosim.diagnosis.effects import TRIED, hypothesis_of, named
-from cosim.diagnosis.effects.base import NOT_DETERMINED, Seen
+from cosim.diagnosis.effects.base import NOT_DETERMINED, UNSEEN, Seen
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.measure.bounds import SeenFrom, bounds
 from cosim.diagnosis.measure.findings import unit_on
+from cosim.diagnosis.search.rivals import AcceptedEffect
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Prepared
 from pyfmi_models.effects import CATALOGUE
@@ -22,6 +25,20 @@ def not_found(comparison: Comparison, chosen: Fit, known: Sequence[str], largest
     reasons = {name: f"{NOT_DETERMINED} {named(name).share_of.rpartition('.')[2]}" for name in sizeless}
     lost = [name for name in TRIED if name not in known]
     return [_absent(n, seen.get(n), chosen.mount, problem.prepared, reasons.get(n, "")) for n in lost]
+
+
+def undecided(finding: Finding, standing: Sequence[AcceptedEffect], policy: Policy) -> Finding:
+    """A finding of an effect that no size would show, where it would be named but for a rival: that is not decided."""
+    if finding.answer != "not_testable" or not finding.bound or finding.bound.reason != UNSEEN:
+        return finding
+    for one in standing:
+        for rival in one.rivals:
+            if rival.effect.id == finding.effect and rival.evidence >= policy.least_evidence:
+                removes = f"{100 * one.own.plain_gain:.0f} % of the error energy, this {100 * rival.plain_gain:.0f} %"
+                said = f"{one.effect.title} stands in its place: it removes {removes}"
+                told = replace(finding, answer="not_decided", rival=one.effect.id, evidence=said, gain=rival.plain_gain)
+                return replace(told, bound=replace(finding.bound, reason=said))
+    return finding
 
 
 def _absent(name: str, found: SeenFrom | None, mount: Mount, prepared: Prepared, reason: str) -> Finding:
