@@ -27,19 +27,22 @@ def prove(
         Path | None,
         typer.Option("--decks", help="List of benchmarks to which this one is added, for example decks.md."),
     ] = None,
+    rough: Annotated[
+        bool, typer.Option("--rough", help="Machines that are not quite what equations say of them.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print proof.json instead of the scores.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Start over, whatever is there.")] = False,
 ) -> None:
     """Conceal effects in simulated recordings, seal the truth, diagnose, open, and score against the bars."""
     out = out or default_out("prove")
-    from cosim_studies.proof.conduct import GENERATOR, Benchmark, check, code, conduct
+    from cosim_studies.proof.conduct import Benchmark, check, code, conduct
     from cosim_studies.proof.ledger import enlist
 
-    benchmark = Benchmark(seed, cases, seconds)
+    benchmark = Benchmark(seed, cases, seconds, rough)
     check(benchmark, workers)
     if decks is not None:
-        enlist(decks, GENERATOR, seed, cases, purpose, code())
-    command = f"cosim prove --cases {cases} --seed {seed} --seconds {seconds:g} --out {out}"
+        enlist(decks, benchmark.generator, seed, cases, purpose, code())
+    command = f"cosim prove --cases {cases} --seed {seed} --seconds {seconds:g}{' --rough' * rough} --out {out}"
     try:
         with _reporting(f"{cases} concealed cases") as on_progress:
             found = conduct(

@@ -35,11 +35,18 @@ TELLS = ("cosim/report",)
 
 @dataclass(frozen=True)
 class Benchmark:
-    """What is played: seed, cases, seconds of each recording."""
+    """What is played: seed, cases, seconds of each recording, how rough machines are."""
 
     seed: int
     cases: int
     seconds: float = 60.0
+    rough: bool = False
+    """Whether machines are not quite what equations say, see rough.py."""
+
+    @property
+    def generator(self) -> str:
+        """What the list of benchmarks calls it."""
+        return f"{GENERATOR}, rough" if self.rough else GENERATOR
 
 
 def conduct(
@@ -72,7 +79,7 @@ def conduct(
     check(benchmark, workers)
     wanted = cases_of(benchmark.seed, benchmark.cases)
     identity = {
-        "generator": GENERATOR,
+        "generator": benchmark.generator,
         "seed": str(benchmark.seed),
         "seconds": str(benchmark.seconds),
         "version": __version__,
@@ -80,7 +87,9 @@ def conduct(
     }
     with ExitStack() as stack:
         journal = stack.enter_context(Journal(out, identity, force, "proof", MADE))
-        runner = CaseRunner(benchmark.seed, benchmark.seconds, Seals(out / "seals.jsonl"), on_seal, tool)
+        runner = CaseRunner(
+            benchmark.seed, benchmark.seconds, Seals(out / "seals.jsonl"), on_seal, tool, benchmark.rough
+        )
         rest = [case for case in wanted if case.number not in journal.rows]
         facts = {
             **identity,

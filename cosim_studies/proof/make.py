@@ -10,8 +10,8 @@ from cosim_studies.proof.cases import CaseSpec
 from cosim_studies.proof.generator import ANY, make_case, write_given
 
 
-def make(wanted: CaseSpec, seconds: float, folder: str) -> Parsed:
+def make(wanted: CaseSpec, seconds: float, folder: str, rough: bool = False) -> Parsed:
     """Write what the tool may see into `folder` and return the truth."""
-    case = make_case(wanted.seed, wanted.effects, wanted.size, duration=seconds, machine=ANY)
+    case = make_case(wanted.seed, wanted.effects, wanted.size, duration=seconds, machine=ANY, rough=rough)
     write_given(case, Path(folder))
     return case.truth

@@ -39,11 +39,19 @@ class CaseRunner:
         seals: where each truth is sealed.
         on_seal: told each seal before the tool runs.
         tool: what is tested.
+        rough: whether machines are not quite what equations say.
     """
 
     def __init__(
-        self, seed: int, seconds: float, seals: Seals, on_seal: Callable[[str], None], tool: Tool = answer
+        self,
+        seed: int,
+        seconds: float,
+        seals: Seals,
+        on_seal: Callable[[str], None],
+        tool: Tool = answer,
+        rough: bool = False,
     ) -> None:
+        self.rough = rough
         self.seed, self.seconds, self.seals, self.on_seal, self.tool = seed, seconds, seals, on_seal, tool
         self._own, self._cells = local(), list[Cell]()
 
@@ -58,7 +66,7 @@ class CaseRunner:
         head |= {"size": case.size}
         with Scratch() as folder:
             begun = perf_counter()
-            truth = _made(maker, case, self.seconds, folder)
+            truth = _made(maker, case, self.seconds, folder, self.rough)
             made = perf_counter() - begun
             opened = self._sealed(case, truth)
             said = _asked(user, self.tool, folder)
@@ -88,9 +96,9 @@ class CaseRunner:
         return cells
 
 
-def _made(maker: Cell, case: CaseSpec, seconds: float, folder: str) -> Parsed:
+def _made(maker: Cell, case: CaseSpec, seconds: float, folder: str, rough: bool) -> Parsed:
     try:
-        truth: Parsed = maker.call(make, case, seconds, folder, timeout=TIMEOUT)
+        truth: Parsed = maker.call(make, case, seconds, folder, rough, timeout=TIMEOUT)
     except LostError as loss:
         raise ProofError(f"Case {case.number} could not be made: {loss}", culprit=case.label) from loss
     return truth
