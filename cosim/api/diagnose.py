@@ -150,7 +150,8 @@ def diagnose(
         fmu: anyone's plant FMU as the base; the card then says roughly what it is.
         variables: our name to the FMU's, where they differ: {"tau": "Motor.torque"}.
         quick: write diagnosis.json and card.toml alone, and close no loop.
-        with_possible: let the card hold effects that are only possible too; else it holds those that are detected.
+        with_possible: let the card hold effects that are only possible too; else it holds those that are detected, and
+            the likelier of a set of which one is there.
         force: overwrite what is there.
         on_progress: told in a line what is being done, the stage of how many, and about how long it takes still.
         on_answer: told the answer as soon as it stands, before FMUs and report are made from it.

@@ -51,7 +51,7 @@ def diagnose(
     check: Annotated[bool, typer.Option("--check", help="Exit with 1 if something is missing.")] = False,
     quick: Annotated[bool, typer.Option("--quick", help="The answer and the card alone: no FMU, no report.")] = False,
     with_possible: Annotated[
-        bool, typer.Option("--with-possible", help="The card holds effects that are only possible too.")
+        bool, typer.Option("--with-possible", help="The card holds effects that are only possible, too.")
     ] = False,
     propose: Annotated[
         Path | None,

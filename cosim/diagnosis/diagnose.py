@@ -27,7 +27,7 @@ from cosim.diagnosis.measure.regression import black_box_rms
 from cosim.diagnosis.measure.withheld import without_names
 from cosim.diagnosis.search.alternatives import prove_sets
 from cosim.diagnosis.search.bookkeeping import enter_answer, finished
-from cosim.diagnosis.search.delivered import detected, standing, with_only
+from cosim.diagnosis.search.delivered import detected, likelier, standing, with_only
 from cosim.diagnosis.search.global_test import global_test
 from cosim.diagnosis.search.nameless import Nameless, nameless
 from cosim.diagnosis.search.proof import Proof
@@ -282,7 +282,7 @@ def _delivered(answer: Answer, heldout: Sequence[Recording], with_possible: bool
     answer, tried = _learned(answer, heldout)
     names = detected(answer.comparison, answer.proof, answer.decision)
     every = {one.effect.id for one in answer.proof.standing}
-    fit = with_only(answer.comparison, answer.proof, every if with_possible else names)
+    fit = with_only(answer.comparison, answer.proof, every if with_possible else names | likelier(answer.decision))
     models = Structures(answer.base.mount, answer.base.mount, fit.mount)
     found = judge(heldout, models, answer.comparison.problem.prepared.band)
     fit = answer.base if found.after_rms > found.before_rms else fit

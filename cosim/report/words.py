@@ -36,8 +36,7 @@ MEANINGS = (
     (
         "ambiguous",
         "Two possible causes",
-        "The rivals are too close to separate. The improved model holds none of them, unless you ask for the likelier "
-        "with --with-possible.",
+        "The rivals are too close to separate. The improved model holds the one named first, which is the likelier.",
     ),
     (
         "not_proven",

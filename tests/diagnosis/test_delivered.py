@@ -62,3 +62,15 @@ def test_what_is_not_detected_leaves_the_structure_and_the_cards_own_effects_sta
     kept = delivered.with_only(comparison, proof, {"cogging"}).mount.effects
     assert kept == (*BARE.effects, *ADDED[1:]), "a ripple with all its waves"
     assert delivered.with_only(comparison, proof, ()).mount.effects == BARE.effects
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "doubtful", "held"),
+    [(0.3, 0.2, (), True), (0.3, 0.19, (), False), (0.6, 0.4, ("cogging",), False)],
+)
+def test_of_a_set_of_which_one_is_there_the_likelier_is_delivered(
+    first: float, second: float, doubtful: tuple[str, ...], held: bool
+) -> None:
+    told = {"cogging": {"cogging": first, "cable_wrap": second}, "delay": {"delay": 0.9}}
+    decision = Decision({"cogging": ("cable_wrap",), "delay": ()}, told, bool(doubtful), (), doubtful)
+    assert delivered.likelier(decision) == ({"cogging"} if held else set())

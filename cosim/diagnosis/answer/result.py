@@ -228,7 +228,7 @@ class Diagnosis:
 
     @property
     def in_model(self) -> tuple[Finding, ...]:
-        """Effects that the delivered model holds: those detected, or what was asked for."""
+        """Effects that the delivered model holds: those detected, the likelier of sets, or what was asked for."""
         return tuple(one for one in self.findings if one.effect in self.delivered)
 
     @property

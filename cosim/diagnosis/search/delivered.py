@@ -23,6 +23,12 @@ def detected(comparison: Comparison, proof: Proof, decision: Decision) -> frozen
     )
 
 
+def likelier(decision: Decision) -> frozenset[str]:
+    """The first of each set of which one is more likely there than not: which one it is does not change what it does."""
+    sums = {name: sum(decision.probabilities[name].values()) for name, rivals in decision.sets.items() if rivals}
+    return frozenset(name for name, p in sums.items() if p >= LIKELY and name not in decision.doubtful)
+
+
 def with_only(comparison: Comparison, proof: Proof, names: Collection[str]) -> Fit:
     """The structure that stands with just some of its effects, refitted where others go."""
     problem, chosen = comparison.problem, proof.chosen
