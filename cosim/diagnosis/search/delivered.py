@@ -24,7 +24,7 @@ def detected(comparison: Comparison, proof: Proof, decision: Decision) -> frozen
 
 
 def likelier(decision: Decision) -> frozenset[str]:
-    """The first of each set of which one is more likely there than not: which one it is does not change what it does."""
+    """The first of each set of which one is more likely there than not: which it is changes little of what it does."""
     sums = {name: sum(decision.probabilities[name].values()) for name, rivals in decision.sets.items() if rivals}
     return frozenset(name for name, p in sums.items() if p >= LIKELY and name not in decision.doubtful)
 
