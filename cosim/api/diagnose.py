@@ -144,14 +144,11 @@ def diagnose(
         out: folder for diagnosis.json, card.toml, the improved FMUs, missing_torque.parquet and report.html; None
             writes nothing and closes no loop.
         motion: "rotary" or "linear", where there is neither a card nor a unit that says it.
-        columns: our name to the source's, as in `cosim.read`; they come before the card's.
-        units: our name to the unit in the source, as in `cosim.read`.
-        layout: how texts are written, as in `cosim.read`.
+        columns, units, layout: as in `cosim.read`; columns come before the card's.
         fmu: anyone's plant FMU as the base; the card then says roughly what it is.
         variables: our name to the FMU's, where they differ: {"tau": "Motor.torque"}.
         quick: write diagnosis.json and card.toml alone, and close no loop.
-        with_possible: let the card hold effects that are only possible too; else it holds those that are detected, and
-            the likelier of a set of which one is there.
+        with_possible: let the card hold effects that are only possible too.
         force: overwrite what is there.
         on_progress: told in a line what is being done, the stage of how many, and about how long it takes still.
         on_answer: told the answer as soon as it stands, before FMUs and report are made from it.

@@ -120,13 +120,11 @@ def diagnose(
 
     Args:
         train: recordings that may be fitted.
-        heldout: recordings that nothing is fitted to. They prove the result, and they have a veto: an effect that
-            they do not predict is taken out as not proven. So their error after it is a little optimistic;
-            `HeldOut.unvetoed_rms` is the error of what training alone proposed.
+        heldout: recordings that nothing is fitted to. They prove the result, and have a veto: so their error after it
+            is a little optimistic; `HeldOut.unvetoed_rms` is the error of what training alone proposed.
         card: the model as delivered.
         on_progress: told, in a few words, what is being done.
-        on_model_ready: told the refitted base ("before") and the model it ends with ("after") as soon as they stand, so
-            that something can be done with them meanwhile.
+        on_model_ready: told the refitted base ("before") and the model it ends with ("after") as soon as they stand.
         refits: what refits structures (default: one after the other); the answer is the same.
         with_possible: whether the card holds effects that stand but are only possible too.
 
