@@ -144,7 +144,9 @@ def diagnose(
         out: folder for diagnosis.json, card.toml, the improved FMUs, missing_torque.parquet and report.html; None
             writes nothing and closes no loop.
         motion: "rotary" or "linear", where there is neither a card nor a unit that says it.
-        columns, units, layout: as in `cosim.read`; columns come before the card's.
+        columns: our name to the source's, as in `cosim.read`; they come before the card's.
+        units: our name to the unit in the source, as in `cosim.read`.
+        layout: how texts are written, as in `cosim.read`.
         fmu: anyone's plant FMU as the base; the card then says roughly what it is.
         variables: our name to the FMU's, where they differ: {"tau": "Motor.torque"}.
         quick: write diagnosis.json and card.toml alone, and close no loop.
@@ -162,10 +164,7 @@ def diagnose(
         CardError: the card is not good. WiringError, FmuError: the FMU has no such variables, or cannot be run.
         OutputError: a file is there already; nothing was diagnosed then.
     """
-    folder = None if out is None else Path(out)
-    if folder:
-        check_out(folder, force, QUICK if quick else FILES)
-        check_directory(folder)
+    folder = _checked(out, quick, force)
     on_progress = Staged(on_progress, stages_of(card is not None, folder is not None and not quick))
     given = _read(train, heldout, card, Written(columns, units, layout), motion, on_progress)
     given = replace(given, with_possible=with_possible)
@@ -176,6 +175,15 @@ def diagnose(
     done = way(given, folder, command, _Listeners(on_progress, on_answer))
     _forget(before)
     return done
+
+
+def _checked(out: str | Path | None, quick: bool, force: bool) -> Path | None:
+    """The folder for the files, if any: refused before anything is computed (OutputError)."""
+    folder = None if out is None else Path(out)
+    if folder:
+        check_out(folder, force, QUICK if quick else FILES)
+        check_directory(folder)
+    return folder
 
 
 def _black_box(fmu: str | Path, variables: Mapping[str, str]) -> BlackBox:
