@@ -60,7 +60,7 @@ def check(
 ) -> CheckResult:
     """Run the experiments that an FMU brings along (FMI-LS-REF), and compare each variable with its reference.
 
-    A variable passes where |y - r| <= rtol * (range of r) at every row of the reference. An FMU without experiments
+    A variable passes where `|y - r| <= rtol * (range of r)` at every row of the reference. An FMU without experiments
     runs its default experiment: to its end, with the same bits after a reset and in a new instance.
 
     Args:

@@ -9,7 +9,7 @@ from pyfmi_models.friction import FrictionLaw
 
 
 def check_effect(effect: type[Effect] | Effect, hypothesis: type | None = None) -> Checks:
-    """List the checks of an effect of your own, in the manner of scikit-learn's `check_estimator`.
+    """List the checks of an effect of your own, in the manner of scikit-learn's `check_estimator`::
 
         cosim.check_effect(WindLoad).run()                    # a table; CheckError where something fails
 
@@ -46,7 +46,7 @@ def check_effect(effect: type[Effect] | Effect, hypothesis: type | None = None) 
 
 
 def check_law(law: type[FrictionLaw] | FrictionLaw) -> Checks:
-    """List the checks of a friction law of your own, in the manner of scikit-learn's `check_estimator`.
+    """List the checks of a friction law of your own, in the manner of scikit-learn's `check_estimator`::
 
         cosim.check_law(HerschelBulkley).run()
 
