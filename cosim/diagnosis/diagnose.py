@@ -27,7 +27,7 @@ from cosim.diagnosis.measure.regression import black_box_rms
 from cosim.diagnosis.measure.withheld import without_names
 from cosim.diagnosis.search.alternatives import prove_sets
 from cosim.diagnosis.search.bookkeeping import enter_answer, finished
-from cosim.diagnosis.search.delivered import detected, likelier, standing, with_only
+from cosim.diagnosis.search.delivered import detected, likelier, standing, with_only, without_ended
 from cosim.diagnosis.search.global_test import global_test
 from cosim.diagnosis.search.nameless import Nameless, nameless
 from cosim.diagnosis.search.proof import Proof
@@ -281,6 +281,7 @@ def _delivered(answer: Answer, heldout: Sequence[Recording], with_possible: bool
     names = detected(answer.comparison, answer.proof, answer.decision)
     every = {one.effect.id for one in answer.proof.standing}
     fit = with_only(answer.comparison, answer.proof, every if with_possible else names | likelier(answer.decision))
+    fit = without_ended(answer.comparison, fit)
     models = Structures(answer.base.mount, answer.base.mount, fit.mount)
     found = judge(heldout, models, answer.comparison.problem.prepared.band)
     fit = answer.base if found.after_rms > found.before_rms else fit

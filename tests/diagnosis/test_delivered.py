@@ -1,14 +1,15 @@
 """What counts as detected, and what the delivered structure holds."""
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from cosim.diagnosis.decide.decision import Decision
+from cosim.diagnosis.effects.tuning import ANY
 from cosim.diagnosis.search import delivered
-from pyfmi_models.effects import Cogging, Delay, TorqueOffset
+from pyfmi_models.effects import Cogging, Delay, FrictionAsymmetry, TorqueOffset
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
@@ -20,11 +21,14 @@ ADDED = (
 )
 
 
+@dataclass(frozen=True)
 class Problem:
-    mount = BARE
+    mount: Mount = BARE
+    held: tuple[str, ...] = ()
+    prepared: Any = field(default_factory=lambda: SimpleNamespace(pieces=()))
 
     def fit(self, mount: Mount, _: int) -> Any:
-        return SimpleNamespace(mount=mount)
+        return SimpleNamespace(mount=mount, held=self.held)
 
 
 @pytest.mark.parametrize(
@@ -74,3 +78,13 @@ def test_of_a_set_of_which_one_is_there_the_likelier_is_delivered(
     told = {"cogging": {"cogging": first, "cable_wrap": second}, "delay": {"delay": 0.9}}
     decision = Decision({"cogging": ("cable_wrap",), "delay": ()}, told, bool(doubtful), (), doubtful)
     assert delivered.likelier(decision) == ({"cogging"} if held else set())
+
+
+def test_a_size_that_only_a_bound_has_made_is_none_in_the_card(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(delivered, "recorded_by", lambda _: ANY)
+    comparison: Any = SimpleNamespace(problem=Problem())
+    for viscous, kept in ((0.95, 0.0), (-0.95, 0.0), (0.2, 0.2)):
+        sides = FrictionAsymmetry(level_asymmetry=0.33, viscous_asymmetry=viscous)
+        found: Any = SimpleNamespace(mount=replace(BARE, effects=(*BARE.effects, sides)))
+        effect: Any = delivered.without_ended(comparison, found).mount.effects[-1]
+        assert (effect.level_asymmetry, effect.viscous_asymmetry) == (0.33, kept)

@@ -11,7 +11,7 @@ from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.priors import is_linear
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Effect
-from pyfmi_models.model import Recorded, parameters_of
+from pyfmi_models.model import Recorded, Variable, parameters_of
 
 LEAST_GAIN = 0.01
 """A whole number of cycles is taken if the residual grows by less than this share, a free shape if it falls by more."""
@@ -35,6 +35,16 @@ def revived(problem: Problem, found: Fit, start: Effect) -> Fit:
     again = replace(found.mount, effects=(*found.mount.effects[:-1], start))
     other = problem.fit(with_values(again, dead, np.array([card[name] for name in dead])), 36)
     return min((found, other), key=problem.error)
+
+
+def ended_sizes(effect: Effect, sizes: Sequence[str], recorded: Recorded = ANY) -> list[str]:
+    """Those of several sizes that are at an end of their range in a fit."""
+    return [one.name for one in parameters_of(effect) if one.name in sizes and _ends(effect, one, recorded)]
+
+
+def _ends(effect: Effect, variable: Variable, recorded: Recorded) -> bool:
+    low, high = effect.fit_bounds(variable, recorded)
+    return variable.start >= high or (low != 0 and variable.start <= low)
 
 
 def refound(
@@ -77,9 +87,6 @@ def at_bound(effect: Effect, sizes: Sequence[str] = (), recorded: Recorded = ANY
     A range from 0 on ends at nothing, which is no bound: there an effect is small. Nor is it one for `may_end`.
     """
     variables = [one for one in parameters_of(effect) if one.name not in may_end]
-    ends = {}
-    for one in variables:
-        low, high = effect.fit_bounds(one, recorded)
-        ends[one.name] = one.start >= high or (low != 0 and one.start <= low)
+    ends = {one.name: _ends(effect, one, recorded) for one in variables}
     own = [ends.pop(one.name) for one in variables if one.name in sizes and one.start]
     return any(ends.values()) or (bool(own) and all(own))

@@ -3,14 +3,19 @@
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from cosim.diagnosis.decide.calibration import LIKELY
 from cosim.diagnosis.decide.decision import Decision
+from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.effects.tuning import ended_sizes
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.search.proof import Proof
 from cosim.diagnosis.search.rivals import AcceptedEffect
 from cosim.diagnosis.search.sizes import tells
 from cosim.diagnosis.search.stages import weighed
-from cosim.estimation.fit import Fit
+from cosim.estimation.fit import Fit, recorded_by, with_values
+from pyfmi_models.effects import Effect
 
 
 def detected(comparison: Comparison, proof: Proof, decision: Decision) -> frozenset[str]:
@@ -37,6 +42,25 @@ def with_only(comparison: Comparison, proof: Proof, names: Collection[str]) -> F
     if len(kept) == len(chosen.mount.effects):
         return chosen
     return problem.fit(replace(chosen.mount, effects=kept), 45)
+
+
+def without_ended(comparison: Comparison, found: Fit) -> Fit:
+    """The same where no size of an effect ends at a bound of the fit.
+
+    Of several sizes (a level and a viscosity) one may be told and the other not: that one is none, and the rest is
+    fitted again beside it, so that no card holds a number that only a bound has made.
+    """
+    problem, mount = comparison.problem, found.mount
+    recorded, own = recorded_by(problem.prepared.pieces), problem.mount.effects
+    ended: dict[str, float] = {}
+    for prefix, part in mount.components().items():
+        if isinstance(part, Effect) and not any(part is one for one in own):
+            none = hypothesis_of(part).none(mount)
+            ended |= {f"{prefix}.{name}": none for name in ended_sizes(part, hypothesis_of(part).sizes, recorded)}
+    if not ended:
+        return found
+    start = with_values(mount, list(ended), np.array([*ended.values()]))
+    return replace(problem, held=(*problem.held, *ended)).fit(start, 45)
 
 
 def standing(comparison: Comparison, proof: Proof) -> Sequence[AcceptedEffect]:
