@@ -15,7 +15,6 @@ from cosim.diagnosis.search.rivals import AcceptedEffect
 from cosim.diagnosis.search.sizes import tells
 from cosim.diagnosis.search.stages import weighed
 from cosim.estimation.fit import Fit, recorded_by, with_values
-from pyfmi_models.effects import Effect
 
 
 def detected(comparison: Comparison, proof: Proof, decision: Decision) -> frozenset[str]:
@@ -51,12 +50,12 @@ def without_ended(comparison: Comparison, found: Fit) -> Fit:
     fitted again beside it, so that no card holds a number that only a bound has made.
     """
     problem, mount = comparison.problem, found.mount
-    recorded, own = recorded_by(problem.prepared.pieces), problem.mount.effects
+    recorded = recorded_by(problem.prepared.pieces)
     ended: dict[str, float] = {}
-    for prefix, part in mount.components().items():
-        if isinstance(part, Effect) and not any(part is one for one in own):
-            none = hypothesis_of(part).none(mount)
-            ended |= {f"{prefix}.{name}": none for name in ended_sizes(part, hypothesis_of(part).sizes, recorded)}
+    names = list(mount.components())[len(mount.components()) - len(mount.effects) :]  # after axis and friction
+    for prefix, effect in list(zip(names, mount.effects, strict=True))[len(problem.mount.effects) :]:
+        own = hypothesis_of(effect)
+        ended |= {f"{prefix}.{name}": own.none(mount) for name in ended_sizes(effect, own.sizes, recorded)}
     if not ended:
         return found
     start = with_values(mount, list(ended), np.array([*ended.values()]))
