@@ -39,7 +39,7 @@ from cosim.diagnosis.terms.learn import NOTHING_TRIED, Learned, learn
 from cosim.diagnosis.terms.spelled import Spelled
 from cosim.diagnosis.trust.admission import check_effects, check_recordings
 from cosim.diagnosis.trust.denied import beyond_denial, without_denied
-from cosim.diagnosis.trust.doubts import doubts, of_base, single_readings
+from cosim.diagnosis.trust.doubts import doubts, of_base, of_delivered, single_readings
 from cosim.diagnosis.trust.limits import half_sample
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.determined import limited, with_held
@@ -163,7 +163,7 @@ def diagnose(
     diagnosis = replace(
         _with_search(described, answer, examined, heldout),
         not_learned=_not_learned(tried) if answer.decision.is_unknown else {},
-        sanity=(*sanity, *not_determined_doubts(unknown)),
+        sanity=(*of_delivered(sanity, problem, mounts[0]), *not_determined_doubts(unknown)),
         not_determined=unknown,
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,

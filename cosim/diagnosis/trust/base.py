@@ -1,12 +1,14 @@
 """Does the refitted base leave the card? What a fit has to bend that far is often all that is wrong."""
 
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 from cosim.diagnosis.answer.doubt_entry import Alternative, Sanity
 from cosim.plots.quantities import raised
 from pyfmi_models.model import Variable
 from pyfmi_models.mount import Mount
 
+BASE_FAR: Final = "base_far_from_card"
 FAR = 3.0
 """A number of the base that leaves the card's by more than this factor says that card and recordings differ; what
 owners write is rarely more than a factor of two off."""
@@ -45,8 +47,7 @@ def base_far_from_card(
                 said += _far(full, words, CAUSES[name], before[full], after[full].start, bounds.get(full))
     causes = tuple(alternatives)
     return tuple(
-        Sanity(finding="base_far_from_card", statement=text, alternatives=causes if "inertia" in text[:24] else ())
-        for text in said
+        Sanity(finding=BASE_FAR, statement=text, alternatives=causes if "inertia" in text[:24] else ()) for text in said
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.doubt_entry import Sanity
 from cosim.diagnosis.trust.balance import Balance
-from cosim.diagnosis.trust.base import base_far_from_card
+from cosim.diagnosis.trust.base import BASE_FAR, base_far_from_card
 from cosim.diagnosis.trust.clocks import clocks
 from cosim.diagnosis.trust.judgement import judged
 from cosim.diagnosis.trust.likelihood import Reference
@@ -70,6 +70,17 @@ def of_base(
         *little_motion(problem.prepared),
         *no_set_point([*train, *heldout]),
     )
+
+
+def of_delivered(sanity: Sequence[Sanity], problem: Problem, delivered: Mount) -> tuple[Sanity, ...]:
+    """The same doubts, where what is said of the base's numbers is judged on the delivered model.
+
+    A base alone bends its numbers to stand in for what is missing: an inertia 8 times the card's beside a weight that
+    nobody knew of.
+    """
+    bounds = edges_of(problem.mount, problem.prepared.pieces)
+    kept = [one for one in sanity if one.finding != BASE_FAR]
+    return (*base_far_from_card(problem.mount, delivered, bounds, problem.top_speed), *kept)
 
 
 def single_readings(given: Sequence[Recording], used: Sequence[Recording]) -> tuple[Sanity, ...]:

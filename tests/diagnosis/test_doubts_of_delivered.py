@@ -1,0 +1,26 @@
+"""What is said of the base's numbers is judged on the model that is delivered."""
+
+from typing import Any
+
+from cosim.diagnosis.answer.doubt_entry import Sanity
+from cosim.diagnosis.trust import doubts
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+
+def axis(inertia: float) -> Mount:
+    return Mount(name="axis", axis=Axis(inertia=inertia), friction=Coulomb(Fc=1.0))
+
+
+def test_an_inertia_that_stood_in_for_a_weight_is_no_doubt_once_the_weight_is_there(monkeypatch: Any) -> None:
+    monkeypatch.setattr(doubts, "edges_of", lambda *_: {})
+    problem: Any = type(
+        "Problem", (), {"mount": axis(5.0), "top_speed": 1.0, "prepared": type("P", (), {"pieces": ()})}
+    )
+    before = (
+        Sanity(finding="base_far_from_card", statement="Refitted, the inertia is 8 times the card's."),
+        Sanity(finding="no_set_point", statement="No set point was recorded."),
+    )
+    assert [one.finding for one in doubts.of_delivered(before, problem, axis(5.5))] == ["no_set_point"]
+    said = doubts.of_delivered(before[1:], problem, axis(45.0))
+    assert [one.finding for one in said] == ["base_far_from_card", "no_set_point"]
