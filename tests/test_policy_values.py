@@ -15,7 +15,6 @@ from cosim.diagnosis.search.stages import least
 BETWEEN = {
     "form_ways": (12, 60),  # 60 rough machines: true names are lost at 10, a false one alone at 80
     "form": (0.05, 0.2),  # machines repeat their laws to 5 to 20 %
-    "law_repeats": (0.042, 0.1),  # the most that rough nulls bend, what friction repeats to
     "moved_prior": (0.05, 0.3),  # friction repeats to 10 to 20 %; .3 gives the same verdicts
     "small_gain": (0.1, 0.2),
     "least_bent": (24, 48),  # nulls, true contacts

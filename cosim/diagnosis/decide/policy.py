@@ -22,10 +22,6 @@ class Policy:
     """How far a machine is from the equation of a named effect, relative to its torque (half-normal): beside others an
     effect must explain more than that. Unit: 1. Friction and loads of machines repeat their laws to 5 to 20 %
     (Armstrong-Helouvry, Control of Machines with Friction, 1991)."""
-    law_repeats: float = 0.05
-    """How far a friction curve is from its law on any day, RMS over speed relative to the level: half of the 10 to 20 %
-    within which friction repeats (the same source). What bends by more is an effect that held-out recordings may
-    prove; what bends by less needs the evidence `least_bent`. Unit: 1."""
     accuracy: float = 0.001
     """Least noise of a band relative to the torque in it: no model of friction is better. Unit: 1."""
     fast_hz: float = 8.0

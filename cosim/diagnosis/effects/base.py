@@ -137,10 +137,6 @@ class Hypothesis(Generic[Form]):
         """Whether a fitted effect, in the fitted mount that holds it, is what its name says."""
         return True
 
-    def bends(self, effect: Form, mount: Mount, prepared: Prepared) -> float:
-        """By how much a fitted effect of friction is another curve than the law, relative to the level."""
-        return 0.0
-
     def shows(self, effect: Form, mount: Mount, prepared: Prepared) -> bool:
         """Whether the recorded motion shows what tells the fitted effect from another law of friction."""
         return True

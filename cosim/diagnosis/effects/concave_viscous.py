@@ -68,17 +68,12 @@ class ThinningGrease(Hypothesis[ConcaveViscous]):
 
     def shows(self, effect: ConcaveViscous, mount: Mount, prepared: Prepared) -> bool:
         """Whether it bends where the axis moves clearly."""
-        return self.bends(effect, mount, prepared) > LEAST_BEND
-
-    def bends(self, effect: ConcaveViscous, mount: Mount, prepared: Prepared) -> float:
-        """RMS beside a level and a line where the axis moves clearly, relative to the level."""
         v = prepared.stacked("v")[far_from_turns(prepared) > 0]
-        level = contact_level(mount)
-        if not len(v) or level <= 0:
-            return 0.0
+        if not len(v):
+            return False
         torque = effect.viscous(ca.DM(mount.friction.viscous(v)), mount.at(0.0, 0.0, ca.DM(v)))
         bend = projected(np.asarray(torque).ravel(), np.column_stack([np.sign(v), v]))
-        return float(np.sqrt(np.mean(bend**2))) / level
+        return bool(np.sqrt(np.mean(bend**2)) > LEAST_BEND * contact_level(mount))
 
     def is_degenerate(self, problem: Problem, effect: ConcaveViscous) -> bool:
         """What thins at lower speeds than are tried is level from there on: the contact's friction by another name."""

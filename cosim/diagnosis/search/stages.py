@@ -45,8 +45,6 @@ class CandidateFit:
     """Share of the energy that a timing effect removes which it removes away from turns."""
     at_rest: float = 1.0
     """Share of the energy at rest that a contact that bends removes."""
-    bends: float = 0.0
-    """By how much it is another friction curve than the law, relative to the level."""
 
 
 @dataclass(frozen=True)
@@ -162,8 +160,7 @@ def weighed(
     share = 1 - float(left @ left) / max(float(before @ before), 1e-300)
     remembers = gets_memory(found.mount, current.mount)
     rest = removed_at_rest(problem.weight, found.residual, current.residual) if remembers else 1.0
-    bends = own.bends(effect, found.mount, problem.prepared)
-    return CandidateFit(effect, found, gain, price, share, loud, away, rest, bends)
+    return CandidateFit(effect, found, gain, price, share, loud, away, rest)
 
 
 @dataclass(frozen=True)
@@ -300,7 +297,7 @@ def is_small(one: CandidateFit, policy: Policy) -> bool:
 def is_common(one: CandidateFit, policy: Policy) -> bool:
     """Whether an effect is no more than what laws of friction lack of any machine: not sure, nor large."""
     common = hypothesis_of(one.effect).is_common_misfit
-    return common and one.evidence < policy.least_bent and one.bends < policy.law_repeats
+    return common and one.evidence < policy.least_bent and one.plain_gain < policy.large_gain
 
 
 def admission(comparison: Comparison, one: CandidateFit) -> Iterator[Rule]:
