@@ -12,6 +12,7 @@ from cosim.diagnosis.search.base_moved import owed_to_base
 from cosim.diagnosis.search.stages import (
     CandidateFit,
     best_of,
+    contest,
     is_hopeful,
     is_minor,
     is_small,
@@ -132,11 +133,27 @@ def test_a_spring_does_not_start_from_a_negative_mass() -> None:
     assert all(one.evidence == -np.inf and one.plain == 0 for one in negative)
 
 
-def test_a_small_presliding_is_minor_however_much_it_removes() -> None:
+def test_a_weak_presliding_is_minor_unless_it_removes_a_quarter_of_the_error() -> None:
     _, base = compared(lambda q, _: 0 * q)
-    bent = CandidateFit(Presliding(sigma0=1e4), base, POLICY.least_bent - 1, 0.0, 0.5)
+    bent = CandidateFit(Presliding(sigma0=1e4), base, POLICY.least_bent - 1, 0.0, POLICY.large_gain - 0.01)
     assert is_minor(bent, POLICY)
     assert not is_minor(replace(bent, evidence=POLICY.least_bent + 1), POLICY)
+    assert not is_minor(replace(bent, plain_gain=POLICY.large_gain), POLICY)
+
+
+def test_in_a_contest_of_names_the_bases_merit_counts_as_little_as_rows_do() -> None:
+    """Twenty nats that the base gained in 400 rows are no twenty where twenty ways of being wrong count."""
+    rng = np.random.default_rng(7)
+    comparison, base = compared(lambda q, _: 0.3 * np.sin(40 * q) + 0.02 * rng.standard_normal(len(q)))
+    one, other = (
+        CandidateFit(effect, fit, 0.0, price, 0.5, few)
+        for effect, fit, price, few in (
+            (Cogging(cycles_per_rev=40.0, amplitude=0.3), stage(comparison, base).tried[0].fit, 20.0, 0.5),
+            (TorqueOffset(torque=1.0), base, 0.0, 0.0),
+        )
+    )
+    dear = replace(one, price_of_forms=20.0)
+    assert contest(comparison, one, other) == pytest.approx(contest(comparison, dear, other) + 19.5)
 
 
 def test_what_is_small_is_taken_if_it_is_all_there_is_and_ends_the_search() -> None:
@@ -164,8 +181,8 @@ def test_what_the_base_gains_by_other_numbers_of_its_own_is_no_merit_of_an_effec
 
     assert comparison.evidence(beside) - comparison.evidence(at(0.1)) > POLICY.least_evidence
     assert weighed(with_card(0.1), beside, at(0.1)).evidence < 1.0
-    assert owed_to_base(with_card(2.5), beside, at(2.5), NONE) == 0.0, "within what owners may be off"
-    assert owed_to_base(comparison, beside, at(0.1), NONE) == 0.0, "the base comes back to the card"
+    assert owed_to_base(with_card(2.5), beside, at(2.5), NONE) == (0.0, 0.0), "within what owners may be off"
+    assert owed_to_base(comparison, beside, at(0.1), NONE) == (0.0, 0.0), "the base comes back to the card"
 
 
 def test_a_curve_is_found_where_the_refitted_friction_has_taken_its_level_over() -> None:

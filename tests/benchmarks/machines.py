@@ -2,7 +2,7 @@
 
     python tests/benchmarks/machines.py --data ../shared/recordings --out results/machines
 
-FOLDER holds machine folders, each with recordings, cards and what is known, and `bench.py`, which runs the diagnosis on
+FOLDER holds machine folders, each with recordings, cards and what is known, and a bench that runs the diagnosis on
 every case and marks its answer; where it is missing, this says so and ends. Nothing in the project was set on these
 machines. The recordings stay where they are.
 """

@@ -15,7 +15,7 @@ FAR = 3.0
 off. Beside a saturation that a measured screw seemed to have the inertia was 46 times larger."""
 
 
-def owed_to_base(comparison: Comparison, found: Fit, current: Fit, aside: Aside) -> float:
+def owed_to_base(comparison: Comparison, found: Fit, current: Fit, aside: Aside) -> tuple[float, float]:
     """Nats by which a structure gains by the numbers that were found beside an effect, without that effect.
 
     Args:
@@ -26,16 +26,21 @@ def owed_to_base(comparison: Comparison, found: Fit, current: Fit, aside: Aside)
 
     Returns:
         At least 0; 0 where no number of the base is further from the card than without the effect, by more than `FAR`.
+        The second one counts the few ways in which an equation may be wrong, as a contest of names does.
     """
     known, moved = current.parameters(), found.parameters()
     card = {variable.name: variable.start for variable in comparison.problem.mount.parameters()}
     shared = [name for name in known if name in moved and name.startswith(("axis.", "friction."))]
     if not any(_has_left(card[name], known[name], moved[name]) for name in shared):
-        return 0.0
+        return 0.0, 0.0
     names = [name for name in known if name in moved]
     there = with_values(current.mount, names, found.values[[found.free.index(name) for name in names]])
     alone = comparison.problem.fit(there, 1)
-    return max(0.0, comparison.evidence(alone, aside) - comparison.evidence(current, aside))
+    rows, forms = (
+        max(0.0, comparison.evidence(alone, aside, few) - comparison.evidence(current, aside, few))
+        for few in (False, True)
+    )
+    return rows, forms
 
 
 def _has_left(card: float, before: float, after: float) -> bool:

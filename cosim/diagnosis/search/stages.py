@@ -39,6 +39,8 @@ class CandidateFit:
     of the base; taken off already."""
     plain_gain: float
     """Share of the plain residual energy removed."""
+    price_of_forms: float = 0.0
+    """The price in a contest of names, which counts few ways of being wrong."""
     above_noise: float = inf
     """Energy that a spring removes, in those of the reading's noise."""
     away: float = 1.0
@@ -150,7 +152,8 @@ def weighed(
     """What an effect of a fitted structure (the last one) is worth beside the structure without it."""
     effect = effect or found.mount.effects[-1]
     aside = aside_for(effect.id)
-    price = log(max(many, 1)) + owed_to_base(comparison, found, current, aside)
+    owed, owed_by_forms = owed_to_base(comparison, found, current, aside)
+    price, price_of_forms = log(max(many, 1)) + owed, log(max(many, 1)) + owed_by_forms
     with_it, without = (comparison.evidence(one, aside, beside=current) for one in (found, current))
     gain = with_it - without - price
     own, problem = hypothesis_of(effect), comparison.problem
@@ -160,7 +163,7 @@ def weighed(
     share = 1 - float(left @ left) / max(float(before @ before), 1e-300)
     remembers = gets_memory(found.mount, current.mount)
     rest = removed_at_rest(problem.weight, found.residual, current.residual) if remembers else 1.0
-    return CandidateFit(effect, found, gain, price, share, loud, away, rest)
+    return CandidateFit(effect, found, gain, price, share, price_of_forms, loud, away, rest)
 
 
 @dataclass(frozen=True)
@@ -275,10 +278,9 @@ def contest(comparison: Comparison, one: CandidateFit, other: CandidateFit) -> f
     Reference: coarsened posterior, Miller and Dunson, J. Am. Stat. Assoc. 114 (2019) 1113.
     """
     aside = aside_for(one.effect.id, other.effect.id)
-    price = one.price - other.price
     rows, forms = (
         comparison.evidence(one.fit, aside, few) - comparison.evidence(other.fit, aside, few) - price
-        for few in (False, True)
+        for few, price in ((False, one.price - other.price), (True, one.price_of_forms - other.price_of_forms))
     )
     way = 1.0 if rows >= 0 else -1.0
     return way * min(abs(rows), max(way * forms, 0.0))
