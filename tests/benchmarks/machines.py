@@ -36,7 +36,7 @@ def main() -> int:
         done = subprocess.run(command, capture_output=True, text=True, check=True)
         rows = sorted(cases(given.data, work, done.stdout), key=lambda row: rank(row["outcome"]))
         given.out.mkdir(parents=True, exist_ok=True)
-        with replacing(given.out / "README.md") as path:
+        with replacing(given.out / "README.md", force=True) as path:
             path.write_text(page(rows, sums(done.stdout)), "utf-8")
     print(sums(done.stdout))
     return 0
