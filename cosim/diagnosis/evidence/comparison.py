@@ -131,6 +131,14 @@ class Comparison:
             known[aside, few, missed] = likelihood - self.policy.phase_price * found.phases
         return known[aside, few, missed]
 
+    def form_gain(self, found: Fit, name: str) -> float:
+        """Nats by which a structure is better where the machine may be off the equation of one of its effects."""
+        missed = self.missed_by(found)
+        if missed is None or name not in missed.names:
+            return 0.0
+        loose, exact = (self._marginal(found, NONE, False, one) for one in (missed.of(name), None))
+        return max(0.0, loose.log_likelihood - exact.log_likelihood)
+
     def missed_by(self, beside: Fit | None) -> Forms | None:
         """What the effects of a structure may miss; computed once."""
         if beside is None:

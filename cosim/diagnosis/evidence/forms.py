@@ -31,6 +31,13 @@ class Forms:
 
     columns: Array
     groups: tuple[tuple[int, ...], ...]
+    names: tuple[str, ...] = ()
+    """The effect that each group belongs to."""
+
+    def of(self, name: str) -> "Forms":
+        """Those of one effect alone."""
+        kept = self.groups[self.names.index(name)]
+        return Forms(self.columns[:, kept], (tuple(range(len(kept))),), (name,))
 
 
 def forms(found: Fit, own: int, prepared: Prepared) -> Forms | None:
@@ -52,7 +59,7 @@ def forms(found: Fit, own: int, prepared: Prepared) -> Forms | None:
         columns.append(torque[:, None] * shapes / sqrt(shapes.shape[1]))
         placed.append(tuple(range(first, first + shapes.shape[1])))
         first += shapes.shape[1]
-    return Forms(np.column_stack(columns), tuple(placed))
+    return Forms(np.column_stack(columns), tuple(placed), tuple(groups))
 
 
 def _left(prepared: Prepared, mount: Mount) -> Array:

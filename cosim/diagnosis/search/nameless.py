@@ -6,11 +6,12 @@ with every term that may be learned, in its place and in the same nats,
 
     lead = worth(others + term) - ln(terms tried) - max(worth(others + effect), worth(others + its own table))
 
-(a contest: a lead counts no more than the few ways in which equations may be wrong allow, see `stages.contest`)
 beside what a law of friction over speed may lack, and leaves where the lead is one by which a rival is excluded where
-something has no name, and the held-out recordings do not contradict it. A term that is the effect in another form
-(`Hypothesis.tables`) takes nothing away: where the effect's own table is as good, it is its shape that is wrong, not
-its name. What then remains is asked again beside that term: names come in twos and threes where each imitates a part.
+something has no name, and the held-out recordings do not contradict it. The machine may be off the effect's equation
+by some per cent (`evidence/forms.py`): what that explains is no lead of a term. A term that is the effect in another
+form (`Hypothesis.tables`) takes nothing away: where the effect's own table is as good, it is its shape that is wrong,
+not its name. What then remains is asked again beside that term: names come in twos and threes where each imitates
+a part.
 """
 
 from collections.abc import Iterable, Sequence
@@ -18,7 +19,6 @@ from dataclasses import dataclass, replace
 from math import inf, log
 
 from cosim.diagnosis.answer.ledger import Rule
-from cosim.diagnosis.decide.policy import Policy
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
@@ -80,8 +80,7 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
     offered = _Offered.by(comparison, held)
     while found.proof.standing:
         known = [*offered.law, *found.terms]
-        whole = _grams(comparison, found.proof.chosen, known)
-        own = tuple(_worth(one, range(len(known))) for one in _counted(whole, comparison.policy))
+        own = _worth(_grams(comparison, found.proof.chosen, known), range(len(known)))
         challenges = [_challenge(comparison, found, one, own, offered) for one in found.proof.standing]
         worst = max(challenges, key=lambda one: one.lead)
         leads = worst.lead >= least and _holds(comparison, found, worst, held)
@@ -96,7 +95,7 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
 
 
 def _challenge(
-    comparison: Comparison, found: Nameless, one: AcceptedEffect, own: tuple[float, ...], offered: _Offered
+    comparison: Comparison, found: Nameless, one: AcceptedEffect, own: float, offered: _Offered
 ) -> _Challenge:
     """What leads an effect by most, beside the terms that took a name already; `own`: the worth of all that stands."""
     beside = _without(comparison, found.proof, one)
@@ -107,14 +106,11 @@ def _challenge(
     if not terms:
         return _Challenge(one, offered.free[0], -inf, beside)
     grams, known = _grams(comparison, beside, [*law, *terms, *alike]), range(len(law) + len(found.terms))
-    leads: list[float] = []
-    best = 0
-    for counted, mine in zip(_counted(grams, comparison.policy), own, strict=True):
-        worth = [_worth(counted, {*known, k + len(law)}) for k in range(len(terms) + len(alike))]
-        kind = max([mine, *(value - log(len(alike)) for value in worth[len(terms) :])])
-        best = best if leads else max(range(len(terms)), key=lambda k: worth[k])
-        leads.append(worth[best] - log(len(terms)) - kind)
-    return _Challenge(one, terms[best], min(leads), beside)
+    worth = [_worth(grams, {*known, k + len(law)}) for k in range(len(terms) + len(alike))]
+    own += comparison.form_gain(found.proof.chosen, one.effect.id)
+    kind = max([own, *(value - log(len(alike)) for value in worth[len(terms) :])])
+    best = max(range(len(terms)), key=lambda k: worth[k])
+    return _Challenge(one, terms[best], worth[best] - log(len(terms)) - kind, beside)
 
 
 def _without(comparison: Comparison, proof: Proof, out: AcceptedEffect) -> Fit:
@@ -128,11 +124,6 @@ def _without(comparison: Comparison, proof: Proof, out: AcceptedEffect) -> Fit:
 def _grams(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]) -> Grams:
     columns = [columns_of(found.mount, one, comparison.problem.prepared) for one in terms]
     return grams_of(comparison, found, columns, terms)
-
-
-def _counted(grams: Grams, policy: Policy) -> tuple[Grams, Grams]:
-    """The same with independent rows, and with the few ways in which equations may be wrong in their place."""
-    return grams, replace(grams, coarsening=policy.form_ways)
 
 
 def _worth(grams: Grams, chosen: Iterable[int]) -> float:
