@@ -136,8 +136,8 @@ class Comparison:
         missed = self.missed_by(found)
         if missed is None or name not in missed.names:
             return 0.0
-        loose, exact = (self._marginal(found, NONE, False, one) for one in (missed.of(name), None))
-        return max(0.0, loose.log_likelihood - exact.log_likelihood)
+        loose = self._marginal(found, NONE, False, missed.of(name)).log_likelihood
+        return max(0.0, loose - self.policy.phase_price * found.phases - self.evidence(found))
 
     def missed_by(self, beside: Fit | None) -> Forms | None:
         """What the effects of a structure may miss; computed once."""
