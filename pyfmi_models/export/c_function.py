@@ -7,11 +7,9 @@ numbers are the FMU's bit for bit. There is no heap and nothing global: joints o
 import re
 from pathlib import Path
 
-from jinja2 import Environment, StrictUndefined
-
 from pyfmi_models.errors import ExportError
-from pyfmi_models.export.c_code import number
 from pyfmi_models.export.codegen import SHIM, TOLERANCE, generate
+from pyfmi_models.export.templates import rendered
 from pyfmi_models.model import Model
 
 FOLDER = SHIM / "function"
@@ -71,12 +69,4 @@ def _only(equations: str) -> str:
 
 
 def _render(name: str, values: dict[str, object]) -> str:
-    environment = Environment(
-        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
-    )
-    environment.filters |= {
-        "macro": lambda text: re.sub(r"\W", "_", text, flags=re.ASCII).upper(),
-        "comment": lambda text: text.replace("*/", "* /").replace("\n", " "),
-        "number": number,
-    }
-    return environment.from_string((FOLDER / name).read_text("utf-8")).render(values | {"number": number})
+    return rendered(FOLDER / name, values)

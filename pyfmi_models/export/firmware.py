@@ -5,19 +5,16 @@ and three functions of hardware to fill in. There is no heap; how much stack and
 out from the compiled code, before anything runs.
 """
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from jinja2 import Environment, StrictUndefined
-
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export.build import compile_shared
-from pyfmi_models.export.c_code import number
 from pyfmi_models.export.codegen import SHIM, generate
 from pyfmi_models.export.description import version_text
 from pyfmi_models.export.objects import Footprint, footprint
 from pyfmi_models.export.platforms import PLATFORMS, host
+from pyfmi_models.export.templates import rendered
 from pyfmi_models.model import Model
 
 FOLDER = SHIM / "firmware"
@@ -135,13 +132,4 @@ def _names(model: Model, encoder: str, quantum: float, command: str) -> dict[str
 
 
 def _render(name: str, values: dict[str, object]) -> bytes:
-    environment = Environment(
-        undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True, keep_trailing_newline=True
-    )
-    environment.filters |= {
-        "macro": lambda text: re.sub(r"\W", "_", text, flags=re.ASCII).upper(),
-        "comment": lambda text: text.replace("*/", "* /").replace("\n", " "),
-        "number": number,
-        "code": "`{}`".format,
-    }
-    return environment.from_string((FOLDER / name).read_text("utf-8")).render(values | {"number": number}).encode()
+    return rendered(FOLDER / name, values).encode()
