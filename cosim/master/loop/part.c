@@ -61,11 +61,10 @@ int set_inputs(const Part *part)
         return 0;
     }
     if (part->version == 2) {
-        return after(part->altered, ((Set2 *)part->set)(part->instance, part->input_references, (size_t)part->inputs,
-                                                       part->input));
+        return ((Set2 *)part->set)(part->instance, part->input_references, (size_t)part->inputs, part->input);
     }
-    return after(part->altered, ((Set3 *)part->set)(part->instance, part->input_references, (size_t)part->inputs,
-                                                   part->input, (size_t)part->inputs));
+    return ((Set3 *)part->set)(part->instance, part->input_references, (size_t)part->inputs, part->input,
+                               (size_t)part->inputs);
 }
 
 int get_outputs(const Part *part)
@@ -74,23 +73,21 @@ int get_outputs(const Part *part)
         return 0;
     }
     if (part->version == 2) {
-        return after(part->altered, ((Get2 *)part->get)(part->instance, part->output_references,
-                                                       (size_t)part->outputs, part->output));
+        return ((Get2 *)part->get)(part->instance, part->output_references, (size_t)part->outputs, part->output);
     }
-    return after(part->altered, ((Get3 *)part->get)(part->instance, part->output_references, (size_t)part->outputs,
-                                                   part->output, (size_t)part->outputs));
+    return ((Get3 *)part->get)(part->instance, part->output_references, (size_t)part->outputs, part->output,
+                               (size_t)part->outputs);
 }
 
 /* `final`: the component will not be taken back to before this step. */
 int do_step(const Part *part, double time, double size, bool final)
 {
     if (part->version == 2) {
-        return after(part->altered, ((Step2 *)part->step)(part->instance, time, size, final));
+        return ((Step2 *)part->step)(part->instance, time, size, final);
     }
     bool event = false, terminate = false, early = false;
     double last = time;
-    int status = after(part->altered, ((Step3 *)part->step)(part->instance, time, size, final, &event, &terminate,
-                                                            &early, &last));
+    int status = ((Step3 *)part->step)(part->instance, time, size, final, &event, &terminate, &early, &last);
     if (status <= FMI_WARNING && terminate) {
         return TERMINATED;
     }
