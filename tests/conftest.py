@@ -1,6 +1,14 @@
-"""Ctrl-C means the same however the tests were started: a shell's background jobs, and so their children, ignore it."""
+"""What all tests share: where the benches are found, and Ctrl-C.
+
+Ctrl-C means the same however the tests were started: a shell's background jobs, and so their children, ignore it.
+"""
 
 import signal
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+sys.path += [str(ROOT / "bench"), str(ROOT)]  # behind the installed package, which is the one that is tested
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)

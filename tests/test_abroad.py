@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from benchmarks import abroad, abroad_page
 
+from bench import abroad, abroad_page
 from cosim_studies.proof.ledger import listed
 
 GENERATOR = """

@@ -1,14 +1,11 @@
 """The benchmarks of the master still run, and all runners do the same work."""
 
-import sys
 from math import isfinite
 from pathlib import Path
 
-import pytest
-
-sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
 import master_runners
 import master_step
+import pytest
 
 
 @pytest.mark.parametrize("fmi", [2, 3])

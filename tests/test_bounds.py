@@ -1,12 +1,11 @@
 """Bounds of what was not seen: what is concealed at the bound is found, what is far below it is not."""
 
-import sys
 from dataclasses import replace
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 import pytest
+from bounds import Stand, case, drawn
 
 from cosim.diagnosis.effects import candidates
 from cosim.diagnosis.effects.candidates import columns_of
@@ -14,9 +13,6 @@ from cosim.diagnosis.measure.bounds import SeenFrom
 from cosim.diagnosis.measure.bounds import tested as seen_from
 from cosim.diagnosis.measure.concealment import Concealment, Hidden
 from cosim.estimation.inverse import Inverse, stacked
-
-sys.path.append(str(Path(__file__).parent / "benchmarks"))
-from bounds import Stand, case, drawn
 
 CONCEALED = ("torque_offset", "cogging", "delay", "friction_asymmetry", "periodic_disturbance")
 

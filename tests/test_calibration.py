@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks import calibration as benchmark
 
+from bench import calibration as benchmark
 from cosim.diagnosis.decide.calibration import OFFSET, SLOPE, calibrated
 
 BENCHMARK = Path(benchmark.__file__)

@@ -11,9 +11,9 @@ import jsonschema
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from benchmarks.diagnosis import null_case
 from test_prepare import recorded, wander
 
+from bench.diagnosis import null_case
 from cosim.cli import main
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import diagnose

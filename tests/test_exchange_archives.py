@@ -1,15 +1,12 @@
 """The table of others' archives: what runs is compared, a refusal counts only where its reason is found elsewhere."""
 
-import sys
 import zipfile
 from pathlib import Path
 
 import pytest
-from tiny_fmu import described, tiny
-
-sys.path.append(str(Path(__file__).with_name("benchmarks")))
 from exchange_archives import page, rows_of
 from exchange_truth import differ
+from tiny_fmu import described, tiny
 
 __all__ = ["tiny"]
 

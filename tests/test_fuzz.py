@@ -1,4 +1,4 @@
-"""Random calls of the C interface: a sample of what tests/benchmarks/fuzz.py does for long and under sanitizers."""
+"""Random calls of the C interface: a sample of what bench/fuzz.py does for long and under sanitizers."""
 
 from functools import cache
 

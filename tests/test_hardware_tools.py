@@ -5,6 +5,8 @@ import sys
 from contextlib import ExitStack
 from pathlib import Path
 
+import hardware_faults
+import hardware_page
 import numpy as np
 import pytest
 from on_hardware import SCENARIO, SIMULATED, invoke, recorded, scenario
@@ -19,10 +21,6 @@ from cosim.hardware.virtual import plant_of
 from cosim.master.exchange import open_fmu
 from cosim.models.cache import fmu_of_card
 from cosim.support.errors import HardwareError
-
-sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
-import hardware_faults
-import hardware_page
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.identification import POSITIVE, multisine, the_card
 
+from bench.identification import POSITIVE, multisine, the_card
 from cosim.cli import main
 from cosim.data.recording import Recording
 from cosim.estimation.identify.deliver import summary

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.investigate import COLUMNS, Case, Concealed, is_true, page
 
+from bench.investigate import COLUMNS, Case, Concealed, is_true, page
 from cosim.investigation.families import fast_sweeps
 from cosim.investigation.motions import room_of
 

@@ -1,8 +1,8 @@
 """The benchmark of learned terms beside regressions: what it records, and what its page counts."""
 
 import numpy as np
-from benchmarks.learned_baselines import METHODS, WIDE, bench_of, page
 
+from bench.learned_baselines import METHODS, WIDE, bench_of, page
 from cosim_studies.proof.simulated_axis import RECORDINGS
 
 

@@ -3,8 +3,8 @@
 from typing import Any
 
 import pytest
-from benchmarks import learned_terms, learned_terms_page
 
+from bench import learned_terms, learned_terms_page
 from cosim_studies.proof.generator import OUTSIDE
 
 

@@ -1,8 +1,6 @@
 """What the diagnosis cannot name is unknown: an effect found by its name, and the same without that name."""
 
-import sys
-from pathlib import Path
-
+import leave_one_out
 import numpy as np
 import pytest
 
@@ -18,10 +16,6 @@ from cosim_studies.proof.generator import make_case, to_toml
 from cosim_studies.proof.outside import SHAPED
 from pyfmi_models.card import parse_card
 from pyfmi_models.effects import ActuatorLag
-
-sys.path.append(str(Path(__file__).parent / "benchmarks"))
-
-import leave_one_out
 
 
 def recorded(effect: str, seed: int) -> list[Recording]:

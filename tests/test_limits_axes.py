@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.investigate_limits import Asked, machine, page, run
-from benchmarks.limits_axes import axis
 
+from bench.investigate_limits import Asked, machine, page, run
+from bench.limits_axes import axis
 from cosim.investigation.families import fast_sweeps
 from cosim.investigation.limits import Limits
 from cosim.investigation.motions import room_of

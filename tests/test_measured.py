@@ -1,10 +1,13 @@
 """Measured machines: the official protocol of EMPS on a machine that is known, and copies with one mistake each."""
 
-import sys
 import time
 from pathlib import Path
 
+import corrupted
+import judges
+import measured
 import numpy as np
+import official
 import pandas as pd
 import pytest
 
@@ -12,12 +15,6 @@ from cosim.data.recording import Recording
 from cosim.support.errors import RecordingError
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
-
-sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
-import corrupted
-import judges
-import measured
-import official
 
 MASS, DRAG, TICK = 95.0, 200.0, 1e-3
 

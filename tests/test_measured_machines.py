@@ -1,14 +1,11 @@
 """Two measured machines, where their recordings lie beside the checkout: what their READMEs say is what is found."""
 
-import sys
 from pathlib import Path
 from typing import Any
 
-import pytest
-
-sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
 import measured
 import measured_later
+import pytest
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "recordings"
 pytestmark = pytest.mark.skipif(not DATA.exists(), reason="the measured recordings are not beside this checkout")

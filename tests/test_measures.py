@@ -15,8 +15,9 @@ def test_no_function_has_more_than_62_lines_and_no_file_more_than_400() -> None:
     assert FOUND.files[-1] <= LONGEST
 
 
-def test_files_of_tests_are_short() -> None:
-    lines = {path: len(path.read_text("utf-8").splitlines()) for path in (ROOT / "tests").rglob("*.py")}
+def test_files_of_tests_and_benches_are_short() -> None:
+    files = [path for folder in ("bench", "tests") for path in (ROOT / folder).rglob("*.py")]
+    lines = {path: len(path.read_text("utf-8").splitlines()) for path in files}
     long = {path.name: number for path, number in lines.items() if number > LONGEST}
     assert not long, f"split by meaning: {long}"
 

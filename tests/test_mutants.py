@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent / "benchmarks"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "bench"))
 
 import mutants
 import mutants_choice
@@ -163,7 +163,7 @@ def test_of_what_is_declared_outside_of_functions_the_tests_come_first_that_name
 
 def test_who_calls_what_is_noted_for_each_test_that_passes(tmp_path: Path) -> None:
     out = tmp_path / "reach"
-    here = Path(__file__).parent / "benchmarks" / "reach.py"
+    here = Path(__file__).parents[1] / "bench" / "reach.py"
     command = [sys.executable, here, "--files", "test_decision_proof.py", "--out", out]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr

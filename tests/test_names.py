@@ -10,10 +10,10 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("cosim", "cosim_studies", "pyfmi_models")
-SOURCES = sorted(path for folder in (*PACKAGES, "tests") for path in (ROOT / folder).rglob("*.py"))
+SOURCES = sorted(path for folder in (*PACKAGES, "bench", "tests") for path in (ROOT / folder).rglob("*.py"))
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "results").glob("*.md")])
 MODULES = {".".join(one.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): one for one in SOURCES}
-PATH = re.compile(r"(?<![\w/.])(?:cosim|cosim_studies|pyfmi_models|tests|docs|results|\.ci)(?:/[\w.-]+)+")
+PATH = re.compile(r"(?<![\w/.])(?:cosim|cosim_studies|pyfmi_models|bench|tests|docs|results|\.ci)(?:/[\w.-]+)+")
 NAME = re.compile(rf"\b(?:{'|'.join(PACKAGES)})(?:\.[a-zA-Z_]\w*)+")
 BARE = re.compile(r"`(\w+\.(?:py|c|h))`")
 TO_WRITE = {"herschel_bulkley.py", "wind_load.py", "wind_load", "my_drive.py", "camera.py", "equations.c", "model.c"}
@@ -68,7 +68,7 @@ def untrue(text: str) -> set[str]:
     return names | {one for one in paths if not (ROOT / one).exists()} | bare
 
 
-FILES = {one.name for folder in (*PACKAGES, "tests", "docs") for one in (ROOT / folder).rglob("*.*")}
+FILES = {one.name for folder in (*PACKAGES, "bench", "tests", "docs") for one in (ROOT / folder).rglob("*.*")}
 
 
 def test_what_is_named_is_there() -> None:

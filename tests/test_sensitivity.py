@@ -1,19 +1,15 @@
 """A replay of a case answers as a diagnosis does, and a constant that is changed changes it."""
 
-import sys
 from dataclasses import fields
 from pathlib import Path
 
 import pytest
+import sensitivity
 
 from cosim.diagnosis.decide.policy import POLICY, Policy
 from cosim.diagnosis.diagnose import diagnose
 from cosim_studies.proof.generator import make_case, write_given
 from cosim_studies.proof.tool import given
-
-sys.path.append(str(Path(__file__).parent / "benchmarks"))
-
-import sensitivity
 
 
 def test_a_replay_is_a_diagnosis_by_another_policy(tmp_path: Path) -> None:

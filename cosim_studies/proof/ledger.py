@@ -15,7 +15,7 @@ PURPOSES = ("tuning", "scoring")
 HEAD = """# Every deck that was played with known truth
 
 A deck for *tuning* may have shaped the code; one for *scoring* was drawn after the code was frozen and is not looked at
-before. `cosim prove --decks` and `tests/benchmarks/abroad.py --decks` append to this list by themselves; *fresh* says
+before. `cosim prove --decks` and `bench/abroad.py --decks` append to this list by themselves; *fresh* says
 that the generator's seed stands in no earlier line of another code.
 
 """

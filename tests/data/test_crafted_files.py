@@ -6,17 +6,13 @@ Each is read in a fork of an interpreter of its own, whose memory and time are c
 import json
 import subprocess
 import sys
-from pathlib import Path
-
-import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
 
 import attack_files
+import pytest
 
 KINDS = sorted({name.partition(":")[0] for name in attack_files.FILES})
 EACH = 2
-"""Files of each kind at most, none that takes long; `python tests/benchmarks/attack_files.py` shows all."""
+"""Files of each kind at most, none that takes long; `python bench/attack_files.py` shows all."""
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks")

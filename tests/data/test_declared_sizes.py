@@ -1,19 +1,15 @@
 """What a file declares is judged before it is unpacked, and what is computed in a database is never run."""
 
 import re
-import sys
 from pathlib import Path
 
+import attack_files
+import attack_files_bags
 import numpy as np
 import pyarrow as pa
 import pytest
 from pyarrow import parquet
 from scipy.io import savemat
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-
-import attack_files
-import attack_files_bags
 
 from cosim.data import limits
 from cosim.data.recording import Recording

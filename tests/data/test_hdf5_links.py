@@ -1,16 +1,12 @@
 """A recording in HDF5, which MAT 7.3 is, is read from its own file alone, and costs what it holds."""
 
-import sys
 from pathlib import Path
 from random import Random
 
+import attack_files_hdf5 as crafted
 import h5py
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "benchmarks"))
-
-import attack_files_hdf5 as crafted
 
 from cosim.data.recording import Recording
 from cosim.support.errors import RecordingError

@@ -1,18 +1,16 @@
 """The small cases of the net: a diagnosis still gives the stored answers, and computes no more for them."""
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
-sys.path.append(str(ROOT))
-import cosim  # noqa: E402
-from bench.net.answers import ALIKE, STORED, Answer, differences, of_folder, read  # noqa: E402
-from bench.net.cases import NetCase, home  # noqa: E402
-from bench.net.counts import counted  # noqa: E402
+import cosim
+from bench.net.answers import ALIKE, STORED, Answer, differences, of_folder, read
+from bench.net.cases import NetCase, home
+from bench.net.counts import counted
 
+ROOT = Path(__file__).parents[2]
 SMALL = [one for one in home() if one.small]
 MORE = 1.1
 """Growth of a count at which the test fails: a cost that nobody sees on a machine that is busy anyhow."""
