@@ -15,7 +15,7 @@ from sweeps import SCENARIO, K, folder, run, written
 from test_cli_run import ENVIRONMENT
 from tiny_fmu import tiny
 
-import cosim.sweeps.pool
+import cosim.sweeps.cluster
 from cosim.support.errors import OutputError, SweepError
 
 __all__ = ["folder", "tiny"]
@@ -211,7 +211,7 @@ def test_a_cluster_gives_the_same_table_and_survives_a_crash(folder: Path, monke
 
 def test_a_cluster_that_is_not_there_is_one_sentence(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr(cosim.sweeps.pool, "PATIENCE", 0.5)
+    monkeypatch.setattr(cosim.sweeps.cluster, "PATIENCE", 0.5)
     with pytest.raises(SweepError, match=r"No Dask scheduler answers at tcp://127.0.0.1:9; give its address as"):
         run(folder / "sweep.toml", address="tcp://127.0.0.1:9", workers=None)
     with pytest.raises(SweepError, match=r"record = true keeps files on this machine; it does not go with --cluster"):

@@ -1,7 +1,8 @@
 """`cosim.identify` of a foreign FMU or of a system: recordings to numbers, and the FMU with these."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from hashlib import sha256
 from math import isfinite
 from pathlib import Path
 
@@ -10,12 +11,16 @@ from cosim.calibration import deliver
 from cosim.calibration.calibrate import Calibrated, Options
 from cosim.calibration.calibrate import calibrate as find
 from cosim.calibration.page import number_rows
+from cosim.calibration.store import stored
 from cosim.calibration.subject import Subject, of_fmu, of_system
 from cosim.data.recording import Recording
 from cosim.models.cache import with_fmus
 from cosim.plots.quantities import number
+from cosim.support.files import sha256 as sha256_of
 from cosim.support.html import table as html_table
 from cosim.support.plain import JsonObject
+from cosim.support.version import __version__
+from cosim.sweeps.portable_job import files_of
 from cosim.system.scenario import Scenario, read_scenario
 
 
@@ -72,9 +77,25 @@ def calibrate(
     if out:
         deliver.check_out(out, subject.source, subject.alone, force)
     train, kept = _read(recordings, "recording", units), _read(heldout, "heldout", units)
-    done = find(subject, train, kept, options, on_progress)
-    files = deliver.deliver(done, (*train, *kept), out, force) if out else {}
+    if out is None:
+        return CalibrateResult(find(subject, train, kept, options, on_progress))
+    with stored(out, _identity(subject, (*train, *kept), options), force) as store:
+        if store.found:
+            on_progress(f"{store.found:,} simulations were done before")
+        done = find(subject, train, kept, options, on_progress, store)
+        files = deliver.deliver(done, (*train, *kept), out, force)
     return CalibrateResult(done, files)
+
+
+def _identity(subject: Subject, recordings: Sequence[Recording], options: Options) -> dict[str, str]:
+    """What simulations depend on, by what it is called in a message."""
+    components = {name: repr(one.model_dump()) for name, one in subject.scenario.components.items()}
+    same = replace(options, workers=None, timeout=0, cluster="", starts=0, seed=0, loss="linear")
+    units = [(one.sha256, sorted(one.units.items())) for one in recordings]
+    texts = {"model": subject.scenario.text + repr(components), "options": repr(same), "recordings": repr(units)}
+    hashes = {name: sha256(text.encode()).hexdigest() for name, text in texts.items()}
+    files = {f"file of {name}": sha256_of(path) for name, path in files_of(subject.scenario).items()}
+    return {"version": __version__} | hashes | files
 
 
 def subject_of(

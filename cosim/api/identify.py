@@ -85,12 +85,16 @@ class ForModels(TypedDict, total=False):
     """Of inputs between rows: "hold" or "linear"."""
     window: float | None
     """Seconds after which a simulation starts anew from the recording; None: never."""
+    initial: str
+    """"recorded" starts windows from readings; "free" finds the start values of each window or recording too."""
     loss: Loss
     """"linear", or "soft_l1" for recordings with outliers."""
     workers: int | None
     """Processes that simulate; None is one a core."""
     timeout: float
     """Seconds that the first simulation may take."""
+    cluster: str
+    """Address of a Dask scheduler whose workers simulate, in place of processes of this machine."""
 
 
 @overload
@@ -195,9 +199,11 @@ def _options(model: ForModels, options: Calibration) -> Calibration:
         step=model.get("step"),
         interpolation=model.get("interpolation", options.interpolation),
         window=model.get("window"),
+        initial=model.get("initial", options.initial),
         loss=model.get("loss", options.loss),
         workers=model.get("workers"),
         timeout=model.get("timeout", options.timeout),
+        cluster=model.get("cluster", options.cluster),
     )
 
 

@@ -14,9 +14,11 @@ import numpy as np
 from cosim.calibration.experiment import Array, Experiment, experiment_of, matching, record_of
 from cosim.calibration.fit import LOSSES, Fit, Loss, fit
 from cosim.calibration.free import Free, free_of
-from cosim.calibration.processes import TIMEOUT, Outputs, Processes
+from cosim.calibration.initial import INITIALS, from_first_row, states_of, with_free_starts
+from cosim.calibration.processes import TIMEOUT, Processes
 from cosim.calibration.residuals import Residuals, Rows
-from cosim.calibration.simulation import Job, Point
+from cosim.calibration.simulation import Job, Outputs, Point
+from cosim.calibration.store import Store
 from cosim.calibration.subject import Subject, unknown
 from cosim.calibration.uncertainty import Uncertainty, uncertainty_of
 from cosim.calibration.windows import windows_of
@@ -41,11 +43,14 @@ class Options:
         step: of the simulation [s]; None is that of the rows.
         interpolation: of inputs between rows: "hold" or "linear".
         window: seconds after which a simulation starts anew from the recording; None simulates each as a whole.
+        initial: "recorded" starts a window from the readings there; "free" finds the start values of each window, or
+            of each recording where there are no windows, like the other numbers.
         starts: starts of the fit, of which two that agree are enough.
         seed: of the random starts.
         loss: "linear", or "soft_l1" for recordings with outliers.
         workers: processes; None is one a core.
         timeout: seconds that the first simulation may take.
+        cluster: address of a Dask scheduler whose workers simulate; "" for processes of this machine.
     """
 
     free: tuple[str, ...]
@@ -55,11 +60,13 @@ class Options:
     step: float | None = None
     interpolation: str = "hold"
     window: float | None = None
+    initial: str = "recorded"
     starts: int = 4
     seed: int = 0
     loss: Loss = "linear"
     workers: int | None = None
     timeout: float = TIMEOUT
+    cluster: str = ""
 
 
 @dataclass(frozen=True)
@@ -94,6 +101,8 @@ class Calibrated:
     evaluations: int
     lost: tuple[str, ...]
     notes: tuple[str, ...]
+    initial: Mapping[str, float] = field(default_factory=dict)
+    """Start values that were free, by name."""
 
 
 def calibrate(
@@ -102,8 +111,11 @@ def calibrate(
     heldout: Sequence[Recording],
     options: Options,
     say: Callable[[str], None] = lambda text: None,
+    store: Store | None = None,
 ) -> Calibrated:
     """Find the numbers of a model with which it follows recordings, and judge them on recordings kept out.
+
+    What `store` has is not simulated again.
 
     Raises:
         InputError: a name, a column, a unit or an option does not fit; or the model cannot be simulated at its start.
@@ -118,22 +130,21 @@ def calibrate(
         experiment_of(subject, one, match, options.step, options.interpolation)
         for one, match in zip((*train, *heldout), matched, strict=True)
     ]
-    whole, fitted = tuple(laid), laid[: len(train)]
-    if options.window is not None:
-        fitted = [part for one in fitted for part in windows_of(subject, one, options.window, options.free)]
-    noted = () if options.window is None else (OF_WINDOWS,)
-    start = np.array([one.start / one.scale for one in free])
-    before = {one.name: one.start for one in free}
+    whole, fitted, own = _experiments(subject, laid, len(train), options)
+    numbers = (*free, *own)
+    noted = () if options.window is None or own else (OF_WINDOWS,)
+    start = np.array([one.start / one.scale for one in numbers])
+    before = {one.name: one.start for one in numbers}
     notes = (*dict.fromkeys(note for match in matched for note in match.notes), *noted)
     job = Job(subject, (*whole, *fitted), options.given)
     all_, part = slice(0, len(whole)), slice(len(whole), None)
-    with Processes(job, options.workers, options.timeout) as processes:
+    with Processes(job, options.workers, options.timeout, options.cluster, store) as processes:
         say("first simulation")
         old = processes.first(before, all_)
         _check_numbers(subject, whole, old)
         rows = Rows.of(fitted)
-        _check_rows(rows, len(free))
-        residuals = Residuals(processes, free, rows, 1 / rows.spread, part)
+        _check_rows(rows, len(numbers))
+        residuals = Residuals(processes, numbers, rows, 1 / rows.spread, part)
         found = fit(residuals, start, options.starts, options.seed, options.loss, say)
         values = residuals.point(found.x)
         notes += _on_roughness(residuals.rough)
@@ -142,16 +153,36 @@ def calibrate(
     if new is None:
         text = f"{subject.source} cannot be simulated on all recordings with the numbers that were found"
         raise InputError(f"{text}: {lost[-1]}", culprit="heldout")
-    uncertainty = uncertainty_of(found, free, residuals.scales, rows)
+    uncertainty, told = uncertainty_of(found, numbers, residuals.scales, rows).of_shared(numbers)
     values = {**values, **{name: before[name] for one in uncertainty.not_determined if one.idle for name in one.parts}}
     traces = _traces(subject, whole, len(train), old, new)
-    return Calibrated(subject, free, values, uncertainty, traces, found, evaluations, lost, notes)
+    initial = {one.name: values.pop(one.name) for one in own}
+    return Calibrated(subject, free, values, uncertainty, traces, found, evaluations, lost, (*notes, *told), initial)
+
+
+def _experiments(
+    subject: Subject, laid: Sequence[Experiment], trained: int, options: Options
+) -> tuple[tuple[Experiment, ...], list[Experiment], tuple[Free, ...]]:
+    """Recordings as a whole, what is fitted, and the start values that are free."""
+    whole, fitted, free = list(laid), list(laid[:trained]), options.free
+    if options.window is not None:
+        fitted = [part for one in fitted for part in windows_of(subject, one, options.window, free)]
+    if options.initial != "free":
+        return tuple(whole), fitted, ()
+    if options.window is None:
+        whole = [from_first_row(one, states_of(subject, one, free, "--initial free")) for one in laid]
+        fitted = whole[:trained]
+    fitted, own = with_free_starts(subject, fitted, free)
+    if options.window is None:
+        whole[:trained] = fitted
+    return tuple(whole), fitted, own
 
 
 def _check(options: Options) -> None:
     for name, value, choices in (
         ("--loss", options.loss, LOSSES),
         ("--interpolation", options.interpolation, INTERPOLATIONS),
+        ("--initial", options.initial, INITIALS),
     ):
         if value not in choices:
             text = f'{name} "{value}": there are: {", ".join(choices)}.'

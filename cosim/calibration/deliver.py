@@ -66,6 +66,7 @@ def as_json(done: Calibrated) -> JsonObject:
             }
             for one, error in zip(done.free, uncertainty.standard_errors, strict=True)
         },
+        "initial_values": dict(done.initial),
         "standard_errors": {
             name: error if isfinite(error) else None
             for name, error in zip(names, uncertainty.standard_errors, strict=True)

@@ -5,7 +5,7 @@ a column whose unit is not known is taken in the variable's.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import floor
 from typing import Any
 
@@ -47,6 +47,8 @@ class Experiment:
     replaced: tuple[str, ...] = ()
     starts: Mapping[str, float] | None = None
     """Start values that hold for this experiment alone, by variable."""
+    own: Mapping[str, str] = field(default_factory=dict)
+    """Start values of this experiment that are free: the number's name by variable."""
 
     def of(self, subject: Subject, scenario: Scenario) -> Scenario:
         """The scenario that simulates it; columns of its recording are those of the outputs."""

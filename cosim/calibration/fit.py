@@ -148,7 +148,10 @@ def _searched(residuals: Residuals, x: Array, loss: Loss, outlier: float, seed: 
         spans, turns = np.linalg.svd(slopes, full_matrices=False)[1:]
         errors = noise / np.maximum(spans, np.finfo(float).eps * max(float(spans[0]), 1e-300))
         reach = np.minimum(errors, REACH)
-        points = [best + width * (reach * random.standard_normal(len(best))) @ turns for _ in range(DRAWN * len(best))]
+        points = [
+            best + width * (reach * random.standard_normal(len(best))) @ turns
+            for _ in range(DRAWN * len(residuals.groups))
+        ]
         costs = [_cost(z, loss, outlier) for z in residuals.many([residuals.inside(one) for one in points])]
         k = int(np.argmin(costs))
         if costs[k] < least:
@@ -178,7 +181,8 @@ def _drawn(free: Sequence[Free], scales: Array, random: np.random.Generator) -> 
     values = []
     for one in free:
         u = float(random.uniform(-1, 1))
-        value = one.start * FACTOR**u if one.start else one.start + u * one.scale
+        near = one.start * FACTOR**u if one.start else one.start + u * one.scale
+        value = near if one.experiment < 0 else one.start  # a reading is near the truth
         values.append(np.clip(value, one.low, one.high))
     return np.array(values, np.float64) / scales
 

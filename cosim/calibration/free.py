@@ -14,7 +14,10 @@ OPTION = "--free"
 
 @dataclass(frozen=True)
 class Free:
-    """One number: its name, unit, start and bounds in the model's unit, and a size that counts as a large change."""
+    """One number: its name, unit, start and bounds in the model's unit, and a size that counts as a large change.
+
+    `experiment` is the one whose start value it is; -1 for a number that all share.
+    """
 
     name: str
     unit: str
@@ -22,6 +25,7 @@ class Free:
     low: float
     high: float
     scale: float
+    experiment: int = -1
 
 
 def free_of(

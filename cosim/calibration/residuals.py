@@ -6,7 +6,7 @@ The step of a difference is chosen by noise: it moves the rows by `SHARE` of wha
 model is as good as linear over it, but by no less than `FLOOR` of an output's spread, far above what a solver's
 tolerance makes of two runs. A model whose events fall on steps of its own is a staircase at small scales: `settle`
 looks for the widest step over which it is as good as linear, below which none is taken. Differences are central,
-one-sided at a bound or beside a point that cannot be simulated.
+one-sided at a bound or beside a point that cannot be simulated. Start values of different experiments move together.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,7 +17,8 @@ import numpy.typing as npt
 
 from cosim.calibration.experiment import Array, Experiment
 from cosim.calibration.free import Free
-from cosim.calibration.processes import Outputs, Processes
+from cosim.calibration.processes import Processes
+from cosim.calibration.simulation import Outputs
 
 SHARE = 0.3
 FLOOR = 1e-4
@@ -48,6 +49,8 @@ class Rows:
     seen: tuple[tuple[npt.NDArray[np.bool_], ...], ...]
     runs: tuple[slice, ...]
     """Rows of each experiment and output, in their order."""
+    parts: tuple[slice, ...]
+    """Rows of each experiment."""
 
     @classmethod
     def of(cls, experiments: Sequence[Experiment]) -> "Rows":
@@ -61,7 +64,9 @@ class Rows:
         ends = np.cumsum([len(part) for part in parts])
         runs = tuple(slice(int(end - len(part)), int(end)) for end, part in zip(ends, parts, strict=True))
         spread = np.array([_spread(measured[output == k]) for k in range(len(names))])
-        return cls(measured, output, names, spread, seen, runs)
+        last = np.cumsum([len(one.outputs) for one in experiments]).tolist()
+        spans = tuple(slice(runs[0 if k == 0 else last[k - 1]].start, runs[last[k] - 1].stop) for k in range(len(last)))
+        return cls(measured, output, names, spread, seen, runs, spans)
 
     def of_outputs(self, outputs: Outputs) -> Array:
         """Simulated numbers in the same order."""
@@ -88,6 +93,10 @@ class Residuals:
         self.least = LEAST * np.ones(len(self.free))
         self.stairs = False
         self.rough: tuple[str, ...] = ()
+        self.groups = groups_of(self.free)
+        """Numbers that one simulation moves together."""
+        self.reach = [slice(None) if one.experiment < 0 else self.rows.parts[one.experiment] for one in self.free]
+        """Rows that each number moves."""
         self._known: dict[bytes, Array | None] = {}
 
     def point(self, x: Array) -> Mapping[str, float]:
@@ -103,7 +112,7 @@ class Residuals:
 
     def simulated(self, points: Sequence[Array]) -> list[Array | None]:
         """Outputs at points, in rows."""
-        if len(self._known) > KEPT * (len(self.free) + 1):
+        if len(self._known) > KEPT * (len(self.groups) + 1):
             self._known.clear()
         new = [x for x in dict.fromkeys(x.tobytes() for x in points) if x not in self._known]
         found = self.processes.at([self.point(np.frombuffer(x)) for x in new], self.part)
@@ -167,15 +176,17 @@ class Residuals:
         low = np.array([one.low for one in self.free]) / self.scales
         high = np.array([one.high for one in self.free]) / self.scales
         up, down = np.minimum(x + steps * size, high), np.maximum(x - steps * size, low)
-        points = [_moved(x, k, value) for values in (up, down) for k, value in enumerate(values)]
+        points = [_moved(x, group, values) for values in (up, down) for group in self.groups]
         here, *found = self.simulated([x, *points])
-        columns = np.zeros((len(self.rows.measured), len(x)))
-        for k in range(len(x)):
-            ends = [(up[k], found[k]), (down[k], found[k + len(x)]), (x[k], here)]
-            good = [(at, values) for at, values in ends if values is not None]
-            if len(good) > 1 and good[0][0] != good[1][0]:
-                (first, above), (second, below) = good[:2]
-                columns[:, k] = self.weights[self.rows.output] * (above - below) / (first - second)
+        columns, weights = np.zeros((len(self.rows.measured), len(x))), self.weights[self.rows.output]
+        for group, above, below in zip(self.groups, found, found[len(self.groups) :], strict=False):
+            for k in group:
+                ends = [(up[k], above), (down[k], below), (x[k], here)]
+                good = [(at, values) for at, values in ends if values is not None]
+                if len(good) > 1 and good[0][0] != good[1][0]:
+                    (first, upper), (second, lower) = good[:2]
+                    rows = self.reach[k]
+                    columns[rows, k] = weights[rows] * (upper[rows] - lower[rows]) / (first - second)
         return columns, here
 
     def _learn(self, columns: Array, z: Array, size: Array) -> None:
@@ -184,17 +195,28 @@ class Residuals:
 
     def _wanted(self, columns: Array, noise: float, size: Array) -> Array:
         """Relative steps that move the rows by a norm of `noise`, and by no less than `FLOOR` asks for."""
-        least = FLOOR * self.weights * self.rows.spread
-        floor = float(np.sqrt(np.sum(least[self.rows.output] ** 2)))
+        least = (FLOOR * self.weights * self.rows.spread)[self.rows.output] ** 2
+        floor = np.array([np.sqrt(np.sum(least[rows])) for rows in self.reach])
         slopes = np.linalg.norm(columns, axis=0)
-        wanted = np.divide(max(noise, floor), slopes, out=np.full(len(slopes), np.inf), where=slopes > 0)
+        wanted = np.divide(np.maximum(noise, floor), slopes, out=np.full(len(slopes), np.inf), where=slopes > 0)
         steps: Array = np.clip(wanted / size, LEAST, MOST)
         return steps
 
 
-def _moved(x: Array, k: int, value: float) -> Array:
+def groups_of(free: Sequence[Free]) -> list[list[int]]:
+    """Numbers whose derivatives one simulation gives: each alone, or one start value of every experiment."""
+    shared = [[k] for k, one in enumerate(free) if one.experiment < 0]
+    own: dict[int, list[int]] = {}
+    for k, one in enumerate(free):
+        if one.experiment >= 0:
+            own.setdefault(one.experiment, []).append(k)
+    most = max((len(numbers) for numbers in own.values()), default=0)
+    return shared + [[numbers[place] for numbers in own.values() if place < len(numbers)] for place in range(most)]
+
+
+def _moved(x: Array, numbers: Sequence[int], values: Array) -> Array:
     moved = x.copy()
-    moved[k] = value
+    moved[numbers] = values[numbers]
     return moved
 
 

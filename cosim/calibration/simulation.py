@@ -19,6 +19,16 @@ from cosim.system.scenario import Scenario
 from cosim.system.system import Fmu, Source
 
 Point = Mapping[str, float]
+Outputs = list[list[Array]]
+"""By experiment and output: the values at the rows of the recording."""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What came of a point: its outputs, or why there are none."""
+
+    outputs: Outputs | None
+    reason: str = ""
 
 
 @dataclass(frozen=True)
@@ -29,9 +39,20 @@ class Job:
     experiments: tuple[Experiment, ...]
     given: Point
 
-    def scenario(self, point: Point, experiment: Experiment) -> Scenario:
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario of the subject, whose files can be elsewhere."""
+        return self.subject.scenario
+
+    def with_scenario(self, scenario: Scenario) -> "Job":
+        """The same job with another scenario."""
+        return replace(self, subject=replace(self.subject, scenario=scenario))
+
+    def at(self, point: Point, experiment: Experiment) -> Scenario:
         """What is simulated at a point for one of the experiments."""
-        values = {**self.given, **(experiment.starts or {}), **point}
+        own = {variable: point[number] for variable, number in experiment.own.items()}
+        shared = {name: value for name, value in point.items() if name in self.subject.known}
+        values = {**self.given, **(experiment.starts or {}), **own, **shared}
         return experiment.of(self.subject, self.subject.with_values(values))
 
 
@@ -43,7 +64,7 @@ class Bench:
         self._stack, self._open = ExitStack(), dict[str, Component]()
         self._keeps: bool | None = None
 
-    def outputs(self, point: Point, part: slice) -> list[list[Array]]:
+    def outputs(self, point: Point, part: slice) -> Outputs:
         """Outputs at the rows of each experiment of a part of them.
 
         Raises:
@@ -61,7 +82,7 @@ class Bench:
         self._stack.close()
         self._stack = ExitStack()
 
-    def _all(self, point: Point, part: slice) -> list[list[Array]]:
+    def _all(self, point: Point, part: slice) -> Outputs:
         try:
             return [self._one(point, experiment) for experiment in self.job.experiments[part]]
         except BaseException:
@@ -69,7 +90,7 @@ class Bench:
             raise
 
     def _one(self, point: Point, experiment: Experiment) -> list[Array]:
-        system = self.job.scenario(point, experiment).system()
+        system = self.job.at(point, experiment).system()
         if self._keeps is False:
             self.close()
         components: dict[str, Source] = {
@@ -96,7 +117,7 @@ def prepare(key: str, job: Job) -> None:
     _BENCHES[key] = Bench(job)
 
 
-def outputs_at(key: str, point: Point, part: slice) -> list[list[Array]] | None:
+def outputs_at(key: str, point: Point, part: slice) -> Outputs | None:
     """Outputs of a job that was prepared; None where it was not."""
     bench = _BENCHES.get(key)
     return bench.outputs(point, part) if bench else None

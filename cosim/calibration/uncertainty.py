@@ -11,7 +11,7 @@ the outputs by less than their noise: |J v| < s. Two numbers that only act as a 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
@@ -58,6 +58,18 @@ class Uncertainty:
     def names(self) -> tuple[str, ...]:
         """Numbers that take part in a direction which is not determined."""
         return tuple(dict.fromkeys(name for one in self.not_determined for name in one.parts))
+
+    def of_shared(self, free: Sequence[Free]) -> tuple["Uncertainty", tuple[str, ...]]:
+        """What holds for the numbers that all experiments share, which come first; and a note on the others."""
+        count = sum(one.experiment < 0 for one in free)
+        own = {one.name for one in free[count:]}
+        kept = tuple(one for one in self.not_determined if not own.issuperset(one.parts))
+        lost = own.intersection(self.names)
+        said = (f"{len(lost)} of {len(own)} start values are not determined.",) if lost else ()
+        correlation = self.correlation[:count, :count]
+        return replace(
+            self, standard_errors=self.standard_errors[:count], correlation=correlation, not_determined=kept
+        ), said
 
 
 def uncertainty_of(found: Fit, free: Sequence[Free], scales: Array, rows: Rows) -> Uncertainty:

@@ -11,8 +11,8 @@ from math import ceil
 import numpy as np
 
 from cosim.calibration.experiment import Experiment
+from cosim.calibration.initial import states_of
 from cosim.calibration.subject import Subject
-from cosim.fmi.types import FLOATS
 from cosim.support.errors import InputError
 
 FEWEST = 4
@@ -25,11 +25,7 @@ def windows_of(subject: Subject, experiment: Experiment, seconds: float, free: S
     Raises:
         InputError: no output can be set at the start, or a window would hold fewer than `FEWEST` steps.
     """
-    states = [name for name in experiment.outputs if _is_state(subject, name) and name not in free]
-    if not states:
-        outputs = ", ".join(experiment.outputs)
-        text = f"--window: {subject.source} lets nobody set {outputs} at the start, so a window cannot begin from them"
-        raise InputError(f"{text}; leave --window out to simulate each recording as a whole.", culprit="--window")
+    states = states_of(subject, experiment, free, "--window")
     length = round(seconds / experiment.step)
     if length < FEWEST:
         text = f"--window {seconds:g}: that is {length} steps of {experiment.step:g} s; {FEWEST} are the fewest."
@@ -37,11 +33,6 @@ def windows_of(subject: Subject, experiment: Experiment, seconds: float, free: S
     count = max(1, ceil(experiment.ticks / length))
     parts = [_part(experiment, k * length, min((k + 1) * length, experiment.ticks), states) for k in range(count)]
     return [one for one in parts if one is not None]
-
-
-def _is_state(subject: Subject, name: str) -> bool:
-    port = subject.ports.get(name)
-    return port is not None and port.settable and port.type in FLOATS and name in subject.known
 
 
 def _part(experiment: Experiment, first: int, last: int, states: Sequence[str]) -> Experiment | None:

@@ -1,15 +1,21 @@
 """`cosim identify`: recordings and a card, an FMU or a system to the same with identified numbers."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 from cosim.cli.complete import cards
-from cosim.cli.options import Columns, Force, Layout, Out, Units, default_out
+from cosim.cli.options import Cluster, Columns, Force, Layout, Out, Units, default_out
 from cosim.support.errors import InputError
 from cosim.support.terminal import put, put_json, say, stage
+
+Set = Annotated[list[str] | None, typer.Option("--set", help="Other values, or starts: Motor.J=0.02 ... (FMU, system)")]
+Bounds = Annotated[
+    list[str] | None, typer.Option("--bounds", help="Least and greatest value: Motor.J=0.01..1 ... (FMU, system)")
+]
 
 
 def identify(
@@ -26,12 +32,8 @@ def identify(
     heldout: Annotated[
         list[Path] | None, typer.Option("--heldout", help="Recording that is not fitted (FMU, system).")
     ] = None,
-    set_: Annotated[
-        list[str] | None, typer.Option("--set", help="Other values, or starts: Motor.J=0.02 ... (FMU, system)")
-    ] = None,
-    bounds: Annotated[
-        list[str] | None, typer.Option("--bounds", help="Least and greatest value: Motor.J=0.01..1 ... (FMU, system)")
-    ] = None,
+    set_: Set = None,
+    bounds: Bounds = None,
     step: Annotated[float | None, typer.Option("--step", help="Of the simulation [s]; else the rows' (FMU).")] = None,
     interpolation: Annotated[
         str, typer.Option("--interpolation", help="Of inputs between rows: hold or linear (FMU, system).")
@@ -39,10 +41,14 @@ def identify(
     window: Annotated[
         float | None, typer.Option("--window", help="Start anew from the recording every so many s (FMU, system).")
     ] = None,
+    initial: Annotated[
+        str, typer.Option("--initial", help="Start values: recorded, or free: found per window (FMU, system).")
+    ] = "recorded",
     loss: Annotated[
         str, typer.Option("--loss", help="linear, or soft_l1 for recordings with outliers (FMU, system).")
     ] = "linear",
     workers: Annotated[int | None, typer.Option("--workers", min=1, help="Processes (FMU, system). [cores]")] = None,
+    cluster: Cluster = "",
     timeout: Annotated[
         float, typer.Option("--timeout", help="Seconds that the first simulation may take (FMU, system).")
     ] = 60.0,
@@ -71,6 +77,7 @@ def identify(
         return
     model = {"fmu": fmu, "system": system, "free": free or (), "workers": workers, "timeout": timeout}
     how = {"step": step, "interpolation": interpolation, "window": window, "loss": loss, "starts": starts, "seed": seed}
+    how |= {"initial": initial, "cluster": cluster}
     _model(recordings, heldout or [], out, {**model, **how}, (set_, bounds, columns, units), as_json, force)
 
 
@@ -121,7 +128,7 @@ def _model(
     )
     values = {name: _number("--set", name, text) for name, text in set_.items()}
     limits = {name: _range(name, text) for name, text in bounds.items()}
-    with stage("identifying") as progress:
+    with stage("identifying") as progress, _going_on(out):
         done = find(
             recordings,
             out=out,
@@ -136,6 +143,16 @@ def _model(
         )
     put_json(done.as_json()) if as_json else put(str(done))
     say(f"Wrote {', '.join(str(path) for path in done.files.values())}")
+
+
+@contextmanager
+def _going_on(out: Path) -> Iterator[None]:
+    """Say where an interrupted calibration goes on."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        say(f"what was simulated is in {out / 'progress'}; the same command with --out {out} goes on from there")
+        raise
 
 
 def _number(option: str, name: str, text: str) -> float:

@@ -24,6 +24,7 @@ Layout = Annotated[
 Out = Annotated[
     Path | None, typer.Option("--out", "-o", help="Folder for the results; cosim_out/NAME-n where it is not given.")
 ]
+Cluster = Annotated[str, typer.Option("--cluster", help="Address of a Dask scheduler: tcp://host:8786.")]
 Force = Annotated[bool, typer.Option("--force", help="Overwrite what is there.")]
 
 

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from cosim.cli.options import Out, command_of, default_out
+from cosim.cli.options import Cluster, Out, command_of, default_out
 from cosim.support.terminal import messages, put, put_json, say, stage
 
 PAUSE = 10.0
@@ -19,7 +19,7 @@ PAUSE = 10.0
 def sweep(
     file: Annotated[Path, typer.Argument(help="What is varied and what is kept (.toml).", metavar="SWEEP")],
     out: Out = None,
-    cluster: Annotated[str, typer.Option("--cluster", help="Address of a Dask scheduler: tcp://host:8786.")] = "",
+    cluster: Cluster = "",
     workers: Annotated[int | None, typer.Option("--workers", help="Processes; the cores of this machine.")] = None,
     retry: Annotated[bool, typer.Option("--retry", help="Run again what failed.")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the summary as JSON.")] = False,

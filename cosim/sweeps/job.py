@@ -32,6 +32,10 @@ class Job:
     recordings: Path | None = None
     kept: tuple[str, ...] = ()
 
+    def with_scenario(self, scenario: Scenario) -> "Job":
+        """Return the same runs of another scenario."""
+        return replace(self, scenario=scenario)
+
     def begun(self, number: int, point: Point) -> Row:
         """Return the row of a run that has come to nothing yet."""
         nothing = dict.fromkeys(self.statistics, nan)

@@ -1,17 +1,15 @@
 """Who does the runs: processes of this machine, or those of a Dask cluster; to the sweep both are the same."""
 
-import re
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any
 
 from cosim.support.cell import Cell, LostError, cores
-from cosim.support.errors import MissingPackageError, SweepError
-from cosim.support.extras import install
+from cosim.support.errors import SweepError
+from cosim.sweeps.cluster import on_cluster
 from cosim.sweeps.design import Point
 from cosim.sweeps.job import Job, Row, work
 from cosim.sweeps.portable_job import PortableJob
@@ -20,10 +18,6 @@ Numbered = tuple[int, Point]
 
 MOST = 1024
 """Processes on this machine at most: more are a slip of the finger, and no machine's memory holds them."""
-PATIENCE = 10.0
-"""Seconds that a scheduler may take to answer."""
-ADDRESS = re.compile(r"(?:[a-z][a-z0-9+]*://)?(?:\[[0-9a-fA-F:]+\]|[^\s:/\[\]]+):[0-9]{1,5}(?:/\S*)?|inproc://\S+")
-"""Of a scheduler: host and port, with or without its protocol."""
 _OWN = threading.local()
 _CELLS: list[Cell] = []
 """The cells of all threads, so that they can be closed from one."""
@@ -126,62 +120,10 @@ def local(job: Job, workers: int) -> Iterator[Pool]:
 
 @contextmanager
 def cluster(job: Job, address: str) -> Iterator[Pool]:
-    """Run on a Dask cluster: FMUs and recordings are sent there, mount-cosim must be installed there.
-
-    Raises:
-        MissingPackageError: Dask is not installed here.
-        SweepError: nobody answers at the address, or mount-cosim is not there.
-    """
-    client = _client(address)
-    try:
-        threads = sum(client.nthreads().values())
-        if not threads:
-            raise SweepError(f"The cluster at {address} has no workers.", culprit=address)
-        _check_versions(client, address)
-        portable = client.scatter(PortableJob.of(job), broadcast=True, hash=False)
-        executor = client.get_executor(pure=False)
-        yield Pool(lambda number, point: executor.submit(_remote, portable, number, point), threads, 2 * threads)
-    finally:
-        with suppress(Exception):  # a cluster that is gone has closed them
-            client.run(close_cells)
-        client.close()
+    """Run on a Dask cluster; errors as of `on_cluster`."""
+    with on_cluster(job, address, close_cells) as there:
+        yield Pool(lambda number, point: there.submit(_remote, number, point), there.threads, 2 * there.threads)
 
 
-def _remote(portable: PortableJob, number: int, point: Point) -> Row:
+def _remote(portable: PortableJob[Job], number: int, point: Point) -> Row:
     return isolated(portable.job_here(), number, point)
-
-
-def _client(address: str) -> Any:
-    if not ADDRESS.fullmatch(address):
-        message = f"--cluster {address} is no address of a Dask scheduler; write it as tcp://host:8786."
-        raise SweepError(message, culprit=address)
-    try:
-        from dask.distributed import Client
-    except ImportError as error:
-        message = f"--cluster needs Dask: {install('cluster')}"
-        raise MissingPackageError(message) from error
-    try:
-        return Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
-        message = f"No Dask scheduler answers at {address}; give its address as tcp://host:8786."
-        raise SweepError(message, culprit=address) from error
-
-
-def _check_versions(client: Any, address: str) -> None:
-    from cosim.support.version import __version__
-
-    try:
-        there = set(client.run(version).values())
-    except Exception as error:  # what a worker raises when it cannot import this comes in many shapes
-        raise SweepError(f"The workers at {address} do not have mount-cosim: {error}.", culprit=address) from error
-    if there != {__version__}:
-        found = ", ".join(sorted(there))
-        message = f"The workers at {address} have mount-cosim {found}; this is {__version__}."
-        raise SweepError(message, culprit=address, value=found)
-
-
-def version() -> str:
-    """Return the version of mount-cosim where this is called."""
-    from cosim.support.version import __version__
-
-    return __version__

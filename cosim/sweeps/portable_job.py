@@ -5,30 +5,43 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, Protocol, Self, TypeVar
 
 from cosim.support.files import cache_home, replacing
-from cosim.sweeps.job import Job
 from cosim.system.scenario import Scenario
 from cosim.system.sections import ComponentSection
 
 
+class WithScenario(Protocol):
+    """What can travel: it has a scenario, whose files can be elsewhere."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """The scenario, whose components all have their FMU."""
+
+    def with_scenario(self, scenario: Scenario) -> Self:
+        """The same with another scenario."""
+
+
+J = TypeVar("J", bound=WithScenario)
+
+
 @dataclass(frozen=True)
-class PortableJob:
+class PortableJob(Generic[J]):
     """A job, and what is in the files it names, by their path where it was made."""
 
-    job: Job
+    job: J
     files: Mapping[Path, bytes]
 
     @classmethod
-    def of(cls, job: Job) -> "PortableJob":
+    def of(cls, job: J) -> "PortableJob[J]":
         """Pack the FMUs and recordings of a job."""
         return cls(job, {path: path.read_bytes() for path in files_of(job.scenario).values()})
 
-    def job_here(self) -> Job:
+    def job_here(self) -> J:
         """Return the job with paths on this machine, where its files are put once."""
         here = {path: _stored(content, path.suffix) for path, content in self.files.items()}
-        return replace(self.job, scenario=_located(self.job.scenario, here))
+        return self.job.with_scenario(_located(self.job.scenario, here))
 
 
 def files_of(scenario: Scenario) -> dict[str, Path]:

@@ -3,7 +3,7 @@
 import pytest
 
 from cosim.support.errors import SweepError
-from cosim.sweeps.pool import ADDRESS, _client
+from cosim.sweeps.cluster import ADDRESS, _client
 
 
 @pytest.mark.parametrize("address", ["foo", "tcp://host", "tcp://", "host:", "a b:1", "127.0.0.1"])

@@ -1,0 +1,122 @@
+"""A calibration that was ended goes on where it was, one on a cluster gives the same bits, start values can be free."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from motor_fmu import motor, recorded
+
+import cosim
+from cosim.calibration.store import Store
+from cosim.support.errors import OutputError, SweepError
+
+TRUTH = {"J": 0.013, "d": 0.08, "Fc": 0.16}
+
+
+@pytest.fixture(scope="module")
+def fmu(tmp_path_factory) -> Path:
+    return motor(tmp_path_factory.mktemp("motor"), 3)
+
+
+@pytest.fixture(scope="module")
+def table(fmu) -> dict:
+    return recorded(fmu, TRUTH)
+
+
+@pytest.fixture(scope="module")
+def whole(fmu, table, tmp_path_factory) -> bytes:
+    """What an undisturbed calibration writes."""
+    out = tmp_path_factory.mktemp("whole")
+    found(table, fmu=fmu, out=out)
+    assert not (out / "progress").exists()
+    return (out / "identified.json").read_bytes()
+
+
+def found(*given, **options):
+    return cosim.identify(*given, **{"workers": 2, "starts": 2, "free": list(TRUTH), **options})
+
+
+def ended(monkeypatch: pytest.MonkeyPatch, count: int, *given, **options) -> None:
+    """A calibration that is ended once some simulations are kept."""
+    put, done = Store.put, []
+
+    def until(self, *arguments):
+        put(self, *arguments)
+        done.append(1)
+        if len(done) == count:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Store, "put", until)
+        with pytest.raises(KeyboardInterrupt):
+            found(*given, **options)
+
+
+def test_one_that_was_ended_twice_comes_to_the_same_bits(fmu, table, whole, tmp_path, monkeypatch):
+    for count in (5, 30):
+        ended(monkeypatch, count, table, fmu=fmu, out=tmp_path)
+        assert not (tmp_path / "identified.json").exists()
+    lines = (tmp_path / "progress" / "runs.jsonl").read_bytes().splitlines(keepends=True)
+    (tmp_path / "progress" / "runs.jsonl").write_bytes(b"".join(lines[:-1]) + lines[-1][:9])  # as a kill leaves it
+    (tmp_path / "progress" / "points" / "000002.npz").write_bytes(b"PK nothing")
+    said: list[str] = []
+    found(table, fmu=fmu, out=tmp_path, on_progress=said.append)
+    assert "34 simulations were done before" in said
+    assert (tmp_path / "identified.json").read_bytes() == whole
+    assert not (tmp_path / "progress").exists()
+
+
+def test_what_was_begun_with_other_recordings_is_not_mixed(fmu, table, whole, tmp_path, monkeypatch):
+    ended(monkeypatch, 3, {**table, "w": 2 * table["w"]}, fmu=fmu, out=tmp_path)
+    with pytest.raises(OutputError, match="holds another calibration: its recordings changed since"):
+        found(table, fmu=fmu, out=tmp_path)
+    found(table, fmu=fmu, out=tmp_path, force=True)
+    assert (tmp_path / "identified.json").read_bytes() == whole
+
+
+def test_a_cluster_comes_to_the_same_bits_and_a_crash_there_costs_a_point(fmu, table, whole, tmp_path, monkeypatch):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
+    gone = tmp_path / "motor3.fmu"
+    shutil.copy(fmu, gone)
+    settings = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    with distributed.LocalCluster(**settings) as cluster:
+        where = {"cluster": cluster.scheduler_address}
+        found(table, fmu=gone, out=tmp_path / "out", **where)
+        crashing = found(table, fmu=gone, set={"crash_above": 0.05}, **where)
+    assert (tmp_path / "out" / "identified.json").read_bytes() == whole
+    assert any("SIGSEGV" in one for one in crashing.calibrated.lost)
+    with pytest.raises(SweepError, match="is no address of a Dask scheduler"):
+        found(table, fmu=gone, cluster="nowhere")
+
+
+def test_free_start_values_take_the_noise_of_single_readings_out_of_the_numbers(fmu, table):
+    off = {}
+    for initial in ("recorded", "free"):
+        done = found(table, fmu=fmu, window=1.0, initial=initial, starts=1)
+        off[initial] = [(done.numbers[name] - value) / done.standard_errors[name] for name, value in TRUTH.items()]
+    assert np.abs(off["free"]).max() < 2.5 < np.abs(off["recorded"]).max()
+    told = done.as_json()
+    assert set(told["numbers"]) == set(TRUTH)
+    assert len(told["initial_values"]) == 2 * 4
+    assert "w at the start of recording 1 from 1 s" in told["initial_values"]
+    assert json.dumps(told)
+
+
+def test_a_recording_that_does_not_begin_at_the_models_start_is_followed_from_a_free_one(fmu, table):
+    later = {name: values[100:] for name, values in table.items()}
+    done = found(later, fmu=fmu, initial="free", starts=1)
+    assert all(abs(done.numbers[name] - value) < 3 * done.standard_errors[name] for name, value in TRUTH.items())
+    trace = next(one for one in done.calibrated.traces if one.output == "w")
+    assert trace.rms(trace.after) < 0.022
+    with pytest.raises(cosim.InputError, match='--initial "no": there are: recorded, free'):
+        found(later, fmu=fmu, initial="no")
+    with pytest.raises(cosim.InputError, match="400 are the most: give longer windows"):
+        found(
+            {name: np.tile(one, 4) if name != "t" else 0.01 * np.arange(1600) for name, one in table.items()},
+            fmu=fmu,
+            window=0.05,
+            initial="free",
+        )
