@@ -40,3 +40,16 @@ def refusing(order: Any) -> dict[str, Any]:
 
 def crashing(order: Any) -> dict[str, Any]:
     os.abort()
+
+
+def comparing(order: Any) -> dict[str, Any]:
+    """Write what a diagnosis of two effects, or without any where it has one recording, is compared by."""
+    from report_example import diagnosis
+
+    from cosim.serve import comparison
+    from cosim.serve.work import in_words
+
+    found = diagnosis("two" if order.uploads[1:] else "none")
+    quickly(order)
+    comparison.write(found, order.out)
+    return in_words(found)

@@ -2,6 +2,7 @@
 
     GET    /                       drop recordings; what was diagnosed
     POST   /jobs                   a new draft; where it is, in the header "location"
+    GET    /compare?job=ID&job=ID  two diagnoses side by side
     GET    /jobs/ID                a job: its files and card, its progress, or its report
     PUT    /jobs/ID/files?name=N   a recording, or a card where N ends in .toml; the bytes are the body
     POST   /jobs/ID/ACTION         see `Actions`; then leads back to the job
@@ -35,6 +36,7 @@ from cosim.serve.desk import Desk
 from cosim.serve.folder import plain_files
 from cosim.serve.guard import REPORT_POLICY, SAFE, Guard
 from cosim.serve.pages import home_page, job_page, unreadable_page
+from cosim.serve.pages.pair import comparison_page
 from cosim.serve.store import UnknownJobError, UnreadableJobError
 from cosim.serve.uploads import ADVICE, check_size, safe_name
 from cosim.support.errors import CosimError
@@ -43,6 +45,8 @@ from cosim.support.system_errors import surroundings
 
 CARD_SUFFIX = ".toml"
 REPORT = "report.html"
+PAIR = 2
+"""Diagnoses that are compared."""
 NO_ROOM = 507
 """Status of what the system refuses to keep (RFC 4918: insufficient storage)."""
 FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -60,6 +64,7 @@ def make_app(desk: Desk, token: str, port: int) -> Starlette:
         Route("/", there.home),
         Route("/jobs", there.new, methods=["POST"]),
         Route("/example", there.example, methods=["POST"]),
+        Route("/compare", there.compare),
         Route("/jobs/{id}", there.job),
         Route("/jobs/{id}/files", there.upload, methods=["PUT"]),
         Route("/jobs/{id}/result/{name}", there.result),
@@ -97,6 +102,13 @@ class Addresses:
         """Make a draft of the example's files."""
         job = await self._looked(self._desk.example)
         return RedirectResponse(f"/jobs/{job.id}", 303)
+
+    def compare(self, request: Request) -> Response:
+        """Show two diagnoses side by side; others than two that are done lead back with a sentence."""
+        chosen = [self._desk.store.get(name) for name in dict.fromkeys(request.query_params.getlist("job"))]
+        if len(chosen) != PAIR or any(job.state != "done" for job in chosen):
+            return home_page(self._desk, f"Choose two diagnoses that are done; {len(chosen)} chosen.", 400)
+        return comparison_page(self._desk, *sorted(chosen, key=lambda job: job.id))
 
     def job(self, request: Request) -> Response:
         """Show a job as far as it is."""

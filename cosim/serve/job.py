@@ -57,13 +57,14 @@ class Finding:
 
 @dataclass(frozen=True, kw_only=True)
 class Answer:
-    """The verdict in words: heading, findings, what to check first; ids of effects."""
+    """The verdict in words: heading, findings, what to check first; ids of effects; validation error in one line."""
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
     heading: str = ""
     findings: tuple[Finding, ...] = ()
     check: tuple[str, ...] = ()
     verdict: tuple[str, ...] = ()
+    error: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)

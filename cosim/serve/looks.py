@@ -118,6 +118,8 @@ def _column(recording: Recording, name: str, seen: Preview) -> Parsed:
         "least": f"{values.min():.5g}",
         "greatest": f"{values.max():.5g}",
         "line": line(t, values),
+        "begins": float(t[0]),
+        "ends": float(t[-1]),
     }
 
 

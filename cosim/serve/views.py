@@ -28,6 +28,9 @@ class Column:
     least: str
     greatest: str
     line: str
+    begins: float | None = None
+    ends: float | None = None
+    """Time at the ends of the line [s]; None in a view that an older version kept."""
 
 
 @dataclass(frozen=True, kw_only=True)

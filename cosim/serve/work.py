@@ -45,6 +45,7 @@ def _diagnosed(order: Order) -> Parsed:
     from cosim.api.diagnose import diagnose
     from cosim.data.recording import Recording
     from cosim.reading import check_kind
+    from cosim.serve import comparison
     from cosim.support.child import tell
     from cosim.support.memory import keep_freed_memory
     from pyfmi_models.card import read_card
@@ -68,6 +69,7 @@ def _diagnosed(order: Order) -> Parsed:
         on_answer=lambda found: tell("answer", in_words(found)),
         command=command(order),
     )
+    comparison.write(done.diagnosis, order.out)
     return in_words(done.diagnosis)
 
 
@@ -105,8 +107,16 @@ def in_words(found: Any) -> Parsed:
         for one in found.findings
         if one.answer in MAIN
     ]
-    check = [one.statement for one in found.sanity]
-    return {"heading": heading(found), "findings": rows, "check": check, "verdict": list(found.verdict)}
+    said = {"heading": heading(found), "findings": rows, "verdict": list(found.verdict), "error": _error(found)}
+    return said | {"check": [one.statement for one in found.sanity]}
+
+
+def _error(found: Any) -> str:
+    """Return the validation error before and after."""
+    from cosim.report.quantities import Scales
+
+    unit, held = Scales.of(found).torque, found.heldout
+    return f"{unit.number(held.before_rms)} → {unit.text(held.after_rms)}"
 
 
 def job_order(job: Job, folder: Path, card: Path, out: Path) -> Order:

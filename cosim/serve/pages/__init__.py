@@ -3,6 +3,7 @@
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,9 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from starlette.responses import HTMLResponse, Response
 
+from cosim.plots.quantities import minus, raised
 from cosim.reading import LAYOUT
+from cosim.serve.chart import Chart, chart
 from cosim.serve.desk import OURS, Desk
 from cosim.serve.folder import plain_files
 from cosim.serve.form import FIELDS, FRICTIONS, MOTIONS
@@ -55,6 +58,8 @@ Fc = 2.5               # N m
 sigma2 = 30.0          # N m s/rad
 """
 """What a card that is to be written begins with."""
+NAMED = 4
+"""Recordings that the history names; of more it says how many."""
 FILES = (
     ("report.html", "Report", "one page, alone"),
     ("card.toml", "Model card", "the better one"),
@@ -67,8 +72,9 @@ FILES = (
 
 def home_page(desk: Desk, problem: str = "", status: int = 200) -> Response:
     """Show where to drop recordings, and what was diagnosed."""
-    values = {"title": "Diagnose an axis", "problem": problem, "jobs": history(desk), "suffixes": SUFFIXES}
-    return _page("home.html.j2", status, **values)
+    jobs = history(desk)
+    values = {"title": "Diagnose an axis", "problem": problem, "jobs": jobs, "suffixes": SUFFIXES}
+    return page("home.html.j2", status, comparable=sum(one["done"] for one in jobs) > 1, **values)
 
 
 def job_page(
@@ -77,41 +83,62 @@ def job_page(
     """Show a job as far as it is; `problem` is why something was refused, `given` the form that was."""
     values = _draft(desk, job) | {"given": defaultdict(str, given or {})} if job.state == "draft" else _begun(desk, job)
     template = "draft.html.j2" if job.state == "draft" else "begun.html.j2"
-    return _page(template, status, title=job.called, job=job, problem=problem, **values)
+    return page(template, status, title=job.called, job=job, problem=problem, **values)
 
 
 def unreadable_page(error: UnreadableJobError, status: int) -> Response:
     """Say why a job cannot be read, and offer to remove it."""
-    return _page("unreadable.html.j2", status, title="Unreadable diagnosis", id=error.id, problem=str(error))
+    return page("unreadable.html.j2", status, title="Unreadable diagnosis", id=error.id, problem=str(error))
 
 
-def history(desk: Desk) -> list[dict[str, str]]:
+def moment(at: datetime) -> Parsed:
+    """Return a time for `<time>`: in ISO form, and as this computer's clock shows it; the script asks the reader's."""
+    return {"iso": at.isoformat(timespec="seconds"), "text": f"{at.astimezone():%Y-%m-%d %H:%M}"}
+
+
+def history(desk: Desk) -> list[Parsed]:
     """Return what was diagnosed, one row a job, the newest first; of one that cannot be read why."""
     return [_unreadable(one) if isinstance(one, UnreadableJobError) else _row(one) for one in desk.store.each()]
 
 
-def _row(job: Job) -> dict[str, str]:
+def _row(job: Job) -> Parsed:
     return {
         "id": job.id,
-        "when": f"{job.made[:16].replace('T', ' ')} UTC",
+        "when": moment(datetime.fromisoformat(job.made)),
         "name": job.called,
-        "files": f"{len(job.uploads)} recording{'' if len(job.uploads) == 1 else 's'}",
+        "files": _files(job),
         "state": STATES[job.state],
-        "told": job.answer.heading if job.state == "done" else job.problem,
+        "done": job.state == "done",
+        "told": _told(job) if job.state == "done" else job.problem,
     }
 
 
-def _unreadable(error: UnreadableJobError) -> dict[str, str]:
+def _files(job: Job) -> str:
+    """Name the recordings that are used, the first few of them."""
+    names = [one.name for one in job.uploads if one.role != "out"]
+    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    return ", ".join(names[:NAMED]) + more if names else "no recording yet"
+
+
+def _told(job: Job) -> str:
+    """Return the verdict, the effects that it names, and the validation error before and after."""
+    error = f"Validation RMS error {job.answer.error}." if job.answer.error else ""
+    effects = ", ".join(one.what for one in job.answer.findings if one.kind == "found")
+    return " ".join(filter(None, [f"{job.answer.heading}{f': {effects}' if effects else ''}.", error]))
+
+
+def _unreadable(error: UnreadableJobError) -> Parsed:
     day, clock = error.id.split("-")[:2]
-    when = f"{day[:4]}-{day[4:6]}-{day[6:]} {clock[:2]}:{clock[2:4]} UTC"
+    when = moment(datetime.strptime(f"{day}{clock} +0000", "%Y%m%d%H%M%S %z"))
     row = {"id": error.id, "when": when, "name": "Unreadable diagnosis", "files": "its files are as they were"}
-    return row | {"state": "not readable", "told": str(error)}
+    return row | {"state": "not readable", "done": False, "told": str(error)}
 
 
 def _draft(desk: Desk, job: Job) -> Parsed:
     views = desk.views(job)
     return {
         "recordings": [(one, views[one.name], number) for number, one in enumerate(job.uploads, 1)],
+        "charts": charts,
         "card_view": desk.card_view(job),
         "start_card": CARD,
         "card_text": desk.card_text(job),
@@ -127,6 +154,13 @@ def _draft(desk: Desk, job: Job) -> Parsed:
         "suffixes": SUFFIXES,
         "size": in_bytes,
     }
+
+
+def charts(column: Mapping[str, Any]) -> Chart:
+    """Return the axes of a column that is drawn; its line is there already."""
+    ends = column["begins"], column["ends"]
+    times = (0.0, 0.0) if None in ends else ends
+    return chart({}, times, (float(column["least"]), float(column["greatest"])))
 
 
 def _proof(job: Job) -> str:
@@ -151,6 +185,8 @@ def _begun(desk: Desk, job: Job) -> Parsed:
         "files": results,
         "has_report": any(one["name"] == FILES[0][0] for one in results),
         "state": STATES[job.state],
+        "made": moment(datetime.fromisoformat(job.made)),
+        "begun": moment(datetime.fromtimestamp(job.begun, UTC)) if job.begun else None,
     }
 
 
@@ -177,8 +213,11 @@ def _shipped() -> list[str]:
 @cache
 def _templates() -> Environment:
     loader = PackageLoader("cosim.serve", "pages")
-    return Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    made = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
+    made.filters |= {"minus": minus, "raised": raised}
+    return made
 
 
-def _page(template: str, status: int = 200, **values: Any) -> Response:
+def page(template: str, status: int = 200, **values: Any) -> Response:
+    """Return a page that a template draws."""
     return HTMLResponse(_templates().get_template(template).render(values), status)

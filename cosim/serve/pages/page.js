@@ -14,9 +14,21 @@ prepare();
 
 function prepare() {
   const main = byId("main");
+  tellTimes(main);
   if (main.dataset.live) setTimeout(follow, SECOND);
   const report = byId("report");
   if (report) report.addEventListener("load", () => fit(report));
+}
+
+// Times as the reader's own clock shows them: the server may be in another zone, behind a tunnel.
+function tellTimes(part) {
+  for (const one of part.querySelectorAll("time")) {
+    const at = new Date(one.dateTime), day = (time) => time.toDateString();
+    const said = { hour: "2-digit", minute: "2-digit" };
+    one.textContent = day(at) === day(new Date()) ? at.toLocaleTimeString([], said)
+      : at.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
+    one.title = at.toLocaleString([], { dateStyle: "full", timeStyle: "long" });
+  }
 }
 
 // The report has a page's height: it scrolls with this page, not inside it.
@@ -32,6 +44,7 @@ function fit(frame) {
 
 async function submitted(event) {
   const form = event.target, question = form.dataset.ask;
+  if (form.method === "get") return; // leads to a page of its own
   event.preventDefault();
   if (question && !confirm(question)) return;
   await send(form);
@@ -119,6 +132,7 @@ function renew(fresh) {
   document.querySelector("h1").textContent = fresh.querySelector("h1").textContent;
   for (const old of document.querySelectorAll("[data-part]")) {
     const now = fresh.getElementById(old.id);
+    tellTimes(now);
     if (now.innerHTML === old.innerHTML) continue;
     const open = [...old.querySelectorAll("details")].some((one) => one.open), focused = document.activeElement.id;
     old.innerHTML = now.innerHTML;
