@@ -26,6 +26,7 @@ NUMBERS: dict[str, dict[str, Any]] = {
     "LocalFriction": {"q_center": 1.0, "width": 0.05, "relative_amplitude": 0.3},
     "GravityUnbalance": {"mgl": 1.5, "phase": 0.2},
     "TorqueOffset": {"torque": 0.7},
+    "ConstantForce": {"force": 0.7},
     "ThermalViscosity": {"viscous_per_degC": -0.04, "coulomb_per_degC": -0.02},
     "WarmingViscosity": {"viscous_per_degC": -0.04, "warm_up_degC": 15.0, "warm_up_s": 30.0},
     "RubbedViscosity": {"viscous_per_degC": -0.04, "heat_degC_per_rad": 8.0, "cooling_s": 30.0},

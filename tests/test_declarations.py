@@ -93,6 +93,7 @@ MAINS: dict[str, Main] = {
     "TorqueDroop": Main("droop", PERCENT, "% at the rated torque"),
     "WarmTorqueDroop": Main("droop", PERCENT, "% at the rated torque"),
     "TorqueOffset": Main("torque"),
+    "ConstantForce": Main("force"),
     "TorqueSaturation": Main("knee_torque", **PLACE),
 }
 NO_TORQUE = {

@@ -40,6 +40,7 @@ CONTRACT = {
     "position_friction": {"cycles_per_rev", "q_center", "relative_amplitude", "width"},
     "gravity_unbalance": {"mgl", "phase"},
     "torque_offset": {"torque"},
+    "constant_force": {"force"},
     "thermal_viscosity": {"viscous_per_degC", "coulomb_per_degC"},
     "dwell_breakaway": {"torque_per_efold"},
     "compliance": {"antiresonance_hz", "resonance_hz"},

@@ -125,6 +125,7 @@ LOADS: dict[str, Callable[[Any, Motion], float]] = {
     "Cogging": lambda e, m: 0.5 / HALF * wave(24 * m.angle + 0.3 + math.pi / 2),
     "GravityUnbalance": lambda e, m: 1.5 * math.sin(m.angle + 0.2),
     "TorqueOffset": lambda e, m: 0.7,
+    "ConstantForce": lambda e, m: 0.7,
     "QuadraticDrag": lambda e, m: 2 * m.v * abs(m.v),
     "CableWrap": lambda e, m: 3 * (m.q - 0.2) * (1 + 0.5 * (m.q - 0.2) ** 2),
     "AzimuthCentrifugal": lambda e, m: 3 * math.sin(m.q) * math.cos(m.q) * m.inputs["azimuth_rate"] ** 2,

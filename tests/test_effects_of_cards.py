@@ -23,8 +23,9 @@ from pyfmi_models.errors import CardError
 
 ASKED = """
     friction_asymmetry stribeck presliding position_friction load_dependent_friction dwell_breakaway thermal_viscosity
-    torque_offset cogging gravity_unbalance cable_wrap quadratic_drag periodic_disturbance torque_saturation delay
-    actuator_lag clock_skew inertia_variation compliance encoder_eccentricity backlash concave_viscous
+    torque_offset constant_force cogging gravity_unbalance cable_wrap quadratic_drag periodic_disturbance
+    torque_saturation delay actuator_lag clock_skew inertia_variation compliance encoder_eccentricity backlash
+    concave_viscous
 """
 """What a diagnosis looks for: an effect in the catalogue is not asked for before it has a hypothesis."""
 OF_CARDS = ("dead_band", "gear_friction", "rough_spot", "torque_droop", "bouc_wen")

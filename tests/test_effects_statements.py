@@ -49,6 +49,9 @@ TURNING = {
         "Of a command of 8 N·m the drive loses 20 %, of small ones less, and gives 0.2 % less per degree."
     ),
     "TorqueOffset": "A constant 0.7 N·m pushes the axis backward, moving or not.",
+    "ConstantForce": (
+        "A constant load of 0.7 N·m pushes the axis backward: a weight, or an offset of the drive's reading."
+    ),
     "TorqueSaturation": "The drive saturates at 5 N·m: 40 % of what is asked for beyond it arrives.",
 }
 """By the examples of tests/effect_examples.py; 36 % is 1 - (20 / 25)^2, the share that rings."""
@@ -59,6 +62,10 @@ SLIDING = (
     ("rad.", "m."),
     ("rad/s", "m/s"),
     ("per turn", "per metre"),
+)
+WEIGHT = (
+    ("constant load of 0.7", "constant force of 0.7"),
+    ("0.7 N pushes the axis backward:", "0.7 N pushes the carriage backward:"),
 )
 
 
@@ -74,7 +81,11 @@ def test_the_sentence_of_an_axis_that_slides_differs_in_its_units_alone(effect: 
         expected = TURNING[type(effect).__name__]
         for one, other in SLIDING:
             expected = expected.replace(one, other)
-        for one, other in (("of the inertia", "of the moving mass"), ("The inertia rises", "The moving mass rises")):
+        for one, other in (
+            ("of the inertia", "of the moving mass"),
+            ("The inertia rises", "The moving mass rises"),
+            *WEIGHT,
+        ):
             expected = expected.replace(one, other)
         assert effect.statement("N") == expected
 

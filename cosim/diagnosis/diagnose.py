@@ -18,7 +18,7 @@ from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.measure.absent import not_found, undecided
 from cosim.diagnosis.measure.breakdown import parts
 from cosim.diagnosis.measure.experiment import Experiment, best, told
-from cosim.diagnosis.measure.findings import accepted, rival_finding, taken_finding
+from cosim.diagnosis.measure.findings import accepted, measured_as, rival_finding, taken_finding
 from cosim.diagnosis.measure.law_selection import proposed_law
 from cosim.diagnosis.measure.locate import regions
 from cosim.diagnosis.measure.loop_bias import loop_bias
@@ -31,6 +31,7 @@ from cosim.diagnosis.search.delivered import detected, likelier, standing, with_
 from cosim.diagnosis.search.global_test import global_test
 from cosim.diagnosis.search.nameless import Nameless, nameless
 from cosim.diagnosis.search.proof import Proof
+from cosim.diagnosis.search.renaming import by_each_name, is_renamed
 from cosim.diagnosis.search.rivals import Examined, examine
 from cosim.diagnosis.search.scores import scores_of
 from cosim.diagnosis.search.sizes import standard_errors
@@ -310,7 +311,7 @@ def _experiment(answer: Answer) -> Experiment | None:
     """What would settle the first open question."""
     for one in answer.proof.standing:
         for rival in one.rivals:
-            if rival.effect.id in answer.decision.sets[one.effect.id]:
+            if rival.effect.id in answer.decision.sets[one.effect.id] and not is_renamed(rival.effect):
                 pair = one.effect.id, rival.effect.id
                 return best(one.own.fit.mount, rival.fit.mount, pair, answer.comparison.problem.prepared)
     return None
@@ -328,11 +329,15 @@ def _findings(answer: Answer, signals: Sequence[Trace]) -> list[Finding]:
         which = 0 if any(effect.id == name for effect in fits[0].mount.effects) else 1
         own = fits[which].mount, errors[which], signals
         found.append(accepted(one, *own, members, shares[name], predicted, name in answer.detected))
-        rivals += [rival_finding(r, shares[r.effect.id], mount) for r in one.rivals if r.effect.id in members]
+        told = [rival_finding(r, shares[r.effect.id], mount) for r in one.rivals if r.effect.id in members]
+        rivals += [measured_as(row, found[-1], mount) for row in told]
     named = {finding.effect for finding in found}
     rivals = [finding for finding in rivals if finding.effect not in named]
-    lost = [replace(rival_finding(one.own, 0.0, mount), answer="not_proven") for one in answer.proof.unproven]
-    lost += [taken_finding(one.own, term.name, mount) for one, term in answer.found.taken]
+    known = named | {finding.effect for finding in rivals}
+    unproven = [fit for one in answer.proof.unproven for fit in by_each_name(one.own, known)]
+    lost = [replace(rival_finding(fit, 0.0, mount), answer="not_proven") for fit in unproven]
+    taken = [(fit, term) for one, term in answer.found.taken for fit in by_each_name(one.own, known)]
+    lost += [taken_finding(fit, term.name, mount) for fit, term in taken]
     named |= {finding.effect for finding in (*rivals, *lost)}
     largest = max((one.own.evidence for one in answer.proof.standing), default=0.0)
     absent = not_found(comparison, answer.proof.chosen, sorted(named), largest)

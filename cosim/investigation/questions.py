@@ -12,6 +12,7 @@ from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.result import Diagnosis, Finding, is_special
 from cosim.diagnosis.diagnose import Outcome
+from cosim.diagnosis.effects import named
 from cosim.diagnosis.evidence.band import in_band
 from cosim.estimation.fit import Fit
 from cosim.estimation.problem import Problem
@@ -74,7 +75,9 @@ def questions(found: Diagnosis) -> tuple[Question, ...]:
     "unconfirmed" is always among them: whether an answer needs another round depends on those before it.
     """
     titles = {one.effect: one.title.lower() for one in found.findings}
-    sets = [Question("set", group, " or ".join(titles.get(n, n) for n in group)) for group in found.ambiguous_with]
+    groups = [tuple(n for n in group if not named(n).same_as) for group in found.ambiguous_with]
+    told = [group for group in groups if len(group) > 1]  # names that no motion tells apart are no question
+    sets = [Question("set", group, " or ".join(titles.get(n, n) for n in group)) for group in told]
     paired = {name for group in found.ambiguous_with for name in group}
     lone = [one for one in found.in_model if one.answer == "ambiguous" and one.effect not in paired]
     unsure = [Question("uncertain", (one.effect,), f"whether it is {titles[one.effect]}") for one in lone]

@@ -19,6 +19,7 @@ from pyfmi_models.effects import ActuatorLag, Cogging, Delay, Effect, GravityUnb
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.effects.compliance import Compliance, LoadSideCompliance
+from pyfmi_models.effects.constant_force import ConstantForce
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag
 from pyfmi_models.friction import Coulomb, LuGre
 from pyfmi_models.mount import Mount
@@ -156,6 +157,7 @@ def _actuators(mount: Mount, bodies: tuple[Body, ...], step: float) -> Iterator[
         numbers = f"{float(wave.amplitude):.17g} {cycles:.17g} {float(wave.phase) - pi / 2:.17g}"
         yield f'<dcmotor name="cogging_{k}" joint="axis" {PASSIVE} cogging="{numbers}"/>'
     constant = sum(float(one.torque) for one in mount.effects if isinstance(one, TorqueOffset))
+    constant += sum(float(one.force) for one in mount.effects if isinstance(one, ConstantForce))
     if constant:
         yield (
             '<general name="torque_offset" joint="axis" gaintype="fixed" gainprm="0" biastype="affine" '
@@ -196,6 +198,7 @@ MUJOCO = Format(
     effects={
         GravityUnbalance: on_rotary("inertial pos"),
         TorqueOffset: whole("general biasprm"),
+        ConstantForce: whole("general biasprm"),
         CableWrap: _spring,
         Cogging: _cogging,
         QuadraticDrag: whole("joint damping"),

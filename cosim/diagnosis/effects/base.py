@@ -5,6 +5,7 @@ stands, one file an effect, what only a diagnosis asks. In the order in which it
 
     candidates(mount, span)        what is worth trying, given what the recordings visit
     twins(effect)                  effects that must be tried where this one is
+    renamed(effect, mount)         the same under this name, where no recording tells two names apart
     tuned(problem, found, ...)     what its grid knows only roughly, fitted
     multiple(effect, k)            a further wave of a ripple
     is_plausible(effect, mount)    whether the fitted effect is what its name says
@@ -103,6 +104,9 @@ class Hypothesis(Generic[Form]):
     """The parameter by which what is concealed differs: cycles, a frequency, a width."""
     sizes: ClassVar[tuple[str, ...]] = ()
     """Parameters of which one must differ from none, where that is not the main number alone."""
+    same_as: ClassVar[str] = ""
+    """Effect with the very same equation: what was found of that one may be this one, and no recording tells which.
+    Such a hypothesis has no candidates of its own."""
     may_end: ClassVar[tuple[str, ...]] = ()
     """Parameters whose least value is a machine's too: a drive that gives nothing beyond its knee."""
     caveat: ClassVar[str] = ""
@@ -124,6 +128,10 @@ class Hypothesis(Generic[Form]):
         """
         found = revived(problem, found, start) if start.place == "Friction" else found
         return in_cycles(problem, found) if getattr(found.mount.effects[-1], "cycles_per_rev", 0.0) > 0 else found
+
+    def renamed(self, effect: Effect, mount: Mount) -> Form | None:
+        """An effect that was found of `same_as` by this name; None where the axis cannot have it."""
+        return None
 
     def multiple(self, ripple: Form, k: int) -> Candidate | None:
         """Candidate for k times the cycles of a ripple; None where the effect is none."""

@@ -10,6 +10,7 @@ from cosim.diagnosis.effects.base import RESTLESS, Hypothesis, Reach
 from cosim.diagnosis.effects.candidates import Candidate, Span, has
 from cosim.estimation.prepare import Array, Prepared
 from pyfmi_models.effects import Effect, FrictionAsymmetry, TorqueOffset
+from pyfmi_models.effects.constant_force import ConstantForce
 from pyfmi_models.mount import Mount
 
 
@@ -54,4 +55,4 @@ class Asymmetry(Hypothesis[FrictionAsymmetry]):
 
 def _is_alike(mount: Mount) -> bool:
     """Whether a constant torque is there already, and friction of two directions no more than that."""
-    return not mount.friction.states() and has(mount, TorqueOffset)
+    return not mount.friction.states() and (has(mount, TorqueOffset) or has(mount, ConstantForce))

@@ -7,6 +7,7 @@ from cosim.diagnosis.effects.base import RESTLESS, Hypothesis
 from cosim.diagnosis.effects.candidates import Candidate, Span, has
 from cosim.estimation.prepare import Array, Prepared
 from pyfmi_models.effects import Effect, FrictionAsymmetry, TorqueOffset
+from pyfmi_models.effects.constant_force import ConstantForce
 from pyfmi_models.mount import Mount
 
 
@@ -20,13 +21,17 @@ class Offset(Hypothesis[TorqueOffset]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """One column of ones; beside friction that differs between the directions only where rest tells them apart."""
-        if has(mount, TorqueOffset) or _is_alike(mount):
+        if has(mount, TorqueOffset) or has(mount, ConstantForce) or _is_alike(mount):
             return
 
         def start(c: Array) -> Effect:
             return TorqueOffset(torque=float(c[0]))
 
         yield Candidate("torque_offset", (TorqueOffset(torque=0.0),), ("torque",), start)
+
+    def is_settled(self, mount: Mount) -> bool:
+        """Whether the model holds a constant already, by either name."""
+        return super().is_settled(mount) or has(mount, ConstantForce)
 
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """A law that says nothing of rest cannot tell it from friction that differs between the directions."""

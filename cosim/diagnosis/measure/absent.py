@@ -22,9 +22,15 @@ def not_found(comparison: Comparison, chosen: Fit, known: Sequence[str], largest
     problem, found = comparison.problem, bounds(comparison, chosen, known, largest)
     sizeless = {name for name in TRIED if named(name).share_of in problem.held}
     seen = {name: one for name, one in found.items() if name not in sizeless}
+    seen |= {name: seen[like] for name in TRIED if (like := named(name).same_as) in seen and _may_be(name, chosen)}
     reasons = {name: f"{NOT_DETERMINED} {named(name).share_of.rpartition('.')[2]}" for name in sizeless}
     lost = [name for name in TRIED if name not in known]
     return [_absent(n, seen.get(n), chosen.mount, problem.prepared, reasons.get(n, "")) for n in lost]
+
+
+def _may_be(name: str, chosen: Fit) -> bool:
+    """Whether the axis can have an effect that is another under its own name."""
+    return not named(name).is_settled(chosen.mount)
 
 
 def undecided(finding: Finding, standing: Sequence[AcceptedEffect], policy: Policy) -> Finding:

@@ -7,13 +7,14 @@ from math import ceil, floor, log10
 import numpy as np
 
 from cosim.diagnosis.answer.result import Finding, Trace
-from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.effects import hypothesis_of, named
 from cosim.diagnosis.measure.advice import advice
 from cosim.diagnosis.measure.locate import where
+from cosim.diagnosis.search.renaming import is_renamed
 from cosim.diagnosis.search.rivals import AcceptedEffect
 from cosim.diagnosis.search.sizes import Z95, Numbers, numbers_of
 from cosim.diagnosis.search.stages import CandidateFit
-from pyfmi_models.effects import Effect
+from pyfmi_models.effects import CATALOGUE, Effect
 from pyfmi_models.model import parameters_of
 from pyfmi_models.mount import LINEAR_UNITS, Mount
 
@@ -60,12 +61,19 @@ def accepted(
         where=where(effect, traces),
         ruled_out=tuple(_behind(one, members, True)),
         less_likely=tuple(_behind(one, members, False)),
-        told_apart_by=effect.told_apart_by,
+        told_apart_by=_apart(one, members),
         action=advice(effect, True, mount.motion),
         evidence=f"removes {100 * one.own.plain_gain:.0f} % of the error energy in training "
         f"(evidence {one.own.evidence:.0f} nats; {predicted:.0f} nats on the held-out recordings){own.caveat}",
         visible_from=visible_from(effect, numbers),
     )
+
+
+def _apart(one: AcceptedEffect, members: Sequence[str]) -> str:
+    """How the effect is told from its rivals; from another name of itself first, and alone where that is all."""
+    same = [rival.effect for rival in one.rivals if rival.effect.id in members and is_renamed(rival.effect)]
+    own = [one.effect.told_apart_by] if len(members) > len(same) or not same else []
+    return "; ".join([*(other.told_apart_by for other in same), *own])
 
 
 def _behind(one: AcceptedEffect, members: Sequence[str], far: bool) -> Iterator[str]:
@@ -103,6 +111,24 @@ def rival_finding(rival: CandidateFit, probability: float, mount: Mount) -> Find
         statement=effect.statement("N" if mount.motion == "linear" else "N·m"),
         told_apart_by=effect.told_apart_by,
         action=advice(effect, False, mount.motion),
+    )
+
+
+def measured_as(row: Finding, first: Finding, mount: Mount) -> Finding:
+    """A rival that is the first by another name has its numbers, with their errors; any other stays as it is."""
+    if named(row.effect).same_as != first.effect:
+        return row
+    names = dict(zip(first.parameters, row.parameters, strict=True))
+    values = {names[name]: value for name, value in first.parameters.items()}
+    statement = CATALOGUE[row.effect][0](**values).statement("N" if mount.motion == "linear" else "N·m")
+    return replace(
+        row,
+        parameters=values,
+        standard_errors={names[name]: error for name, error in first.standard_errors.items()},
+        ranges={names[name]: ends for name, ends in first.ranges.items()},
+        size=first.size,
+        size_range=first.size_range,
+        statement=statement,
     )
 
 

@@ -12,6 +12,7 @@ from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.search.instrumental_variable import misfits_of
 from cosim.diagnosis.search.proof import Proof, prove
+from cosim.diagnosis.search.renaming import is_renamed
 from cosim.diagnosis.search.rivals import AcceptedEffect, Examined, margins
 from cosim.diagnosis.search.stages import CandidateFit, contest
 
@@ -33,7 +34,7 @@ def _ways(
     told, least = margins(refused), comparison.policy.set_margin
     stood = {one.effect.id for one in proof.standing}
     for rival in refused.rivals:
-        if told[rival.effect.id] < least and rival.effect.id not in stood:
+        if told[rival.effect.id] < least and rival.effect.id not in stood and not is_renamed(rival.effect):
             swapped = _in_place(comparison, examined, refused, rival)
             again = prove(comparison, swapped, held)
             if stood | {rival.effect.id} <= {one.effect.id for one in again.standing}:

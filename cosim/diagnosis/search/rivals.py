@@ -7,6 +7,7 @@ from cosim.diagnosis.answer.ledger import Rule, all_pass, at_least, until_refuse
 from cosim.diagnosis.decide.policy import Policy
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.search.instrumental_variable import Misfits, excludes, misfits_of, settled
+from cosim.diagnosis.search.renaming import renamed
 from cosim.diagnosis.search.stages import (
     IN_TURN,
     CandidateFit,
@@ -158,9 +159,23 @@ def _challenged(
     margins = {rival.effect.id: margin(comparison, own, rival) for rival in best.values()}
     ranked = sorted(best.values(), key=lambda rival: margins[rival.effect.id])
     contests = {rival.effect.id: contest(comparison, own, rival) for rival in ranked}
-    found = AcceptedEffect(group, own, beside.current, tuple(ranked), margins, contests, misfits)
+    found = with_names(AcceptedEffect(group, own, beside.current, tuple(ranked), margins, contests, misfits))
     _enter(comparison, found)
     return found
+
+
+def with_names(one: AcceptedEffect) -> AcceptedEffect:
+    """The same with other names of the effect, and of each rival, as rivals: behind by nothing, or by as much."""
+    own, rivals = renamed(one.own), [(rival, other) for rival in one.rivals for other in renamed(rival)]
+    if not own and not rivals:
+        return one
+    margins, contests = {other.effect.id: 0.0 for other in own}, {other.effect.id: 0.0 for other in own}
+    margins |= {other.effect.id: one.margins[rival.effect.id] for rival, other in rivals}
+    contests |= {other.effect.id: one.contests[rival.effect.id] for rival, other in rivals}
+    everyone = [*own, *one.rivals, *(other for _, other in rivals)]
+    margins, contests = margins | dict(one.margins), contests | dict(one.contests)
+    ranked = tuple(sorted(everyone, key=lambda rival: margins[rival.effect.id]))
+    return replace(one, rivals=ranked, margins=margins, contests=contests)
 
 
 def _is_admissible(comparison: Comparison, one: CandidateFit) -> bool:

@@ -1,0 +1,91 @@
+"""A weight on a linear axis: a constant has two names there, and no recording tells which is right."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.diagnose import Outcome, diagnose
+from cosim.diagnosis.search import stages
+from pyfmi_models.card import Card, parse_card
+from pyfmi_models.effects import Effect, TorqueOffset
+from pyfmi_models.effects.constant_force import ConstantForce
+
+FORCE = 20.0
+"""More than the friction level, so that no difference of the directions does the same."""
+CARD = """
+[mount]
+name = "carriage"
+motion = "{motion}"
+inertia = 20.0
+[friction]
+model = "coulomb"
+Fc = 15.0
+sigma2 = 30.0
+"""
+TRIED: list[Effect] = []
+
+
+def card(motion: str) -> Card:
+    return parse_card(CARD.format(motion=motion), "card.toml")
+
+
+def recorded(seed: int, force: float = FORCE) -> Recording:
+    """16 s of a carriage that swings, with the noise of its drive and of its scale."""
+    dice, t = np.random.default_rng(seed), np.arange(0, 16, 1 / 250)
+    waves = [(0.09, 0.23), (0.035, 0.61), (0.012, 1.7)]
+    tones = [(a, 2 * np.pi * f, dice.uniform(0, 2 * np.pi)) for a, f in waves]
+    q = sum(a * np.sin(w * t + p) for a, w, p in tones)
+    v = sum(a * w * np.cos(w * t + p) for a, w, p in tones)
+    acceleration = sum(-a * w**2 * np.sin(w * t + p) for a, w, p in tones)
+    tau = 20 * acceleration + 15 * np.tanh(v / 1e-4) + 30 * v + force + dice.normal(0, 0.3, len(t))
+    return Recording.of({"t": t, "tau": tau, "q": q + dice.normal(0, 1e-7, len(t))}, f"run {seed}")
+
+
+@cache
+def outcome(motion: str) -> Outcome:
+    with pytest.MonkeyPatch.context() as patched:
+        own = stages.refitted
+
+        def counted(comparison: object, current: object, effect: Effect, many: int) -> stages.CandidateFit:
+            TRIED.append(effect)
+            return own(comparison, current, effect, many)  # type: ignore[arg-type]
+
+        patched.setattr(stages, "refitted", counted)
+        return diagnose([recorded(1), recorded(2)], [recorded(3)], card(motion))
+
+
+def test_a_constant_of_a_linear_axis_is_told_as_a_set_of_two() -> None:
+    found = outcome("linear").diagnosis
+    assert found.ambiguous_with == (("torque_offset", "constant_force"),)
+    first, second = (next(one for one in found.findings if one.effect == name) for name in found.ambiguous_with[0])
+    assert first.parameters["torque"] == second.parameters["force"] == pytest.approx(FORCE, rel=0.01)
+    assert first.ranges["torque"] == second.ranges["force"]
+    assert first.ranges["torque"][0] < FORCE < first.ranges["torque"][1]
+    assert first.probability == second.probability == pytest.approx(0.5, abs=0.05)
+    assert (
+        second.statement
+        == "A constant force of 20 N pushes the carriage backward: a weight, or an offset of the drive's reading."
+    )
+    assert "release the carriage" in first.told_apart_by
+    assert not found.next_experiment, "no motion separates the two"
+
+
+def test_the_card_holds_one_of_both_and_the_better_error() -> None:
+    (held,) = outcome("linear").card.effects
+    assert isinstance(held, TorqueOffset)
+    assert outcome("linear").diagnosis.heldout.after_rms < 0.05 * outcome("linear").diagnosis.heldout.before_rms
+
+
+def test_what_was_fitted_once_is_not_fitted_again() -> None:
+    outcome("linear")
+    assert any(isinstance(one, TorqueOffset) for one in TRIED)
+    assert not any(isinstance(one, ConstantForce) for one in TRIED)
+
+
+def test_an_axis_that_turns_has_a_torque_offset_alone() -> None:
+    found = outcome("rotary").diagnosis
+    assert "constant_force" not in {name for names in found.ambiguous_with for name in names}
+    (row,) = (one for one in found.findings if one.effect == "constant_force")
+    assert (row.answer, row.evidence) == ("not_testable", "on an axis that turns a constant is called a torque offset")
