@@ -27,9 +27,9 @@ class Weight(Hypothesis[ConstantForce]):
 
     def renamed(self, effect: Effect, mount: Mount) -> ConstantForce | None:
         """The same force as a weight, on an axis that moves along."""
-        if mount.motion != "linear" or not isinstance(effect, TorqueOffset):
+        if mount.motion != "linear":
             return None
-        return ConstantForce(force=effect.torque)
+        return ConstantForce(force=getattr(effect, effect.main.parameter))
 
     def is_settled(self, mount: Mount) -> bool:
         """It needs a linear axis, and a card without a constant."""
