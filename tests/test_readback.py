@@ -125,7 +125,8 @@ def test_the_origin_of_the_card_says_the_same_errors(delivered: Delivered) -> No
 
 def test_the_origin_of_the_card_names_the_same_recordings_version_and_date(delivered: Delivered) -> None:
     origin, told = delivered.better.origin, delivered.told["provenance"]
-    assert set(origin) == {"version", "date", "card", "recordings", "evidence"}
+    assert set(origin) == {"version", "date", "card", "recordings", "evidence", "operational_domain"}
+    assert origin["operational_domain"]["speed"]["low"] == repr(delivered.told["improved"]["speed"][0])
     assert [origin["version"], origin["date"]] == [told["version"], told["date"]]
     assert origin["version"] == delivered.told["version"]
     assert origin["card"] == told["card"]["name"] == "card.toml"

@@ -8,7 +8,7 @@ from typing import Literal
 from cosim.api.recordings import Source
 from cosim.api.recordings import read as read_recording
 from cosim.delivery.experiment import sines, with_experiment
-from cosim.models.maps import related_maps
+from cosim.models.carried import related_of
 from cosim.reading import check_kind
 from cosim.simulators import FORMATS, WHOLE
 from cosim.simulators.deliver import Planned
@@ -259,7 +259,7 @@ def _archives(
     models = {"plant": card.plant().model()}
     if card.controller is not None:
         models["controller"] = card.controller_model()
-    beside = {"plant": related_maps(card)}
+    beside = {"plant": related_of(card, f"{stem}_plant")}
     return [
         _Archive(out / folder / f"{stem}_{part}_fmi{version}.fmu", model, version, machines, beside.get(part, ()))
         for part, model in models.items()

@@ -201,8 +201,8 @@ def _fmu(path: Path) -> tuple[Facts, Tables]:
 
 def _carried(path: Path) -> dict[str, str]:
     """What an FMU brings along (FMI-LS-REF): where it is proven, and experiments that `cosim check` runs."""
-    from cosim.experiments.domain import domains_in
-    from cosim.experiments.manifest import manifest_of
+    from cosim.fmi.domain import domains_in
+    from cosim.fmi.manifest import manifest_of
 
     try:
         manifest = manifest_of(path)
@@ -261,6 +261,7 @@ def _toml(file: str) -> tuple[Facts, Tables]:
 
 
 def _scenario(file: str) -> tuple[Facts, Tables]:
+    from cosim.api.proven import proven_rows
     from cosim.system.diagram import in_short, on_the_way, origin, wire_delays
     from cosim.system.scenario import read_scenario
 
@@ -288,10 +289,13 @@ def _scenario(file: str) -> tuple[Facts, Tables]:
         for wire in scenario.wires
     ]
     records = [{"column": name, "signal": one.signal, "mode": one.mode} for name, one in scenario.records.items()]
-    return facts, {"components": components, WIRES: wires, "recorded": records}
+    proven = proven_rows(scenario)
+    more = {"proven for": proven} if proven else {}
+    return facts, {"components": components, WIRES: wires, "recorded": records, **more}
 
 
 def _card(file: str) -> tuple[Facts, Tables]:
+    from cosim.fmi.domain import KEY, domains_of
     from cosim.models.maps import curves, maps_of
     from pyfmi_models.card import read_card
 
@@ -305,6 +309,8 @@ def _card(file: str) -> tuple[Facts, Tables]:
         "effects": ", ".join(effect.id for effect in card.effects) or "none",
         "controller": card.controller.compensation if card.controller else "none",
     }
+    domains = domains_of(card.origin.get(KEY))
+    facts |= {"proven for": "; ".join(map(str, domains))} if domains else {}
     facts |= {f"note {number}": note for number, note in enumerate(card.remarks(), 1)}
     parameters = [
         {"parameter": v.name, "value": f"{v.start:.6g}", "unit": v.unit, "description": v.description}

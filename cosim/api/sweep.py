@@ -52,7 +52,9 @@ class SweepResult:
         done = self.summary
         before = f", {done.found:,} of them done before" if done.found else ""
         failed = f"; {done.failed:,} came to nothing, the table says why" if done.failed else ""
-        return f"{_best(self.results)}{done.runs:,} runs{before}, {done.seconds:.3g} s{failed}; picture: {self.picture}"
+        left = f"{done.outside:,} runs left what is proven; {done.left}\n" if done.outside else ""
+        how = f"{done.runs:,} runs{before}, {done.seconds:.3g} s{failed}; picture: {self.picture}"
+        return f"{_best(self.results)}{left}{how}"
 
     def __repr__(self) -> str:
         return f"SweepResult({self.summary.runs:,} runs, table={str(self.table)!r})"

@@ -21,15 +21,14 @@ from cosim.diagnosis.answer.result import Diagnosis, Finding, HeldOut
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.effects import named
 from cosim.diagnosis.measure.experiment import SCENARIO, scenario
-from cosim.experiments.domain import KEY, Domain, entries_of
-from cosim.models.maps import related_maps
+from cosim.fmi.domain import KEY, Domain, entries_of
+from cosim.models.carried import related_of
 from cosim.support.files import check_free, directory, replacing, sha256
 from cosim.support.plain import JsonObject
 from cosim.support.version import __version__
 from pyfmi_models.card import Card
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.export import export_fmu
-from pyfmi_models.export.related import Related, identified
 
 DOCUMENT, CARD = "diagnosis.json", "card.toml"
 MISSING, REPORT = "missing_torque.parquet", "report.html"
@@ -253,12 +252,14 @@ def _source_of(card: Card) -> CardSource:
 
 def _origin(found: Diagnosis, provenance: Provenance) -> JsonObject:
     held = found.heldout
+    proven: JsonObject = {KEY: entries_of(_domains(found))} if found.adds_physics else {}
     return {
         "version": provenance["version"],
         "date": provenance["date"],
         "card": provenance["card"]["name"],
         "recordings": [{"name": r["name"], "sha256": r["sha256"], "role": r["role"]} for r in provenance["recordings"]],
         "evidence": f"held-out RMS {held.before_rms:.4g} refitted, {held.after_rms:.4g} with the effects named here",
+        **proven,
     }
 
 
@@ -297,17 +298,15 @@ def _fmus(card: Card, found: Diagnosis, heldout: Recording, out: Path) -> Improv
     model = card.plant().model()
     proven = f"{model.description}; proven on a held-out recording for speeds {span[0]:.3g} to {span[1]:.3g} {unit}"
     model = replace(model, description=proven, name=f"{card.plant().name}_improved")
-    stimulus, told = of_recording(heldout, model), _identification(card, found, model.name)
+    stimulus, told = of_recording(heldout, model), related_of(card, model.name)
     three, two = out / f"{model.name}.fmu", out / f"{model.name}_fmi2.fmu"
-    told = (*told, *related_maps(card))
     with_experiment(lambda related: export_fmu(model, three, fmi=3, force=True, related=(*told, *related)), stimulus)
     with_experiment(lambda related: export_fmu(model, two, fmi=2, force=True, related=(*told, *related)), stimulus)
     return Improved(fmu=f"{model.name}.fmu", fmu_fmi2=f"{model.name}_fmi2.fmu")
 
 
-def _identification(card: Card, found: Diagnosis, name: str) -> tuple[Related, ...]:
-    """What the improved FMU says of where it comes from, and within which range it is proven."""
+def _domains(found: Diagnosis) -> tuple[Domain, Domain]:
+    """Where the improved model is proven; q and v are what its FMU calls position and speed."""
     position, speed = ("m", "m/s") if found.motion == "linear" else ("rad", "rad/s")
     (slow, fast), (left, right) = _proven_range(found)["speed"], _proven_range(found)["position"]
-    domains = (Domain("speed", slow, fast, speed), Domain("position", left, right, position))
-    return identified(name, {**card.origin, KEY: entries_of(domains)}, b"")
+    return Domain("speed", slow, fast, speed, "v"), Domain("position", left, right, position, "q")

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from cosim.experiments.experiment_file import CSV, KINDS, Experiment, experiments_in
-from cosim.experiments.manifest import Manifest, manifest_of
 from cosim.experiments.run import MODEL, Outcome, run_experiment, settings_of, system_of
 from cosim.fmi.description import describe, first_line
+from cosim.fmi.manifest import Manifest, manifest_of
 from cosim.fmi.variables import ports_of
 from cosim.master.exchange import open_fmu
 from cosim.master.simulate import simulate

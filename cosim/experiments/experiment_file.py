@@ -10,8 +10,8 @@ from math import isfinite
 from pathlib import Path
 from xml.etree import ElementTree
 
-from cosim.experiments.manifest import Related, member_of
-from cosim.experiments.xml_member import plain, xml_in
+from cosim.fmi.manifest import Related, member_of
+from cosim.fmi.xml_member import plain, xml_in
 from cosim.support.errors import FmuError
 
 KINDS = ("application/x-ma-hs-experiments", "application/x-ma-ls-experiments")

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from cosim.experiments.xml_member import plain, xml_in
 from cosim.fmi.component import Port
+from cosim.fmi.xml_member import plain, xml_in
 from cosim.support.errors import FmuError, UnitError
 from cosim.support.plain import Parsed
 from cosim.support.units import conversion

@@ -17,6 +17,7 @@ from functools import cached_property
 from typing import Any
 
 from cosim.fmi.component import Component, Port
+from cosim.fmi.domain import Domain
 from cosim.support.errors import UnitError, WiringError
 from cosim.support.units import unit
 
@@ -53,6 +54,12 @@ class Aliased:
     def initial_dependencies(self) -> Mapping[str, frozenset[str] | None]:
         """What the component says, in our names."""
         return self._renamed(self._component.initial_dependencies)
+
+    @cached_property
+    def domains(self) -> tuple[Domain, ...]:
+        """Where the component is proven, in our names."""
+        found: tuple[Domain, ...] = getattr(self._component, "domains", ())
+        return tuple(replace(one, variable=self._ours.get(one.variable or one.name, one.variable)) for one in found)
 
     def enter_initialisation(self, parameters: Mapping[str, Any], time: float = 0.0) -> None:
         """Start the component with parameters under either name."""

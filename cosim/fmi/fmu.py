@@ -27,6 +27,7 @@ from cosim.fmi.description import (
     own_step_of,
     provides_derivatives,
 )
+from cosim.fmi.domain import Domain, domains_at
 from cosim.fmi.guard import Guard
 from cosim.fmi.listeners import callbacks2, registered, same_directory
 from cosim.fmi.own_starts import own_starts
@@ -94,6 +95,11 @@ class FmuComponent:
         except BaseException:
             self._directory.cleanup()
             raise
+
+    @cached_property
+    def domains(self) -> tuple[Domain, ...]:
+        """Where the FMU is proven, as its metadata state it."""
+        return domains_at(self.path)
 
     def configure(self, parameters: Mapping[str, Any]) -> None:
         """Give arrays the size that structural parameters among these ask for; others wait for initialisation.

@@ -13,6 +13,7 @@ from cosim.fmi.guard import Guard
 from cosim.master.access import who_ended
 from cosim.master.given import Given
 from cosim.master.loop import CompiledLoop, InterpretedLoop, slow_because
+from cosim.master.proven import Proven, said_of
 from cosim.master.result import Statistics
 from cosim.support.interrupts import uninterrupted
 from cosim.system.plan import Column, Plan
@@ -38,6 +39,8 @@ class Execution:
     ticks: int
     on_progress: Progress | None
     guard: Guard
+    proven: Sequence[Proven] = ()
+    """What is watched; its columns are the last ones."""
     last: bool = False
     seconds: float = 0.0
     ended: str = ""
@@ -69,6 +72,7 @@ class Execution:
             "coupling": [asdict(effort) for effort in self.loop.efforts],
             "warnings": self.loop.warnings,
             "unconnected": list(self.wiring.unconnected()),
+            "outside": said_of(self.proven),
             "notes": self._notes(),
         }
 
@@ -125,8 +129,10 @@ class Execution:
         first, count = self.writer.rows, rows.shape[1]
         if count:
             t = self.plan.start + np.arange(first, first + count) * self.plan.decimation * self.plan.step
-            columns = zip(self.wiring.records, self.plan.columns, rows, strict=True)
+            columns = zip(self.wiring.records, self.plan.columns, rows, strict=False)
             self.writer.write({"t": t} | {name: self._told(column, row) for name, column, row in columns})
+            for one, row in zip(self.proven, rows[len(self.wiring.records) :], strict=True):
+                one.see(t, row)
         if self.plan.pool is not None:
             self.plan.pool.sweep(np.concatenate([self.plan.bus[list(self.plan.named)], self.loop.held]))
 

@@ -30,7 +30,7 @@ def writer_of(
 ) -> MemoryWriter:
     """Return what takes the rows of a plan: a file where a path is given."""
     units = {"t": "s"} | {key: wiring.unit(one) for key, one in wiring.records.items()}
-    columns = zip(wiring.records, plan.columns, strict=True)
+    columns = zip(wiring.records, plan.columns, strict=False)  # what is watched comes after
     kinds = {name: column.kind for name, column in columns if column.kind}
     if path is not None:
         return StreamWriter(path, units, dict(origin), force, kinds)

@@ -11,7 +11,9 @@ from cosim.support.html import facts
 
 
 class Statistics(TypedDict):
-    """How a run went, as run.json says it; times in s. `coupling` has a row for each coupled group."""
+    """How a run went, as run.json says it; times in s. `coupling` has a row for each coupled group,
+    `outside` a sentence for each range in which a component is proven and that was left.
+    """
 
     steps: int
     step: float
@@ -30,6 +32,7 @@ class Statistics(TypedDict):
     scenario: NotRequired[str]
     recording: NotRequired[str]
     page: NotRequired[str]
+    outside: NotRequired[Sequence[str]]
     tracking: NotRequired[Sequence[Mapping[str, float | str]]]
 
 
@@ -80,7 +83,7 @@ def remarks(statistics: Statistics) -> list[str]:
         said.append(f"pictures: {statistics['page']}")
     if statistics["unconnected"]:
         said.append(f"not connected, at their start values: {', '.join(statistics['unconnected'])}")
-    said += statistics["notes"]
+    said += [*statistics.get("outside", ()), *statistics["notes"]]
     if statistics["warnings"]:
         said.append(f"{statistics['warnings']:,} steps ended with a warning of their FMU")
     return said

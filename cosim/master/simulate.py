@@ -7,7 +7,7 @@ the algorithm's (`algorithm`); Jacobi where nothing else is said.
 import sys
 from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +20,7 @@ from cosim.master.notes import notes_of
 from cosim.master.opening import started, wiring_of
 from cosim.master.output import check_room, kept, origin_of, writer_of
 from cosim.master.planning import make_plan
+from cosim.master.proven import proven_of, with_records
 from cosim.master.result import RunResult, Statistics
 from cosim.support.errors import CosimError
 from cosim.system.scenario import Scenario
@@ -62,7 +63,9 @@ def simulate(system: System, options: Options = PLAIN) -> RunResult:
     path = options.path and options.path.absolute()  # foreign code may change the working directory
     with ExitStack() as stack:
         wiring = wiring_of(stack, system)
-        plan = make_plan(wiring, system.step, system.decimation, system.start)
+        proven = proven_of(wiring)
+        watched = replace(wiring, records=with_records(wiring, proven))
+        plan = make_plan(watched, system.step, system.decimation, system.start)
         settings = started(wiring, system, plan)
         guard, signals = guard_of(plan), Given(wiring, plan).at(np.zeros(1, dtype=np.int64))[:, 0]
         notes = [*system.notes, *notes_of(wiring, plan, settings)]
@@ -73,7 +76,7 @@ def simulate(system: System, options: Options = PLAIN) -> RunResult:
         writer = writer_of(wiring, plan, {**origin, **told}, path, options.force)
         loop = make_loop(plan, options.compiled)
         ticks, last = system.ticks, system.ends_on_a_row
-        work = Execution(wiring, plan, notes, loop, writer, ticks, options.on_progress, guard, last)
+        work = Execution(wiring, plan, notes, loop, writer, ticks, options.on_progress, guard, proven, last)
         _execute(work, options)
     recording = kept(writer, system.name) if options.path is None else None
     files = {} if options.path is None else {"recording": options.path}

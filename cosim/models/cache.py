@@ -61,6 +61,7 @@ def _fmu(component: ComponentSection, where: str, on_build: Callable[[str], None
     card, part = str(component.card), str(component.part)
     source = _card_file(card, where)
     made_by = f"{_sources()} {part} {FMI} ".encode() + b"".join(path.read_bytes() for path in plugins.files())
+    made_by += b" carried" if b"[origin]" in source.read_bytes() else b""
     key = hashlib.sha256(made_by + source.read_bytes()).hexdigest()[:16]
     path = _home() / f"{source.stem}-{part}-{key}.fmu"
     if not path.exists():
@@ -85,17 +86,22 @@ def _model(name: str) -> Any:
 
 
 def _build(card: str, part: str, path: Path) -> None:
+    from cosim.models.carried import related_of
     from pyfmi_models.card import read_card
 
     read = read_card(card)
-    _export(read.plant().model() if part == "plant" else read.controller_model(), path)
+    if part == "plant":
+        model = read.plant().model()
+        _export(model, path, related_of(read, model.name))
+    else:
+        _export(read.controller_model(), path)
 
 
-def _export(model: Any, path: Path) -> None:
+def _export(model: Any, path: Path, related: Any = ()) -> None:
     from pyfmi_models.export import export_fmu
 
     directory(path.parent)
-    export_fmu(model, path, fmi=FMI, force=True)
+    export_fmu(model, path, fmi=FMI, force=True, related=related)
 
 
 def _card_file(card: str, where: str) -> Path:

@@ -33,6 +33,10 @@ class Summary:
     failed: int
     seconds: float
     table: Path
+    outside: int = 0
+    """Runs that left the range in which a component is proven."""
+    left: str = ""
+    """How the first of them did."""
 
 
 def conduct(
@@ -84,7 +88,9 @@ def conduct(
             journal.append(row)
             failed += row["status"] != "ok"
             on_progress(done, sweep.design.runs, failed)
-    return Summary(sweep.design.runs, len(rest), len(known), failed, perf_counter() - begun, table)
+        outside = [run for run, row in sorted(journal.rows.items()) if row["status"] == "ok" and row["reason"]]
+        left = f"run {outside[0]}: {journal.rows[outside[0]]['reason']}" if outside else ""
+    return Summary(sweep.design.runs, len(rest), len(known), failed, perf_counter() - begun, table, len(outside), left)
 
 
 def _rows(pool: AbstractContextManager[Pool], rest: list[Numbered]) -> Generator[Row, None, None]:

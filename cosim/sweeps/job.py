@@ -18,7 +18,9 @@ from cosim.system.scenario import Scenario
 from cosim.system.wire import Record
 
 Row = Parsed
-"""Column to value: run, what was varied, statistics, seconds, status ("ok", "failed", "crashed", "timeout"), reason."""
+"""Column to value: run, what was varied, statistics, seconds, status ("ok", "failed", "crashed", "timeout"), reason.
+
+The reason of a run that is ok is how it left the range in which a component is proven, where it did."""
 
 
 @dataclass(frozen=True)
@@ -74,10 +76,11 @@ def work(job: Job, number: int, point: Point) -> Row:
     """Run one point. Whatever goes wrong is said in the row."""
     row, begun = job.begun(number, point), perf_counter()
     try:
-        recording = run(job.at(point)).recording
-        row |= {name: one.of(recording) for name, one in job.statistics.items()}
-        _keep(job, number, recording)
-        row["status"] = "ok"
+        done = run(job.at(point))
+        row |= {name: one.of(done.recording) for name, one in job.statistics.items()}
+        _keep(job, number, done.recording)
+        outside = done.statistics.get("outside", ())
+        row |= {"status": "ok", "reason": outside[0] if outside else ""}
     except CosimError as error:
         row["reason"] = str(error)
     except Exception as error:  # whatever a foreign FMU or a full disk raises costs this row only

@@ -9,7 +9,7 @@ import pytest
 import cosim
 from cosim.data.recording import Recording
 from cosim.delivery.experiment import of_recording, with_experiment
-from cosim.experiments.domain import KEY, Domain, entries_of
+from cosim.fmi.domain import KEY, Domain, entries_of
 from pyfmi_models.card import read_card
 from pyfmi_models.export import export_fmu
 from pyfmi_models.export.related import identified

@@ -11,7 +11,7 @@ from pathlib import Path
 from urllib.parse import unquote, urlsplit
 from xml.etree import ElementTree
 
-from cosim.experiments.xml_member import plain, xml_in
+from cosim.fmi.xml_member import plain, xml_in
 from cosim.support.errors import FmuError
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"

@@ -1,0 +1,111 @@
+"""A run, a sweep and a system say where a model is proven, and the first time and variable at which it is left."""
+
+import json
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from motor_fmu import motor
+
+import cosim
+from cosim.fmi.domain import KEY, Domain, domains_of, entries_of
+from pyfmi_models.card import read_card
+from pyfmi_models.card_writer import card_text
+from pyfmi_models.export.related import identified, references
+
+SCENARIO = """
+step = 1e-2
+stop = 2.0
+[components.a]
+fmu = "proven.fmu"
+variables = {{ speed = "w" }}
+[components.b]
+fmu = "proven.fmu"
+[signals.u]
+kind = "ramp"
+velocity = 2.0
+unit = "A"
+[[connections]]
+from = "u.position"
+to = "a.i"
+[[connections]]
+from = "u.position"
+to = "b.i"
+gain = 0.5
+[record]
+signals = {{ phi = "a.phi" }}
+decimation = {decimation}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory) -> Path:
+    """A motor that is proven for speeds up to 60 rpm and currents of 3 A, and a system of two of them."""
+    folder = tmp_path_factory.mktemp("proven")
+    domains = (Domain("speed", -60.0, 60.0, "rpm", "w"), Domain("i", -3.0, 3.0, "A"), Domain("dust", 0, 1, "1"))
+    files = references(identified("motor", {KEY: entries_of(domains)}, b""))
+    with zipfile.ZipFile(motor(folder, 3)) as source, zipfile.ZipFile(folder / "proven.fmu", "w") as target:
+        for name in source.namelist():
+            target.writestr(name, source.read(name))
+        for name, content in files.items():
+            target.writestr(name, content)
+    (folder / "system.toml").write_text(SCENARIO.format(decimation=1))
+    return folder
+
+
+def test_a_run_says_the_first_time_and_variable(folder):
+    done = cosim.run(folder / "system.toml")
+    outside = done.statistics["outside"]
+    assert [one.split(" leaves")[0] for one in outside] == ["a.speed", "a.i"], "the first one first"
+    current = next(one for one in outside if one.startswith("a.i"))
+    assert "a is proven at 1.51 s: 3.02 A, proven -3 to 3; at most it is 3.98" in current
+    speed = next(one for one in outside if one.startswith("a.speed"))
+    assert "proven -6.283 to 6.283" in speed
+    assert outside[0] in str(done)
+    assert list(done.recording.columns) == ["t", "phi"], "nothing more is recorded"
+
+
+def test_a_run_within_the_range_says_nothing(folder):
+    assert cosim.run(folder / "system.toml", stop=0.5).statistics["outside"] == []
+
+
+def test_a_sweep_says_which_run_leaves_it_first(folder, tmp_path):
+    (folder / "sweep.toml").write_text(
+        'scenario = "system.toml"\n[vary]\n"u.velocity" = [0.1, 2.0, 4.0]\n'
+        '[statistics]\nend = { signal = "phi", kind = "final" }\n'
+    )
+    done = cosim.sweep(folder / "sweep.toml", tmp_path / "out", workers=1)
+    assert done.summary.outside == 2
+    assert "2 runs left what is proven; run 1: a.speed leaves the range in which a is proven at " in str(done)
+    reasons = done.frame()["reason"].tolist()
+    assert [bool(one) for one in reasons] == [False, True, True]
+    assert done.frame()["status"].tolist() == ["ok"] * 3
+
+
+def test_ranges_of_a_system_are_intersected_where_one_signal_feeds_both(folder):
+    rows = {row["signal"]: row for row in cosim.show(folder / "system.toml").tables["proven for"]}
+    assert rows["u.position"] == {"signal": "u.position", "proven": "-3 to 3 A", "for": "a, b"}, "b allows 6 A of it"
+    assert rows["a.speed"]["proven"] == "-60 to 60 rpm"
+
+
+def test_a_card_states_its_range_and_its_fmu_carries_it(tmp_path):
+    card = read_card("emps")
+    domains = (Domain("speed", -0.1, 0.1, "m/s", "v"),)
+    path = tmp_path / "better.toml"
+    origin = {KEY: entries_of(domains)}
+    path.write_text(card_text(replace(card, origin=origin)))
+    assert cosim.show(path).facts["proven for"] == "speed -0.1 to 0.1 m/s"
+    (tmp_path / "push.toml").write_text(
+        f'step = 1e-3\nstop = 0.5\n[components.axis]\ncard = "{path}"\npart = "plant"\n'
+        '[signals.u]\nkind = "constant"\nvalue = 100.0\nunit = "N"\n'
+        '[[connections]]\nfrom = "u"\nto = "axis.tau"\n[record]\nsignals = { q = "axis.q" }\n'
+    )
+    assert cosim.show(tmp_path / "push.toml").tables["proven for"][0]["proven"] == "-0.1 to 0.1 m/s"
+    assert "axis.v leaves the range" in cosim.run(tmp_path / "push.toml").statistics["outside"][0]
+
+
+def test_what_is_no_range_is_no_domain():
+    assert domains_of("all") == ()
+    assert domains_of({"a": {"low": "x", "high": "1"}, "b": 3, "c": {"low": 2, "high": 1}, "d": {"low": 0}}) == ()
+    assert json.dumps([one.name for one in domains_of({"e": {"low": "0", "high": "1"}})]) == '["e"]'
