@@ -22,7 +22,7 @@ from pyfmi_models.card import read_card
 from pyfmi_models.export import build_library, export_fmu
 from pyfmi_models.export.platforms import PLATFORMS, host
 
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
+sys.path.append(str(Path(__file__).parents[1] / "tests/tools"))
 from fmu_tools import TOOLS
 
 ROUNDS = 9
@@ -108,7 +108,7 @@ def present(module: str) -> bool:
 
 
 def load(tool: str, fmi: int, folder: Path) -> float:
-    runner, out = Path(__file__).parents[1] / "tests" / "fmu_tools.py", folder / "rows.npz"
+    runner, out = Path(__file__).parents[1] / "tests/tools/fmu_tools.py", folder / "rows.npz"
     command = [sys.executable, str(runner), tool, str(folder / f"1{fmi}.fmu"), "1", str(out)]
     subprocess.run(command, check=True, capture_output=True)
     return float(np.load(out)["seconds"])

@@ -28,7 +28,10 @@ from shutil import rmtree
 
 for name in ("OMP", "OPENBLAS", "ARROW"):
     os.environ.setdefault(f"{name}_NUM_THREADS", "1")
-sys.path[:0] = [str(Path(__file__).parent), *(str(Path(__file__).parents[1] / one) for one in ("tests", "tests/data"))]
+sys.path[:0] = [
+    str(Path(__file__).parent),
+    *(str(Path(__file__).parents[1] / one) for one in ("tests/tools", "tests/data")),
+]
 
 from attack_kinds import kinds, untouched  # noqa: E402
 from attack_targets import Target, Yard, line  # noqa: E402

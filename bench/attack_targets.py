@@ -124,7 +124,7 @@ class Yard:
     """A folder with good files, made once."""
 
     def __init__(self, folder: Path) -> None:
-        from test_scenario import TEXT
+        from small_loop import TEXT
         from tiny_fmu import build
 
         self.folder = folder

@@ -28,7 +28,7 @@ from pyfmi_models.derivation import derivation_of
 from pyfmi_models.export.modelica import modelica_text
 from pyfmi_models.export.ssp import export_ssp
 
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
+sys.path.append(str(Path(__file__).parents[1] / "tests/tools"))
 from exchange_archives import page, rows_of
 from ssp_tools import SIGNALS, TOOLS
 
@@ -89,7 +89,7 @@ def present(module: str) -> bool:
 
 
 def in_tool(tool: str, ssp: Path, steps: int) -> np.ndarray:
-    runner, out = Path(__file__).parents[1] / "tests" / "ssp_tools.py", ssp.with_suffix(f".{tool}.npy")
+    runner, out = Path(__file__).parents[1] / "tests/tools/ssp_tools.py", ssp.with_suffix(f".{tool}.npy")
     command = [sys.executable, str(runner), tool, str(ssp), str(STEP), str(steps), str(out)]
     subprocess.run(command, check=True, capture_output=True)
     return np.load(out)

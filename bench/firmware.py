@@ -22,7 +22,7 @@ import numpy as np
 import cosim
 from pyfmi_models.card import Card, parse_card
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests/tools"))
 
 import firmware_tools as tools
 

@@ -27,7 +27,7 @@ from pyfmi_models.export.codegen import SHIM, TOLERANCE, generate
 from pyfmi_models.export.platforms import PLATFORMS, host
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE.parent / "tests"))
+sys.path.insert(0, str(HERE.parent / "tests/tools"))
 
 from export_models import Driver  # noqa: E402
 

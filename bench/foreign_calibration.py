@@ -24,7 +24,7 @@ from cosim.master.simulate import simulate
 from cosim.system.system import System
 from cosim.system.wire import Record, Wire
 
-sys.path[:0] = [str(Path(__file__).parents[1] / "tests"), str(Path(__file__).parents[1] / "tests/exchange")]
+sys.path[:0] = [str(Path(__file__).parents[1] / one) for one in ("tests/tools", "tests/exchange")]
 from motor_fmu import motor  # noqa: E402
 
 FACTOR = 1.6

@@ -21,7 +21,7 @@ from typing import Any
 
 import hypothesis
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests/tools"))
 import fuzz_models
 from fuzz_calls import functions
 from fuzz_models import MODELS, PLANTED, Planted, Played

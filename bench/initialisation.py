@@ -2,7 +2,7 @@
 
 python bench/initialisation.py --out results/exchange
 
-The FMUs are those of tests/start_fmus.py, of FMI 2, because not all tools know another. FMPy and libcosim show nothing
+The FMUs are those of `start_fmus.py`, of FMI 2, because not all tools know another. FMPy and libcosim show nothing
 before the first step, so what is looked at cannot be right after some steps if the start was wrong. --python names an
 interpreter in which the other tools are installed (extra `peers`), where that is another than this one.
 """
@@ -24,7 +24,7 @@ from cosim.support.errors import CosimError
 from cosim.support.files import replacing
 from cosim.system.scenario import read_scenario
 
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
+sys.path.append(str(Path(__file__).parents[1] / "tests/tools"))
 from ssp_files import EXPERIMENT, SPACES, real, wire
 from ssp_tools import TOOLS
 from start_fmus import DX, C, K, U, V, X, Y, library, packed
@@ -192,7 +192,7 @@ def ours(archive: Path, case: Case) -> np.ndarray | str:
 
 
 def theirs(archive: Path, case: Case, python: str, tool: str) -> np.ndarray | str:
-    runner, out = Path(__file__).parents[1] / "tests" / "ssp_tools.py", archive.with_suffix(f".{tool}.npy")
+    runner, out = Path(__file__).parents[1] / "tests/tools/ssp_tools.py", archive.with_suffix(f".{tool}.npy")
     command = [python, str(runner), tool, str(archive), str(STEP), str(STEPS), str(out), case.signal]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     if done.returncode or not out.exists():

@@ -28,7 +28,7 @@ from pathlib import Path
 from random import Random
 from shutil import rmtree
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tests")]
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tests/tools")]
 
 import pyarrow.parquet as pq  # noqa: E402
 
@@ -141,7 +141,7 @@ def commands(folder: Path) -> dict[str, list[str]]:
     """The commands, all of which write to `out` in the folder that they run in."""
     from attack_targets import PLAIN, table
     from on_hardware import SCENARIO
-    from test_scenario import TEXT
+    from small_loop import TEXT
     from tiny_fmu import build
 
     for version in (2, 3):

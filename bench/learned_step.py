@@ -25,7 +25,7 @@ from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHys
 from pyfmi_models.export import build_library
 from pyfmi_models.model import Model
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests/tools"))
 
 from export_models import Driver
 

@@ -29,7 +29,7 @@ from cosim.models.cache import with_fmus
 from cosim.system.scenario import read_scenario
 from pyfmi_models.card import Card, read_card
 
-sys.path.append(str(Path(__file__).parents[1] / "tests"))
+sys.path.append(str(Path(__file__).parents[1] / "tests/tools"))
 from investigations import BELIEVED, SCENARIO
 
 QUIET = (r'\[signals\.(ripple|grain)\]\nkind = "noise"\nrms = \S+\nseed = \d\n\n', r'noise = "\w+"\n')

@@ -32,7 +32,7 @@ import pyarrow.parquet  # noqa: F401
 import pytest
 import scipy.signal  # noqa: F401
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tests")]
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tests/tools")]
 
 from mutants_choice import around, belonging, calling  # noqa: E402
 from mutants_fork import HOME, QUIET, TOO_LONG, Server, function_of, limited, prepared  # noqa: E402
@@ -104,7 +104,7 @@ def failed(tree: Path, tests: Sequence[str], without: Iterable[str] = ()) -> str
     if NO_SUCH_TEST in text:
         raise SystemExit(f"{tree}: of the tests that are asked some are not there: {text[-300:]}")
     lost = [one.split(" - ")[0] for one in text.splitlines() if one.startswith(LOST)]
-    named = re.search(r"tests/(test_\w+\.py::.*)", lost[-1]) if lost else None
+    named = re.search(r"tests/((?:\w+/)*test_\w+\.py::.*)", lost[-1]) if lost else None
     return named[1] if named else tests[0]
 
 

@@ -51,7 +51,11 @@ def imported(path: Path) -> frozenset[Path]:
             names = [node.module, *(f"{node.module}.{one.name}" for one in node.names)]
         for name in names:
             stem = name.replace(".", "/")
-            files = [place / f"{stem}{end}" for place in (HOME, HOME / "tests") for end in (".py", "/__init__.py")]
+            files = [
+                place / f"{stem}{end}"
+                for place in (HOME, HOME / "tests" / "tools", path.parent)
+                for end in (".py", "/__init__.py")
+            ]
             found |= {one for one in files if one.is_file()}
     return frozenset(found - {path})
 
@@ -72,10 +76,10 @@ def belonging(module: Path) -> tuple[str, ...]:
     """The test files nearest to a module: by imports and by words of the name, the smallest of equally near first."""
     words = set(str(module.relative_to(HOME).with_suffix("")).replace("/", "_").split("_"))
     ranked = []
-    for test in (HOME / "tests").glob("test_*.py"):
+    for test in (HOME / "tests").rglob("test_*.py"):
         steps, shared = distance(test, module), len(words & set(test.stem.split("_")[1:]))
         if steps <= MOST and not test.stem.startswith(SLOW):
-            ranked.append((steps - 2 * shared, test.stat().st_size, test.name))
+            ranked.append((steps - 2 * shared, test.stat().st_size, str(test.relative_to(HOME / "tests"))))
     return tuple(name for *_, name in sorted(ranked)[:NEAREST])
 
 

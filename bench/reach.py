@@ -109,7 +109,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--files", nargs="*", help="files of tests; all where none is named")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args(arguments)
-    gather(given.files or sorted(one.name for one in (HOME / "tests").glob("test_*.py")), given.out.absolute())
+    gather(
+        given.files or sorted(str(one.relative_to(HOME / "tests")) for one in (HOME / "tests").rglob("test_*.py")),
+        given.out.absolute(),
+    )
 
 
 if __name__ == "__main__":

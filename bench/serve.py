@@ -23,13 +23,13 @@ from pathlib import Path
 from typing import Any
 
 TESTS = Path(__file__).parents[1] / "tests"
-sys.path[:0] = [str(TESTS), str(TESTS.parent)]
+sys.path[:0] = [str(TESTS / "tools"), str(TESTS.parent)]
 
 import numpy as np  # noqa: E402
 from browsing import DESK, PATIENCE, PHONE, axe_script, chromium, dropped, opened, processor, violations  # noqa: E402
 from damages import damaged  # noqa: E402
+from report_text import text_of  # noqa: E402
 from serving import until  # noqa: E402
-from test_report_truth import text_of  # noqa: E402
 
 from cosim.support.version import __version__  # noqa: E402
 

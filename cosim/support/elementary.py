@@ -4,7 +4,7 @@ numpy's differ in the last bit between processors (it has another library where 
 systems. These use only what IEEE 754 rounds in one way (+ - * /, floor, comparisons), in a fixed order. They are those
 of `detmath_trig.c`, which exported FMUs call, with the same bits; constants are rounded from their definitions here.
 
-Errors, measured against mpmath, in units in the last place; tests/test_elementary.py holds them:
+Errors, measured against mpmath, in units in the last place; tests/support/test_elementary.py holds them:
     sine, cosine    0.80 for |x| <= 1.6e6; beyond, an absolute error of |x| 2^-52, as if x were no better known
     arctan2         1.45
     cube_root       0.90

@@ -4,7 +4,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from test_cli_run import call
+from commands import call
 
 
 def test_a_table_of_very_many_variables_is_written_plainly(

@@ -19,7 +19,7 @@ from pyfmi_models.card import parse_card
 ROOT = Path(__file__).parents[2]
 FENCED = re.compile(r"^( *)```(\w+)\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
 TESTED_ELSEWHERE = {"adding_physics.md"}
-"""Its files make a law and an effect: tests/test_new_physics.py."""
+"""Its files make a law and an effect: tests/documents/test_new_physics.py."""
 
 
 class Block(NamedTuple):
@@ -61,7 +61,7 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @each("python")
 def test_a_block_of_python_runs(block: Block, prepared: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     if block.name.split()[0] in TESTED_ELSEWHERE:
-        pytest.skip("tests/test_new_physics.py runs it")
+        pytest.skip("tests/documents/test_new_physics.py runs it")
     monkeypatch.chdir(prepared)
     exec(compile(block.text, block.name, "exec"), {"__name__": "block"})
 

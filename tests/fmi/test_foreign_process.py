@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from commands import ENVIRONMENT, call
 from pyarrow.parquet import read_table
 from rude_fmu import DEEDS, STAGES, rude_fmu
-from test_cli_run import ENVIRONMENT, call
 from tiny_fmu import tiny
 
 import cosim
@@ -23,7 +23,7 @@ from cosim.fmi.guard import Guard
 __all__ = ["tiny"]
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what the FMU of the test changes is there on Linux")
-PROBE = Path(__file__).parents[1] / "rude_probe.py"
+PROBE = Path(__file__).parents[1] / "tools" / "rude_probe.py"
 NAMES = {
     "directory": "the working directory",
     "umask": "the umask",

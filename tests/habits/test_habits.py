@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
-from test_cli_run import call
+from commands import call
 from typer.main import get_command
 
 from cosim.cli import VERBS, application

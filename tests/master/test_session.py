@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from test_scenario import TEXT
+from small_loop import TEXT
 from tiny_fmu import tiny
 
 import cosim

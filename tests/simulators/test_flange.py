@@ -5,8 +5,8 @@ from pathlib import Path
 import pymoca.ast as ast
 import pymoca.parser
 import pytest
+from modelica_flat import Flat, at_random, in_modelica
 from pymoca.tree import flatten
-from test_modelica import Flat, at_random, in_modelica
 
 from cosim.api.export import export
 from pyfmi_models.card import parse_card, read_card

@@ -27,7 +27,7 @@ LEAST_SHARE = 0.02
 STEP, STEPS = 1.5, 12
 """Factor between two sizes that are tried, and how many are: up to 86 times the first. The first is also one such step
 above the least that has a name, as what is read is smaller than what is concealed: the base takes a part of it. Of a
-delay at 500 Hz .79 to .84 was read (tests/test_bounds.py)."""
+delay at 500 Hz .79 to .84 was read (tests/diagnosis/measure/test_bounds.py)."""
 ALIKE = 3.0
 """Members of a kind share a bound if theirs differ by no more than this factor."""
 MARGIN = 1.25

@@ -1,0 +1,253 @@
+"""The command line: data on stdout, messages on stderr, one sentence for a mistake, nothing overwritten unasked."""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from commands import ENVIRONMENT, cache, call, scenario
+from tiny_fmu import tiny
+
+import cosim.models.cache
+from cosim.cli import main
+from cosim.data.recording import Recording
+
+__all__ = ["cache", "scenario", "tiny"]
+
+
+def test_run_writes_a_recording_and_prints_its_path(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call("run", scenario, "--out", tmp_path / "out") == 0
+    said = capsys.readouterr()
+    assert said.out == f"{tmp_path / 'out' / 'recording.parquet'}\n"
+    assert "loop: 500 steps of 0.001 s\nRMS tracking error " in said.err
+    assert "\n500 steps in " in said.err
+    assert "not connected, at their start values: plant.b" in said.err
+    assert len(Recording.read(tmp_path / "out" / "recording.parquet")) == 250
+
+
+def test_run_as_json_prints_what_it_also_writes(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call("run", scenario, "--out", tmp_path / "out", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told == json.loads((tmp_path / "out" / "run.json").read_text())
+    assert told["steps"] == 500
+    assert told["recording"] == str(tmp_path / "out" / "recording.parquet")
+    np.testing.assert_allclose(told["ratio_to_real_time"], 0.5 / told["seconds"])
+
+
+def test_nothing_is_overwritten_without_force(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call("run", scenario, "--out", tmp_path / "out") == 0
+    capsys.readouterr()
+    assert call("run", scenario, "--out", tmp_path / "out") == 2
+    path = tmp_path / "out" / "recording.parquet"
+    assert capsys.readouterr() == ("", f"cosim: {path} exists already; give --force to overwrite it.\n")
+    assert call("run", scenario, "--out", tmp_path / "out", "--force", "--interpreted") == 0
+    assert "It was asked for: the loop ran in Python." in capsys.readouterr().err
+
+
+def test_a_mistake_is_one_sentence_and_exit_code_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("run", "none.toml", "--out", tmp_path / "out") == 2
+    said = capsys.readouterr()
+    assert said.err.startswith("cosim: none.toml: no such scenario; a scenario is a .toml or .ssp file or one of: ")
+    assert said.err.count("\n") == 1
+    assert said.out == ""
+    assert not (tmp_path / "out").exists()
+
+
+def test_debug_shows_where_it_came_from(tmp_path: Path) -> None:
+    from cosim.support.errors import ScenarioError
+
+    with pytest.raises(ScenarioError):
+        main(["run", "none.toml", "--out", str(tmp_path), "--debug"])
+
+
+def test_a_failing_component_leaves_what_was_recorded(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scenario.write_text(scenario.read_text().replace("k = 5.0", "k = 5.0, fail_at = 0.3"))
+    assert call("run", scenario, "--out", tmp_path / "out") == 2
+    path = tmp_path / "out" / "recording.parquet"
+    note, sentence = capsys.readouterr().err.splitlines()[-2:]
+    assert note == f"what was recorded until then is in {path}"
+    assert sentence.startswith(
+        'cosim: controller returned an error at tick 300 (0.3 s); it said "the shaft broke"; its last'
+    )
+    assert len(Recording.read(path)) == 151
+
+
+def test_an_fmu_that_prints_does_not_spoil_the_data(scenario: Path, tmp_path: Path) -> None:
+    scenario.write_text(scenario.read_text().replace("k = 5.0", "k = 5.0, fail_at = 0.3, status = 13"))
+    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out"), "--json"]
+    done = subprocess.run(command, env=ENVIRONMENT, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert json.loads(done.stdout)["steps"] == 500
+    assert done.stderr.count("chatter") == 200
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "word"), [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
+)
+def test_ctrl_c_and_termination_leave_a_complete_file(
+    scenario: Path, tmp_path: Path, number: int, code: int, word: str
+) -> None:
+    scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e6"))
+    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out")]
+    with subprocess.Popen(command, env=ENVIRONMENT, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        until = time.monotonic() + 60
+        while time.monotonic() < until and not any(
+            one.stat().st_size > 1000 for one in tmp_path.glob("out/.*.partial")
+        ):
+            time.sleep(0.05)  # until the first group of rows is in the file
+        process.send_signal(number)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == code
+    assert said.endswith(f"cosim: {word}\n")
+    assert "Traceback" not in said
+    recording = Recording.read(tmp_path / "out" / "recording.parquet")
+    assert recording.origin["complete"] is False
+    assert [one.name for one in (tmp_path / "out").iterdir()] == ["recording.parquet"]
+
+
+def test_a_long_run_says_how_long_and_an_absurd_one_is_refused(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import cosim.cli.run
+
+    told: list[str] = []
+    with monkeypatch.context() as clock:
+        clock.setattr(cosim.cli.run, "perf_counter", iter([45.0, 45.01, 2.0, 4.0]).__next__)
+        loaded_late = cosim.cli.run.with_forecast(lambda done, of: None, 8000, told.append)
+        loaded_late(100, 500)
+        loaded_late(200, 500)
+        progress = cosim.cli.run.with_forecast(lambda done, of: None, 2_000_000_000, told.append)
+        progress(1000, 7_201_000)
+        progress(2000, 7_201_000)
+    assert told == ["about 4 h to go; the recording grows to 2 GB"]
+    scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e12"))
+    assert call("run", scenario, "--out", tmp_path / "out") == 2
+    assert "PB are needed and " in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_reference_of_the_paper_runs_from_its_card_and_builds_its_fmus_once(
+    tmp_path: Path, cache: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call("run", "sidereal", "--out", tmp_path / "a") == 0
+    assert "building the FMU of the plant of paper_mount" in capsys.readouterr().err
+    assert len(list(cache.iterdir())) == 2
+    assert call("run", "sidereal", "--out", tmp_path / "b") == 0
+    assert "building" not in capsys.readouterr().err
+    one, other = (Recording.read(tmp_path / name / "recording.parquet") for name in "ab")
+    error = (one["q_d"] - one["position"])[25_000:] * 648000 / np.pi
+    assert np.abs(error).max() < 0.1  # arcsec; matched compensation: the paper's C2a without its disturbances
+    for name in one:
+        np.testing.assert_array_equal(one[name], other[name])
+
+
+def test_a_card_that_is_not_there_is_met_with_those_that_are(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = scenario.read_text()
+    line = next(line for line in text.splitlines() if line.startswith("fmu"))
+    scenario.write_text(text.replace(line, 'card = "none"\npart = "plant"', 1))
+    assert call("run", scenario, "--out", tmp_path / "out") == 2
+    sentence = 'components.plant.card = "none": no such card; a card is a .toml file or one of: altaz_altitude,'
+    assert sentence in capsys.readouterr().err
+
+
+def test_export_writes_plant_and_controller_for_both_versions(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert call("export", "paper_mount", "--out", tmp_path, "--json") == 0
+    parts = [f"paper_mount_{part}_fmi{version}.fmu" for part in ("plant", "controller") for version in (2, 3)]
+    assert json.loads(capsys.readouterr().out) == {"fmus": [str(tmp_path / part) for part in parts]}
+    assert call("export", "paper_mount", "--out", tmp_path, "--fmi", "3") == 2
+    assert "exists already; give --force to overwrite it." in capsys.readouterr().err
+    assert call("export", "none", "--out", tmp_path) == 2
+
+
+@pytest.mark.parametrize(
+    ("what", "words"),
+    [
+        (
+            "sidereal",
+            [
+                "scenario: sidereal",
+                "─ tau ───────────▶ mount.tau       1 tick, 0.1 ms",
+                "15 s (150,000 steps)",
+                "rows: every step",
+                "→ mount: 2 ticks, 0.2 ms",
+            ],
+        ),
+        ("paper_mount", ["card: paper_mount", "friction.sigma0", "kg.m2", "controller: C2a"]),
+        ("loop.toml", ["scenario: loop", "x 2; quantum 1e-06; + n", "r.position"]),
+        ("tiny3.fmu", ["FMI: 3.0", "model: tiny", "output     Float64  rad"]),
+        ("run.csv", ["rows: 200", "rate: 1000 Hz", "least", "gaps: 0"]),
+    ],
+)
+def test_show_tells_what_a_file_is(
+    scenario: Path,
+    tiny: dict[int, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    what: str,
+    words: list[str],
+) -> None:
+    Recording("run", {"t": np.arange(200) * 1e-3, "q": np.arange(200.0)}).write(tmp_path / "run.csv")
+    files = {"loop.toml": scenario, "tiny3.fmu": tiny[3], "run.csv": tmp_path / "run.csv"}
+    assert call("show", files.get(what, what)) == 0
+    shown = capsys.readouterr().out
+    assert [word for word in words if word not in shown] == []
+    assert call("show", files.get(what, what), "--json") == 0
+    json.loads(capsys.readouterr().out)
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "sentence"),
+    [
+        ("none", None, "does not exist; shipped are: sidereal, two_axis, altaz_altitude,"),
+        ("none.csv", None, "none.csv does not exist."),
+        ("odd.toml", "a = ", "is not valid TOML"),
+        ("odd", "x", "is nothing that can be shown: a recording, FMU, SSP, scenario, card, sweep, or a folder of"),
+        ("odd.xyz", "x", "is of no known kind, .xyz; known are: .csv, "),
+    ],
+)
+def test_show_says_what_it_cannot_show(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, text: str | None, sentence: str
+) -> None:
+    if text is not None:
+        (tmp_path / name).write_text(text)
+    assert call("show", tmp_path / name) == 2
+    assert sentence in capsys.readouterr().err
+
+
+def test_wrong_use_is_exit_code_2_and_help_lists_the_verbs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("dance") == 2
+    assert call("run") == 2
+    capsys.readouterr()
+    assert call("--help") == 0
+    shown = capsys.readouterr().out
+    assert all(verb in shown for verb in ("export", "run", "show"))
+    assert call("--version") == 0
+    assert capsys.readouterr().out == f"mount-cosim {cosim.__version__}\n"
+
+
+def test_importing_the_package_is_quick_and_a_warm_run_needs_no_casadi(tmp_path: Path) -> None:
+    program = "import time; begun = time.process_time(); import cosim.cli; print(time.process_time() - begun)"
+    command = [sys.executable, "-c", program]
+    best = min(float(subprocess.check_output(command, env=ENVIRONMENT, cwd=tmp_path)) for _ in range(3))
+    assert best < 0.5
+    program = "import sys, cosim.cli\ntry: cosim.cli.main(sys.argv[1:])\nfinally: print(*sys.modules)"
+    command = [sys.executable, "-c", program, "run", "sidereal", "--out"]
+    environment = ENVIRONMENT | {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+    for name in ("cold", "warm"):
+        said = subprocess.check_output([*command, str(tmp_path / name)], env=environment, cwd=tmp_path, text=True)
+    assert not {"casadi", "ziglang", "matplotlib", "pandas"} & set(said.split())

@@ -1,0 +1,212 @@
+"""A signal ends a command wherever it comes, with its exit code and a word."""
+
+import errno
+import signal
+import subprocess
+import sys
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+
+import pytest
+from commands import ENVIRONMENT, call
+
+from cosim.cli import guarded, main
+from cosim.support.interrupts import end_well
+
+
+def test_a_signal_that_comes_before_a_verb_begins_is_told_by_the_exit_code(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Typer takes each KeyboardInterrupt for Ctrl-C."""
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        for number, code in ((signal.SIGTERM, 143), (signal.SIGINT, 130)):
+            come = partial(signal.raise_signal, number)
+            monkeypatch.setattr("typer.core.TyperGroup.parse_args", lambda *_, come=come, **__: come())
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+            assert call("show", "paper_mount") == code
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+    assert "cosim: terminated" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("error", "number", "code"),
+    [
+        (RuntimeError("error building a validator"), signal.SIGINT, 130),
+        (RuntimeError("error building a validator"), signal.SIGTERM, 143),
+        (RuntimeError("error building a validator"), None, None),
+        (OSError(errno.EBADF, "Bad file descriptor"), signal.SIGTERM, 143),
+        (OSError(errno.EBADF, "Bad file descriptor"), None, 2),
+        (OSError(errno.ENOSPC, "No space left on device"), signal.SIGTERM, 2),
+    ],
+)
+def test_what_a_c_extension_makes_of_a_signal_is_an_interrupt(
+    error: Exception, number: int | None, code: int | None
+) -> None:
+    """Some swallow the KeyboardInterrupt and raise an error of their own that does not even hold it.
+
+    Python's own `rmtree` closes a file a second time; a disk that is full is what a person must know all the same.
+    """
+
+    def verb() -> None:
+        with suppress(KeyboardInterrupt):
+            end_well()
+            if number is not None:
+                signal.raise_signal(number)
+        raise error
+
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        with pytest.raises(RuntimeError if code is None else SystemExit) as ended:
+            guarded(verb, False)()
+        assert getattr(ended.value, "code", None) == code
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+        end_well()
+
+
+@pytest.mark.parametrize(("cause", "code"), [(KeyboardInterrupt(), 130), (ValueError(), None)])
+def test_a_signal_while_a_c_extension_is_loaded_is_an_interrupt(cause: BaseException, code: int | None) -> None:
+    def verb() -> None:
+        raise ImportError("initialization failed") from cause
+
+    with pytest.raises(ImportError if code is None else SystemExit) as ended:
+        guarded(verb, False)()
+    assert getattr(ended.value, "code", None) == code
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (None, None)])
+def test_a_signal_while_a_verb_is_loaded_is_an_interrupt_whatever_becomes_of_it(
+    number: int | None, code: int | None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A C extension that is interrupted as it is loaded raises an ImportError of its own."""
+
+    def loaded(name: str) -> None:
+        with suppress(KeyboardInterrupt):
+            if number is not None:
+                signal.raise_signal(number)
+        raise ImportError(f"initialization of {name} failed")
+
+    before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
+    monkeypatch.setattr("cosim.cli.import_module", loaded)
+    try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        with pytest.raises(ImportError if code is None else SystemExit) as ended:
+            main(["export", "paper_mount", "--out", "out"])
+        assert getattr(ended.value, "code", None) == code
+    finally:
+        for one, handler in before.items():
+            signal.signal(one, handler)
+        end_well()
+    said = {130: "cosim: interrupted\n", 143: "cosim: terminated\n", None: ""}
+    assert capsys.readouterr().err == said[code]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+@pytest.mark.parametrize("library", ["casadi", "numpy"])
+def test_termination_ends_an_export_wherever_it_comes_with_a_word_and_leaves_nothing(
+    library: str, tmp_path: Path
+) -> None:
+    """Here: while the verb loads what it works with; SIGTERM comes from within."""
+    start = f"""
+import builtins, signal
+load = builtins.__import__
+def come(name, *given, **named):
+    if name.split(".")[0] == "{library}":
+        builtins.__import__ = load
+        signal.raise_signal(signal.SIGTERM)
+    return load(name, *given, **named)
+builtins.__import__ = come
+from cosim.cli import main
+main()
+"""
+    command = [sys.executable, "-c", start, "export", "paper_mount", "--out", "out"]
+    done = subprocess.run(command, cwd=tmp_path, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, timeout=120)
+    assert (done.returncode, done.stderr) == (143, "cosim: terminated\n")
+    assert not [one for one in tmp_path.rglob("*") if one.is_file()]
+
+
+FINALIZED = """
+import signal, time
+from cosim.cli import guarded, main
+from cosim.support.interrupts import end_well
+
+class Last:
+    def __del__(self):
+        {comes}
+
+def verb():
+    Last()
+    time.sleep({seconds})
+
+end_well()
+guarded(verb, False)()
+"""
+
+
+def ended(comes: str, seconds: float) -> tuple[int, str]:
+    """Run a verb in which something comes while an object is finalized."""
+    command = [sys.executable, "-c", FINALIZED.format(comes=comes, seconds=seconds)]
+    done = subprocess.run(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
+    return done.returncode, done.stderr
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "said"), [("SIGINT", 130, "cosim: interrupted\n"), ("SIGTERM", 143, "cosim: terminated\n")]
+)
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_a_signal_that_comes_where_python_ignores_exceptions_is_not_lost(name: str, code: int, said: str) -> None:
+    assert ended(f"signal.raise_signal(signal.{name})", 600) == (code, said)
+
+
+def test_other_exceptions_that_python_ignores_are_told_as_ever() -> None:
+    code, said = ended("raise ValueError('of a finalizer')", 0)
+    assert code == 0
+    assert said.startswith("Exception ignored in: ")
+    assert said.endswith("ValueError: of a finalizer\n")
+
+
+ASKED = """
+import os, signal, time
+import casadi as ca
+from cosim.cli import guarded, main
+from cosim.support.interrupts import end_well
+
+class Shaped:
+    asked = 0
+
+    @property
+    def shape(self):
+        self.asked += 1
+        if self.asked == 1:
+            os.kill(os.getpid(), signal.{name})
+        return 1, 1
+
+def verb():
+    try:
+        ca.fmax(ca.SX.sym("x"), Shaped())
+    except NotImplementedError:
+        pass  # it is no number
+    time.sleep(600)
+
+end_well()
+guarded(verb, False)()
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "said"), [("SIGINT", 130, "cosim: interrupted\n"), ("SIGTERM", 143, "cosim: terminated\n")]
+)
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_a_signal_that_comes_where_casadi_takes_errors_for_an_answer_is_not_lost(
+    name: str, code: int, said: str
+) -> None:
+    command = [sys.executable, "-c", ASKED.format(name=name)]
+    done = subprocess.run(command, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True, check=False, timeout=120)
+    assert (done.returncode, done.stderr) == (code, said)

@@ -1,0 +1,243 @@
+"""Numbers that arithmetic, counting or memory cannot take are one sentence before anything runs."""
+
+from importlib.resources import files
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from commands import call, scenario
+from simulating import simulate
+from small_loop import TEXT
+from tiny_fmu import tiny
+
+from cosim.data.signals import Samples, Slews, Stream
+from cosim.hardware.machine import parse_machine
+from cosim.support.errors import HardwareError, ScenarioError, SignalError, SweepError
+from cosim.support.numbers import shown
+from cosim.sweeps import read_sweep
+from cosim.system.scenario import parse_scenario
+from pyfmi_models.card import parse_card
+from pyfmi_models.errors import CardError
+
+__all__ = ["scenario", "tiny"]
+
+DIGITS, NESTED = "1" + "0" * 5000, "[" * 2000 + "]" * 2000
+FAULT = '[[faults]]\non = "plant.a"\nkind = "offset"\nvalue = 1.0\n'
+CARD = (Path(__file__).parents[2] / "pyfmi_models" / "cards" / "paper_mount.toml").read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("decimation = 2", f"decimation = {2**64}", r"record\.decimation = 18446744073709551616 breaks a rule"),
+        ('fmu = "tiny3.fmu"', f'fmu = "tiny3.fmu"\nevery = {10**30}', r"components\.plant\.every = 10+ breaks a rule"),
+        ('fmu = "tiny3.fmu"', 'fmu = "tiny3.fmu"\nevery = 501', r"every 501 ticks; the run has 500 ticks, so it would"),
+        ('fmu = "tiny3.fmu"', 'fmu = "tiny3.fmu"\nstep = 1e300', r"components\.plant\.step = 1e\+300 breaks a rule"),
+        ("step = 1e-3", "step = 1e-308", r"step = 1e-308 breaks a rule: input should be greater than or equal"),
+        ("stop = 0.5", "stop = 1e308", r"stop = 1e\+308 breaks a rule: input should be less than or equal"),
+        ("step = 1e-3\nstop = 0.5", "step = 1e-9\nstop = 1e8", r"stop = 1e\+08 s is 1e\+17 steps of 1e-09 s; 9,007,1"),
+        ("smooth_start = 0.1", "smooth_start = 1e308", r"smooth_start = 1e\+308 breaks a rule: input should be less"),
+        ("decimation = 2", f"decimation = {DIGITS}", r"is not valid TOML: a number in it has too many digits"),
+        ("decimation = 2", f"decimation = {NESTED}", r"is not valid TOML: its brackets are nested too deeply"),
+        ("[record]", f"{FAULT}from = 1e308\n[record]", r"from = 1e\+308 breaks a rule: input should be less"),
+        ("[record]", f"{FAULT}from = 0.1\nuntil = 1e308\n[record]", r"until = 1e\+308 breaks a rule: input should be"),
+        (
+            'kind = "sine"\nfrequency = 2.0\namplitude = 0.1',
+            'kind = "slews"\npositions = [0.0, 1e300]\nmax_velocity = 1.0\nmax_acceleration = 1.0\nmax_jerk = 1.0',
+            r"a move would take more than 1e\+12 s",
+        ),
+        (
+            "[signals.r]",
+            '[algorithm]\nkind = "iterated"\nmax_iterations = 10000000\n[signals.r]',
+            r"max_iterations = 10",
+        ),
+    ],
+)
+def test_a_scenario_with_such_a_number_is_refused(old: str, new: str, sentence: str) -> None:
+    assert old in TEXT
+    with pytest.raises(ScenarioError, match=sentence):
+        parse_scenario(TEXT.replace(old, new, 1), "loop.toml", Path())
+
+
+@pytest.mark.parametrize(
+    ("kind", "named"),
+    [
+        ('kind = "sine"\nfrequency = 1e14\namplitude = 0.1', "1e+14"),
+        ('kind = "sine"\nfrequency = 500.0\namplitude = 0.1', "500"),
+        ('kind = "multisine"\nfrequencies = [1.0, 700.0]\namplitudes = 0.1', "700"),
+        ('kind = "chirp"\nstart = 1.0\nstop = 1e300\nduration = 1.0\namplitude = 0.1', "1e+300"),
+    ],
+)
+def test_a_frequency_that_the_ticks_cannot_show_is_refused(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], kind: str, named: str
+) -> None:
+    scenario.write_text(scenario.read_text().replace('kind = "sine"\nfrequency = 2.0\namplitude = 0.1', kind))
+    assert call("run", scenario, "--out", tmp_path / "out") == 2
+    sentence = f'The signal "r" has {named} Hz; at a step of 0.001 s it must stay below 500 Hz.'
+    assert sentence in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_frequency_just_below_half_of_the_ticks_is_run(tiny: dict[int, Path]) -> None:
+    text = TEXT.replace("frequency = 2.0", "frequency = 499.0").replace('"tiny', f'"{tiny[2].parent}/tiny')
+    from cosim.master.simulate import run
+
+    assert run(parse_scenario(text, "loop.toml", Path())).statistics["steps"] == 500
+
+
+@pytest.mark.parametrize("isolate", ["--isolate", "--no-isolate"])
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("k = 5.0", f"k = {10**400}", f'"controller.k" is 1{"0" * 59}... (401 characters); that is beyond a Float64.'),
+        ("amplitude = 0.1", "amplitude = 1e308", 'The signal "r.velocity" is nan at tick 0 (0 s); it must be a finite'),
+    ],
+    ids=["parameter", "amplitude"],
+)
+def test_a_number_that_arithmetic_cannot_take_costs_a_sentence_and_no_warning(
+    scenario: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], old: str, new: str, sentence: str, isolate: str
+) -> None:
+    assert old in scenario.read_text()
+    scenario.write_text(scenario.read_text().replace(old, new))
+    assert call("run", scenario, "--out", tmp_path / "out", isolate) == 2
+    said = capfd.readouterr().err.splitlines()
+    assert said[0] == "loop: 500 steps of 0.001 s"
+    assert said[-1].startswith(f"cosim: {sentence}")
+    assert [one for one in said[1:-1] if not one.startswith("what was recorded until then is in ")] == []
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_signal_that_is_no_number_is_named_with_its_time(tiny: dict[int, Path], bad: float) -> None:
+    values = np.zeros(40)
+    values[33] = bad
+    sentence = rf'The signal "r\.value" is {bad} at tick 33 \(0\.033 s\); it must be a finite number\.'
+    with pytest.raises(SignalError, match=sentence):
+        simulate(
+            {"plant": tiny[3]},
+            [("r.value", "plant.a")],
+            record={"y": "plant.y"},
+            step=1e-3,
+            ticks=40,
+            signals={"r": Samples(values)},
+        )
+
+
+class Overflowing:
+    """A signal of a caller's own whose numbers Python refuses."""
+
+    outputs: ClassVar[dict[str, str]] = {"value": ""}
+
+    def stream(self, step: float) -> Stream:
+        return lambda ticks: np.full((1, len(ticks)), 10.0**400)
+
+
+def test_a_signal_whose_numbers_overflow_is_named(tiny: dict[int, Path]) -> None:
+    sentence = r'The signal "r" cannot be computed: its numbers lead beyond what arithmetic has\.'
+    with pytest.raises(SignalError, match=sentence):
+        simulate(
+            {"plant": tiny[3]},
+            [("r.value", "plant.a")],
+            record={"y": "plant.y"},
+            step=1e-3,
+            ticks=40,
+            signals={"r": Overflowing()},
+        )
+
+
+@pytest.mark.parametrize("limit", [1e150, 1e200, 1e308])
+def test_slews_without_limits_worth_the_name_are_steps(limit: float) -> None:
+    limits = {"max_velocity": 1e11, "max_acceleration": limit, "max_jerk": limit}
+    position, velocity, acceleration = Slews(kind="slews", positions=[0.0, 1.0], **limits).stream(1e-3)(np.arange(9))
+    assert position.tolist() == [0.0] + [1.0] * 8
+    assert not velocity.any()
+    assert not acceleration[1:].any()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("inertia = 30.0", "inertia = 5e-324", r"\[mount\] inertia = 5e-324 breaks the rule: input should be greater"),
+        ("inertia = 30.0", "inertia = 1e308", r"\[mount\] inertia = 1e\+308 breaks the rule: input should be less"),
+        ("inertia = 30.0", f"inertia = {10**400}", r"inertia = 10+\.\.\. \(401 characters\) breaks the rule"),
+        ("inertia = 30.0", f"inertia = {DIGITS}", r"not valid TOML: a number in it has too many digits"),
+        ("inertia = 30.0", f"inertia = {NESTED}", r"not valid TOML: its brackets are nested too deeply"),
+        ("loop_hz = 10000", "loop_hz = 1e-308", r"\[controller\] loop_hz = 1e-308 breaks the rule"),
+        ("loop_hz = 10000", "loop_hz = 1e308", r"\[controller\] loop_hz = 1e\+308 breaks the rule"),
+        ("[mount]", f'[mount]\nname = "{"x" * 5000}"', r"name = 'x+\.\.\. \(5,002 characters\) breaks the rule"),
+    ],
+)
+def test_a_card_with_such_a_number_is_refused(old: str, new: str, sentence: str) -> None:
+    lines = [line for line in CARD.splitlines() if not (old == "[mount]" and line.startswith("name"))]
+    text = "\n".join(new if line.startswith(old) else line for line in lines)
+    assert new in text
+    with pytest.raises(CardError, match=sentence):
+        parse_card(text, "card.toml")
+
+
+@pytest.mark.parametrize(
+    ("line", "sentence"),
+    [
+        ("timeout = 2e101", r"timeout = 2e\+101 breaks a rule"),
+        (f"decimation = {2**64}", r"decimation = 18446744073709551616 breaks a rule"),
+        (f"seed = {DIGITS}", r"is not valid TOML: a number in it has too many digits"),
+        (f"seed = {NESTED}", r"is not valid TOML: its brackets are nested too deeply"),
+        ('"a.b" = { low = 0.0, high = 1.0, count = 1000000000000 }', r"count = 1000000000000 breaks a rule"),
+        ('"a.b" = { low = 0.0, high = 1e300, scale = "integer" }', r"asks for 1,000,001 runs; 1,000,000 is the most"),
+        ('"a.b" = { low = -1e308, high = 1e308, count = 3 }', r"low = -1e\+308 and high = 1e\+308 are too far apart"),
+    ],
+)
+def test_a_sweep_with_such_a_number_is_refused(tmp_path: Path, line: str, sentence: str) -> None:
+    varied = line if line.startswith('"') else '"a.b" = [1.0]'
+    head = "" if line.startswith('"') else f"{line}\n"
+    path = tmp_path / "sweep.toml"
+    path.write_text(
+        f'scenario = "sidereal"\n{head}[vary]\n{varied}\n[statistics]\nend = {{ signal = "q", kind = "final" }}'
+    )
+    with pytest.raises(SweepError, match=sentence):
+        read_sweep(path)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("watchdog_ms = 2.0", "watchdog_ms = 1e300", r"watchdog_ms = 1e\+300 breaks a rule"),
+        ("watchdog_ms = 2.0", "black_box_seconds = 1e300", r"black_box_seconds = 1e\+300 breaks a rule"),
+        ("watchdog_ms = 2.0", f"watchdog_ms = {DIGITS}", r"is not valid TOML: a number in it has too many digits"),
+        ("torque = 50.0", "torque = 1e308", r"limits\.torque = 1e\+308 breaks a rule"),
+        (
+            "[limits]",
+            "[reactions]\nlost_cycles = 99999999999\n[limits]",
+            r"reactions\.lost_cycles = 99999999999 breaks",
+        ),
+    ],
+)
+def test_a_machine_with_such_a_number_is_refused(old: str, new: str, sentence: str) -> None:
+    text = (files("cosim.hardware") / "machines" / "simulated.toml").read_text("utf-8")
+    assert old in text
+    with pytest.raises(HardwareError, match=sentence):
+        parse_machine(text.replace(old, new, 1), "m.toml")
+
+
+@pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
+@pytest.mark.parametrize(
+    ("verb", "option"),
+    [("run", "--call-timeout"), ("hardware check", "--seconds"), ("prove", "--seconds"), ("identify", "--cut")],
+)
+def test_a_number_of_the_command_line_that_is_none_is_refused(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], verb: str, option: str, number: str
+) -> None:
+    card = ["--card", "paper_mount"] if verb == "identify" else []
+    file = [] if verb == "prove" else [scenario]
+    out = [] if verb == "hardware check" else ["--out", tmp_path / "out"]
+    assert call(*verb.split(), *file, *card, *out, option, number) == 2
+    said = capsys.readouterr().err
+    assert f"{option} {number}: it must be a finite number." in said or said.startswith("Usage: ")
+    assert "Traceback" not in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_long_value_is_cut_short_in_a_message() -> None:
+    assert shown(3.5) == "3.5"
+    assert shown("x" * 100) == f"'{'x' * 59}... (102 characters)"
+    assert shown(10**5000) == "a int"

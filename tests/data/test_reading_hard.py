@@ -1,0 +1,269 @@
+"""Whatever a file holds, reading it costs bounded memory and time, and ends in a recording or in one sentence."""
+
+import gc
+import gzip
+import importlib.util
+import json
+import random
+import re
+import resource
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+
+from cosim.cli import main
+from cosim.data import limits
+from cosim.data.preview import preview
+from cosim.data.recording import Recording
+from cosim.support.errors import CosimError, RecordingError
+
+SAMPLES = Path(__file__).parents[1] / "samples"
+ROWS = 400
+T = np.arange(ROWS) * 1e-3
+TABLE = {"t": T, "tau": np.cos(9 * T), "q": np.sin(9 * T)}
+
+
+def csv_text(table: dict[str, np.ndarray]) -> str:
+    lines = [",".join(table)] + [",".join(repr(float(x)) for x in row) for row in zip(*table.values(), strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def written(path: Path, data: str | bytes) -> Path:
+    path.write_bytes(data.encode() if isinstance(data, str) else data)
+    return path
+
+
+@contextmanager
+def bounded(seconds: float, megabytes: float) -> Iterator[None]:
+    """Fail if the block takes more processor or raises the peak of memory by more."""
+    before, peak = time.process_time(), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    yield
+    assert time.process_time() - before < seconds
+    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - peak) / 1024 < megabytes
+
+
+ALTERNATING = np.concatenate([[0.0], np.cumsum(np.resize([1e-9, 1e-9, 0.01], ROWS - 1))])
+NUMBERS = {
+    "1e308": ({"tau": 1e308 * np.sign(TABLE["tau"])}, 'column "tau" holds 1e+308 at row 1, which is beyond any axis.'),
+    "5e9 s between samples": ({"t [s]": 5e9 * np.arange(ROWS), "t": None}, "is sampled every 5e+09 s; an axis is"),
+    "a time of no known unit": ({"t": 5e9 * np.arange(ROWS)}, "Say which with --units t=ms."),
+    "1e-9 s and 0.01 s in turns": ({"t": ALTERNATING}, "half of its time steps are 1e-09 s or less and others 0.01 s:"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", NUMBERS)
+def test_numbers_that_no_axis_has_are_refused(tmp_path: Path, what: str) -> None:
+    changed, sentence = NUMBERS[what]
+    table = {name: column for name, column in (changed | TABLE | changed).items() if column is not None}
+    with pytest.raises(RecordingError, match=re.escape(sentence)):
+        Recording.read(written(tmp_path / "run.csv", csv_text(table)))
+
+
+def test_a_million_columns_are_refused_before_they_are_parsed(tmp_path: Path) -> None:
+    names, row = ",".join(f"c{number}" for number in range(10**6)), ",".join(["1"] * 10**6)
+    path = written(tmp_path / "run.csv", f"{names}\n{row}\n{row}\n")
+    with (
+        bounded(10, 600),
+        pytest.raises(RecordingError, match=r"has 1,000,000 columns; a recording has at most 10,000."),
+    ):
+        Recording.read(path)
+
+
+def test_parquet_of_too_many_columns_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "COLUMNS", 50)
+    parquet.write_table(pa.table({f"c{number}": [1.0] for number in range(60)}), tmp_path / "run.parquet")
+    with pytest.raises(RecordingError, match=r"has 60 columns; a recording has at most 50\."):
+        Recording.read(tmp_path / "run.parquet")
+
+
+def test_a_bomb_of_a_gigabyte_is_refused_early(tmp_path: Path) -> None:
+    four_megabytes = gzip.compress(b"0.001,1,2\n" * 400_000)
+    (tmp_path / "run.csv.gz").write_bytes(gzip.compress(b"t,tau,q\n") + four_megabytes * 250)
+    with (
+        bounded(20, 500),
+        pytest.raises(
+            RecordingError, match=r"unpacks to 20\d MB or more; a file .* may unpack to 200 MB: .* limit=2\."
+        ),
+    ):
+        Recording.read(tmp_path / "run.csv.gz")
+
+
+def test_text_that_is_too_long_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "TEXT", 1000)
+    with pytest.raises(
+        RecordingError,
+        match=r"holds more than 1 kB of text; write it as Parquet, cut it in pieces, or .* limit=\d+\.",
+    ):
+        Recording.read(written(tmp_path / "run.csv", csv_text(TABLE)))
+
+
+@pytest.mark.parametrize("origin", [5, "text", [1, 2], None, True, {"file": 7, "version": ["x"]}])
+def test_an_origin_may_be_anything(tmp_path: Path, origin: object) -> None:
+    Recording("run", TABLE, {"t": "s"}).write(tmp_path / "run.parquet")
+    table = parquet.read_table(tmp_path / "run.parquet")
+    metadata = {**(table.schema.metadata or {}), b"cosim.origin": json.dumps(origin).encode()}
+    parquet.write_table(table.replace_schema_metadata(metadata), tmp_path / "odd.parquet")
+    recording = Recording.read(tmp_path / "odd.parquet")
+    assert len(recording.sha256) == 64
+    assert bool(recording.notes) == (not isinstance(origin, dict))
+
+
+def test_an_origin_that_is_no_json_is_left_out_with_a_note(tmp_path: Path) -> None:
+    table = pa.table(TABLE).replace_schema_metadata({b"cosim.origin": b"{" * 5000})
+    parquet.write_table(table, tmp_path / "run.parquet")
+    assert "its origin was left out" in Recording.read(tmp_path / "run.parquet").notes[0]
+
+
+def test_messages_stay_short_however_long_names_are(tmp_path: Path) -> None:
+    table = {f"{'x' * 5000}{number}": column for number, column in enumerate(TABLE.values())}
+    with pytest.raises(RecordingError) as caught:
+        Recording.read(written(tmp_path / "run.csv", csv_text(table)), {"tau": "y" * 9000})
+    assert len(str(caught.value)) < 1000
+
+
+SENTENCES: dict[str, tuple[str, Callable[[], bytes], str]] = {
+    "nothing": ("run.csv", bytes, "is empty"),
+    "one blank line": ("run.csv", lambda: b"\n", "holds no samples"),
+    "noise": ("run.csv", lambda: random.Random(1).randbytes(4000), "is no text"),
+    "a picture": ("run.csv", lambda: b"\x89PNG\r\n\x1a\n" + random.Random(2).randbytes(4000), "is no text"),
+    "zero bytes at the end": ("run.csv", lambda: csv_text(TABLE).encode() + bytes(512), "holds a zero byte at byte"),
+    "zero bytes only": ("run.csv", lambda: bytes(4096), "holds no table|is no text|zero byte"),
+    "words": ("run.csv", lambda: b"hello world\nand so on\n", "no table of numbers; its first line is: 'hello world'"),
+    "JSON": ("run.csv", lambda: json.dumps({"t": [0.1]}, indent=1).encode(), "no table of numbers|at least 2 are"),
+    "UTF-8 that is none later": (
+        "run.csv",
+        lambda: b"\xef\xbb\xbf" + csv_text(TABLE).encode() + b"0.1,\x9d,3,4\n1,2,3\n",
+        "holds bytes that are no UTF-8; --layout encoding=cp1252",
+    ),
+    "half a gzip": ("run.csv.gz", lambda: gzip.compress(csv_text(TABLE).encode())[:-900], "cannot be read as .csv.gz"),
+    "no gzip": ("run.csv.gz", lambda: b"t,tau,q\n1,2,3\n", "cannot be read as .csv.gz: Not a gzipped file"),
+    "no Parquet": ("run.parquet", lambda: b"PAR1" + bytes(90), "cannot be read as .parquet"),
+    "no MAT": ("run.mat", lambda: b"MATLAB 5.0 MAT-file" + bytes(200), "cannot be read as .mat|holds no samples"),
+    "no HDF5": ("run.h5", lambda: b"\x89HDF\r\n\x1a\n" + bytes(90), "cannot be read as .h5|needs the package h5py"),
+    "no MDF": ("run.mf4", lambda: b"MDF     4.10    " + bytes(90), "cannot be read as .mf4|needs the package asammdf"),
+    "no MCAP": ("run.mcap", lambda: b"\x89MCAP0\r\n" + bytes(90), "cannot be read as .mcap|needs the package mcap"),
+    "no bag": ("run.db3", lambda: b"SQLite format 3\x00" + bytes(90), "cannot be read as .db3|needs the package mcap"),
+    "a bag of messages that are not defined": ("run.db3", lambda: b"", "is empty"),
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("default")
+@pytest.mark.parametrize("what", SENTENCES)
+def test_what_is_no_recording_is_one_sentence(tmp_path: Path, what: str, capsys: pytest.CaptureFixture[str]) -> None:
+    name, data, sentence = SENTENCES[what]
+    path = written(tmp_path / name, data())
+    with pytest.raises(SystemExit) as left:
+        main(["show", str(path)])
+    said = capsys.readouterr().err
+    gc.collect()  # what a package could not open complains when it is thrown away
+    assert left.value.code == 2
+    assert re.search(sentence, said), said
+    assert said.count("\n") == 1
+
+
+@pytest.mark.parametrize("name", ["x" * 300 + ".csv", "a\0b.csv"])
+def test_a_name_that_no_file_can_have_is_one_sentence(tmp_path: Path, name: str) -> None:
+    with pytest.raises(RecordingError, match=r"cannot be opened|does not exist"):
+        Recording.read(tmp_path / name)
+
+
+SIGNS = (b",", b";", b"\t", b".", b"\n", b"0", b"-")
+OTHERS = (b"", b",", b";", b"e9", b"\r")
+STRANGE = (b"1e308", b"nan", b"-inf", b"9" * 400, b'"', b"\xff\xfe", b"\xef\xbb\xbf")
+
+
+def mutated(data: bytes, draw: random.Random) -> bytes:
+    """Change a file as disks, wires and people do."""
+    place, size = draw.randrange(len(data)), 1 + int(draw.expovariate(1 / 40))
+    ways: list[Callable[[], bytes]] = [
+        lambda: data[:place],
+        lambda: data[:place] + data[place + size :],
+        lambda: data[:place] + draw.randbytes(size) + data[place:],
+        lambda: data[:place] + bytes(size) + data[place + size :],
+        lambda: data[:place] + bytes([data[place] ^ (1 << draw.randrange(8))]) + data[place + 1 :],
+        lambda: data[:place] + data[place : place + size] * draw.randrange(2, 50) + data[place + size :],
+        lambda: data.replace(draw.choice(SIGNS), draw.choice(OTHERS)),
+        lambda: data[:place] + draw.choice(STRANGE) + data[place:],
+        lambda: b"\n".join(draw.sample(lines, len(lines))) if len(lines := data.split(b"\n")) < 2000 else data[1:],
+        lambda: data.decode("latin-1").encode("utf-16"),
+    ]  # fmt: skip
+    return draw.choice(ways)()
+
+
+def originals(folder: Path) -> list[tuple[str, bytes]]:
+    """Small files of every kind that can be written here."""
+    from scipy.io import savemat
+
+    found = [
+        (path.name, path.read_bytes()) for path in sorted(SAMPLES.iterdir()) if path.is_file() and path.suffix != ".py"
+    ]
+    Recording("run", TABLE, {"t": "s", "q": "rad"}).write(folder / "run.parquet")
+    Recording("run", TABLE).write(folder / "run.csv.gz")
+    savemat(folder / "run.mat", TABLE, do_compression=True)
+    found += [(name, (folder / name).read_bytes()) for name in ("run.parquet", "run.csv.gz", "run.mat")]
+    if importlib.util.find_spec("h5py"):
+        import h5py
+
+        with h5py.File(folder / "run.h5", "w") as file:
+            for name, column in TABLE.items():
+                file[name] = column
+        found.append(("run.h5", (folder / "run.h5").read_bytes()))
+    return found
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_three_hundred_damaged_files_end_in_a_recording_or_a_sentence(tmp_path: Path) -> None:
+    draw, read = random.Random(17), 0
+    with bounded(30, 800):
+        files = originals(tmp_path)
+        for number in range(300):
+            name, data = files[number % len(files)]
+            for _ in range(1 + draw.randrange(3)):
+                data = mutated(data, draw) or b"\n"
+            path = written(tmp_path / f"{number}_{name}", data)
+            try:
+                recording = preview(path).recording
+                assert np.isfinite(np.stack([recording[one] for one in recording])).all()
+                read += 1
+            except CosimError as error:
+                sentence = str(error)
+                assert "\n" not in sentence
+                assert len(sentence) < 2000, sentence
+            path.unlink()
+    assert 30 < read < 270, sys.stderr.write(f"{read} of 300 were read\n")
+
+
+@pytest.mark.parametrize(
+    ("formula", "runs"),
+    [
+        ("X1*2+1", True),
+        ("2.5e-3 * (X - 4) / 7", True),
+        ("__import__('os').system('true')", False),
+        ("X.__class__", False),
+        ("9**9**9**9", False),
+        ("(X1\n**9)", False),
+        ("1" * 100 + "!", False),
+        ("X*" * 5000 + "X", False),
+        ("where(X>0,X,0)", False),
+        ("exp(X)", False),
+    ],
+)
+def test_a_formula_in_a_file_runs_only_if_it_is_arithmetic(tmp_path: Path, formula: str, runs: bool) -> None:
+    asammdf = pytest.importorskip("asammdf")
+    t = np.arange(3000) / 500
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(np.sin(t), t, name="torque", conversion={"formula": formula})])
+        file.append([asammdf.Signal(np.sin(3 * t), t, name="position")])
+        file.save(tmp_path / "run.mf4")
+    if runs:
+        assert np.isfinite(Recording.read(tmp_path / "run.mf4")["tau"]).all()
+    else:
+        with pytest.raises(RecordingError, match="converted by a formula that is no plain arithmetic"):
+            Recording.read(tmp_path / "run.mf4")

@@ -1,0 +1,140 @@
+"""What shakes the axis in time: one frequency and one amplitude, and in each recording a phase of its own."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from closed_loop import recorded
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.diagnose import Outcome, diagnose
+from cosim.diagnosis.effects.candidates import span_of
+from cosim.diagnosis.effects.periodogram import tones
+from cosim.estimation.filters import gain, lowpass
+from cosim.estimation.fit import fit
+from cosim.estimation.inverse import Inverse
+from cosim.estimation.prepare import prepare
+from cosim_studies.proof.ceiling import ceiling
+from cosim_studies.proof.generator import make_case, to_toml, write_case
+from pyfmi_models.card import parse_card, read_card
+from pyfmi_models.effects import ActuatorLag
+from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+HERTZ, SECOND, AMPLITUDE = 4.3, 9.1, 0.4
+BASE = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0))
+
+
+def run(name: str, amplitude: float, phase: float, seed: int, seconds: float = 12.0) -> Recording:
+    """A wandering motion of the base, disturbed by two tones, with a little noise."""
+    t, rng = np.arange(int(seconds * 250)) / 250, np.random.default_rng(seed)
+    tones = [(a, 2 * np.pi * f, p) for a, f, p in zip((0.2, 0.1, 0.03), rng.uniform(0.1, 1, 3), (0, 1, 2), strict=True)]
+    q, v, a = (sum(s * w**k * np.sin(w * t + p + k * np.pi / 2) for s, w, p in tones) for k in range(3))
+    disturbed = amplitude * (np.sin(2 * np.pi * HERTZ * t + phase) + 0.6 * np.sin(2 * np.pi * SECOND * t + 2 * phase))
+    noise = 0.05 * rng.standard_normal(len(t))
+    return Recording(name, {"t": t, "tau": 5.0 * a + 2.0 * np.sign(v) + 1.0 * v + disturbed + noise, "q": q})
+
+
+def disturbed(*amplitudes: float) -> list[Recording]:
+    """Recordings with tones of these amplitudes, in each in other phases."""
+    return [run(f"run_{k}", amplitude, 0.5 + k, k) for k, amplitude in enumerate(amplitudes)]
+
+
+def answered(*amplitudes: float) -> Outcome:
+    *train, held = disturbed(*amplitudes)
+    card = replace(read_card("paper_mount"), controller=None)
+    card = replace(card, mount=card.mount.model_copy(update={"inertia": 5.0}), friction=BASE.friction)
+    return diagnose(train, [held], card)
+
+
+def test_a_fit_finds_one_frequency_and_one_amplitude_over_recordings_of_other_phases() -> None:
+    prepared = prepare(disturbed(AMPLITUDE, AMPLITUDE), 20.0)
+    start = replace(BASE, effects=(PeriodicDisturbance(frequency_hz=HERTZ + 0.005, amplitude=0.1),))
+    weight = (np.abs(prepared.stacked("v")) > 0.02).astype(float)
+    found = fit(start, prepared.pieces, weight)
+    assert "periodic_disturbance.phase" not in found.free
+    tone = found.mount.effects[0]
+    assert isinstance(tone, PeriodicDisturbance)
+    assert tone.frequency_hz == pytest.approx(HERTZ, abs=1e-3)
+    assert tone.amplitude == pytest.approx(AMPLITUDE, rel=0.05)
+    inverse = Inverse(found.mount, found.free)
+    phases = [inverse.phases(piece, found.values)["periodic_disturbance.phase"] for piece in prepared.pieces]
+    assert phases == pytest.approx([0.5, 1.5], abs=0.1)
+    assert tone.phase == pytest.approx(phases[0])
+
+
+def test_behind_a_lag_amplitude_and_phase_are_those_of_the_disturbance_not_of_the_command() -> None:
+    lag, tone = ActuatorLag(time_constant_ms=15.0), PeriodicDisturbance(frequency_hz=9.0, amplitude=0.6, phase=0.2)
+    mount = replace(read_card("paper_mount").plant(), effects=(lag, tone))
+    piece = recorded(mount).pieces[0]
+    inverse = Inverse(mount, ())
+    rest = (piece.tau - inverse.torque(piece, np.zeros(0))[0])[piece.inside]
+    assert float(np.sqrt(np.mean(rest**2))) < 0.15
+    assert inverse.phases(piece, np.zeros(0))["periodic_disturbance.phase"] == pytest.approx(0.2, abs=0.1)
+
+
+def test_gain_is_what_the_filter_leaves_of_a_tone() -> None:
+    t = np.arange(4000) / 200
+    for hertz in (5.0, 12.0, 18.0):
+        passed = lowpass(np.sin(2 * np.pi * hertz * t), 1 / 200, 15.0)[1000:3000]
+        assert float(np.abs(passed).max()) == pytest.approx(gain(hertz, 1 / 200, 15.0), rel=5e-3)
+    assert gain(18.0, 1 / 200, 95.0) == 1.0
+
+
+def test_a_machine_with_two_tones_is_one_disturbance_and_its_card_holds_both() -> None:
+    outcome = answered(AMPLITUDE, AMPLITUDE, AMPLITUDE)
+    assert outcome.diagnosis.verdict == ("periodic_disturbance",)
+    (found,) = (one for one in outcome.diagnosis.findings if one.answer == "found")
+    assert found.statement.endswith("Further tones: 9.1 Hz.")
+    main, second = sorted(outcome.card.effects, key=lambda tone: tone.frequency_hz)
+    assert (main.frequency_hz, main.amplitude, main.phase) == pytest.approx((HERTZ, AMPLITUDE, 0.5), abs=0.03)
+    assert (second.frequency_hz, second.amplitude) == pytest.approx((SECOND, 0.6 * AMPLITUDE), abs=0.03)
+    assert np.cos(second.phase - 1.0) > 0.99
+
+
+def test_a_tone_in_one_recording_only_is_no_disturbance_of_all() -> None:
+    found = answered(AMPLITUDE, 0.0, 0.0).diagnosis
+    assert "periodic_disturbance" not in found.verdict
+    (one,) = (finding for finding in found.findings if finding.effect == "periodic_disturbance")
+    # One recording alone shows it, and the held-out one does not confirm it.
+    assert one.answer == "not_proven"
+
+
+def test_a_concealed_disturbance_is_named_and_has_a_ceiling(tmp_path: Path) -> None:
+    case = make_case(5000, ["periodic_disturbance"], duration=20)
+    write_case(case, tmp_path)
+    train = [Recording.read(tmp_path / f"train_{k}.parquet") for k in (1, 2)]
+    held = Recording.read(tmp_path / "heldout.parquet")
+    outcome = diagnose(train, [held], parse_card(to_toml(case.card), "card.toml"))
+    assert outcome.diagnosis.verdict == ("periodic_disturbance",)
+    true = case.truth["effects"][0]["parameters"]
+    (tone,) = outcome.card.effects
+    assert (tone.frequency_hz, tone.amplitude) == pytest.approx((true["frequency_hz"], true["amplitude"]), rel=0.05)
+    assert np.cos(tone.phase - true["phases"]["train_1"]) > 0.99
+    best, base = (ceiling(str(tmp_path), effects)["heldout_rms"] for effects in (case.truth["effects"], []))
+    assert best < 0.5 * base
+    assert outcome.diagnosis.heldout.after_rms < 1.2 * best
+
+
+def found_in(q: np.ndarray, t: np.ndarray, residual: np.ndarray) -> list[float]:
+    """The tones that stand out from a residual beside a motion."""
+    prepared = prepare([Recording("r", {"t": t, "tau": residual, "q": q})], 20.0)
+    rest = prepared.stacked("tau")
+    return tones(span_of(BASE, prepared, rest, np.zeros(len(rest))), rest)
+
+
+def test_what_follows_a_motion_that_repeats_itself_or_turns_steadily_is_no_tone() -> None:
+    t, pitch = np.arange(6000) / 125, 0.35
+    residual = np.sin(2 * np.pi * 3 * pitch * t) + 0.1 * np.random.default_rng(1).standard_normal(len(t))
+    for wild in (0, 9):
+        found = found_in(np.sin(2 * np.pi * pitch * t + 0.5 * wild * np.sin(0.4 * t)), t, residual)
+        assert any(abs(hertz - 3 * pitch) < 0.02 for hertz in found) == bool(wild)
+    turning = found_in(0.6 * t + 1e-3 * np.sin(t), t, residual)
+    assert not any(abs(hertz - 3 * pitch) < 0.02 for hertz in turning)
+
+
+def test_recordings_too_short_for_a_tone_have_none() -> None:
+    t = np.arange(40) / 10
+    assert found_in(np.sin(t), t, np.cos(9 * t)) == []

@@ -1,0 +1,230 @@
+"""The diagnosis names what is missing, says "none" when nothing is, and proves it on data it never saw."""
+
+import hashlib
+import json
+import subprocess
+import sys
+from importlib.resources import files
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from wandering import axis, recorded, wander
+
+from bench.diagnosis import null_case
+from cosim.cli import main
+from cosim.data.recording import Recording
+from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.measure.protocol import Structures, judge, traces
+from cosim.estimation.blocks import Blocks
+from cosim.estimation.prepare import Band, prepare
+from cosim.support.errors import InputError
+from cosim_studies.proof.demo import demo_case
+from cosim_studies.proof.generator import make_case, to_toml, write_case
+from pyfmi_models.card import Card, parse_card, read_card
+
+
+def loaded(case: object, folder: Path) -> tuple[list[Recording], Recording, Card]:
+    write_case(case, folder)
+    train = [Recording.read(folder / f"train_{k}.parquet") for k in (1, 2)]
+    return train, Recording.read(folder / "heldout.parquet"), parse_card(to_toml(case.card), "card.toml")
+
+
+class TestEvidence:
+    def test_blocks_hold_every_kept_row_once_and_know_their_recording(self) -> None:
+        t, q, _v, a = wander(60.0)
+        prepared = prepare([recorded(a, t, q), recorded(a, t, q, "two")], 30.0)
+        blocks = Blocks.of(prepared)
+        rows = np.concatenate(blocks.rows)
+        np.testing.assert_array_equal(np.sort(rows), np.arange(len(prepared.recording_of)))
+        assert all(set(prepared.recording_of[r]) == {o} for r, o in zip(blocks.rows, blocks.recording, strict=True))
+
+    def test_several_recordings_may_be_held_out(self) -> None:
+        t, q, v, a = wander()
+        pair = [recorded(5 * a + 2 * np.sign(v) + off, t, q, name) for off, name in ((0.3, "one"), (-0.3, "two"))]
+        models = Structures(axis(), axis(), axis())
+        judged = judge(pair, models, Band(30.0))
+        each = [judge([one], models, Band(30.0)).before_rms for one in pair]
+        assert judged.name == "one, two"
+        assert judged.before_rms == pytest.approx(np.sqrt(np.mean(np.square(each))), rel=1e-6)
+        assert [trace.heldout for trace in traces(pair[:1], pair, models)] == [False, True, True]
+
+
+class TestAnswers:
+    @pytest.mark.parametrize(("seed", "noise"), [(1, 0.0), (2, 3e-7)])
+    def test_the_cards_own_physics_with_other_numbers_is_nothing_missing(self, seed: int, noise: float) -> None:
+        assert null_case(seed, noise).verdict == ()
+
+    def test_a_null_of_a_foreign_friction_law_is_nothing_missing(self, tmp_path: Path) -> None:
+        train, held, card = loaded(make_case(203, []), tmp_path)
+        assert diagnose(train, [held], card).diagnosis.verdict == ()
+
+    @pytest.mark.parametrize(("effect", "seed"), [("torque_offset", 200), ("delay", 103), ("gravity_unbalance", 103)])
+    def test_a_concealed_effect_is_named_and_proven(self, effect: str, seed: int, tmp_path: Path) -> None:
+        case = make_case(seed, [effect])
+        train, held, card = loaded(case, tmp_path)
+        found = diagnose(train, [held], card).diagnosis
+        assert found.verdict == (effect,)
+        assert found.heldout.after_rms < 0.5 * found.heldout.before_rms
+        assert found.heldout.confidence_interval[0] > 0
+
+
+DATA = Path(__file__).resolve().parents[3] / "shared" / "recordings" / "emps"
+
+
+@pytest.mark.skipif(not DATA.exists(), reason="the measured recordings are not beside this checkout")
+def test_a_measured_axis_has_direction_dependent_friction_and_a_delay() -> None:
+    card = read_card("emps")
+    train, held = (Recording.read(DATA / f"{n}.parquet", card.columns) for n in ("estimation", "validation_pulses"))
+    found = diagnose([train], [held], card).diagnosis
+    delay = next(finding for finding in found.findings if finding.effect == "delay")
+    assert {"friction_asymmetry", "delay"} <= set(found.verdict)
+    assert 0.4 <= delay.parameters["delay_ms"] <= 0.9
+    assert found.heldout.sliding["after_rms"] < 2.0 < 4.2 < found.heldout.sliding["before_rms"]
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("night")
+    write_case(demo_case(), folder)
+    return folder
+
+
+class TestCommand:
+    def arguments(self, folder: Path, out: Path, *more: str) -> list[str]:
+        train = [str(folder / "train_1.parquet"), str(folder / "train_2.parquet")]
+        held = ["--heldout", str(folder / "heldout.parquet")]
+        return ["diagnose", *train, *held, "--card", str(folder / "card.toml"), "--out", str(out), *more]
+
+    def run(self, arguments: list[str]) -> int:
+        with pytest.raises(SystemExit) as left:
+            main(arguments)
+        return int(left.value.code or 0)
+
+    def test_files_json_and_improved_card(
+        self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        out = tmp_path / "out"
+        assert self.run(self.arguments(folder, out, "--json")) == 0
+        printed = json.loads(capsys.readouterr().out)
+        assert printed == json.loads((out / "diagnosis.json").read_text())
+        schema = json.loads((files("cosim") / "delivery" / "schema.json").read_text())
+        jsonschema.Draft202012Validator(schema).validate(printed)
+        assert sorted(printed["verdict"]) == ["cogging", "friction_asymmetry"]
+        assert printed["heldout"]["after_rms"] < 0.15 * printed["heldout"]["before_rms"]
+        (ripple,) = [one["parameters"] for one in printed["effects"] if one["effect"] == "cogging"]
+        assert (
+            ripple["cycles_per_rev"] == 20
+        )  # a refit that ends before it has settled leaves 20.8, and .18 of the error
+        first = printed["effects"][0]
+        assert first["answer"] == "found"
+        assert first["standard_errors"]
+        assert first["where"]["axis"]
+        improved = read_card(out / "card.toml")
+        assert {effect.id for effect in improved.effects} == {"cogging", "friction_asymmetry"}
+        assert improved.origin["recordings"][0]["sha256"]
+        rows = pq.read_table(out / "missing_torque.parquet")
+        assert rows.num_rows == sum(
+            pq.read_table(folder / f).num_rows for f in ("train_1.parquet", "train_2.parquet", "heldout.parquet")
+        )
+        page = (out / "report.html").read_text()
+        assert "<html" in page
+        assert "not passive" in printed["data_quality"][0]
+        assert "Notes on the card and the recordings" in page
+        assert "it is not passive" in page
+        assert len(list(out.glob("*.fmu"))) == 2
+        assert self.run(self.arguments(folder, out)) == 2
+        assert "exists already" in capsys.readouterr().err
+
+    def test_quick_gives_the_same_answer_and_the_card_alone(
+        self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        out = tmp_path / "quick"
+        assert self.run(self.arguments(folder, out, "--quick", "--propose", str(tmp_path / "proposed"))) == 0
+        printed, said = capsys.readouterr()
+        assert "Nothing to propose: nothing is left without a name." in said
+        assert not (tmp_path / "proposed").exists()
+        assert {path.name for path in out.iterdir()} == {"diagnosis.json", "card.toml"}
+        assert "Wrote diagnosis.json card.toml" in printed
+        assert "report.html" not in printed
+        told = json.loads((out / "diagnosis.json").read_text())
+        schema = json.loads((files("cosim") / "delivery" / "schema.json").read_text())
+        jsonschema.Draft202012Validator(schema).validate(told)
+        assert sorted(told["verdict"]) == ["cogging", "friction_asymmetry"]
+        assert told["provenance"]["command"].endswith(f"--propose {tmp_path / 'proposed'} --quick")
+        assert told["provenance"]["card"]["sha256"] == hashlib.sha256((folder / "card.toml").read_bytes()).hexdigest()
+        assert not {"fmu", "scenario"} & (set(told["improved"]) | set(told["next_experiment"]))
+        assert {effect.id for effect in read_card(out / "card.toml").effects} == {"cogging", "friction_asymmetry"}
+        assert self.run(self.arguments(folder, out, "--quick")) == 2
+        assert "exists already" in capsys.readouterr().err
+        self.with_a_report_beside(out)
+        assert self.run(self.arguments(folder, out, "--quick", "--force")) == 0
+        assert {path.name for path in out.iterdir()} == {"diagnosis.json", "card.toml", "mine.txt"}
+
+    def with_a_report_beside(self, out: Path) -> None:
+        """What a whole diagnosis would have left, which tells of another answer then, and a file of the user."""
+        told = json.loads((out / "diagnosis.json").read_text())
+        told["improved"]["fmu"] = "axis_improved.fmu"
+        (out / "diagnosis.json").write_text(json.dumps(told))
+        for name in ("report.html", "missing_torque.parquet", "axis_improved.fmu", "mine.txt"):
+            (out / name).write_text("before")
+
+    def spoiled(self, folder: Path, tmp_path: Path, column: str, change: object) -> list[str]:
+        import pandas as pd
+
+        frame = pd.read_parquet(folder / "train_1.parquet")
+        frame[column] = change(frame[column].to_numpy().copy())  # type: ignore[operator]
+        frame.to_parquet(tmp_path / "spoiled.parquet")
+        arguments = self.arguments(folder, tmp_path / "out")
+        arguments[1] = str(tmp_path / "spoiled.parquet")
+        return arguments
+
+    @pytest.mark.parametrize(
+        ("column", "change", "said"),
+        [
+            ("tau", lambda x: np.where(np.arange(len(x)) == 5, np.nan, x), "tau"),
+            ("q", lambda x: np.zeros_like(x), "q"),
+            ("q", np.degrees, "--units q=deg"),
+        ],
+    )
+    def test_bad_recordings_get_one_sentence_and_leave_nothing(
+        self, folder: Path, tmp_path: Path, column: str, change: object, said: str, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        assert self.run(self.spoiled(folder, tmp_path, column, change)) == 2
+        error = capsys.readouterr().err.strip()
+        assert said in error
+        assert "Traceback" not in error
+        assert not (tmp_path / "out").exists()
+
+    def test_several_columns_may_follow_one_option(self, folder: Path, tmp_path: Path) -> None:
+        given = self.arguments(folder, tmp_path / "out", "--columns", "tau=torque", "q=angle")
+        assert self.run(given) == 2  # the file has no such columns, which is what the sentence is about
+
+    def test_the_held_out_recording_must_not_be_fitted(
+        self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        given = self.arguments(folder, tmp_path / "out")
+        given[2] = str(folder / "heldout.parquet")
+        assert self.run(given) == 2
+        assert "held out" in capsys.readouterr().err
+
+
+def test_a_card_with_physics_that_the_inverse_model_lacks_is_refused() -> None:
+    card = parse_card(
+        '[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\n'
+        '[[effects]]\neffect = "quadratic_drag"\ncoefficient = 1.0\n'
+        '[[effects]]\neffect = "friction_wander"\nstd = 0.1\n',
+        "card.toml",
+    )
+    t, q, _, a = wander()
+    with pytest.raises(InputError) as caught:
+        diagnose([recorded(2 * a, t, q)], [recorded(2 * a, t, q, "other")], card)
+    assert "The card holds friction_wander, which a diagnosis cannot take into account yet" in str(caught.value)
+
+
+def test_diagnosis_is_not_imported_by_a_run() -> None:
+    heavy = "{'casadi', 'matplotlib', 'cosim.diagnosis', 'cosim.estimation'}"
+    code = f"import sys, cosim.cli, cosim.master.simulate; assert not {heavy} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code], check=True)

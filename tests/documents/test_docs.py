@@ -1,0 +1,82 @@
+"""The documentation site says of every effect what a reader needs, and has a page for every subject."""
+
+import importlib.util
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from effect_examples import FORMS
+
+from cosim.diagnosis.effects import TRIED
+from pyfmi_models.effects import CATALOGUE
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = (
+    "card recording_data report theory decision glossary reading scenarios fmus other_tools hardware api architecture"
+)
+
+
+@pytest.fixture(scope="module")
+def gallery() -> Any:
+    sys.path.insert(0, str(DOCS))
+    try:
+        yield importlib.import_module("gallery")
+    finally:
+        sys.path.remove(str(DOCS))
+
+
+@pytest.fixture
+def site(monkeypatch: pytest.MonkeyPatch) -> Any:
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    spec = importlib.util.spec_from_file_location("site_conf", DOCS / "conf.py")
+    assert spec
+    assert spec.loader
+    spec.loader.exec_module(module := importlib.util.module_from_spec(spec))
+    return module
+
+
+@pytest.mark.parametrize("name", sorted(TRIED))
+def test_every_effect_has_equation_words_advice_and_literature(gallery: Any, name: str) -> None:
+    for form in CATALOGUE[name]:
+        said, literature = gallery.described(form)
+        assert said
+        assert form.equation
+        assert form.action
+    assert literature or gallery.LITERATURE[name]
+
+
+def test_no_literature_is_told_twice(gallery: Any) -> None:
+    assert set(gallery.LITERATURE) <= set(TRIED)
+    last = {form.id: form for form in FORMS if form.id in TRIED}
+    assert [name for name in gallery.LITERATURE if gallery.described(last[name])[1]] == []
+
+
+def test_the_gallery_lists_the_effects_that_a_diagnosis_does_not_look_for(gallery: Any) -> None:
+    text = "\n".join(gallery.of_cards_alone())
+    assert "A diagnosis does not look for them yet" in text
+    assert set(re.findall(r"^`(\w+)`, ", text, re.M)) == set(CATALOGUE) - set(TRIED)
+    assert text.count("*Literature:* Wen") == 1
+
+
+def test_the_index_leads_to_every_page_that_is_there() -> None:
+    index = (DOCS / "index.md").read_text("utf-8")
+    listed = set(re.findall(r"^([a-z_/]+)$", index, re.M))
+    assert {*PAGES.split()} <= listed
+    assert all((DOCS / f"{name}.md").exists() for name in listed if not name.startswith("_generated"))
+
+
+def test_ci_builds_the_site_with_warnings_as_errors() -> None:
+    ci = (DOCS.parent / ".ci" / "run").read_text("utf-8")
+    assert "-m sphinx -W" in ci
+    assert "-m sphinx -W" in (DOCS / "site.md").read_text("utf-8")
+
+
+def test_links_out_of_the_folder_are_said_as_paths(site: Any) -> None:
+    text = ["see [results](../results/a.md#b) and [x](y.md)"]
+    site.inside_the_site(None, "index", text)
+    assert text == ["see results (`results/a.md` in the source) and [x](y.md)"]
+    text = ["of [the report](../report.md), in [results](../../results/a.md)"]
+    site.inside_the_site(None, "_generated/effects", text)
+    assert text == ["of [the report](../report.md), in results (`results/a.md` in the source)"]

@@ -1,0 +1,57 @@
+"""The archives in tools of others: they load, and compute the same bits."""
+
+import importlib
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fmpy import simulate_fmu
+from fmu_tools import START, STEP, TOOLS
+
+from pyfmi_models.card import read_card
+from pyfmi_models.export import export_fmu
+
+STEPS = 100
+CASES = [(tool, fmi) for tool, (_, versions) in TOOLS.items() for fmi in versions]
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory):
+    """Export plant or controller of the paper's mount once."""
+    card, folder = read_card("paper_mount"), tmp_path_factory.mktemp("fmus")
+    models = {"plant": card.plant().model(), "controller": card.controller_model()}
+    return cache(lambda part, fmi: export_fmu(models[part], folder / f"{part}{fmi}.fmu", fmi=fmi))
+
+
+def rows_in(tool, path, folder):
+    try:
+        importlib.import_module(TOOLS[tool][0])
+    except (ImportError, OSError) as error:
+        pytest.skip(f"{tool} is not installed: {error}")
+    runner, out = Path(__file__).parents[1] / "tools" / "fmu_tools.py", folder / f"{tool}.npz"
+    command = [sys.executable, str(runner), tool, str(path), str(STEPS), str(out)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr[-2000:]
+    return np.load(out)["rows"]
+
+
+@pytest.mark.parametrize("part", ["plant", "controller"])
+@pytest.mark.parametrize(("tool", "fmi"), CASES)
+def test_each_tool_loads_the_archive_and_finds_the_same_bits(archive, tool, fmi, part, tmp_path):
+    own = rows_in("fmpy", archive(part, 3), tmp_path)
+    assert np.ptp(own[:, 0]) > 0  # something moves
+    assert rows_in(tool, archive(part, fmi), tmp_path).tobytes() == own.tobytes()
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_model_exchange_in_fmpy_is_the_same_motion(archive, fmi, tmp_path):
+    own = rows_in("fmpy", archive("plant", 3), tmp_path)
+    start = {name: START[name] for name in ("tau", "disturbance")}
+    options = {"fmi_type": "ModelExchange", "stop_time": STEPS * STEP, "output_interval": STEP}
+    options |= {"relative_tolerance": 1e-10, "output": ["q", "v", "friction"]}
+    found = simulate_fmu(str(archive("plant", fmi)), start_values=start, **options)
+    for k, name in enumerate(("q", "v", "friction")):
+        assert np.abs(found[name][1:] - own[:, k]).max() <= 1e-7 * np.abs(own[:, k]).max()

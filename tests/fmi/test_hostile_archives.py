@@ -1,0 +1,224 @@
+"""Archives and descriptions that nobody could have meant are one sentence each, and leave nothing."""
+
+import struct
+import tempfile
+import zipfile
+from pathlib import Path
+
+import pytest
+from commands import call
+from ssp_files import component, pack, system
+from tiny_fmu import described, description, tiny
+
+import cosim.support.archive
+from cosim.fmi.fmu import FmuComponent
+from cosim.support.archive import BOMB, contents
+from cosim.support.errors import FmuError, ScenarioError
+from cosim.system.scenario import read_scenario
+
+__all__ = ["tiny"]
+
+
+def changed(good: Path, bad: Path, *more: tuple[zipfile.ZipInfo | str, bytes]) -> Path:
+    """Copy an archive and add members."""
+    bad.write_bytes(good.read_bytes())
+    with zipfile.ZipFile(bad, "a") as archive:
+        for name, content in more:
+            archive.writestr(name, content)
+    return bad
+
+
+def link(name: str) -> zipfile.ZipInfo:
+    info = zipfile.ZipInfo(name)
+    info.external_attr = 0o120777 << 16
+    return info
+
+
+NAMES = [
+    ("/etc/cosim", "has an absolute name"),
+    ("C:/cosim", "has a drive letter or a backslash in its name"),
+    ("resources\\cosim", "has a drive letter or a backslash in its name"),
+    ("resources/../../cosim", "has a name that leads elsewhere"),
+    ("resources//cosim", "has a name that leads elsewhere"),
+    ("resources/" + "x" * 300, "has a name that is too long"),
+    ("x/" * 300 + "x", "has a name that is too long"),
+    ("resources/a\nb", "has a name with characters that no file has"),
+    (link("resources/link"), "is a link or a device, and only files and folders are unpacked"),
+]
+
+
+@pytest.mark.parametrize(("name", "sentence"), NAMES)
+@pytest.mark.parametrize("kind", ["fmu", "ssp"])
+def test_a_member_with_such_a_name_is_refused(
+    tiny: dict[int, Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    kind: str,
+    name: zipfile.ZipInfo | str,
+    sentence: str,
+) -> None:
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    good = tiny[3] if kind == "fmu" else pack(tmp_path / "good.ssp", tiny[2], system(component("one")))
+    bad = changed(good, tmp_path / f"bad.{kind}", (name, b"here"))
+    with pytest.raises((FmuError, ScenarioError), match=sentence):
+        FmuComponent(bad) if kind == "fmu" else read_scenario(bad)
+    assert [one.name for one in tmp_path.rglob("*") if "cosim" in one.name] == []
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
+def test_a_bomb_is_refused_before_it_is_unpacked(tiny: dict[int, Path], tmp_path: Path) -> None:
+    bad = tmp_path / "bomb.fmu"
+    bad.write_bytes(tiny[3].read_bytes())
+    with zipfile.ZipFile(bad, "a", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("resources/zeros", bytes(BOMB))
+    with pytest.raises(FmuError, match=r"are \d+ times as large as their packing, and 200 is the most"):
+        FmuComponent(bad)
+
+
+@pytest.mark.parametrize(
+    ("limit", "most", "sentence"),
+    [("LARGEST", 100, "its members have .* GiB, and 0 are the most"), ("MEMBERS", 1, "2 members, and 1 are the most")],
+)
+def test_an_archive_of_too_much_is_refused(
+    tiny: dict[int, Path], monkeypatch: pytest.MonkeyPatch, limit: str, most: int, sentence: str
+) -> None:
+    monkeypatch.setattr(cosim.support.archive, limit, most)
+    with pytest.raises(FmuError, match=sentence):
+        FmuComponent(tiny[3])
+
+
+def test_two_members_of_one_name_are_refused(tiny: dict[int, Path], tmp_path: Path) -> None:
+    with pytest.warns(UserWarning, match="Duplicate name"):
+        bad = changed(tiny[3], tmp_path / "bad.fmu", ("modelDescription.xml", b"<other/>"))
+    with pytest.raises(FmuError, match=r'it holds two members "modelDescription\.xml"'):
+        FmuComponent(bad)
+
+
+def spoiled(good: Path, bad: Path, field: int, value: int, kind: bytes = b"PK\x01\x02") -> Path:
+    """Write another 16-bit number into the last entry of the table of contents (and of nothing else)."""
+    content = bytearray(good.read_bytes())
+    struct.pack_into("<H", content, content.rindex(kind) + field, value)
+    bad.write_bytes(bytes(content))
+    return bad
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "sentence"),
+    [(8, 1, "has a password"), (10, 99, r"is packed in a way that is not known \(99\)")],
+)
+def test_a_member_that_cannot_be_unpacked_is_refused(
+    tiny: dict[int, Path], tmp_path: Path, field: int, value: int, sentence: str
+) -> None:
+    with pytest.raises(FmuError, match=sentence):
+        FmuComponent(spoiled(tiny[3], tmp_path / "bad.fmu", field, value))
+
+
+def test_a_member_that_is_damaged_is_found_when_it_is_unpacked(
+    tiny: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
+    (tmp_path / "temporary").mkdir()
+    content = bytearray(tiny[3].read_bytes())
+    content[content.index(b"\x7fELF") + 1000] ^= 1
+    bad = tmp_path / "bad.fmu"
+    bad.write_bytes(bytes(content))
+    with pytest.raises(FmuError, match=r"tiny\.so\" cannot be unpacked: Bad CRC-32 for file"):
+        FmuComponent(bad)
+    assert list((tmp_path / "temporary").iterdir()) == []
+
+
+@pytest.mark.parametrize("length", [0, 10, 100, -1, -30])
+def test_an_archive_that_is_cut_short_is_no_fmu(tiny: dict[int, Path], tmp_path: Path, length: int) -> None:
+    bad = tmp_path / "cut.fmu"
+    bad.write_bytes(tiny[3].read_bytes()[:length])
+    with pytest.raises(FmuError, match=r"cut\.fmu is no FMU"):
+        FmuComponent(bad)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ('valueReference="1"', 'valueReference="4294967296"', '"b" has the value reference 4294967296; a value refe'),
+        ('valueReference="1"', 'valueReference="-1"', '"b" has the value reference -1; a value reference is a whole'),
+        ('valueReference="1"', 'valueReference="1e3"', "cannot be read: invalid literal for int"),
+        (
+            'causality="output"',
+            'causality="gives"',
+            'Variable "y" (line 1) has an illegal combination of causality="gives"',
+        ),
+        (
+            'variability="fixed"',
+            'variability="wobbly"',
+            'Variable "k" (line 1) has an illegal combination of causality="parameter" and va',
+        ),
+        ('min="0"', 'min="low"', '"k" has min = "low", which is no number'),
+        ('name="b"', 'name="a"', 'the variable "a" is there twice'),
+        ('name="b"', 'name=""', 'the variable "" has no name'),
+    ],
+)
+def test_a_variable_that_no_fmu_can_have_is_named(
+    tiny: dict[int, Path], tmp_path: Path, version: int, old: str, new: str, sentence: str
+) -> None:
+    text = description(version)
+    assert old in text
+    with pytest.raises(FmuError) as caught:
+        FmuComponent(described(tiny[version], tmp_path / "bad.fmu", text.replace(old, new, 1)))
+    assert sentence in str(caught.value)
+
+
+def test_event_indicators_without_number_are_refused(tiny: dict[int, Path], tmp_path: Path) -> None:
+    text = description(2).replace('guid="t"', 'guid="t" numberOfEventIndicators="99999999999"')
+    with pytest.raises(FmuError, match=r"numberOfEventIndicators = 99999999999; 1,000,000 are the most"):
+        FmuComponent(described(tiny[2], tmp_path / "bad.fmu", text))
+
+
+@pytest.mark.parametrize("coding", ["utf-8", "utf-16"])
+def test_a_description_that_defines_its_own_parts_is_refused(
+    tiny: dict[int, Path], tmp_path: Path, coding: str
+) -> None:
+    head = f'<?xml version="1.0" encoding="{coding}"?><!DOCTYPE a [<!ENTITY b SYSTEM "file:///etc/hostname">]>'
+    bad = described(tiny[3], tmp_path / "bad.fmu", (head + description(3)).encode(coding))  # type: ignore[arg-type]
+    with pytest.raises(FmuError, match=r"modelDescription\.xml has a DOCTYPE"):
+        FmuComponent(bad)
+
+
+def test_systems_that_use_each_other_without_end_are_refused(tiny: dict[int, Path], tmp_path: Path) -> None:
+    inner = component("one")
+    for _ in range(3000):
+        inner = system(inner, name="sub")
+    with pytest.raises(ScenarioError, match="nests systems more than 50 deep"):
+        read_scenario(pack(tmp_path / "deep.ssp", tiny[2], inner))
+
+
+def test_a_system_that_doubles_at_each_level_is_refused(tiny: dict[int, Path], tmp_path: Path) -> None:
+    """Each of 20 systems uses the next one twice: a million FMUs from two kilobytes."""
+    levels = []
+    for level in range(20):
+        twice = "".join(
+            f'<ssd:Component name="{side}" source="#s{level + 1}" type="application/x-ssp-definition"/>'
+            for side in ("left", "right")
+        )
+        whole = system(twice if level < 19 else component("one"), name=f"s{level}")
+        levels.append(whole.replace("<ssd:System ", f'<ssd:System id="s{level}" ', 1))
+    with pytest.raises(ScenarioError, match="it has more than 10,000 elements"):
+        read_scenario(pack(tmp_path / "wide.ssp", tiny[2], system("".join(levels))))
+
+
+def test_the_command_says_it_and_leaves_nothing(
+    tiny: dict[int, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad = changed(tiny[3], tmp_path / "bad.fmu", ("../up", b""))
+    (tmp_path / "s.toml").write_text(
+        f'stop = 0.1\n[components.a]\nfmu = "{bad}"\n[record]\nsignals = ["a.y"]\n', "utf-8"
+    )
+    assert call("run", tmp_path / "s.toml", "--out", tmp_path / "out") == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last == (f'cosim: {bad} is no FMU that can be run: its member "../up" has a name that leads elsewhere.')
+    assert not (tmp_path / "out").exists()
+
+
+def test_what_our_own_exports_hold_is_not_refused(tiny: dict[int, Path]) -> None:
+    assert {one.filename for one in contents(tiny[3], AssertionError)} >= {"modelDescription.xml"}

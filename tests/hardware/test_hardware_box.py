@@ -1,0 +1,134 @@
+"""The black box says what happened, also after a kill, and replays bit for bit."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from on_hardware import SIMULATED, recorded, scenario, session
+
+from cosim.data.recording import Recording
+from cosim.hardware.blackbox import HEADER, read_black_box
+from cosim.hardware.replay import replay
+from cosim.hardware.session import Session, run_session
+from cosim.hardware.structures import RECORD
+from cosim.master.simulate import run
+from cosim.support.errors import HardwareError
+from cosim.system.wire import Record
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
+
+
+def test_the_recording_is_one_that_a_diagnosis_reads(tmp_path: Path) -> None:
+    with session(tmp_path) as one:
+        run_session(one)
+    path = recorded(tmp_path).write(tmp_path / "r.parquet")
+    read = Recording.read(path)
+    assert {"tau", "q", "q_d"} <= set(read)
+    assert [read.units[one] for one in ("t", "tau", "q", "q_d", "v_d")] == ["s", "N.m", "rad", "rad", "rad/s"]
+    what = scenario()
+    twin = run(replace(what, records={"tau": Record("mount.tau", "mean")})).recording
+    first = int(np.flatnonzero(read["machine.notes"].astype(int) & 1)[0])
+    assert np.allclose(read["tau"][first:][1:3999], twin["tau"][1:3999], rtol=1e-15, atol=1e-15)
+    assert replay(read).identical
+
+
+def test_a_replay_notices_a_single_changed_bit(tmp_path: Path) -> None:
+    with session(tmp_path) as one:
+        run_session(one)
+    found = recorded(tmp_path)
+    order = found["machine.order"].copy()
+    order[2000] = np.nextafter(order[2000], 1e9)
+    done = replay(replace(found, table=found.table | {"machine.order": order}))
+    assert (done.identical, done.first, done.different["machine.order"]) == (False, 2000, 1)
+    counts = found["machine.counts"].copy()
+    counts[2000] += 1
+    done = replay(replace(found, table=found.table | {"machine.counts": counts}))
+    assert (done.identical, done.first) == (False, 2000)
+
+
+def test_a_black_box_is_let_go_of_when_its_session_ends(tmp_path: Path) -> None:
+    def mapped() -> bool:
+        return str(tmp_path / "box") in Path("/proc/self/maps").read_text()
+
+    with session(tmp_path) as one:
+        one.advance(10)
+        assert mapped()
+    assert not mapped(), "though the session is still there"
+    assert one is not None
+
+
+def test_a_torn_record_is_known(tmp_path: Path) -> None:
+    with session(tmp_path) as one:
+        one.advance(100)
+    path = tmp_path / "box"
+    raw = bytearray(path.read_bytes())
+    raw[HEADER + 50 * RECORD.itemsize + 20] ^= 1
+    path.write_bytes(raw)
+    kept = read_black_box(path)
+    assert (len(kept.records), kept.torn) == (99, 1)
+
+
+def test_a_ring_that_is_full_keeps_the_end_and_says_that_the_beginning_is_gone(tmp_path: Path) -> None:
+    short = SIMULATED.model_copy(update={"black_box_seconds": 0.05})
+    with session(tmp_path, short) as one:
+        one.advance(1234)
+    found = recorded(tmp_path)
+    assert np.array_equal(found["machine.tick"], np.arange(734, 1234))
+    with pytest.raises(HardwareError, match="begins at cycle 734"):
+        replay(found)
+
+
+def test_a_session_whose_first_cycle_came_late_replays_from_there(tmp_path: Path) -> None:
+    with session(tmp_path) as one:
+        one.advance(100)
+    found = recorded(tmp_path)
+    late = np.zeros(100)
+    late[0] = 3
+    shifted = {"machine.tick": found["machine.tick"] + 3, "machine.late": late}
+    assert replay(replace(found, table=found.table | shifted)).cycles == 100
+
+
+LIVE = """
+import sys
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from on_hardware import SIMULATED, scenario
+from cosim.hardware.session import Session
+with Session(scenario(("stop = 0.4", "stop = 30.0")), SIMULATED, Path({box!r}), fast=True) as one:
+    one.enable()
+    one.track(1000)
+    print("on", flush=True)
+    one.track()
+"""
+
+
+def test_a_killed_process_leaves_a_black_box_without_a_torn_record(tmp_path: Path) -> None:
+    code = textwrap.dedent(LIVE).format(tests=str(Path(__file__).parents[1] / "tools"), box=str(tmp_path / "box"))
+    process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
+    assert process.stdout is not None
+    with process.stdout:
+        assert process.stdout.readline() == b"on\n"
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    found = recorded(tmp_path)
+    assert found["machine.order"].any()
+    assert np.array_equal(np.diff(found["machine.tick"]), np.ones(len(found) - 1))
+    assert replay(found).identical
+
+
+def test_in_real_time_whatever_the_clock_does_the_recording_replays(tmp_path: Path) -> None:
+    what = scenario(("stop = 0.4", "stop = 0.2"))
+    with Session(what, SIMULATED, tmp_path / "box") as one:
+        try:
+            done = run_session(one)
+        except HardwareError:  # this computer was too late before there was any torque
+            done = {"completed": False}
+    found = recorded(tmp_path)
+    assert done["completed"] or found["machine.order"][-1] == 0
+    assert replay(found).identical

@@ -1,0 +1,133 @@
+"""The arrows of the architecture: a folder imports only from floors below its own; nothing imports itself by a detour.
+
+Every import counts: at the top of a file, inside a function, under TYPE_CHECKING. Folders are read from the tree.
+"""
+
+import re
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+from imports import FILES, PACKAGES, ROOT, imports
+
+from cosim_studies.proof.conduct import TELLS
+
+FLOORS = (
+    {"cosim.support"},
+    {"cosim.data"},
+    {"cosim.fmi", "cosim.reading"},
+    {"cosim.system"},
+    {"cosim.master", "cosim.plots"},
+    {"cosim.nesting", "cosim.hardware", "cosim.observatory", "cosim.sweeps", "cosim.models", "cosim.estimation"},
+    {"cosim.calibration", "cosim.experiments"},
+    {"cosim.diagnosis.answer"},
+    {"cosim.diagnosis.decide"},
+    {"cosim.diagnosis.effects"},
+    {"cosim.diagnosis.evidence"},
+    {"cosim.diagnosis.terms"},
+    {"cosim.diagnosis.search"},
+    {"cosim.diagnosis.trust"},
+    {"cosim.diagnosis.measure"},
+    {"cosim.diagnosis"},
+    {"cosim.report"},
+    {"cosim.delivery"},
+    {"cosim.investigation", "cosim.checks", "cosim.simulators"},
+    {"cosim.api", "cosim_studies"},
+    {"cosim.serve"},
+    {"cosim", "cosim.cli"},
+    {"cosim.__main__"},
+)
+"""The floors of the house, from the ground: what stands on one imports only from floors below."""
+FLOOR_OF = {folder: number for number, floor in enumerate(FLOORS) for folder in floor}
+HIGHEST = {"cosim", "cosim.api", "cosim.cli", "cosim.serve", "cosim_studies"}
+ROOMS = {folder for floor in FLOORS for folder in floor if folder.count(".") == 2}
+KNOW_PHYSICS = (
+    ROOMS | {"cosim.diagnosis", "cosim.report", "cosim.delivery", "cosim.investigation", "cosim.checks"} | HIGHEST
+)
+KNOW_PHYSICS |= {"cosim.models", "cosim.estimation", "cosim.simulators", "cosim.nesting"}
+NEED_HEAVY = KNOW_PHYSICS | {"cosim.plots"}
+"""Folders that may import CasADi, the compiler or matplotlib: a run needs none of them."""
+STUDY_VERBS = {f"cosim.cli.{verb}" for verb in ("demo", "paper", "prove")}
+EXPORT_READS = ("pyfmi_models.model", "pyfmi_models.errors", "pyfmi_models.export")
+C_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
+C_FUNCTION = re.compile(r"^(?!static)(?:[A-Za-z_][\w *]*[ *])(\w+)\([^;{}]*\)\n\{", re.MULTILINE)
+
+
+def ours(name: str) -> set[str]:
+    return {other for other in imports(name) if other in FILES} - {name}
+
+
+def belongs(name: str, *rooms: str) -> bool:
+    return any(name == room or name.startswith(f"{room}.") for room in rooms)
+
+
+def folder_of(name: str) -> str:
+    """cosim.system.plan -> cosim.system; rooms of the diagnosis are folders; studies and physics one folder each."""
+    parts = name.split(".")
+    if (room := ".".join(parts[:3])) in ROOMS:
+        return room
+    return ".".join(parts[:2]) if parts[0] == "cosim" else parts[0]
+
+
+def floor(name: str) -> int:
+    return FLOOR_OF[folder_of(name)]
+
+
+def test_every_folder_stands_on_a_floor() -> None:
+    found = {folder_of(name) for name in FILES} - {"pyfmi_models"}
+    assert found == set(FLOOR_OF)
+
+
+def test_cosim_holds_folders_and_at_most_four_modules() -> None:
+    assert len(list((ROOT / "cosim").glob("*.py"))) <= 4
+
+
+@pytest.mark.parametrize("folder", sorted(set(FLOOR_OF)))
+def test_a_folder_imports_only_from_floors_below(folder: str) -> None:
+    for name in (one for one in FILES if folder_of(one) == folder):
+        for other in (one for one in ours(name) if not belongs(one, folder, "pyfmi_models")):
+            assert floor(other) < floor(name), f"{name} imports {other}, which does not stand below it"
+
+
+def test_only_the_verbs_of_the_studies_import_them_and_only_when_called() -> None:
+    for name in (one for one in FILES if not belongs(one, "cosim_studies")):
+        if any(belongs(other, "cosim_studies") for other in ours(name)):
+            assert name in STUDY_VERBS, f"{name} imports a study"
+            assert not any(belongs(other, "cosim_studies") for other in imports(name, inside=False)), name
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_physics_and_what_is_heavy_stay_where_they_belong(name: str) -> None:
+    for other in imports(name):
+        if belongs(name, "pyfmi_models"):
+            assert not belongs(other, "cosim", "cosim_studies"), f"{name} imports {other}: physics knows no runner"
+        elif belongs(other, "pyfmi_models"):
+            assert folder_of(name) in KNOW_PHYSICS, f"{name} imports {other}: only {', '.join(KNOW_PHYSICS)} may"
+        elif belongs(other, "casadi", "ziglang", "matplotlib"):
+            assert folder_of(name) in NEED_HEAVY, f"{name} imports {other}: only {', '.join(NEED_HEAVY)} may"
+        if belongs(name, "pyfmi_models.export"):
+            assert not belongs(other, "pyfmi_models") or belongs(other, *EXPORT_READS), f"{name} imports {other}"
+        elif belongs(name, "pyfmi_models"):
+            assert not belongs(other, "pyfmi_models.export"), f"{name} imports {other}: physics does not export itself"
+
+
+def test_nothing_that_decides_asks_what_tells() -> None:
+    """The code that a page of scores is made by leaves out what only tells: no score may come from there."""
+    tells = tuple(path.removesuffix(".py").replace("/", ".") for path in TELLS)
+    deciding = {name for name in FILES if belongs(name, "cosim.diagnosis", "cosim.estimation", "cosim_studies.proof")}
+    asking = {name for name in deciding if not belongs(name, *tells) if any(belongs(one, *tells) for one in ours(name))}
+    assert not asking, asking
+
+
+def test_no_file_imports_itself_by_a_detour() -> None:
+    TopologicalSorter({name: ours(name) for name in FILES}).prepare()
+
+
+@pytest.mark.parametrize(
+    "folder", sorted({path.parent for package in PACKAGES for path in (ROOT / package).rglob("*.c")})
+)
+def test_no_file_in_c_calls_itself_by_a_detour(folder: Path) -> None:
+    texts = {path.name: C_COMMENT.sub("", path.read_text("utf-8")) for path in folder.glob("*.c")}
+    homes = {function: name for name, text in texts.items() for function in C_FUNCTION.findall(text)}
+    calls = {name: {homes[word] for word in re.findall(r"\w+", text) if word in homes} for name, text in texts.items()}
+    TopologicalSorter({name: others - {name} for name, others in calls.items()}).prepare()

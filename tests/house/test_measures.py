@@ -1,0 +1,31 @@
+"""The sizes of the house have limits: functions, files and the tests' files; types and docstrings."""
+
+from pathlib import Path
+
+from measures import measured
+
+ROOT = Path(__file__).parents[2]
+FOUND = measured(ROOT)
+LONGEST = 400
+"""Lines of a file: beyond them it holds more than one idea."""
+
+
+def test_no_function_has_more_than_62_lines_and_no_file_more_than_400() -> None:
+    assert FOUND.functions[-1] <= 62
+    assert FOUND.files[-1] <= LONGEST
+
+
+def test_files_of_tests_and_benches_are_short() -> None:
+    files = [path for folder in ("bench", "tests") for path in (ROOT / folder).rglob("*.py")]
+    lines = {path: len(path.read_text("utf-8").splitlines()) for path in files}
+    long = {path.name: number for path, number in lines.items() if number > LONGEST}
+    assert not long, f"split by meaning: {long}"
+
+
+def test_what_has_a_type_is_no_dictionary_and_a_diagnosis_does_not_ask_for_classes() -> None:
+    assert FOUND.dictionaries <= 40
+    assert FOUND.instances <= 10
+
+
+def test_public_names_have_docstrings() -> None:
+    assert not FOUND.bare

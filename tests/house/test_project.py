@@ -1,0 +1,134 @@
+"""The project on paper is the project as it is: commands, card, version, requirements, files of the package."""
+
+import ast
+import re
+import sys
+import tomllib
+from importlib.metadata import PackageNotFoundError, packages_distributions, version
+from importlib.util import find_spec
+from pathlib import Path
+
+import pytest
+
+import cosim
+import cosim_studies
+import pyfmi_models
+from cosim.diagnosis.effects import TRIED
+from pyfmi_models.card import read_card
+from pyfmi_models.effects import CATALOGUE
+
+ROOT = Path(__file__).parents[2]
+README = (ROOT / "README.md").read_text("utf-8")
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+START = "python3 -m venv .venv && .venv/bin/pip install . && .venv/bin/cosim demo"
+TEST = ".venv/bin/pip install '.[test]' && .venv/bin/pytest"
+PACKAGES = {"cosim": cosim, "cosim_studies": cosim_studies, "pyfmi_models": pyfmi_models}
+SOURCES = [path for name in PACKAGES for path in (ROOT / name).rglob("*")]
+CALLED = {"sklearn": "scikit-learn"}
+"""Optional packages that are installed by another name than they are imported by."""
+BUILT = {".so", ".dylib", ".dll", ".pyc"}
+
+
+def fenced(language: str) -> list[str]:
+    found = re.findall(rf"^( *)```{language}\n(.*?)^ *```", README, re.MULTILINE | re.DOTALL)
+    return [re.sub(rf"^{indent}", "", text, flags=re.MULTILINE) for indent, text in found]
+
+
+def test_readme_states_the_two_commands_and_ci_runs_the_second() -> None:
+    assert START in README
+    assert TEST in README
+    assert TEST in (ROOT / ".ci" / "run").read_text("utf-8")
+    assert (ROOT / ".ci" / "run").stat().st_mode & 0o100
+
+
+def test_every_verb_that_readme_types_exists() -> None:
+    typed = set(re.findall(r"(?:^|/|\s|`)cosim ([a-z]+)\b", "\n".join(fenced("sh")), re.MULTILINE))
+    assert typed
+    missing = sorted(verb for verb in typed if find_spec(f"cosim.cli.{verb}") is None)
+    assert not missing, f"README types verbs that do not exist: {', '.join(missing)}"
+
+
+def test_the_card_in_readme_makes_a_plant(tmp_path: Path) -> None:
+    (card,) = fenced("toml")
+    path = tmp_path / "axis.toml"
+    path.write_text(card, "utf-8")
+    assert read_card(path).plant().model().parameters
+
+
+def test_readme_lists_the_effects_that_a_diagnosis_can_name() -> None:
+    limits = README.partition("## Limits")[2]
+    assert {name for name in re.findall(r"`([a-z_]+)`", limits) if name in CATALOGUE} == set(TRIED)
+
+
+def test_links_of_the_documents_lead_somewhere() -> None:
+    for document in ROOT.glob("*.md"):
+        for target in re.findall(r"\]\(([^)#]+)\)", document.read_text("utf-8")):
+            assert target.startswith("https://") or (ROOT / target).exists(), f"{document.name}: {target}"
+
+
+def test_no_document_names_a_path_of_one_machine() -> None:
+    for document in [*ROOT.glob("*.md"), ROOT / ".ci" / "run", ROOT / "pyproject.toml"]:
+        assert not re.search(r"(?<![\w.])/(work|home|root|Users)/", document.read_text("utf-8")), document.name
+
+
+def test_the_version_is_stated_once_and_is_a_release_or_in_the_making() -> None:
+    assert "version" in PROJECT["dynamic"]
+    changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    assert "## [Unreleased]" in changelog
+    assert cosim.__version__ in changelog
+    try:
+        assert version(PROJECT["name"]) == cosim.__version__
+    except PackageNotFoundError:
+        pytest.skip("the package is not installed here")
+
+
+def test_every_file_of_the_packages_is_installed() -> None:
+    for path in SOURCES:
+        if path.is_file() and path.suffix not in BUILT and "partial" not in path.suffixes:
+            relative = path.relative_to(ROOT)
+            home = Path(str(PACKAGES[relative.parts[0]].__file__)).parent
+            assert (home / Path(*relative.parts[1:])).is_file(), f"{relative} is not in the installed package"
+
+
+@pytest.mark.parametrize("library", ["cosim/master/loop/_loop", "cosim_studies/proof/_machine"])
+def test_the_compiled_libraries_are_installed(library: str) -> None:
+    package, _, rest = library.partition("/")
+    path = Path(str(PACKAGES[package].__file__)).parent / rest
+    assert list(path.parent.glob(f"{path.name}.*")), (
+        f"{library} is missing: python cosim/master/loop/build_hook.py builds it"
+    )
+
+
+def test_what_is_imported_is_required() -> None:
+    """A package that only happens to be there, because another one brought it, is a missing install step."""
+    stated = [*PROJECT["dependencies"], *(one for extra in PROJECT["optional-dependencies"].values() for one in extra)]
+    required = {re.split(r"[^\w-]", one)[0].lower() for one in stated} | {"hatchling"}
+    providers = packages_distributions()
+    for module, path in sorted(imported().items()):
+        names = {one.lower() for one in providers.get(module, [CALLED.get(module, module)])}
+        assert names & required, f"{path} imports {module}, which pyproject.toml does not require"
+
+
+def imported() -> dict[str, Path]:
+    """Return the outside modules that the packages import, each with one file that does."""
+    found: dict[str, Path] = {}
+    for path in SOURCES:
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))) if path.suffix == ".py" else ():
+            names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module] if isinstance(node, ast.ImportFrom) and node.module and not node.level else []
+            found |= {name.partition(".")[0]: path.relative_to(ROOT) for name in names}
+    return {name: path for name, path in found.items() if name not in {*sys.stdlib_module_names, *PACKAGES}}
+
+
+def test_every_result_is_told_how_it_is_rebuilt() -> None:
+    table = (ROOT / "results" / "README.md").read_text("utf-8")
+    missing = [one.name for one in (ROOT / "results").iterdir() if one.name != "README.md" and one.name not in table]
+    assert not missing, f"results/README.md does not say how these are rebuilt: {', '.join(missing)}"
+
+
+def test_no_result_names_a_folder_of_the_machine_that_made_it() -> None:
+    """Whoever rebuilds it has no such folder: a command is given with paths that begin in the project."""
+    absolute = re.compile(r"(?<![\w./~-])/(?:work|root|home|tmp|mnt|Users)/\w")
+    files = [one for one in (ROOT / "results").rglob("*") if one.suffix in {".md", ".json", ".jsonl", ".csv", ".toml"}]
+    named = [str(one.relative_to(ROOT)) for one in files if absolute.search(one.read_text("utf-8"))]
+    assert not named, f"these results name a folder of one machine: {', '.join(named)}"

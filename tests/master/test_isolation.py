@@ -1,0 +1,250 @@
+"""A component that crashes, ends its process or never returns costs one sentence, and leaves nothing behind."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import zipfile
+from pathlib import Path
+
+import pytest
+from commands import ENVIRONMENT, call, scenario
+from tiny_fmu import tiny
+
+from cosim.data.recording import Recording
+from cosim.master.isolated import run_isolated
+from cosim.master.simulate import Options
+from cosim.support.errors import LostComponentError
+from cosim.system.scenario import read_scenario
+
+__all__ = ["scenario", "tiny"]
+
+FUNCTION = """
+[components.odd]
+python = "odd.py:odd"
+inputs = { q = "rad" }
+outputs = { seen = "rad" }
+"""
+linux = pytest.mark.skipif(sys.platform != "linux", reason="signals and sessions as Linux has them")
+
+
+@pytest.fixture
+def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder for temporary files, for this test alone."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setenv("TMPDIR", str(folder))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    return folder
+
+
+def written(scenario: Path, parameters: str, *more: str) -> Path:
+    scenario.write_text(scenario.read_text().replace("k = 5.0", f"k = 5.0, {parameters}") + "".join(more))
+    return scenario
+
+
+def left(folder: Path) -> list[str]:
+    return sorted(str(one.relative_to(folder)) for one in folder.rglob("*"))
+
+
+@linux
+@pytest.mark.parametrize(
+    ("status", "sentence"),
+    [
+        (11, "crashed: SIGSEGV, segmentation fault, while it was stepped at tick 300 (0.3 s);"),
+        (14, "ended its process with exit code 0 while it was stepped at tick 300 (0.3 s);"),
+        (15, "crashed: SIGABRT, abort, while it was stepped at tick 300 (0.3 s);"),
+        (12, "did not return within 0.5 s while it was stepped at tick 300 (0.3 s);"),
+    ],
+)
+@pytest.mark.parametrize("loop", [(), ("--interpreted",)])
+def test_an_fmu_that_ends_its_process_costs_a_sentence_and_leaves_nothing(
+    scenario: Path,
+    temporary: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    status: int,
+    sentence: str,
+    loop: tuple[str, ...],
+) -> None:
+    written(scenario, f"fail_at = 0.3, status = {status}")
+    assert call("run", scenario, "--out", tmp_path / "out", "--call-timeout", 0.5, *loop) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    last = said.err.splitlines()[-1]
+    assert last.startswith("cosim: controller (")
+    assert sentence in last
+    assert last.endswith("Nothing was recorded.")
+    assert left(temporary) == []
+    assert not (tmp_path / "out").exists()
+
+
+@linux
+def test_what_an_fmu_started_ends_with_it(scenario: Path, tmp_path: Path) -> None:
+    written(scenario, "fail_at = 0.3, status = 16")
+    mark = f"{ENVIRONMENT['PYTHONPATH']}:{tmp_path}"
+    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out")]
+    done = subprocess.run(
+        command, env=ENVIRONMENT | {"PYTHONPATH": mark}, cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert "ended its process with exit code 3" in done.stderr
+    assert [pid for pid in processes() if str(tmp_path) in environment_of(pid)] == []
+
+
+def processes() -> list[int]:
+    return [int(one.name) for one in Path("/proc").iterdir() if one.name.isdigit() and int(one.name) != os.getpid()]
+
+
+def environment_of(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/environ").read_bytes().decode("utf-8", "replace")
+    except OSError:
+        return ""
+
+
+@linux
+def test_a_library_that_is_cut_short_is_named(
+    scenario: Path, tiny: dict[int, Path], temporary: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cut = tmp_path / "cut.fmu"
+    with zipfile.ZipFile(tiny[2]) as good, zipfile.ZipFile(cut, "w") as bad:
+        for name in good.namelist():
+            content = good.read(name)
+            bad.writestr(name, content[: len(content) // 3] if name.startswith("binaries") else content)
+    scenario.write_text(scenario.read_text().replace(str(tiny[2]), str(cut), 1))
+    assert call("run", scenario, "--out", tmp_path / "out") == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert re.search(r"cut\.fmu\) crashed: SIG|cut\.fmu cannot be instantiated: ", last)
+    assert left(temporary) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "sentence"),
+    [
+        ("def odd(t, q): raise SystemExit(0)", 'odd returned an error at tick 0 (0 s); it said "SystemExit: 0"'),
+        ("def odd(t, q): raise KeyboardInterrupt", "KeyboardInterrupt"),
+        ("import os\ndef odd(t, q): os._exit(0)", "ended its process with exit code 0 while it was stepped at tick 0"),
+        ("import os\nos._exit(0)", "odd.py ended its process with exit code 0 while it was loaded;"),
+        ("import sys\nsys.exit(0)", "the file cannot be run: SystemExit: 0."),
+        ("def odd(t, q):\n  while True: pass", "odd (odd.py:odd) did not return within 0.5 s while it was stepped"),
+        ("while True: pass", "odd.py did not return within 0.5 s while it was loaded;"),
+        ("class odd:\n  def __init__(self): raise OSError('no')", "odd cannot be made: OSError: no."),
+        ("class odd:\n  def __init__(self): raise SystemExit", "odd cannot be made: SystemExit: SystemExit."),
+    ],
+)
+def test_a_function_that_ends_its_process_costs_a_sentence(
+    scenario: Path,
+    temporary: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    text: str,
+    sentence: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("odd.py").write_text(text + "\n")
+    written(scenario, "nan_at = 1e9", FUNCTION)
+    assert call("run", scenario.name, "--out", "out", "--call-timeout", 0.5) == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert sentence in last
+    assert left(temporary) == []
+    assert "run.json" not in left(tmp_path)
+
+
+def test_isolated_or_not_the_rows_are_the_same(scenario: Path, tmp_path: Path) -> None:
+    for name, option in (("there", "--isolate"), ("here", "--no-isolate")):
+        assert call("run", scenario, "--out", tmp_path / name, option, "--no-page") == 0
+    one, other = (Recording.read(tmp_path / name / "recording.parquet", required=()) for name in ("there", "here"))
+    assert all((one[name] == other[name]).all() for name in one)
+    assert one.origin["complete"] is True
+
+
+def test_a_failure_that_is_said_is_the_same_sentence(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    written(scenario, "fail_at = 0.3")
+    said = []
+    for name, option in (("there", "--isolate"), ("here", "--no-isolate")):
+        assert call("run", scenario, "--out", tmp_path / name, option) == 2
+        said.append(capsys.readouterr().err.splitlines()[-1])
+        assert len(Recording.read(tmp_path / name / "recording.parquet", required=())) == 151
+    assert said[0] == said[1]
+
+
+@linux
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+@pytest.mark.parametrize("hang", [False, True])
+def test_a_signal_ends_both_processes_and_leaves_nothing_half_written(
+    scenario: Path, temporary: Path, tmp_path: Path, number: int, hang: bool
+) -> None:
+    written(scenario, "fail_at = 0.3, status = 12" if hang else "nan_at = 1e9")
+    scenario.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e6"))
+    command = [sys.executable, "-m", "cosim", "run", str(scenario), "--out", str(tmp_path / "out")]
+    process = subprocess.Popen(command, env=ENVIRONMENT | {"TMPDIR": str(temporary)}, stderr=subprocess.DEVNULL)
+    until = time.monotonic() + 30
+    while time.monotonic() < until and not list((tmp_path / "out").glob(".*.partial")):
+        time.sleep(0.02)
+    time.sleep(0.3)
+    process.send_signal(number)
+    process.wait(20)
+    until = time.monotonic() + 10
+    while time.monotonic() < until and [pid for pid in processes() if str(temporary) in environment_of(pid)]:
+        time.sleep(0.05)
+    assert [pid for pid in processes() if str(temporary) in environment_of(pid)] == []
+    assert left(temporary) == []
+    files = [name for name in left(tmp_path / "out") if name != ".cosim.lock"]
+    assert files == ["recording.parquet"] or (hang and files == [])  # a late computer interrupts before it hangs
+
+
+@linux
+def test_the_second_of_two_runs_into_one_folder_is_refused_while_the_first_lives(
+    scenario: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    long = tmp_path / "long.toml"
+    long.write_text(scenario.read_text().replace("stop = 0.5", "stop = 1e6"))
+    command = [sys.executable, "-m", "cosim", "run", str(long), "--out", str(tmp_path / "out")]
+    first = subprocess.Popen(command, env=ENVIRONMENT, stderr=subprocess.DEVNULL)
+    until = time.monotonic() + 120
+    while time.monotonic() < until and first.poll() is None and not list((tmp_path / "out").glob(".*.partial")):
+        time.sleep(0.02)
+    assert first.poll() is None, "the first run ended before the second began"
+    for force in ((), ("--force",)):
+        assert call("run", scenario, "--out", tmp_path / "out", *force) == 2
+        sentence = f"Another run is writing to {tmp_path / 'out'}; wait for it, end it, or give another --out."
+        assert sentence in capsys.readouterr().err
+    first.terminate()
+    assert first.wait(20) == 143
+    assert call("run", scenario, "--out", tmp_path / "out") == 2
+    assert "exists already" in capsys.readouterr().err
+    assert call("run", scenario, "--out", tmp_path / "out", "--force") == 0
+    assert left(tmp_path / "out") == ["recording.parquet", "run.html", "run.json"]
+
+
+def test_a_file_that_came_into_being_meanwhile_is_not_replaced(tmp_path: Path) -> None:
+    from cosim.support.errors import OutputError
+    from cosim.support.files import replacing
+
+    path = tmp_path / "card.toml"
+
+    def write() -> None:
+        with replacing(path) as partial:
+            partial.write_text("ours")
+            path.write_text("theirs")
+
+    with pytest.raises(OutputError, match="exists already"):
+        write()
+    assert path.read_text() == "theirs"
+    assert left(tmp_path) == ["card.toml"]
+
+
+def test_a_program_of_its_own_can_run_isolated_too(scenario: Path, tmp_path: Path) -> None:
+    done = run_isolated(read_scenario(scenario), Options(tmp_path / "a.parquet"))
+    assert done.statistics["steps"] == 500
+    assert len(done.recording) == 250
+    written(scenario, "fail_at = 0.1, status = 14")
+    with pytest.raises(LostComponentError) as lost:
+        run_isolated(read_scenario(scenario), Options(tmp_path / "b.parquet"))
+    assert (lost.value.component, "code 0" in lost.value.reason) == ("controller", True)

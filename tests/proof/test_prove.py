@@ -1,0 +1,196 @@
+"""A proof is honest: sealed before, opened after, scored as stated, and the same for a seed."""
+
+import json
+from pathlib import Path
+
+import prove_tool
+import pytest
+from imports import imports
+from prove_rows import ROWS, row
+from report_example import diagnosis
+
+from cosim.cli import main
+from cosim.cli.prove import _line
+from cosim.support.errors import OutputError, ProofError
+from cosim.sweeps.journal import RUNS
+from cosim_studies.proof import baselines, marks
+from cosim_studies.proof.cases import TOGETHER, cases_of
+from cosim_studies.proof.conduct import Benchmark, conduct
+from cosim_studies.proof.generator import FAMILIES, OUTSIDE
+from cosim_studies.proof.ledger import enlist, listed
+from cosim_studies.proof.page import page, proof
+from cosim_studies.proof.seal import Seals, canonical, salt_of, seal
+from cosim_studies.proof.tool import told
+
+
+def test_a_deck_is_drawn_from_its_seed_alone_and_a_longer_one_begins_alike() -> None:
+    assert cases_of(3, 40) == cases_of(3, 40)
+    assert cases_of(3, 90)[:40] == cases_of(3, 40)
+    assert cases_of(4, 40) != cases_of(3, 40)
+
+
+def test_kinds_come_in_their_shares_and_families_in_fair_rotation() -> None:
+    hands = cases_of(11, 420)
+    kinds = [hand.kind for hand in hands]
+    assert [kinds.count(kind) for kind in ("none", "one", "several", "outside")] == [105, 168, 84, 63]
+    alone = [hand.effects[0] for hand in hands if hand.kind == "one"]
+    assert {alone.count(name) for name in FAMILIES} == {8}
+    assert {[h.effects[0] for h in hands if h.kind == "outside"].count(name) for name in OUTSIDE} <= {4, 5}
+    sizes = [len(hand.effects) for hand in hands if hand.kind == "several"]
+    assert (sizes.count(2), sizes.count(3)) == (63, 21)
+    assert not any(len(group & set(hand.effects)) > 1 for hand in hands for group in TOGETHER)
+    assert len({hand.seed for hand in hands}) == len(hands)
+
+
+def test_a_list_of_decks_keeps_every_line_and_says_what_is_not_fresh(tmp_path: Path) -> None:
+    path = tmp_path / "decks.md"
+    enlist(path, "home", 5, 60, "tuning", "a" * 64)
+    enlist(path, "home", 5, 90, "tuning", "a" * 64)  # made longer
+    enlist(path, "home", 5, 90, "scoring", "b" * 64)
+    enlist(path, "abroad", 5, 30, "scoring", "b" * 64)
+    assert [(one.generator, one.cases, one.purpose, one.fresh) for one in listed(path)] == [
+        ("home", 90, "tuning", "yes"),
+        ("home", 90, "scoring", "no"),
+        ("abroad", 30, "scoring", "yes"),
+    ]
+    with pytest.raises(ProofError, match="--purpose play: it must be one of tuning, scoring"):
+        enlist(path, "home", 6, 60, "play", "b" * 64)
+    kept = listed(Path(__file__).parents[2] / "results" / "decks.md")
+    assert {one.purpose for one in kept} == {"tuning", "scoring"}
+
+
+def test_a_truth_cannot_be_changed_without_breaking_its_seal(tmp_path: Path) -> None:
+    truth = {"verdict": ["cogging"], "effects": [{"amplitude": 0.1 + 0.2}]}
+    salt = salt_of(5, 0)
+    seals = Seals(tmp_path / "seals.jsonl")
+    seals.write(0, seal(truth, salt))
+    opened = {"run": 0, "salt": salt, "truth": json.loads(json.dumps(truth))}
+    Seals(tmp_path / "seals.jsonl").check([opened])
+    for change in ({"truth": truth | {"verdict": []}}, {"salt": salt_of(6, 0)}):
+        with pytest.raises(ProofError, match="Case 0: what stands as its truth is not the truth that was sealed"):
+            seals.check([opened | change])
+    with pytest.raises(ProofError, match=r"Case 1: .* has no seal"):
+        seals.check([opened | {"run": 1}])
+    with pytest.raises(ProofError, match="Case 0 was sealed before with another truth"):
+        seals.write(0, seal(truth, salt_of(6, 0)))
+    assert Seals(tmp_path / "seals.jsonl").known == {0: seal(truth, salt)}
+
+
+def test_a_seal_that_was_cut_short_is_written_again(tmp_path: Path) -> None:
+    path = tmp_path / "seals.jsonl"
+    Seals(path).write(0, "a" * 64)
+    with path.open("a") as file:
+        file.write('{"run": 1, "se')
+    seals = Seals(path)
+    seals.write(1, "b" * 64)
+    assert Seals(path).known == {0: "a" * 64, 1: "b" * 64}
+
+
+def test_the_text_that_is_sealed_does_not_depend_on_the_order_of_keys() -> None:
+    assert canonical({"b": 1, "a": [1.5]}) == canonical({"a": [1.5], "b": 1}) == '{"a":[1.5],"b":1}'
+
+
+def test_what_makes_cases_shares_nothing_with_what_is_tested() -> None:
+    seen, rest = set(), {"cosim_studies.proof.make"}
+    while rest:
+        name = rest.pop()
+        seen.add(name)
+        rest |= {other for other in imports(name) if other.startswith(("cosim", "pyfmi_models"))} - seen
+    assert "cosim_studies.proof.truth" in seen
+    assert not [name for name in seen if name.startswith(("pyfmi_models", "cosim.diagnosis", "cosim.estimation"))]
+
+
+def test_what_a_diagnosis_says_is_what_is_scored() -> None:
+    found = diagnosis("two")
+    said = json.loads(json.dumps(told(found), allow_nan=False))
+    case = row("several", ["cogging", "friction_asymmetry"], []) | {"answer": said}
+    assert (marks.exact(case), marks.hits(case), marks.verdict(case)) == (True, 2, found.verdict)
+    offered = [(one.probability, one.effect) for one in found.findings if one.answer in ("found", "ambiguous")]
+    assert [p for p, _ in marks.probabilities(case)] == [p for p, _ in offered]
+    assert marks.gain(case, "cosim") == pytest.approx(1 - 0.18 / 0.37)
+    assert set(said["windows"]) == {"run1", "run2", "run3"}
+    assert set(baselines.compared(found.traces, names=("refit", "kernel"))) == {"refit", "kernel"}
+
+
+@pytest.fixture
+def tools(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the process of the tool import what stands in for it."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent))
+
+
+@pytest.mark.usefixtures("tools")
+def test_a_proof_goes_on_where_it_ended_and_leaves_complete_files(tmp_path: Path) -> None:
+    told: list[str] = []
+    wanted = {"workers": 1, "tool": prove_tool.cautious, "on_seal": told.append}
+    out = tmp_path / "proof"
+    first = conduct(Benchmark(5, 1, 10.0), out, **wanted)
+    before = (out / RUNS).read_text()
+    whole = conduct(Benchmark(5, 2, 10.0), out, **wanted)
+    assert (first["played"], whole["played"]) == (1, 2)
+    assert (out / RUNS).read_text().startswith(before)
+    assert [one["seal"] in line for one, line in zip(whole["rows"], told, strict=True)] == [True, True]
+    assert json.loads((out / "proof.json").read_text()) == json.loads(json.dumps(whole))
+    assert (out / "README.md").read_text() == page(whole)
+    lines = (out / "cases.csv").read_text().splitlines()
+    assert len(lines) == 3
+    assert all((out / f"{name}.svg").read_text().startswith("<?xml") for name in ("confusion", "calibration", "gap"))
+    with pytest.raises(OutputError, match="holds another proof: its seed"):
+        conduct(Benchmark(6, 2, 10.0), out, **wanted)
+    (out / RUNS).write_text((out / RUNS).read_text().replace('"blend": ', '"blend": 1', 1))
+    with pytest.raises(ProofError, match="is not the truth that was sealed"):
+        conduct(Benchmark(5, 2, 10.0), out, **wanted)
+
+
+@pytest.mark.usefixtures("tools")
+def test_a_crash_of_the_tool_is_a_row_and_not_the_end(tmp_path: Path) -> None:
+    found = conduct(Benchmark(5, 1, 10.0), tmp_path, workers=1, tool=prove_tool.crashing)
+    assert found["rows"][0]["status"] == "crashed"
+    assert "code 3" in found["rows"][0]["reason"]
+
+
+def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "README.md").write_text("mine")
+    with pytest.raises(OutputError, match=r"README.md exists already; give --force"):
+        conduct(Benchmark(5, 1, 10.0), tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["README.md"]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        (["--cases", "0"], "--cases 0: it must be at least 1"),
+        (["--seconds", "5"], "--seconds 5: a recording must last 10 s at least"),
+        (["--workers", "0"], "--workers 0: it must be at least 1"),
+        (["--workers", str(2**64)], "--workers 18446744073709551616: 1,024 are the most"),
+        (["--seed", "-1"], "--seed -1: it must be at least 0"),
+        (["--seconds", "nan"], "--seconds nan: it must be a finite number"),
+    ],
+)
+def test_wrong_wishes_end_with_one_sentence(wrong, message, tmp_path, capsys) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["prove", "--out", str(tmp_path / "out"), "--decks", str(tmp_path / "decks.md"), *wrong])
+    assert ended.value.code == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"cosim: {message}")
+    assert said.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("met", "sure", "said"),
+    [(True, True, "met"), (True, False, "not sure"), (False, True, "MISSED"), (False, False, "not sure")],
+)
+def test_the_terminal_says_whether_more_cases_could_turn_a_bar(met: bool, sure: bool, said: str) -> None:
+    score = {"title": "right", "value": 0.9, "low": 0.8, "high": 1.0, "asked": ">= 0.9", "met": met, "sure": sure}
+    assert _line(score).endswith(f">= 0.9   {said}")
+
+
+def test_the_page_says_every_score_and_every_miss() -> None:
+    rows = [one | {"run": k} for k, one in enumerate(ROWS)]
+    facts = {"command": "cosim prove", "seed": 1, "cases": 13, "seconds": 60.0, "version": "0", "code": "c" * 64}
+    text = page(proof(rows, facts))
+    assert (
+        "| nothing concealed: something is said to be missing | 0.5 [0.15, 0.85] | 4 | <= 0.02 | **missed** |" in text
+    )
+    missed = [line for line in text.splitlines() if line.startswith(tuple(f"| {k} | 1 |" for k in range(13)))]
+    assert len(missed) == sum(not marks.exact(one) for one in ROWS)

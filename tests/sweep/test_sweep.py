@@ -1,0 +1,154 @@
+"""A sweep is a table with a row for each run, whatever the runs do to it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from commands import call
+from pyarrow import parquet
+from sweeps import K, R, folder, run, written
+from tiny_fmu import tiny
+
+from cosim.data.formats import ORIGIN_KEY, UNIT_KEY
+from cosim.data.recording import Recording
+
+__all__ = ["folder", "tiny"]
+
+
+def test_a_grid_is_every_combination_and_each_row_is_its_own_run(folder: Path) -> None:
+    done, table = run(folder / "sweep.toml", workers=2)
+    assert (done.runs, done.done, done.found, done.failed) == (9, 9, 0, 0)
+    assert list(table) == ["run", "plant.k", "r.value", "end", "error", "seconds", "status", "reason"]
+    assert table[["plant.k", "r.value"]].values.tolist() == [[k, r] for k in (1, 2, 4) for r in (0.5, 1.0, 1.5)]
+    # y' = k (r - y) by Euler: y_n = r (1 - (1 - k h)^n), seen at the last row, n = 499
+    np.testing.assert_allclose(table["end"], table["r.value"] * (1 - (1 - 1e-3 * table["plant.k"]) ** 499), rtol=1e-12)
+    window = np.arange(100, 401)[:, np.newaxis]
+    left = table["r.value"].to_numpy() * (1 - 1e-3 * table["plant.k"].to_numpy()) ** window
+    np.testing.assert_allclose(table["error"], 1e3 * np.sqrt(np.mean(left**2, axis=0)), rtol=1e-12)
+    assert set(table["status"]) == {"ok"}
+    assert (table["seconds"] > 0).all()
+
+
+def test_the_table_says_its_units_and_what_made_it(folder: Path) -> None:
+    done, _ = run(written(folder, ('"rms"', '"ise"'), (R, '"plant.a.gain" = [1.0]')), command="cosim sweep x")
+    schema = parquet.read_schema(done.table)
+    units = {name: schema.field(name).metadata[UNIT_KEY].decode() for name in ("plant.k", "end", "error", "seconds")}
+    assert units == {"plant.k": "1", "end": "rad", "error": "mrad2.s", "seconds": "s"}
+    origin = json.loads(schema.metadata[ORIGIN_KEY])
+    assert origin["command"] == "cosim sweep x"
+    assert origin["scenario"] == (folder / "loop.toml").read_text()
+
+
+def test_wires_signals_and_parameters_shared_by_name_are_varied(folder: Path) -> None:
+    both = 'k = { of = ["plant.k", "plant.a.gain"], low = 1.0, high = 2.0, count = 2 }'
+    _, table = run(written(folder, (K, both), (R, '"plant.b.offset" = [0.0, 0.25]')))
+    assert list(table)[1:3] == ["k", "plant.b.offset"]
+    k, offset = table["k"], table["plant.b.offset"]
+    np.testing.assert_allclose(table["end"], (k - offset) * (1 - (1 - 1e-3 * k) ** 499), rtol=1e-12)
+
+
+def test_a_number_of_workers_changes_nothing_but_time(folder: Path) -> None:
+    path = written(folder, (K, '"plant.k" = { low = 1.0, high = 4.0 }'), (", count = 3", ""))
+    path.write_text('method = "monte_carlo"\nruns = 12\nseed = 5\n' + path.read_text())
+    tables = [run(path, workers=workers, force=True)[1].drop(columns="seconds") for workers in (1, 3)]
+    pd.testing.assert_frame_equal(*tables)
+    path.write_text(path.read_text().replace("seed = 5", "seed = 6"))
+    assert not run(path, force=True)[1]["end"].equals(tables[0]["end"])
+
+
+@pytest.mark.parametrize(
+    ("parameters", "status", "reason"),
+    [
+        ("fail_at = 0.3", "failed", 'plant returned an error at tick 300 (0.3 s); it said "the shaft broke"; its last'),
+        ("nan_at = 0.3", "failed", "plant gave an output that is not a finite number at tick 300 (0.3 s)"),
+        (
+            "fail_at = 0.3, status = 11",
+            "crashed",
+            "The process of this run crashed: it was ended by signal 11, SIGSEGV",
+        ),
+        ("fail_at = 0.3, status = 12", "timeout", "It was given up: no answer within 8 s."),
+    ],
+)
+def test_a_run_that_goes_wrong_costs_its_row_and_no_other(
+    folder: Path, parameters: str, status: str, reason: str
+) -> None:
+    # k = 1e9 is what starts the trouble: the others keep the start value, which is never reached
+    name, _, rest = parameters.partition(" = ")
+    value, _, more = rest.partition(", ")
+    scenario = (folder / "loop.toml").read_text()
+    kind = f"parameters = {{ {more} }}\n" if more else ""
+    (folder / "loop.toml").write_text(scenario.replace("[signals.r]", f"{kind}[signals.r]"))
+    path = written(folder, (K, f'"plant.{name}" = [1e9, {value}, 1e8]'), (R, '"plant.k" = [1.0, 2.0]'))
+    path.write_text("timeout = 8.0\n" + path.read_text())  # a busy machine starts a process in seconds
+    done, table = run(path)
+    assert done.failed == 2
+    assert table["status"].tolist() == ["ok", "ok", status, status, "ok", "ok"]
+    assert table["reason"][2].startswith(reason)
+    assert table["end"].isna().tolist() == [False, False, True, True, False, False]
+    assert (table["reason"].drop([2, 3]) == "").all()
+
+
+def test_a_value_that_a_component_or_signal_refuses_is_a_row(folder: Path) -> None:
+    path = written(folder, (K, '"plant.k" = [-1.0, 1.0]'), (R, '"plant.b.quantum" = [-1.0, 0.0]'))
+    _, table = run(path)
+    assert table["status"].tolist() == ["failed"] * 3 + ["ok"]
+    assert table["reason"][1] == '"plant.k" is -1; it must lie in 0 .. inf 1.'
+    assert table["reason"][2] == "The quantum of the wire to plant.b is -1; it must not be negative."
+
+
+def test_recordings_are_kept_when_asked_for_and_agree_with_the_table(folder: Path) -> None:
+    _, table = run(written(folder, ("[vary]", "record = true\ndecimation = 3\n[vary]")))
+    kept = Recording.read(folder / "out" / "recordings" / "000004.parquet", required=())
+    assert kept.columns == ("t", "q", "r")
+    assert kept["q"][-1] == table["end"][4]
+    assert kept.units["q"] == "rad"
+    assert len(kept) == 167
+
+
+def test_the_command_prints_the_table_and_draws_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("sweep", folder / "sweep.toml", "--out", folder / "out", "--json") == 0
+    said = capsys.readouterr()
+    told = json.loads(said.out)
+    assert (told["runs"], told["done"], told["failed"]) == (9, 9, 0)
+    assert pd.read_parquet(told["table"]).shape == (9, 8)
+    assert Path(told["picture"]).read_text().count("<svg") == 1
+    assert call("sweep", folder / "sweep.toml", "--out", folder / "out") == 0
+    said = capsys.readouterr()
+    assert said.out == f"{folder / 'out' / 'table.parquet'}\n"
+    assert "9 runs, 9 of them done before" in said.err
+    assert call("sweep", folder / "sweep.toml", "--out", folder / "out", "--workers", "0") == 2
+    assert capsys.readouterr().err.endswith("cosim: --workers 0: there must be at least one.\n")
+    assert call("sweep", folder / "sweep.toml", "--out", folder / "out", "--workers", str(2**64)) == 2
+    assert capsys.readouterr().err.endswith("cosim: --workers 18446744073709551616: 1,024 are the most.\n")
+
+
+@pytest.mark.parametrize("varied", ["one", "map", "many"])
+def test_every_shape_of_sweep_has_a_picture_with_its_failures(folder: Path, varied: str) -> None:
+    from cosim.plots.sweep import draw
+
+    changes = {
+        "one": [(R, ""), (K, '"plant.k" = { low = 0.1, high = 1.0, count = 4, scale = "log" }')],
+        "map": [(K, '"plant.k" = [-1.0, 1.0, 2.0]')],
+        "many": [(K, '"plant.k" = [-1.0, 1.0]\n"plant.b.gain" = [1.0, 1.1]')],
+    }
+    done, _ = run(written(folder, *changes[varied]))
+    text = draw(done.table, folder / "picture.svg").read_text()
+    assert draw(done.table, folder / "picture.png").stat().st_size > 5000
+    assert ("without result" in text) == (varied != "one")
+    assert "error [mrad]" in text
+
+
+def test_a_sweep_of_a_python_function(folder: Path) -> None:
+    (folder / "f.py").write_text("def f(t, x, gain):\n    return gain * x\n")
+    component = '[components.f]\npython = "f.py:f"\ninputs = { x = "rad" }\noutputs = { y = "rad" }\n'
+    text = (
+        (folder / "loop.toml")
+        .read_text()
+        .replace("[signals.r]", component + "parameters = { gain = 1.0 }\n[signals.r]")
+    )
+    text = text.replace("[record]", '[[connections]]\nfrom = "plant.y"\nto = "f.x"\n[record]')
+    (folder / "loop.toml").write_text(text.replace("q = ", 'z = "f.y", q = '))
+    _, table = run(written(folder, (K, '"f.gain" = [1.0, 3.0]'), (R, ""), ('"q", kind', '"z", kind')))
+    assert table["end"][1] == pytest.approx(3 * table["end"][0])

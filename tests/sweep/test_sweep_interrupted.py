@@ -1,0 +1,218 @@
+"""A sweep goes on where it was, however it was ended, and in a folder of its own only."""
+
+import json
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from commands import ENVIRONMENT
+from sweeps import SCENARIO, K, folder, run, written
+from tiny_fmu import tiny
+
+import cosim.sweeps.cluster
+from cosim.support.errors import OutputError, SweepError
+
+__all__ = ["folder", "tiny"]
+
+
+def test_a_finished_sweep_is_not_run_again_and_failures_only_when_asked(folder: Path) -> None:
+    path = written(folder, (K, '"plant.k" = [-1.0, 1.0, 2.0]'))
+    first, table = run(path)
+    again, same = run(path)
+    assert (first.done, again.done, again.found, again.failed) == (9, 0, 9, 3)
+    pd.testing.assert_frame_equal(table, same)
+    retried, _ = run(path, retry=True)
+    assert (retried.done, retried.found, retried.failed) == (3, 6, 3)
+
+
+def test_a_killed_sweep_goes_on_where_it_was(folder: Path) -> None:
+    path = written(folder, (K, '"plant.k" = { low = 1.0, high = 9.0, count = 20 }'))
+    whole, table = run(path)
+    lines = (folder / "out" / "runs.jsonl").read_bytes().splitlines(keepends=True)
+    (whole.table).unlink()
+    # What a kill leaves: the lines before, and one that was being written.
+    (folder / "out" / "runs.jsonl").write_bytes(b"".join(lines[:51]) + lines[51][:20])
+    rest, same = run(path)
+    assert (rest.found, rest.done) == (51, 9)
+    pd.testing.assert_frame_equal(table.drop(columns="seconds"), same.drop(columns="seconds"))
+
+
+@pytest.mark.parametrize(
+    "spoilt",
+    [
+        b"no row at all",
+        b"[1, 2]",
+        b'{"run": 1}',
+        b'{"run": "1"}',
+        b"[" * 100_000,
+        b"\xff\x00",
+        lambda line: line.replace(b'"status": "ok"', b'"status": 3'),
+        lambda line: line.replace(b'"run": 2', b'"run": 9'),
+        lambda line: line.replace(b'"run": 2', b'"run": true'),
+        lambda line: line.replace(b'"plant.k"', b'"plant.j"'),
+        lambda line: line.replace(b'"seconds": ', b'"seconds": "long", "was": '),
+    ],
+)
+def test_a_journal_that_another_hand_changed_is_a_sentence_and_stays_as_it_is(
+    folder: Path, spoilt: bytes | Callable[[bytes], bytes]
+) -> None:
+    path, journal = written(folder), folder / "out" / "runs.jsonl"
+    run(path)
+    lines = sorted(journal.read_bytes().splitlines(), key=lambda line: json.loads(line)["run"])
+    line = spoilt if isinstance(spoilt, bytes) else spoilt(lines[2])
+    assert line != lines[2]
+    journal.write_bytes(b"\n".join([*lines[:2], line, *lines[3:], b""]))
+    before = journal.read_bytes()
+    with pytest.raises(OutputError, match=r"runs.jsonl: line 3 is no row of a sweep; mend or remove that line"):
+        run(path)
+    assert journal.read_bytes() == before
+    journal.write_bytes(b"\n".join([*lines[:2], *lines[3:], b""]))
+    again, _ = run(path)
+    assert (again.done, again.found) == (1, 8)
+
+
+def test_an_identity_that_is_no_json_is_a_sentence(folder: Path) -> None:
+    path, identity = written(folder), folder / "out" / "sweep.json"
+    run(path)
+    for spoilt in (b"", b"{", b"[]", b"\xff", b"[" * 100_000):
+        identity.write_bytes(spoilt)
+        with pytest.raises(OutputError, match=r"sweep.json is damaged: it is no JSON; give another --out, or --force"):
+            run(path)
+
+
+@pytest.fixture
+def started(folder: Path) -> Iterator[Callable[[], "subprocess.Popen[str]"]]:
+    """Start a sweep that takes long."""
+    written(folder, (K, '"plant.k" = { low = 1.0, high = 9.0, count = 100000 }'))
+    command = [sys.executable, "-m", "cosim", "sweep", "sweep.toml", "--out", "out", "--workers", "2"]
+    processes = []
+
+    def start() -> "subprocess.Popen[str]":
+        process = subprocess.Popen(command, env=ENVIRONMENT, cwd=folder, stderr=subprocess.PIPE, text=True)
+        processes.append(process)
+        return process
+
+    yield start
+    for process in processes:
+        if process.poll() is None:
+            process.kill()
+            process.communicate()
+
+
+def wait_for(path: Path, lines: int) -> None:
+    until = time.monotonic() + 60
+    while time.monotonic() < until and (not path.exists() or path.read_bytes().count(b"\n") < lines):
+        time.sleep(0.05)
+
+
+def children(process: "subprocess.Popen[str]") -> list[int]:
+    found = subprocess.run(
+        ["ps", "-o", "pid=", "--ppid", str(process.pid)], capture_output=True, text=True, check=False
+    )
+    return [int(line) for line in found.stdout.split()]
+
+
+def gone(pids: list[int]) -> bool:
+    until = time.monotonic() + 10
+    while any(Path(f"/proc/{pid}").exists() for pid in pids) and time.monotonic() < until:
+        time.sleep(0.05)
+    return not any(Path(f"/proc/{pid}").exists() for pid in pids)
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="it looks for processes as Linux shows them")
+def test_kill_9_and_ctrl_c_lose_nothing_that_was_done(
+    folder: Path, started: Callable[[], "subprocess.Popen[str]"]
+) -> None:
+    process, journal = started(), folder / "out" / "runs.jsonl"
+    wait_for(journal, 5)
+    with pytest.raises(OutputError, match=r"Another sweep is writing to .*out; wait for it, or end it"):
+        run(folder / "sweep.toml")
+    workers = children(process)
+    process.kill()
+    process.communicate()
+    assert len(workers) == 2
+    assert gone(workers)  # they see their parent's end
+    before = journal.read_bytes().count(b"\n")
+    process = started()
+    wait_for(journal, before + 5)
+    workers = children(process)
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert said.endswith("the same command goes on from there\ncosim: interrupted\n")
+    assert "Traceback" not in said
+    assert gone(workers)
+    table = pd.read_parquet(folder / "out" / "table.parquet")
+    assert table["run"].is_unique
+    assert len(table) >= before + 5
+    assert set(table["status"]) == {"ok"}
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (lambda folder: written(folder, ("low = 0.5", "low = 0.6")), "sweep file"),
+        (
+            lambda folder: (folder / "loop.toml").write_text((folder / "loop.toml").read_text() + "decimation = 2\n"),
+            "scenario",
+        ),
+    ],
+)
+def test_a_folder_of_another_sweep_is_refused(folder: Path, change: Callable[[Path], object], named: str) -> None:
+    run(folder / "sweep.toml")
+    change(folder)
+    rule = f"out holds another sweep: its {named} changed since; give another --out, or --force to start over."
+    with pytest.raises(OutputError, match=re.escape(rule)):
+        run(folder / "sweep.toml")
+    assert run(folder / "sweep.toml", force=True)[0].done == 9
+
+
+def test_a_changed_fmu_makes_it_another_sweep(folder: Path, tiny: dict[int, Path]) -> None:
+    path = folder / "tiny.fmu"
+    path.write_bytes(tiny[3].read_bytes())
+    (folder / "loop.toml").write_text(SCENARIO.replace("{fmu}", "tiny.fmu"))
+    run(folder / "sweep.toml")
+    path.write_bytes(tiny[2].read_bytes())
+    with pytest.raises(OutputError, match=r"its file of components.plant changed since"):
+        run(folder / "sweep.toml")
+
+
+def test_force_removes_what_a_sweep_made_and_nothing_else(folder: Path) -> None:
+    (folder / "out").mkdir()
+    (folder / "out" / "notes.txt").write_text("mine")
+    run(written(folder, ("[vary]", "record = true\n[vary]")))
+    assert len(list((folder / "out" / "recordings").iterdir())) == 9
+    run(folder / "sweep.toml", force=True)
+    assert (folder / "out" / "notes.txt").read_text() == "mine"
+    (folder / "out" / "sweep.json").unlink()
+    with pytest.raises(OutputError, match="exists already; give --force"):
+        run(folder / "sweep.toml")
+
+
+def test_a_cluster_gives_the_same_table_and_survives_a_crash(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+    scenario = (folder / "loop.toml").read_text()
+    (folder / "loop.toml").write_text(scenario.replace("[signals.r]", "parameters = { status = 11 }\n[signals.r]"))
+    path = written(folder, (K, '"plant.fail_at" = [1e9, 0.3]'))
+    _, here = run(path)
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(folder / "cache"))
+    settings = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    with distributed.LocalCluster(**settings) as cluster:
+        _, there = run(path, force=True, address=cluster.scheduler_address, workers=None)
+    pd.testing.assert_frame_equal(here.drop(columns="seconds"), there.drop(columns="seconds"))
+    assert there["status"].tolist() == ["ok"] * 3 + ["crashed"] * 3
+
+
+def test_a_cluster_that_is_not_there_is_one_sentence(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(cosim.sweeps.cluster, "PATIENCE", 0.5)
+    with pytest.raises(SweepError, match=r"No Dask scheduler answers at tcp://127.0.0.1:9; give its address as"):
+        run(folder / "sweep.toml", address="tcp://127.0.0.1:9", workers=None)
+    with pytest.raises(SweepError, match=r"record = true keeps files on this machine; it does not go with --cluster"):
+        run(written(folder, ("[vary]", "record = true\n[vary]")), address="tcp://127.0.0.1:9", workers=None)

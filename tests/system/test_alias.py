@@ -1,0 +1,133 @@
+"""Any team's FMU takes a place in a scenario: its own names and units behind ours."""
+
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+import pytest
+from foreign_fmu import foreign
+from mirror_fmu import mirror
+from small_loop import TEXT
+from tiny_fmu import tiny
+
+from cosim.fmi.description import describe
+from cosim.fmi.variables import ports_of
+from cosim.master.simulate import run
+from cosim.models.cache import with_fmus
+from cosim.support.errors import FmuError, ScenarioError, WiringError
+from cosim.system.scenario import parse_scenario
+
+__all__ = ["mirror", "tiny"]
+
+MAPPING = 'variables = { a = "Motor.torque", b = "Brake.torque", y = "Encoder.angle" }'
+
+
+def scenario(plant: str, folder: Path, tiny: dict[int, Path]):
+    """The loop of the scenario tests with another plant."""
+    text = TEXT.replace('fmu = "tiny3.fmu"', plant).replace('"tiny2.fmu"', f'"{tiny[2]}"')
+    return parse_scenario(text, "loop.toml", folder)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_foreign_plant_behind_our_names_gives_the_same_bits(
+    version: int, tiny: dict[int, Path], tmp_path: Path
+) -> None:
+    foreign(tiny[version], tmp_path / "theirs.fmu")
+    ours = run(scenario(f'fmu = "{tiny[version]}"\nparameters = {{ k = 2.0, b = 0.1 }}', tmp_path, tiny))
+    plant = f'fmu = "theirs.fmu"\n{MAPPING}\nparameters = {{ "Gain[1]" = 2.0, b = 0.1 }}'
+    theirs = run(scenario(plant, tmp_path, tiny))
+    assert list(ours.recording) == list(theirs.recording)
+    for name in ours.recording:
+        np.testing.assert_array_equal(theirs.recording[name], ours.recording[name])
+    assert theirs.statistics["loop"] == ours.statistics["loop"]
+    assert theirs.recording.origin["components"]["plant"]["variables"]["y"] == "Encoder.angle"
+
+
+def test_a_unit_that_the_model_does_not_state_is_given_with_the_name(tiny: dict[int, Path], tmp_path: Path) -> None:
+    foreign(tiny[2], tmp_path / "theirs.fmu", a="")
+    for unit, factor in (("", 1.0), ("rad", 1.0), ("deg", 180 / np.pi)):
+        mapping = MAPPING.replace('"Motor.torque"', f'{{ name = "Motor.torque", unit = "{unit}" }}')
+        mapping += "\nparameters = { mode = 1.0 }"
+        recording = run(replace(scenario(f'fmu = "theirs.fmu"\n{mapping}', tmp_path, tiny), ticks=20)).recording
+        sent = run(scenario(f'fmu = "{tiny[2]}"\nparameters = {{ mode = 1.0 }}', tmp_path, tiny)).recording
+        row = np.flatnonzero(sent["q"])[0]  # before the loop has closed
+        np.testing.assert_allclose(recording["q"][row] / sent["q"][row], factor)
+
+
+def test_units_that_only_the_model_knows_are_read_from_its_definitions(tiny: dict[int, Path], tmp_path: Path) -> None:
+    turns = '<Unit name="turns"><BaseUnit rad="1" factor="6.283185307179586"/></Unit><Unit name="u"/>'
+    torque = '<Unit name="SI"><BaseUnit kg="1" m="2" s="-2"/></Unit>'
+    path = foreign(tiny[2], tmp_path / "theirs.fmu", turns + torque, a="turns", b="SI")
+    ports = ports_of(describe(path))
+    assert ports["Motor.torque"].unit == "6.283185307179586 rad"
+    assert ports["Brake.torque"].unit == "kg.m2.s-2"
+    plant = f'fmu = "theirs.fmu"\n{MAPPING}\nparameters = {{ mode = 1.0 }}'
+    recording = run(scenario(plant, tmp_path, tiny)).recording
+    sent = run(scenario(f'fmu = "{tiny[2]}"\nparameters = {{ mode = 1.0 }}', tmp_path, tiny)).recording
+    row = np.flatnonzero(sent["q"])[0]
+    np.testing.assert_allclose(recording["q"][row] / sent["q"][row], 1 / (2 * np.pi))
+
+
+WRONG = {
+    'variables = { a = "Motor.torqe" }': '"plant.a" stands for "Motor.torqe", which does not exist; names like it '
+    "are: Motor.torque, Brake.torque",
+    'variables = { mode = "Motor.torque" }': '"plant.mode" stands for "Motor.torque", but there is a "mode" already;',
+    'variables = { a = "Motor.torque", b = "Motor.torque" }': '"Motor.torque" of plant has two names in its variables',
+    'variables = { a = { name = "Motor.torque", unit = "deg" } }': '"plant.a" is in rad, as its model says, and',
+    'variables = { a = { name = "Motor.torque", unit = "dag" } }': '"plant.a": "dag" is no unit known here',
+    'variables = { b = "Motor.torque" }': '"plant.a" cannot be fed: it does not exist; inputs of plant are: b, Brake',
+}
+
+
+@pytest.mark.parametrize("plant", WRONG)
+def test_a_wrong_name_or_unit_is_one_sentence(plant: str, tiny: dict[int, Path], tmp_path: Path) -> None:
+    foreign(tiny[2], tmp_path / "theirs.fmu")
+    with pytest.raises(WiringError, match=WRONG[plant]) as raised:
+        run(scenario(f'fmu = "theirs.fmu"\n{plant}', tmp_path, tiny))
+    assert str(raised.value).count("\n") == 0
+
+
+def test_a_mistake_in_the_mapping_names_key_and_choices(tiny: dict[int, Path], tmp_path: Path) -> None:
+    said = r'"components.plant.variables.a.units" is no key of a scenario; keys there are: name, unit'
+    with pytest.raises(ScenarioError, match=said):
+        scenario('fmu = "x.fmu"\nvariables = { a = { name = "b", units = "deg" } }', tmp_path, tiny)
+    foreign(tiny[2], tmp_path / "theirs.fmu")
+    with pytest.raises(FmuError, match=r'"plant.kk" does not exist; what can be set: .*Gain\[1\]'):
+        run(scenario(f'fmu = "theirs.fmu"\n{MAPPING}\nparameters = {{ kk = 1 }}', tmp_path, tiny))
+
+
+@pytest.mark.parametrize(("interface", "tolerance"), [("co-simulation", 0.0), ("model-exchange", 1e-7)])
+def test_the_shipped_scenario_runs_with_a_plant_of_other_names(interface: str, tolerance: float) -> None:
+    """The plant of the card from outside: the wires of `sidereal` stay as they are."""
+    text = (files("cosim") / "scenarios" / "sidereal.toml").read_text("utf-8").replace("stop = 15.0", "stop = 0.1")
+    wanted = with_fmus(parse_scenario(text, "sidereal", Path()))
+    own = '[components.mount]\ncard = "paper_mount"\npart = "plant"\n'
+    assert own in text
+    renamed = 'variables = { position = "q", q = "position", speed = "v", v = "speed" }'
+    plant = f'[components.mount]\nfmu = "{wanted.components["mount"].fmu}"\ninterface = "{interface}"\n{renamed}\n'
+    theirs = with_fmus(parse_scenario(text.replace(own, plant), "theirs", Path()))
+    ours, found = run(wanted).recording, run(theirs).recording
+    for name in ours:
+        np.testing.assert_allclose(found[name], ours[name], rtol=0, atol=tolerance * np.abs(ours[name]).max())
+
+
+def test_an_array_has_our_name_whole_and_by_element(mirror: dict[int, Path]) -> None:
+    text = f"""
+    step = 0.1
+    stop = 0.4
+    [components.one]
+    fmu = "{mirror[3]}"
+    variables = {{ force = "u", reply = "y", size = "n" }}
+    parameters = {{ size = 2, force = [3, 4] }}
+    [components.two]
+    fmu = "{mirror[3]}"
+    variables = {{ force = {{ name = "u", unit = "N" }} }}
+    [[connections]]
+    from = "one.reply[2]"
+    to = "two.force[1]"
+    [record]
+    signals = {{ reply = "one.reply", y = "two.y[1]" }}
+    """
+    recording = run(parse_scenario(text, "x.toml", Path())).recording
+    assert [recording[name][-1] for name in ("reply[1]", "reply[2]", "y")] == [3, 4, 4]

@@ -1,0 +1,189 @@
+"""A scenario file says everything about a run, and each mistake in it is one sentence."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_loop import TEXT
+from tiny_fmu import tiny
+
+from cosim.master.simulate import Options, run
+from cosim.support.errors import RecordingError, ScenarioError, SignalError
+from cosim.system.scenario import parse_scenario, read_scenario, shipped_scenarios
+from cosim.system.wire import Record, Wire
+
+__all__ = ["tiny"]
+
+
+def test_a_scenario_is_read_as_written(tmp_path: Path) -> None:
+    (tmp_path / "loop.toml").write_text(TEXT)
+    scenario = read_scenario(tmp_path / "loop.toml")
+    assert (scenario.name, scenario.step, scenario.ticks, scenario.stop, scenario.decimation) == (
+        "loop",
+        1e-3,
+        500,
+        0.5,
+        2,
+    )
+    assert scenario.components["plant"].fmu == tmp_path / "tiny3.fmu"
+    assert scenario.wires[1] == Wire("plant.y", "controller.b", gain=2.0, quantum=1e-6, noise="n")
+    assert scenario.records["tau"] == Record("plant.a", "mean")
+
+
+def test_a_scenario_runs_and_its_text_is_in_the_recording(tiny: dict[int, Path], tmp_path: Path) -> None:
+    scenario = parse_scenario(TEXT, "loop.toml", tiny[2].parent)
+    first, second = (run(scenario, Options(tmp_path / f"{number}.parquet")) for number in (1, 2))
+    assert first.recording.columns == ("t", "q", "tau", "q_d")
+    assert len(first.recording) == 250
+    assert first.recording.origin["scenario"] == TEXT
+    for name in first.recording:
+        np.testing.assert_array_equal(first.recording[name], second.recording[name])
+
+
+def test_a_list_of_signals_names_its_own_columns() -> None:
+    text = re.sub(r"signals = \{ q.*", 'signals = ["plant.y", "r.velocity"]\nmode = "mean"', TEXT)
+    records = parse_scenario(text, "loop.toml", Path()).records
+    assert records == {"plant.y": Record("plant.y", "mean"), "r.velocity": Record("r.velocity", "mean")}
+
+
+RATES = TEXT.replace("k = 5.0 }", "k = 5.0 }\nstep = 0.01").replace(
+    "[components.plant]", '[algorithm]\nkind = "gauss-seidel"\norder = ["controller", "plant"]\n[components.plant]'
+)
+
+
+def test_algorithm_and_steps_are_read_and_kept_in_the_recording(tiny: dict[int, Path], tmp_path: Path) -> None:
+    scenario = parse_scenario(RATES, "loop.toml", tiny[2].parent)
+    assert (scenario.every, scenario.algorithm.kind) == ({"controller": 10}, "gauss-seidel")
+    assert parse_scenario(RATES.replace("step = 0.01", "every = 10"), "loop.toml", Path()).every == {"controller": 10}
+    done = run(scenario, Options(tmp_path / "run.parquet"))
+    assert done.recording.origin["algorithm"] == {"kind": "gauss-seidel", "order": ["controller", "plant"]}
+    assert done.recording.origin["every"] == {"controller": 10}
+    assert len(set(done.recording["q"])) > 200  # the plant goes on between the commands
+
+
+def test_an_algorithm_without_options_may_be_a_word() -> None:
+    text = TEXT.replace("step = 1e-3", 'step = 1e-3\nalgorithm = "iterated"', 1)
+    assert parse_scenario(text, "loop.toml", Path()).algorithm.kind == "iterated"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("step = 0.01", "step = 0.0105", "components.controller.step = 0.0105 is not a whole number of steps of 0.001"),
+        ("step = 0.01", "step = 0.01\nevery = 10", "components.controller breaks a rule: give either every or step."),
+        ("step = 0.01", "every = 0", "components.controller.every = 0 breaks a rule: input should be greater than or"),
+        ('"gauss-seidel"', '"gauss"', "algorithm breaks a rule: 'kind' 'gauss' is none of 'jacobi', "),
+        ("order =", "ordre =", '"algorithm.gauss-seidel.ordre" is no key of a scenario; keys there are: kind, order.'),
+        ('["controller", "plant"]', '["plant"]', "loop.toml: The Gauss-Seidel order names plant; it must name each"),
+    ],
+)
+def test_a_mistake_in_algorithm_or_step_is_one_sentence(old: str, new: str, sentence: str) -> None:
+    assert old in RATES
+    with pytest.raises(ScenarioError, match=re.escape(sentence)):
+        parse_scenario(RATES.replace(old, new), "loop.toml", Path())
+
+
+def test_the_wiring_is_drawn_with_its_delays() -> None:
+    from cosim.system.diagram import draw
+
+    lines = draw(parse_scenario(RATES, "loop.toml", Path()))
+    assert "└─ y ─────────▶ plant.a       9 to 18 ticks, 9 to 18 ms" in lines
+    assert "└─ y ─────────▶ controller.b  1 tick, 1 ms; x 2; quantum 1e-06; + n" in lines
+    assert lines[-1] == "round plant → controller → plant: 10 to 19 ticks, 10 to 19 ms"
+
+
+def test_the_reference_of_the_paper_is_shipped() -> None:
+    assert "sidereal" in shipped_scenarios()
+    scenario = read_scenario("sidereal")
+    velocity = scenario.signals["reference"].stream(scenario.step)(np.arange(scenario.ticks))[1]
+    np.testing.assert_allclose(velocity[25_000:].max(), 5 * 7.268e-5, rtol=1e-6)
+    assert (scenario.ticks, scenario.step) == (150_000, 1e-4)
+    assert {one.part for one in scenario.components.values()} == {"plant", "controller"}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        (
+            "stop = 0.5",
+            "stop = 0.5\nstp = 1",
+            'loop.toml: "stp" is no key of a scenario; keys there are: name, description, notes,',
+        ),
+        (
+            'fmu = "tiny3.fmu"',
+            'fmuu = "x"',
+            '"components.plant.fmuu" is no key of a scenario; keys there are: fmu, card, part,',
+        ),
+        (
+            "seed = 7",
+            "seed = 7\nrate = 1",
+            '"signals.n.noise.rate" is no key of a scenario; keys there are: unit, kind, rms, seed.',
+        ),
+        ("gain = 2.0", "gian = 2.0", '"connections.1.gian" is no key of a scenario; keys there are: from, to, gain,'),
+        (
+            "decimation = 2",
+            "decimate = 2",
+            '"record.decimate" is no key of a scenario; keys there are: signals, decimation,',
+        ),
+        ("stop = 0.5\n", "", 'loop.toml: "stop" is missing.'),
+        ("stop = 0.5", "stop = -0.5", "loop.toml: stop = -0.5 breaks a rule: input should be greater than 0."),
+        ("stop = 0.5", "stop = 0.50005", "loop.toml: stop = 0.50005 is not a whole number of steps of 0.001 s."),
+        (
+            "decimation = 2",
+            "decimation = 0",
+            "record.decimation = 0 breaks a rule: input should be greater than or equal to 1.",
+        ),
+        (
+            'fmu = "tiny3.fmu"',
+            'card = "x"',
+            'components.plant breaks a rule: give fmu = "...", or card = "..." with part = ',
+        ),
+        (
+            'kind = "noise"',
+            'kind = "nose"',
+            "signals.n breaks a rule: 'kind' 'nose' is none of '",
+        ),
+        ('kind = "noise"', "", "signals.n breaks a rule: it needs a 'kind'."),
+        ('name = "loop"', "name = 7", "loop.toml: name = 7 breaks a rule: it must be text in quotes."),
+        (
+            "[components.plant]",
+            "[components]\nhead = 7\n[components.plant]",
+            "components.head = 7 breaks a rule: it must be a",
+        ),
+        ("amplitude = 0.1", "", "signals.r.sine breaks a rule: give either amplitude or max_velocity."),
+        ("step = 1e-3", "step = ", "loop.toml is not valid TOML: "),
+    ],
+)
+def test_a_mistake_in_a_scenario_is_one_sentence(old: str, new: str, sentence: str) -> None:
+    assert old in TEXT
+    with pytest.raises(ScenarioError, match=re.escape(sentence)):
+        parse_scenario(TEXT.replace(old, new), "loop.toml", Path())
+
+
+def test_a_scenario_that_is_not_there_is_met_with_those_that_are(tmp_path: Path) -> None:
+    with pytest.raises(
+        ScenarioError, match=r"none: no such scenario; a scenario is a .toml or .ssp file or one of: .*sidereal"
+    ):
+        read_scenario("none")
+    (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
+    with pytest.raises(ScenarioError, match=r"binary.toml is no scenario: it is not UTF-8 text."):
+        read_scenario(tmp_path / "binary.toml")
+
+
+def test_a_component_made_from_a_card_needs_its_fmu_first() -> None:
+    with pytest.raises(ScenarioError, match='sidereal: the component "mount" has no FMU yet; `cosim run` builds it'):
+        run(read_scenario("sidereal"))
+
+
+def test_a_replayed_recording_is_found_beside_the_scenario(tiny: dict[int, Path], tmp_path: Path) -> None:
+    replay = TEXT.replace(
+        'kind = "noise"\nrms = 1e-3\nseed = 7', 'kind = "recorded"\nfile = "night.csv"\ncolumn = "load"'
+    )
+    (tmp_path / "loop.toml").write_text(replay.replace('"tiny', f'"{tiny[2].parent}/tiny'))
+    scenario = read_scenario(tmp_path / "loop.toml")
+    with pytest.raises(RecordingError, match=re.escape(f"{tmp_path / 'night.csv'} does not exist.")):
+        run(scenario)
+    (tmp_path / "night.csv").write_text("t,q\n0,1\n1,2\n")
+    with pytest.raises(SignalError, match=r'night.csv has no column "load" to replay; it has: t, q.'):
+        run(scenario)

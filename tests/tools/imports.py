@@ -1,0 +1,25 @@
+"""What the modules of the packages import, read from their text."""
+
+import ast
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PACKAGES = ("cosim", "cosim_studies", "pyfmi_models")
+FILES = {
+    ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+    for package in PACKAGES
+    for path in (ROOT / package).rglob("*.py")
+}
+
+
+def imports(name: str, inside: bool = True) -> set[str]:
+    """List what a module imports, as far as modules of ours go; `inside` counts imports within functions too."""
+    tree = ast.parse(FILES[name].read_text("utf-8"))
+    found: set[str] = set()
+    for node in ast.walk(tree) if inside else tree.body:
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            whole = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {one if one in FILES else node.module for one in whole}
+    return found
