@@ -4,6 +4,7 @@
     open        a scenario                            ->  Session: stepped by hand, values read and set between steps
     run         a scenario                            ->  RunResult, with its recording
     diagnose    recordings and a card                 ->  DiagnosisResult: what the card lacks, and a better card
+    diagnose_folder  recordings of several machines   ->  FolderResult: what each machine's card lacks
     investigate scenario, card, machine               ->  InvestigateResult: motions until one answer is left
     compare     runs, recordings                      ->  Comparison: overlay and differences
     card        recordings                            ->  CardResult: a first card, with ranges
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
     from cosim.api.compare import Comparison, compare
     from cosim.api.diagnose import DiagnosisResult, diagnose
     from cosim.api.export import Exported, export
+    from cosim.api.folder import FolderResult, diagnose_folder
     from cosim.api.identify import IdentifyResult, identify
     from cosim.api.investigate import InvestigateResult, investigate
     from cosim.api.open import open
@@ -60,6 +62,7 @@ _HOMES = {
     "cosim.api.compare": ("Comparison", "compare"),
     "cosim.api.diagnose": ("DiagnosisResult", "diagnose"),
     "cosim.api.export": ("Exported", "export"),
+    "cosim.api.folder": ("FolderResult", "diagnose_folder"),
     "cosim.api.identify": ("IdentifyResult", "identify"),
     "cosim.api.investigate": ("InvestigateResult", "investigate"),
     "cosim.api.open": ("open",),
@@ -88,6 +91,7 @@ __all__ = [
     "CosimError",
     "DiagnosisResult",
     "Exported",
+    "FolderResult",
     "IdentifyResult",
     "InputError",
     "InvestigateResult",
@@ -104,6 +108,7 @@ __all__ = [
     "check_law",
     "compare",
     "diagnose",
+    "diagnose_folder",
     "export",
     "identify",
     "investigate",

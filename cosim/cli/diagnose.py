@@ -2,20 +2,22 @@
 
 import json
 import sys
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
 from cosim.cli.complete import cards
-from cosim.cli.options import Columns, Force, Layout, Out, Units, command_of, default_out
+from cosim.cli.options import Cluster, Columns, Force, Layout, Out, Units, command_of, default_out, results
 from cosim.reading import pairs_of, read_recordings
 from cosim.support.memory import keep_freed_memory
 from cosim.support.terminal import put, put_json, say, stage
 
 if TYPE_CHECKING:
     from cosim.api.diagnose import DiagnosisResult
-    from cosim.api.fleet import Machine
+    from cosim.api.folder import FolderResult
+    from cosim.api.machines import Machine
     from cosim.data.recording import Recording
     from pyfmi_models.card import Card
 
@@ -60,15 +62,17 @@ def diagnose(
     workers: Annotated[
         int | None, typer.Option("--workers", help="A folder of several machines: so many at a time.", min=1)
     ] = None,
+    cluster: Cluster = "",
     force: Force = False,
 ) -> None:
     """Say which physics a card lacks, and prove it on a recording that was never fitted."""
-    out = out or default_out(Path(train[0]).stem)
     shared: dict[str, object] = {"--motion": motion, "--columns": columns, "--units": units, "--layout": layout}
     shared |= {"--fmu": fmu, "--variables": variables, "--quick": quick, "--with-possible": with_possible}
     if len(train) == 1 and train[0].is_dir() and (machines := _machines(train[0], heldout, propose)):
-        _all(machines, Together(out, card, command_of("", [], shared), workers, force, as_json, check))
-        return
+        out = out or _begun(train[0].resolve().stem)
+        return _all(machines, Together(out, card, workers, cluster, force, as_json, check), shared, variables)
+    _check_single(workers, cluster)
+    out = out or default_out(Path(train[0]).resolve().stem)
     one = One(train, heldout or [], card, out, propose, force, shared)
     found = _found(one, variables)
     for note in found.notes:
@@ -124,8 +128,8 @@ class Together(NamedTuple):
 
     out: Path
     card: str
-    options: str
     workers: int | None
+    cluster: str
     force: bool
     as_json: bool
     check: bool
@@ -133,7 +137,7 @@ class Together(NamedTuple):
 
 def _machines(folder: Path, heldout: list[Path] | None, propose: Path | None) -> "list[Machine]":
     """List the machines of a folder; options that are of one machine alone are refused (InputError)."""
-    from cosim.api.fleet import machines_in
+    from cosim.api.machines import machines_in
     from cosim.support.errors import InputError
 
     found = machines_in(folder)
@@ -144,30 +148,72 @@ def _machines(folder: Path, heldout: list[Path] | None, propose: Path | None) ->
     return found
 
 
-def _all(machines: "list[Machine]", how: Together) -> None:
-    """Diagnose machine by machine; print a line of each as it comes."""
-    import shlex
-    import time
+def _begun(name: str) -> Path:
+    """Return the folder of results in which machines of this name were begun last; where there is none a new one."""
+    from cosim.api.machines import JOURNAL
 
-    from cosim.api.fleet import diagnose_all
+    made = results().glob(f"{name}-*/{JOURNAL}")
+    last = max(made, key=lambda path: path.stat().st_mtime_ns, default=None)
+    if last is None:
+        return default_out(name)
+    say(f"results go to {last.parent}, where they were begun")
+    return last.parent
+
+
+def _check_single(workers: int | None, cluster: str) -> None:
+    """Refuse what is for a folder of several machines (InputError)."""
+    from cosim.support.errors import InputError
+
+    for option, given in (("--workers", workers), ("--cluster", cluster)):
+        if given:
+            text = f"{option} is for a folder of several machines; these are recordings of one: cosim diagnose FOLDER."
+            raise InputError(text, culprit=option)
+
+
+def _all(machines: "list[Machine]", how: Together, options: dict[str, object], variables: list[str] | None) -> None:
+    """Diagnose machine by machine; print a line of each as it comes."""
+    from cosim.api.folder import diagnose_folder
+    from cosim.api.machines import MachineResult
 
     say(f"{len(machines)} machines: {', '.join(one.name for one in machines)}")
-    began, fresh, missing, lost = time.monotonic(), 0, False, 0
-    options = shlex.split(how.options)[1:]
-    for number, one in enumerate(
-        diagnose_all(machines, how.out, options, card=how.card, workers=how.workers, force=how.force), 1
-    ):
+    began, fresh = time.monotonic(), 0
+
+    def on_machine(one: MachineResult, done: int, of: int) -> None:
+        nonlocal fresh
         put(json.dumps(one.as_json())) if how.as_json else put(str(one))
-        fresh, lost = fresh + (not one.earlier), lost + bool(one.error)
-        missing = missing or bool(one.document.get("verdict"))
-        left = (len(machines) - number) * (time.monotonic() - began) / max(fresh, 1)
-        if number < len(machines) and fresh:
-            say(f"{number} of {len(machines)} machines, about {left:.0f} s left")
-    if lost:
-        say(f"{lost} of {len(machines)} machines could not be diagnosed; the same command goes on with them")
-    if lost == len(machines):
+        sys.stdout.flush()
+        fresh += not one.earlier
+        if done < of and fresh:
+            say(f"{done} of {of} machines, about {(of - done) * (time.monotonic() - began) / fresh:.0f} s left")
+
+    named: Any = {name: options[f"--{name}"] or () for name in ("columns", "units", "layout")}
+    rest: Any = {name: options[f"--{name.replace('_', '-')}"] for name in ("motion", "fmu", "quick", "with_possible")}
+    try:
+        done = diagnose_folder(
+            machines,
+            how.out,
+            card=how.card,
+            variables=pairs_of("--variables", variables),
+            workers=how.workers,
+            cluster=how.cluster,
+            force=how.force,
+            on_machine=on_machine,
+            **named,
+            **rest,
+        )
+    except KeyboardInterrupt:
+        say(f"what was done until then is in {how.out}; the same command goes on from there")
+        raise
+    _end(done, how.check)
+
+
+def _end(done: "FolderResult", check: bool) -> None:
+    """Say what could not be diagnosed, and exit as was asked."""
+    if lost := len(done.errors):
+        say(f"{lost} of {len(done.machines)} machines could not be diagnosed; the same command goes on with them")
+    if lost == len(done.machines):
         sys.exit(2)
-    if how.check and missing:
+    if check and any(done.missing.values()):
         sys.exit(1)
 
 

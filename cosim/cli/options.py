@@ -1,16 +1,16 @@
 """Options that more than one verb has, and the command line that does the same again."""
 
 import os
-from collections.abc import Mapping, Sequence
 from itertools import count
 from pathlib import Path
-from shlex import join
 from typing import Annotated
 
 import typer
 
+from cosim.support.command import command_of
 from cosim.support.terminal import say
 
+__all__ = ["Cluster", "Columns", "Force", "Layout", "Out", "Units", "command_of", "default_out", "results"]
 RESULTS = "cosim_out"
 """Folder of results whose own folder is not given."""
 
@@ -28,29 +28,15 @@ Cluster = Annotated[str, typer.Option("--cluster", help="Address of a Dask sched
 Force = Annotated[bool, typer.Option("--force", help="Overwrite what is there.")]
 
 
+def results() -> Path:
+    """Return the folder of results whose own folder is not given."""
+    return Path(os.environ.get("COSIM_OUT") or RESULTS)
+
+
 def default_out(name: str) -> Path:
     """Return a folder that is not there yet, for results of `name`, and say so: cosim_out/NAME-1, -2, ..."""
     stem = "".join(c if c.isalnum() or c in "._-" else "_" for c in name).strip("._") or "results"
-    free = (Path(os.environ.get("COSIM_OUT") or RESULTS) / f"{stem}-{k}" for k in count(1))
+    free = (results() / f"{stem}-{k}" for k in count(1))
     found = next(path for path in free if not path.exists())
     say(f"results go to {found}")
     return found
-
-
-def command_of(verb: str, arguments: Sequence[object], options: Mapping[str, object]) -> str:
-    """The command line that does the same again.
-
-    Args:
-        verb: "diagnose", "hardware run".
-        arguments: what stands before the options.
-        options: by name; a list is an option given several times, True one without a value; None, False and "" are
-            left out.
-    """
-    words = ["cosim", *verb.split(), *map(str, arguments)]
-    for name, given in options.items():
-        for value in given if isinstance(given, list) else [given]:
-            if value is not None and value is not False and value != "":
-                words += [name] if value is True else [name, str(value)]
-    for folder in filter(None, os.environ.get("COSIM_PLUGINS", "").split(os.pathsep)):
-        words += ["--plugins", folder]
-    return join(words)

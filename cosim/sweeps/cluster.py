@@ -39,14 +39,21 @@ def on_cluster(job: WithScenario, address: str, close: Callable[[], None]) -> It
         MissingPackageError: Dask is not installed here.
         SweepError: nobody answers at the address, or mount-cosim is not there.
     """
+    with connected(address, close) as (client, threads):
+        portable = client.scatter(PortableJob.of(job), broadcast=True, hash=False)
+        yield Cluster(threads, client.get_executor(pure=False), portable)
+
+
+@contextmanager
+def connected(address: str, close: Callable[[], None]) -> Iterator[tuple[Any, int]]:
+    """Yield a client of a cluster and how many calls are done there at a time; the rest as `on_cluster`."""
     client = _client(address)
     try:
         threads = sum(client.nthreads().values())
         if not threads:
             raise SweepError(f"The cluster at {address} has no workers.", culprit=address)
         _check_versions(client, address)
-        portable = client.scatter(PortableJob.of(job), broadcast=True, hash=False)
-        yield Cluster(threads, client.get_executor(pure=False), portable)
+        yield client, threads
     finally:
         with suppress(Exception):  # a cluster that is gone has closed them
             client.run(close)

@@ -51,6 +51,9 @@ def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / name).write_text(text, "utf-8")
     for name, text in zip(("night_1.csv", "night_2.csv", "night_3.csv"), texts, strict=True):
         (folder / name).write_text(text, "utf-8")
+    (folder / "all").mkdir()
+    for name, text in zip(("north_1.csv", "north_2.csv", "south_1.csv", "south_2.csv"), texts * 2, strict=False):
+        (folder / "all" / name).write_text(text[: len(text) // 3].rpartition("\n")[0], "utf-8")
     (folder / "axis.toml").write_text(example.CARD, "utf-8")
     for path in cosim.export("paper_mount", folder / "fmus", fmi=3).fmus:
         part = "plant" if "plant" in path.name else "controller"

@@ -3,8 +3,6 @@
 import json
 from pathlib import Path
 
-import numpy as np
-import pandas as pd
 import pytest
 from commands import call
 from typer.main import get_command
@@ -102,41 +100,3 @@ def test_a_run_takes_its_defaults_and_the_command_line_comes_first(
     Path("cosim.toml").write_text("[run]\nstopp = 1\n", "utf-8")
     assert call("run", "sidereal") == 2
     assert "[run] stopp is no option of it" in capsys.readouterr().err
-
-
-def write(path: Path, level: float, seed: int) -> None:
-    t = np.arange(2400) / 200
-    q = 0.4 * np.sin(2 * t + seed) + 0.1 * np.sin(5 * t)
-    v, a = np.gradient(q, t), np.gradient(np.gradient(q, t), t)
-    tau = 3.0 * a + level * np.sign(v) + v + 0.02 * np.random.default_rng(seed).standard_normal(len(t))
-    pd.DataFrame({"t": t, "tau": tau, "q": q}).to_csv(path, index=False)
-
-
-@pytest.fixture
-def fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "all").mkdir()
-    for machine, level in (("north", 2.0), ("south", 3.0)):
-        for run in (1, 2):
-            write(tmp_path / "all" / f"{machine}_{run}.csv", level, run)
-    return tmp_path
-
-
-def test_a_folder_of_machines_is_diagnosed_line_by_line_and_gone_on_with(
-    fleet: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    arguments = ("diagnose", "all", "--out", "found", "--quick", "--json", "--workers", "2")
-    assert call(*arguments) == 0
-    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
-    assert sorted(one["machine"] for one in lines) == ["north", "south"]
-    assert all(one["after_rms"] <= one["before_rms"] < 0.1 for one in lines)
-    kept = (fleet / "found" / "south" / "diagnosis.json").stat().st_mtime_ns
-    (fleet / "found" / "north" / "diagnosis.json").unlink()
-    write(fleet / "all" / "north_1.csv", 2.0, 1)
-    (fleet / "all" / "north_2.csv").write_text("t,tau,q\n1,2,3\n", "utf-8")
-    assert call(*arguments) == 0
-    again = {one["machine"]: one for one in map(json.loads, capsys.readouterr().out.splitlines())}
-    assert (fleet / "found" / "south" / "diagnosis.json").stat().st_mtime_ns == kept
-    assert "north_2.csv" in again["north"]["error"]
-    assert call("diagnose", "all", "--heldout", "all/north_1.csv", "--out", "x") == 2
-    assert "holds several: north, south" in capsys.readouterr().err

@@ -1,0 +1,195 @@
+"""A folder of machines: paired by name, gone on with after a kill, on a cluster too, and from Python."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from mortal import mortal
+from test_cli_run import ENVIRONMENT, call
+
+import cosim
+from cosim.api.machine_work import Options, Order
+from cosim.api.machines import JOURNAL, machines_in
+from cosim.support.errors import InputError, SweepError
+
+LEVELS = {"north": 2.0, "south": 3.0}
+
+
+def write(path: Path, level: float, seed: int) -> None:
+    t = np.arange(1600) / 200
+    q = 0.4 * np.sin(2 * t + seed) + 0.1 * np.sin(5 * t)
+    v, a = np.gradient(q, t), np.gradient(np.gradient(q, t), t)
+    tau = 3.0 * a + level * np.sign(v) + v + 0.02 * np.random.default_rng(seed).standard_normal(len(t))
+    pd.DataFrame({"t": t, "tau": tau, "q": q}).to_csv(path, index=False)
+
+
+@pytest.fixture
+def fleet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "all").mkdir()
+    for machine, level in LEVELS.items():
+        for run in (1, 2):
+            write(tmp_path / "all" / f"{machine}_{run}.csv", level, run)
+    return tmp_path
+
+
+def lines_of(text: str) -> dict[str, dict[str, object]]:
+    return {one["machine"]: one for one in map(json.loads, text.splitlines())}
+
+
+def test_a_folder_of_machines_is_diagnosed_line_by_line_and_gone_on_with(
+    fleet: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = ("diagnose", "all", "--out", "found", "--quick", "--json", "--workers", "2")
+    assert call(*arguments) == 0
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert sorted(one["machine"] for one in lines) == sorted(LEVELS)
+    assert all(one["after_rms"] <= one["before_rms"] < 0.1 for one in lines)
+    kept = (fleet / "found" / "south" / "diagnosis.json").stat().st_mtime_ns
+    (fleet / "found" / "north" / "diagnosis.json").unlink()
+    write(fleet / "all" / "north_1.csv", 2.0, 1)
+    (fleet / "all" / "north_2.csv").write_text("t,tau,q\n1,2,3\n", "utf-8")
+    assert call(*arguments) == 0
+    again = {one["machine"]: one for one in map(json.loads, capsys.readouterr().out.splitlines())}
+    assert (fleet / "found" / "south" / "diagnosis.json").stat().st_mtime_ns == kept
+    assert "north_2.csv" in again["north"]["error"]
+    assert call("diagnose", "all", "--heldout", "all/north_1.csv", "--out", "x") == 2
+    assert "holds several: north, south" in capsys.readouterr().err
+
+
+def test_what_was_done_before_a_kill_is_not_done_again(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["diagnose", "all", "--out", "found", "--quick", "--json", "--workers", "1"]
+    process = subprocess.Popen(
+        mortal(sys.executable, "-m", "cosim", *words),
+        env=ENVIRONMENT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+    )
+    assert process.stdout is not None
+    first = json.loads(process.stdout.readline())["machine"]
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    process.stdout.close()
+    kept = (fleet / "found" / first / "diagnosis.json").stat().st_mtime_ns
+    with (fleet / "found" / "machines.jsonl").open("a") as journal:
+        journal.write('{"machine": "sou')  # what a kill leaves half written
+    assert call(*words) == 0
+    told = lines_of(capsys.readouterr().out)
+    assert sorted(told) == sorted(LEVELS)
+    assert not any("error" in one for one in told.values())
+    assert (fleet / "found" / first / "diagnosis.json").stat().st_mtime_ns == kept
+    before = {path: path.stat().st_mtime_ns for path in (fleet / "found").rglob("diagnosis.json")}
+    assert call(*words) == 0
+    assert before == {path: path.stat().st_mtime_ns for path in before}
+
+
+def test_no_process_outlives_a_kill(fleet: Path) -> None:
+    words = [sys.executable, "-m", "cosim", "diagnose", "all", "--out", "found", "--workers", "1"]
+    process = subprocess.Popen(words, env=ENVIRONMENT | {"COSIM_MARK": str(fleet)}, stderr=subprocess.PIPE, text=True)
+    assert process.stderr is not None
+    process.stderr.readline()
+    end = time.monotonic() + 30
+    while len(marked(str(fleet))) < 2:
+        assert time.monotonic() < end
+        time.sleep(0.05)
+    process.kill()
+    process.wait()
+    process.stderr.close()
+    while marked(str(fleet)):
+        assert time.monotonic() < end, "a process of a machine outlives the kill"
+        time.sleep(0.1)
+
+
+def marked(mark: str) -> list[int]:
+    """Processes that were started with a mark in their environment."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/environ"):
+        try:
+            if f"COSIM_MARK={mark}".encode() in path.read_bytes():
+                found.append(int(path.parent.name))
+        except OSError:
+            continue
+    return found
+
+
+def test_other_recordings_or_options_are_diagnosed_again(fleet: Path) -> None:
+    done = cosim.diagnose_folder("all", "found", quick=True)
+    assert [one.earlier for one in done.machines] == [False] * 2
+    assert sorted(done.missing) == sorted(LEVELS)
+    assert done.frame()["machine"].tolist() == [one.name for one in done.machines]
+    write(fleet / "all" / "north_1.csv", 2.5, 1)
+    again = cosim.diagnose_folder(fleet / "all", "found", quick=True)
+    assert {one.name: one.earlier for one in again.machines} == {"north": False, "south": True}
+    assert "2 machines" in repr(again)
+
+
+def test_the_key_of_an_answer_changes_with_files_card_and_options(fleet: Path) -> None:
+    (machine, _) = machines_in(fleet / "all")
+    order = Order(machine, "", fleet / "out", Options())
+    others = [
+        replace(order, card="paper_mount"),
+        replace(order, options=Options(quick=True)),
+        replace(order, options=Options(columns=("tau=force",))),
+        replace(order, machine=replace(machine, train=machine.train[:1], heldout=machine.train[1:])),
+    ]
+    keys = {one.key() for one in (order, *others)}
+    write(fleet / "all" / "north_2.csv", 2.5, 1)
+    assert len(keys | {order.key()}) == len(others) + 2
+    assert replace(order, out=fleet / "elsewhere").key() == order.key()
+
+
+def test_a_cluster_gives_the_same_answers(fleet: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+    (fleet / "all" / "south_2.csv").write_text("t,tau,q\n1,2,3\n", "utf-8")
+    here = cosim.diagnose_folder("all", "here", quick=True)
+    settings = {"n_workers": 1, "threads_per_worker": 2, "processes": False, "dashboard_address": None}
+    with distributed.LocalCluster(**settings) as cluster:
+        there = cosim.diagnose_folder("all", "there", quick=True, cluster=cluster.scheduler_address)
+    assert there.missing == here.missing
+    assert there.errors == here.errors
+    assert "all/south_2.csv" in there.errors["south"]
+    for name in there.missing:
+        files = [sorted(path.name for path in (fleet / where / name).iterdir()) for where in ("here", "there")]
+        assert files[0] == files[1]
+        held = [
+            json.loads((fleet / where / name / "diagnosis.json").read_text())["heldout"] for where in ("here", "there")
+        ]
+        assert held[0] == held[1]
+
+
+def test_wrong_use_is_one_sentence(fleet: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SweepError, match="is no address of a Dask scheduler"):
+        cosim.diagnose_folder("all", "found", cluster="nowhere")
+    with pytest.raises(InputError, match="no-such cannot be listed"):
+        cosim.diagnose_folder("no-such", "found")
+    (fleet / "empty").mkdir()
+    with pytest.raises(InputError, match="empty holds no recordings of several machines"):
+        cosim.diagnose_folder("empty", "found")
+    assert call("diagnose", "all/north_1.csv", "all/north_2.csv", "--cluster", "tcp://h:1", "--out", "x") == 2
+    assert "--cluster is for a folder of several machines" in capsys.readouterr().err
+
+
+def test_results_among_the_recordings_are_no_machine(fleet: Path) -> None:
+    (fleet / "all" / "found").mkdir()
+    (fleet / "all" / "found" / JOURNAL).touch()
+    write(fleet / "all" / "found" / "run.csv", 1.0, 1)
+    assert [one.name for one in machines_in(fleet / "all")] == sorted(LEVELS)
+
+
+def test_without_out_the_same_command_goes_on(
+    fleet: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("COSIM_OUT", "")
+    for _ in range(2):
+        assert call("diagnose", "all", "--quick", "--workers", "2") == 0
+    assert "where they were begun" in capsys.readouterr().err
+    assert [one.name for one in (fleet / "cosim_out").iterdir()] == ["all-1"]
+    assert os.path.exists(fleet / "cosim_out" / "all-1" / "machines.jsonl")
