@@ -25,6 +25,7 @@ from cosim.system.system import System
 from cosim.system.wire import Record, Wire
 
 sys.path[:0] = [str(Path(__file__).parents[1] / one) for one in ("tests/tools", "tests/exchange")]
+from foreign_machine import kept_section  # noqa: E402
 from motor_fmu import motor  # noqa: E402
 
 FACTOR = 1.6
@@ -202,7 +203,8 @@ def write(out: Path, rows: list[dict], named: list[bool], times: list[tuple[floa
         f"The motor, {LONG:,} rows, from one start: {ours:.1f} s; FMPy and SciPy by hand {hand:.1f} s",
         f"(ratio {ours / hand:.2f}).",
     ]
-    (out / "README.md").write_text("\n".join(lines) + "\n", "utf-8")
+    machine = kept_section(out / "README.md")
+    (out / "README.md").write_text("\n".join(lines) + "\n" + (f"\n{machine}" if machine else ""), "utf-8")
     print("\n".join(lines))
 
 

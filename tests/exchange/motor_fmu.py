@@ -10,6 +10,7 @@ inertia 2 % larger, 7 a speed that ends at 2, 8 an angle by Euler's rule, 9 degr
 import subprocess
 import sys
 import zipfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import fmpy
@@ -53,7 +54,8 @@ static int step(M *m, double t, double h) {
 """
     + TINY[TINY.index("#define API") :]
 )
-VARIABLES = (
+Row = tuple[str, str, str, str, str]
+VARIABLES: tuple[Row, ...] = (
     ("i", "input", "A", "0", ""),
     ("J", "parameter", "kg.m2", "0.02", 'min="1e-6" nominal="0.01"'),
     ("d", "parameter", "N.m.s/rad", "0.05", 'min="0"'),
@@ -72,26 +74,34 @@ VARIABLES = (
 
 def motor(directory: Path, version: int, planted: int = 0) -> Path:
     """Compile and pack the motor for one FMI version, with an error planted in its binary."""
-    library = directory / f"motor{version}_{planted}{fmpy.sharedLibraryExtension}"
+    stem = f"motor{version}{f'_{planted}' if planted else ''}"
+    return packed(directory, stem, SOURCE, VARIABLES, version, "motor", f"-DBUILT={planted}")
+
+
+def packed(
+    directory: Path, stem: str, source: str, variables: Sequence[Row], version: int, name: str, *options: str
+) -> Path:
+    """Compile and pack an FMU written like the motor, whose value references are the places of its variables."""
+    library = directory / f"{stem}{fmpy.sharedLibraryExtension}"
     if not library.exists():
-        source = directory / f"motor{version}.c"
-        source.write_text(SOURCE + _stubs(version))
-        command = [sys.executable, "-m", "ziglang", "cc", "-shared", "-fPIC", "-O2", "-w", f"-DBUILT={planted}", "-o"]
-        subprocess.run([*command, str(library), str(source)], check=True)
+        text = directory / f"{stem}.c"
+        text.write_text(source + _stubs(version))
+        command = [sys.executable, "-m", "ziglang", "cc", "-shared", "-fPIC", "-O2", "-w", *options, "-o"]
+        subprocess.run([*command, str(library), str(text)], check=True)
     platform = fmpy.platform if version == 2 else fmpy.platform_tuple
-    path = directory / f"motor{version}{f'_{planted}' if planted else ''}.fmu"
+    path = directory / f"{stem}.fmu"
     with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", description(version))
-        archive.write(library, f"binaries/{platform}/motor{fmpy.sharedLibraryExtension}")
+        archive.writestr("modelDescription.xml", description(version, variables, name))
+        archive.write(library, f"binaries/{platform}/{name}{fmpy.sharedLibraryExtension}")
     return path
 
 
-def description(version: int) -> str:
+def description(version: int, variables: Sequence[Row] = VARIABLES, model: str = "motor") -> str:
     """The XML of one FMI version."""
     token = "guid" if version == 2 else "instantiationToken"
-    units = "".join(f'<Unit name="{unit}"/>' for unit in dict.fromkeys(row[2] for row in VARIABLES))
-    rows = []
-    for number, (name, causality, unit, start, more) in enumerate(VARIABLES):
+    units = "".join(f'<Unit name="{unit}"/>' for unit in dict.fromkeys(row[2] for row in variables))
+    rows, told = [], [k for k, row in enumerate(variables) if row[1] == "output"]
+    for number, (name, causality, unit, start, more) in enumerate(variables):
         variability = "tunable" if causality == "parameter" else "continuous"
         exact = ' initial="exact"' if causality != "input" else ""
         common = f'name="{name}" valueReference="{number}" causality="{causality}" variability="{variability}"{exact}'
@@ -99,14 +109,15 @@ def description(version: int) -> str:
         old = f"<ScalarVariable {common}><Real {value}/></ScalarVariable>"
         rows.append(old if version == 2 else f"<Float64 {common} {value}/>")
     if version == 2:
-        outputs = '<Outputs><Unknown index="12" dependencies=""/><Unknown index="13" dependencies=""/></Outputs>'
+        outputs = "".join(f'<Unknown index="{k + 1}" dependencies=""/>' for k in told)
+        outputs = f"<Outputs>{outputs}</Outputs>"
     else:
         rows.append('<Float64 name="time" valueReference="99" causality="independent" variability="continuous"/>')
-        outputs = '<Output valueReference="11" dependencies=""/><Output valueReference="12" dependencies=""/>'
+        outputs = "".join(f'<Output valueReference="{k}" dependencies=""/>' for k in told)
     saves = f'canGetAndSetFMU{"s" if version == 2 else "S"}tate="true" canHandleVariableCommunicationStepSize="true"'
     return (
-        f'<fmiModelDescription fmiVersion="{version}.0" modelName="motor" {token}="t">'
-        f'<CoSimulation modelIdentifier="motor" {saves}/><UnitDefinitions>{units}</UnitDefinitions>'
+        f'<fmiModelDescription fmiVersion="{version}.0" modelName="{model}" {token}="t">'
+        f'<CoSimulation modelIdentifier="{model}" {saves}/><UnitDefinitions>{units}</UnitDefinitions>'
         f'<DefaultExperiment startTime="0" stopTime="2" stepSize="0.01"/>'
         f"<ModelVariables>{''.join(rows)}</ModelVariables><ModelStructure>{outputs}</ModelStructure></fmiModelDescription>"
     )
