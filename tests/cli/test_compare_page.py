@@ -3,9 +3,8 @@
 from pathlib import Path
 from typing import Any
 
-from browsing import browser
+from browsing import browser, check_by_axe
 from test_compare import table
-from test_pages import check_by_axe
 
 import cosim
 

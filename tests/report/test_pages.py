@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browsing import PATIENCE, axe_script, browser, violations
+from browsing import PATIENCE, browser, check_by_axe
 from commands import call, scenario
 from report_example import diagnosis
 from tiny_fmu import tiny
@@ -25,8 +25,6 @@ from pyfmi_models.export.codegen import generate
 from pyfmi_models.export.documentation import documentation
 
 __all__ = ["browser", "scenario", "tiny"]
-
-SIZES = {"desk": (1280, 800), "phone": (390, 844)}
 
 
 @cache
@@ -142,20 +140,6 @@ REPORTS = {
     "unknown": ("unknown", "rotary"),
     "linear": ("two", "linear"),
 }
-
-
-def check_by_axe(browser: Any, html: str, folder: Path) -> None:
-    """Nothing is found, and nothing is wider than the screen, with everything unfolded."""
-    script = axe_script()
-    (folder / "page.html").write_text(html, "utf-8")
-    for (width, height), scheme in ((SIZES["desk"], "light"), (SIZES["phone"], "light"), (SIZES["desk"], "dark")):
-        page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme, bypass_csp=True)
-        page.set_default_timeout(PATIENCE)
-        page.goto((folder / "page.html").as_uri())
-        page.evaluate("document.querySelectorAll('details').forEach(one => one.open = true)")
-        assert violations(page, script) == [], (width, scheme)
-        assert page.evaluate("document.documentElement.scrollWidth") <= width
-        page.close()
 
 
 @pytest.mark.parametrize("kind", REPORTS)

@@ -22,6 +22,7 @@ FLAGS = (
 )
 """Chromium shall talk to nobody but the page."""
 PHONE, DESK = {"width": 390, "height": 844}, {"width": 1280, "height": 800}
+SIZES = {"desk": (1280, 800), "phone": (390, 844)}
 PATIENCE = 300_000
 """Milliseconds for a browser or a diagnosis that has a busy processor."""
 REFUSED = "400 (Bad Request)"
@@ -95,6 +96,20 @@ def violations(page: Page, script: str) -> list[tuple[str, str, list[str]]]:
     page.evaluate(script)
     found = page.evaluate("(rules) => axe.run(document, { runOnly: rules })", RULES)["violations"]
     return [(one["id"], one["impact"], [node["html"][:120] for node in one["nodes"]]) for one in found]
+
+
+def check_by_axe(browser: Any, html: str, folder: Path) -> None:
+    """Nothing is found, and nothing is wider than the screen, with everything unfolded."""
+    script = axe_script()
+    (folder / "page.html").write_text(html, "utf-8")
+    for (width, height), scheme in ((SIZES["desk"], "light"), (SIZES["phone"], "light"), (SIZES["desk"], "dark")):
+        page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme, bypass_csp=True)
+        page.set_default_timeout(PATIENCE)
+        page.goto((folder / "page.html").as_uri())
+        page.evaluate("document.querySelectorAll('details').forEach(one => one.open = true)")
+        assert violations(page, script) == [], (width, scheme)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
+        page.close()
 
 
 def processor(pid: int) -> float:
