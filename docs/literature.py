@@ -5,6 +5,7 @@ LITERATURE = {
     "cable_wrap": "A spring; no source is needed.",
     "clock_skew": "Moon, Skelly, Towsley, Estimation and removal of clock skew from network delay measurements, "
     "IEEE INFOCOM (1999).",
+    "axis_coupling": "Siciliano, Sciavicco, Villani, Oriolo, Robotics (2009), section 7.1.",
     "constant_force": "A constant; no source is needed.",
     "cogging": "Zhu, Howe, IEEE Transactions on Energy Conversion 15 (2000) 407.",
     "friction_asymmetry": "Armstrong-Helouvry, Dupont, Canudas de Wit, Automatica 30 (1994) 1083.",

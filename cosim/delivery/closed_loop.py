@@ -16,6 +16,7 @@ from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
 from cosim.diagnosis.measure.protocol import CUTOFF
 from cosim.estimation.filters import lowpass
+from cosim.estimation.neighbours import as_inputs
 from cosim.estimation.prepare import Array
 from cosim.estimation.set_point import set_point
 from cosim.master.simulate import simulate
@@ -156,6 +157,7 @@ class Loops:
         self, plant: Path, controller: Path, mount: Mount, set_points: Sequence[Future[dict[str, Array]]]
     ) -> list[Recording]:
         reading = "q_recorded" if any(mount.of_kind(ClockEffect)) else "q"
+        fed = [as_inputs(one, mount, CUTOFF) for one in self._recordings]
         return [
             close_loop(
                 *(plant, controller, self._card, one),
@@ -163,7 +165,7 @@ class Loops:
                 inputs=[variable.name for variable in mount.inputs() if variable.name in one],
                 asked=asked.result(),
             )
-            for one, asked in zip(self._recordings, set_points, strict=True)
+            for one, asked in zip(fed, set_points, strict=True)
         ]
 
 

@@ -10,7 +10,7 @@ linear in the motion, so what a narrow filter smears is a misfit of every law. T
 the band is the same.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import sqrt
@@ -19,9 +19,11 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from cosim.data.neighbours import Neighbour, neighbours
 from cosim.data.recording import GAP, Gap, Recording
 from cosim.data.resolution import resolution
 from cosim.estimation.filters import EDGE, derivative, gain, highpass, lowpass, passes_of
+from cosim.estimation.neighbours import is_alone, key, motions, moving
 from cosim.support.errors import RecordingError
 from cosim.support.statistics import rms
 
@@ -80,6 +82,10 @@ class Piece:
     step: float = 0.0
     """Step of the encoder [rad, m]; 0 where it is too fine to be seen."""
     motion: float = 0.0
+    neighbours: Mapping[str, Array] = field(default_factory=dict)
+    """Filtered motion of neighbouring axes, see `neighbours.py`."""
+    moving: frozenset[str] = frozenset()
+    """Neighbours that do not stand still here."""
 
     def lowpass(self, columns: Array) -> Array:
         """Second pass of the filter, along the first axis."""
@@ -96,7 +102,10 @@ class Piece:
         of an input that was not recorded. Nothing that is returned may be changed.
         """
         if inputs not in self._given:
-            columns = [self.extras.get(name, np.full(len(self.t), start)) for name, start in inputs]
+            columns = [
+                self.neighbours[name] if name in self.neighbours else self.extras.get(name, np.full(len(self.t), start))
+                for name, start in inputs
+            ]
             rows = np.vstack([self.t, self.q, self.v, self.a, *columns])
             middle, end = (rows[:, 1:] + rows[:, :-1]) / 2, rows[:, 1:]
             self._given[inputs] = rows, (*middle, *end, np.full(len(self.t) - 1, self.dt))
@@ -134,6 +143,24 @@ class Prepared:
     has_position: bool
     motion: float = 0.0
     """Cutoff [Hz] in which the motion was read; 0 where it is `cutoff`."""
+    neighbours_recorded: tuple[Neighbour, ...] = ()
+    """Neighbouring axes of which all recordings have columns."""
+
+    @cached_property
+    def neighbours(self) -> tuple[Neighbour, ...]:
+        """Those of them that move, and by themselves."""
+        own = np.column_stack([self.stacked(name) for name in ("q", "v", "a")]) if self.neighbours_recorded else None
+        return tuple(
+            one
+            for one in self.neighbours_recorded
+            if own is not None
+            and any(one.name in piece.moving for piece in self.pieces)
+            and is_alone(own, *(self.of_neighbour(key(one.name, kind)) for kind in ("position", "acceleration")))
+        )
+
+    def of_neighbour(self, name: str) -> Array:
+        """A signal of a neighbour of all pieces at the kept rows."""
+        return np.concatenate([piece.neighbours[name][piece.kept] for piece in self.pieces])
 
     @property
     def band(self) -> Band:
@@ -174,9 +201,17 @@ def prepare(recordings: Sequence[Recording], band: float | Band) -> Prepared:
     cutoff, motion = (min(edge, 0.3 / slowest) for edge in (band if isinstance(band, Band) else Band(band)))
     cutoff = min(_telling(one, cutoff) for one in recordings)
     read = Band(cutoff, motion if motion > cutoff else 0.0)
-    pieces = [piece for index, one in enumerate(recordings) for piece in _pieces(one, index, read)]
+    beside = _neighbours(recordings)
+    pieces = [piece for index, one in enumerate(recordings) for piece in _pieces(one, index, read, beside)]
     has_position = all("q" in recording for recording in recordings)
-    return Prepared(tuple(r.name for r in recordings), tuple(pieces), cutoff, has_position, read.motion)
+    return Prepared(tuple(r.name for r in recordings), tuple(pieces), cutoff, has_position, read.motion, beside)
+
+
+def _neighbours(recordings: Sequence[Recording]) -> tuple[Neighbour, ...]:
+    """Neighbouring axes of which all recordings have the same columns."""
+    whole = [[name for name in one.columns if np.isfinite(one[name]).all()] for one in recordings]
+    found = [neighbours(names, one.units) for names, one in zip(whole, recordings, strict=True)]
+    return tuple(one for one in found[0] if all(one in others for others in found[1:]))
 
 
 def quality(recording: Recording, cutoff: float) -> tuple[str, ...]:
@@ -219,12 +254,12 @@ def _spans(recording: Recording, cutoff: float) -> list[slice]:
     return [slice(a, b) for a, b in spans if (b - a) * dt >= LEAST_SECONDS and b - a > TURNED]
 
 
-def _pieces(recording: Recording, index: int, band: Band) -> list[Piece]:
+def _pieces(recording: Recording, index: int, band: Band, beside: Sequence[Neighbour]) -> list[Piece]:
     step = resolution(recording["q"]) if "q" in recording else 0.0
-    return [replace(_piece(recording, index, span, band), step=step) for span in _spans(recording, band.cutoff)]
+    return [replace(_piece(recording, index, span, band, beside), step=step) for span in _spans(recording, band.cutoff)]
 
 
-def _piece(recording: Recording, index: int, span: slice, band: Band) -> Piece:
+def _piece(recording: Recording, index: int, span: slice, band: Band, beside: Sequence[Neighbour]) -> Piece:
     grid, table = _on_grid(recording, span)
     dt = float(grid[-1] - grid[0]) / (len(grid) - 1)
     cutoff, first = band.cutoff, max(band)
@@ -245,6 +280,8 @@ def _piece(recording: Recording, index: int, span: slice, band: Band) -> Piece:
         motion=band.motion,
         stride=max(1, int(1 / (KEPT_RATE * cutoff * coarse))),
         extras={n: c[::each].copy() for n, c in table.items() if n not in ("t", "tau", "q", "v")},
+        neighbours={name: one[::each].copy() for name, one in motions(beside, table, dt, first).items()},
+        moving=moving(beside, table, dt, first, noise_of) if len(grid) > LEAST_ROWS else frozenset(),
         reading_noise=noise_of(table["q" if "q" in table else "v"], dt) * sqrt(dt) if len(grid) > LEAST_ROWS else 0.0,
     )
 

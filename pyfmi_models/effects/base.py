@@ -104,6 +104,10 @@ class Effect(Part):
         """Name the plant inputs that the effect reads; effects that name the same input share it."""
         return ()
 
+    def recorded_as(self) -> Mapping[str, str]:
+        """Inputs that a recording holds under another name, by their own."""
+        return {}
+
     def broken_rule(self) -> str:
         """Say which rule between the parameters these numbers break; empty if none."""
         return ""

@@ -41,6 +41,7 @@ CONTRACT = {
     "gravity_unbalance": {"mgl", "phase"},
     "torque_offset": {"torque"},
     "constant_force": {"force"},
+    "axis_coupling": {"inertia", "damping", "weight", "phase", "follows", "neighbour"},
     "thermal_viscosity": {"viscous_per_degC", "coulomb_per_degC"},
     "dwell_breakaway": {"torque_per_efold"},
     "compliance": {"antiresonance_hz", "resonance_hz"},

@@ -130,6 +130,11 @@ LOADS: dict[str, Callable[[Any, Motion], float]] = {
     "CableWrap": lambda e, m: 3 * (m.q - 0.2) * (1 + 0.5 * (m.q - 0.2) ** 2),
     "AzimuthCentrifugal": lambda e, m: 3 * math.sin(m.q) * math.cos(m.q) * m.inputs["azimuth_rate"] ** 2,
     "KnownLoad": lambda e, m: e.gain * m.inputs["load_torque"],
+    "AxisCoupling": lambda e, m: 0.4 * m.inputs["neighbour_acceleration"],
+    "DampedCoupling": lambda e, m: 0.4 * m.inputs["neighbour_acceleration"] + 0.3 * m.inputs["neighbour_speed"],
+    "WeightCoupling": lambda e, m: (
+        0.4 * m.inputs["neighbour_acceleration"] + 1.5 * math.sin(m.angle + m.inputs["neighbour_position"] + 0.2)
+    ),
     "BoucWen": lambda e, m: 0.8 * m.state[0],
     "PeriodicDisturbance": lambda e, m: 0.6 * math.sin(2 * math.pi * 3 * m.t + 0.2),
     "LearnedTorque": lambda e, m: table(e, e.torque, -1, 1.2, m.q),
@@ -179,6 +184,7 @@ def motions(effect: Effect, seed: int) -> list[Motion]:
     dice, found = Random(seed), []
     for k in range(12):
         names = ("temperature", "altitude", "azimuth_rate", "load_torque", "altitude_rate")
+        names += ("neighbour_position", "neighbour_speed", "neighbour_acceleration")
         inputs = {name: dice.uniform(10, 40) if name == "temperature" else dice.uniform(-2, 2) for name in names}
         speed = (0.0, dice.uniform(0.01, 2), -dice.uniform(0.01, 2), dice.uniform(-2e-4, 2e-4))[k % 4]
         state = [abs(dice.uniform(-1.5, 1.5)) if one.low >= 0 else dice.uniform(-1.5, 1.5) for one in effect.states()]

@@ -25,7 +25,7 @@ ASKED = """
     friction_asymmetry stribeck presliding position_friction load_dependent_friction dwell_breakaway thermal_viscosity
     torque_offset constant_force cogging gravity_unbalance cable_wrap quadratic_drag periodic_disturbance
     torque_saturation delay actuator_lag clock_skew inertia_variation compliance encoder_eccentricity backlash
-    concave_viscous
+    concave_viscous axis_coupling
 """
 """What a diagnosis looks for: an effect in the catalogue is not asked for before it has a hypothesis."""
 OF_CARDS = ("dead_band", "gear_friction", "rough_spot", "torque_droop", "bouc_wen")

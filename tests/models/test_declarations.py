@@ -39,6 +39,9 @@ READ: dict[str, list[str]] = {
     "AltitudeInertia": ["altitude [rad] ~0.7", "altitude_rate [rad/s] ~0.01"],
     "AzimuthCentrifugal": ["azimuth_rate [rad/s] ~0.1"],
     "KnownLoad": ["load_torque [N.m]"],
+    "AxisCoupling": ["neighbour_acceleration [rad/s2]"],
+    "DampedCoupling": ["neighbour_acceleration [rad/s2]", "neighbour_speed [rad/s]"],
+    "WeightCoupling": ["neighbour_acceleration [rad/s2]", "neighbour_position [rad]"],
     **dict.fromkeys(("LearnedFriction", "ThermalViscosity", "WarmingViscosity", "RubbedViscosity"), WARM),
     "WarmTorqueDroop": WARM,
 }
@@ -94,6 +97,9 @@ MAINS: dict[str, Main] = {
     "WarmTorqueDroop": Main("droop", PERCENT, "% at the rated torque"),
     "TorqueOffset": Main("torque"),
     "ConstantForce": Main("force"),
+    "AxisCoupling": Main("inertia", unit="kg.m2"),
+    "DampedCoupling": Main("damping", unit="N.m.s/rad"),
+    "WeightCoupling": Main("weight"),
     "TorqueSaturation": Main("knee_torque", **PLACE),
 }
 NO_TORQUE = {

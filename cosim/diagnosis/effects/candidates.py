@@ -127,8 +127,13 @@ def columns_of(mount: Mount, found: Sequence[Candidate], prepared: Prepared, val
 
 
 def _group(candidate: Candidate) -> str:
-    """Effects of the moment are differentiated all at once; those with states or in the sensor by themselves."""
+    """Effects of the moment are differentiated all at once; those with states or in the sensor by themselves.
+
+    So are those whose inputs are other columns of the recording for each.
+    """
     effect = candidate.instances[0]
+    if recorded := effect.recorded_as():
+        return ", ".join((candidate.effect, *recorded.values()))
     return candidate.effect if effect.states() or isinstance(effect, SensorEffect) else ""
 
 

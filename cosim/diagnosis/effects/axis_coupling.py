@@ -1,0 +1,109 @@
+"""A neighbouring axis whose motion was recorded acts on this one."""
+
+from collections.abc import Iterator, Sequence
+from math import atan2, hypot, pi
+from typing import ClassVar
+
+import numpy as np
+
+from cosim.data.neighbours import Neighbour
+from cosim.diagnosis.answer.result import Where
+from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach
+from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.tuning import refound
+from cosim.estimation.fit import Fit
+from cosim.estimation.neighbours import key
+from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.problem import Problem
+from pyfmi_models.effects import Effect
+from pyfmi_models.effects.axis_coupling import AxisCoupling, DampedCoupling, WeightCoupling
+from pyfmi_models.mount import Mount
+
+FOLLOWS = (1.0, 0.0)
+"""Whether a weight turns with this axis too, or with the neighbour alone."""
+
+
+class NeighbouringAxis(Hypothesis[AxisCoupling]):
+    """An inertia that both axes accelerate, alone or with a damping or a weight beside it."""
+
+    forms = (AxisCoupling, DampedCoupling, WeightCoupling)
+    sizes: ClassVar[tuple[str, ...]] = ("inertia", "damping", "weight")
+    rank: ClassVar[float] = 14.5
+    needs_position: ClassVar[bool] = False
+    view = "time"
+
+    def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
+        """Each neighbour: its acceleration, with its speed, and the weight that turns with it."""
+        if has(mount, AxisCoupling):
+            return
+        for one in span.prepared.neighbours:
+            yield from _moved_by(one, mount)
+
+    def tuned(self, problem: Problem, found: Fit, start: AxisCoupling, evidence: Evidence) -> Fit:
+        """Beside an inertia that was found a damping or a weight, where that has evidence."""
+        coupling = found.mount.effects[-1]
+        if type(start) is not AxisCoupling or type(coupling) is not AxisCoupling:
+            return found
+        inertia, name = float(coupling.inertia), coupling.neighbour
+        others: list[Effect] = [DampedCoupling(inertia=inertia, damping=0.0, neighbour=name)]
+        one = next((one for one in problem.prepared.neighbours if one.name == name), None)
+        if one and _both_turn(one, found.mount):
+            others += [_weight_left(problem, found, name, inertia, follows) for follows in FOLLOWS]
+        return refound(problem, found, evidence, others)
+
+    def where(self, effect: AxisCoupling, reach: Reach) -> Where:
+        """Wherever the neighbour moves."""
+        return Where(axis="everywhere", description=f"wherever {effect.called} moves", regions=())
+
+    def why_not(self, mount: Mount, prepared: Prepared) -> str:
+        """It needs columns of a neighbour that moves by itself."""
+        if not prepared.neighbours_recorded:
+            return "no column of a neighbour"
+        if not prepared.neighbours and not self.is_settled(mount):
+            return f"{_listed(prepared.neighbours_recorded)} stands still, is this axis itself, or follows its motion"
+        return super().why_not(mount, prepared)
+
+
+def _moved_by(one: Neighbour, mount: Mount) -> Iterator[Candidate]:
+    """What one neighbour may do."""
+
+    def inertia(c: Array) -> Effect:
+        return AxisCoupling(inertia=float(c[0]), neighbour=one.name)
+
+    def damped(c: Array) -> Effect:
+        return DampedCoupling(inertia=float(c[0]), damping=float(c[1]), neighbour=one.name)
+
+    yield Candidate("axis_coupling", (AxisCoupling(neighbour=one.name),), ("inertia",), inertia)
+    drag = DampedCoupling(damping=0.0, neighbour=one.name)
+    yield Candidate("axis_coupling", (drag,), ("inertia", "damping"), damped)
+    for follows in FOLLOWS if _both_turn(one, mount) else ():
+
+        def weight(c: Array, follows: float = follows) -> Effect:
+            size, phase = hypot(*c), atan2(c[1], c[0])
+            return WeightCoupling(weight=size, phase=phase, follows=follows, neighbour=one.name)
+
+        pair = tuple(
+            WeightCoupling(weight=0.0, phase=phase, follows=follows, neighbour=one.name) for phase in (0.0, pi / 2)
+        )
+        yield Candidate("axis_coupling", pair, ("weight",), weight)
+
+
+def _both_turn(one: Neighbour, mount: Mount) -> bool:
+    """Whether a weight may hang on both: it needs two axes that turn, and the neighbour's position."""
+    return mount.motion == "rotary" and one.turns and bool(one.position)
+
+
+def _weight_left(problem: Problem, found: Fit, name: str, inertia: float, follows: float) -> Effect:
+    """A weight on both axes as large as what an inertia leaves says."""
+    prepared = problem.prepared
+    angle = follows * prepared.stacked("q") + prepared.of_neighbour(key(name, "position"))
+    columns = np.column_stack([np.sin(angle), np.cos(angle), found.slopes]) * problem.weight[:, None]
+    size = np.sqrt((columns**2).sum(0)) + 1e-300
+    c = np.linalg.lstsq(columns / size, found.residual * problem.weight, rcond=1e-9)[0] / size
+    sine, cosine = float(c[0]), float(c[1])
+    size_left = max(hypot(sine, cosine), 1e-9)
+    return WeightCoupling(inertia=inertia, weight=size_left, phase=atan2(cosine, sine), follows=follows, neighbour=name)
+
+
+def _listed(several: Sequence[Neighbour]) -> str:
+    return ", ".join(f"`{one.name}`" for one in several)

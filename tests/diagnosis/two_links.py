@@ -1,0 +1,67 @@
+"""An arm of two links in a vertical plane: what its elbow needs while both joints move.
+
+    tau_2 = (I + m c^2) (a_1 + a_2) + m l c (cos(q_2) a_1 + sin(q_2) v_1^2) + m g c sin(q_1 + q_2) + friction
+
+q_2 counts from the direction of the first link, both hang down at 0. Reference: Spong, Hutchinson, Vidyasagar, Robot
+Modeling and Control (2006), section 7.4.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from cosim.data.recording import Recording
+
+Array = npt.NDArray[np.float64]
+OWN, LEVER, WEIGHT = 0.064, 0.03, 1.2
+"""I + m c^2 and m l c [kg m2], and m g c [N m]."""
+FC, VISCOUS = 0.15, 0.08
+NOISE, READING = 0.01, 2e-5
+"""RMS of the torque's noise [N m] and of the encoders' [rad]."""
+
+
+class Joint(NamedTuple):
+    """Motion of a joint."""
+
+    q: Array
+    v: Array
+    a: Array
+
+
+def tones(t: Array, seed: int, size: float) -> Joint:
+    """Swings at four frequencies that are another in each joint and recording."""
+    dice = np.random.default_rng(seed)
+    waves = [
+        (size / k, 2 * np.pi * f * dice.uniform(0.85, 1.15), p)
+        for k, f, p in zip((1, 2, 4, 8), (0.15, 0.4, 0.9, 1.9), dice.uniform(0, 2 * np.pi, 4), strict=True)
+    ]
+    q = sum(a * np.sin(w * t + p) for a, w, p in waves)
+    v = sum(a * w * np.cos(w * t + p) for a, w, p in waves)
+    a = sum(-a * w**2 * np.sin(w * t + p) for a, w, p in waves)
+    return Joint(np.asarray(q), np.asarray(v), np.asarray(a))
+
+
+def still(t: Array) -> Joint:
+    """A joint that is held."""
+    return Joint(0.3 + 0 * t, 0 * t, 0 * t)
+
+
+def elbow(seed: int, neighbour: str = "tones", seconds: float = 12.0, columns: bool = True) -> Recording:
+    """A recording of the elbow, with the shoulder's position in column `q1`."""
+    t, dice = np.arange(0.0, seconds, 1 / 250), np.random.default_rng(seed)
+    own = tones(t, 10 + seed, 0.5)
+    other = {"tones": tones(t, 50 + seed, 0.7), "still": still(t), "alike": Joint(*(0.7 * one for one in own))}[
+        neighbour
+    ]
+    tau = OWN * (other.a + own.a) + LEVER * (np.cos(own.q) * other.a + np.sin(own.q) * other.v**2)
+    tau = tau + WEIGHT * np.sin(other.q + own.q) + FC * np.tanh(own.v / 1e-3) + VISCOUS * own.v
+    table = {"t": t, "tau": tau + dice.normal(0, NOISE, len(t)), "q": own.q + dice.normal(0, READING, len(t))}
+    table |= {"q1": other.q + dice.normal(0, READING, len(t))} if columns else {}
+    return Recording.of(table, f"run {seed}")
+
+
+def coupling() -> float:
+    """Mean of what the shoulder's acceleration needs at the elbow [kg m2]."""
+    q = np.concatenate([tones(np.arange(0.0, 12.0, 1 / 250), 10 + seed, 0.5).q for seed in (1, 2)])
+    return float(OWN + LEVER * np.mean(np.cos(q)))
