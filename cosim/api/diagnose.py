@@ -32,6 +32,7 @@ from cosim.support.errors import InputError
 from cosim.support.files import check_directory
 from cosim.support.html import table as html_table
 from cosim.support.html import text as html_text
+from cosim.support.notebook import shows_progress
 from cosim.support.plain import JsonObject
 from pyfmi_models.card import Card, read_card
 
@@ -113,6 +114,7 @@ class DiagnosisResult:
         return html_table("Missing physics", rows) + html_text(str(self))
 
 
+@shows_progress()
 def diagnose(
     train: Source | Sequence[Source],
     heldout: Source | Sequence[Source] = (),

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from cosim.api.diagnose import check_split
 from cosim.api.recordings import Source, read_all
+from cosim.api.rounds import Rounds
 from cosim.data.recording import Recording
 from cosim.delivery.deliver import deliver_quickly
 from cosim.diagnosis.answer.result import Diagnosis
@@ -18,6 +19,7 @@ from cosim.investigation.prepare import given
 from cosim.investigation.story import Answered, Moved, Story
 from cosim.support.files import replacing
 from cosim.support.html import text as html_text
+from cosim.support.notebook import shows_progress
 from cosim.support.plain import JsonObject
 from pyfmi_models.card import Card
 
@@ -49,6 +51,7 @@ class InvestigateResult:
         return html_text(str(self))
 
 
+@shows_progress()
 def investigate(
     scenario: str,
     card: str,
@@ -85,7 +88,8 @@ def investigate(
         seed: of the phases of motions with many tones.
         fast: run a drive without a clock.
         force: start over, and remove what an investigation left there.
-        on_progress: told in a few words what is being done.
+        on_progress: told in a line what is being done: the stage, of at most how many, the best answer so far, and the
+            time that is left at most.
         on_step: told each recording and each answer.
         command: what the files shall name as what made them.
 
@@ -103,7 +107,9 @@ def investigate(
     check_split(first, second)
     ready = given(scenario, card, machine, limits or {}, settings, first, second, fast)
     with Log(Path(out), ready.identity(), force) as log:
-        work = Investigation(ready.machine, ready.card, ready.limits, log, settings, on_progress, on_step)
+        rounds = Rounds(on_progress, budget, seconds)
+        heard = rounds.beside(on_step)
+        work = Investigation(ready.machine, ready.card, ready.limits, log, settings, rounds, heard)
         work.begin(ready.own, ready.train, ready.heldout)
         return _written(work, work.go_on(), Path(out), command)
 

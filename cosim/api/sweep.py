@@ -8,6 +8,7 @@ from typing import Any
 from cosim.models.cache import with_fmus
 from cosim.plots.sweep import Results, draw, read_results
 from cosim.support.html import facts
+from cosim.support.notebook import shows_progress
 from cosim.sweeps import Summary, conduct, read_sweep
 from cosim.system.scenario import read_scenario
 
@@ -63,6 +64,7 @@ class SweepResult:
         return facts("sweep", {"result": str(self), "table": str(self.table)})
 
 
+@shows_progress(lambda done, of, failed: f"{done:,} of {of:,} runs" + (f", {failed:,} failed" if failed else ""))
 def sweep(
     file: str | Path,
     out: str | Path,

@@ -44,6 +44,7 @@ def investigate(
     out = out or default_out(Path(scenario).stem)
     from cosim.api.investigate import investigate as ask
     from cosim.investigation.log import PAGE
+    from cosim.investigation.story import line_of
 
     words = {"--card": card, "--out": out, "--machine": machine, "--drive": drive, "--key": key, "--move": move}
     words |= {"--budget": budget, "--seconds": seconds, "--limits": limits, "--train": train, "--heldout": heldout}
@@ -63,6 +64,7 @@ def investigate(
             seed=seed,
             force=force,
             on_progress=progress.tell,
+            on_step=lambda step: progress.log(line_of(step)),
             command=command,
         )
     put_json(done.as_json()) if as_json else put(str(done))

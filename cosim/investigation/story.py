@@ -116,7 +116,7 @@ class Story:
         }
 
     def __str__(self) -> str:
-        lines = [_line(one) for one in self.steps]
+        lines = [line_of(one) for one in self.steps]
         more = [f"Instead  {one}" for one in self.otherwise]
         refused = [f"Refused  {one}" for one in self.refused]
         return "\n".join([*lines, *refused, SENTENCES[self.ended], *more, self._total()])
@@ -128,7 +128,8 @@ class Story:
         )
 
 
-def _line(one: Moved | Answered) -> str:
+def line_of(one: Moved | Answered) -> str:
+    """Return a step in one line."""
     if isinstance(one, Moved):
         hope = f", {one.nats:.0f} nats expected" if one.nats else ""
         left = f"; LEFT {one.left}" if one.left else ""
