@@ -3,19 +3,19 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cosim.api.show_results import result, sweep_file
-from cosim.data.preview import preview
-from cosim.data.recording import Recording
-from cosim.data.runs import Run, taken
-from cosim.plots import recording as told
-from cosim.support.errors import FmuError, InputError, ManyRecordingsError
+from cosim.support.errors import FmuError, InputError
 from cosim.support.html import facts as html_facts
 from cosim.support.html import table as html_table
 from cosim.support.html import text as html_text
 from cosim.support.plain import Json
 from cosim.system.variant import ssp_of
+
+if TYPE_CHECKING:
+    from cosim.data.recording import Recording
+    from pyfmi_models.card import Card
 
 Facts = Mapping[str, Json]
 Row = Mapping[str, Json]
@@ -50,7 +50,7 @@ class Shown:
 
 
 def show(
-    source: str | Path | Recording,
+    source: "str | Path | Recording",
     *,
     columns: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
@@ -79,21 +79,25 @@ def show(
     """
     if schedule:
         return _of_schedule(source)
-    if isinstance(source, Recording):
-        return _of_recording(source, picture, force)
+    if not isinstance(source, str | Path):
+        from cosim.api.show_recordings import of_recording
+
+        return Shown(*of_recording(source, picture, force))
     if (own := result(Path(source))) is not None:
         return Shown(*own)
     if Path(source).suffix in NO_RECORDINGS or ssp_of(source)[0] is not None:
         facts, tables = describe(str(source))
         return Shown(facts, tables, tuple(drawing(str(source))) if WIRES in tables else ())
+    from cosim.api.show_recordings import of_file
+
     options = {"columns": columns or {}, "units": units or {}, "layout": layout or {}}
-    return _of_file(Path(source), options, picture, force)
+    return Shown(*of_file(Path(source), options, picture, force))
 
 
-def _of_schedule(source: str | Path | Recording) -> Shown:
+def _of_schedule(source: "str | Path | Recording") -> Shown:
     from cosim.api.schedule import schedule
 
-    if isinstance(source, Recording):
+    if not isinstance(source, str | Path):
         raise InputError("A recording has no schedule: give a scenario (.toml) or an SSP.")
     return Shown(*schedule(str(source)))
 
@@ -126,42 +130,6 @@ def describe(file: str) -> tuple[Facts, Tables]:
     if ssp_of(file)[0] is not None:
         return _scenario(file)
     return _toml(file)
-
-
-def _of_file(path: Path, options: Mapping[str, Mapping[str, str]], picture: str | Path | None, force: bool) -> Shown:
-    try:
-        seen = preview(path, options)
-    except ManyRecordingsError as error:
-        return _of_many(path, error.runs)
-    drawn = {"picture": str(told.draw(seen.recording, seen.sources, Path(picture), force))} if picture else {}
-    return Shown(
-        {"recording": str(path)} | told.facts(seen) | drawn, {"columns": told.rows(seen.recording, seen.sources)}
-    )
-
-
-def _of_many(path: Path, runs: Sequence[Run]) -> Shown:
-    """Tell of the recordings that a file holds, and how one is taken."""
-    rows: list[Row] = [
-        {"number": f"#{number}", "recording": one.which, "rows": one.rows, "duration": f"{one.seconds:.6g} s"}
-        for number, one in enumerate(runs, 1)
-    ]
-    facts: Facts = {"recording": str(path), "holds": f"{len(runs):,} recordings", "take one": taken(path, runs)}
-    return Shown(facts, {"recordings": rows})
-
-
-def _of_recording(recording: Recording, picture: str | Path | None, force: bool) -> Shown:
-    drawn = {"picture": str(told.draw(recording, {}, Path(picture), force))} if picture else {}
-    tables: dict[str, Sequence[Row]] = {"columns": told.rows(recording)}
-    if recording.others:
-        tables["text"] = [_of_text(recording, name) for name in recording.others]
-    return Shown({"recording": recording.name} | told.facts_of(recording) | drawn, tables)
-
-
-def _of_text(recording: Recording, name: str) -> Row:
-    """Tell of a column that is no number how often it changes, and its first and last value."""
-    changes = recording.changes(name)
-    shown = [f"{len(one)} bytes" if isinstance(one, bytes) else f"{one}" for one in (changes[0][1], changes[-1][1])]
-    return {"column": name, "changes": len(changes) - 1, "first": shown[0], "last": shown[1]}
 
 
 def _fmu(path: Path) -> tuple[Facts, Tables]:
@@ -236,11 +204,8 @@ def _toml(file: str) -> tuple[Facts, Tables]:
     import tomllib
 
     from cosim.support.toml import parsed
-    from cosim.system.scenario import shipped_scenarios
 
     path = Path(file)
-    if file in shipped_scenarios():
-        return _scenario(file)
     if path.suffix == ".toml" and path.is_file():
         try:
             keys = parsed(path.read_text("utf-8"))
@@ -249,6 +214,10 @@ def _toml(file: str) -> tuple[Facts, Tables]:
         if "vary" in keys:
             return sweep_file(path)
         return _card(file) if "mount" in keys else _scenario(file)
+    from cosim.system.scenario import shipped_scenarios
+
+    if file in shipped_scenarios():
+        return _scenario(file)
     from pyfmi_models.card import shipped_cards
 
     if file in shipped_cards():
@@ -296,7 +265,6 @@ def _scenario(file: str) -> tuple[Facts, Tables]:
 
 def _card(file: str) -> tuple[Facts, Tables]:
     from cosim.fmi.domain import KEY, domains_of
-    from cosim.models.maps import curves, maps_of
     from pyfmi_models.card import read_card
 
     card = read_card(file)
@@ -316,5 +284,12 @@ def _card(file: str) -> tuple[Facts, Tables]:
         {"parameter": v.name, "value": f"{v.start:.6g}", "unit": v.unit, "description": v.description}
         for v in model.parameters
     ]
-    drawn = curves(maps_of(card))
+    drawn = _maps(card) if card.effects else []
     return facts, {"parameters": parameters} | ({"learned maps": drawn} if drawn else {})
+
+
+def _maps(card: "Card") -> list[dict[str, Json]]:
+    """Return the learned terms of a card as curves of text."""
+    from cosim.models.maps import curves, maps_of
+
+    return curves(maps_of(card))

@@ -3,11 +3,13 @@
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from cosim.plots.sweep import Results, read_results
 from cosim.support.errors import InputError
 from cosim.support.plain import Json, Parsed
+
+if TYPE_CHECKING:
+    from cosim.plots.sweep import Results
 
 Told = tuple[dict[str, Json], dict[str, Sequence[Mapping[str, Json]]]]
 DIAGNOSIS, RUN, TABLE = "diagnosis.json", "run.json", "table.parquet"
@@ -106,6 +108,8 @@ def _is_sweep(path: Path) -> bool:
 def _sweep(path: Path) -> Told:
     if not _is_sweep(path):
         raise InputError(f"{path} is no table of a sweep.", culprit=str(path))
+    from cosim.plots.sweep import read_results
+
     results = read_results(path)
     facts: dict[str, Json] = {"sweep": results.title, "table": str(path)}
     if row := results.best_row():
@@ -115,7 +119,7 @@ def _sweep(path: Path) -> Told:
     return facts, {"runs, the best first": _ranked(results)}
 
 
-def _ranked(results: Results) -> list[Mapping[str, Json]]:
+def _ranked(results: "Results") -> list[Mapping[str, Json]]:
     import numpy as np
 
     columns = {**results.varied, **results.statistics}

@@ -10,7 +10,6 @@ import typer
 
 from cosim.cli.complete import cards
 from cosim.cli.options import Cluster, Columns, Force, Layout, Out, Units, command_of, default_out, results
-from cosim.reading import pairs_of, read_recordings
 from cosim.support.memory import keep_freed_memory
 from cosim.support.terminal import put, put_json, say, stage
 
@@ -101,6 +100,7 @@ class One(NamedTuple):
 def _found(one: One, variables: list[str] | None) -> "DiagnosisResult":
     """Read, diagnose and write, and show how it goes."""
     from cosim.api.diagnose import diagnose as find
+    from cosim.reading import pairs_of
 
     keep_freed_memory()
     quick, motion = bool(one.options["--quick"]), str(one.options["--motion"])
@@ -174,6 +174,7 @@ def _all(machines: "list[Machine]", how: Together, options: dict[str, object], v
     """Diagnose machine by machine; print a line of each as it comes."""
     from cosim.api.folder import diagnose_folder
     from cosim.api.machines import MachineResult
+    from cosim.reading import pairs_of
 
     say(f"{len(machines)} machines: {', '.join(one.name for one in machines)}")
     began, fresh = time.monotonic(), 0
@@ -221,6 +222,7 @@ def _read(
     train: list[Path], heldout: list[Path], card: str, motion: str, options: tuple[list[str] | None, ...]
 ) -> "tuple[Card | None, list[Recording]]":
     """Read the card, if one is given, and all recordings."""
+    from cosim.reading import read_recordings
     from pyfmi_models.card import read_card
 
     believed = read_card(card) if card else None

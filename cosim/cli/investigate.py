@@ -10,7 +10,6 @@ import typer
 from cosim.cli.complete import cards, scenarios
 from cosim.cli.drive import KeyOption, machine_of
 from cosim.cli.options import Force, Out, command_of, default_out
-from cosim.reading import pairs_of
 from cosim.support.errors import InputError
 from cosim.support.terminal import put, put_json, say, stage
 
@@ -45,6 +44,7 @@ def investigate(
     from cosim.api.investigate import investigate as ask
     from cosim.investigation.log import PAGE
     from cosim.investigation.story import line_of
+    from cosim.reading import pairs_of
 
     words = {"--card": card, "--out": out, "--machine": machine, "--drive": drive, "--key": key, "--move": move}
     words |= {"--budget": budget, "--seconds": seconds, "--limits": limits, "--train": train, "--heldout": heldout}

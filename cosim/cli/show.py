@@ -35,9 +35,8 @@ def show(
     """Show a recording and the options to use it with, an FMU, a scenario or a card."""
     from cosim.api.show import WIRES
     from cosim.api.show import show as shown_of
-    from cosim.reading import options_of
 
-    options = options_of(Path(file), columns, units, layout)
+    options = _options(Path(file), {"columns": columns, "units": units, "layout": layout})
     shown = shown_of(file, **options, picture=out, schedule=schedule, force=force)
     if as_json:
         put_json({**shown.facts, **shown.tables})
@@ -52,6 +51,15 @@ def show(
             sys.stdout.write(_plain(name, table) + "\n")
         else:
             console.print(_table(name, table))
+
+
+def _options(path: Path, given: Mapping[str, list[str] | None]) -> dict[str, dict[str, str]]:
+    """Return what the options say of the file; what reads recordings is loaded only where they say something."""
+    if not any(given.values()):
+        return {}
+    from cosim.reading import options_of
+
+    return options_of(path, **given)
 
 
 def _plain(title: str, rows: Sequence[Mapping[str, Json]]) -> str:
