@@ -14,13 +14,15 @@ from pyfmi_models.mount import Mount
 
 Array = npt.NDArray[np.float64]
 Noise = Callable[[Array, float], float]
+Motion = tuple[Array, Array, Array]
+"""Position, speed and acceleration at the same rows."""
 STILL = 10.0
 """Times the RMS noise, or the step, of its reading that a neighbour must move from end to end: what stands still is
 within 6 as good as always."""
-ALONE = 0.02
-"""Share of the energy of a neighbour's position and of its acceleration that must not follow the axis' own motion: one
-that does is the axis itself in other units, its set point, or moves in proportion to it, and then nothing tells them
-apart."""
+ALONE = 1e-3
+"""Share of the energy of a neighbour's position and of its acceleration that must not follow the axis' own: 3 % of its
+motion. What follows is the axis itself in other units or through a second encoder (whose twist, play and lag are less
+than that), its set point, or an axis that moves in proportion to it, and then nothing tells their torques apart."""
 
 
 def key(name: str, kind: str) -> str:
@@ -68,9 +70,10 @@ def moving(
     return frozenset(names)
 
 
-def is_alone(own: Array, position: Array, acceleration: Array) -> bool:
-    """Whether a neighbour moves by itself: neither its position nor its acceleration follows `own`, (rows, columns)."""
-    return all(_left(own, column) > ALONE for column in (position, acceleration))
+def is_alone(own: Motion, other: Motion) -> bool:
+    """Whether a neighbour moves by itself: its position does not follow the axis, even late, nor its acceleration."""
+    (q, v, a), (position, _, acceleration) = own, other
+    return _left(np.column_stack([q, v]), position) > ALONE and _left(a[:, None], acceleration) > ALONE
 
 
 def _left(own: Array, column: Array) -> float:

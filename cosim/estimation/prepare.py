@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from cosim.data.neighbours import Neighbour, neighbours
+from cosim.data.neighbours import KINDS, Neighbour, neighbours
 from cosim.data.recording import GAP, Gap, Recording
 from cosim.data.resolution import resolution
 from cosim.estimation.filters import EDGE, derivative, gain, highpass, lowpass, passes_of
@@ -149,14 +149,17 @@ class Prepared:
     @cached_property
     def neighbours(self) -> tuple[Neighbour, ...]:
         """Those of them that move, and by themselves."""
-        own = np.column_stack([self.stacked(name) for name in ("q", "v", "a")]) if self.neighbours_recorded else None
-        return tuple(
-            one
-            for one in self.neighbours_recorded
-            if own is not None
-            and any(one.name in piece.moving for piece in self.pieces)
-            and is_alone(own, *(self.of_neighbour(key(one.name, kind)) for kind in ("position", "acceleration")))
+        return tuple(one for one in self.neighbours_recorded if self._moves(one))
+
+    def _moves(self, one: Neighbour) -> bool:
+        own, other = (
+            (signal(names[0]), signal(names[1]), signal(names[2]))
+            for signal, names in (
+                (self.stacked, ("q", "v", "a")),
+                (self.of_neighbour, [key(one.name, kind) for kind in KINDS]),
+            )
         )
+        return any(one.name in piece.moving for piece in self.pieces) and is_alone(own, other)
 
     def of_neighbour(self, name: str) -> Array:
         """A signal of a neighbour of all pieces at the kept rows."""
@@ -208,10 +211,9 @@ def prepare(recordings: Sequence[Recording], band: float | Band) -> Prepared:
 
 
 def _neighbours(recordings: Sequence[Recording]) -> tuple[Neighbour, ...]:
-    """Neighbouring axes of which all recordings have the same columns."""
-    whole = [[name for name in one.columns if np.isfinite(one[name]).all()] for one in recordings]
-    found = [neighbours(names, one.units) for names, one in zip(whole, recordings, strict=True)]
-    return tuple(one for one in found[0] if all(one in others for others in found[1:]))
+    """Neighbouring axes of which all recordings have columns, without gaps."""
+    whole = [{name for name in one.columns if np.isfinite(one[name]).all()} for one in recordings]
+    return neighbours(set.intersection(*whole), recordings[0].units)
 
 
 def quality(recording: Recording, cutoff: float) -> tuple[str, ...]:

@@ -1,6 +1,6 @@
 """A neighbouring axis whose motion was recorded acts on this one."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from math import atan2, hypot, pi
 from typing import ClassVar
 
@@ -10,17 +10,20 @@ from cosim.data.neighbours import Neighbour
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach
 from cosim.diagnosis.effects.candidates import Candidate, Span, has
-from cosim.diagnosis.effects.tuning import refound
+from cosim.diagnosis.effects.tuning import restarted
 from cosim.estimation.fit import Fit
 from cosim.estimation.neighbours import key
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
+from cosim.support.statistics import column_rms
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.axis_coupling import AxisCoupling, DampedCoupling, WeightCoupling
 from pyfmi_models.mount import Mount
 
 FOLLOWS = (1.0, 0.0)
 """Whether a weight turns with this axis too, or with the neighbour alone."""
+LEAST_MORE = 5.0
+"""Nats that a damping or a weight must have beside the inertia: odds of 150 to 1."""
 
 
 class NeighbouringAxis(Hypothesis[AxisCoupling]):
@@ -40,16 +43,25 @@ class NeighbouringAxis(Hypothesis[AxisCoupling]):
             yield from _moved_by(one, mount)
 
     def tuned(self, problem: Problem, found: Fit, start: AxisCoupling, evidence: Evidence) -> Fit:
-        """Beside an inertia that was found a damping or a weight, where that has evidence."""
-        coupling = found.mount.effects[-1]
-        if type(start) is not AxisCoupling or type(coupling) is not AxisCoupling:
-            return found
-        inertia, name = float(coupling.inertia), coupling.neighbour
-        others: list[Effect] = [DampedCoupling(inertia=inertia, damping=0.0, neighbour=name)]
-        one = next((one for one in problem.prepared.neighbours if one.name == name), None)
-        if one and _both_turn(one, found.mount):
-            others += [_weight_left(problem, found, name, inertia, follows) for follows in FOLLOWS]
-        return refound(problem, found, evidence, others)
+        """The simplest form that explains it: a damping or a weight only where it has evidence beside the inertia."""
+        one = next((one for one in problem.prepared.neighbours if one.name == start.neighbour), None)
+        fits = {type(start): found}
+        inertia = AxisCoupling(inertia=found.parameters()[f"{start.id}.inertia"], neighbour=start.neighbour)
+        if AxisCoupling not in fits:
+            fits[AxisCoupling] = restarted(problem, found, inertia)
+        else:
+            drag = DampedCoupling(inertia=inertia.inertia, damping=0.0, neighbour=start.neighbour)
+            fits[DampedCoupling] = restarted(problem, found, drag)
+            if one and _both_turn(one, found.mount):
+                loads = [_weight_left(problem, found, inertia, follows) for follows in FOLLOWS]
+                fits[WeightCoupling] = max((restarted(problem, found, load) for load in loads), key=evidence)
+        told = {form: evidence(fit) for form, fit in fits.items()}
+        simplest = [form for form in self.forms if form in told and told[form] >= max(told.values()) - LEAST_MORE]
+        return fits[simplest[0]]
+
+    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
+        """An inertia coupling to each neighbour: what its size counts in is not what a weight counts in."""
+        return [one for one in tried if type(one.instances[0]) is AxisCoupling]
 
     def where(self, effect: AxisCoupling, reach: Reach) -> Where:
         """Wherever the neighbour moves."""
@@ -93,16 +105,15 @@ def _both_turn(one: Neighbour, mount: Mount) -> bool:
     return mount.motion == "rotary" and one.turns and bool(one.position)
 
 
-def _weight_left(problem: Problem, found: Fit, name: str, inertia: float, follows: float) -> Effect:
+def _weight_left(problem: Problem, found: Fit, coupling: AxisCoupling, follows: float) -> Effect:
     """A weight on both axes as large as what an inertia leaves says."""
-    prepared = problem.prepared
+    prepared, name = problem.prepared, coupling.neighbour
     angle = follows * prepared.stacked("q") + prepared.of_neighbour(key(name, "position"))
     columns = np.column_stack([np.sin(angle), np.cos(angle), found.slopes]) * problem.weight[:, None]
-    size = np.sqrt((columns**2).sum(0)) + 1e-300
+    size = column_rms(columns) + 1e-300
     c = np.linalg.lstsq(columns / size, found.residual * problem.weight, rcond=1e-9)[0] / size
-    sine, cosine = float(c[0]), float(c[1])
-    size_left = max(hypot(sine, cosine), 1e-9)
-    return WeightCoupling(inertia=inertia, weight=size_left, phase=atan2(cosine, sine), follows=follows, neighbour=name)
+    load, phase = max(hypot(c[0], c[1]), 1e-9), atan2(c[1], c[0])
+    return WeightCoupling(inertia=coupling.inertia, weight=load, phase=phase, follows=follows, neighbour=name)
 
 
 def _listed(several: Sequence[Neighbour]) -> str:
