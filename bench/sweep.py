@@ -95,7 +95,8 @@ def ratio(slow: list[float], fast: list[float]) -> dict[str, Any]:
 def swept(folder: Path, runs: int, seed: int, workers: int | None = None, address: str = "") -> float:
     """Return the seconds of a whole sweep into a folder of its own; a run that fails is no measurement."""
     from cosim.models.cache import with_fmus
-    from cosim.sweeps import conduct, read_sweep
+    from cosim.sweeps.conduct import conduct
+    from cosim.sweeps.file import read_sweep
     from cosim.system.scenario import read_scenario
 
     file = folder / "sweep.toml"

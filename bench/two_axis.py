@@ -23,7 +23,8 @@ from cosim.data.signals import Slews
 from cosim.data.star import SIDEREAL_RATE
 from cosim.master.simulate import run
 from cosim.models.cache import with_fmus
-from cosim.sweeps import conduct, read_sweep
+from cosim.sweeps.conduct import conduct
+from cosim.sweeps.file import read_sweep
 from cosim.system.scenario import Scenario, read_scenario
 
 COMMAND = "python bench/two_axis.py --out results/two_axis"

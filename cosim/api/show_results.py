@@ -132,7 +132,7 @@ def _ranked(results: "Results") -> list[Mapping[str, Json]]:
 
 def sweep_file(path: Path) -> Told:
     """Return what a sweep file asks for."""
-    from cosim.sweeps import read_sweep
+    from cosim.sweeps.file import read_sweep
 
     wanted = read_sweep(path)
     facts: dict[str, Json] = {

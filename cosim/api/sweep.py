@@ -9,7 +9,8 @@ from cosim.models.cache import with_fmus
 from cosim.plots.sweep import Results, draw, read_results
 from cosim.support.html import facts
 from cosim.support.notebook import shows_progress
-from cosim.sweeps import Summary, conduct, read_sweep
+from cosim.sweeps.conduct import Summary, conduct
+from cosim.sweeps.file import read_sweep
 from cosim.system.scenario import read_scenario
 
 PICTURE = "sweep.svg"

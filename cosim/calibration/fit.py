@@ -28,6 +28,8 @@ TRIED = 8
 EVALUATIONS = 60
 """Evaluations of one start; derivatives come on top."""
 TOLERANCE = 1e-8
+ROUGH = 1e-4
+"""Tolerance of a first look, where weights are found after it and the fit goes on with them."""
 AGREE = 1e-3
 """Share by which the sums of two starts may differ to have found the same minimum."""
 ROUNDS = 3
@@ -78,13 +80,16 @@ def fit(residuals: Residuals, x: Array, starts: int, seed: int, loss: Loss, say:
     residuals.weights = 1 / spread
     z = residuals.at(x)
     residuals.bad = BAD * max(float(np.sqrt(np.mean(z**2))), 1.0)
+    residuals.quick = len(spread) > 1
+    first = ROUGH if residuals.quick else TOLERANCE
     found: list[tuple[float, Array]] = []
     for k, one in enumerate(_starts(residuals, x, starts, seed)):
         say(f"start {k + 1} of {starts}")
-        found.append(_minimum(residuals, one, loss, _outlier(z, loss)))
+        found.append(_minimum(residuals, one, loss, _outlier(z, loss), first))
         if _agreeing(found) > 1:
             break
     best = min(found, key=lambda pair: pair[0])[1]
+    residuals.quick = False
     agreeing = _agreeing(found)
     residuals.settle(best)
     best, outlier = _weighted(residuals, best, loss, say)
@@ -112,7 +117,9 @@ def _weighted(residuals: Residuals, best: Array, loss: Loss, say: Callable[[str]
     return best, outlier
 
 
-def _minimum(residuals: Residuals, x: Array, loss: Loss, outlier: float) -> tuple[float, Array]:
+def _minimum(
+    residuals: Residuals, x: Array, loss: Loss, outlier: float, tolerance: float = TOLERANCE
+) -> tuple[float, Array]:
     low = np.array([one.low for one in residuals.free]) / residuals.scales
     high = np.array([one.high for one in residuals.free]) / residuals.scales
     edge = np.where(np.isfinite(high - low), 1e-9 * (high - low), 1e-9)
@@ -127,8 +134,8 @@ def _minimum(residuals: Residuals, x: Array, loss: Loss, outlier: float) -> tupl
         x_scale="jac",
         loss=loss,
         f_scale=outlier,
-        ftol=TOLERANCE,
-        xtol=TOLERANCE,
+        ftol=tolerance,
+        xtol=tolerance,
         gtol=1e-12,
         max_nfev=EVALUATIONS,
     )

@@ -92,6 +92,8 @@ class Residuals:
         self.steps = FIRST * np.ones(len(self.free))
         self.least = LEAST * np.ones(len(self.free))
         self.stairs = False
+        self.quick = False
+        """Whether differences are one-sided: half as dear, good enough to come near a minimum."""
         self.rough: tuple[str, ...] = ()
         self.groups = groups_of(self.free)
         """Numbers that one simulation moves together."""
@@ -148,8 +150,10 @@ class Residuals:
         """Find for each number the widest step near a point over which the model is as good as linear.
 
         Slopes over a step and over a quarter of it agree there, or at narrower steps differ more. Where they agree, a
-        central difference over the quarter is wrong by a sixteenth of that. `rough` are numbers for which no two steps
-        agree; `stairs` says that the smallest steps see other slopes: a staircase around a smooth course.
+        central difference over the quarter is wrong by a sixteenth of that. Where the smallest steps see the same
+        slopes, these are taken: what two numbers that act only as a product leave must be far below noise. `rough` are
+        numbers for which no two steps agree; `stairs` says that the smallest steps see other slopes: a staircase around
+        a smooth course.
         """
         steps = MOST * np.ones(len(self.free))
         wide, here = self._differences(x, steps)
@@ -165,9 +169,10 @@ class Residuals:
             steps, wide = np.where(worse, steps, narrow), np.where(worse, wide, fine)
             agree |= worse | (gap <= AGREE)
             before = gap
-        self.least = steps
         fine = self._differences(x, np.minimum(floor, steps))[0]
-        self.stairs = bool(np.any(agree & (_apart(fine, wide) > STAIRS)))
+        gap = _apart(fine, wide)
+        self.least = np.where(agree & (gap <= AGREE), np.minimum(floor, steps), steps)
+        self.stairs = bool(np.any(agree & (gap > STAIRS)))
         self.rough = tuple(one.name for one, is_smooth in zip(self.free, agree, strict=True) if not is_smooth)
 
     def _differences(self, x: Array, steps: Array) -> tuple[Array, Array | None]:
@@ -176,8 +181,9 @@ class Residuals:
         low = np.array([one.low for one in self.free]) / self.scales
         high = np.array([one.high for one in self.free]) / self.scales
         up, down = np.minimum(x + steps * size, high), np.maximum(x - steps * size, low)
-        points = [_moved(x, group, values) for values in (up, down) for group in self.groups]
+        points = [_moved(x, group, values) for values in ((up,) if self.quick else (up, down)) for group in self.groups]
         here, *found = self.simulated([x, *points])
+        found += [None] * (2 * len(self.groups) - len(points))
         columns, weights = np.zeros((len(self.rows.measured), len(x))), self.weights[self.rows.output]
         for group, above, below in zip(self.groups, found, found[len(self.groups) :], strict=False):
             for k in group:

@@ -28,7 +28,7 @@ def sweep(
     """Run a scenario many times; write DIR/table.parquet, a row a run, and DIR/sweep.svg, its picture."""
     out = out or default_out(file.stem)
     from cosim.api.sweep import sweep as conduct
-    from cosim.sweeps import read_sweep
+    from cosim.sweeps.file import read_sweep
 
     title = f"{file.stem}: {read_sweep(file).design.runs:,} runs"
     command = command_of("sweep", [file], {"--out": out, "--cluster": cluster})

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim.experiments.experiment_file import CSV, KINDS, Experiment, experiments_in
+from cosim.experiments.experiment_file import CSV, KINDS, Experiment, experiments_in, only
 from cosim.experiments.run import MODEL, Outcome, run_experiment, settings_of, system_of
 from cosim.fmi.description import describe, first_line
 from cosim.fmi.manifest import Manifest, manifest_of
@@ -97,6 +97,9 @@ def _experiments(path: Path, manifest: Manifest | None) -> list[Experiment]:
             found.append(Experiment(name, one.description, not_run=not_run))
         elif one.role == "result" and one.kind == CSV and not brings:
             found.append(Experiment(DEFAULT, one.description, "result", references=one.member))
+        elif one.role == "result" and not brings:
+            not_run = f"{one.member.rpartition('/')[2]} is of type {one.kind}{only(CSV)}"
+            found.append(Experiment(DEFAULT, one.description, "result", not_run=not_run))
     return found
 
 

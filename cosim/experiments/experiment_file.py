@@ -71,7 +71,7 @@ def _experiment(path: Path, member: str, element: ElementTree.Element, purpose: 
             continue
         files[tag] = member_of(member, part.get("source", ""))
         if part.get("type", kind) != kind:
-            not_run = not_run or f"its {tag} are of type {part.get('type')}, and only {kind} is read here"
+            not_run = not_run or f"its {tag} are of type {part.get('type')}{only(kind)}"
         elif not files[tag]:
             not_run = not_run or f'its {tag} lie elsewhere ("{part.get("source")}")'
     times = {
@@ -90,6 +90,12 @@ def _experiment(path: Path, member: str, element: ElementTree.Element, purpose: 
         references=files.get("References", ""),
         not_run=not_run,
     )
+
+
+def only(kind: str) -> str:
+    """The end of a sentence on a file of another kind: what is read, and what helps."""
+    advice = '; a table with the first column "time", as CSV in its place, is run' if kind == CSV else ""
+    return f", and only {kind} is read here{advice}"
 
 
 def _number(path: Path, member: str, name: str, key: str, found: dict[str, str]) -> float | None:

@@ -21,6 +21,8 @@ from cosim.support.errors import FmuError
 
 Array = npt.NDArray[np.float64]
 TIME = "time"
+HEAD = 512
+"""Bytes among which a binary file has a zero."""
 _TRUTHS = {"true": 1.0, "false": 0.0}
 
 
@@ -40,7 +42,11 @@ def series_of(path: Path, member: str, ports: Mapping[str, Port]) -> Series:
     Raises:
         FmuError: it is not there, has no time that grows, or a cell is no value of its variable.
     """
-    text = read(path, member, complaint_of(path)).decode("utf-8-sig", "replace")
+    content = read(path, member, complaint_of(path))
+    if b"\0" in content[:HEAD]:
+        rule = 'a table as text, with the first column "time", is read in its place'
+        raise FmuError(f"{path}: {member} is no CSV but binary ({_kind(content)}); {rule}.", culprit=member)
+    text = content.decode("utf-8-sig", "replace")
     rows = [row for row in csv.reader(StringIO(text)) if row]
     if len(rows) < 2 or rows[0][0].strip().lower() != TIME:
         raise FmuError(f'{path}: {member} is no time series: its first column must be "time".', culprit=member)
@@ -66,6 +72,10 @@ def series_of(path: Path, member: str, ports: Mapping[str, Port]) -> Series:
         else:
             numbers[name] = _numbers(path, member, name, columns[name])
     return Series(times, numbers, texts, tuple(name for name in names[1:] if name not in ports))
+
+
+def _kind(content: bytes) -> str:
+    return "HDF5" if content.startswith(b"\x89HDF") else "of no known kind"
 
 
 def _elements(path: Path, member: str, port: Port, cells: list[str]) -> dict[str, Array]:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from cosim.data.signals import Constant, Samples
-from cosim.fmi.description import describe
+from cosim.fmi.description import INTERFACES, describe
 from cosim.fmi.fmu import FmuComponent
 from cosim.fmi.settings import STRUCTURAL, Setting
 from cosim.fmi.types import function_of
@@ -139,7 +139,7 @@ def _check_sources(system: System) -> None:
         if isinstance(source, Function):
             raise _refused(system, f'the component "{name}" is a Python function; export it as an FMU first')
         if isinstance(source, Fmu) and source.interface not in ("", "co-simulation"):
-            raise _refused(system, f'the component "{name}" is stepped by {source.interface}; only co-simulation is')
+            raise _refused(system, f'the component "{name}" is stepped by {source.interface}, {_ADVICE}')
     if system.start:
         raise _refused(system, f"it starts at {system.start:g} s, and an FMU of a system starts at 0 s")
 
@@ -149,9 +149,17 @@ def _check_plan(plan: Plan) -> None:
         if isinstance(part.component, TypedComponent) or plan.pool is not None:
             raise _refused(plan, f'wires or records of "{part.name}" carry other values than doubles')
         if type(_plain(part)) is not FmuComponent:
-            raise _refused(plan, f'the component "{part.name}" has no co-simulation')
+            raise _refused(plan, f'the component "{part.name}" is stepped by {word_of(part)}, {_ADVICE}')
         if any(link.breaks_loop for link in part.links):
             raise _refused(plan, f'a wire to "{part.name}" breaks a ring of values at the start (breaks_loop)')
+
+
+_ADVICE = "and only co-simulation can be nested: leave `interface` out where its FMU has both, else export it for that"
+
+
+def word_of(part: Part) -> str:
+    """What a part is stepped by."""
+    return INTERFACES.get(str(getattr(_plain(part), "interface", "")), "another interface")
 
 
 def _refused(system: System | Plan, why: str) -> WiringError:

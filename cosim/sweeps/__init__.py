@@ -11,8 +11,3 @@
 
 A run that fails, gives no finite number, crashes its process or takes too long is a row with its reason.
 """
-
-from cosim.sweeps.conduct import Summary, conduct
-from cosim.sweeps.file import Sweep, read_sweep
-
-__all__ = ["Summary", "Sweep", "conduct", "read_sweep"]

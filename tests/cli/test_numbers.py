@@ -15,7 +15,7 @@ from cosim.data.signals import Samples, Slews, Stream
 from cosim.hardware.machine import parse_machine
 from cosim.support.errors import HardwareError, ScenarioError, SignalError, SweepError
 from cosim.support.numbers import shown
-from cosim.sweeps import read_sweep
+from cosim.sweeps.file import read_sweep
 from cosim.system.scenario import parse_scenario
 from pyfmi_models.card import parse_card
 from pyfmi_models.errors import CardError

@@ -11,7 +11,8 @@ import pytest
 from cosim.cli import main
 from cosim.master.simulate import run
 from cosim.models.cache import with_fmus
-from cosim.sweeps import conduct, read_sweep
+from cosim.sweeps.conduct import conduct
+from cosim.sweeps.file import read_sweep
 from cosim.system.diagram import draw
 from cosim.system.scenario import read_scenario
 

@@ -130,6 +130,20 @@ def test_a_reference_outside_the_experiment_and_files_that_are_not_there_are_sen
     assert not cosim.check(fmu).passed
 
 
+def test_references_in_hdf5_are_refused_with_what_to_do(folder, made):
+    files = bundle(**made)
+    files["a.exp"] = experiments().replace("<References", '<References type="application/x-hdf"')
+    said = str(cosim.check(with_files(motor(folder, 3), folder / "typed.fmu", files)))
+    assert "its References are of type application/x-hdf, and only text/csv is read here; a table with" in said
+    files = bundle(**made) | {"test-ref.csv": "\x89HDF\0\0"}
+    done = cosim.check(with_files(motor(folder, 3), folder / "hidden.fmu", files))
+    assert not done.passed
+    assert "test-ref.csv is no CSV but binary" in str(done)
+    listed = {"fmi-ls-manifest.xml": manifest(("application/x-hdf", "r.h5", "result")), "r.h5": "x"}
+    said = str(cosim.check(with_files(motor(folder, 3), folder / "result.fmu", listed)))
+    assert "r.h5 is of type application/x-hdf, and only text/csv is read here" in said
+
+
 def test_an_fmu_without_experiments_runs_its_default_experiment(folder, capsys):
     assert verb("check", motor(folder, 2)) == 0
     said = capsys.readouterr().out

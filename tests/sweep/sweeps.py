@@ -7,7 +7,8 @@ import pandas as pd
 import pytest
 from tiny_fmu import tiny
 
-from cosim.sweeps import Summary, conduct, read_sweep
+from cosim.sweeps.conduct import Summary, conduct
+from cosim.sweeps.file import read_sweep
 from cosim.system.scenario import Scenario, read_scenario
 
 __all__ = ["tiny"]

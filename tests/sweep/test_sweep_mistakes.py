@@ -9,7 +9,7 @@ from sweeps import SCENARIO, K, R, folder, run, written
 from tiny_fmu import tiny
 
 from cosim.support.errors import FmuError, SweepError, WiringError
-from cosim.sweeps import read_sweep
+from cosim.sweeps.file import read_sweep
 
 __all__ = ["folder", "tiny"]
 

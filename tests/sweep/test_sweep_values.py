@@ -11,7 +11,7 @@ from sweeps import K, folder, written
 from tiny_fmu import tiny
 
 from cosim.data.recording import Recording
-from cosim.sweeps import read_sweep
+from cosim.sweeps.file import read_sweep
 from cosim.sweeps.statistics import KINDS, Statistic
 from cosim.sweeps.variation import Normal, Range, Values, Variation
 
