@@ -1,6 +1,6 @@
 """What an archive costs: its size, the time to build it for all platforms, to load it in a tool and to step it once.
 
-python bench/archive.py --out results/archive
+python bench/archive.py --out results/exchange
 """
 
 import argparse
@@ -36,7 +36,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         text = [*head(), *building(Path(folder)), *sizes(Path(folder)), *loading(Path(folder))]
     out.mkdir(parents=True, exist_ok=True)
-    (out / "README.md").write_text("\n".join(text) + "\n", "utf-8")
+    (out / "archive.md").write_text("\n".join(text) + "\n", "utf-8")
     print("\n".join(text))
 
 
@@ -44,7 +44,7 @@ def head() -> list[str]:
     return [
         "# What an archive costs",
         "",
-        "    python bench/archive.py --out results/archive",
+        "    python bench/archive.py --out results/exchange",
         "",
         f"mount-cosim {cosim.__version__}, ziglang {version('ziglang')}; the plant of `paper_mount`.",
         f"{platform.machine()}, {os.cpu_count()} cores shared with others, so times are rough; medians of {ROUNDS}.",

@@ -1,6 +1,6 @@
 """Spoilt files, numbers and requests of every kind: what is it that a user sees, and what is left?
 
-    python bench/attack.py --seed 1 --out results/attack [--count 5200] [--journal FILE --seconds 250]
+    python bench/attack.py --seed 1 --out results/robustness [--count 5200] [--journal FILE --seconds 250]
 
 Each mutation runs in a forked process with limits of time and memory (attack_worker.py) and ends in one of these ways:
 
@@ -164,10 +164,10 @@ def page(found: list[Found], seed: int, asked: int) -> str:
     lines = [
         "# Spoilt files, numbers and requests against the command line, the page and the servers",
         "",
-        f"    python bench/attack.py --seed {seed} --count {asked} --out results/attack",
+        f"    python bench/attack.py --seed {seed} --count {asked} --out results/robustness",
         "",
         f"mount-cosim {__version__} at {commit()}; {len(found):,} mutations of {asked:,} asked for, {defects} defects. "
-        "The top of `bench/attack.py` says what the columns mean; `defects.json` has what was said in each. "
+        "The top of `bench/attack.py` says what the columns mean; `attack.json` has what was said in each. "
         "Seconds are those of the clock, on a computer with other work. Memory is that of all processes of an attack "
         "for themselves together, looked at ten times a second; - where it was not looked at.",
         "",
@@ -236,12 +236,12 @@ def _worker(targets: list[Target], given: argparse.Namespace, journal: Path, num
 
 
 def written(found: list[Found], seed: int, asked: int, out: Path) -> None:
-    """Write README.md and defects.json."""
+    """Write attack.md and attack.json."""
     out.mkdir(parents=True, exist_ok=True)
     defects = [vars(one) for one in found if one.end in DEFECTS]
     for name, text in (
-        ("README.md", page(found, seed, asked)),
-        ("defects.json", json.dumps(defects, indent=1) + "\n"),
+        ("attack.md", page(found, seed, asked)),
+        ("attack.json", json.dumps(defects, indent=1) + "\n"),
     ):
         with replacing(out / name, force=True) as partial:
             partial.write_text(text, "utf-8")

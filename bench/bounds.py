@@ -1,13 +1,13 @@
 """Bounds of what was not seen, tested: an effect of just that size is concealed anew, and must be found.
 
-    python bench/bounds.py --cases 4 --seed 7100 --out results/bounds
+    python bench/bounds.py --cases 4 --seed 7100 --out results/proof
 
 Fresh cases of the home generator without a gap (their truth is not the card's friction law), every other one a mount,
 the rest machines of any class with cards of any law. For each effect with a bound, the torque that an effect of that
 size adds along the recorded motion, by the plant's own equations, is added to the recorded torque; sign, phase and
 cycles are drawn within what the bound says it holds for. Then the recordings are prepared, the base is refitted, the
 effect's candidates are screened and the best is refitted: it is found if it is admissible and has the evidence that
-the search asks for. Writes table.csv and README.md.
+the search asks for. Writes bounds.csv and bounds.md.
 """
 
 import argparse
@@ -158,7 +158,7 @@ def page(found: Sequence[dict[str, Any]], given: argparse.Namespace, seconds: fl
         [
             "# Bounds of what was not seen: concealed at the bound, found?",
             "",
-            f"    python bench/bounds.py --cases {given.cases} --seed {given.seed} --out results/bounds",
+            f"    python bench/bounds.py --cases {given.cases} --seed {given.seed} --out results/proof",
             "",
             f"mount-cosim {__version__}, {seconds:.0f} s. Found: {hits} of {len(found)}, {hits / len(found):.2f} "
             f"({low:.2f} to {high:.2f}); the bar of {BAR:g} is {held}.",
@@ -188,11 +188,11 @@ def main() -> None:
             print(*row.values(), file=sys.stderr, flush=True)
             found.append(row)
     given.out.mkdir(parents=True, exist_ok=True)
-    with (given.out / "table.csv").open("w", newline="") as file:
+    with (given.out / "bounds.csv").open("w", newline="") as file:
         table = csv.DictWriter(file, list(found[0]))
         table.writeheader()
         table.writerows(found)
-    (given.out / "README.md").write_text(page(found, given, time.process_time() - started), "utf-8")
+    (given.out / "bounds.md").write_text(page(found, given, time.process_time() - started), "utf-8")
 
 
 if __name__ == "__main__":

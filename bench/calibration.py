@@ -1,6 +1,6 @@
 """Fit the curve of `cosim/diagnosis/decide/calibration.py` to decks that were played with known truth.
 
-python bench/calibration.py DECK/proof.json ... --played 0 1 --out results/calibration
+python bench/calibration.py DECK/proof.json ... --played 0 1 --out results/abroad
 
 `--played` are offset and slope of the package that played the decks: their printed probabilities are turned back into
 shares of the evidence. The decks must be others than the one that is scored. Prints the two numbers to write into the
@@ -39,7 +39,7 @@ def main() -> None:
     print(text)
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
-        (options.out / "README.md").write_text(text, "utf-8")
+        (options.out / "calibration.md").write_text(text, "utf-8")
 
 
 def share_of(probability: float, offset: float = OFFSET, slope: float = SLOPE) -> float:
@@ -87,7 +87,7 @@ def page(decks: list[dict[str, Any]], was: tuple[float, float]) -> str:
         "# Probabilities that come true",
         "",
         *(f"    cosim prove --cases {len(deck['rows'])} --seed {deck['seed']} --out DECK" for deck in decks),
-        f"    python bench/calibration.py DECK/proof.json --played {was[0]:g} {was[1]:g} --out results/calibration",
+        f"    python bench/calibration.py DECK/proof.json --played {was[0]:g} {was[1]:g} --out results/abroad",
         "",
         f"mount-cosim {cosim.__version__}. Decks of `cosim prove`: {played}; {len(pairs)} probabilities in "
         f"{len(cases)} cases. The package has offset {OFFSET}, slope {SLOPE}; these decks ask for:",

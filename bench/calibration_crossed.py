@@ -1,6 +1,6 @@
 """Whether printed probabilities of one world come true when their curve is fitted in the other.
 
-python bench/calibration_crossed.py ABROAD.json PROOF.json --out results/calibration
+python bench/calibration_crossed.py ABROAD.json PROOF.json --out results/abroad
 
 Of each deck Platt's curve is fitted to what was printed (offset 0, slope 1 leaves it as it is) and judges the other
 deck: expected calibration error of 10 bins, with a bootstrap over cases. Writes crossed.md.

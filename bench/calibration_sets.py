@@ -1,6 +1,6 @@
 """How much of a margin counts between members of a set, and what is left of a doubtful name beside something unknown.
 
-python bench/calibration_sets.py COMMIT:results/proof/proof.json ... --out results/calibration
+python bench/calibration_sets.py COMMIT:results/proof/proof.json ... --out results/abroad
 
 Each is the `proof.json` of `cosim prove` or the `abroad.json` of `abroad.py` of a commit of this project, of decks that
 are not scored any more; `--played` and `--kept` are `margin_within_set` and `true_beside_unknown` of the package that

@@ -1,6 +1,6 @@
 """The two-mass mount split into motor side and load side: which algorithm stays correct, and up to which step.
 
-python bench/coupling.py --out results/coupling
+python bench/coupling.py --out results/master
 
 Torque of the spring one way, speed of the motor side the other way; the reference is the same mount as one FMU with the
 effect `compliance`, stepped at the same ticks. Sliding under a constant torque, so that only the coupling makes errors.
@@ -28,7 +28,7 @@ from cosim.master.result import RunResult
 from cosim.support.errors import StepError
 from cosim.system.algorithm import Algorithm, Energy, GaussSeidel, Iterated, Jacobi
 
-COMMAND = "python bench/coupling.py --out results/coupling"
+COMMAND = "python bench/coupling.py --out results/master"
 TORQUE, SECONDS = 10.0, 0.3
 STEPS = (5e-5, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3, 1e-2)
 BONDS = (("far.torque", "near.v"),)
@@ -70,11 +70,11 @@ def main() -> None:
         traces = {name: together(fmus, ALGORITHMS[name], SHOWN_STEP) for name in ALGORITHMS}
         reference = alone(fmus, SHOWN_STEP)
     out.mkdir(parents=True, exist_ok=True)
-    with (out / "table.csv").open("w", newline="") as file:
+    with (out / "coupling.csv").open("w", newline="") as file:
         writer = csv.DictWriter(file, Row.__dataclass_fields__)
         writer.writeheader()
         writer.writerows(vars(row) for row in rows)
-    (out / "README.md").write_text(page(rows, limits), "utf-8")
+    (out / "coupling.md").write_text(page(rows, limits), "utf-8")
     draw(rows, traces, reference, out / "coupling.svg")
     print(page(rows, limits))
 

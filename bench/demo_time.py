@@ -1,6 +1,6 @@
 """Time `cosim demo` as a whole process, with an empty compiler cache and with a filled one.
 
-python bench/demo_time.py --out results/demo
+python bench/demo_time.py --out results/master
 """
 
 import argparse
@@ -27,7 +27,7 @@ def main() -> None:
     text = [
         "# Time of `cosim demo`",
         "",
-        "    python bench/demo_time.py --out results/demo",
+        "    python bench/demo_time.py --out results/master",
         "",
         f"mount-cosim {cosim.__version__}, Python {platform.python_version()}, {os.cpu_count()} cores, "
         f"{platform.machine()}; whole process, wall clock, a shared machine.",
@@ -38,7 +38,7 @@ def main() -> None:
         f"| filled, median of {WARM} | {warm:.1f} |",
     ]
     out.mkdir(parents=True, exist_ok=True)
-    (out / "README.md").write_text("\n".join(text) + "\n", "utf-8")
+    (out / "demo.md").write_text("\n".join(text) + "\n", "utf-8")
     print("\n".join(text))
 
 

@@ -1,10 +1,10 @@
 """Proof of the diagnosis, rebuilt by one command each.
 
-    python bench/diagnosis.py emps --data FOLDER --out results/emps        measured, not in the project
+    python bench/diagnosis.py emps --data FOLDER --out results/measured        measured, not in the project
     python bench/diagnosis.py measured --data FOLDER --out results/measured    six measured machines
-    python bench/diagnosis.py null --cases 10 --out results/null           the card's own physics, 15 % off
+    python bench/diagnosis.py null --cases 10 --out results/proof           the card's own physics, 15 % off
 
-Each writes table.csv and README.md with version, seeds and inputs.
+Each writes a table and a page with version, seeds and inputs.
 """
 
 import argparse
@@ -52,7 +52,7 @@ def main() -> None:
 
 def write(given: argparse.Namespace, rows: list[dict[str, Any]], seconds: float) -> None:
     given.out.mkdir(parents=True, exist_ok=True)
-    with (given.out / "table.csv").open("w", newline="") as file:
+    with (given.out / f"{given.what}.csv").open("w", newline="") as file:
         table = csv.DictWriter(file, list(rows[0]))
         table.writeheader()
         table.writerows(rows)
@@ -62,7 +62,7 @@ def write(given: argparse.Namespace, rows: list[dict[str, Any]], seconds: float)
     text = [
         f"# {TITLES[given.what]}",
         "",
-        f"    python bench/diagnosis.py {given.what}{data}{seeds} --out results/{given.what}",
+        f"    python bench/diagnosis.py {given.what}{data}{seeds} --out {given.out}",
         "",
         f"Made by mount-cosim {cosim.__version__} on Python {platform.python_version()} in {seconds:.0f} s.",
         "",
@@ -72,10 +72,11 @@ def write(given: argparse.Namespace, rows: list[dict[str, Any]], seconds: float)
         "",
         NOTES[given.what],
     ]
-    (given.out / "README.md").write_text("\n".join(text) + "\n", "utf-8")
+    (given.out / PAGES[given.what]).write_text("\n".join(text) + "\n", "utf-8")
     print("\n".join(text))
 
 
+PAGES = {"emps": "emps.md", "measured": "README.md", "null": "null.md"}
 TITLES = {
     "measured": "Measured machines: physics that the card conceals, and the error on recordings that were not fitted",
     "emps": "EMPS: a measured ball-screw axis whose standard model lacks direction-dependent friction and a delay",

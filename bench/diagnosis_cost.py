@@ -1,6 +1,6 @@
 """What a diagnosis costs: `cosim diagnose` as a process, over longer and faster recordings.
 
-python bench/diagnosis_cost.py --out results/diagnosis_cost      (10 to 20 minutes, 1 GB of disk)
+python bench/diagnosis_cost.py --out results/master      (10 to 20 minutes, 1 GB of disk)
 
 Each case is two training recordings and one held out, each of the named length, with a cogging and a delay concealed.
 `noise 0.01` is the worst case: with hardly any encoder noise the analysis takes its widest band.
@@ -25,7 +25,7 @@ import cosim
 from cosim_studies.proof.generator import make_case, write_case
 from cosim_studies.proof.simulated_axis import RECORDINGS
 
-COMMAND = "python bench/diagnosis_cost.py --out results/diagnosis_cost"
+COMMAND = "python bench/diagnosis_cost.py --out results/master"
 EFFECTS = ("cogging", "delay")
 
 
@@ -59,7 +59,7 @@ def main() -> None:
     text = page(rows, options.seed)
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
-        (options.out / "README.md").write_text(text, "utf-8")
+        (options.out / "diagnosis_cost.md").write_text(text, "utf-8")
 
 
 def measured(case: Case, seed: int) -> dict[str, Any]:

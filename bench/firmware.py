@@ -1,6 +1,6 @@
 """The firmware of each controller on an emulated Cortex-A9: bits, instructions, stack, memory.
 
-python bench/firmware.py --out results/firmware     (--json prints the numbers)
+python bench/firmware.py --out results/hardware     (--json prints the numbers)
 
 Needs qemu-arm. The samples are a noisy sine of 0.13 rad/s. 100 000 outputs are compared: of the FMU, of the firmware
 on this machine, of the firmware for the Cortex-A9. Instructions are counted one by one under qemu-arm over 1000 cycles
@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests/tools"))
 
 import firmware_tools as tools
 
-COMMAND = "python bench/firmware.py --out results/firmware"
+COMMAND = "python bench/firmware.py --out results/hardware"
 CASES = ("C1", "C2a", "C2b", "C3a", "C3b", "C2a+C3a")
 MORE = {
     "C2a, on-line identification": ("C2a", "[controller.adaptation]\n"),
@@ -119,7 +119,7 @@ def main() -> None:
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
         (options.out / "firmware.json").write_text(json.dumps(found, indent=2) + "\n", "utf-8")
-        (options.out / "README.md").write_text(page(found), "utf-8")
+        (options.out / "firmware.md").write_text(page(found), "utf-8")
     print(json.dumps(found, indent=2) if options.json else page(found))
 
 

@@ -1,6 +1,6 @@
 """What a 0.1 ms co-simulation step of the paper's plant costs, beside a step of RODAS4 written by hand in C.
 
-python bench/fmu_step.py --out results/fmu_step     (--json prints the numbers)
+python bench/fmu_step.py --out results/master     (--json prints the numbers)
 
 The opponent is rodas4_lugre.c: fixed size, structure known, numbers of the parameters worked out beforehand, the same
 exp and pow, the same compiler and flags. A block of steps by hand and one through the FMU follow each other; a ratio is
@@ -31,7 +31,7 @@ sys.path.insert(0, str(HERE.parent / "tests/tools"))
 
 from export_models import Driver  # noqa: E402
 
-COMMAND = "python bench/fmu_step.py --out results/fmu_step"
+COMMAND = "python bench/fmu_step.py --out results/master"
 STEP, BLOCK = 1e-4, 2000
 # Torque [N m] over time [s]: at rest within the bristles, to and fro through break-away, sliding at some deg/s.
 MOTIONS = {
@@ -52,7 +52,7 @@ def main() -> None:
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
         (options.out / "fmu_step.json").write_text(json.dumps(found, indent=2) + "\n", "utf-8")
-        (options.out / "README.md").write_text(page(found), "utf-8")
+        (options.out / "fmu_step.md").write_text(page(found), "utf-8")
     print(json.dumps(found, indent=2) if options.json else page(found))
 
 

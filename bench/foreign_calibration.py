@@ -1,6 +1,6 @@
 """How often `cosim identify --fmu` holds the truth of foreign FMUs, names what is not determined, and what it costs.
 
-python bench/foreign_calibration.py --fmus DIR --out results/foreign_calibration
+python bench/foreign_calibration.py --fmus DIR --out results/identify
 
 DIR holds built Reference-FMUs (modelica/Reference-FMUs: VanDerPol, Dahlquist, BouncingBall), called NAME2.fmu or
 NAME3.fmu for FMI 2.0 and 3.0; of the ball the height is recorded (its speed jumps: least squares have no derivative
@@ -195,7 +195,7 @@ def write(out: Path, rows: list[dict], named: list[bool], times: list[tuple[Cost
     lines = [
         "# Numbers of foreign FMUs",
         "",
-        "    python bench/foreign_calibration.py --fmus DIR --out results/foreign_calibration",
+        "    python bench/foreign_calibration.py --fmus DIR --out results/identify",
         "",
         f"mount-cosim {cosim.__version__}; noise 1 to 3 % of each output's spread, true values within a factor",
         f"{FACTOR} of the start. Share of true values within 2 standard errors (95 % where all is as assumed):",
@@ -229,8 +229,8 @@ def write(out: Path, rows: list[dict], named: list[bool], times: list[tuple[Cost
         f"{total(ours, 'cpu') / total(hand, 'cpu'):.2f};",
         "by hand means no weights, no check of the derivatives and no standard errors.",
     ]
-    machine = kept_section(out / "README.md")
-    (out / "README.md").write_text("\n".join(lines) + "\n" + (f"\n{machine}" if machine else ""), "utf-8")
+    machine = kept_section(out / "foreign_calibration.md")
+    (out / "foreign_calibration.md").write_text("\n".join(lines) + "\n" + (f"\n{machine}" if machine else ""), "utf-8")
     print("\n".join(lines))
 
 

@@ -1,6 +1,6 @@
 """A foreign plant FMU of a measured machine (EMPS) calibrated on its recordings, beside our own card's fit.
 
-python bench/foreign_machine.py --data /work/shared/recordings/emps --out results/foreign_calibration
+python bench/foreign_machine.py --data DIR --out results/identify
 
 The FMU is written from the equations of the benchmark (`emps_fmu`). `cosim identify --fmu` fits M, Fv and Fc to the
 speed on the estimation run, in windows of 0.5 s with free start values. Our own card is the base that `cosim diagnose`
@@ -66,7 +66,7 @@ def section(rows: dict[str, dict[str, float]], errors: dict[str, float], train: 
     lines = [
         TITLE,
         "",
-        "    python bench/foreign_machine.py --data DIR --out results/foreign_calibration",
+        "    python bench/foreign_machine.py --data DIR --out results/identify",
         "",
         "EMPS (Janot, Gautier, Brunot 2019): an FMU written by hand from the benchmark's equations; M, Fv and Fc from",
         f"the estimation run, speed in windows of {WINDOW:g} s with free start values, {took:.0f} s. RMS of the force",
@@ -101,7 +101,7 @@ def main() -> None:
         numbers, errors = of_fmu(train, Path(folder))
     took = perf_counter() - begun
     rows = {"as published": dict(STARTS), "FMU, calibrated": numbers, "card, refitted": of_card(*files)}
-    page = given.out / "README.md"
+    page = given.out / "foreign_calibration.md"
     before = page.read_text("utf-8") if page.exists() else ""
     text = before.removesuffix(kept_section(page)).rstrip("\n")
     page.write_text(f"{text}\n\n{section(rows, errors, train, kept, took)}", "utf-8")

@@ -62,7 +62,7 @@ def main() -> None:
                 text = page(rows, " ".join([COMMAND, *sys.argv[1:]]))
                 if options.out:  # what is done is kept if the rest is not
                     options.out.mkdir(parents=True, exist_ok=True)
-                    (options.out / "README.md").write_text(text, "utf-8")
+                    (options.out / "fuzz.md").write_text(text, "utf-8")
     print(text)
     sys.exit(any(row[-1] in ("FAILED", "NOT SEEN") for row in rows))
 

@@ -1,6 +1,6 @@
 """Commands that are ended at any moment: is a file half written, does anything still run, is anything left behind?
 
-    python bench/kills.py --trials 50 --out results/kills [--only run sweep] [--journal FILE [--so-far]]
+    python bench/kills.py --trials 50 --out results/robustness [--only run sweep] [--journal FILE [--so-far]]
 
 Each command is run once to its end, and then again and again, ended by SIGKILL, SIGINT or SIGTERM at a moment drawn
 from that time. Afterwards every file under its own name must be whole. After SIGINT and SIGTERM there must be no
@@ -265,8 +265,8 @@ def written(given: argparse.Namespace) -> None:
     """Write the table of what the journal has; rows may be of runs with other seeds."""
     found, undone = journalled(given.journal)
     given.out.mkdir(parents=True, exist_ok=True)
-    line = f"python bench/kills.py --trials {given.trials} --seed {given.seed} --out results/kills"
-    with replacing(given.out / "README.md", force=True) as partial:
+    line = f"python bench/kills.py --trials {given.trials} --seed {given.seed} --out results/robustness"
+    with replacing(given.out / "kills.md", force=True) as partial:
         partial.write_text(page(found, undone, line), "utf-8")
 
 

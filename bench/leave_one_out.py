@@ -1,6 +1,6 @@
 """What is said of physics that the diagnosis cannot name, or has no shape for: each effect left out of it, once.
 
-    python bench/leave_one_out.py --cases 4 --seed 5 --out results/left_out
+    python bench/leave_one_out.py --cases 4 --seed 5 --out results/proof
 
 Fresh cases of the home generator, machines of any class, one effect each. Two questions:
 
@@ -8,7 +8,7 @@ Fresh cases of the home generator, machines of any class, one effect each. Two q
   is another name and nothing else; "none" says that nothing is missing.
 * *shapes*: an effect outside the list for which the diagnosis has a general shape loses that shape. Right is "unknown".
 
-Writes README.md and table.csv.
+Writes left_out.md and left_out.csv.
 """
 
 import argparse
@@ -173,11 +173,11 @@ def main() -> None:
             rows += answers
             print(", ".join(map(str, answers[-1].values())), flush=True)
     options.out.mkdir(parents=True, exist_ok=True)
-    with (options.out / "table.csv").open("w", newline="", encoding="utf-8") as file:
+    with (options.out / "left_out.csv").open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         table.writeheader()
         table.writerows(rows)
-    (options.out / "README.md").write_text(page(rows, options, time.perf_counter() - begun), "utf-8")
+    (options.out / "left_out.md").write_text(page(rows, options, time.perf_counter() - begun), "utf-8")
 
 
 if __name__ == "__main__":

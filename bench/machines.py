@@ -1,6 +1,6 @@
 """What is said of measured machines, beside what is known of them: one page, failures first.
 
-    python bench/machines.py --data ../shared/recordings --out results/machines
+    python bench/machines.py --data ../shared/recordings --out results/measured
 
 FOLDER holds machine folders, each with recordings, cards and what is known, and a bench that runs the diagnosis on
 every case and marks its answer; where it is missing, this says so and ends. Nothing in the project was set on these
@@ -36,7 +36,7 @@ def main() -> int:
         done = subprocess.run(command, capture_output=True, text=True, check=True)
         rows = sorted(cases(given.data, work, done.stdout), key=lambda row: rank(row["outcome"]))
         given.out.mkdir(parents=True, exist_ok=True)
-        with replacing(given.out / "README.md", force=True) as path:
+        with replacing(given.out / "machines.md", force=True) as path:
             path.write_text(page(rows, sums(done.stdout)), "utf-8")
     print(sums(done.stdout))
     return 0
@@ -87,7 +87,7 @@ def page(rows: list[dict[str, Any]], counts: str) -> str:
             "# Measured machines",
             "",
             f"Version {__version__}. Nothing in the project was set on these recordings, which are not part of it.",
-            "Made by `python bench/machines.py --data ../shared/recordings --out results/machines`.",
+            "Made by `python bench/machines.py --data ../shared/recordings --out results/measured`.",
             "Probabilities stand behind the names; `or` stands between causes that the recordings cannot separate;",
             "what is wrong or missed stands first.",
             "",

@@ -1,7 +1,7 @@
 """What a step of the master costs now, beside an earlier commit: is it as fast as it was?
 
     git worktree add --detach OLD COMMIT && python OLD/cosim/loop/build_hook.py
-    python bench/master_before.py --before OLD --pairs 11 --out results/master_step
+    python bench/master_before.py --before OLD --pairs 11 --out results/master
 
 Both checkouts step the same two FMUs of the paper's mount by their own `master_runners.py`, in processes of their
 own, one right after the other, and which comes first takes turns. Processor time is counted, all threads together;
@@ -75,7 +75,7 @@ def commit(checkout: Path) -> str:
 def page(rows: Sequence[str], given: argparse.Namespace) -> str:
     """The table for people."""
     old, machine = commit(given.before), f"{os.cpu_count()} cores, {platform.machine()}, shared"
-    command = f"master_before.py --before OLD --pairs {given.pairs} --steps {given.steps} --out results/master_step"
+    command = f"master_before.py --before OLD --pairs {given.pairs} --steps {given.steps} --out results/master"
     return "\n".join(
         [
             "# A step of the master, before and now",

@@ -1,6 +1,6 @@
 """What a step of the master costs, beside a plain C loop and what others give Python users; all in one run.
 
-python bench/master_step.py --out results/master_step     (--json prints the numbers)
+python bench/master_step.py --out results/master     (--json prints the numbers)
 
 Two FMUs of the paper's mount, plant and controller, at 0.1 ms. A ratio is that of two runs of the same round, right
 after each other; the median of the rounds counts. A peer that is missing or does not run is named with the reason.
@@ -44,7 +44,7 @@ TITLES = {
     "fmpy": "FMPy: get, set, doStep in Python",
     "interpreted": "cosim --interpreted, 6 signals to Parquet",
 }
-COMMAND = "python bench/master_step.py --out results/master_step"
+COMMAND = "python bench/master_step.py --out results/master"
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 """Memory of a long run: an hour at 10 kHz, six signals of every step streamed to Parquet.
 
-python bench/memory.py --out results/memory      (a few minutes, needs 2.5 GB of disk while it runs)
+python bench/memory.py --out results/master      (a few minutes, needs 2.5 GB of disk while it runs)
 
 The process `cosim run` is looked at from outside every half second: its resident memory, the file growing meanwhile.
 """
@@ -18,7 +18,7 @@ from pathlib import Path
 
 import cosim
 
-COMMAND = "python bench/memory.py --out results/memory"
+COMMAND = "python bench/memory.py --out results/master"
 
 
 def main() -> None:
@@ -32,7 +32,7 @@ def main() -> None:
     print(text)
     if options.out:
         options.out.mkdir(parents=True, exist_ok=True)
-        (options.out / "README.md").write_text(text, "utf-8")
+        (options.out / "memory.md").write_text(text, "utf-8")
 
 
 def watched(folder: Path, seconds: float) -> tuple[list[float], dict[str, float], int]:

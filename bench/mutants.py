@@ -1,8 +1,8 @@
 """Small errors planted in the code, one at a time: do the tests notice?
 
     python bench/reach.py --out FILE
-    python bench/mutants.py --seed 1 --count 160 --reach FILE --out results/mutants [--journal FILE]
-    python bench/mutants.py --journal FILE --ask MODULE=FILE_OF_TESTS ... --out results/mutants
+    python bench/mutants.py --seed 1 --count 160 --reach FILE --out results/robustness [--journal FILE]
+    python bench/mutants.py --journal FILE --ask MODULE=FILE_OF_TESTS ... --out results/robustness
 
 A mutant is a module with one operator, number or truth value changed, or one call left out (`mutations.py`). It is
 written into a copy of the tree, and tests run there until one fails, for `BUDGET` seconds (`mutants_choice.py`): those
@@ -175,7 +175,7 @@ def main() -> None:
     parser.add_argument("--journal", type=Path, help="file of what is done: a run that ended early goes on from there")
     parser.add_argument("--ask", nargs="*", default=[], help="MODULE=FILE: tests that survivors there are asked too")
     parser.add_argument("--remarks", type=Path, help="what is known of survivors (.toml): why, by MODULE:LINE")
-    parser.add_argument("--page", default="README.md", help="name of the page")
+    parser.add_argument("--page", default="mutants.md", help="name of the page")
     parser.add_argument("--so-far", action="store_true", help="only write the table of what the journal has")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()

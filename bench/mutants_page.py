@@ -73,5 +73,5 @@ def written(tried: Sequence[Tried], sample: Sample, out: Path, remarks: Mapping[
     asked = f"--seed {sample.seed} --count {sample.count} --reach FILE"
     out.parent.mkdir(parents=True, exist_ok=True)
     with replacing(out, force=True) as partial:
-        command = f"python bench/mutants.py {asked} --out results/mutants"
+        command = f"python bench/mutants.py {asked} --out results/robustness"
         partial.write_text(page(tried, sample.count, command, remarks), "utf-8")

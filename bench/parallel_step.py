@@ -1,6 +1,6 @@
 """Do two threads step independent FMUs sooner than one? By the cost of a step, on this machine.
 
-    python bench/parallel_step.py --out results/parallel [--rounds 200] [--json]
+    python bench/parallel_step.py --out results/master [--rounds 200] [--json]
 
 Two controllers of the paper's mount that do not depend on each other, as FMI 3, each with a constant position to work
 against. A step of 0.1 ms is one of the FMU's ticks; a longer step is so many of them, so the same binary is a cheap FMU
@@ -123,7 +123,7 @@ def page(rows: list[Row], rounds: int, loads: tuple[float, float]) -> str:
     lines = [
         "# Two threads for two independent FMUs",
         "",
-        f"    python bench/parallel_step.py --rounds {rounds} --out results/parallel",
+        f"    python bench/parallel_step.py --rounds {rounds} --out results/master",
         "",
         f"mount-cosim {__version__}, {os.cpu_count()} cores, load {loads[0]:.1f} before and {loads[1]:.1f} after.",
         "What is measured stands at the top of `bench/parallel_step.py`.",
@@ -154,7 +154,7 @@ def main() -> None:
     text = page(rows, given.rounds, (before, os.getloadavg()[0]))
     print(json.dumps([row._asdict() for row in rows], indent=1) if given.json else text)
     given.out.mkdir(parents=True, exist_ok=True)
-    with replacing(given.out / "README.md", force=True) as partial:
+    with replacing(given.out / "parallel.md", force=True) as partial:
         partial.write_text(text, "utf-8")
 
 

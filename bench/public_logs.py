@@ -94,7 +94,7 @@ def main() -> None:
     parser.add_argument("--scores", type=Path, help="write the scores here as JSON")
     parser.add_argument("--before", type=Path, help="scores of an earlier version")
     parser.add_argument("--only", nargs="*", default=[], help="files to score")
-    parser.add_argument("--out", type=Path, help="write README.md and logs.tsv into this folder")
+    parser.add_argument("--out", type=Path, help="write public_logs.md and public_logs.tsv into this folder")
     options = parser.parse_args()
     truths = [one for one in read_truth(options.truth) if not options.only or one["file"] in options.only]
     scores = []
@@ -280,8 +280,8 @@ def write(out: Path, truths: Sequence[Mapping[str, str]], scores: Sequence[Score
         old = before[one.file].outcome if one.file in before else ""
         cells = [truth[name] for name in ("file", "repository", "path", "tool", "kind", "says")]
         lines.append("\t".join(cell.replace("\t", " ") for cell in [*cells, old, one.outcome, one.line.split("\n")[0]]))
-    (out / "logs.tsv").write_text("\n".join(lines) + "\n", "utf-8")
-    (out / "README.md").write_text("\n".join(page(truths, scores, before)) + "\n", "utf-8")
+    (out / "public_logs.tsv").write_text("\n".join(lines) + "\n", "utf-8")
+    (out / "public_logs.md").write_text("\n".join(page(truths, scores, before)) + "\n", "utf-8")
 
 
 def page(truths: Sequence[Mapping[str, str]], scores: Sequence[Score], before: Mapping[str, Score]) -> list[str]:
@@ -295,9 +295,10 @@ def page(truths: Sequence[Mapping[str, str]], scores: Sequence[Score], before: M
         "    python bench/public_logs.py --logs FOLDER --truth bench/public_logs.tsv --before BEFORE.json --out PAGE",
         "",
         f"mount-cosim {__version__}. {len(scores)} logs of {tools} tools from public repositories, found by search;",
-        "they are not stored here, [logs.tsv](logs.tsv) names repository and path of each, what it holds, and both",
-        "outcomes. bench/public_logs.tsv is what they hold by their repositories' documents and code, read",
-        "with other tools: ranges in SI units, and the answers that an owner can give. Only what is asked is answered.",
+        "they are not stored here, [public_logs.tsv](public_logs.tsv) names repository and path of each, what it",
+        "holds, and both outcomes. bench/public_logs.tsv is what they hold by their repositories' documents and code,",
+        "read with other tools: ranges in SI units, and the answers that an owner can give. Only what is asked is",
+        "answered.",
         "*Before* is commit 2ad1e55, which was scored on the logs that were found first. Nothing in the code knows a",
         "name of these files, but they were at hand while it was written: they show what kinds are read, not how often",
         "an unknown log is.",

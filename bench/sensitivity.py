@@ -1,10 +1,10 @@
 """What depends on each constant of the decision: halved and doubled, one at a time, how many answers change?
 
-    python bench/sensitivity.py --cases 6 --seed 5 --out results/sensitivity
+    python bench/sensitivity.py --cases 6 --seed 5 --out results/proof
 
 Fresh cases of the home generator, mixed as `cosim prove` mixes them. Each is diagnosed with the policy as it is, then
 once for each constant at half and at twice its value; pairs and triples of numbers are scaled together. Fits do not
-depend on the policy and are made once. Writes README.md and table.csv (answers as the policy is, and those that
+depend on the policy and are made once. Writes a page and a table (answers as the policy is, and those that
 change).
 
 Two readers are beyond it: `dwell_breakaway` takes the least rise of a dwell from the policy as it is,
@@ -187,7 +187,7 @@ def page(rows: Sequence[dict[str, Any]], options: argparse.Namespace, seconds: f
         f"generator, {seconds / 60:.0f} minutes. As the policy is, {sum(map(is_right, usual.values()))} answers are "
         "right: nothing where nothing is concealed, `unknown` first, the name first, all names of several. Each "
         "constant of `cosim/diagnosis/decide/policy.py` at half and at twice its value: answers that become another, "
-        "and how many are right then. Cases in [table.csv](table.csv). No number on this page was written by hand.",
+        "and how many are right then. Cases in [sensitivity.csv](sensitivity.csv). No number here was written by hand.",
         "",
         "| constant | value | others at half | right | others at twice | right |",
         "|---|---|---|---|---|---|",
@@ -219,12 +219,12 @@ def main() -> None:
             rows += answers
             print(", ".join(str(value) for value in answers[0].values() if value != ""), flush=True)
     options.out.mkdir(parents=True, exist_ok=True)
-    with (options.out / "table.csv").open("w", newline="", encoding="utf-8") as file:
+    with (options.out / "sensitivity.csv").open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         table.writeheader()
         usual = as_it_is(rows)
         table.writerows(row for row in rows if not row["constant"] or row["answer"] != usual[row["case"]]["answer"])
-    (options.out / "README.md").write_text(page(rows, options, time.perf_counter() - begun), "utf-8")
+    (options.out / "sensitivity.md").write_text(page(rows, options, time.perf_counter() - begun), "utf-8")
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """The local page in a real browser: how soon it answers, how soon a report is ready, and what damaged files do to it.
 
-    python bench/serve.py --drops 100 --rounds 3 --seed 17 --out results/serve
+    python bench/serve.py --drops 100 --rounds 3 --seed 17 --out results/robustness
 
 Everything is done as a user does it: `cosim serve` in a process of its own, Debian's Chromium, files that are dropped.
 An answer counts from the drop of the demo's files (3 recordings of 30 s at 1 kHz, a card) over looking at them and
@@ -201,7 +201,7 @@ def main() -> None:
         found = played(given, Path(folder))
     given.out.mkdir(parents=True, exist_ok=True)
     command = f"python bench/serve.py --drops {given.drops} --rounds {given.rounds} --seed {given.seed}"
-    (given.out / "README.md").write_text(page_of(found, f"{command} --out {given.out}"), "utf-8")
+    (given.out / "serve.md").write_text(page_of(found, f"{command} --out {given.out}"), "utf-8")
     (given.out / "serve.json").write_text(json.dumps(found, indent=1) + "\n", "utf-8")
 
 

@@ -1,6 +1,6 @@
 """Five measured machines in three simulators: error on recordings that were not fitted, beside that of the FMU.
 
-python bench/simulators.py --data FOLDER --out results/simulators
+python bench/simulators.py --data FOLDER --out results/exchange
 
 FOLDER holds a folder for each machine with its recordings (results/measured says where they are from). The card is that
 of a quick diagnosis of the training recordings; each simulator's file is then compared with it along the others.
@@ -43,7 +43,7 @@ MACHINES = (
 
 
 def main() -> None:
-    """Write table.csv and README.md."""
+    """Write simulators.csv and simulators.md."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--out", type=Path, required=True)
@@ -51,8 +51,8 @@ def main() -> None:
     rows = [row for machine in MACHINES for row in _rows(machine, chosen.data / machine.folder)]
     table = pd.DataFrame(rows)
     chosen.out.mkdir(parents=True, exist_ok=True)
-    table.to_csv(chosen.out / "table.csv", index=False)
-    (chosen.out / "README.md").write_text(_page(table), "utf-8")
+    table.to_csv(chosen.out / "simulators.csv", index=False)
+    (chosen.out / "simulators.md").write_text(_page(table), "utf-8")
     print(table.to_string(index=False))
 
 
@@ -93,7 +93,7 @@ def _page(table: pd.DataFrame) -> str:
     )
     return f"""# One card in three simulators
 
-`python bench/simulators.py --data FOLDER --out results/simulators`
+`python bench/simulators.py --data FOLDER --out results/exchange`
 mount-cosim {__version__}, {platform.machine()}
 
 The card is that of a quick diagnosis of the training recordings. RMS torque below 30 Hz along a recording that was not

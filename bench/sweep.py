@@ -1,6 +1,6 @@
 """What a sweep costs: one core, two, and a Dask cluster of two workers on the same machine, side by side.
 
-python bench/sweep.py --out results/sweep     (--runs and --rounds make it shorter, --json prints numbers)
+python bench/sweep.py --out results/master     (--runs and --rounds make it shorter, --json prints numbers)
 
 The scenario `sidereal` (15 s at 0.1 ms), four parameters drawn by Latin hypercube. Each round does `runs` of its own on
 each of the three, right after each other, whole: with start-up, rehearsal, journal and table. A ratio is that of two
@@ -24,7 +24,7 @@ from typing import Any
 
 import cosim
 
-COMMAND = "python bench/sweep.py --runs 250 --rounds 4 --out results/sweep"
+COMMAND = "python bench/sweep.py --runs 250 --rounds 4 --out results/master"
 SWEEP = """
 scenario = "sidereal"
 method = "latin_hypercube"
@@ -172,7 +172,7 @@ def page(found: dict[str, Any]) -> str:
     lines += ["| --- | --- |", *(f"| {n} | {value} |" for n, value in found["linearity"].items())]
     lines += [
         "",
-        "![seconds of each round](rounds.svg)",
+        "![seconds of each round](sweep_rounds.svg)",
         "",
         "The picture that `cosim sweep` draws of a round's table:",
     ]
@@ -188,7 +188,7 @@ def write(found: dict[str, Any], out: Path, folder: Path) -> None:
     from cosim.plots.sweep import draw
 
     out.mkdir(parents=True, exist_ok=True)
-    (out / "README.md").write_text(page(found), "utf-8")
+    (out / "sweep.md").write_text(page(found), "utf-8")
     (out / "sweep.json").write_text(json.dumps(found | {"command": COMMAND}, indent=2) + "\n", "utf-8")
     draw(folder / "out" / "table.parquet", out / "sweep.svg")
     with matplotlib.rc_context(rc=STYLE):
@@ -204,7 +204,7 @@ def write(found: dict[str, Any], out: Path, folder: Path) -> None:
         right.plot(counts, whole, "o-", color=AFTER)
         right.set(xlabel="runs, two cores", xlim=(0, None), ylim=(0, None))
         right.set_title("seconds of a sweep", loc="left")
-        figure.savefig(out / "rounds.svg", metadata={"Date": None})
+        figure.savefig(out / "sweep_rounds.svg", metadata={"Date": None})
 
 
 if __name__ == "__main__":

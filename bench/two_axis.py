@@ -1,6 +1,6 @@
 """What two axes do on one star: the error on the sky, what the coupling is worth, and the blind spot at the zenith.
 
-python bench/two_axis.py --out results/two_axis     (--json prints the numbers)
+python bench/two_axis.py --out results/master     (--json prints the numbers)
 
 Three parts: the shipped scenario `two_axis`; the same mount slewing both axes at once, with the coupling and without
 it; and the scenario without gusts, swept over stars that culminate nearer and nearer to the zenith.
@@ -27,7 +27,7 @@ from cosim.sweeps.conduct import conduct
 from cosim.sweeps.file import read_sweep
 from cosim.system.scenario import Scenario, read_scenario
 
-COMMAND = "python bench/two_axis.py --out results/two_axis"
+COMMAND = "python bench/two_axis.py --out results/master"
 ARCSEC = pi / 648000
 LATITUDE, TUBE = 49.0, 12.0
 DISTANCES = (4.0, 2.0, 1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005, 0.002, 0.001)
@@ -203,7 +203,7 @@ def write(found: dict[str, Any], tracked: Recording, blind: pd.DataFrame, out: P
     from cosim.plots.style import AFTER, BEFORE, GREY, MEASURED, STYLE, thin
 
     out.mkdir(parents=True, exist_ok=True)
-    (out / "README.md").write_text(page(found), "utf-8")
+    (out / "two_axis.md").write_text(page(found), "utf-8")
     (out / "two_axis.json").write_text(json.dumps(found, indent=2) + "\n", "utf-8")
     late = tracked.t >= 1.0
     t = tracked.t[late]

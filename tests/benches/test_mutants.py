@@ -193,7 +193,7 @@ def test_an_error_is_noticed_where_a_test_looks_and_survives_where_none_does(tmp
 
 @pytest.mark.parametrize("part", ["story", "clamp"])
 def test_a_sample_of_planted_errors_in_the_product_is_noticed(part: str, tmp_path: Path) -> None:
-    """A few that were drawn once; the whole table is results/mutants."""
+    """A few that were drawn once; the whole table is results/robustness/mutants.md."""
     alone(part, tmp_path)
 
 

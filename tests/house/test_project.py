@@ -13,11 +13,14 @@ import pytest
 import cosim
 import cosim_studies
 import pyfmi_models
+from bench import scores
+from bench.rebuild import PAGES
 from cosim.diagnosis.effects import TRIED
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import CATALOGUE
 
 ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "results"
 README = (ROOT / "README.md").read_text("utf-8")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 START = "python3 -m venv .venv && .venv/bin/pip install . && .venv/bin/cosim demo"
@@ -121,9 +124,30 @@ def imported() -> dict[str, Path]:
 
 
 def test_every_result_is_told_how_it_is_rebuilt() -> None:
-    table = (ROOT / "results" / "README.md").read_text("utf-8")
-    missing = [one.name for one in (ROOT / "results").iterdir() if one.name != "README.md" and one.name not in table]
-    assert not missing, f"results/README.md does not say how these are rebuilt: {', '.join(missing)}"
+    """By hand are the list of the folder, the list of decks, and what is read from pages: causes."""
+    pages = {str(one.relative_to(RESULTS)) for one in RESULTS.glob("*/*.md") if not one.stem.endswith("causes")}
+    assert pages == set(PAGES)
+    for command in PAGES.values():
+        for file in re.findall(r"bench/\w+\.py", command):
+            assert (ROOT / file).is_file(), command
+
+
+def test_every_page_of_the_results_is_in_their_list_and_every_link_leads_somewhere() -> None:
+    told = (RESULTS / "README.md").read_text("utf-8")
+    assert not [one for one in RESULTS.rglob("*.md") if one.name != "README.md" and f"{one.name})" not in told]
+    for page in RESULTS.rglob("*.md"):
+        for target in re.findall(r"\]\(([^)#\s]+)", page.read_text("utf-8")):
+            assert target.startswith("https://") or (page.parent / target).exists(), f"{page}: {target}"
+
+
+def test_results_are_small() -> None:
+    """Proof is read by people: twelve topics and a megabyte; `python bench/slim.py` makes them so."""
+    assert len([one for one in RESULTS.rglob("*") if one.is_dir()]) <= 12
+    assert sum(one.stat().st_size for one in RESULTS.rglob("*") if one.is_file()) <= 1_000_000
+
+
+def test_the_scores_are_those_of_the_results() -> None:
+    assert scores.PAGE.read_text("utf-8") == scores.page(), "python bench/scores.py writes results/SCORES.md"
 
 
 def test_no_result_names_a_folder_of_the_machine_that_made_it() -> None:

@@ -156,7 +156,7 @@ def halves(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 def test_the_split_mount_meets_the_whole_one_as_far_as_the_algorithm_goes(
     halves: dict[str, Path], algorithm: Any, least: float, most: float
 ) -> None:
-    """Compare at 2 ms, where Jacobi swings ever wider; results/coupling shows all steps."""
+    """Compare at 2 ms, where Jacobi swings ever wider; results/master/coupling.md shows all steps."""
     common: dict[str, Any] = {"step": 2e-3, "ticks": 150, "signals": {"tau": 10.0}}
     start = {"near": {"speed": START}, "far": {"speed": START, "v": START}}
     wires = [("far.torque", "near.disturbance"), ("near.v", "far.v"), ("tau", "near.tau")]

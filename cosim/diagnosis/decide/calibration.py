@@ -7,7 +7,7 @@ Evidence alone promises too much: it knows only rivals that were tried. Where th
 removes a tenth of the energy is right less than half of the time, whatever its evidence, one that removes nine tenths
 nearly always: the former may imitate what is missing, the latter leaves no room for that. Platt's curve, fitted to 102
 named effects of two generators, neither of them that of results/proof; from one of them alone it would be 2.2, 1.0
-(telescope mounts), from the other 1.2, 1.1 (other machines): see results/calibration.
+(telescope mounts), from the other 1.2, 1.1 (other machines): see results/abroad/calibration.md.
 
 Reference: Platt, Advances in Large Margin Classifiers, 1999.
 """

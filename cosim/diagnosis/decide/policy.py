@@ -90,7 +90,7 @@ class Policy:
     margin_within_set: float = 0.5
     """Share of a margin that counts between members of a set: what is left of a model's misfit does not change from
     row to row, as its likelihood has it. Unit: 1. In 59 sets of two generators that held the truth .4 is the
-    likeliest, 4.0 nats before 1; from .2 to .8 within 1.9 nats (results/calibration/sets.md)."""
+    likeliest, 4.0 nats before 1; from .2 to .8 within 1.9 nats (results/abroad/calibration_sets.md)."""
     least_predicted: float = 3.0
     """What held-out recordings must lose without what is small but halves the error, or holds at rest. Unit: nats."""
     clearly_predicted: float = 10.0
@@ -153,7 +153,7 @@ class Policy:
     .95 and .997 there, .95 to .98 on two measured machines."""
     true_beside_unknown: float = 0.2
     """What is left of the probability of any other name there. Unit: 1. Of 38 such names in three decks of two
-    generators 5 were true [.06, .27], where .62 would be printed (results/calibration/sets.md)."""
+    generators 5 were true [.06, .27], where .62 would be printed (results/abroad/calibration_sets.md)."""
     beside: float = 0.7
     """... and beside the best one: this share of what that predicts. Unit: 1."""
     large_residual: float = 0.12
