@@ -127,6 +127,7 @@ def motion() -> Recording:
     q = np.cumsum(v) / RATE
     table = {"t": t, "q": q, "tau": 2.0 * np.gradient(v, t) + np.sign(v)}
     table |= {"temperature": 20 + 12 * (1 - np.exp(-t / 25)), "load_torque": 3.0 * np.sin(0.4 * t)}
+    table |= {"neighbour_position": 0.5 * np.sin(2 * t)}
     return Recording("made up", table)
 
 

@@ -34,7 +34,7 @@ def motions(found: Sequence[Neighbour], table: Mapping[str, Array], dt: float, c
     """Position, speed and acceleration of neighbours by `key`, filtered and differentiated as the axis' own.
 
     What was recorded is taken; what was not is the derivative of what was. A position that was not is the integral of
-    the speed, from 0 on.
+    the speed, from 0 on. The motion of an only neighbour is there under the names of a plant's inputs too.
 
     Args:
         found: the neighbours.
@@ -54,7 +54,9 @@ def motions(found: Sequence[Neighbour], table: Mapping[str, Array], dt: float, c
         if a is None:
             a = derivative(derivative(q, dt) if q is not None else v, dt)
         q = q if q is not None else np.cumsum(v) * dt
-        columns |= {key(one.name, kind): column for kind, column in zip(KINDS, (q, v, a), strict=True)}
+        signals = dict(zip(KINDS, (q, v, a), strict=True))
+        columns |= {key(one.name, kind): column for kind, column in signals.items()}
+        columns |= {f"neighbour_{kind}": column for kind, column in signals.items()} if len(found) == 1 else {}
     return columns
 
 
@@ -86,9 +88,11 @@ def _left(own: Array, column: Array) -> float:
 
 def as_inputs(recording: Recording, mount: Mount, cutoff: float) -> Recording:
     """A recording with the motion of neighbours under the names of a plant's inputs, in which its effects read it."""
-    wanted = {name: own for effect in mount.effects for name, own in effect.recorded_as().items()}
-    if not wanted:
+    wanted = {one.name: effect.recorded_as().get(one.name) for effect in mount.effects for one in effect.inputs()}
+    wanted = {name: own or name for name, own in wanted.items() if own or name not in recording}
+    told = neighbours(recording.columns, recording.units)
+    if not wanted or not told:
         return recording
-    dt, told = recording.sample_time, neighbours(recording.columns, recording.units)
+    dt = recording.sample_time
     found = motions(told, recording.table, dt, min(cutoff, 0.3 / dt))
     return replace(recording, table=recording.table | {n: found[own] for n, own in wanted.items() if own in found})

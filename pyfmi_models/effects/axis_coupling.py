@@ -69,7 +69,7 @@ class AxisCoupling(LoadEffect):
 
 @dataclass(frozen=True, kw_only=True)
 class DampedCoupling(AxisCoupling):
-    """The same with drives that drag each other: torque = h a_n + d v_n, v_n the speed of the neighbour."""
+    """Inertia that both axes accelerate, and drives that drag each other: torque = h a_n + d v_n, v_n its speed."""
 
     equation: ClassVar[str] = "h aₙ + d vₙ"
     main: ClassVar[Main] = Main("damping", unit="N.m.s/rad")
@@ -90,7 +90,7 @@ class DampedCoupling(AxisCoupling):
 
 @dataclass(frozen=True, kw_only=True)
 class WeightCoupling(AxisCoupling):
-    """The same with a weight that hangs on both axes: torque = h a_n + w sin(s q + q_n + phase).
+    """Inertia and a weight that both axes carry: torque = h a_n + w sin(s q + q_n + phase).
 
     q and q_n are the angles of both axes; s = 1 where the weight turns with both, 0 where the neighbour alone turns it.
     """

@@ -1,5 +1,6 @@
 """A neighbouring axis acts on this one: named where its columns are there and it moves by itself, and only then."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -9,8 +10,11 @@ from two_links import WEIGHT, coupling, elbow
 from cosim.data.neighbours import Neighbour, neighbours
 from cosim.diagnosis.answer.result import Diagnosis
 from cosim.diagnosis.diagnose import diagnose
+from cosim.diagnosis.trust.admission import check_neighbours
+from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.neighbours import as_inputs, key
 from cosim.estimation.prepare import prepare
+from cosim.support.errors import RecordingError
 from pyfmi_models.card import parse_card
 from pyfmi_models.effects.axis_coupling import AxisCoupling, WeightCoupling
 
@@ -103,3 +107,23 @@ def test_a_sentence_names_the_column_and_the_inputs_are_the_plants() -> None:
     assert [each.name for each in one.inputs()] == ["neighbour_acceleration", "neighbour_position"]
     assert one.recorded_as()["neighbour_acceleration"] == "q2 acceleration"
     assert AxisCoupling(inertia=0.1).recorded_as() == {}
+
+
+def test_a_card_that_names_a_column_which_is_not_there_is_refused_with_those_that_are() -> None:
+    plant = parse_card(CARD + '[[effects]]\neffect="axis_coupling"\nneighbour="q7"\n', "card.toml").plant()
+    with pytest.raises(RecordingError, match=r'reads "q7", which this recording lacks; neighbours are: q1\.'):
+        check_neighbours(plant, [elbow(1)])
+    with pytest.raises(RecordingError, match="it has no column of a neighbour"):
+        check_neighbours(plant, [elbow(1, columns=False)])
+
+
+def test_a_card_without_the_word_reads_the_only_neighbour() -> None:
+    named, bare = (
+        parse_card(CARD + f'[[effects]]\neffect="axis_coupling"\ninertia=0.09\n{more}\n', "c").plant()
+        for more in ('neighbour="q1"', "")
+    )
+    pieces = prepare([elbow(1)], 15.0).pieces
+    torques = [stacked(Inverse(mount, ()), pieces, np.zeros(0))[0] for mount in (named, bare)]
+    np.testing.assert_array_equal(*torques)
+    without = stacked(Inverse(replace(named, effects=()), ()), pieces, np.zeros(0))[0]
+    assert np.ptp(torques[0] - without) > 0.1

@@ -5,6 +5,7 @@ from math import pi
 
 import numpy as np
 
+from cosim.data.neighbours import neighbours
 from cosim.data.recording import Recording
 from cosim.estimation.filters import derivative, lowpass
 from cosim.estimation.prepare import LEAST_SECONDS as SHORTEST
@@ -33,6 +34,17 @@ def check_effects(mount: Mount) -> None:
 def is_held(effect: Effect) -> bool:
     """Whether `Inverse` holds an effect: not what was drawn by chance."""
     return effect.is_determined
+
+
+def check_neighbours(mount: Mount, recordings: Sequence[Recording]) -> None:
+    """Refuse a card that names a neighbour of which a recording has no column (RecordingError)."""
+    for name in (effect.neighbour for effect in mount.effects if hasattr(effect, "neighbour")):
+        for one in recordings:
+            there = [each.name for each in neighbours(one.columns, one.units)]
+            if name and name not in there:
+                listed = f"neighbours are: {', '.join(there)}" if there else "it has no column of a neighbour"
+                text = f'{one.name}: the card\'s axis_coupling reads "{name}", which this recording lacks; {listed}.'
+                raise RecordingError(text, culprit=name, choices=tuple(there))
 
 
 def check_recordings(train: Sequence[Recording], heldout: Sequence[Recording]) -> None:
