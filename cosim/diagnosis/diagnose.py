@@ -38,7 +38,7 @@ from cosim.diagnosis.search.sizes import standard_errors
 from cosim.diagnosis.search.stages import InTurn, search
 from cosim.diagnosis.terms.learn import NOTHING_TRIED, Learned, learn
 from cosim.diagnosis.terms.spelled import Spelled
-from cosim.diagnosis.trust.admission import check_effects, check_neighbours, check_recordings
+from cosim.diagnosis.trust.admission import check_effects, check_recordings
 from cosim.diagnosis.trust.denied import beyond_denial, without_denied
 from cosim.diagnosis.trust.doubts import doubts, of_base, of_delivered, single_readings
 from cosim.diagnosis.trust.limits import half_sample
@@ -135,9 +135,8 @@ def diagnose(
     """
     started = time.perf_counter()
     given, train, heldout = (*train, *heldout), [*map(as_analysed, train)], [*map(as_analysed, heldout)]
-    check_effects(card.plant())
+    check_effects(card.plant(), (*train, *heldout))
     check_recordings(train, heldout)
-    check_neighbours(card.plant(), (*train, *heldout))
     sanity = (*doubts(train, heldout, card), *single_readings(given, (*train, *heldout)))
     on_progress("refitting the base")
     problem, base, late = _refitted(train, heldout, card)

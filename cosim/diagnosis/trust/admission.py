@@ -21,14 +21,18 @@ QUICK_SECONDS, LEAST_CYCLES, LEAST_ROWS = 4.0, 2.0, 500
 """... and those that are, if the speed goes up and down so many times in them, in so many rows."""
 
 
-def check_effects(mount: Mount) -> None:
-    """Refuse a card with an effect that the torque needed for a recorded motion does not hold yet (InputError)."""
+def check_effects(mount: Mount, recordings: Sequence[Recording] = ()) -> None:
+    """Refuse a card with an effect that the torque needed for a recorded motion does not hold yet (InputError).
+
+    So is one that reads a neighbour of which recordings have no column (RecordingError).
+    """
     for effect in mount.effects:
         if not is_held(effect):
             text = (
                 f"The card holds {effect.id}, which a diagnosis cannot take into account yet; take it out of the card."
             )
             raise InputError(text, culprit=effect.id)
+    check_neighbours(mount, recordings)
 
 
 def is_held(effect: Effect) -> bool:
