@@ -63,9 +63,9 @@ def test_the_same_seed_draws_the_same_mutants_from_every_group() -> None:
 
 def test_the_tests_of_a_module_are_those_that_are_near() -> None:
     root = mutants.HOME
-    assert mutants_choice.belonging(root / "cosim" / "hardware" / "replay.py")[0] == "test_hardware_replay.py"
-    assert "test_adrc.py" in mutants_choice.belonging(root / "pyfmi_models" / "adrc" / "controller.py")
-    assert "test_master.py" in mutants_choice.belonging(root / "cosim" / "master" / "planning.py")
+    assert mutants_choice.belonging(root / "cosim" / "hardware" / "replay.py")[0] == "hardware/test_hardware_replay.py"
+    assert "adrc/test_adrc.py" in mutants_choice.belonging(root / "pyfmi_models" / "adrc" / "controller.py")
+    assert "master/test_master.py" in mutants_choice.belonging(root / "cosim" / "master" / "planning.py")
 
 
 SHORT = """LIMIT = 3

@@ -30,13 +30,13 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs 
 
 
 def operating(one: Session) -> Session:
-    """Bring a session in real time into operation, with torque; on a computer that is too late for that, skip."""
-    for _ in range(20):
+    """Bring a session in real time into operation, with torque; begun again as often as a busy computer is late."""
+    while True:
         with suppress(HardwareError):
             one.enable()
-            if one.track(2000).torque:
-                return one
-    pytest.skip("this computer was never in time for a second of operation")
+            while one.axis.running:
+                if one.track(20).torque:
+                    return one
 
 
 def box_of(folder: Path) -> Recording:
@@ -121,7 +121,7 @@ def faults_when_python_is_killed(folder: Path) -> set[str]:
             box=str(folder / "box"),
         )
         with spawned("-c", code) as process:
-            loop = int(line_of(process) or pytest.skip("this computer was never in time"))
+            loop = int(line_of(process))
         try:
             wait_for(lambda: not Path(f"/proc/{loop}").exists())
         except AssertionError:

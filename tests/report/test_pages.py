@@ -1,10 +1,8 @@
 """Every page we write can be read by keyboard, by a screen reader, in the dark, on a phone and on paper."""
 
-import os
 import re
 import shutil
 import subprocess
-import time
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -168,21 +166,19 @@ def test_axe_finds_nothing_in_the_page_of_an_investigation(browser: Any, tmp_pat
 
 
 def test_a_report_is_small_and_soon_ready(browser: Any, tmp_path: Path) -> None:
-    if os.getloadavg()[0] > 2 * (os.cpu_count() or 1):
-        pytest.skip("this machine is busy with something else")
+    """Time of the page's own thread on a processor, so that other work on this machine does not count."""
     html = render(diagnosis("two"))
     assert len(html.encode()) <= 1_000_000
     (tmp_path / "report.html").write_text(html, "utf-8")
-    least = 10.0
-    for _ in range(5):  # the best of five: another process may have the processor
-        page = browser.new_page(viewport={"width": 1280, "height": 800})
-        page.set_default_timeout(PATIENCE)
-        begun = time.perf_counter()
-        page.goto((tmp_path / "report.html").as_uri())
-        page.wait_for_function("document.getElementById('explorer').dataset.ready === 'yes'")
-        least = min(least, time.perf_counter() - begun)
-        page.close()
-    assert least <= 0.5
+    page = browser.new_page(viewport={"width": 1280, "height": 800})
+    page.set_default_timeout(PATIENCE)
+    watch = page.context.new_cdp_session(page)
+    watch.send("Performance.enable", {"timeDomain": "threadTicks"})
+    page.goto((tmp_path / "report.html").as_uri())
+    page.wait_for_function("document.getElementById('explorer').dataset.ready === 'yes'")
+    spent = {one["name"]: one["value"] for one in watch.send("Performance.getMetrics")["metrics"]}
+    page.close()
+    assert 0 < spent["TaskDuration"] <= 0.5
 
 
 def test_the_explorer_has_at_least_three_ticks_on_each_side(browser: Any, tmp_path: Path) -> None:
