@@ -55,6 +55,18 @@ def number(value: float, digits: int = 2) -> str:
     return _fixed(round(value, places), max(places, 0))
 
 
+def spelled(text: str) -> str:
+    """Return text whose numbers with an exponent from -4 to 6 are written out: 2.32e+06 as 2,320,000."""
+    return re.sub(r"(?<![\w.])([-−]?\d(?:\.(\d+))?)e([+-]\d{2})(?!\d)", _spelled, text)
+
+
+def _spelled(found: re.Match[str]) -> str:
+    power = int(found[3])
+    if not -4 <= power <= 6:
+        return found[0]
+    return _fixed(float(f"{found[1]}e{power}".replace("−", "-")), max(len(found[2] or "") - power, 0))
+
+
 def raised(unit: str) -> str:
     """Return a unit as it is printed: N.m.s2/rad2 with points and powers."""
     powers = re.sub(r"(?<=[A-Za-z])\d", lambda found: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(found[0])], unit)

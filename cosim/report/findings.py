@@ -11,7 +11,7 @@ from cosim.report.next_experiment import is_about, to_record
 from cosim.report.quantities import Scales
 from cosim.report.sheet import Picture
 
-NOTHING_YET = "Nothing yet: it did not hold on the run that was not fitted."
+NOTHING_YET = "Nothing yet: it did not hold on the validation run."
 PROBABILITY = (
     "The probability is its share of the evidence among its rivals, calibrated on simulated telescope mounts and "
     "machines of six other classes; on machines unlike these it may come true less often."

@@ -6,11 +6,9 @@ from cosim.diagnosis.answer.result import Diagnosis, Finding, HeldOut
 from cosim.diagnosis.decide.calibration import LIKELY, SURE
 from cosim.plots.quantities import joined
 from cosim.report.quantities import Scales
-from cosim.report.words import Block, blocks, count, lowered, stated, verdict
+from cosim.report.words import Block, blocks, count, lowered, sized, stated, verdict
 
 NO_MODEL = "No improved model was written; card.toml is the delivered card with its numbers refitted."
-LED = 3
-"""Findings whose statement stands in the lead; of further ones it stands with the finding."""
 
 
 def heading(diagnosis: Diagnosis, model: str = "the model") -> str:
@@ -30,7 +28,7 @@ def heading(diagnosis: Diagnosis, model: str = "the model") -> str:
 
 
 _UNKNOWN = "Something is missing, and it is none of the effects cosim knows"
-_NOT_CONFIRMED = "Something is missing that no known effect explains on unseen runs"
+_NOT_CONFIRMED = "Something is missing that no known effect explains on the validation runs"
 
 
 def _unknown_heading(diagnosis: Diagnosis) -> str:
@@ -80,16 +78,22 @@ def _these(diagnosis: Diagnosis) -> str:
 
 
 def lead(diagnosis: Diagnosis, scales: Scales) -> list[str]:
-    """Return two to four plain sentences below the heading."""
+    """Return one or two plain sentences below the heading; sizes, doubts and rivals stand in the table of findings."""
     return [sentence for sentence in _LEADS[verdict(diagnosis)](diagnosis, scales) if sentence]
 
 
 def _found(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     found = [block for block in blocks(diagnosis) if block.answer == "found"]
-    said = [_stated(block) for block in found[:LED]]
-    has = "The simulation does not have it." if len(found) == 1 else "The simulation has neither."
-    has = has if len(found) < 3 else "The simulation has none of them."
-    return [*said, has, *_doubts(found), _either(diagnosis, "A further error"), improvement(diagnosis, scales)]
+    said = _stated(found[0]) if len(found) == 1 else f"The model lacks {_listed(found)}."
+    if more := _either(diagnosis, "a further error"):
+        said = f"{said.removesuffix('.')}; {more}"
+    return [said, improvement(diagnosis, scales)]
+
+
+def _listed(found: list[Block]) -> str:
+    """Name effects with their sizes, as they read inside a sentence."""
+    names = [lowered(block.title) + (f" ({size})" if (size := sized(block.first)[0]) else "") for block in found]
+    return f"{', '.join(names[:-1])} and {names[-1]}" if names[1:] else names[0]
 
 
 def _rival(diagnosis: Diagnosis, scales: Scales) -> list[str]:
@@ -97,37 +101,30 @@ def _rival(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     before, noise = (unit.number(value) for value in (held.before_rms, held.floor_rms))
     likeliest = unit.number(held.after_rms if held.possible_rms is None else held.possible_rms)
     would = "with the likeliest cause" if held.possible_rms is None else "with the likeliest cause it would be"
-    error = f"On unseen runs the error is {joined(before, unit.unit)}, {would} {likeliest}, noise {noise}."
-    return [_either(diagnosis, "The error"), error, _written(diagnosis)]
+    error = f"The validation error is {joined(before, unit.unit)}, {would} {likeliest}, noise floor {noise}"
+    return [_either(diagnosis, "The error"), f"{error}{_written(diagnosis)}."]
 
 
 def _either(diagnosis: Diagnosis, subject: str) -> str:
-    """Name each set of rivals, and each cause that is only possible."""
+    """Name each set of rivals, and each cause that is only possible, in one sentence."""
     said = []
     for block in _ambiguous(diagnosis):
         said.append(f"{subject} {_causes(block, diagnosis)}")
-        subject = "A further error"
-    return " ".join(said)
+        subject = "a further error"
+    return f"{'; '.join(said)}." if said else ""
 
 
 def _causes(block: Block, diagnosis: Diagnosis) -> str:
     causes = " or ".join(lowered(rival.title) for rival in block.findings)
     if len(block.findings) == 1:
         unlikely = block.first.probability < LIKELY
-        return f"may come from {causes}: {_probability(block) if unlikely else 'that is not certain'}."
-    held = "; the first is in the improved model" if block.first in diagnosis.in_model else ""
-    return f"has {count(len(block.findings)).lower()} possible causes: {causes}{held}."
+        return f"may come from {causes} ({_probability(block) if unlikely else 'not certain'})"
+    held = ", of which the first is in the improved model" if block.first in diagnosis.in_model else ""
+    return f"has {count(len(block.findings)).lower()} possible causes: {causes}{held}"
 
 
 def _stated(block: Block) -> str:
     return stated(block.first) or f"{block.title} acts on the machine."
-
-
-def _doubts(found: list[Block]) -> list[str]:
-    """Say of what was found that it is not sure."""
-    return [
-        f"{block.title} is not certain: {_probability(block)}." for block in found if block.first.probability < SURE
-    ]
 
 
 def _probability(block: Block) -> str:
@@ -135,43 +132,42 @@ def _probability(block: Block) -> str:
 
 
 def _written(diagnosis: Diagnosis) -> str:
-    """Say that there is no improved model, where there is none."""
+    """Say that there is no improved model, where there is none; a part of a sentence."""
     if diagnosis.learned:
-        return "The improved model holds it as a table: see What has no name."
-    return "" if diagnosis.in_model else NO_MODEL
+        return "; the improved model holds it as a table"
+    return "" if diagnosis.in_model else "; no improved model was written"
 
 
 def led(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Return the effects whose statement stands in the lead."""
     found = [block.first.effect for block in blocks(diagnosis) if block.answer == "found"]
-    return tuple(found[:LED]) if verdict(diagnosis) in ("found", "unknown") else ()
+    return tuple(found) if len(found) == 1 and verdict(diagnosis) == "found" else ()
 
 
 def _nothing(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     held = diagnosis.heldout
     error, noise = scales.torque.text(held.before_rms), scales.torque.text(held.floor_rms)
     near = "to within the noise" if held.before_rms <= 1.25 * held.floor_rms else "as well as any known effect can"
-    proven = [block.title for block in blocks(diagnosis) if block.answer == "not_proven"]
-    fits = f"{' and '.join(proven)}: fits better, but not on unseen runs." if proven else ""
-    first = f"The refitted simulation matches the machine {near} on runs it never saw ({error} error, {noise} noise)."
-    return [first, fits, NO_MODEL]
+    first = (
+        f"The refitted model matches the machine {near} on the validation runs (error {error}, noise floor {noise})."
+    )
+    return [first, NO_MODEL]
 
 
 def _unknown(diagnosis: Diagnosis, scales: Scales) -> list[str]:
-    """Say what was named, that the others are not the rest, and where the rest goes."""
-    named, found = _named(diagnosis), [block for block in blocks(diagnosis) if block.answer == "found"]
-    said = [_stated(block) for block in found[:LED]]
+    """Say what is detected beside it, that no other effect explains the rest, and how large the error is."""
+    found = [block for block in blocks(diagnosis) if block.answer == "found"]
     own = next((stated(finding) for finding in diagnosis.findings if finding.effect == "unknown"), "")
     others = [f for f in diagnosis.findings if f.effect != "unknown" and f.answer in ("not_seen", "not_proven")]
-    none = f"None of the {len(others)} {'other ' if named else ''}known effects that could be tested "
-    none += "explains the rest." if named or diagnosis.learned else "lowers it."
+    beside = f"Beside {_listed(found)} an error remains that" if found else "The error is one that"
+    none = f"{beside} none of the {len(others)} {'other ' if found else ''}known effects tested here explains."
     numbers = improvement(diagnosis, scales) if diagnosis.learned else _numbers(diagnosis, scales)
-    return [*said, *_doubts(found), _either(diagnosis, "The error"), own, numbers, none, _written(diagnosis)]
+    return [own if own and not found else none, numbers.removesuffix(".") + _written(diagnosis) + "."]
 
 
 def _withheld(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     """What blocks the naming stands above the lead."""
-    return ["What a fit found beside this would be an error of the recordings.", _written(diagnosis)]
+    return ["An effect fitted now would only make up for this error of the recordings.", NO_MODEL]
 
 
 _LEADS = {"withheld": _withheld, "found": _found, "either": _rival, "none": _nothing, "unknown": _unknown}
@@ -179,18 +175,18 @@ _LEADS = {"withheld": _withheld, "found": _found, "either": _rival, "none": _not
 
 def _numbers(diagnosis: Diagnosis, scales: Scales) -> str:
     held, unit = diagnosis.heldout, scales.torque
-    return f"The error on unseen runs is {unit.text(held.after_rms)} against {unit.text(held.floor_rms)} of noise."
+    return f"The validation error is {unit.text(held.after_rms)}, the noise floor {unit.text(held.floor_rms)}."
 
 
 def improvement(diagnosis: Diagnosis, scales: Scales) -> str:
-    """Return the held-out proof in one sentence; where rests hide what motion shows, in two."""
+    """Return the validation error before and after in one sentence; where rests hide it, that of clear motion first."""
     held, unit = diagnosis.heldout, scales.torque
     before, noise = unit.number(held.before_rms), unit.number(held.floor_rms)
     moving, clear = _moving(held, scales), held.confidence_interval[0] > 0
     verb = "falls" if clear else "does not clearly fall:"
-    where = "Over all samples, rests included, it" if moving and not clear else "On unseen runs the error"
-    said = f"{where} {verb} from {before} to {unit.text(held.after_rms)}; noise is {noise}."
-    return said if clear or not moving else f"{moving} {said}"
+    where = "over all samples, rests included, it" if moving and not clear else "The validation error"
+    said = f"{where} {verb} from {before} to {unit.text(held.after_rms)} (noise floor {noise})."
+    return said if clear or not moving else f"{moving}; {said}"
 
 
 def _moving(held: HeldOut, scales: Scales) -> str:
@@ -199,4 +195,4 @@ def _moving(held: HeldOut, scales: Scales) -> str:
     unit = scales.torque
     falls = f"from {unit.number(before)} to {unit.text(after)}"
     seen = after < before and unit.number(before) != unit.number(after)
-    return f"In clear motion the error on unseen runs falls {falls}." if seen else ""
+    return f"In clear motion the validation error falls {falls}" if seen else ""

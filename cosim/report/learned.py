@@ -55,7 +55,7 @@ def _rows(diagnosis: Diagnosis, scales: Scales) -> Iterator[tuple[str, str]]:
     change = f"{unit.number(told['before'])} → {unit.text(told['after'])}"
     yield "Unseen runs", f"error {change}, less by {unit.span(low, high)} (95 %), {band}"
     for one in told.get("formula", ()):
-        yield "Formula", f"{one['equation']}; {_numbers_of(one)}. As good on unseen runs, proposed, in no model."
+        yield "Formula", f"{one['equation']}; {_numbers_of(one)}. As good on validation runs; proposed, in no model."
     yield "Seen", minus("; ".join(told["range"])).replace(" degC", " °C").replace("N.m", "N·m")
 
 

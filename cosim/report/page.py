@@ -49,7 +49,7 @@ def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, o
         "lead": lead(diagnosis, scales),
         "facts": unknown.facts(diagnosis, scales) if kind == "unknown" else None,
         "limits": tables.limits(diagnosis, scales) if kind == "none" else None,
-        "unseen": "" if kind == "none" else tables.unseen(diagnosis),
+        "unseen": ("", "") if kind == "none" else tables.unseen(diagnosis),
         "proof": proof(diagnosis, rows, scales),
         "parts_table": tables.parts(rows, scales),
         "added": diagnosis.adds_physics,
@@ -106,7 +106,9 @@ def _box(diagnosis: Diagnosis, worse: list[str], scales: Scales) -> dict[str, st
         return None
     proven = words.proven_range(diagnosis, scales)
     text = (
-        f"is proven {proven}. Elsewhere, keep the delivered model." if proven else "is proven on the unseen runs only."
+        f"is proven {proven}. Elsewhere, keep the delivered model."
+        if proven
+        else "is proven on the validation runs only."
     )
     said = [f"in front of {words.model(diagnosis)}"] if "correction" in diagnosis.improved else []
     said += [text, f"It is worse here: {', '.join(worse)}." if worse else ""]
@@ -142,7 +144,7 @@ def _middle(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, 
     }
 
 
-MISFIT = "A friction law that is not quite the machine's leaves as much: that is no proof of another effect."
+MISFIT = "Friction-model error alone could explain this."
 """What can be said of a rest that was judged to be no effect: what it goes with was not asked."""
 
 
@@ -152,10 +154,10 @@ def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     rest = float(np.sqrt(max(held.after_rms**2 - held.floor_rms**2, 0.0)))
     if quiet := rest <= 0.5 * held.floor_rms:
         error, noise = unit.text(held.after_rms), unit.text(held.floor_rms)
-        left = f"Hardly anything: {error} of error on unseen runs against {noise} of noise."
+        left = f"Hardly anything: {error} of validation error against a noise floor of {noise}."
     else:
-        left = f"{unit.text(rest)} of error on unseen runs stays unexplained, beyond the noise."
-    goes = f"It goes with {', '.join(diagnosis.depends_on)}." if diagnosis.depends_on else ""
+        left = f"{unit.text(rest)} of validation error stays unexplained, beyond the noise."
+    goes = f"It correlates with {', '.join(diagnosis.depends_on)}." if diagnosis.depends_on else ""
     misfit = "" if goes or quiet or words.verdict(diagnosis) == "withheld" else MISFIT
     there = "" if quiet else untrained(diagnosis, scales)
     return [text for text in (left, there, goes, misfit) if text]

@@ -11,7 +11,7 @@ from cosim.diagnosis.measure.breakdown import bars
 from cosim.plots.quantities import decimals, number, raised, scale_of
 from cosim.report.equations import base_unit, least
 from cosim.report.quantities import Scales
-from cosim.report.words import ANSWERS, limit, lowered, shows_from, sized, unseen_torque
+from cosim.report.words import ANSWERS, limit, lowered, shows_from, sized, started, unseen_torque
 
 
 @dataclass(frozen=True)
@@ -166,17 +166,15 @@ def files(diagnosis: Diagnosis) -> Table:
     return Table(("File", "Role", "Length", "SHA-256"), tuple(rows), (), "stack named hash")
 
 
-def unseen(diagnosis: Diagnosis) -> str:
-    """Return the one line on what was not seen and what these recordings cannot show."""
-    said = []
-    starts = {
-        "not_seen": "Not detected",
-        "not_decided": "Not decided",
-        "not_testable": "Not testable with these recordings",
-    }
-    for answer, start in starts.items():
-        names = [lowered(finding.title) for finding in diagnosis.findings if finding.answer == answer]
-        rest = f" and {len(names) - 5} more" if len(names) > 6 else ""
-        if names:
-            said.append(f"{start}: {', '.join(names[:5] if rest else names)}{rest}.")
-    return " ".join(said)
+def unseen(diagnosis: Diagnosis) -> tuple[str, str]:
+    """Return one line on what was not detected and what these recordings cannot show, and the names that it folds."""
+    words = {"not_seen": "not detected", "not_decided": "not decided", "not_testable": "not testable here"}
+    named = {answer: [lowered(f.title) for f in diagnosis.findings if f.answer == answer] for answer in words}
+    counts = [f"{len(names)} {words[answer]}" for answer, names in named.items() if names]
+    if not counts:
+        return "", ""
+    many, _, first = counts[0].partition(" ")
+    head = f"{many} other effect{'' if many == '1' else 's'}: {first}"
+    head += ", limits in the table below" if named["not_seen"] else ""
+    told = [f"{started(words[answer])}: {', '.join(names)}." for answer, names in named.items() if names]
+    return "; ".join([head, *counts[1:]]), " ".join(told)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from cosim.diagnosis.answer.result import Diagnosis, Finding
+from cosim.plots.quantities import spelled
 from cosim.report.findings import do, where
 from cosim.report.lead import heading
 from cosim.report.next_experiment import to_record
@@ -28,8 +29,10 @@ from cosim.report.words import (
 
 WIDTH = 80
 REPORT = "report.html"
-WORDS = {"found": ANSWERS["found"].lower(), "ambiguous": ANSWERS["ambiguous"].lower(), "not_proven": "no proof"}
+WORDS = {"found": ANSWERS["found"].lower(), "ambiguous": ANSWERS["ambiguous"].lower(), "not_proven": "unproven"}
 NAME, SIZE, RANGE = 21, 12, 16
+REMARKS = 3
+"""Remarks on recordings and card that the terminal prints."""
 ORDER = 10
 """Columns of what to do, before the text."""
 
@@ -46,11 +49,7 @@ def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -
     title = printable(_title(diagnosis))
     parts = [
         [f"\033[1m{line}\033[0m" if bold else line for line in textwrap.wrap(title, WIDTH)],
-        [
-            line
-            for one in sorted(diagnosis.sanity, key=lambda one: not one.blocks_naming)
-            for line in _ordered("Careful" if one.blocks_naming else "Note", one.statement)
-        ],
+        _doubts(diagnosis, out),
         [line for block in blocks(diagnosis) for line in _to_do(block, diagnosis)],
         _files(diagnosis, scales, out),
         [""],
@@ -58,7 +57,7 @@ def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -
         _goes_with(diagnosis),
         _wrapped(untrained(diagnosis, scales), 2) if "unknown" in diagnosis.verdict else [],
         _rest(diagnosis),
-        _wrapped(diagnosis.learned.get("statement", "") or diagnosis.not_learned.get("statement", ""), 0),
+        _wrapped(spelled(diagnosis.learned.get("statement", "") or diagnosis.not_learned.get("statement", "")), 0),
         _formulas(diagnosis),
         _wrapped(law(diagnosis), 0),
         _error(diagnosis, scales),
@@ -66,6 +65,16 @@ def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -
         _wrote(diagnosis),
     ]
     return "\n".join(line for part in parts for line in part)
+
+
+def _doubts(diagnosis: Diagnosis, out: Path | None) -> list[str]:
+    """Return alarms and the first remarks; where there is a report, it holds the others."""
+    ranked = sorted(diagnosis.sanity, key=lambda one: not one.blocks_naming)
+    alarms = sum(one.blocks_naming for one in ranked)
+    shown = ranked[: alarms + REMARKS] if out and REPORT in diagnosis.files else ranked
+    lines = [line for one in shown for line in _ordered("Careful" if one.blocks_naming else "Note", one.statement)]
+    rest = len(ranked) - len(shown)
+    return lines + (_ordered("Note", f"{rest} more remark{'s' if rest > 1 else ''} in {REPORT}") if rest else [])
 
 
 def _ordered(word: str, text: str) -> list[str]:
@@ -135,7 +144,11 @@ def _wrapped(text: str, indent: int) -> list[str]:
 
 def _goes_with(diagnosis: Diagnosis) -> list[str]:
     """Return on what an unknown rest depends."""
-    return _wrapped(f"The rest goes with: {', '.join(diagnosis.depends_on)}", 2) if diagnosis.depends_on else []
+    return (
+        _wrapped(f"The remaining error correlates with: {', '.join(diagnosis.depends_on)}", 2)
+        if diagnosis.depends_on
+        else []
+    )
 
 
 def _formulas(diagnosis: Diagnosis) -> list[str]:
@@ -157,7 +170,7 @@ def proposed(diagnosis: Diagnosis, files: Sequence[Path]) -> str:
     if diagnosis.learned:
         return "Nothing to propose: no formula is as good as what was learned."
     unknown = "unknown" in diagnosis.verdict
-    reason = "nothing was learned for what has no name" if unknown else "nothing is left without a name"
+    reason = "nothing was learned outside the catalogue" if unknown else "nothing is left outside the catalogue"
     return f"Nothing to propose: {reason}."
 
 
@@ -167,8 +180,12 @@ def _rest(diagnosis: Diagnosis) -> list[str]:
     told = {"not_seen": "not detected", "not_decided": "not decided", "not_testable": "not testable here"}
     counts = [(sum(one == answer for one in answers), words) for answer, words in told.items()]
     said = [f"{number} {words}" for number, words in counts if number]
-    where_ = REPORT if REPORT in diagnosis.files else "diagnosis.json"
-    return _wrapped(f"Other effects: {', '.join(said)}; upper limits and reasons in {where_}", 2) if said else []
+    where_ = "the report" if REPORT in diagnosis.files else "diagnosis.json"
+    if not said:
+        return []
+    many, _, first = said[0].partition(" ")
+    plural = "" if many == "1" else "s"
+    return _wrapped("; ".join([f"{many} other effect{plural}: {first}, limits in {where_}", *said[1:]]), 2)
 
 
 def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:

@@ -20,7 +20,7 @@ def facts(diagnosis: Diagnosis, scales: Scales) -> Table:
         ("Where", _where(diagnosis, own, scales)),
         ("When", _when(diagnosis)),
         ("Size", _size(diagnosis, own, scales)),
-        ("Goes with", ", ".join(diagnosis.depends_on) or "nothing that was recorded"),
+        ("Correlates with", ", ".join(diagnosis.depends_on) or "nothing that was recorded"),
         ("Do this", _action(diagnosis, own)),
     ]
     return Table(("Question", "What is known about it"), tuple(row for row in rows if row[1]), (), "facts")

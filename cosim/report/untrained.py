@@ -48,5 +48,5 @@ def _beyond(values: Array, left: Array, edges: tuple[float, float]) -> tuple[flo
 
 def _sentence(energy: float, rows: float, name: str, edges: tuple[float, float], unit: Scale) -> str:
     where = f"at {name} outside {unit.span(*edges)}, which the fit never had ({100 * rows:.0f} % of the time)"
-    part = f"{100 * energy:.0f} % of the error energy on unseen runs"
-    return f"{part} lies {where}: what acts there alone has no name before it is fitted."
+    part = f"{100 * energy:.0f} % of the error energy on validation runs"
+    return f"{part} lies {where}: what acts there alone cannot be named without training data."

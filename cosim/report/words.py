@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.diagnosis.answer.result import Diagnosis, Finding
-from cosim.plots.quantities import decimals, joined, minus, number, raised, scale_of, trimmed
+from cosim.plots.quantities import decimals, joined, minus, number, raised, scale_of, spelled, trimmed
 from cosim.report.quantities import Scales
 
 COUNTS = ("No", "One", "Two", "Three", "Four", "Five", "Six", "Seven", "Eight", "Nine", "Ten")
@@ -25,12 +25,12 @@ MEANINGS = (
     (
         "found",
         "Detected",
-        "The error on unseen runs falls, and every rival fits worse. Its probability, 0.5 or more, stands beside it.",
+        "The validation error falls, and every rival fits worse. Its probability is 0.5 or more.",
     ),
     (
         "ambiguous",
         "Possible",
-        "The error on unseen runs falls, but its probability is below 0.5 or its size is not determined. The improved "
+        "The validation error falls, but its probability is below 0.5 or its size is not determined. The improved "
         "model does not hold it, unless you ask with --with-possible.",
     ),
     (
@@ -41,9 +41,9 @@ MEANINGS = (
     (
         "not_proven",
         "Not confirmed",
-        "It fits better, but not on runs the fit never saw, or something without a name fits better still.",
+        "It fits better in training, but not on validation runs, or something outside the catalogue fits better still.",
     ),
-    ("not_decided", "Not decided", "Another effect stands in its place and explains more."),
+    ("not_decided", "Not decided", "Another effect explains more instead."),
     ("not_seen", "Not detected", "It would have been detected from the size given (upper limit)."),
     ("not_testable", "Not testable", "The recordings lack the condition given; it says how to record it."),
     ("unknown", "Unknown", "Error above the noise that no known effect lowers."),
@@ -169,10 +169,15 @@ def sized(finding: Finding) -> tuple[str, str]:
     """Return size and its 95 % range as they are printed: angles and lengths in a unit that needs no zeros."""
     size = re.fullmatch(r"([-−\d.e+]+) (rad|m)", finding.size)
     if not size:
-        return minus(finding.size), minus(finding.size_range)
+        return spelled(minus(finding.size)), spelled(minus(_thousands(finding.size_range)))
     scale = scale_of(size[2], abs(_value(size[1])))
     ends = tuple(_value(end) * scale.factor for end in finding.size_range.split(" to ") if end)
     return scale.text(_value(size[1]), 3), " to ".join(decimals(ends, 3))
+
+
+def _thousands(text: str) -> str:
+    """Return a range whose long numbers have separators, as those of tables have."""
+    return re.sub(r"(?<![\w.,])\d{5,}(?![\w,])", lambda found: f"{int(found[0]):,}", text)
 
 
 def in_handy_units(text: str) -> str:
@@ -187,7 +192,7 @@ def _handy(found: re.Match[str]) -> str:
 
 def stated(finding: Finding) -> str:
     """Return the plain sentence of a finding."""
-    return closed(minus(in_handy_units(finding.statement)))
+    return closed(minus(spelled(in_handy_units(finding.statement))))
 
 
 def _value(text: str) -> float:
@@ -204,7 +209,7 @@ def shows_from(finding: Finding) -> str:
 
 def limit(finding: Finding) -> str:
     """Return from which size, or of what kind, an effect would have shown: "8.3 ms", "wider than 3 mm"."""
-    return in_handy_units(shows_from(finding) or finding.evidence.removeprefix(FROM))
+    return spelled(in_handy_units(shows_from(finding) or finding.evidence.removeprefix(FROM)))
 
 
 def _limit(value: float, unit: str) -> str:

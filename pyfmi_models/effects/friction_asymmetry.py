@@ -51,6 +51,6 @@ class FrictionAsymmetry(FrictionEffect):
 
 def _percent(name: str, asymmetry: float) -> tuple[float, str]:
     """How far two directions differ, as a share of their mean, and in words."""
-    harder, easier = ("forward", "backward") if asymmetry > 0 else ("backward", "forward")
+    harder = "forward" if asymmetry > 0 else "backward"
     size = 2 * abs(asymmetry)
-    return size, f"{name.capitalize()} is higher moving {harder} than {easier}, by {percent(size)} of their mean"
+    return size, f"{name.capitalize()} differs by {percent(size)} between directions (of the mean; higher {harder})"

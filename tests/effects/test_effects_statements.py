@@ -122,18 +122,18 @@ def test_the_sentence_of_an_axis_that_slides_differs_in_its_units_alone(effect: 
         (
             "FrictionAsymmetry",
             {"level_asymmetry": 0.1},
-            "Sliding friction is higher moving forward than backward, by 20 % of their mean.",
+            "Sliding friction differs by 20 % between directions (of the mean; higher forward).",
         ),
         (
             "FrictionAsymmetry",
             {"level_asymmetry": -0.1, "viscous_asymmetry": 0.009},
-            "Sliding friction is higher moving backward than forward, by 20 % of their mean.",
+            "Sliding friction differs by 20 % between directions (of the mean; higher backward).",
         ),
         (
             "FrictionAsymmetry",
             {"level_asymmetry": 0.1, "viscous_asymmetry": -0.2},
-            "Viscous friction is higher moving backward than forward, by 40 % of their mean, "
-            "sliding friction is higher moving forward than backward, by 20 % of their mean.",
+            "Viscous friction differs by 40 % between directions (of the mean; higher backward), "
+            "sliding friction differs by 20 % between directions (of the mean; higher forward).",
         ),
         (
             "GearFriction",

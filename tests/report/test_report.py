@@ -35,7 +35,7 @@ def page(kind: str = "two", motion: str = "rotary") -> str:
 CASES = [("two", "rotary"), ("none", "rotary"), ("unknown", "rotary"), ("two", "linear")]
 KINDS = pytest.mark.parametrize(("kind", "motion"), CASES)
 HEADINGS = """Findings|Next experiment|Everything that was looked for|What stays unexplained|When|Where|
-Proof on unseen runs|The worst seconds|Look at the recordings|Parameters of the base|How this was made"""
+Validation|The worst seconds|Look at the recordings|Parameters of the base|How this was made"""
 SIGNALS = ("t", "q", "v", "tau", "before", "after", "missing", "band")
 BARE: dict[str, Any] = {name: {} for name in ("provenance", "improved", "base_parameters", "next_experiment")}
 
@@ -69,7 +69,7 @@ def test_html_is_well_formed(kind: str, motion: str) -> None:
 def test_two_effects_are_told_on_the_first_screen() -> None:
     first = re.sub(r"<[^>]+>", " ", page().split("<h2>Findings")[0].split("</style>")[1])
     assert "Two effects are missing from the model" in first
-    assert "Turning forward takes 0.26 N·m more than backward." in first
+    assert "The model lacks cogging (0.42 N·m) and friction asymmetry (0.26 N·m); a further error has" in first
     for text in (
         "0.39 to 0.45",
         "Detected",
@@ -79,9 +79,8 @@ def test_two_effects_are_told_on_the_first_screen() -> None:
         "20 to 90°/s",
     ):
         assert text in first
-    assert (
-        "Not detected: delay, clock skew. Not testable with these recordings: thermal drift, dwell break-away." in first
-    )
+    assert "2 other effects: not detected, limits in the table below; 2 not testable here" in first
+    assert "Not detected: delay, clock skew. Not testable here: thermal drift, dwell break-away." in first
 
 
 def test_nothing_missing_has_its_own_first_screen() -> None:
@@ -94,7 +93,7 @@ def test_nothing_missing_has_its_own_first_screen() -> None:
 
 def test_unknown_says_where_to_look_and_names_no_effect() -> None:
     html = page("unknown")
-    assert "<h1>Something is missing that no known effect explains on unseen runs</h1>" in html
+    assert "<h1>Something is missing that no known effect explains on the validation runs</h1>" in html
     assert re.search(r"position .*20\d to 2\d\d°.*forward only", html)
     assert "position, direction of motion" in html
 
@@ -268,9 +267,10 @@ def test_something_unknown_stands_beside_what_is_named() -> None:
     both = replace(diagnosis("two"), verdict=("cogging", "friction_asymmetry", "unknown"), depends_on=("time",))
     assert lead.heading(both).endswith("effects are missing from the model, and something unknown")
     said = " ".join(lead.lead(both, Scales.of(both)))
-    assert "24 times per turn" in said
+    assert "cogging (0.42 N·m)" in said
+    assert len(lead.lead(both, Scales.of(both))) == 2
     assert "other known effects" in said
-    assert "The rest goes with: time" in summary(both)
+    assert "The remaining error correlates with: time" in summary(both)
     rivals = tuple(finding for finding in both.findings if finding.answer != "found")
     open_question = replace(both, findings=rivals, verdict=("gravity_unbalance", "unknown"))
     assert "more than one possible cause, and something unknown" in lead.heading(open_question)

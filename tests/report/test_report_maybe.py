@@ -51,7 +51,7 @@ def test_page_and_terminal_use_one_word_for_what_may_be() -> None:
     lines = summary(whole).splitlines()
     assert lines[0] == "Two effects are missing from mount.toml, perhaps one more"
     assert [line.split()[0] for line in lines if "cable wrap  " in line] == ["possible"]
-    assert "A further error may come from cable wrap: its probability is 0.49." in said(whole)
+    assert "; a further error may come from cable wrap (its probability is 0.49)." in said(whole)
 
 
 def test_the_lead_names_every_open_question() -> None:

@@ -2,17 +2,23 @@
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
+import pytest
 from report_example import FOUND, REST, RIVALS, diagnosis
 from report_text import text_of
 from test_report_truth import drawn
 
 from cosim.delivery.deliver import without_files
+from cosim.diagnosis.answer.result import Sanity
+from cosim.plots.quantities import spelled
 from cosim.report import render, words
+from cosim.report.lead import heading, lead
 from cosim.report.motion import motion
 from cosim.report.quantities import Scales
 from cosim.report.tables import limits
 from cosim.report.terminal import summary
+from cosim.report.words import sized
 
 
 def test_how_far_a_rival_is_behind_in_evidence_stands_among_the_numbers() -> None:
@@ -34,7 +40,7 @@ def test_of_rivals_that_remove_as_much_it_is_said_what_decides() -> None:
 def test_nothing_is_to_be_done_about_what_did_not_prove_itself() -> None:
     weak = replace(FOUND[0], answer="not_proven", action="Check the bearing.")
     whole = replace(diagnosis("two"), findings=(weak, *FOUND[1:], *REST), verdict=("friction_asymmetry",))
-    assert "Nothing yet: it did not hold on the run that was not fitted." in render(whole)
+    assert "Nothing yet: it did not hold on the validation run." in render(whole)
     assert "Check the bearing" not in render(whole) + summary(whole)
 
 
@@ -55,7 +61,7 @@ def test_each_limit_stands_beside_the_effect_that_it_is_of() -> None:
 def test_effects_that_were_not_detected_are_one_line_on_the_terminal() -> None:
     untold = [replace(REST[0], effect=f"e{k}", title=f"E{k}", answer="not_testable") for k in range(3)]
     said = " ".join(summary(replace(diagnosis("none"), findings=(*untold, REST[0]))).split())
-    assert "Other effects: 1 not detected, 3 not testable here; upper limits and reasons in report.html" in said
+    assert "1 other effect: not detected, limits in the report; 3 not testable here" in said
 
 
 def test_a_chirp_of_a_few_micrometres_is_not_told_in_metres() -> None:
@@ -79,3 +85,28 @@ def test_an_answer_that_was_not_written_names_no_file() -> None:
     whole = without_files(diagnosis("two"))
     assert "Wrote" not in summary(replace(whole, improved={}))
     assert "scenario" not in whole.next_experiment
+
+
+@pytest.mark.parametrize("kind", ["two", "none", "unknown"])
+def test_the_lead_has_at_most_two_sentences_and_a_heading_one(kind: str) -> None:
+    whole = diagnosis(kind)
+    said = " ".join(lead(whole, Scales.of(whole)))
+    assert len(re.findall(r"[.!?](?= [A-Z]|$)", said)) <= 2
+    assert len(re.findall(r"[.!?](?= [A-Z])", heading(whole))) == 0
+
+
+def test_numbers_with_an_exponent_are_written_out() -> None:
+    assert (
+        spelled("2.32e+06 N/m, 1.8e+03 to -4.1e-04, 1e+09, 3e-05x") == "2,320,000 N/m, 1,800 to −0.00041, 1e+09, 3e-05x"
+    )
+    stiff = replace(FOUND[0], size="2.32e+06 N/m", size_range="2091449 to 2546496")
+    assert sized(stiff) == ("2,320,000 N/m", "2,091,449 to 2,546,496")
+
+
+def test_many_remarks_are_folded_on_the_terminal_and_alarms_are_not(tmp_path: Path) -> None:
+    remarks = tuple(Sanity(finding="encoder_step", statement=f"Remark {k}.") for k in range(7))
+    whole = replace(diagnosis("two"), sanity=remarks)
+    assert summary(whole).count("Remark") == 7  # without a folder there is no report to read
+    told = summary(whole, out=tmp_path)
+    assert told.count("Remark") == 3
+    assert "4 more remarks in report.html" in told

@@ -27,7 +27,9 @@ def test_a_rest_where_training_never_was_is_said_to_lie_there() -> None:
     top = float(np.quantile(diagnosis("none").traces[-1].tau, 0.97))
     said = limited(top, top)
     page = " ".join(unexplained(said, Scales.of(said)))
-    assert re.search(r"9\d % of the error energy on unseen runs lies at torques outside .* \(3 % of the time\)", page)
+    assert re.search(
+        r"9\d % of the error energy on validation runs lies at torques outside .* \(3 % of the time\)", page
+    )
     assert "which the fit never had (3 % of the time): what acts there" in " ".join(summary(said).split())
 
 

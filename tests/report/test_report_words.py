@@ -64,13 +64,13 @@ def test_terminal_is_bold_only_where_wanted(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_what_rests_hide_is_said_of_clear_motion_and_never_called_clear() -> None:
     whole = diagnosis("two")
-    assert improvement(whole, Scales.of(whole)).startswith("On unseen runs the error falls from ")
+    assert improvement(whole, Scales.of(whole)).startswith("The validation error falls from ")
     hidden = replace(whole, heldout=replace(whole.heldout, confidence_interval=(-0.02, 0.3)))
     said = improvement(hidden, Scales.of(whole))
-    assert said.startswith("In clear motion the error on unseen runs falls from 0.35 to 0.17")
-    assert "Over all samples, rests included, it does not clearly fall: from" in said
+    assert said.startswith("In clear motion the validation error falls from 0.35 to 0.17")
+    assert "over all samples, rests included, it does not clearly fall: from" in said
     worse = replace(hidden, heldout=replace(hidden.heldout, sliding={"before_rms": 0.17, "after_rms": 0.35}))
-    assert improvement(worse, Scales.of(whole)).startswith("On unseen runs the error does not clearly fall: from")
+    assert improvement(worse, Scales.of(whole)).startswith("The validation error does not clearly fall: from")
 
 
 def test_a_range_ends_where_the_parameter_does() -> None:

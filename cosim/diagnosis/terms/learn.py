@@ -103,7 +103,7 @@ class Learned:
         error = f"held-out error {self.before:.2g} → {self.after:.2g} {self.unit}"
         if not self.helps:
             return (
-                f"A table over {depends} was tried for what has no name and is not in the model: {error}, "
+                f"A table over {depends} was tried outside the catalogue and is not in the model: {error}, "
                 "not clearly less, or more on one recording."
             )
         said = f"Something that depends on {depends}, {self.size:.2g} {self.unit}; modelled as a table"
@@ -150,7 +150,7 @@ class Learned:
 
 NOTHING_TRIED: NotLearnedEntry = {
     "quantities": [],
-    "statement": "No table over what was recorded predicts what has no name, so none was added to the model.",
+    "statement": "No table over what was recorded predicts the remaining error, so none was added to the model.",
 }
 
 

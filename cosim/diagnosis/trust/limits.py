@@ -71,8 +71,8 @@ def no_set_point(recordings: Sequence[Recording]) -> tuple[Sanity, ...]:
     if not without:
         return ()
     text = (
-        f"{', '.join(without)}: no set point (q_d) was recorded. So nothing but the fit itself tells a delay from a "
-        "lag, bias by the control loop cannot be tested, and there is no proof in closed loop. Record q_d as well."
+        f"{', '.join(without)}: no set point (q_d) was recorded. So only the fit distinguishes a delay from a lag, "
+        "bias by the control loop cannot be tested, and nothing is validated in closed loop. Record q_d as well."
     )
     return (Sanity(finding="no_set_point", statement=text),)
 
