@@ -89,7 +89,12 @@ def pairs_of(option: str, given: Sequence[str] | None) -> dict[str, str]:
     for name, equals, value in pairs:
         if not (name and equals and value):
             raise InputError(f'{option} {name}{equals}{value}: write it as name=value, for example "tau=force".')
-    return {name: value for name, _, value in pairs}
+    found: dict[str, str] = {}
+    for name, _, value in pairs:
+        if found.setdefault(name, value) != value:
+            text = f"{option} {name}={found[name]} {name}={value}: it is given twice; once is enough."
+            raise InputError(text, culprit=name, value=value)
+    return found
 
 
 def _by_file(option: str, given: Sequence[str] | None, paths: Sequence[Path]) -> list[dict[str, str]]:

@@ -8,6 +8,7 @@ fit -> uncertainty   least squares over several starts (`fit`), and what it is w
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 
 import numpy as np
 
@@ -121,7 +122,10 @@ def calibrate(
         InputError: a name, a column, a unit or an option does not fit; or the model cannot be simulated at its start.
     """
     _check(options)
-    for name in options.given:
+    _check_kept_out(train, heldout)
+    for name, value in options.given.items():
+        if not isfinite(value):
+            raise InputError(f"--set {name}={value:g}: it must be a finite number.", culprit=name, value=value)
         if name not in subject.known:
             raise unknown("--set", name, subject.source, subject.known, "what can be set")
     free = free_of(subject, options.free, options.given, options.bounds)
@@ -190,6 +194,15 @@ def _check(options: Options) -> None:
     for name, number in (("--step", options.step), ("--window", options.window), ("--timeout", options.timeout)):
         if number is not None and not 0 < number < float("inf"):
             raise InputError(f"{name} {number:g}: it must be above 0.", culprit=name, value=number)
+
+
+def _check_kept_out(train: Sequence[Recording], heldout: Sequence[Recording]) -> None:
+    """Refuse a recording that is fitted and kept out."""
+    fitted = {one.sha256 for one in train}
+    for one in heldout:
+        if one.sha256 in fitted:
+            text = f"{one.name} is fitted and kept out; a recording that is kept out must be another one."
+            raise InputError(text, culprit="heldout", value=one.name)
 
 
 def _on_roughness(names: Sequence[str]) -> tuple[str, ...]:

@@ -16,10 +16,10 @@ from uuid import uuid4
 
 from cosim.calibration.simulation import Answer, Job, Outputs, Point, outputs_at, prepare
 from cosim.calibration.store import Store
-from cosim.support.cell import Cell, LostError, cores, ending
+from cosim.support.cell import Cell, LostError, ending
 from cosim.support.errors import CosimError, InputError
 from cosim.sweeps.cluster import on_cluster
-from cosim.sweeps.pool import close_cells, own_cell
+from cosim.sweeps.pool import MOST, close_cells, most_workers, own_cell
 from cosim.sweeps.portable_job import PortableJob
 
 TIMEOUT = 60.0
@@ -48,7 +48,7 @@ class Processes:
         store: Store | None = None,
     ) -> None:
         self.job, self._key, self._timeout, self._store = job, uuid4().hex, timeout, store
-        self._count = 1 if cluster else workers or cores()
+        self._count = 1 if cluster else most_workers(workers, MOST)
         self._address = cluster
         self._submit: Callable[..., Future[Answer]] = self._here
         self.evaluations = self.lost = 0

@@ -84,6 +84,8 @@ def _run(path: Path, experiment: Experiment, rtol: float, interface: str) -> Out
         for what, one in (("The reference has columns", reference), ("The stimulus has columns", stimuli))
         if one and one.strange
     ]
+    if stimuli is not None:
+        _check_stimulus(stimuli, settings)
     if reference is not None:
         _check_time(reference, settings)
         if not reference.numbers and not reference.texts:
@@ -203,6 +205,19 @@ def _until_ended(reference: Series, settings: Settings, done: int) -> tuple[Seri
     numbers = {name: values[rows] for name, values in reference.numbers.items()}
     texts = {name: cells[: int(rows.sum())] for name, cells in reference.texts.items()}
     return Series(reference.times[rows], numbers, texts, reference.strange), f"{said}{left}."
+
+
+def _check_stimulus(stimuli: Series, settings: Settings) -> None:
+    """Refuse a stimulus without a number in a row, or one that says nothing of the time of the experiment."""
+    for name, values in stimuli.numbers.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            text = f"The stimulus has no number for {name} at {stimuli.times[bad[0]]:g} s; it must be finite."
+            raise FmuError(text, culprit=name)
+    first, last = float(stimuli.times[0]), float(stimuli.times[-1])
+    if first >= settings.stop or last < settings.start:
+        times = f"from {first:g} to {last:g} s, and the experiment from {settings.start:g} to {settings.stop:g} s"
+        raise FmuError(f"The stimulus is {times}: they must have a time in common.", culprit="stimulus")
 
 
 def _check_time(reference: Series, settings: Settings) -> None:

@@ -51,6 +51,9 @@ def series_of(path: Path, member: str, ports: Mapping[str, Port]) -> Series:
     if len(rows) < 2 or rows[0][0].strip().lower() != TIME:
         raise FmuError(f'{path}: {member} is no time series: its first column must be "time".', culprit=member)
     names = [name.strip() for name in rows[0]]
+    twice = next((name for k, name in enumerate(names) if name in names[:k]), None)
+    if twice is not None:
+        raise FmuError(f'{path}: {member} has two columns "{twice}"; one is enough.', culprit=member, value=twice)
     for number, row in enumerate(rows[1:], 2):
         if len(row) != len(names):
             rule = f"line {number} has {len(row)} cells, and there are {len(names)} columns"

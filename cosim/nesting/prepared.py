@@ -65,7 +65,10 @@ class Binary:
 
 @dataclass(frozen=True)
 class Prepared:
-    """Everything that the FMU of a system holds; `bus` is that before the start, `signals` are (signals, ticks + 1)."""
+    """Everything that the FMU of a system holds; `bus` is that before the start, `signals` are (signals, ticks + 1).
+
+    Where all signals are constant, they are (signals, 1).
+    """
 
     name: str
     wiring: Wiring
@@ -96,11 +99,12 @@ def prepare(stack: ExitStack, system: System) -> Prepared:
     plan = make_plan(wiring, system.step, 1)
     _check_plan(plan)
     settings = started(wiring, system, plan)
-    ticks = np.arange(system.ticks + 1)
-    if len(ticks) * plan.signals * 8 > LARGEST:
-        what = f"{plan.signals} signals at {len(ticks):,} ticks"
+    limited = any(not _is_constant(name, wiring) for name in wiring.sources())
+    count = system.ticks + 1 if limited else 1
+    if count * plan.signals * 8 > LARGEST:
+        what = f"{plan.signals} signals at {count:,} ticks"
         raise WiringError(f"The signals of {system.name} do not go into an FMU: {what} are over {LARGEST:,} bytes.")
-    signals = Given(wiring, plan).at(ticks)
+    signals = Given(wiring, plan).at(np.arange(count))
     noted = _Noted(plan)
     initialise(noted.plan, settings, signals[:, 0])
     return Prepared(
@@ -113,7 +117,7 @@ def prepare(stack: ExitStack, system: System) -> Prepared:
         starts=tuple(noted.starts),
         given=tuple(_given(plan, settings)),
         binaries=tuple(_binary(_plain(part)) for part in plan.parts),
-        limited=any(not _is_constant(name, wiring) for name in wiring.sources()),
+        limited=limited,
     )
 
 

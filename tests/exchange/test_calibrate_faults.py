@@ -89,3 +89,22 @@ def test_an_input_without_a_number_in_a_row_is_a_sentence_and_notes_of_the_readi
     table = recorded(fmus[3], TRUTH) | {"more": np.full(400, np.nan)}
     done = found(table, fmu=fmus[3], free=["J"], starts=1)
     assert any("more" in note for note in done.calibrated.notes)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"set": {"d": np.inf}}, "--set d=inf: it must be a finite number"),
+        ({"workers": 100_000}, "1,024 are the most"),
+        ({"initial": "guess"}, "there are: recorded, free"),
+    ],
+)
+def test_options_that_cannot_be_meant_are_sentences(fmus, options, words):
+    with pytest.raises(cosim.InputError, match=words):
+        found(recorded(fmus[3], TRUTH), fmu=fmus[3], free=["J"], **options)
+
+
+def test_a_recording_that_is_fitted_cannot_be_kept_out(fmus):
+    table = recorded(fmus[3], TRUTH)
+    with pytest.raises(cosim.InputError, match="is fitted and kept out"):
+        found(table, fmu=fmus[3], free=["J"], heldout=table)

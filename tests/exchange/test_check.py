@@ -130,6 +130,21 @@ def test_a_reference_outside_the_experiment_and_files_that_are_not_there_are_sen
     assert not cosim.check(fmu).passed
 
 
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("test-in.csv", "time,i\n0,nan\n2,1\n", "The stimulus has no number for i at 0 s"),
+        ("test-in.csv", "time,i\n5,0\n6,1\n", "The stimulus is from 5 to 6 s, and the experiment from 0 to 2 s"),
+        ("test-ref.csv", "time,w,w\n0,0,1\n2,1,3\n", 'has two columns "w"'),
+    ],
+)
+def test_a_table_that_cannot_be_meant_fails_with_a_sentence(folder, made, name, content, words):
+    fmu = with_files(motor(folder, 3), folder / "table.fmu", bundle(**made) | {name: content})
+    done = cosim.check(fmu)
+    assert not done.passed
+    assert words in str(done)
+
+
 def test_references_in_hdf5_are_refused_with_what_to_do(folder, made):
     files = bundle(**made)
     files["a.exp"] = experiments().replace("<References", '<References type="application/x-hdf"')

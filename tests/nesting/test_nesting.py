@@ -162,6 +162,16 @@ def test_an_fmu_of_a_system_is_a_component_of_another(tiny: Tiny, tmp_path: Path
     assert_same_bits(*both(system, tmp_path / "outer", 3))
 
 
+def test_a_system_without_signals_takes_none_along_however_long_it_runs(tiny: Tiny, tmp_path: Path) -> None:
+    endless = System(components={"it": tiny[3]}, records={"y": Record("it.y")}, step=1e-3, ticks=10**12)
+    (path,) = nest(endless, {3: tmp_path / "endless.fmu"})
+    assert path.stat().st_size < 1_000_000
+    moving = replace(
+        endless, signals={"u": Noise(kind="noise", rms=1.0, seed=1, unit="rad")}, wires=[Wire("u.value", "it.a")]
+    )
+    assert "do not go into an FMU: 1 signals at 1,000,000,000,001 ticks" in refusal(moving, tmp_path)
+
+
 def test_several_instances_and_a_reset_begin_anew(tiny: Tiny, tmp_path: Path) -> None:
     one = nested(oscillator(tiny[2]), tmp_path, 2)
     one.start()
