@@ -86,7 +86,9 @@ def _mind_parent(parent: int) -> None:
         time.sleep(GRACE)
     forget_partials()
     _remove_folder()
-    os.killpg(0, signal.SIGKILL)
+    if hasattr(os, "killpg"):
+        os.killpg(0, signal.SIGKILL)
+    os._exit(1)  # Windows has no groups of processes
 
 
 def _remove_folder() -> None:

@@ -39,6 +39,8 @@ class Scratch(TemporaryDirectory[str]):
 @cache
 def tidy(folder: str) -> None:
     """Remove what killed commands of this user left in a folder; once in a process."""
+    if not hasattr(os, "getuid"):  # Windows, which has no such locks either: nobody knows whose a folder is
+        return
     for one in Path(folder).glob(f"{PREFIX}*"):
         with suppress(OSError):
             if one.stat().st_uid == os.getuid() and time.time() - one.stat().st_mtime > YOUNG:

@@ -1,8 +1,11 @@
 """Draw the architecture from the imports of the code: python tests/house/architecture.py rewrites its page in docs."""
 
 import re
+import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
 
 from test_arrows import FILES, FLOORS, folder_of, ours
 

@@ -65,7 +65,7 @@ def close() -> None:
 
 
 def _lost(path: Path, suffix: str, error: LostError) -> RecordingError:
-    if error.status == "timeout" or error.code in (-getattr(signal, "SIGXCPU", 0), -signal.SIGKILL.value):
+    if error.status == "timeout" or error.code in (-getattr(signal, "SIGXCPU", 0), -getattr(signal, "SIGKILL", 0)):
         return over_time(path)
     text = f"{path} is damaged: the library that reads {suffix} files crashed on it"
     return RecordingError(f"{text} (exit code {error.code}).", culprit=str(path))
