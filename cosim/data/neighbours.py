@@ -32,6 +32,11 @@ PLACES = frozenset(
     }
 )
 """Words that say which axis a column is of, in small letters."""
+SENSORS, AXES = (
+    frozenset({"enc", "encoder", "sensor", "channel", "ch", "adc", "raw"}),
+    frozenset({"joint", "axis", "link"}),
+)
+"""A number beside the first counts sensors of one axis (`encoder_2`), unless one of the second stands there too."""
 OTHER_KINDS = ("asked", "wrong", "torque", "current", "voltage", "temperature", "time")
 """What a column is named for that is no motion that was measured."""
 OWN = frozenset({"t", "tau", "q", "v", "q_d", "temperature"})
@@ -88,6 +93,8 @@ def _named(name: str) -> Iterator[Kind]:
 def _place(name: str) -> str:
     """The number or the place of the axis; "" where the name holds none."""
     words = words_of(name)
+    if SENSORS & {*words} and not AXES & {*words}:
+        return ""
     numbers = [str(int(word)) for word in words if word.isdigit()]
     places = [word for word in words if word in PLACES]
     return numbers[0] if len(numbers) == 1 else places[0] if places and not numbers else ""

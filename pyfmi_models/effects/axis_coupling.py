@@ -92,7 +92,8 @@ class DampedCoupling(AxisCoupling):
 class WeightCoupling(AxisCoupling):
     """Inertia and a weight that both axes carry: torque = h a_n + w sin(s q + q_n + phase).
 
-    q and q_n are the angles of both axes; s = 1 where the weight turns with both, 0 where the neighbour alone turns it.
+    q and q_n are the angles of both axes; s = 1 where the weight turns with both (-1 where they count the other way
+    round), 0 where the neighbour alone turns it.
     """
 
     equation: ClassVar[str] = "h aₙ + w sin(s q + qₙ + φ)"
@@ -112,7 +113,8 @@ class WeightCoupling(AxisCoupling):
 
     def said(self, unit: str) -> list[str]:
         """Each torque in words."""
-        by = f"the sum of both angles, this axis' and {self.called}" if self.follows else f"the angle {self.called}"
+        name = "difference" if self.follows < 0 else "sum"
+        by = f"the {name} of both angles, this axis' and {self.called}" if self.follows else f"the angle {self.called}"
         return [*super().said(unit), f"a weight of {self.weight:.3g} {unit} that goes with {by}"]
 
 

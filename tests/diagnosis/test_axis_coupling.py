@@ -92,6 +92,7 @@ def test_what_was_not_recorded_of_a_neighbour_is_the_derivative_of_what_was() ->
         (["q1", "q3"], {}, [Neighbour("q1"), Neighbour("q3")]),
         (["tau2", "q2_ref", "position_error_2", "i2", "temp2", "position", "load", "v", "q_d"], {}, []),
         (["q2"], {"q2": "N.m"}, []),
+        (["encoder_2", "joint2_encoder"], {}, [Neighbour("joint2_encoder")]),
     ],
 )
 def test_columns_of_a_neighbour_are_told_by_the_fields_usual_names(

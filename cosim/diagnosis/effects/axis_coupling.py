@@ -20,8 +20,8 @@ from pyfmi_models.effects import Effect
 from pyfmi_models.effects.axis_coupling import AxisCoupling, DampedCoupling, WeightCoupling
 from pyfmi_models.mount import Mount
 
-FOLLOWS = (1.0, 0.0)
-"""Whether a weight turns with this axis too, or with the neighbour alone."""
+FOLLOWS = (1.0, 0.0, -1.0)
+"""Whether a weight turns with this axis too, or with the neighbour alone; -1 where both count the other way round."""
 LEAST_MORE = 5.0
 """Nats that a damping or a weight must have beside the inertia: odds of 150 to 1."""
 
