@@ -3,9 +3,10 @@
 python bench/calibration_sets.py COMMIT:results/proof/proof.json ... --out results/abroad
 
 Each is the `proof.json` of `cosim prove` or the `abroad.json` of `abroad.py` of a commit of this project, of decks that
-are not scored any more; `--played` and `--kept` are `margin_within_set` and `true_beside_unknown` of the package that
-played them. Of sets that hold the truth, the log-likelihood that it is the member that it is, shares ~ (share printed
-for it)^part; of names with less than `LIKELY` beside `unknown`, how many were true. Writes sets.md.
+are not scored any more; `--played` is the part of a margin that counted in the package that played them (1 from
+evidence 4 on, .5 before), `--kept` its `true_beside_unknown`. Of sets that hold the truth, the log-likelihood that it
+is the member that it is, shares ~ (share printed for it)^part; of names with less than `LIKELY` beside `unknown`, how
+many were true. Writes sets.md.
 """
 
 import argparse

@@ -20,6 +20,7 @@ from cosim.diagnosis.answer.entries import CardSource, Improved, Provenance, Sou
 from cosim.diagnosis.answer.result import Diagnosis, Finding, HeldOut
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.effects import named
+from cosim.diagnosis.measure.broadband import broadband_finding
 from cosim.diagnosis.measure.experiment import SCENARIO, scenario
 from cosim.diagnosis.measure.protocol import CUTOFF
 from cosim.estimation.neighbours import as_inputs
@@ -140,7 +141,7 @@ def as_json(found: Diagnosis) -> JsonObject:
     held = found.heldout
     whole = {
         "verdict": list(found.verdict),
-        "effects": [_effect(finding) for finding in found.findings],
+        "effects": [_effect(finding) for finding in (*found.findings, *_shaken(found))],
         "friction_law": found.friction_law,
         "delivered": list(found.delivered),
         "ambiguous_with": [list(group) for group in found.ambiguous_with],
@@ -148,6 +149,7 @@ def as_json(found: Diagnosis) -> JsonObject:
         "heldout": _heldout(held),
         "intervals": {trace.name: [list(span) for span in trace.intervals] for trace in found.traces},
         "depends_on": list(found.depends_on),
+        "broadband_disturbance": found.broadband,
         "learned": found.learned,
         "not_learned": found.not_learned,
         "data_quality": list(found.data_quality),
@@ -165,6 +167,10 @@ def as_json(found: Diagnosis) -> JsonObject:
         "version": __version__,
     }
     return cast(JsonObject, whole)
+
+
+def _shaken(found: Diagnosis) -> tuple[Finding, ...]:
+    return (broadband_finding(found.broadband, found.motion),) if found.broadband else ()
 
 
 def _effect(finding: Finding) -> JsonObject:

@@ -7,16 +7,18 @@ from dataclasses import dataclass, replace
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.doubt_entry import not_determined_doubts
-from cosim.diagnosis.answer.entries import NotLearnedEntry
+from cosim.diagnosis.answer.entries import BroadbandEntry, NotLearnedEntry
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.answer.scores import Scores
 from cosim.diagnosis.decide.decision import Decision, decide, rest_rules
 from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.adequacy import friction_level
 from cosim.diagnosis.evidence.band import in_band
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.measure.absent import not_found, undecided
 from cosim.diagnosis.measure.breakdown import parts
+from cosim.diagnosis.measure.broadband import broadband_entry
 from cosim.diagnosis.measure.experiment import Experiment, best, told
 from cosim.diagnosis.measure.findings import accepted, measured_as, rival_finding, taken_finding
 from cosim.diagnosis.measure.law_selection import proposed_law
@@ -33,7 +35,7 @@ from cosim.diagnosis.search.nameless import Nameless, nameless
 from cosim.diagnosis.search.proof import Proof
 from cosim.diagnosis.search.renaming import by_each_name, is_renamed
 from cosim.diagnosis.search.rivals import Examined, examine
-from cosim.diagnosis.search.scores import scores_of
+from cosim.diagnosis.search.scores import scores_of, shaken_everywhere
 from cosim.diagnosis.search.sizes import standard_errors
 from cosim.diagnosis.search.stages import InTurn, search
 from cosim.diagnosis.terms.learn import NOTHING_TRIED, Learned, learn
@@ -248,6 +250,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         ),
         ambiguous_with=tuple((name, *members) for name, members in decision.sets.items() if members),
         depends_on=decision.depends_on,
+        broadband=_shaken(answer),
         data_quality=(*card.remarks(), *(n for one in (*train, *heldout) for n in quality(one, prepared.cutoff))),
         friction_law=proposed_law(problem, answer.chosen),
         loop_bias=bias.as_json() if bias else {},
@@ -255,6 +258,15 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         ledger=finished(answer.comparison, answer.held, answer.proof.chosen),
         scores=answer.scores,
     )
+
+
+def _shaken(answer: Answer) -> BroadbandEntry:
+    """What shakes the machine all the time, if it is enough to be told."""
+    comparison, chosen = answer.comparison, answer.proof.chosen
+    if not answer.scores.rest.shaken > comparison.policy.large_broadband:
+        return {}
+    found, motion = shaken_everywhere(comparison, chosen, answer.held), comparison.problem.mount.motion
+    return broadband_entry(found, answer.held.residual(chosen.mount), friction_level(comparison), motion)
 
 
 def _with_learned(

@@ -79,6 +79,8 @@ class Piece:
     extras: dict[str, Array] = field(default_factory=dict)
     reading_noise: float = 0.0
     """Amplitude density of the reading's white noise [rad s^1/2, m s^1/2]; of a speed's where only that was read."""
+    torque_noise: float = 0.0
+    """The same of the torque [N m s^1/2, N s^1/2]."""
     step: float = 0.0
     """Step of the encoder [rad, m]; 0 where it is too fine to be seen."""
     motion: float = 0.0
@@ -284,8 +286,14 @@ def _piece(recording: Recording, index: int, span: slice, band: Band, beside: Se
         extras={n: c[::each].copy() for n, c in table.items() if n not in ("t", "tau", "q", "v")},
         neighbours={name: one[::each].copy() for name, one in motions(beside, table, dt, first).items()},
         moving=moving(beside, table, dt, first, noise_of) if len(grid) > LEAST_ROWS else frozenset(),
-        reading_noise=noise_of(table["q" if "q" in table else "v"], dt) * sqrt(dt) if len(grid) > LEAST_ROWS else 0.0,
+        reading_noise=_density(table["q" if "q" in table else "v"], dt),
+        torque_noise=_density(table["tau"], dt),
     )
+
+
+def _density(column: Array, dt: float) -> float:
+    """Amplitude density of a column's white noise, in its unit times s^1/2."""
+    return noise_of(column, dt) * sqrt(dt) if len(column) > LEAST_ROWS else 0.0
 
 
 def _on_grid(recording: Recording, span: slice) -> tuple[Array, dict[str, Array]]:

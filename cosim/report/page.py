@@ -158,9 +158,10 @@ def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     else:
         left = f"{unit.text(rest)} of validation error stays unexplained, beyond the noise."
     goes = f"It correlates with {', '.join(diagnosis.depends_on)}." if diagnosis.depends_on else ""
+    shaken = diagnosis.broadband.get("statement", "")
     misfit = "" if goes or quiet or words.verdict(diagnosis) == "withheld" else MISFIT
     there = "" if quiet else untrained(diagnosis, scales)
-    return [text for text in (left, there, goes, misfit) if text]
+    return [text for text in (left, shaken, there, goes, misfit) if text]
 
 
 def _proof_sentence(diagnosis: Diagnosis, scales: Scales) -> str:

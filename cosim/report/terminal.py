@@ -54,6 +54,7 @@ def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -
         _files(diagnosis, scales, out),
         [""],
         [line for block in blocks(diagnosis) for line in _block(block, scales)],
+        _wrapped(diagnosis.broadband.get("statement", ""), 2),
         _goes_with(diagnosis),
         _wrapped(untrained(diagnosis, scales), 2) if "unknown" in diagnosis.verdict else [],
         _rest(diagnosis),

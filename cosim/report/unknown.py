@@ -3,8 +3,9 @@
 import numpy as np
 
 from cosim.diagnosis.answer.result import Array, Diagnosis, Finding, Region
-from cosim.diagnosis.decide.decision import IN_BURSTS
+from cosim.diagnosis.decide.decision import ALL_THE_TIME, IN_BURSTS
 from cosim.diagnosis.measure.breakdown import bars
+from cosim.diagnosis.measure.broadband import ACTION
 from cosim.report.figures_where import NAMES, runs
 from cosim.report.next_experiment import is_about, to_record
 from cosim.report.quantities import Scales
@@ -20,6 +21,7 @@ def facts(diagnosis: Diagnosis, scales: Scales) -> Table:
         ("Where", _where(diagnosis, own, scales)),
         ("When", _when(diagnosis)),
         ("Size", _size(diagnosis, own, scales)),
+        ("What", diagnosis.broadband.get("statement", "")),
         ("Correlates with", ", ".join(diagnosis.depends_on) or "nothing that was recorded"),
         ("Do this", _action(diagnosis, own)),
     ]
@@ -74,8 +76,8 @@ def _action(diagnosis: Diagnosis, own: Finding | None) -> str:
     if is_about(diagnosis, ("unknown",)) and (order := to_record(diagnosis)):
         return order
     on = diagnosis.depends_on[0] if diagnosis.depends_on else ""
-    if on == IN_BURSTS:
-        return "record at rest, with all around it off and on, and look for what shakes it: floor, pump, another axis"
+    if on in (IN_BURSTS, ALL_THE_TIME):
+        return ACTION
     return _vary(on, diagnosis)
 
 

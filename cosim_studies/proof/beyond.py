@@ -7,6 +7,8 @@ motor_ripple   a torque constant that waves with position: command times positio
 drive_fade     a drive that gives less when warm: command times temperature
 payload_comes  a weight that is there from some moment on: position, but only then
 ground         a floor that trembles now and then: noise between 2 and 10 Hz
+vibration      a floor that always trembles, in a band of an octave or so between 2 and 10 Hz
+wind           gusts: noise that is the weaker the faster, correlated over .2 to 1 s
 """
 
 import numpy as np
@@ -81,10 +83,47 @@ def ground(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Param
     return {"torque_rms": strength, "from_hz": low}
 
 
+def vibration(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
+    """A floor that always trembles: a torque of random phase in a band."""
+    low = float(rng.uniform(2, 4))
+    high = low * float(rng.uniform(1.5, 2.5))
+    strength = 1.5 * goal(bench, rng, size)
+    _shake(bench, rng, strength, butter(2, (low, high), "bandpass", fs=1 / TICK, output="sos"))
+    return {"torque_rms": strength, "from_hz": low, "to_hz": high}
+
+
+def wind(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
+    """Gusts on whatever the axis carries: noise behind a lag of second order."""
+    correlation = float(rng.uniform(0.2, 1.0))
+    strength = 1.5 * goal(bench, rng, size)
+    _shake(bench, rng, strength, butter(2, 1 / (2 * np.pi * correlation), "lowpass", fs=1 / TICK, output="sos"))
+    return {"torque_rms": strength, "correlation_s": correlation}
+
+
+def _shake(bench: SimulatedAxis, rng: np.random.Generator, strength: float, shape: Array) -> None:
+    """Add noise of a shape to each recording."""
+
+    def push(_: str, t: Array) -> Array:
+        noise = np.asarray(sosfilt(shape, rng.standard_normal(t.size)))
+        return np.asarray(strength * noise / (noise.std() + 1e-300))
+
+    add_push(bench, push)
+
+
 def _bursts(rng: np.random.Generator, end: float) -> list[tuple[float, float]]:
     return [(float(rng.uniform(0.1, 0.9)) * end, end * float(rng.uniform(0.03, 0.08))) for _ in range(3)]
 
 
-_ALL: tuple[Family, ...] = (run_in, sluggish_oil, dead_band, motor_ripple, drive_fade, payload_comes, ground)
+_ALL: tuple[Family, ...] = (
+    run_in,
+    sluggish_oil,
+    dead_band,
+    motor_ripple,
+    drive_fade,
+    payload_comes,
+    ground,
+    vibration,
+    wind,
+)
 
 SHAPELESS = {family.__name__: family for family in _ALL}

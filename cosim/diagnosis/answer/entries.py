@@ -82,6 +82,17 @@ class NotLearnedEntry(TypedDict, total=False):
     statement: str
 
 
+class BroadbandEntry(TypedDict, total=False):
+    """A random disturbance at any motion: RMS [N m, N], relative to the friction, its band, how likely it is there."""
+
+    level: float
+    relative: float
+    low_hz: float
+    high_hz: float
+    probability: float
+    statement: str
+
+
 class NextExperiment(TypedDict, total=False):
     """The recording that would tell most: which effects it separates, by how much torque [N m], and how to take it."""
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from cosim.diagnosis.answer.doubt_entry import Sanity
 from cosim.diagnosis.answer.entries import (
     BiasEntry,
+    BroadbandEntry,
     Improved,
     LawProposal,
     LearnedEntry,
@@ -28,7 +29,7 @@ from pyfmi_models.effects import CATALOGUE, Effect
 
 Array = npt.NDArray[np.float64]
 Answer = Literal["found", "ambiguous", "not_proven", "not_decided", "not_seen", "not_testable"]
-POLICY_VERSION = "3"
+POLICY_VERSION = "4"
 """Of the constants by which is decided; it is raised when one of them changes."""
 POLICY = f"evidence {POLICY_VERSION}"
 """Name and version of the constants by which is decided."""
@@ -204,6 +205,8 @@ class Diagnosis:
     """The term that was learned for what has no name; {} where there is none or it is not proven."""
     not_learned: NotLearnedEntry = field(default_factory=NotLearnedEntry)
     """Where the verdict holds "unknown" and nothing was learned: what was tried, and why it is not in the model."""
+    broadband: BroadbandEntry = field(default_factory=BroadbandEntry)
+    """What shakes the machine all the time; {} where nothing does."""
     data_quality: tuple[str, ...] = ()
     sanity: tuple[Sanity, ...] = ()
     """Doubts about the recordings themselves, gravest first."""

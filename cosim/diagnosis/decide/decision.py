@@ -10,7 +10,9 @@ from cosim.diagnosis.decide.calibration import calibrated
 from cosim.diagnosis.decide.policy import Policy
 
 IN_BURSTS = "time, in bursts"
-"""What the rest is said to go with where it comes now and then."""
+"""What the rest is said to go with where it comes now and then ..."""
+ALL_THE_TIME = "nothing that was recorded"
+"""... and where it is there at any motion."""
 
 
 @dataclass(frozen=True)
@@ -63,19 +65,20 @@ def _of_rest(effects: Sequence[EffectScores], residual: ResidualScores, policy: 
     if is_left(effects, residual, policy):
         return beside_rest(effects, followed(residual, policy), policy)
     named = _named(effects, policy)
-    # What comes in bursts is no part of what a name says, and no name imitates it.
-    return named.with_rest((IN_BURSTS,), (), policy) if residual.in_bursts > policy.large_in_bursts else named
+    # What shakes a machine is no part of what a name says, and no name imitates it.
+    if residual.in_bursts > policy.large_in_bursts:
+        return named.with_rest((IN_BURSTS,), (), policy)
+    return named.with_rest((ALL_THE_TIME,), (), policy) if residual.shaken > policy.large_broadband else named
 
 
 def beside_rest(effects: Sequence[EffectScores], follows: tuple[str, ...], policy: Policy) -> Decision:
-    """The answer where something without a name is left, that follows quantities: margins count for less there."""
-    told = [one.with_margins_of(policy.margin_beside_unknown) for one in effects]
-    return _named(told, policy).with_rest(follows, beside_unknown(effects, policy), policy)
+    """The answer where something without a name is left, that follows quantities."""
+    return _named(effects, policy).with_rest(follows, beside_unknown(effects, policy), policy)
 
 
 def _named(effects: Sequence[EffectScores], policy: Policy) -> Decision:
     sets = {one.effect: open_rivals(one, policy) for one in effects}
-    return Decision(sets, {one.effect: _probabilities(one, sets[one.effect], policy) for one in effects}, False, ())
+    return Decision(sets, {one.effect: _probabilities(one, sets[one.effect]) for one in effects}, False, ())
 
 
 def beside_unknown(effects: Sequence[EffectScores], policy: Policy) -> tuple[str, ...]:
@@ -89,7 +92,7 @@ def doubted(effects: Sequence[EffectScores], residual: ResidualScores, policy: P
     left = max((one.evidence for one in residual.terms), default=0.0)
     if left < policy.floor:
         return ()
-    weak = [one for one in effects if one.explains[one.effect] < policy.imitation_share]
+    weak = [one for one in effects if one.explains[one.effect] < policy.sure_beside_unknown]
     return tuple(one.effect for one in weak if left > policy.imitation * one.evidence)
 
 
@@ -110,24 +113,19 @@ class Gain:
     def halves(self, policy: Policy) -> bool:
         """Whether the plain error energy is halved in both bands, and the likelihood does not clearly speak against it.
 
-        What is slow is free to wander in the likelihood, so that an effect of it may gain nothing there. Where next to
-        nothing is left, the likelihood is not asked: it judges the few parts in a hundred that the equation misses. Nor
-        is it where that is so at rest, whose rows hardly count in it.
+        What is slow is free to wander in the likelihood, so that an effect of it may gain nothing there; where hardly
+        anything is left, it judges the few parts in a hundred that the equation misses, and is not asked. Of rows at
+        rest, which hardly count in it, the error may be halved instead, where nothing is raised.
         """
         removed = min(self.narrow, self.wide)
-        at_rest = self.at_rest >= policy.cleared and removed >= 0
-        return removed >= policy.cleared or at_rest or (removed >= policy.halved and self.nats > -policy.floor)
+        halved = max(removed, self.at_rest if removed >= 0 else 0.0) >= policy.halved
+        return halved and (self.nats > -policy.floor or removed >= policy.sure_beside_unknown)
 
     def predicts(self, policy: Policy) -> bool:
-        """Whether the likelihood clearly says so, or the plain error in both bands and nothing speaks against it.
-
-        What slow nuisances may stand for too (an offset, a change with temperature) gains little likelihood there,
-        whatever it removes. So does a contact at rest, where few rows count.
-        """
-        removed, said = min(self.narrow, self.wide), self.nats >= policy.least_predicted
-        seen = self.nats >= 0 and removed >= policy.third
-        both = said and (removed >= policy.fifth or self.at_rest >= policy.halved)
-        return seen or both or self.nats >= policy.clearly_predicted or self.halves(policy)
+        """Whether the likelihood clearly says so, or says so of what is large, or the plain error is halved."""
+        large = min(self.narrow, self.wide) >= policy.large_gain or self.at_rest >= policy.halved
+        said = self.nats >= policy.clearly_predicted or (large and self.nats >= policy.least_predicted)
+        return said or self.halves(policy)
 
     def matters_alone(self, policy: Policy) -> bool:
         """Whether an effect that is small in training matters held out: it halves the error there, and predicts."""
@@ -137,14 +135,10 @@ class Gain:
         """Whether the plain error is raised, in both bands or by much in one.
 
         What surely predicts and halves the error in the wider band may raise it in the narrower one: a bristle at rest
-        creeps with each vibration that a filter leaves, the less of them the more a model keeps of a wrong torque. So
-        may what halves the error at rest, of which the model without it says nothing: what it costs elsewhere is
-        judged by the likelihood.
+        creeps with each vibration that a filter leaves, the less of them the more a model keeps of a wrong torque.
         """
         if self.wide >= policy.halved and self.nats >= policy.sure_predicted:
             return False
-        if self.at_rest >= policy.halved and self.nats >= policy.least_predicted:
-            return min(self.narrow, self.wide) < -policy.most_raised_beside_rest
         return max(self.narrow, self.wide) < 0 or min(self.narrow, self.wide) < -policy.most_raised
 
 
@@ -228,24 +222,16 @@ def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
     if residual.in_place:
         return residual.in_place
     best = max((one.share for one in residual.terms), default=0.0)
-    least = max(policy.follows, policy.beside * best)
+    least = max(policy.follows, policy.halved * best)
     ranked = sorted(residual.terms, key=lambda one: -one.share)
     return tuple(one.name for one in ranked if one.share > least) or (residual.over_time,)
 
 
-def _probabilities(one: EffectScores, members: Sequence[str], policy: Policy) -> dict[str, float]:
+def _probabilities(one: EffectScores, members: Sequence[str]) -> dict[str, float]:
     """Posterior shares of an effect, its rivals and "none" (equal priors), times what each explains, calibrated."""
     odds = {one.effect: 0.0, **{name: -margin for name, margin in one.margins.items()}}
     top = max(odds.values())
     weights = {name: exp(value - top) for name, value in odds.items()}
     total = sum(weights.values()) + exp(-min(one.evidence, 700.0) - top)
-    shares = _within_set({name: weights[name] / total for name in (one.effect, *members)}, policy)
-    told = {name: calibrated(share * one.explains[name]) for name, share in shares.items()}
+    told = {name: calibrated(weights[name] / total * one.explains[name]) for name in (one.effect, *members)}
     return {name: value / max(1.0, sum(told.values())) for name, value in told.items()}
-
-
-def _within_set(shares: Mapping[str, float], policy: Policy) -> dict[str, float]:
-    """What members of a set share, by the part of their margins that counts there: shares ~ exp(-part x margin)."""
-    told = {name: share**policy.margin_within_set for name, share in shares.items()}
-    scale = sum(shares.values()) / max(sum(told.values()), 1e-300)
-    return {name: scale * value for name, value in told.items()}

@@ -83,14 +83,6 @@ class Policy:
     """Different effects that one diagnosis may add."""
     set_margin: float = 3.0
     """Evidence by which a rival must be beaten to be out of the set. Unit: nats."""
-    margin_beside_unknown: float = 0.3
-    """Share of a margin that counts where something without a name is left, which no likelihood has: there ten nats
-    exclude what three do elsewhere. Unit: 1. A measured arm that lifts itself by half a radian has 3 nats for a cable
-    and nine tenths of its friction left; with .5 the same is said of it."""
-    margin_within_set: float = 0.5
-    """Share of a margin that counts between members of a set: what is left of a model's misfit does not change from
-    row to row, as its likelihood has it. Unit: 1. In 59 sets of two generators that held the truth .4 is the
-    likeliest, 4.0 nats before 1; from .2 to .8 within 1.9 nats (results/abroad/calibration_sets.md)."""
     least_predicted: float = 3.0
     """What held-out recordings must lose without what is small but halves the error, or holds at rest. Unit: nats."""
     clearly_predicted: float = 10.0
@@ -99,22 +91,10 @@ class Policy:
     two have 3.5 and 3.6; false ones had 4.9, 6.2 and 7.9 (seeds 560194608, 1494289175)."""
     halved: float = 0.5
     """Share of the plain held-out error energy that an effect may remove instead. Unit: 1."""
-    third: float = 0.33
-    """The same where the likelihood does not speak against it. Unit: 1. Of 91 cases of two generators with a name that
-    was refused, four true ones removed .34 to .49 at 0.4 to 2.3 nats, one false one .46; of 15 nulls none more than .24
-    (seeds 1667696721, 84481856)."""
-    fifth: float = 0.2
-    """The same where the likelihood says so, but not clearly. Unit: 1. Of such names one true one removed .28, false
-    ones .12 and .13, another true one .06 (seeds 560194608, 1494289175)."""
-    cleared: float = 0.7
-    """The same, from which the likelihood of held-out recordings is not asked. Unit: 1. Two true inertias over position
-    removed .99 and .74 in both bands at -103 and -70 nats; of 19 small effects in 200 nulls one removed half."""
     sure_predicted: float = 30.0
     """The same, from which an effect may be small. Unit: nats."""
     most_raised: float = 0.03
     """Share by which the plain held-out error energy may rise in one of two bands. Unit: 1."""
-    most_raised_beside_rest: float = 0.2
-    """The same in motion where the error at rest is halved. Unit: 1. One true contact in 60 singles needs .06."""
     least_share: float = 0.02
     """Energy that an effect must remove, relative to what the base leaves: less may be the form of another effect.
     Unit: 1."""
@@ -145,8 +125,6 @@ class Policy:
     """Evidence of what is left, relative to a name's, from which the name may imitate what is missing. Unit: 1."""
     follows: float = 0.3
     """Share of the held-out residual that a quantity must predict for it to be said to follow that ... Unit: 1."""
-    imitation_share: float = 0.6
-    """Share of the residual energy from which a name imitates nothing smaller. Unit: 1."""
     sure_beside_unknown: float = 0.9
     """Share of the residual energy that a name must remove, in training or held out, to be sure where something unknown
     is left. Unit: 1. Beside it 15 names of 19 in the own generator were false, with .03 to .89; true ones had .19,
@@ -154,8 +132,6 @@ class Policy:
     true_beside_unknown: float = 0.2
     """What is left of the probability of any other name there. Unit: 1. Of 38 such names in three decks of two
     generators 5 were true [.06, .27], where .62 would be printed (results/abroad/calibration_sets.md)."""
-    beside: float = 0.7
-    """... and beside the best one: this share of what that predicts. Unit: 1."""
     large_residual: float = 0.12
     """Slow part of the residual, relative to the friction torque, above which something is missing, whatever it
     follows. Unit: 1. 96 nulls of three generators left at most .118."""
@@ -168,11 +144,10 @@ class Policy:
     """Share of the energy of the residual that comes in bursts, above which something shakes the machine now and then.
     Unit: 1. 167 nulls of two generators have .052 at most, of 100 others two .10 and .12; ten machines on a trembling
     floor .21 to .81."""
-
-    @property
-    def excluded_beside_unknown(self) -> float:
-        """Evidence by which a rival is excluded where something has no name. Unit: nats."""
-        return self.set_margin / self.margin_beside_unknown
+    large_broadband: float = 0.05
+    """Level of a random disturbance at any motion, relative to the friction, from which something shakes the machine
+    all the time. Unit: 1. Friction repeats no better (Armstrong-Helouvry, Control of Machines with Friction, 1991); 60
+    nulls of three worlds have .02 at most, twelve trembling floors .09 and more."""
 
 
 POLICY = Policy()

@@ -92,6 +92,11 @@ def _clear_there(comparison: Comparison, held: Predictive) -> Array:
     return np.asarray(weight)
 
 
+def friction_level(comparison: Comparison) -> float:
+    """RMS of the friction torque in clear motion away from turns."""
+    return _friction(comparison, comparison.problem.weight * far_from_turns(comparison.problem.prepared))
+
+
 def _friction(comparison: Comparison, clear: Array) -> float:
     """RMS of the friction torque in clear motion."""
     tau = comparison.problem.prepared.stacked("tau")

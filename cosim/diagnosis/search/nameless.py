@@ -76,7 +76,7 @@ class _Offered:
 
 def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Predictive) -> Nameless:
     """Take away the names that something without a name explains far better, the worst first."""
-    found, least = Nameless(proof), comparison.policy.excluded_beside_unknown
+    found, least = Nameless(proof), comparison.policy.least_followed
     offered = _Offered.by(comparison, held)
     while found.proof.standing:
         known = [*offered.law, *found.terms]
@@ -139,5 +139,5 @@ def _holds(comparison: Comparison, found: Nameless, one: _Challenge, held: Predi
         return False
     gain = held.log_likelihood(held.residual(whole)) - held.log_likelihood(held.residual(one.beside.mount))
     policy = comparison.policy
-    least = found.proof.predicted[one.effect.effect.id] - policy.excluded_beside_unknown
+    least = found.proof.predicted[one.effect.effect.id] - policy.least_followed
     return gain >= max(policy.least_predicted, least)

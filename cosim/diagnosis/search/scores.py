@@ -4,7 +4,8 @@ from math import inf
 
 from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores
 from cosim.diagnosis.effects import hypothesis_of
-from cosim.diagnosis.evidence.adequacy import over_time, share_beside, share_left, share_there
+from cosim.diagnosis.evidence.adequacy import friction_level, over_time, share_beside, share_left, share_there
+from cosim.diagnosis.evidence.broadband import Shaken, shaken
 from cosim.diagnosis.evidence.bursts import burst_share
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
@@ -12,6 +13,7 @@ from cosim.diagnosis.search.nameless import Nameless
 from cosim.diagnosis.search.proof import Proof
 from cosim.diagnosis.search.rivals import explains, margins
 from cosim.diagnosis.terms.flexible import flexible_terms
+from cosim.estimation.fit import Fit
 
 
 def effect_scores(proof: Proof) -> list[EffectScores]:
@@ -39,7 +41,15 @@ def residual_scores(comparison: Comparison, found: Nameless, held: Predictive) -
     terms = [one for one in terms if one.evidence > shapes.get(one.name, -inf)]
     beside = share_beside(comparison, chosen, there, held)
     there_left, bursts = share_there(comparison, chosen, there, held), burst_share(comparison, chosen)
-    return ResidualScores(left, there_left, terms, shown, beside, found.quantities, bursts)
+    level = shaken_everywhere(comparison, chosen, held).least / friction_level(comparison)
+    return ResidualScores(left, there_left, terms, shown, beside, found.quantities, bursts, level)
+
+
+def shaken_everywhere(comparison: Comparison, chosen: Fit, held: Predictive) -> Shaken:
+    """A random disturbance that training and held-out recordings show, as the one shows it that has less of it."""
+    both = ((comparison.problem.prepared, chosen.residual), (held.prepared, held.residual(chosen.mount)))
+    found = [shaken(*one, comparison.inertia, comparison.policy.bands_hz) for one in both]
+    return min(found, key=lambda one: one.least)
 
 
 def _own_shapes(proof: Proof) -> dict[str, float]:

@@ -10,7 +10,6 @@ from cosim.diagnosis.decide.calibration import calibrated
 from cosim.diagnosis.decide.decision import (
     Decision,
     Gain,
-    beside_rest,
     decide,
     doubted,
     followed,
@@ -28,9 +27,6 @@ ROUND = replace(
     clearly_predicted=8.0,
     sure_predicted=32.0,
     halved=0.5,
-    third=0.375,
-    fifth=0.1875,
-    cleared=0.875,
     most_raised=0.25,
     least_share=0.125,
     floor=16.0,
@@ -41,14 +37,10 @@ ROUND = replace(
     denied=2.0,
     least_followed=8.0,
     follows=0.25,
-    beside=0.5,
     imitation=0.5,
-    imitation_share=0.75,
     large_residual=0.125,
     large_residual_there=0.25,
     large_residual_beside=0.0625,
-    most_raised_beside_rest=0.5,
-    margin_within_set=0.25,
     true_beside_unknown=0.375,
 )
 """Constants with which every product is exact, so that a limit can be met exactly."""
@@ -86,12 +78,10 @@ def test_a_rival_at_the_margin_of_a_set_is_beaten() -> None:
         (Gain(-999.0, 0.9, 0.875 - LITTLE), 0.5, False),
         (Gain(-LITTLE, 0.5 - LITTLE, 0.5), 0.5, False),
         (Gain(-LITTLE, 0.5, 0.5 - LITTLE), 0.5, False),
-        (Gain(0.0, 0.375, 0.375), 0.5, True),
-        (Gain(4.0, 0.1875, 0.1875), 0.5, True),
-        (Gain(4.0, 0.1875, 0.1875 - LITTLE), 0.5, False),
-        (Gain(4.0 - LITTLE, 0.1875, 0.1875), 0.5, False),
-        (Gain(0.0, 0.375 - LITTLE, 0.5), 0.5, False),
-        (Gain(0.0, 0.5, 0.375 - LITTLE), 0.5, False),
+        (Gain(4.0, 0.25, 0.25), 0.5, True),
+        (Gain(4.0, 0.25, 0.25 - LITTLE), 0.5, False),
+        (Gain(4.0, 0.25 - LITTLE, 0.25), 0.5, False),
+        (Gain(4.0 - LITTLE, 0.25, 0.25), 0.5, False),
         (Gain(9.0, 0.0, 0.0), 0.5, True),
         (Gain(9.0, 0.0, -LITTLE), 0.5, True),
         (Gain(9.0, -LITTLE, -LITTLE), 0.5, False),
@@ -101,13 +91,12 @@ def test_a_rival_at_the_margin_of_a_set_is_beaten() -> None:
         (Gain(32.0, -0.9, 0.5), 0.5, True),
         (Gain(32.0 - LITTLE, -0.9, 0.5), 0.5, False),
         (Gain(32.0, -0.9, 0.5 - LITTLE), 0.5, False),
-        (Gain(4.0, -0.5, -0.5, at_rest=0.5), 0.5, True),
-        (Gain(4.0, -0.5, -0.5, at_rest=0.5 - LITTLE), 0.5, False),
-        (Gain(4.0 - LITTLE, -0.5, -0.5, at_rest=0.5), 0.5, False),
-        (Gain(4.0, -0.5 - LITTLE, 0.5, at_rest=0.9), 0.5, False),
-        (Gain(-999.0, 0.0, 0.0, at_rest=0.875), 0.5, True),
-        (Gain(-999.0, 0.0, -LITTLE, at_rest=0.875), 0.5, False),
-        (Gain(-999.0, 0.0, 0.0, at_rest=0.875 - LITTLE), 0.5, False),
+        (Gain(4.0, -0.25, 0.0, at_rest=0.5), 0.5, True),
+        (Gain(4.0, -0.25, 0.0, at_rest=0.5 - LITTLE), 0.5, False),
+        (Gain(4.0 - LITTLE, -0.25, 0.0, at_rest=0.5), 0.5, False),
+        (Gain(-16.0 + LITTLE, 0.0, 0.0, at_rest=0.5), 0.5, True),
+        (Gain(-16.0, 0.0, 0.0, at_rest=0.5), 0.5, False),
+        (Gain(-16.0 + LITTLE, 0.0, -LITTLE, at_rest=0.5), 0.5, False),
     ],
 )
 def test_an_effect_stands_from_its_limits_on(gain: Gain, share: float, expected: bool) -> None:
@@ -119,8 +108,8 @@ def test_an_effect_stands_from_its_limits_on(gain: Gain, share: float, expected:
     [
         (20.0, 0.5, 16.0, True),
         (20.0, 0.5, 16.0 - LITTLE, False),
-        (20.0, 0.75, 16.0, False),
-        (20.0, 0.75 - LITTLE, 16.0, True),
+        (20.0, 0.875, 16.0, False),
+        (20.0, 0.875 - LITTLE, 16.0, True),
         (32.0, 0.5, 16.0, False),
         (32.0 - LITTLE, 0.5, 16.0, True),
     ],
@@ -158,28 +147,6 @@ def test_the_evidence_that_is_asked_goes_with_what_held_out_recordings_say() -> 
     assert unknown(12.0, 0.1875), "half way between the shares, half way between the evidences"
     assert not unknown(12.0 - LITTLE, 0.1875)
     assert not unknown(12.0, 0.1875, -24.0 - LITTLE), "denied by the likelihood"
-
-
-def test_beside_what_has_no_name_a_margin_counts_for_a_share() -> None:
-    one = EffectScores(
-        "cable_wrap", 60.0, {"gravity_unbalance": 9.0, "delay": 13.0}, {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
-    )
-    alone, beside = (
-        decide(Scores([one], left(share=share)), replace(ROUND, margin_beside_unknown=0.25)) for share in (0.0, 1.0)
-    )
-    assert (alone.is_unknown, alone.sets["cable_wrap"]) == (False, ())
-    assert (beside.is_unknown, beside.sets["cable_wrap"]) == (True, ("gravity_unbalance",))
-    odds = beside.probabilities["cable_wrap"]
-    assert alone.probabilities["cable_wrap"]["cable_wrap"] > odds["cable_wrap"] > odds["gravity_unbalance"] > 0.02
-
-
-def test_what_was_learned_for_what_has_no_name_leaves_rivals_as_open_as_what_is_left() -> None:
-    explained = {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
-    one = EffectScores("cable_wrap", 60.0, {"gravity_unbalance": 9.0}, explained)
-    rules = replace(ROUND, margin_beside_unknown=0.25)
-    learned, seen = beside_rest([one], ("time",), rules), decide(Scores([one], left(share=1.0)), rules)
-    assert learned == seen
-    assert learned.sets["cable_wrap"] == ("gravity_unbalance",)
 
 
 def test_what_a_term_removes_about_turns_alone_is_nothing_unknown() -> None:
@@ -233,9 +200,7 @@ def test_probabilities_are_calibrated_posterior_shares_times_what_is_explained(m
     one = EffectScores("delay", evidence, {"lag": margin, "far": 9.0}, {"delay": 0.75, "lag": 0.5, "far": 0.25})
     found = decide(Scores([one], left()), ROUND).probabilities["delay"]
     total = 1 + exp(-margin) + exp(-9.0) + exp(-min(evidence, 700.0))
-    whole = (1 + exp(-margin)) / total
-    lag = exp(-0.25 * margin) / (1 + exp(-0.25 * margin))
-    told = {"delay": calibrated(0.75 * whole * (1 - lag)), "lag": calibrated(0.5 * whole * lag)}
+    told = {"delay": calibrated(0.75 / total), "lag": calibrated(0.5 * exp(-margin) / total)}
     scale = max(1.0, sum(told.values()))
     assert found == pytest.approx({name: value / scale for name, value in told.items()}, rel=1e-12)
 

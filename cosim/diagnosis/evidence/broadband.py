@@ -1,0 +1,160 @@
+"""A random disturbance: what a structure leaves at any motion above the slow band, more than both readings' noise.
+
+In each band [f1, f2] above the slow one, and in windows w of a second of motion away from turns,
+
+    E_w = mean square of the rest in the band, less what comes again at the same position
+    least^2, level^2 = decile, median of max(E_w - noise^2, 0), summed over the bands
+
+What a law lacks goes with the motion, so that some windows have little of it; a floor that trembles, or wind, spares
+none. Noise is that of the position, white and differentiated twice, and that of the torque: white as above the band, or
+what it has in rest phases, whichever is more. What comes again in another passage is the machine's (teeth, a rough
+ring).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+from scipy.fft import dct, idct
+
+from cosim.estimation.prepare import Array, Piece, Prepared
+from cosim.estimation.row_weights import far_from_turns, least_speed
+
+Rows = npt.NDArray[np.bool_]
+
+SECONDS = 1.0
+"""Length of a window [s] ..."""
+LEAST_ROWS = 8
+"""... rows of clear motion, or of rest, that it must hold, and at least half of its own."""
+LEAST_WINDOWS = 10
+"""Windows in motion of which the decile is one at least."""
+OUTSIDE = 0.05
+"""Share of the energy that may lie below, and above, the band that is told. Unit: 1."""
+SPARED = 0.1
+"""Share of the windows that may have less than the level: noise of few periods is uneven. Unit: 1."""
+UNMOVED = 4.0
+"""Times its noise that the mean square of a position may have at rest: more is motion. Unit: 1."""
+PLACES = 4.0
+"""Places to a period of the band's upper edge at the RMS speed: what comes again is seen by its mean there."""
+
+
+@dataclass(frozen=True)
+class Shaken:
+    """A disturbance that goes on all the time: its level [N m, N], and the band [Hz] that holds nine tenths of it."""
+
+    level: float = 0.0
+    """Usual RMS."""
+    least: float = 0.0
+    """RMS that nine tenths of all windows reach."""
+    low: float = 0.0
+    high: float = 0.0
+
+
+def shaken(prepared: Prepared, residual: Array, inertia: float, bands_hz: tuple[float, ...]) -> Shaken:
+    """What is left of recordings at any motion; level 0 where nothing is, or too little was recorded to tell."""
+    edges = (*(one for one in bands_hz if one < prepared.cutoff / 1.5), prepared.cutoff)
+    bands = list(pairwise(edges))
+    levels = np.array([_levels(prepared, residual, inertia, band) for band in bands]).reshape(-1, 2)
+    whole = levels.sum(0)
+    if not whole[0]:
+        return Shaken()
+    shown = [band for band, one in zip(bands, levels[:, 1], strict=True) if one > OUTSIDE * whole[1]]
+    least, level = np.sqrt(whole)
+    return Shaken(float(level), float(least), *_middle(prepared, residual, shown[0][0], shown[-1][1]))
+
+
+def _levels(prepared: Prepared, residual: Array, inertia: float, band: tuple[float, float]) -> Array:
+    """Decile and median of the energy in a band, noise taken off."""
+    moving: list[Array] = []
+    resting: list[float] = []
+    noise = [0.0]
+    parts = list(_parts(prepared, residual))
+    rests = [_in_band(piece, rest * clear, band) for piece, rest, clear in parts]  # what turns leave would ring on
+    again = _again(prepared, [piece for piece, *_ in parts], rests, band)
+    for (piece, _, clear), rest, place in zip(parts, rests, again, strict=True):
+        moving.append(_windows(piece, rest - place, clear))
+        resting.extend(_at_rest(prepared, piece, band))
+        noise.append(_reading_noise(prepared, piece, inertia, band))
+    energies = np.concatenate(moving) if moving else np.zeros(0)
+    if len(energies) < LEAST_WINDOWS:
+        return np.zeros(2)
+    still = float(np.median(resting)) if len(resting) >= LEAST_WINDOWS else 0.0
+    return np.maximum(np.quantile(energies, (SPARED, 0.5)) - max(still, *noise), 0.0)
+
+
+def _parts(prepared: Prepared, residual: Array) -> Iterator[tuple[Piece, Array, Rows]]:
+    """Each piece with its rest, and whether its rows are in clear motion away from turns."""
+    clear, first = far_from_turns(prepared) > 0, 0
+    for piece in prepared.pieces:
+        rows = slice(first, first := first + len(piece.kept))
+        if len(piece.kept) >= LEAST_ROWS:
+            yield piece, residual[rows], clear[rows]
+
+
+def _in_band(piece: Piece, column: Array, band: tuple[float, float]) -> Array:
+    """What a column of a piece holds between two frequencies."""
+    wave = dct(column, norm="ortho")
+    hertz = np.arange(len(column)) / (2 * len(column) * piece.dt * piece.stride)
+    return np.asarray(idct(np.where((hertz >= band[0]) & (hertz < band[1]), wave, 0.0), norm="ortho"))
+
+
+def _windows(piece: Piece, column: Array, rows: Rows) -> Array:
+    """Mean squares in the windows that hold enough of the rows."""
+    t = piece.t[piece.kept]
+    window = np.floor((t - t[0]) / SECONDS).astype(np.int64)
+    whole, count = np.bincount(window), np.bincount(window, rows)
+    enough = count >= np.maximum(LEAST_ROWS, whole / 2)
+    return np.asarray(np.bincount(window, rows * column**2)[enough] / count[enough])
+
+
+def _at_rest(prepared: Prepared, piece: Piece, band: tuple[float, float]) -> Array:
+    """Mean squares of the torque in windows of rest in which the position is no more than its noise.
+
+    What shakes an axis shakes it at rest too, and its controller answers what the encoder shows: that is no noise.
+    """
+    rows = np.abs(piece.v[piece.kept]) < least_speed(prepared.stacked("v"))
+    torque, moved = (_windows(piece, _in_band(piece, one[piece.kept], band), rows) for one in (piece.tau, piece.q))
+    return torque[moved < UNMOVED * (2 * piece.reading_noise**2 * (band[1] - band[0]) + piece.step**2 / 12)]
+
+
+def _again(prepared: Prepared, pieces: list[Piece], rests: list[Array], band: tuple[float, float]) -> list[Array]:
+    """What each rest has in common with those of other passages at the same place and direction."""
+    if not prepared.has_position:
+        return [np.zeros_like(one) for one in rests]
+    q, v = (np.concatenate([getattr(piece, name)[piece.kept] for piece in pieces]) for name in ("q", "v"))
+    usual = float(np.sqrt(np.mean(v**2)))
+    way = max(usual / (PLACES * band[1]), 1e-300)
+    _, place = np.unique(np.column_stack([np.floor(q / way), v > 0]), axis=0, return_inverse=True)
+    place = place.ravel()
+    whole = np.concatenate(rests)
+    passage = np.concatenate([[0], np.cumsum(np.diff(place) != 0)])
+    own_count, own = np.bincount(passage), np.bincount(passage, whole)
+    count = np.bincount(place)
+    others = count[place] - own_count[passage]
+    mean = (np.bincount(place, whole)[place] - own[passage]) / np.maximum(others, 1)
+    share = float(np.clip(mean @ whole / max(float(mean @ mean), 1e-300), 0.0, 1.0))
+    return np.split(share * mean, np.cumsum([len(one) for one in rests])[:-1])
+
+
+def _reading_noise(prepared: Prepared, piece: Piece, inertia: float, band: tuple[float, float]) -> float:
+    """Variance [N2 m2] of both readings' white noise in a band: D_q (J w^2 g^2)^2 + D_tau g^4, D densities."""
+    hertz = np.linspace(*band, 200)
+    passed = 1 / (1 + (hertz / prepared.cutoff) ** 8)
+    power = 2 if prepared.has_position else 1
+    position = inertia * (2 * np.pi * hertz) ** power * piece.reading_noise
+    density = ((position**2 + piece.torque_noise**2) * passed**4).mean()
+    return float(2 * density * (band[1] - band[0]))
+
+
+def _middle(prepared: Prepared, residual: Array, low: float, high: float) -> tuple[float, float]:
+    """Band that holds nine tenths of the energy between two frequencies."""
+    grid = np.linspace(low, high, 61)
+    energy = np.zeros(60)
+    for piece, rest, _ in _parts(prepared, residual):
+        hertz = np.arange(len(rest)) / (2 * len(rest) * piece.dt * piece.stride)
+        energy += np.histogram(hertz, grid, weights=dct(rest, norm="ortho") ** 2)[0]
+    shares = np.cumsum(energy) / max(float(energy.sum()), 1e-300)
+    first, last = (int(np.searchsorted(shares, one)) for one in (OUTSIDE, 1 - OUTSIDE))
+    return float(grid[first]), float(grid[min(last + 1, 60)])
