@@ -99,7 +99,7 @@ def card(
         inertia: where it is known [kg m2, kg]; it is not estimated then.
         columns: our name to the source's, as in `cosim.read`.
         units: our name to the unit in the source, as in `cosim.read`.
-        layout: how texts are written, as in `cosim.read`.
+        layout: CSV format, as in `cosim.read`.
         force: overwrite what is there.
         on_progress: called with a few words on what is being done.
 

@@ -64,7 +64,7 @@ def check(
     runs its default experiment: to its end, with the same bits after a reset and in a new instance.
 
     Args:
-        fmu: the FMU, anybody's.
+        fmu: the FMU, also a third-party one.
         out: folder for check.json and a picture of each experiment; None writes nothing.
         rtol: allowed difference, relative to the range of the reference; texts and whole numbers must be equal.
         interface: "co-simulation" or "model-exchange"; "" takes what the FMU has, co-simulation first.

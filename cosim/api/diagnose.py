@@ -47,13 +47,13 @@ class DiagnosisResult:
     refitted: Card
     """The card refitted, without any effect."""
     proposals: tuple[Proposal, ...] = ()
-    """Effect files for a person to review, of formulas that are as good as what was learned for what has no name."""
+    """Effect files for a person to review, of formulas that are as good as what was learned outside the catalogue."""
     notes: tuple[str, ...] = ()
     """What was chosen where less was given: a card from the recordings, a recording that was kept out of the fit."""
 
     @property
     def missing(self) -> tuple[str, ...]:
-        """() nothing is missing; ("unknown",) something is, and has no name; or ids of effects, largest first."""
+        """() nothing is missing; ("unknown",) something outside the catalogue is; or ids of effects, largest first."""
         return self.diagnosis.verdict
 
     @property
@@ -148,8 +148,8 @@ def diagnose(
         motion: "rotary" or "linear", where there is neither a card nor a unit that says it.
         columns: our name to the source's, as in `cosim.read`; they come before the card's.
         units: our name to the unit in the source, as in `cosim.read`.
-        layout: how texts are written, as in `cosim.read`.
-        fmu: anyone's plant FMU as the base; the card then says roughly what it is.
+        layout: CSV format, as in `cosim.read`.
+        fmu: a third-party plant FMU as the base; the card then says roughly what it is.
         variables: our name to the FMU's, where they differ: {"tau": "Motor.torque"}.
         quick: write diagnosis.json and card.toml alone, and close no loop.
         with_possible: let the card hold effects that are only possible too.

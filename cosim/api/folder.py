@@ -101,8 +101,8 @@ def diagnose_folder(
         motion: "rotary" or "linear", where there is neither a card nor a unit that says it.
         columns: our name to the files', {"tau": "force"}; or pairs as on the command line, "run3.csv:tau=current".
         units: our name to the unit in the files, in the same ways.
-        layout: how texts are written, in the same ways.
-        fmu: anyone's plant FMU as the base of all.
+        layout: CSV format, in the same ways.
+        fmu: a third-party plant FMU as the base of all.
         variables: our name to the FMU's, where they differ.
         quick: write diagnosis.json and card.toml alone.
         with_possible: let cards hold effects that are only possible too.

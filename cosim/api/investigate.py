@@ -79,12 +79,12 @@ def investigate(
         machine: a card or plant FMU that stands in for the machine, in the place of the scenario's plant; or a drive,
             from `cosim.hardware.machine.read_machine`, which is moved inside its own limits too.
         budget: seconds of motion that may be spent, the first recordings and those of earlier calls included.
-        seconds: length of one motion [s]; each is run twice, to be fitted and for the proof.
+        seconds: length of one motion [s]; each is run twice, to be fitted and for validation.
         limits: {"position": "LOW:HIGH", "speed": ..., "acceleration": ..., "torque": ..., "frequency": ...,
             "forbidden": "FROM:TO"} in SI, the last a band [Hz] in which no tone lies;
             what is not given is what the scenario's own set point asks for.
         train: recordings to go on from, with `heldout` in the place of the first two.
-        heldout: recordings for the proof, to go on from.
+        heldout: recordings for validation, to go on from.
         seed: of the phases of motions with many tones.
         fast: run a drive without a clock.
         force: start over, and remove what an investigation left there.

@@ -29,7 +29,7 @@ def read(
         units: our name to the unit in the source, {"q": "arcsec"}; values become SI.
         name: what a table in memory is called in messages and reports; a file has a name of its own.
         required: columns that must be there, be finite and move ("q|v": either); () for any table with a time.
-        layout: how a text is written, {"decimal": "comma"}; see `Recording.read`.
+        layout: CSV format, {"decimal": "comma"}; see `Recording.read`.
 
     Returns:
         `Recording`: float64 columns of shape (rows,), with units, origin and notes.

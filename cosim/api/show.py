@@ -65,7 +65,7 @@ def show(
         source: a path, the name of a shipped scenario or card, or a `Recording`.
         columns: of a recording's file, our name to its name.
         units: of a recording's file, our name to the unit in it.
-        layout: how a text is written; see `Recording.read`.
+        layout: CSV format; see `Recording.read`.
         picture: an SVG or PNG file into which a recording is drawn.
         schedule: of a scenario or SSP, what happens in a step: order, age of inputs, what FMUs offer besides.
         force: overwrite the picture.
@@ -75,7 +75,7 @@ def show(
         that it needs.
 
     Raises:
-        InputError: the file is nothing that can be shown, or breaks its own rules.
+        InputError: the file is unsupported, or breaks its own rules.
     """
     if schedule:
         return _of_schedule(source)
@@ -122,7 +122,7 @@ def describe(file: str) -> tuple[Facts, Tables]:
     """Return facts by name, and tables by name as lists of rows.
 
     Raises:
-        InputError: the file is nothing that can be shown, or breaks its own rules.
+        InputError: the file is unsupported, or breaks its own rules.
     """
     path = Path(file)
     if path.suffix == ".fmu":
@@ -224,7 +224,7 @@ def _toml(file: str) -> tuple[Facts, Tables]:
         return _card(file)
     if path.exists():
         kinds = "a recording, FMU, SSP, scenario, card, sweep, or a folder of a run, diagnosis or sweep"
-        raise InputError(f"{file} is nothing that can be shown: {kinds}.", culprit=file)
+        raise InputError(f"{file} is unsupported: cosim show takes {kinds}.", culprit=file)
     choices = (*shipped_scenarios(), *shipped_cards())
     raise InputError(f"{file} does not exist; shipped are: {', '.join(choices)}.", culprit=file, choices=choices)
 

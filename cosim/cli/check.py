@@ -11,7 +11,7 @@ from cosim.support.terminal import finish_stdout, put, put_json, say, stage
 
 
 def check(
-    fmu: Annotated[Path, typer.Argument(help="Anybody's FMU.", metavar="FMU")],
+    fmu: Annotated[Path, typer.Argument(help="The FMU, also a third-party one.", metavar="FMU")],
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder for check.json and pictures. [nothing is written]")
     ] = None,

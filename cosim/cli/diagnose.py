@@ -43,7 +43,7 @@ def diagnose(
     layout: Layout = None,
     fmu: Annotated[
         Path | None,
-        typer.Option("--fmu", help="Anyone's plant FMU as the base; the card says roughly what it is."),
+        typer.Option("--fmu", help="A third-party plant FMU as the baseline, with an approximate card."),
     ] = None,
     variables: Annotated[
         list[str] | None, typer.Option("--variables", help="Our name = the FMU's: tau=Motor.torque q=Encoder.angle ...")
@@ -56,7 +56,7 @@ def diagnose(
     ] = False,
     propose: Annotated[
         Path | None,
-        typer.Option("--propose", help="Folder for the formula of what has no name, as an effect to review."),
+        typer.Option("--propose", help="Folder for formulas outside the catalogue, as effects to review."),
     ] = None,
     workers: Annotated[
         int | None, typer.Option("--workers", help="A folder of several machines: so many at a time.", min=1)

@@ -34,7 +34,7 @@ def investigate(
         typer.Option("--limits", help="SI, where not the scenario's: position=-0.5:0.5 speed=0.2 torque=20 ..."),
     ] = None,
     train: Annotated[list[Path] | None, typer.Option("--train", help="Recordings to go on from.")] = None,
-    heldout: Annotated[list[Path] | None, typer.Option("--heldout", help="Recordings for the proof.")] = None,
+    heldout: Annotated[list[Path] | None, typer.Option("--heldout", help="Recordings for validation.")] = None,
     seed: Annotated[int, typer.Option("--seed", help="Of the phases of many tones.", min=0)] = 1,
     as_json: Annotated[bool, typer.Option("--json", help="Print story.json instead of its lines.")] = False,
     force: Force = False,

@@ -18,9 +18,7 @@ Columns = Annotated[
     list[str] | None, typer.Option("--columns", help="Our name = the file's: tau=force run3.csv:tau=current ...")
 ]
 Units = Annotated[list[str] | None, typer.Option("--units", help="Units in the files: q=deg run3.csv:t=ms ...")]
-Layout = Annotated[
-    list[str] | None, typer.Option("--layout", help="How texts are written: decimal=comma header=4 period=1ms ...")
-]
+Layout = Annotated[list[str] | None, typer.Option("--layout", help="CSV format: decimal=comma header=4 period=1ms ...")]
 Out = Annotated[
     Path | None, typer.Option("--out", "-o", help="Folder for the results; cosim_out/NAME-n where it is not given.")
 ]

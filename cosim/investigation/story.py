@@ -133,7 +133,7 @@ def line_of(one: Moved | Answered) -> str:
     if isinstance(one, Moved):
         hope = f", {one.nats:.0f} nats expected" if one.nats else ""
         left = f"; LEFT {one.left}" if one.left else ""
-        role = "to fit" if one.role == "train" else "for proof"
+        role = "to fit" if one.role == "train" else "for validation"
         return f"Moved    {one.title}, {one.seconds:.0f} s ({role}{hope}){left}"
     open_ = f"; open: {'; '.join(one.open)}" if one.open else ""
     return f"Answer   {one.words}, held-out error {one.after:.3g} (noise {one.floor:.3g}){open_}"

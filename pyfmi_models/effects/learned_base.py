@@ -91,7 +91,7 @@ class TableEffect(LearnedEffect):
     title: ClassVar[str] = "Learned term"
     equation: ClassVar[str] = "Σ c cos(k π x)"
     main: ClassVar[Main] = Main("share", unit="1", is_size=False)
-    told_apart_by: ClassVar[str] = "it has no name: it says over what the rest goes, not what makes it"
+    told_apart_by: ClassVar[str] = "it says what the remaining error correlates with, not its cause"
     action: ClassVar[str] = "Look at the machine where the table is large; trust it only in the range it was seen in."
     over: str = word("Quantity that the table goes over")
     seen: tuple[float, ...] = structure("1", "Lowest and highest value seen", low=-1e9, high=1e9)

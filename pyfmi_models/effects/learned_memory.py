@@ -25,7 +25,7 @@ class _Memory(LearnedEffect, MotionEffect):
     title: ClassVar[str] = "Learned term"
     equation: ClassVar[str] = "Σ c y"
     main: ClassVar[Main] = Main("share", unit="1", is_size=False)
-    told_apart_by: ClassVar[str] = "it has no name: it says what the rest remembers, not what makes it"
+    told_apart_by: ClassVar[str] = "it says what the remaining error remembers, not its cause"
     action: ClassVar[str] = "Look for what is elastic or magnetic and is carried along: belts, seals, cables, iron."
     share: Scalar = parameter("1", "Share of the term that acts", default=1.0, low=0, high=1, fitted=False)
 

@@ -216,7 +216,7 @@ def test_show_tells_what_a_file_is(
         ("none", None, "does not exist; shipped are: sidereal, two_axis, altaz_altitude,"),
         ("none.csv", None, "none.csv does not exist."),
         ("odd.toml", "a = ", "is not valid TOML"),
-        ("odd", "x", "is nothing that can be shown: a recording, FMU, SSP, scenario, card, sweep, or a folder of"),
+        ("odd", "x", "is unsupported: cosim show takes a recording, FMU, SSP, scenario, card, sweep, or a folder of"),
         ("odd.xyz", "x", "is of no known kind, .xyz; known are: .csv, "),
     ],
 )

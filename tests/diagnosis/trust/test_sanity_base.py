@@ -80,7 +80,7 @@ def test_a_missing_set_point_is_said_with_what_it_costs() -> None:
     (one,) = no_set_point([asked, run(name="blind")])
     assert one.statement.startswith("blind: no set point (q_d) was recorded.")
     assert "delay from a lag" in one.statement
-    assert "no proof in closed loop" in one.statement
+    assert "nothing is validated in closed loop" in one.statement
 
 
 @pytest.mark.parametrize(("hertz", "still", "told"), [(0.1, 0.0, False), (4.0, 0.0, True), (0.1, 0.97, True)])
