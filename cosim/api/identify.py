@@ -93,6 +93,8 @@ class ForModels(TypedDict, total=False):
     """Processes that simulate; None is one a core."""
     timeout: float
     """Seconds that the first simulation may take."""
+    derivatives: str
+    """"differences", or "directional" for those that the FMU gives, where they agree with differences."""
     cluster: str
     """Address of a Dask scheduler whose workers simulate, in place of processes of this machine."""
 
@@ -204,6 +206,7 @@ def _options(model: ForModels, options: Calibration) -> Calibration:
         workers=model.get("workers"),
         timeout=model.get("timeout", options.timeout),
         cluster=model.get("cluster", options.cluster),
+        derivatives=model.get("derivatives", options.derivatives),
     )
 
 

@@ -27,6 +27,7 @@ from cosim.data.recording import Recording
 from cosim.support.errors import InputError
 
 INTERPOLATIONS = ("hold", "linear")
+DERIVATIVES = ("differences", "directional")
 OF_WINDOWS = (
     "Each window starts from single readings: their noise is not in the standard errors, and moves the numbers."
 )
@@ -52,6 +53,7 @@ class Options:
         workers: processes; None is one a core.
         timeout: seconds that the first simulation may take.
         cluster: address of a Dask scheduler whose workers simulate; "" for processes of this machine.
+        derivatives: "differences", or "directional" for those that the FMU gives, where they agree with differences.
     """
 
     free: tuple[str, ...]
@@ -68,6 +70,7 @@ class Options:
     workers: int | None = None
     timeout: float = TIMEOUT
     cluster: str = ""
+    derivatives: str = "differences"
 
 
 @dataclass(frozen=True)
@@ -122,6 +125,9 @@ def calibrate(
         InputError: a name, a column, a unit or an option does not fit; or the model cannot be simulated at its start.
     """
     _check(options)
+    if options.derivatives == "directional" and not subject.alone:
+        text = f"--derivatives directional is of one FMU, and {subject.source} is a system; leave it out."
+        raise InputError(text, culprit="--derivatives", value=options.derivatives)
     _check_kept_out(train, heldout)
     for name, value in options.given.items():
         if not isfinite(value):
@@ -149,9 +155,11 @@ def calibrate(
         rows = Rows.of(fitted)
         _check_rows(rows, len(numbers))
         residuals = Residuals(processes, numbers, rows, 1 / rows.spread, part)
-        found = fit(residuals, start, options.starts, options.seed, options.loss, say)
+        found = fit(
+            residuals, start, options.starts, options.seed, options.loss, say, options.derivatives == "directional"
+        )
         values = residuals.point(found.x)
-        notes += _on_roughness(residuals.rough)
+        notes += (*residuals.notes, *_on_roughness(residuals.rough))
         (new,) = processes.at([values], all_)
         evaluations, lost = processes.evaluations, tuple(processes.reasons)
     if new is None:
@@ -187,6 +195,7 @@ def _check(options: Options) -> None:
         ("--loss", options.loss, LOSSES),
         ("--interpolation", options.interpolation, INTERPOLATIONS),
         ("--initial", options.initial, INITIALS),
+        ("--derivatives", options.derivatives, DERIVATIVES),
     ):
         if value not in choices:
             text = f'{name} "{value}": there are: {", ".join(choices)}.'

@@ -65,7 +65,15 @@ class Fit:
     """Starts that ended at the same least sum."""
 
 
-def fit(residuals: Residuals, x: Array, starts: int, seed: int, loss: Loss, say: Callable[[str], None]) -> Fit:
+def fit(
+    residuals: Residuals,
+    x: Array,
+    starts: int,
+    seed: int,
+    loss: Loss,
+    say: Callable[[str], None],
+    directional: bool = False,
+) -> Fit:
     """Fit from the point given and from random ones near it.
 
     Args:
@@ -75,9 +83,12 @@ def fit(residuals: Residuals, x: Array, starts: int, seed: int, loss: Loss, say:
         seed: of the random ones.
         loss: one of `LOSSES`.
         say: told in a few words what is being done.
+        directional: whether the FMU's own derivatives are taken where they agree with differences.
     """
     spread = residuals.rows.spread
     residuals.weights = 1 / spread
+    if directional:
+        residuals.notes = residuals.use_directional(residuals.inside(x))
     z = residuals.at(x)
     residuals.bad = BAD * max(float(np.sqrt(np.mean(z**2))), 1.0)
     residuals.quick = len(spread) > 1

@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Any, Self
 from uuid import uuid4
 
-from cosim.calibration.simulation import Answer, Job, Outputs, Point, outputs_at, prepare
+from cosim.calibration.simulation import Answer, Job, Outputs, Point, outputs_at, prepare, slopes_at
 from cosim.calibration.store import Store
 from cosim.support.cell import Cell, LostError, ending
 from cosim.support.errors import CosimError, InputError
@@ -115,6 +115,19 @@ class Processes:
         self.reasons += [one.reason for one in ended if one.outputs is None]
         self.lost = len(self.reasons)
         return [one.outputs for one in ended]
+
+    def slopes(self, point: Point, part: slice, names: Sequence[str]) -> Outputs | None:
+        """Derivatives of the outputs by some numbers, by the FMU itself; None where it gives none."""
+        cell = self._free.get()
+        try:
+            found: Outputs | None = cell.call(
+                slopes_at, self._key, self.job, dict(point), part, list(names), timeout=PATIENCE * self._timeout
+            )
+        except (CosimError, LostError):
+            return None
+        finally:
+            self._free.put(cell)
+        return found
 
     def _here(self, key: str, point: Point, part: slice, timeout: float) -> Future[Answer]:
         return self._threads.submit(self._one, key, point, part, timeout)

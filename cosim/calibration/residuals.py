@@ -28,6 +28,8 @@ AGREE = 0.2
 """Share by which slopes at two scales may differ where the model is smooth."""
 NEARLY = 0.5
 """Share from which on narrower slopes that differ more than wider ones are those of a staircase."""
+AGREE_OWN = 0.02
+"""Share by which derivatives that an FMU gives may differ from differences to be taken."""
 STAIRS = 0.5
 """Share by which slopes at the smallest scale differ from those at the settled one where a model is a staircase."""
 WIDER = 4.0
@@ -99,6 +101,9 @@ class Residuals:
         """Numbers that one simulation moves together."""
         self.reach = [slice(None) if one.experiment < 0 else self.rows.parts[one.experiment] for one in self.free]
         """Rows that each number moves."""
+        self.notes: tuple[str, ...] = ()
+        self.own: tuple[int, ...] = ()
+        """Numbers whose derivatives the FMU gives."""
         self._known: dict[bytes, Array | None] = {}
 
     def point(self, x: Array) -> Mapping[str, float]:
@@ -141,7 +146,7 @@ class Residuals:
 
     def jacobian(self, x: Array) -> Array:
         """Derivatives d z / d x at a point, shape (rows, numbers)."""
-        columns, here = self._differences(x, self.steps)
+        columns, here = self._derivatives(x, self.steps)
         if here is not None:
             self._learn(columns, self._residual(here), np.maximum(np.abs(x), 1.0))
         return columns
@@ -174,6 +179,41 @@ class Residuals:
         self.least = np.where(agree & (gap <= AGREE), np.minimum(floor, steps), steps)
         self.stairs = bool(np.any(agree & (gap > STAIRS)))
         self.rough = tuple(one.name for one, is_smooth in zip(self.free, agree, strict=True) if not is_smooth)
+
+    def use_directional(self, x: Array) -> tuple[str, ...]:
+        """Take the FMU's own derivatives where they agree with differences at a point; returns notes on where not."""
+        shared = [k for k, one in enumerate(self.free) if one.experiment < 0]
+        exact = self._directional(x, shared)
+        names = [self.free[k].name for k in shared]
+        if exact is None:
+            return (f"The FMU gives no directional derivatives by {', '.join(names)}: differences are used.",)
+        gap = _apart(exact, self._differences(x, self.steps)[0][:, shared])
+        self.own = tuple(k for k, one in zip(shared, gap, strict=True) if one <= AGREE_OWN)
+        self.groups = [one for one in self.groups if not set(one) & set(self.own)]
+        return tuple(
+            f"The FMU's derivatives by {name} are {100 * one:.0f} % from differences, which are used in their place."
+            for name, one in zip(names, gap, strict=True)
+            if one > AGREE_OWN
+        )
+
+    def _directional(self, x: Array, numbers: Sequence[int]) -> Array | None:
+        """Derivatives d z / d x by some numbers, by the FMU itself."""
+        names = [self.free[k].name for k in numbers]
+        found = self.processes.slopes(self.point(x), self.part, names) if numbers else None
+        if found is None:
+            return None
+        pairs = (
+            pair for masks, run in zip(self.rows.seen, found, strict=True) for pair in zip(masks, run, strict=True)
+        )
+        slopes = np.concatenate([values[mask] for mask, values in pairs])
+        return np.asarray(self.weights[self.rows.output][:, None] * slopes * self.scales[list(numbers)], np.float64)
+
+    def _derivatives(self, x: Array, steps: Array) -> tuple[Array, Array | None]:
+        """Derivatives by the FMU where they are taken, else by differences; and the outputs at the point."""
+        columns, here = self._differences(x, steps)
+        if self.own and (exact := self._directional(x, self.own)) is not None:
+            columns[:, list(self.own)] = exact
+        return columns, here
 
     def _differences(self, x: Array, steps: Array) -> tuple[Array, Array | None]:
         """Derivatives with these relative steps, and the outputs at the point."""

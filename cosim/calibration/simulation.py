@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cosim.calibration.experiment import Array, Experiment
-from cosim.calibration.subject import Subject
+from cosim.calibration.subject import MODEL, Subject
 from cosim.fmi.component import Component
+from cosim.fmi.fmu import FmuComponent
 from cosim.master.opening import open_source
 from cosim.master.simulate import simulate
 from cosim.system.scenario import Scenario
@@ -50,10 +51,13 @@ class Job:
 
     def at(self, point: Point, experiment: Experiment) -> Scenario:
         """What is simulated at a point for one of the experiments."""
-        own = {variable: point[number] for variable, number in experiment.own.items()}
-        shared = {name: value for name, value in point.items() if name in self.subject.known}
-        values = {**self.given, **(experiment.starts or {}), **own, **shared}
+        values = {**self.given, **(experiment.starts or {}), **self.of(point, experiment)}
         return experiment.of(self.subject, self.subject.with_values(values))
+
+    def of(self, point: Point, experiment: Experiment) -> Point:
+        """The numbers of a point that are for an experiment, by variable."""
+        own = {variable: point[number] for variable, number in experiment.own.items()}
+        return {**own, **{name: value for name, value in point.items() if name in self.subject.known}}
 
 
 class Bench:
@@ -75,6 +79,24 @@ class Bench:
             self._keeps = _same(first, second)
             return first
         return self._all(point, part)
+
+    def slopes(self, point: Point, part: slice, names: Sequence[str]) -> Outputs | None:
+        """Derivatives of the outputs by some numbers, (rows, names) for each; None where the FMU gives none."""
+        from cosim.calibration.sensitivity import slopes_of
+
+        subject, found = self.job.subject, []
+        source = self.job.scenario.system().components[MODEL]
+        for experiment in self.job.experiments[part]:
+            with ExitStack() as stack:
+                component = open_source(stack, MODEL, source)
+                if not isinstance(component, FmuComponent):
+                    return None
+                values = {**self.job.given, **(experiment.starts or {}), **self.job.of(point, experiment)}
+                one = slopes_of(component, subject, experiment, values, names)
+            if one is None:
+                return None
+            found.append(one)
+        return found
 
     def close(self) -> None:
         """Close the FMUs."""
@@ -121,6 +143,13 @@ def outputs_at(key: str, point: Point, part: slice) -> Outputs | None:
     """Outputs of a job that was prepared; None where it was not."""
     bench = _BENCHES.get(key)
     return bench.outputs(point, part) if bench else None
+
+
+def slopes_at(key: str, job: Job, point: Point, part: slice, names: Sequence[str]) -> Outputs | None:
+    """Derivatives of a job; it is prepared where it was not."""
+    if key not in _BENCHES:
+        prepare(key, job)
+    return _BENCHES[key].slopes(point, part, names)
 
 
 def _same(first: Sequence[Sequence[Array]], second: Sequence[Sequence[Array]]) -> bool:

@@ -13,6 +13,9 @@ from cosim.support.errors import InputError
 from cosim.support.terminal import put, put_json, say, stage
 
 Set = Annotated[list[str] | None, typer.Option("--set", help="Other values, or starts: Motor.J=0.02 ... (FMU, system)")]
+Derivatives = Annotated[
+    str, typer.Option("--derivatives", help="differences, or directional: the FMU's own where they agree (FMU).")
+]
 Bounds = Annotated[
     list[str] | None, typer.Option("--bounds", help="Least and greatest value: Motor.J=0.01..1 ... (FMU, system)")
 ]
@@ -49,6 +52,7 @@ def identify(
     ] = "linear",
     workers: Annotated[int | None, typer.Option("--workers", min=1, help="Processes (FMU, system). [cores]")] = None,
     cluster: Cluster = "",
+    derivatives: Derivatives = "differences",
     timeout: Annotated[
         float, typer.Option("--timeout", help="Seconds that the first simulation may take (FMU, system).")
     ] = 60.0,
@@ -77,7 +81,7 @@ def identify(
         return
     model = {"fmu": fmu, "system": system, "free": free or (), "workers": workers, "timeout": timeout}
     how = {"step": step, "interpolation": interpolation, "window": window, "loss": loss, "starts": starts, "seed": seed}
-    how |= {"initial": initial, "cluster": cluster}
+    how |= {"initial": initial, "cluster": cluster, "derivatives": derivatives}
     _model(recordings, heldout or [], out, {**model, **how}, (set_, bounds, columns, units), as_json, force)
 
 
