@@ -202,6 +202,18 @@ WarmTorqueDroop
     per_degC -0.05..0.05 ~1
 TorqueOffset
     torque -inf..inf ~1
+ConstantForce
+    force -inf..inf ~1
+AxisCoupling
+    inertia -inf..inf ~1 = 0
+DampedCoupling
+    inertia -inf..inf ~1 = 0
+    damping -inf..inf ~1
+WeightCoupling
+    inertia -inf..inf ~1 = 0
+    weight 0..inf ~1
+    phase -inf..inf ~1 = 0
+    follows -inf..inf ~1 = 1 fixed
 TorqueSaturation
     knee_torque 1e-06..inf ~1
     slope 0..1 ~1 = 0
