@@ -144,7 +144,7 @@ class TestCommand:
         out = tmp_path / "quick"
         assert self.run(self.arguments(folder, out, "--quick", "--propose", str(tmp_path / "proposed"))) == 0
         printed, said = capsys.readouterr()
-        assert "Nothing to propose: nothing is left without a name." in said
+        assert "Nothing to propose: nothing is left outside the catalogue." in said
         assert not (tmp_path / "proposed").exists()
         assert {path.name for path in out.iterdir()} == {"diagnosis.json", "card.toml"}
         assert "Wrote diagnosis.json card.toml" in printed

@@ -147,8 +147,8 @@ def test_where_there_is_nothing_to_propose_one_sentence_says_why(tmp_path: Path)
     assert not (tmp_path / "none").exists()
     table = replace(diagnosis("unknown"), learned=TOLD)
     for found_, reason in (
-        (diagnosis("none"), "nothing is left without a name"),
-        (diagnosis("unknown"), "nothing was learned for what has no name"),
+        (diagnosis("none"), "nothing is left outside the catalogue"),
+        (diagnosis("unknown"), "nothing was learned outside the catalogue"),
         (table, "no formula is as good as what was learned"),
     ):
         assert proposed(found_, ()) == f"Nothing to propose: {reason}."
