@@ -1,49 +1,29 @@
 """The report of a calibration: a page with the numbers, what is not determined, and the overlay of all outputs."""
 
 from collections.abc import Sequence
-from importlib.resources import files
 from math import isfinite
 from pathlib import Path
 
 import numpy as np
 
 from cosim.calibration.calibrate import Calibrated, Trace
-from cosim.plots.compare import Overlay, payload
-from cosim.plots.explorer import INKS, script_of_page
+from cosim.plots.compare import Overlay, write_explorer
 from cosim.plots.quantities import number
-from cosim.support.files import replacing
-from cosim.support.version import __version__
 
 LINES = ("measured", "before", "after")
 
 
 def write_page(done: Calibrated, path: Path, force: bool) -> Path:
     """Write the page; self-contained, no network (OutputError where it exists and `force` is not set)."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-    from markupsafe import Markup
-
-    loader = PackageLoader("cosim.calibration", "")
-    pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
-    script, digest = script_of_page()
-    folder = files("cosim.plots")
-    css = "".join(folder.joinpath(name).read_text("utf-8") for name in ("run_page.css", "compare.css"))
-    text = pages.get_template("page.html.j2").render(
-        name=done.subject.source.name,
-        lead=_lead(done),
-        notes=done.notes,
-        numbers=number_rows(done),
-        undetermined=[one.statement for one in done.uncertainty.not_determined],
-        errors=[_error_row(one) for one in done.traces],
-        key=[(name, INKS[k % len(INKS)]) for k, name in enumerate(LINES)],
-        data=payload(_overlays(done.traces)),
-        script=Markup(script),
-        script_hash=digest,
-        css=Markup(css),
-        made=f"Made by mount-cosim {__version__}.",
-    )
-    with replacing(path, force) as partial:
-        partial.write_text(text, "utf-8")
-    return path
+    shown = {
+        "name": done.subject.source.name,
+        "lead": _lead(done),
+        "notes": done.notes,
+        "numbers": number_rows(done),
+        "undetermined": [one.statement for one in done.uncertainty.not_determined],
+        "errors": [_error_row(one) for one in done.traces],
+    }
+    return write_explorer("cosim.calibration", "page.html.j2", LINES, _overlays(done.traces), shown, path, force)
 
 
 def number_rows(done: Calibrated) -> list[dict[str, str]]:

@@ -99,21 +99,45 @@ def write_figure(overlay: Overlay, path: Path, force: bool) -> Path:
 
 def write_page(overlay: Overlay, notes: Sequence[str], path: Path, force: bool) -> Path:
     """Write the page: a table of differences, and the explorer; self-contained, no network."""
+    rows = [_row(one) for one in overlay.differences()]
+    shown = {"names": overlay.names, "lead": _lead(overlay), "notes": notes, "rows": rows}
+    return write_explorer("cosim.plots", "compare.html.j2", overlay.names, {"": overlay}, shown, path, force)
+
+
+def write_explorer(
+    package: str,
+    template: str,
+    names: Sequence[str],
+    overlays: Mapping[str, Overlay],
+    shown: Mapping[str, Any],
+    path: Path,
+    force: bool,
+) -> Path:
+    """Write a page with the explorer of overlays; self-contained, no network.
+
+    Args:
+        package: where the template is.
+        template: its name.
+        names: of what lies over each other, in the order of their colours.
+        overlays: as of `payload`.
+        shown: what else the template shows.
+        path: of the page.
+        force: overwrite it.
+
+    Raises:
+        OutputError: the page exists and `force` is not set.
+    """
     from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
-    loader = PackageLoader("cosim.plots", "")
-    pages = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    pages = Environment(loader=PackageLoader(package, ""), autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     script, digest = script_of_page()
     folder = files("cosim.plots")
     css = "".join(folder.joinpath(name).read_text("utf-8") for name in ("run_page.css", "compare.css"))
-    text = pages.get_template("compare.html.j2").render(
-        names=overlay.names,
-        lead=_lead(overlay),
-        notes=notes,
-        rows=[_row(one) for one in overlay.differences()],
-        key=[(name, INKS[k % len(INKS)]) for k, name in enumerate(overlay.names)],
-        data=payload({"": overlay}),
+    text = pages.get_template(template).render(
+        **shown,
+        key=[(name, INKS[k % len(INKS)]) for k, name in enumerate(names)],
+        data=payload(overlays),
         script=Markup(script),
         script_hash=digest,
         css=Markup(css),

@@ -40,6 +40,12 @@ class HeldFriction:
     """A constant torque that stands for the difference of the directions."""
 
 
+def level_and_viscous(mount: Mount) -> tuple[float, float]:
+    """Coulomb level [N m; N] and viscous coefficient [N m s/rad; N s/m] of a mount that has no other friction."""
+    law = mount.friction
+    return (float(law.Fc), float(law.sigma2)) if isinstance(law, Coulomb) else (0.0, 0.0)
+
+
 def torque(mount: Mount, pieces: Sequence[Piece]) -> Array:
     """Torque that a mount needs along the kept rows of all pieces [N m; N], filtered."""
     inverse = Inverse(mount, (), alone=True)

@@ -10,9 +10,9 @@ from math import pi
 import numpy as np
 
 from cosim.simulators.format import Format, on_rotary
+from cosim.simulators.friction import level_and_viscous
 from cosim.simulators.weight import GRAVITY, off_axis
 from pyfmi_models.effects import GravityUnbalance
-from pyfmi_models.friction import Coulomb
 from pyfmi_models.friction.base import each_way
 from pyfmi_models.mount import Mount
 
@@ -80,9 +80,9 @@ def Xform "joint" (
 
 def isaac_text(mount: Mount, card: Mount, title: str) -> str:
     """Write a mount that PhysX holds as a whole; the break-away level is the card's."""
-    rotary, law = mount.motion == "rotary", mount.friction
+    rotary = mount.motion == "rotary"
     inertia, (along, across), mass = off_axis(mount, float(mount.axis.inertia))
-    level, viscous = (float(law.Fc), float(law.sigma2)) if isinstance(law, Coulomb) else (0.0, 0.0)
+    level, viscous = level_and_viscous(mount)
     return _USD.format(
         title=_text(title),
         gravity=GRAVITY,

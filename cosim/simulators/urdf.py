@@ -6,9 +6,9 @@ Reference: ROS wiki, "URDF XML specification, joint": `damping` [N m s/rad; N s/
 from xml.sax.saxutils import quoteattr
 
 from cosim.simulators.format import Format, on_rotary
+from cosim.simulators.friction import level_and_viscous
 from cosim.simulators.weight import off_axis
 from pyfmi_models.effects import GravityUnbalance
-from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Mount
 
 NO_LIMIT = 1e3
@@ -23,8 +23,7 @@ def urdf_text(mount: Mount, card: Mount, title: str) -> str:
     # Gravity is along -z and the axis is y: the mass is opposite to where it would hang at q + phase = 0.
     place = f"{-across:.17g} 0 {-along:.17g}"
     travel = "" if rotary else f'lower="{-NO_LIMIT:g}" upper="{NO_LIMIT:g}" '
-    law = mount.friction
-    level, viscous = (float(law.Fc), float(law.sigma2)) if isinstance(law, Coulomb) else (0.0, 0.0)
+    level, viscous = level_and_viscous(mount)
     return f"""<?xml version="1.0"?>
 <!-- {title.replace("--", "- -")} -->
 <!-- SI units. Gravity is along -z. A card has no limits of position and speed: {NO_LIMIT:g} stands for none. -->

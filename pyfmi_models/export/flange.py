@@ -12,7 +12,7 @@ from pathlib import Path
 
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export.book import Book
-from pyfmi_models.export.modelica import modelica_text, quoted
+from pyfmi_models.export.modelica import modelica_text, quoted, write_package
 from pyfmi_models.model import Derivation, Model, Variable
 
 LIBRARY = "4.0.0"
@@ -23,13 +23,7 @@ EXTERNAL = "disturbance"
 
 def export_flange(model: Model, path: Path, derivation: Derivation | None = None, *, force: bool = False) -> Path:
     """Write the package, which is called as the file, and return its path; errors as `export_modelica`."""
-    path = Path(path)
-    if path.exists() and not force:
-        raise ExportError(f"{path} exists; use force to replace it")
-    text = flange_text(model, path.stem, derivation)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text, encoding="utf-8")
-    return path
+    return write_package(Path(path), lambda name: flange_text(model, name, derivation), force)
 
 
 def flange_text(model: Model, package: str, derivation: Derivation | None = None) -> str:

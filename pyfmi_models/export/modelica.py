@@ -8,7 +8,7 @@ part needs from others are its inputs, bound where it is instantiated. Nothing o
 import math
 import re
 import textwrap
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 
 from pyfmi_models.errors import ExportError
@@ -31,10 +31,14 @@ def export_modelica(model: Model, path: Path, derivation: Derivation | None = No
     Raises ExportError if the file exists and `force` is not given, its name is no identifier, or the model is sampled
     or has an operation that Modelica lacks.
     """
-    path = Path(path)
+    return write_package(Path(path), lambda name: modelica_text(model, name, derivation), force)
+
+
+def write_package(path: Path, text_of: Callable[[str], str], force: bool) -> Path:
+    """Write a package whose text follows from its name, that of the file; ExportError where the file exists."""
     if path.exists() and not force:
         raise ExportError(f"{path} exists; use force to replace it")
-    text = modelica_text(model, path.stem, derivation)
+    text = text_of(path.stem)
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
     return path
