@@ -105,8 +105,9 @@ SAME = {
     "show": {"file": "source", "out": "picture"},
 }
 """Options of the command line that have another word in Python."""
-METHODS = {"as_json": "as_json", "check": "missing", "propose": "propose", "workers": "a loop over folders"}
-"""Options that are a method or a property of the result."""
+FOLDER = dict.fromkeys(("workers", "cluster"), "cosim.diagnose_folder")
+METHODS = {"as_json": "as_json", "check": "missing", "propose": "propose", **FOLDER}
+"""Options that are a method or a property of the result, or an argument of the call for several machines."""
 PYTHON_ONLY = {"on_progress", "on_build", "on_answer", "on_step", "command", "fast"}
 """Arguments that make no sense on a command line: who is told, and what files name as their maker."""
 VERBS = ("run", "diagnose", "export", "show", "sweep", "investigate", "card", "compare")
