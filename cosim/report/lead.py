@@ -28,11 +28,14 @@ def heading(diagnosis: Diagnosis, model: str = "the model") -> str:
 
 
 _UNKNOWN = "Something is missing, and it is none of the effects cosim knows"
+_SHAKEN = "Something shakes the machine all the time, and the motion does not cause it"
 _NOT_CONFIRMED = "Something is missing that no known effect explains on the validation runs"
 
 
 def _unknown_heading(diagnosis: Diagnosis) -> str:
     """Claim that it is no known effect only where none of them is left to be confirmed."""
+    if diagnosis.broadband:
+        return _SHAKEN
     return _NOT_CONFIRMED if any(one.answer == "not_proven" for one in diagnosis.findings) else _UNKNOWN
 
 

@@ -152,16 +152,17 @@ def unexplained(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     """Say how much error is left above the noise, and what it goes with."""
     held, unit = diagnosis.heldout, scales.torque
     rest = float(np.sqrt(max(held.after_rms**2 - held.floor_rms**2, 0.0)))
-    if quiet := rest <= 0.5 * held.floor_rms:
+    if quiet := rest <= 0.5 * held.floor_rms or bool(diagnosis.broadband):
         error, noise = unit.text(held.after_rms), unit.text(held.floor_rms)
-        left = f"Hardly anything: {error} of validation error against a noise floor of {noise}."
+        left = diagnosis.broadband.get("statement") or (
+            f"Hardly anything: {error} of validation error against a noise floor of {noise}."
+        )
     else:
         left = f"{unit.text(rest)} of validation error stays unexplained, beyond the noise."
     goes = f"It correlates with {', '.join(diagnosis.depends_on)}." if diagnosis.depends_on else ""
-    shaken = diagnosis.broadband.get("statement", "")
     misfit = "" if goes or quiet or words.verdict(diagnosis) == "withheld" else MISFIT
     there = "" if quiet else untrained(diagnosis, scales)
-    return [text for text in (left, shaken, there, goes, misfit) if text]
+    return [text for text in (left, there, goes, misfit) if text]
 
 
 def _proof_sentence(diagnosis: Diagnosis, scales: Scales) -> str:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from cosim.diagnosis.answer.result import Array, Diagnosis, Finding, Region
-from cosim.diagnosis.decide.decision import ALL_THE_TIME, IN_BURSTS
+from cosim.diagnosis.decide.decision import IN_BURSTS
 from cosim.diagnosis.measure.breakdown import bars
 from cosim.diagnosis.measure.broadband import ACTION
 from cosim.report.figures_where import NAMES, runs
@@ -73,10 +73,12 @@ def _size(diagnosis: Diagnosis, own: Finding | None, scales: Scales) -> str:
 def _action(diagnosis: Diagnosis, own: Finding | None) -> str:
     if own and own.action:
         return own.action
+    if diagnosis.broadband:
+        return ACTION
     if is_about(diagnosis, ("unknown",)) and (order := to_record(diagnosis)):
         return order
     on = diagnosis.depends_on[0] if diagnosis.depends_on else ""
-    if on in (IN_BURSTS, ALL_THE_TIME):
+    if on == IN_BURSTS:
         return ACTION
     return _vary(on, diagnosis)
 
