@@ -1,7 +1,7 @@
 """Scores: all numbers from which a diagnosis is decided, as plain data that can be stored and decided again."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any, cast
 
 from cosim.support.plain import JsonObject
@@ -22,6 +22,10 @@ class EffectScores:
     """What the held-out recordings lose without it ..."""
     removes: float = 0.0
     """... and the share of their residual energy that it removes."""
+
+    def with_margins_of(self, share: float) -> "EffectScores":
+        """The same with so much of each margin."""
+        return replace(self, margins={name: share * margin for name, margin in self.margins.items()})
 
 
 @dataclass(frozen=True)

@@ -72,8 +72,9 @@ def _of_rest(effects: Sequence[EffectScores], residual: ResidualScores, policy: 
 
 
 def beside_rest(effects: Sequence[EffectScores], follows: tuple[str, ...], policy: Policy) -> Decision:
-    """The answer where something without a name is left, that follows quantities."""
-    return _named(effects, policy).with_rest(follows, beside_unknown(effects, policy), policy)
+    """The answer where something without a name is left, that follows quantities: margins count for less there."""
+    told = [one.with_margins_of(policy.margin_beside_unknown) for one in effects]
+    return _named(told, policy).with_rest(follows, beside_unknown(effects, policy), policy)
 
 
 def _named(effects: Sequence[EffectScores], policy: Policy) -> Decision:

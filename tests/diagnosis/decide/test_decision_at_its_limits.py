@@ -10,6 +10,7 @@ from cosim.diagnosis.decide.calibration import calibrated
 from cosim.diagnosis.decide.decision import (
     Decision,
     Gain,
+    beside_rest,
     decide,
     doubted,
     followed,
@@ -147,6 +148,28 @@ def test_the_evidence_that_is_asked_goes_with_what_held_out_recordings_say() -> 
     assert unknown(12.0, 0.1875), "half way between the shares, half way between the evidences"
     assert not unknown(12.0 - LITTLE, 0.1875)
     assert not unknown(12.0, 0.1875, -24.0 - LITTLE), "denied by the likelihood"
+
+
+def test_beside_what_has_no_name_a_margin_counts_for_a_share() -> None:
+    one = EffectScores(
+        "cable_wrap", 60.0, {"gravity_unbalance": 9.0, "delay": 13.0}, {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
+    )
+    alone, beside = (
+        decide(Scores([one], left(share=share)), replace(ROUND, margin_beside_unknown=0.25)) for share in (0.0, 1.0)
+    )
+    assert (alone.is_unknown, alone.sets["cable_wrap"]) == (False, ())
+    assert (beside.is_unknown, beside.sets["cable_wrap"]) == (True, ("gravity_unbalance",))
+    odds = beside.probabilities["cable_wrap"]
+    assert alone.probabilities["cable_wrap"]["cable_wrap"] > odds["cable_wrap"] > odds["gravity_unbalance"] > 0.02
+
+
+def test_what_was_learned_for_what_has_no_name_leaves_rivals_as_open_as_what_is_left() -> None:
+    explained = {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
+    one = EffectScores("cable_wrap", 60.0, {"gravity_unbalance": 9.0}, explained)
+    rules = replace(ROUND, margin_beside_unknown=0.25)
+    learned, seen = beside_rest([one], ("time",), rules), decide(Scores([one], left(share=1.0)), rules)
+    assert learned == seen
+    assert learned.sets["cable_wrap"] == ("gravity_unbalance",)
 
 
 def test_what_a_term_removes_about_turns_alone_is_nothing_unknown() -> None:
