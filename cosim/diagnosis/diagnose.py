@@ -10,7 +10,7 @@ from cosim.diagnosis.answer.doubt_entry import not_determined_doubts
 from cosim.diagnosis.answer.entries import BroadbandEntry, NotLearnedEntry
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.answer.scores import Scores
-from cosim.diagnosis.decide.decision import Decision, decide, rest_rules
+from cosim.diagnosis.decide.decision import Decision, decide, rest_rules, shaking_rules
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.adequacy import friction_level
 from cosim.diagnosis.evidence.band import in_band
@@ -233,8 +233,9 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
     signals = traces(train, heldout, models)
     found = _findings(answer, signals)
     bias = loop_bias(prepared, answer.chosen, problem.weight)
-    rest = rest_rules(answer.scores.effects, answer.scores.rest, answer.comparison.policy)
-    enter_answer(answer.comparison, answer.proof.chosen, found, tuple(rest), decision.is_unknown)
+    policy, left = answer.comparison.policy, answer.scores.rest
+    rest = (*rest_rules(answer.scores.effects, left, policy), *shaking_rules(left, policy))
+    enter_answer(answer.comparison, answer.proof.chosen, found, rest, decision.is_unknown)
     return Diagnosis(
         verdict=_verdict(found, decision),
         findings=tuple(found),

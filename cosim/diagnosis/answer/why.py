@@ -113,6 +113,8 @@ def _reason(entry: Mapping[str, Any], one: Trial | None) -> str:
     word, refused = WORDS.get(answer, answer), one.refused_by if one else None
     if answer in ("not_decided", "not_testable"):
         return f"{word}: {(entry.get('bound') or {}).get('reason') or 'these recordings do not excite it'}."
+    if one is None and answer == "ambiguous":
+        return f"{word}, p {entry['probability']:.2f}: {entry['evidence']}."
     if one is None:
         return f"{word}: not fitted, as no linear step towards it has evidence."
     if answer in ("not_seen", "not_proven"):

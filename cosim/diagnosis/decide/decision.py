@@ -10,9 +10,11 @@ from cosim.diagnosis.decide.calibration import calibrated
 from cosim.diagnosis.decide.policy import Policy
 
 IN_BURSTS = "time, in bursts"
-"""What the rest is said to go with where it comes now and then ..."""
-ALL_THE_TIME = "nothing that was recorded"
-"""... and where it is there at any motion."""
+SHAKING = {
+    "share of the error that comes in bursts": IN_BURSTS,
+    "random disturbance at any motion relative to friction": "nothing that was recorded",
+}
+"""Rules by which something shakes a machine, now and then or all the time; what the rest is then said to go with."""
 
 
 @dataclass(frozen=True)
@@ -66,9 +68,15 @@ def _of_rest(effects: Sequence[EffectScores], residual: ResidualScores, policy: 
         return beside_rest(effects, followed(residual, policy), policy)
     named = _named(effects, policy)
     # What shakes a machine is no part of what a name says, and no name imitates it.
-    if residual.in_bursts > policy.large_in_bursts:
-        return named.with_rest((IN_BURSTS,), (), policy)
-    return named.with_rest((ALL_THE_TIME,), (), policy) if residual.shaken > policy.large_broadband else named
+    shaking = [rule.name for rule in shaking_rules(residual, policy) if rule.outcome]
+    return named.with_rest((SHAKING[shaking[0]],), (), policy) if shaking else named
+
+
+def shaking_rules(residual: ResidualScores, policy: Policy) -> Iterator[Rule]:
+    """Rules of which one is enough to say that something shakes the machine."""
+    values = ((residual.in_bursts, policy.large_in_bursts), (residual.shaken, policy.large_broadband))
+    for name, (value, limit) in zip(SHAKING, values, strict=True):
+        yield Rule(name, value > limit, value, limit)
 
 
 def beside_rest(effects: Sequence[EffectScores], follows: tuple[str, ...], policy: Policy) -> Decision:

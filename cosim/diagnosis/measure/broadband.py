@@ -49,5 +49,6 @@ def broadband_finding(entry: BroadbandEntry, motion: str) -> Finding:
         units={"level": unit, "low_hz": "Hz", "high_hz": "Hz"},
         size=f"{entry['level']:.2g} {unit.replace('.', '·')}",
         statement=entry["statement"],
+        evidence=f"its level at any motion is {entry['relative']:.2g} of the friction, in training and held out",
         action=ACTION[:1].upper() + ACTION[1:] + ".",
     )

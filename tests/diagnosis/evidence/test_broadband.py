@@ -8,6 +8,8 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.delivery.deliver import as_json
+from cosim.diagnosis.answer.ledger import Trial
+from cosim.diagnosis.answer.why import reasons as why
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.evidence.broadband import shaken
 from cosim.estimation.prepare import Array, Prepared, prepare
@@ -76,3 +78,6 @@ def test_a_diagnosis_calls_it_unknown(effect: str | None, told: bool, tmp_path: 
     answer: Any = as_json(diagnose(read[:2], read[2:], card).diagnosis)
     rows = [one for one in answer["effects"] if one["effect"] == "broadband_disturbance"]
     assert ("unknown" in answer["verdict"]) == told == bool(rows) == bool(answer["broadband_disturbance"])
+    reasons = dict(why(answer, [Trial.of_json(one) for one in answer["ledger"]]))
+    assert ("random disturbance at any motion relative to friction" in reasons["unknown"]) == told
+    assert reasons.get("broadband_disturbance", "").startswith("possible, p ") == told
