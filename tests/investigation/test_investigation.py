@@ -153,7 +153,7 @@ def test_the_command_that_is_recorded_asks_for_the_same(options: str, monkeypatc
     asked: list[dict[str, object]] = []
 
     def noted(*given: object, **options: object) -> None:
-        asked.append({"given": given, **options, "on_progress": None})
+        asked.append({"given": given, **options, "on_progress": None, "on_step": None})
         raise InputError("enough")
 
     monkeypatch.setattr(sys.modules["cosim.api.investigate"], "investigate", noted)
