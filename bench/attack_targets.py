@@ -116,7 +116,7 @@ phase = 0.1
 """
 
 
-PLAIN = '[mount]\ninertia = 30.0\n[friction]\nmodel = "coulomb"\nFc = 2.5\nsigma2 = 30.0\n'
+PLAIN = '[mount]\ninertia = 1.0\n[friction]\nmodel = "coulomb"\nFc = 0.7\nsigma2 = 2.0\n'
 """A card of which a recording is soon identified."""
 
 
