@@ -54,6 +54,7 @@ class Here:
 
     look = staticmethod(looks.look)
     card = staticmethod(looks.look_at_card)
+    estimate = staticmethod(looks.estimated_card)
 
     def warm(self) -> None: ...
 
