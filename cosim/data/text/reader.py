@@ -71,10 +71,10 @@ def _check_first_line(path: Path, data: bytes) -> None:
 
 def _one_column(path: Path, data: bytes) -> Columns | None:
     """Return a text of one number a line as a column without a name; None for any other."""
+    check_cells(path, data.count(b"\n"), 1)  # before each becomes an object
     values = data.split()
     if len(values) < LEAST or len(values) != sum(bool(line.strip()) for line in data.split(b"\n")):
         return None
-    check_cells(path, len(values), 1)
     try:
         column = np.array(values, np.float64)
     except ValueError:
