@@ -157,6 +157,7 @@ def test_where_one_of_several_changed_something_in_the_loop_all_are_named(folder
 CALLS = [
     ("CoSimulation", 2, "step", "third", ""),
     ("CoSimulation", 2, "set", "third", FED),
+    ("CoSimulation", 2, "set", "third", "step = 4e-3\n" + FED),
     ("CoSimulation", 2, "get", "third", ""),
     ("CoSimulation", 3, "step", "third", ""),
     ("CoSimulation", 3, "get", "third", ""),

@@ -102,9 +102,7 @@ static int sweep(Loop *loop, Stage *stage, double time)
             }
         }
         int status = step_held(loop, stage, part, time, loop->step, false);
-        if (status <= FMI_WARNING) {
-            status = worse(status, read_at_end(loop, stage, part));
-        }
+        status = status <= FMI_WARNING ? worse(status, read_at_end(loop, stage, part)) : leave(part, status);
         if (judge(loop, i, status)) {
             return 1;
         }
@@ -179,10 +177,8 @@ static int piece(Loop *loop, Stage *stage, double time, double size)
     for (int64_t i = stage->part; i < stage->part + stage->parts; i++) {
         const Part *part = enter(loop, i);
         int status = step_held(loop, stage, part, time, size, true);
-        if (status <= FMI_WARNING) {
-            status = leave(part, worse(status, get_outputs(part)));
-        }
-        if (judge(loop, i, status)) {
+        status = status <= FMI_WARNING ? worse(status, get_outputs(part)) : status;
+        if (judge(loop, i, leave(part, status))) {
             return 1;
         }
     }

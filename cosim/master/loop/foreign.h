@@ -1,9 +1,10 @@
 /* Foreign code leaves the floating-point environment as it found it.
  *
  * The environment belongs to the thread: a rounding mode, a flush of subnormal numbers to zero or a trap that an FMU
- * leaves behind would change the last bits of all other components, and end the process where a trap is met. `after` is
- * called behind every call of an FMU: it reads the control register (a nanosecond), and where that is not as IEEE 754
- * has it (round to nearest, subnormal numbers kept, no traps) it notes what was changed and puts it right. */
+ * leaves behind would change the last bits of all other components, and end the process where a trap is met. The control
+ * registers are read behind the calls of an FMU before anything else is computed, and where they are not as IEEE 754 has
+ * it (round to nearest, subnormal numbers kept, no traps) what was changed is noted and put right: by `after_all` when
+ * a component has had all its calls of a tick, by `after` where we compute between two calls. */
 #ifndef FOREIGN_H
 #define FOREIGN_H
 
@@ -154,11 +155,6 @@ static inline Environment begin_standard(void)
     return before;
 }
 
-static inline void end_standard(Environment before)
-{
-    if (deviation(before)) {
-        set_environment(before);
-    }
-}
+static inline void end_standard(Environment before) { set_environment(before); }
 
 #endif

@@ -33,14 +33,15 @@ static void gather(const Loop *loop, const Part *part)
 /* Takes one component over its step, as far as it falls into this tick; returns the worst status of its calls. */
 static int advance(const Loop *loop, const Part *part)
 {
-    int status = begins(part, loop->tick) ? set_inputs(part) : 0;
-    if (status > FMI_WARNING || !ends(part, loop->tick)) {
-        return status;
+    bool fed = begins(part, loop->tick), due = ends(part, loop->tick);
+    if (!fed && !due) {
+        return 0;
     }
-    double time = (double)(loop->tick + 1 - part->every) * loop->step;
-    status = worse(status, do_step(part, time, (double)part->every * loop->step, true));
-    if (status <= FMI_WARNING) {
-        status = worse(status, get_outputs(part));
+    int status = fed ? set_inputs(part) : 0;
+    if (status <= FMI_WARNING && due) {
+        double time = (double)(loop->tick + 1 - part->every) * loop->step;
+        status = worse(status, do_step(part, time, (double)part->every * loop->step, true));
+        status = status <= FMI_WARNING ? worse(status, get_outputs(part)) : status;
     }
     return leave(part, status);
 }

@@ -197,10 +197,11 @@ EXPORT int typed_set(Typed *t, const uint32_t *references, size_t count, const d
     int status = t->begun ? 0 : begin(t);
     if (status <= FMI_WARNING) {
         Part inner = {.version = t->inner_version, .instance = t->inner, .set = t->set, .inputs = t->plain_inputs,
-                      .input_references = t->plain_input, .input = (double *)values, .altered = t->altered};
+                      .input_references = t->plain_input, .input = (double *)values};
         bool must = t->inner != t->instance; /* exchange.c goes to event mode before anything is set */
-        status = must && t->plain_inputs == 0 ? ((Set2 *)t->set)(t->inner, t->plain_input, 0, values)
-                                              : worse(status, set_inputs(&inner));
+        int set = must && t->plain_inputs == 0 ? ((Set2 *)t->set)(t->inner, t->plain_input, 0, values)
+                                               : set_inputs(&inner);
+        status = worse(status, after(t->altered, set)); /* numbers are converted below */
     }
     for (int64_t i = 0; i < t->inputs && status <= FMI_WARNING; i++) {
         const Variable *v = &t->input[i];
@@ -221,8 +222,8 @@ EXPORT int typed_get(Typed *t, const uint32_t *references, size_t count, double 
     (void)references;
     (void)count;
     Part inner = {.version = t->inner_version, .instance = t->inner, .get = t->get, .outputs = t->plain_outputs,
-                  .output_references = t->plain_output, .output = values, .altered = t->altered};
-    int status = get_outputs(&inner);
+                  .output_references = t->plain_output, .output = values};
+    int status = after(t->altered, get_outputs(&inner));
     for (int64_t i = 0; i < t->outputs && status <= FMI_WARNING; i++) {
         const Variable *v = &t->output[i];
         status = worse(status, call_get(t, v, v->access));
@@ -243,7 +244,7 @@ EXPORT int typed_get(Typed *t, const uint32_t *references, size_t count, double 
 
 EXPORT int typed_step(Typed *t, double time, double size, int final)
 {
-    Part inner = {.version = t->inner_version, .instance = t->inner, .step = t->step, .altered = t->altered};
+    Part inner = {.version = t->inner_version, .instance = t->inner, .step = t->step};
     return do_step(&inner, t->start + time, size, final);
 }
 
