@@ -75,10 +75,9 @@ def _kind(name: str, text: str) -> Kind | None:
     """What of a motion a column is: by its unit, else by its name."""
     if any(is_named(name, kind) for kind in OTHER_KINDS):
         return None
-    told = list(_named(name))
     if text and is_unit(text):
         return UNITS.get(unit(spelled(text)).si)
-    return told[0] if told else None
+    return next(_named(name), None)
 
 
 def _named(name: str) -> Iterator[Kind]:

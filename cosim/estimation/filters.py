@@ -28,6 +28,12 @@ def highpass(column: Array, dt: float, cutoff: float) -> Array:
     return _both_ways(column, *_butterworth(cutoff * dt, 1, high=True), EDGE)
 
 
+def noise_of(values: Array, dt: float) -> float:
+    """RMS of white noise per sample, judged from the upper 40 % of the spectrum."""
+    high = highpass(values - values[0], dt, 0.6 * 0.5 / dt)
+    return float(np.sqrt(np.mean(high[20:-20] ** 2) / 0.4))
+
+
 def _both_ways(columns: Array, sections: Array, settled: Array, edge: int) -> Array:
     edge, kernels = min(edge, len(columns) - 1), library()
     if kernels is not None:

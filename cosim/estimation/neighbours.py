@@ -1,6 +1,6 @@
 """The motion of neighbouring axes along a recording, and which of it tells anything beside the axis' own."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,11 +9,10 @@ import numpy.typing as npt
 from cosim.data.neighbours import KINDS, Neighbour, neighbours
 from cosim.data.recording import Recording
 from cosim.data.resolution import resolution
-from cosim.estimation.filters import derivative, lowpass
+from cosim.estimation.filters import derivative, lowpass, noise_of
 from pyfmi_models.mount import Mount
 
 Array = npt.NDArray[np.float64]
-Noise = Callable[[Array, float], float]
 Motion = tuple[Array, Array, Array]
 """Position, speed and acceleration at the same rows."""
 STILL = 10.0
@@ -60,10 +59,8 @@ def motions(found: Sequence[Neighbour], table: Mapping[str, Array], dt: float, c
     return columns
 
 
-def moving(
-    found: Sequence[Neighbour], table: Mapping[str, Array], dt: float, cutoff: float, noise_of: Noise
-) -> frozenset[str]:
-    """Names of the neighbours that do not stand still; `noise_of` is the RMS of a reading's white noise."""
+def moving(found: Sequence[Neighbour], table: Mapping[str, Array], dt: float, cutoff: float) -> frozenset[str]:
+    """Names of the neighbours that do not stand still."""
     names = []
     for one in found:
         reading = table[one.name]
@@ -90,9 +87,9 @@ def as_inputs(recording: Recording, mount: Mount, cutoff: float) -> Recording:
     """A recording with the motion of neighbours under the names of a plant's inputs, in which its effects read it."""
     wanted = {one.name: effect.recorded_as().get(one.name) for effect in mount.effects for one in effect.inputs()}
     wanted = {name: own or name for name, own in wanted.items() if own or name not in recording}
-    told = neighbours(recording.columns, recording.units)
-    if not wanted or not told:
+    there = neighbours(recording.columns, recording.units)
+    if not wanted or not there:
         return recording
     dt = recording.sample_time
-    found = motions(told, recording.table, dt, min(cutoff, 0.3 / dt))
+    found = motions(there, recording.table, dt, min(cutoff, 0.3 / dt))
     return replace(recording, table=recording.table | {n: found[own] for n, own in wanted.items() if own in found})

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from cosim.data.neighbours import KINDS, Neighbour, neighbours
 from cosim.data.recording import GAP, Gap, Recording
 from cosim.data.resolution import resolution
-from cosim.estimation.filters import EDGE, derivative, gain, highpass, lowpass, passes_of
+from cosim.estimation.filters import EDGE, derivative, gain, lowpass, noise_of, passes_of
 from cosim.estimation.neighbours import is_alone, key, motions, moving
 from cosim.support.errors import RecordingError
 from cosim.support.statistics import rms
@@ -285,7 +285,7 @@ def _piece(recording: Recording, index: int, span: slice, band: Band, beside: Se
         stride=max(1, int(1 / (KEPT_RATE * cutoff * coarse))),
         extras={n: c[::each].copy() for n, c in table.items() if n not in ("t", "tau", "q", "v")},
         neighbours={name: one[::each].copy() for name, one in motions(beside, table, dt, first).items()},
-        moving=moving(beside, table, dt, first, noise_of) if len(grid) > LEAST_ROWS else frozenset(),
+        moving=moving(beside, table, dt, first) if len(grid) > LEAST_ROWS else frozenset(),
         reading_noise=_density(table["q" if "q" in table else "v"], dt),
         torque_noise=_density(table["tau"], dt),
     )
@@ -342,9 +342,3 @@ def _cutoff(recording: Recording, inertia: float, noise_share: float) -> float:
             if inertia * noise * omega ** (power / 2) * np.sqrt(share) <= noise_share * size:
                 return cutoff
     return CUTOFFS[-1]
-
-
-def noise_of(values: Array, dt: float) -> float:
-    """RMS of white noise per sample, judged from the upper 40 % of the spectrum."""
-    high = highpass(values - values[0], dt, 0.6 * 0.5 / dt)
-    return float(np.sqrt(np.mean(high[20:-20] ** 2) / 0.4))

@@ -11,6 +11,8 @@ vibration      a floor that always trembles, in a band of an octave or so betwee
 wind           gusts: noise that is the weaker the faster, correlated over .2 to 1 s
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.signal import butter, sosfilt
 
@@ -18,6 +20,9 @@ from cosim.support.statistics import rms
 from cosim_studies.proof.families import Family, add_push, angle, goal
 from cosim_studies.proof.simulated_axis import Parameters, SimulatedAxis, log_uniform
 from cosim_studies.proof.truth import TICK, Array
+
+Gate = Callable[[Array], Array]
+"""How strong something is at each time, 0 to 1."""
 
 
 def run_in(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Parameters:
@@ -73,13 +78,7 @@ def ground(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Param
     filtered = butter(2, (low, low * float(rng.uniform(1.5, 2.5))), "bandpass", fs=1 / TICK, output="sos")
     strength = 2.5 * goal(bench, rng, size)
 
-    def push(_: str, t: Array) -> Array:
-        noise = np.asarray(sosfilt(filtered, rng.standard_normal(t.size)))
-        wave = noise / (noise.std() + 1e-300)
-        gates = [np.exp(-(((t - c) / w) ** 2)) for c, w in _bursts(rng, t[-1])]
-        return np.asarray(strength * wave * np.sum(gates, axis=0))
-
-    add_push(bench, push)
+    _shake(bench, rng, strength, filtered, lambda t: _gates(rng, t))
     return {"torque_rms": strength, "from_hz": low}
 
 
@@ -100,14 +99,22 @@ def wind(bench: SimulatedAxis, rng: np.random.Generator, size: float) -> Paramet
     return {"torque_rms": strength, "correlation_s": correlation}
 
 
-def _shake(bench: SimulatedAxis, rng: np.random.Generator, strength: float, shape: Array) -> None:
-    """Add noise of a shape to each recording."""
+def _always(t: Array) -> Array:
+    return np.ones_like(t)
+
+
+def _shake(bench: SimulatedAxis, rng: np.random.Generator, strength: float, shape: Array, gate: Gate = _always) -> None:
+    """Add filtered noise to each recording, of the strength where the gate is 1."""
 
     def push(_: str, t: Array) -> Array:
         noise = np.asarray(sosfilt(shape, rng.standard_normal(t.size)))
-        return np.asarray(strength * noise / (noise.std() + 1e-300))
+        return np.asarray(strength * (noise / (noise.std() + 1e-300)) * gate(t))
 
     add_push(bench, push)
+
+
+def _gates(rng: np.random.Generator, t: Array) -> Array:
+    return np.asarray(np.sum([np.exp(-(((t - c) / w) ** 2)) for c, w in _bursts(rng, t[-1])], axis=0))
 
 
 def _bursts(rng: np.random.Generator, end: float) -> list[tuple[float, float]]:

@@ -11,9 +11,9 @@ from cosim.diagnosis.trust.admission import check_recordings
 from cosim.diagnosis.trust.judgement import judged
 from cosim.diagnosis.trust.likelihood import Reference
 from cosim.estimation.blocks import Blocks
-from cosim.estimation.filters import derivative, lowpass
+from cosim.estimation.filters import derivative, lowpass, noise_of
 from cosim.estimation.inverse import Inverse
-from cosim.estimation.prepare import choose_cutoff, noise_of, prepare, quality
+from cosim.estimation.prepare import choose_cutoff, prepare, quality
 from cosim.support.errors import RecordingError
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount

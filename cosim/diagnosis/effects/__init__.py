@@ -48,8 +48,8 @@ def named(effect: str) -> Hypothesis[Any]:
 
 def namesakes(effect: Effect, mount: Mount) -> list[Effect]:
     """The same effect by each other name that it may have on such an axis."""
-    told = (one.renamed(effect, mount) for one in HYPOTHESES if one.same_as == effect.id)
-    return [one for one in told if one is not None]
+    others = (one.renamed(effect, mount) for one in HYPOTHESES if one.same_as == effect.id)
+    return [one for one in others if one is not None]
 
 
 def candidates(

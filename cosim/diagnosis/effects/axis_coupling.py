@@ -1,7 +1,7 @@
 """A neighbouring axis whose motion was recorded acts on this one."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from math import atan2, hypot, pi
+from math import atan2, hypot, inf, pi
 from typing import ClassVar
 
 import numpy as np
@@ -55,9 +55,9 @@ class NeighbouringAxis(Hypothesis[AxisCoupling]):
             if one and _both_turn(one, found.mount):
                 loads = [_weight_left(problem, found, inertia, follows) for follows in FOLLOWS]
                 fits[WeightCoupling] = max((restarted(problem, found, load) for load in loads), key=evidence)
-        told = {form: evidence(fit) for form, fit in fits.items()}
-        simplest = [form for form in self.forms if form in told and told[form] >= max(told.values()) - LEAST_MORE]
-        return fits[simplest[0]]
+        worth = {form: evidence(fit) for form, fit in fits.items()}
+        least = max(worth.values()) - LEAST_MORE
+        return next(fits[form] for form in self.forms if worth.get(form, -inf) >= least)
 
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """An inertia coupling to each neighbour: what its size counts in is not what a weight counts in."""

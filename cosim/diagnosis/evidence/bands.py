@@ -101,9 +101,7 @@ class Bands:
         for piece, part in zip(prepared.pieces, self.slices, strict=True):
             step, rows = piece.dt * piece.stride, part.stop - part.start
             hertz = np.arange(rows) / (2 * max(rows, 1) * step)
-            passed = 1 / (1 + (hertz / prepared.cutoff) ** 8)
-            power = 2 if prepared.has_position else 1
-            density = inertia * (2 * np.pi * hertz) ** power * passed**2 * piece.reading_noise
+            density = reading_torque(hertz, prepared, inertia) * piece.reading_noise
             variance[part] = density**2 / step * float(np.mean(self.gain[part] ** 2))
         return np.array([float(np.mean(variance[rows])) for rows in self._order])
 
@@ -119,6 +117,20 @@ class Bands:
     def crossed(self, one: Array, other: Array) -> Array:
         """Products of two sets of columns in each band, (bands, n, m)."""
         return np.array([one[rows].T @ other[rows] for rows in self._order])
+
+
+def passed(hertz: Array, cutoff: float) -> Array:
+    """What one pass of the filter, to and fro, leaves of a tone: 1 / (1 + (f / f_c)^8)."""
+    return np.asarray(1 / (1 + (hertz / cutoff) ** 8))
+
+
+def reading_torque(hertz: Array, prepared: Prepared, inertia: float) -> Array:
+    """Torque [N m, N] that a tone of unit amplitude in the reading makes behind both passes g: J w^2 g^2, or J w g^2.
+
+    The latter is of a speed, where only that was read.
+    """
+    power = 2 if prepared.has_position else 1
+    return np.asarray(inertia * (2 * np.pi * hertz) ** power * passed(hertz, prepared.cutoff) ** 2)
 
 
 @dataclass(frozen=True)

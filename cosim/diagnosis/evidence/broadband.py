@@ -19,15 +19,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import dct, idct
 
+from cosim.diagnosis.evidence.bands import passed, reading_torque
+from cosim.diagnosis.evidence.windows import LEAST_ROWS, window_means
 from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.row_weights import far_from_turns, least_speed
 
 Rows = npt.NDArray[np.bool_]
 
-SECONDS = 1.0
-"""Length of a window [s] ..."""
-LEAST_ROWS = 8
-"""... rows of clear motion, or of rest, that it must hold, and at least half of its own."""
 LEAST_WINDOWS = 10
 """Windows in motion of which the decile is one at least."""
 OUTSIDE = 0.05
@@ -102,11 +100,8 @@ def _in_band(piece: Piece, column: Array, band: tuple[float, float]) -> Array:
 
 def _windows(piece: Piece, column: Array, rows: Rows) -> Array:
     """Mean squares in the windows that hold enough of the rows."""
-    t = piece.t[piece.kept]
-    window = np.floor((t - t[0]) / SECONDS).astype(np.int64)
-    whole, count = np.bincount(window), np.bincount(window, rows)
-    enough = count >= np.maximum(LEAST_ROWS, whole / 2)
-    return np.asarray(np.bincount(window, rows * column**2)[enough] / count[enough])
+    means = window_means(piece.t[piece.kept], rows, (column**2,))[:, 0]
+    return means[np.isfinite(means)]
 
 
 def _at_rest(prepared: Prepared, piece: Piece, band: tuple[float, float]) -> Array:
@@ -141,11 +136,9 @@ def _again(prepared: Prepared, pieces: list[Piece], rests: list[Array], band: tu
 def _reading_noise(prepared: Prepared, piece: Piece, inertia: float, band: tuple[float, float]) -> float:
     """Variance [N2 m2] of both readings' white noise in a band: D_q (J w^2 g^2)^2 + D_tau g^4, D densities."""
     hertz = np.linspace(*band, 200)
-    passed = 1 / (1 + (hertz / prepared.cutoff) ** 8)
-    power = 2 if prepared.has_position else 1
-    position = inertia * (2 * np.pi * hertz) ** power * piece.reading_noise
-    density = ((position**2 + piece.torque_noise**2) * passed**4).mean()
-    return float(2 * density * (band[1] - band[0]))
+    position = reading_torque(hertz, prepared, inertia) * piece.reading_noise
+    torque = passed(hertz, prepared.cutoff) ** 2 * piece.torque_noise
+    return float(2 * (band[1] - band[0]) * np.mean(position**2 + torque**2))
 
 
 def _middle(prepared: Prepared, residual: Array, low: float, high: float) -> tuple[float, float]:

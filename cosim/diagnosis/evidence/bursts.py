@@ -10,16 +10,13 @@ motion; a single window that stands out is a jolt, and counts nothing.
 import numpy as np
 
 from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.windows import LEAST_ROWS, SECONDS, window_means
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array, Piece
 from cosim.estimation.row_weights import far_from_turns
 
-SECONDS = 1.0
-"""Length of a window [s] ..."""
 PERIODS = 8.0
-"""... and at least so many periods of the cutoff: an energy of fewer rows says little. Unit: 1."""
-LEAST_ROWS = 8
-"""Rows in clear motion that a window must hold, and at least half of its own."""
+"""Periods of the cutoff that a window holds at least: an energy of fewer rows says little. Unit: 1."""
 LEAST_WINDOWS = 20
 """Windows that tell what is usual in which motion."""
 ABOVE = 3.0
@@ -54,12 +51,8 @@ def _windows(piece: Piece, rest: Array, clear: Array, seconds: float) -> Array:
     t, v = piece.t[piece.kept], piece.v[piece.kept]
     if len(t) < LEAST_ROWS:
         return np.full((1, 3), np.nan)
-    window = np.floor((t - t[0]) / seconds).astype(np.int64)
-    rows, count = np.bincount(window), np.bincount(window, clear)
-    enough, count = count >= np.maximum(LEAST_ROWS, rows / 2), np.maximum(count, 1.0)
-    columns = (rest, rest**2, v**2, np.gradient(v, t) ** 2)
-    mean, square, speed, acceleration = (np.bincount(window, clear * one) / count for one in columns)
-    return np.where(enough[:, None], np.column_stack([square - mean**2, speed, acceleration]), np.nan)
+    means = window_means(t, clear, (rest, rest**2, v**2, np.gradient(v, t) ** 2), seconds)
+    return np.column_stack([means[:, 1] - means[:, 0] ** 2, means[:, 2:]])
 
 
 def _beside_motion(logs: Array) -> Array:

@@ -17,7 +17,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from cosim.diagnosis.decide.policy import Policy
-from cosim.diagnosis.evidence.bands import Bands
+from cosim.diagnosis.evidence.bands import Bands, reading_torque
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.discrepancy import Discrepancy, Shapes, discrepancy
 from cosim.diagnosis.evidence.error import is_noise
@@ -208,8 +208,7 @@ def reading_noise(prepared: Prepared, mount: Mount) -> float:
     total, rows, inertia = 0.0, 0, float(mount.axis.inertia)
     for piece in prepared.pieces:
         hertz = np.linspace(0.0, 0.5 / piece.dt, POINTS)
-        passed = 1 / (1 + (hertz / piece.cutoff) ** 8)
-        density = inertia * (2 * np.pi * hertz) ** (2 if prepared.has_position else 1) * passed**2 * piece.reading_noise
+        density = reading_torque(hertz, prepared, inertia) * piece.reading_noise
         total += len(piece.t) * float(np.trapezoid(2 * density**2, hertz))
         rows += len(piece.t)
     return total / max(rows, 1)

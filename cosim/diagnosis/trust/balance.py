@@ -17,8 +17,8 @@ import numpy.typing as npt
 from scipy.optimize import lsq_linear
 
 from cosim.data.recording import Recording
-from cosim.estimation.filters import gain
-from cosim.estimation.prepare import Array, Piece, Prepared, noise_of, prepare
+from cosim.estimation.filters import gain, noise_of
+from cosim.estimation.prepare import Array, Piece, Prepared, prepare
 from cosim.support.statistics import rms
 
 BAND = 10.0
