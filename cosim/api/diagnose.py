@@ -1,7 +1,8 @@
 """`cosim.diagnose`: recordings and a card to what the card lacks, and a better card."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -172,11 +173,9 @@ def diagnose(
     given = replace(given, with_possible=with_possible)
     if fmu is not None:
         given = _beside(_black_box(fmu, variables or {}), given, on_progress)
-    before = _written(folder) if folder and force else {}
     way = _delivered if folder and not quick else _found
-    done = way(given, folder, command, _Listeners(on_progress, on_answer))
-    _forget(before)
-    return done
+    with _anew(folder if force else None):
+        return way(given, folder, command, _Listeners(on_progress, on_answer))
 
 
 def _checked(out: str | Path | None, quick: bool, force: bool) -> Path | None:
@@ -203,8 +202,11 @@ def _written(folder: Path) -> dict[Path, int]:
     return {path: path.stat().st_mtime_ns for path in paths if path.is_file()}
 
 
-def _forget(before: Mapping[Path, int]) -> None:
-    """Remove those that were not written over: beside a new answer they tell of another one."""
+@contextmanager
+def _anew(folder: Path | None) -> Iterator[None]:
+    """Remove in the end what was there and was not written over: beside a new answer it tells of another one."""
+    before = _written(folder) if folder else {}
+    yield
     for path, written in before.items():
         if path.is_file() and path.stat().st_mtime_ns == written:
             path.unlink()

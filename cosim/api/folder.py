@@ -26,6 +26,8 @@ from cosim.sweeps.pool import close_cells, most_workers, own_cell
 if TYPE_CHECKING:
     import pandas as pd
 
+AS_FILES = "a folder each, or north_1.csv north_2.csv south_1.csv"
+"""How recordings of several machines lie in a folder, for people."""
 OnMachine = Callable[[MachineResult, int, int], None]
 """Called with what came of a machine, machines done, machines in all."""
 
@@ -121,10 +123,7 @@ def diagnose_folder(
     """
     machines = list(folder) if not isinstance(folder, str | Path) else machines_in(Path(folder))
     if not machines:
-        text = (
-            f"{folder} holds no recordings of several machines: a folder each, or north_1.csv north_2.csv south_1.csv."
-        )
-        raise InputError(text, culprit=str(folder))
+        raise InputError(f"{folder} holds no recordings of several machines: {AS_FILES}.", culprit=str(folder))
     named = {"columns": _pairs(columns), "units": _pairs(units), "layout": _pairs(layout)}
     base, names = None if fmu is None else Path(fmu), dict(variables or {})
     options = Options(motion=motion, fmu=base, variables=names, quick=quick, with_possible=with_possible, **named)

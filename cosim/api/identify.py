@@ -182,6 +182,7 @@ def identify(
     check_one(card, model.get("fmu"), model.get("system"))
     folder = None if out is None else Path(out)
     if card is not None:
+        _check_none(model)
         given = Options(tuple(free), cut, keep_inertia, starts, seed)
         return _of_card(recordings, card, folder, given, columns, units, force, on_progress)
     options = _options(model, Calibration(tuple(free), columns=columns or {}, starts=starts, seed=seed))
@@ -189,11 +190,21 @@ def identify(
     return calibrate(recordings, heldout, subject, options, folder, units=units, force=force, on_progress=on_progress)
 
 
+def _check_none(model: ForModels) -> None:
+    """Refuse beside a card what goes with an FMU or a system (InputError)."""
+    _check_names(model)
+    if given := sorted(name for name, value in model.items() if value is not None):
+        raise InputError(f"{', '.join(given)}: of an FMU or a system, not of a card; leave it out.", culprit=given[0])
+
+
+def _check_names(model: ForModels) -> None:
+    if strange := set(model) - set(ForModels.__annotations__):
+        raise TypeError(f"identify() got an unexpected keyword argument '{min(strange)}'")
+
+
 def _options(model: ForModels, options: Calibration) -> Calibration:
     """Join what is said of a model with what is said of any (TypeError for a name that there is not)."""
-    strange = set(model) - set(ForModels.__annotations__)
-    if strange:
-        raise TypeError(f"identify() got an unexpected keyword argument '{min(strange)}'")
+    _check_names(model)
     return replace(
         options,
         given=model.get("set") or {},

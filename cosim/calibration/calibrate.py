@@ -129,11 +129,7 @@ def calibrate(
         text = f"--derivatives directional is of one FMU, and {subject.source} is a system; leave it out."
         raise InputError(text, culprit="--derivatives", value=options.derivatives)
     _check_kept_out(train, heldout)
-    for name, value in options.given.items():
-        if not isfinite(value):
-            raise InputError(f"--set {name}={value:g}: it must be a finite number.", culprit=name, value=value)
-        if name not in subject.known:
-            raise unknown("--set", name, subject.source, subject.known, "what can be set")
+    _check_set(subject, options)
     free = free_of(subject, options.free, options.given, options.bounds)
     matched = [matching(subject, one, options.columns) for one in (*train, *heldout)]
     laid = [
@@ -170,6 +166,15 @@ def calibrate(
     traces = _traces(subject, whole, len(train), old, new)
     initial = {one.name: values.pop(one.name) for one in own}
     return Calibrated(subject, free, values, uncertainty, traces, found, evaluations, lost, (*notes, *told), initial)
+
+
+def _check_set(subject: Subject, options: Options) -> None:
+    """Refuse other values that are no numbers, or of nothing that the model has (InputError)."""
+    for name, value in options.given.items():
+        if not isfinite(value):
+            raise InputError(f"--set {name}={value:g}: it must be a finite number.", culprit=name, value=value)
+        if name not in subject.known:
+            raise unknown("--set", name, subject.source, subject.known, "what can be set")
 
 
 def _experiments(

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from cosim.api.machines import Machine
     from cosim.data.recording import Recording
     from pyfmi_models.card import Card
+Propose = Annotated[
+    Path | None, typer.Option("--propose", help="Folder for formulas outside the catalogue, as effects to review.")
+]
 
 
 def diagnose(
@@ -54,10 +57,7 @@ def diagnose(
     with_possible: Annotated[
         bool, typer.Option("--with-possible", help="The card holds effects that are only possible, too.")
     ] = False,
-    propose: Annotated[
-        Path | None,
-        typer.Option("--propose", help="Folder for formulas outside the catalogue, as effects to review."),
-    ] = None,
+    propose: Propose = None,
     workers: Annotated[
         int | None, typer.Option("--workers", help="A folder of several machines: so many at a time.", min=1)
     ] = None,

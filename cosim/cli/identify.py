@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from inspect import signature
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,6 +20,14 @@ Derivatives = Annotated[
 Bounds = Annotated[
     list[str] | None, typer.Option("--bounds", help="Least and greatest value: Motor.J=0.01..1 ... (FMU, system)")
 ]
+Timeout = Annotated[float, typer.Option("--timeout", help="Seconds that the first simulation may take (FMU, system).")]
+OF_CARDS = {"cut", "keep_inertia", "layout"}
+"""Options that go with a card alone ..."""
+HOW = ("step", "interpolation", "window", "initial", "loss", "workers", "cluster", "derivatives", "timeout")
+OF_MODELS = {"heldout", "set_", "bounds", *HOW}
+"""... and with an FMU or a system alone."""
+PLAIN = ("fmu", "system", "starts", "seed", *HOW)
+"""Options that are handed on as they are."""
 
 
 def identify(
@@ -47,15 +56,11 @@ def identify(
     initial: Annotated[
         str, typer.Option("--initial", help="Start values: recorded, or free: found per window (FMU, system).")
     ] = "recorded",
-    loss: Annotated[
-        str, typer.Option("--loss", help="linear, or soft_l1 for recordings with outliers (FMU, system).")
-    ] = "linear",
+    loss: Annotated[str, typer.Option("--loss", help="linear, or soft_l1 for outliers (FMU, system).")] = "linear",
     workers: Annotated[int | None, typer.Option("--workers", min=1, help="Processes (FMU, system). [cores]")] = None,
     cluster: Cluster = "",
     derivatives: Derivatives = "differences",
-    timeout: Annotated[
-        float, typer.Option("--timeout", help="Seconds that the first simulation may take (FMU, system).")
-    ] = 60.0,
+    timeout: Timeout = 60.0,
     cut: Annotated[
         float | None, typer.Option("--cut", min=0.0, help="Slowest speed of the friction map [rad/s or m/s] (card).")
     ] = None,
@@ -71,18 +76,28 @@ def identify(
     force: Force = False,
 ) -> None:
     """Identify numbers of a card, of a foreign FMU (--fmu) or of a whole system (--system), with standard errors."""
+    given: dict[str, Any] = dict(locals())
     from cosim.api.identify import check_one
 
     check_one(card, fmu, system)
+    _check_given(card is not None, given)
     out = out or default_out(Path(recordings[0]).stem)
     if card is not None:
-        given: Any = {"free": free or (), "cut": cut, "keep_inertia": keep_inertia, "starts": starts, "seed": seed}
-        _card(recordings, card, out, given, columns, units, layout, as_json, force)
+        how = {"free": free or (), "cut": cut, "keep_inertia": keep_inertia, "starts": starts, "seed": seed}
+        _card(recordings, card, out, how, columns, units, layout, as_json, force)
         return
-    model = {"fmu": fmu, "system": system, "free": free or (), "workers": workers, "timeout": timeout}
-    how = {"step": step, "interpolation": interpolation, "window": window, "loss": loss, "starts": starts, "seed": seed}
-    how |= {"initial": initial, "cluster": cluster, "derivatives": derivatives}
-    _model(recordings, heldout or [], out, {**model, **how}, (set_, bounds, columns, units), as_json, force)
+    how = {"free": free or (), **{name: given[name] for name in PLAIN}}
+    _model(recordings, heldout or [], out, how, (set_, bounds, columns, units), as_json, force)
+
+
+def _check_given(of_card: bool, given: Mapping[str, Any]) -> None:
+    """Refuse an option other than its default that goes with another kind of model (InputError)."""
+    known = signature(identify).parameters
+    for name in sorted(OF_MODELS if of_card else OF_CARDS):
+        if given[name] != known[name].default:
+            option = f"--{name.strip('_').replace('_', '-')}"
+            other = "an FMU or a system" if of_card else "a card"
+            raise InputError(f"{option} goes with {other} alone; leave it out.", culprit=option)
 
 
 def _card(

@@ -79,10 +79,7 @@ def run(
     done = _run(ready, Delivery(out, options, apart, call_timeout, page))
     for line in str(done).removeprefix(f"{done.name}: ").splitlines():
         say(line)
-    if as_json:
-        put_json(done.statistics)
-    else:
-        put(str(files["recording"]))
+    put_json(done.statistics) if as_json else put(str(files["recording"]))
 
 
 def _run(scenario: "Scenario", delivery: "Delivery") -> "RunResult":

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.doubt_entry import not_determined_doubts
-from cosim.diagnosis.answer.entries import BroadbandEntry, NotLearnedEntry
+from cosim.diagnosis.answer.entries import BroadbandEntry
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.answer.scores import Scores
 from cosim.diagnosis.decide.decision import Decision, decide, rest_rules, shaking_rules
@@ -40,7 +40,7 @@ from cosim.diagnosis.search.sizes import standard_errors
 from cosim.diagnosis.search.stages import InTurn, search
 from cosim.diagnosis.terms.learn import NOTHING_TRIED, Learned, learn
 from cosim.diagnosis.terms.spelled import Spelled
-from cosim.diagnosis.trust.admission import check_effects, check_recordings
+from cosim.diagnosis.trust.admission import admit
 from cosim.diagnosis.trust.denied import beyond_denial, without_denied
 from cosim.diagnosis.trust.doubts import doubts, of_base, of_delivered, single_readings
 from cosim.diagnosis.trust.limits import half_sample
@@ -137,8 +137,7 @@ def diagnose(
     """
     started = time.perf_counter()
     given, train, heldout = (*train, *heldout), [*map(as_analysed, train)], [*map(as_analysed, heldout)]
-    check_effects(card.plant(), (*train, *heldout))
-    check_recordings(train, heldout)
+    admit(card.plant(), train, heldout)
     sanity = (*doubts(train, heldout, card), *single_readings(given, (*train, *heldout)))
     on_progress("refitting the base")
     problem, base, late = _refitted(train, heldout, card)
@@ -162,10 +161,9 @@ def diagnose(
     unknown = not_determined(problem, limited(problem, mounts[0])[1])
     on_model_ready("after", delivered.plant())
     experiment = _experiment(answer)
-    described = _with_learned(_described(answer, train, heldout, card), answer, learned, train, heldout)
+    described = _with_learned(_described(answer, train, heldout, card), answer, tried, train, heldout)
     diagnosis = replace(
         _with_search(described, answer, examined, heldout),
-        not_learned=_not_learned(tried) if answer.decision.is_unknown else {},
         sanity=(*of_delivered(sanity, problem, mounts[0]), *not_determined_doubts(unknown)),
         not_determined=unknown,
         next_experiment=told(experiment, card.controller is not None) if experiment else {},
@@ -271,16 +269,17 @@ def _shaken(answer: Answer) -> BroadbandEntry:
 
 
 def _with_learned(
-    named: Diagnosis, answer: Answer, learned: Learned | None, train: Sequence[Recording], heldout: Sequence[Recording]
+    named: Diagnosis, answer: Answer, tried: Learned | None, train: Sequence[Recording], heldout: Sequence[Recording]
 ) -> Diagnosis:
-    """Let what describes the delivered model hold the learned term too; names and answers stay as they are."""
-    if not learned:
-        return named
-    problem, models = answer.comparison.problem, answer.models(learned.mount)
+    """Let what describes the delivered model hold a learned term that helps; names and answers stay as they are."""
+    if not (tried and tried.helps):
+        refused = tried.refused() if tried else NOTHING_TRIED
+        return replace(named, not_learned=refused) if answer.decision.is_unknown else named
+    problem, models = answer.comparison.problem, answer.models(tried.mount)
     signals, held = traces(train, heldout, models), judge(heldout, models, problem.prepared.band)
     return replace(
         named,
-        learned=learned.as_json(),
+        learned=tried.as_json(),
         heldout=replace(held, black_box_rms=named.heldout.black_box_rms),
         traces=signals,
         parts=parts(signals),
@@ -313,11 +312,6 @@ def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Lear
     told = tried.judged_in(judged_band(heldout, models, problem.prepared.band), answer.chosen.mount)
     answer = replace(answer, scores=replace(answer.scores, learned=told.scores()))
     return answer, told if answer.decision.is_unknown else None
-
-
-def _not_learned(tried: Learned | None) -> NotLearnedEntry:
-    """What is said of a term that is not delivered, and that there was none; {} of one that is."""
-    return NOTHING_TRIED if not tried else {} if tried.helps else tried.refused()
 
 
 def _experiment(answer: Answer) -> Experiment | None:

@@ -51,6 +51,12 @@ def check_neighbours(mount: Mount, recordings: Sequence[Recording]) -> None:
                 raise RecordingError(text, culprit=name, choices=tuple(there))
 
 
+def admit(mount: Mount, train: Sequence[Recording], heldout: Sequence[Recording]) -> None:
+    """Refuse a card or recordings of which nothing can be said; errors as of the two checks."""
+    check_effects(mount, (*train, *heldout))
+    check_recordings(train, heldout)
+
+
 def check_recordings(train: Sequence[Recording], heldout: Sequence[Recording]) -> None:
     """Refuse recordings that are too short or do not move (RecordingError)."""
     for recording in (*train, *heldout):
