@@ -1,4 +1,4 @@
-"""A foreign plant FMU of a measured machine (EMPS) calibrated on its recordings, beside our own card's fit.
+"""A foreign plant FMU of a measured machine (EMPS) calibrated on its recordings, next to our own card's fit.
 
 python bench/foreign_machine.py --data DIR --out results/identify
 
@@ -76,8 +76,8 @@ def section(rows: dict[str, dict[str, float]], errors: dict[str, float], train: 
         "|---|---|---|---|---|---|",
     ]
     for name, numbers in rows.items():
-        told = [f"{numbers[key]:.2f}" + (f" ± {errors[key]:.2f}" if name.startswith("FMU") else "") for key in FREE]
-        lines.append(f"| {name} | {' | '.join(told)} | {rms(train, numbers):.3f} | {rms(kept, numbers):.3f} |")
+        cells = [f"{numbers[key]:.2f}" + (f" ± {errors[key]:.2f}" if name.startswith("FMU") else "") for key in FREE]
+        lines.append(f"| {name} | {' | '.join(cells)} | {rms(train, numbers):.3f} | {rms(kept, numbers):.3f} |")
     fmu, card = (rms(kept, one) for one in list(rows.values())[1:])
     lines += ["", f"Held out, the FMU is {100 * (fmu / card - 1):+.2f} % from our own card's fit (asked: within 2 %)."]
     return "\n".join(lines) + "\n"

@@ -1,6 +1,6 @@
 """All scores of `results/` in one table: python bench/scores.py writes results/SCORES.md.
 
-Nothing is computed here: value, 95 % interval, bar and whether it is met are what the JSON beside a page holds, with
+Nothing is computed here: value, 95 % interval, bar and whether it is met are what the JSON next to a page holds, with
 the commit or the hash of the code, the seed and the command that made them. A speed has no bar and one machine.
 """
 
@@ -20,7 +20,7 @@ SCORED = {
     "learned/README.md": "learned/learned.json",
 }
 """Pages with scores, and where these stand."""
-Told = dict[str, Any]
+Document = dict[str, Any]
 
 
 def main() -> None:
@@ -33,7 +33,7 @@ def page() -> str:
     lines = [
         "# Scores",
         "",
-        "Written by `python bench/scores.py` from the JSON beside each page, no number by hand. In brackets: 95 %",
+        "Written by `python bench/scores.py` from the JSON next to each page, no number by hand. In brackets: 95 %",
         "intervals. *not sure*: the bar lies inside the interval. How to rebuild: [README.md](README.md).",
     ]
     for name, file in SCORED.items():
@@ -45,28 +45,28 @@ def page() -> str:
     return "\n".join(lines) + "\n"
 
 
-def read(file: str) -> Told:
+def read(file: str) -> Document:
     """A JSON file of `results/`."""
     return dict(json.loads((RESULTS / file).read_text("utf-8")))
 
 
-def section(name: str, told: Told) -> Iterator[str]:
+def section(name: str, document: Document) -> Iterator[str]:
     """The table of one page."""
-    commit = f"commit {told['commit']}, " if "commit" in told else ""
+    commit = f"commit {document['commit']}, " if "commit" in document else ""
     yield f"## [{name}]({name})"
     yield ""
-    yield f"    {told['command']}"
+    yield f"    {document['command']}"
     yield ""
-    made = f"{commit}code {str(told['code'])[:16]}, seed {told['seed']}, mount-cosim {told['version']}"
-    yield f"{made}, {told['played']} cases."
+    made = f"{commit}code {str(document['code'])[:16]}, seed {document['seed']}, mount-cosim {document['version']}"
+    yield f"{made}, {document['played']} cases."
     yield ""
     yield "| | value [95 %] | n | bar | |"
     yield "|---|--:|--:|--:|---|"
-    for one in told["scores"]:
+    for one in document["scores"]:
         yield f"| {one['title']} | {spanned(one)} | {one['n']} | {one['asked'] or ''} | {met(one)} |"
 
 
-def spanned(one: Told) -> str:
+def spanned(one: Document) -> str:
     """A value with its interval."""
     if one["value"] is None:
         return "-"

@@ -69,9 +69,9 @@ def shortened(path: Path) -> None:
     """Leave long lists out of a large JSON file and name them."""
     if path.stat().st_size <= JSON_FILE:
         return
-    told: dict[str, Any] = json.loads(path.read_text("utf-8"))
-    long = [name for name, part in told.items() if len(json.dumps(part)) > JSON_PART]
-    kept = {name: part for name, part in told.items() if name not in long}
+    document: dict[str, Any] = json.loads(path.read_text("utf-8"))
+    long = [name for name, part in document.items() if len(json.dumps(part)) > JSON_PART]
+    kept = {name: part for name, part in document.items() if name not in long}
     path.write_text(json.dumps(kept | {"left_out": long}, indent=1) + "\n", "utf-8")
 
 

@@ -259,9 +259,9 @@ def _archives(
     models = {"plant": card.plant().model()}
     if card.controller is not None:
         models["controller"] = card.controller_model()
-    beside = {"plant": related_of(card, f"{stem}_plant")}
+    related = {"plant": related_of(card, f"{stem}_plant")}
     return [
-        _Archive(out / folder / f"{stem}_{part}_fmi{version}.fmu", model, version, machines, beside.get(part, ()))
+        _Archive(out / folder / f"{stem}_{part}_fmi{version}.fmu", model, version, machines, related.get(part, ()))
         for part, model in models.items()
         for version in versions
         for folder, machines in _folders(version, platforms).items()

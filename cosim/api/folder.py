@@ -129,11 +129,11 @@ def diagnose_folder(
     options = Options(motion=motion, fmu=base, variables=names, quick=quick, with_possible=with_possible, **named)
     orders = [Order(one, str(one.card or card), Path(out) / one.name, options) for one in machines]
     _check_folders(orders)
-    done = _told(_conducted(orders, Path(out), workers, cluster, force), on_machine, len(orders))
+    done = _reported(_conducted(orders, Path(out), workers, cluster, force), on_machine, len(orders))
     return FolderResult(tuple(done), Path(out))
 
 
-def _told(results: Iterable[MachineResult], on_machine: OnMachine, of: int) -> Iterator[MachineResult]:
+def _reported(results: Iterable[MachineResult], on_machine: OnMachine, of: int) -> Iterator[MachineResult]:
     for number, one in enumerate(results, 1):
         on_machine(one, number, of)
         yield one

@@ -108,7 +108,7 @@ def investigate(
     ready = given(scenario, card, machine, limits or {}, settings, first, second, fast)
     with Log(Path(out), ready.identity(), force) as log:
         rounds = Rounds(on_progress, budget, seconds)
-        heard = rounds.beside(on_step)
+        heard = rounds.before(on_step)
         work = Investigation(ready.machine, ready.card, ready.limits, log, settings, rounds, heard)
         work.begin(ready.own, ready.train, ready.heldout)
         return _written(work, work.go_on(), Path(out), command)

@@ -35,9 +35,9 @@ class Options:
     def words(self) -> dict[str, object]:
         """The options of the command line that say the same."""
         pairs = [f"{ours}={theirs}" for ours, theirs in self.variables.items()]
-        told: dict[str, object] = {"--motion": self.motion, "--columns": [*self.columns], "--units": [*self.units]}
-        told |= {"--layout": [*self.layout], "--fmu": self.fmu, "--variables": pairs}
-        return told | {"--quick": self.quick, "--with-possible": self.with_possible}
+        words: dict[str, object] = {"--motion": self.motion, "--columns": [*self.columns], "--units": [*self.units]}
+        words |= {"--layout": [*self.layout], "--fmu": self.fmu, "--variables": pairs}
+        return words | {"--quick": self.quick, "--with-possible": self.with_possible}
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 A machine is a folder inside with recordings, or what several files have in their names before the last separator:
 north_monday.csv and north_tuesday.csv are two recordings of "north". Names that say so (heldout, validation, check,
-test) are kept out of the fit; NAME.toml or a card.toml beside the recordings is the card.
+test) are kept out of the fit; NAME.toml or a card.toml in the folder of the recordings is the card.
 """
 
 import json
@@ -19,7 +19,7 @@ HELD = re.compile(r"(held[ _-]?out|validation|valid|check|test|proof)", re.IGNOR
 SEPARATED = re.compile(r"[_\-. ]+[^_\-. ]*$")
 DOCUMENT, JOURNAL = "diagnosis.json", "machines.jsonl"
 OURS = (".toml", ".json", ".jsonl")
-"""Suffixes of what is no recording beside recordings: cards, settings, and what we write ourselves."""
+"""Suffixes of what is no recording among recordings: cards, settings, and what we write ourselves."""
 LEAST = 2
 """Machines, and recordings of each, from which a folder of files is one of several machines: else it is one run."""
 
@@ -53,11 +53,11 @@ class MachineResult:
         """One line of it: the verdict, the probabilities of what is detected or possible, and the errors."""
         if self.error:
             return {"machine": self.name, "error": self.error}
-        told, held = self.document, self.document["heldout"]
-        named = [one for one in told["effects"] if one["answer"] in ("found", "ambiguous")]
+        held = self.document["heldout"]
+        named = [one for one in self.document["effects"] if one["answer"] in ("found", "ambiguous")]
         return {
             "machine": self.name,
-            "verdict": told["verdict"],
+            "verdict": self.document["verdict"],
             "probabilities": {one["effect"]: one["probability"] for one in named},
             "before_rms": held["before_rms"],
             "after_rms": held["after_rms"],

@@ -10,18 +10,18 @@ from cosim.investigation.story import Answered, Moved
 MOVE, DIAGNOSE, DESIGN = range(3)
 """The stages of a round."""
 BEGINS = {"moving": MOVE, "designing": DESIGN}
-"""How what is told begins; everything else is told by the diagnosis."""
+"""How a text of a stage begins; all others come from the diagnosis."""
 PAIR = 2
 """Motions of a round: one to fit, one for validation."""
 
 
 class Rounds:
-    """Tells somebody what an investigation does; call it with a text, and `step` with what has happened.
+    """Says what an investigation does; call it with a text, and `step` with what has happened.
 
     A round is motion, diagnosis, design; how many there are is known only as the most that the budget of motion allows.
 
     Args:
-        tell: who is told: "stage 5 of at most 12: Delay (3 of 14); best so far: cogging, validation error 0.8 -> 0.2;
+        tell: called with "stage 5 of at most 12: Delay (3 of 14); best so far: cogging, validation error 0.8 -> 0.2;
             at most about 40 s left".
         budget: seconds of motion in all.
         seconds: length of one motion [s].
@@ -50,8 +50,8 @@ class Rounds:
             "; ".join(filter(None, [f"stage {self._number} of {self._most()}: {text}", self._so_far(), self._left()]))
         )
 
-    def beside(self, on_step: Callable[[Moved | Answered], None]) -> Callable[[Moved | Answered], None]:
-        """Return who takes in each recording and answer before somebody else is told of it."""
+    def before(self, on_step: Callable[[Moved | Answered], None]) -> Callable[[Moved | Answered], None]:
+        """Take in each recording and answer before `on_step` is called with it."""
 
         def happened(step: Moved | Answered) -> None:
             self.step(step)

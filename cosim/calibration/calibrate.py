@@ -161,11 +161,11 @@ def calibrate(
     if new is None:
         text = f"{subject.source} cannot be simulated on all recordings with the numbers that were found"
         raise InputError(f"{text}: {lost[-1]}", culprit="heldout")
-    uncertainty, told = uncertainty_of(found, numbers, residuals.scales, rows).of_shared(numbers)
+    uncertainty, remarks = uncertainty_of(found, numbers, residuals.scales, rows).of_shared(numbers)
     values = {**values, **{name: before[name] for one in uncertainty.not_determined if one.idle for name in one.parts}}
     traces = _traces(subject, whole, len(train), old, new)
     initial = {one.name: values.pop(one.name) for one in own}
-    return Calibrated(subject, free, values, uncertainty, traces, found, evaluations, lost, (*notes, *told), initial)
+    return Calibrated(subject, free, values, uncertainty, traces, found, evaluations, lost, (*notes, *remarks), initial)
 
 
 def _check_set(subject: Subject, options: Options) -> None:

@@ -307,10 +307,10 @@ def _fmus(card: Card, found: Diagnosis, heldout: Recording, out: Path) -> Improv
     proven = f"{model.description}; proven on a held-out recording for speeds {span[0]:.3g} to {span[1]:.3g} {unit}"
     model = replace(model, description=proven, name=f"{card.plant().name}_improved")
     fed = as_inputs(heldout, card.plant(), CUTOFF)
-    stimulus, told = of_recording(fed, model), related_of(card, model.name)
+    stimulus, origin = of_recording(fed, model), related_of(card, model.name)
     three, two = out / f"{model.name}.fmu", out / f"{model.name}_fmi2.fmu"
-    with_experiment(lambda related: export_fmu(model, three, fmi=3, force=True, related=(*told, *related)), stimulus)
-    with_experiment(lambda related: export_fmu(model, two, fmi=2, force=True, related=(*told, *related)), stimulus)
+    with_experiment(lambda related: export_fmu(model, three, fmi=3, force=True, related=(*origin, *related)), stimulus)
+    with_experiment(lambda related: export_fmu(model, two, fmi=2, force=True, related=(*origin, *related)), stimulus)
     return Improved(fmu=f"{model.name}.fmu", fmu_fmi2=f"{model.name}_fmi2.fmu")
 
 

@@ -260,7 +260,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
 
 
 def _shaken(answer: Answer) -> BroadbandEntry:
-    """What shakes the machine all the time, if it is enough to be told."""
+    """What shakes the machine all the time, if it is above its limit."""
     comparison, chosen = answer.comparison, answer.proof.chosen
     if not answer.scores.rest.shaken > comparison.policy.large_broadband:
         return {}
@@ -336,8 +336,8 @@ def _findings(answer: Answer, signals: Sequence[Trace]) -> list[Finding]:
         which = 0 if any(effect.id == name for effect in fits[0].mount.effects) else 1
         own = fits[which].mount, errors[which], signals
         found.append(accepted(one, *own, members, shares[name], predicted, name in answer.detected))
-        told = [rival_finding(r, shares[r.effect.id], mount) for r in one.rivals if r.effect.id in members]
-        rivals += [measured_as(row, found[-1], mount) for row in told]
+        open_ = [rival_finding(r, shares[r.effect.id], mount) for r in one.rivals if r.effect.id in members]
+        rivals += [measured_as(row, found[-1], mount) for row in open_]
     named = {finding.effect for finding in found}
     rivals = [finding for finding in rivals if finding.effect not in named]
     known = named | {finding.effect for finding in rivals}

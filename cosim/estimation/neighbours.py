@@ -1,4 +1,4 @@
-"""The motion of neighbouring axes along a recording, and which of it tells anything beside the axis' own."""
+"""The motion of neighbouring axes along a recording, and which of it differs from the axis' own."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

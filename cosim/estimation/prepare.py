@@ -206,10 +206,10 @@ def prepare(recordings: Sequence[Recording], band: float | Band) -> Prepared:
     cutoff, motion = (min(edge, 0.3 / slowest) for edge in (band if isinstance(band, Band) else Band(band)))
     cutoff = min(_telling(one, cutoff) for one in recordings)
     read = Band(cutoff, motion if motion > cutoff else 0.0)
-    beside = _neighbours(recordings)
-    pieces = [piece for index, one in enumerate(recordings) for piece in _pieces(one, index, read, beside)]
+    others = _neighbours(recordings)
+    pieces = [piece for index, one in enumerate(recordings) for piece in _pieces(one, index, read, others)]
     has_position = all("q" in recording for recording in recordings)
-    return Prepared(tuple(r.name for r in recordings), tuple(pieces), cutoff, has_position, read.motion, beside)
+    return Prepared(tuple(r.name for r in recordings), tuple(pieces), cutoff, has_position, read.motion, others)
 
 
 def _neighbours(recordings: Sequence[Recording]) -> tuple[Neighbour, ...]:
@@ -258,12 +258,12 @@ def _spans(recording: Recording, cutoff: float) -> list[slice]:
     return [slice(a, b) for a, b in spans if (b - a) * dt >= LEAST_SECONDS and b - a > TURNED]
 
 
-def _pieces(recording: Recording, index: int, band: Band, beside: Sequence[Neighbour]) -> list[Piece]:
+def _pieces(recording: Recording, index: int, band: Band, others: Sequence[Neighbour]) -> list[Piece]:
     step = resolution(recording["q"]) if "q" in recording else 0.0
-    return [replace(_piece(recording, index, span, band, beside), step=step) for span in _spans(recording, band.cutoff)]
+    return [replace(_piece(recording, index, span, band, others), step=step) for span in _spans(recording, band.cutoff)]
 
 
-def _piece(recording: Recording, index: int, span: slice, band: Band, beside: Sequence[Neighbour]) -> Piece:
+def _piece(recording: Recording, index: int, span: slice, band: Band, others: Sequence[Neighbour]) -> Piece:
     grid, table = _on_grid(recording, span)
     dt = float(grid[-1] - grid[0]) / (len(grid) - 1)
     cutoff, first = band.cutoff, max(band)
@@ -284,8 +284,8 @@ def _piece(recording: Recording, index: int, span: slice, band: Band, beside: Se
         motion=band.motion,
         stride=max(1, int(1 / (KEPT_RATE * cutoff * coarse))),
         extras={n: c[::each].copy() for n, c in table.items() if n not in ("t", "tau", "q", "v")},
-        neighbours={name: one[::each].copy() for name, one in motions(beside, table, dt, first).items()},
-        moving=moving(beside, table, dt, first) if len(grid) > LEAST_ROWS else frozenset(),
+        neighbours={name: one[::each].copy() for name, one in motions(others, table, dt, first).items()},
+        moving=moving(others, table, dt, first) if len(grid) > LEAST_ROWS else frozenset(),
         reading_noise=_density(table["q" if "q" in table else "v"], dt),
         torque_noise=_density(table["tau"], dt),
     )

@@ -76,8 +76,8 @@ def questions(found: Diagnosis) -> tuple[Question, ...]:
     """
     titles = {one.effect: one.title.lower() for one in found.findings}
     groups = [tuple(n for n in group if not named(n).same_as) for group in found.ambiguous_with]
-    told = [group for group in groups if len(group) > 1]  # names that no motion tells apart are no question
-    sets = [Question("set", group, " or ".join(titles.get(n, n) for n in group)) for group in told]
+    separable = [group for group in groups if len(group) > 1]  # names that no motion tells apart are no question
+    sets = [Question("set", group, " or ".join(titles.get(n, n) for n in group)) for group in separable]
     paired = {name for group in found.ambiguous_with for name in group}
     lone = [one for one in found.in_model if one.answer == "ambiguous" and one.effect not in paired]
     unsure = [Question("uncertain", (one.effect,), f"whether it is {titles[one.effect]}") for one in lone]

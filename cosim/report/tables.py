@@ -176,5 +176,5 @@ def unseen(diagnosis: Diagnosis) -> tuple[str, str]:
     many, _, first = counts[0].partition(" ")
     head = f"{many} other effect{'' if many == '1' else 's'}: {first}"
     head += ", limits in the table below" if named["not_seen"] else ""
-    told = [f"{started(words[answer])}: {', '.join(names)}." for answer, names in named.items() if names]
-    return "; ".join([head, *counts[1:]]), " ".join(told)
+    sentences = [f"{started(words[answer])}: {', '.join(names)}." for answer, names in named.items() if names]
+    return "; ".join([head, *counts[1:]]), " ".join(sentences)

@@ -1,4 +1,4 @@
-"""What of a diagnosis is set beside another one: answers with sizes, validation errors, and the overlay.
+"""What of a diagnosis is compared with another one: answers with sizes, validation errors, and the overlay.
 
 JOB/result/comparison.json     written with the report, in the units of the report
 """
@@ -49,7 +49,7 @@ class Line:
 
 @dataclass(frozen=True, kw_only=True)
 class Comparison:
-    """A diagnosis as it stands beside another one; errors are RMS on the validation recording, in `unit`."""
+    """A diagnosis as it is compared with another one; errors are RMS on the validation recording, in `unit`."""
 
     __pydantic_config__: ClassVar[ConfigDict] = STRICT
     heading: str
@@ -62,7 +62,7 @@ class Comparison:
 
 
 def compared(found: Diagnosis) -> Comparison:
-    """Return what of a diagnosis is set beside another one."""
+    """Return what of a diagnosis is compared with another one."""
     from cosim.report.lead import heading
     from cosim.report.quantities import Scales
     from cosim.report.words import model

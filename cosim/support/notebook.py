@@ -16,7 +16,7 @@ PAUSE = 0.2
 def shows_progress(
     says: Callable[..., str] = lambda text: str(text),
 ) -> Callable[[Callable[P, R]], Callable[P, R]]:
-    """Make a function that has `on_progress` show it as a line in a notebook, where nobody else is told.
+    """Make a function that has `on_progress` show it as a line in a notebook, where nobody else listens.
 
     Args:
         says: makes a text of what `on_progress` is called with.
@@ -29,7 +29,7 @@ def shows_progress(
             if display is None:
                 return function(*given, **named)
             line = _Line(display)
-            named["on_progress"] = lambda *told: line.tell(says(*told))
+            named["on_progress"] = lambda *given: line.tell(says(*given))
             try:
                 return function(*given, **named)
             finally:

@@ -81,8 +81,8 @@ def shaking_rules(residual: ResidualScores, policy: Policy) -> Iterator[Rule]:
 
 def beside_rest(effects: Sequence[EffectScores], follows: tuple[str, ...], policy: Policy) -> Decision:
     """The answer where something without a name is left, that follows quantities: margins count for less there."""
-    told = [one.with_margins_of(policy.margin_beside_unknown) for one in effects]
-    return _named(told, policy).with_rest(follows, beside_unknown(effects, policy), policy)
+    weighed = [one.with_margins_of(policy.margin_beside_unknown) for one in effects]
+    return _named(weighed, policy).with_rest(follows, beside_unknown(effects, policy), policy)
 
 
 def _named(effects: Sequence[EffectScores], policy: Policy) -> Decision:
@@ -242,5 +242,5 @@ def _probabilities(one: EffectScores, members: Sequence[str]) -> dict[str, float
     top = max(odds.values())
     weights = {name: exp(value - top) for name, value in odds.items()}
     total = sum(weights.values()) + exp(-min(one.evidence, 700.0) - top)
-    told = {name: calibrated(weights[name] / total * one.explains[name]) for name in (one.effect, *members)}
-    return {name: value / max(1.0, sum(told.values())) for name, value in told.items()}
+    shown = {name: calibrated(weights[name] / total * one.explains[name]) for name in (one.effect, *members)}
+    return {name: value / max(1.0, sum(shown.values())) for name, value in shown.items()}

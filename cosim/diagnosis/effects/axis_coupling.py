@@ -23,7 +23,7 @@ from pyfmi_models.mount import Mount
 FOLLOWS = (1.0, 0.0, -1.0)
 """Whether a weight turns with this axis too, or with the neighbour alone; -1 where both count the other way round."""
 LEAST_MORE = 5.0
-"""Nats that a damping or a weight must have beside the inertia: odds of 150 to 1."""
+"""Nats that a damping or a weight must have in addition to the inertia: odds of 150 to 1."""
 
 
 class NeighbouringAxis(Hypothesis[AxisCoupling]):
@@ -43,7 +43,7 @@ class NeighbouringAxis(Hypothesis[AxisCoupling]):
             yield from _moved_by(one, mount)
 
     def tuned(self, problem: Problem, found: Fit, start: AxisCoupling, evidence: Evidence) -> Fit:
-        """The simplest form that explains it: a damping or a weight only where it has evidence beside the inertia."""
+        """The simplest form that explains it: a damping or a weight only where it adds evidence to the inertia."""
         one = next((one for one in problem.prepared.neighbours if one.name == start.neighbour), None)
         fits = {type(start): found}
         inertia = AxisCoupling(inertia=found.parameters()[f"{start.id}.inertia"], neighbour=start.neighbour)

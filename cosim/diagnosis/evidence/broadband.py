@@ -29,7 +29,7 @@ Rows = npt.NDArray[np.bool_]
 LEAST_WINDOWS = 10
 """Windows in motion of which the decile is one at least."""
 OUTSIDE = 0.05
-"""Share of the energy that may lie below, and above, the band that is told. Unit: 1."""
+"""Share of the energy that may lie below, and above, the band that is stated. Unit: 1."""
 SPARED = 0.1
 """Share of the windows that may have less than the level: noise of few periods is uneven. Unit: 1."""
 UNMOVED = 4.0

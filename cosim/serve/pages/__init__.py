@@ -109,7 +109,7 @@ def _row(job: Job) -> Parsed:
         "files": _files(job),
         "state": STATES[job.state],
         "done": job.state == "done",
-        "told": _told(job) if job.state == "done" else job.problem,
+        "outcome": _outcome(job) if job.state == "done" else job.problem,
     }
 
 
@@ -120,7 +120,7 @@ def _files(job: Job) -> str:
     return ", ".join(names[:NAMED]) + more if names else "no recording yet"
 
 
-def _told(job: Job) -> str:
+def _outcome(job: Job) -> str:
     """Return the verdict, the effects that it names, and the validation error before and after."""
     error = f"Validation RMS error {job.answer.error}." if job.answer.error else ""
     effects = ", ".join(one.what for one in job.answer.findings if one.kind == "found")
@@ -131,7 +131,7 @@ def _unreadable(error: UnreadableJobError) -> Parsed:
     day, clock = error.id.split("-")[:2]
     when = moment(datetime.strptime(f"{day}{clock} +0000", "%Y%m%d%H%M%S %z"))
     row = {"id": error.id, "when": when, "name": "Unreadable diagnosis", "files": "its files are as they were"}
-    return row | {"state": "not readable", "done": False, "told": str(error)}
+    return row | {"state": "not readable", "done": False, "outcome": str(error)}
 
 
 def _draft(desk: Desk, job: Job) -> Parsed:

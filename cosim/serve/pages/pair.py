@@ -85,12 +85,12 @@ def _effect(held: Comparison | None, name: str) -> Parsed | None:
     one: Effect | None = next((one for one in held.effects if one.id == name), None) if held else None
     if one is None:
         return None
-    told = f"probability {one.probability:.2f}" if one.probability is not None else ""
+    likely = f"probability {one.probability:.2f}" if one.probability is not None else ""
     return {
         "answer": one.answer,
         "shows": one.shows,
         "size": one.size,
-        "more": ", ".join(filter(None, (one.range, told))),
+        "more": ", ".join(filter(None, (one.range, likely))),
     }
 
 
