@@ -113,7 +113,7 @@ def test_what_a_public_name_says_of_itself_is_in_plain_words(name: str) -> None:
 
 def test_what_is_new_is_told_in_plain_words() -> None:
     text = (ROOT / "CHANGELOG.md").read_text("utf-8")
-    assert not unplain(text.split("## [Unreleased]")[1].split("\n## [")[0])
+    assert not unplain(text.split("## [Unreleased]")[1].split("\n## [0.1.0]")[0])
 
 
 def test_readme_is_short() -> None:

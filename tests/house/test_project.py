@@ -78,7 +78,7 @@ def test_the_version_is_stated_once_and_is_a_release_or_in_the_making() -> None:
     assert "version" in PROJECT["dynamic"]
     changelog = (ROOT / "CHANGELOG.md").read_text("utf-8")
     assert "## [Unreleased]" in changelog
-    assert cosim.__version__ in changelog
+    assert f"\n## [{cosim.__version__}] - " in changelog
     try:
         assert version(PROJECT["name"]) == cosim.__version__
     except PackageNotFoundError:
