@@ -19,6 +19,7 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 exclude_patterns = ["_build"]
 html_theme, html_title = "furo", "mount-cosim"
+html_static_path, html_css_files = ["static"], ["gallery.css"]
 html_copy_source = html_show_copyright = html_show_sphinx = False
 myst_heading_anchors = 3
 default_role = "code"

@@ -24,6 +24,7 @@ from cosim.plots.quantities import ANGLE, TORQUE, TURNING
 from cosim.plots.style import STYLE
 from cosim.report.figures_dynamic import effect as draw
 from cosim.report.quantities import Scales
+from cosim.report.repairs import MACHINES, repairs_of
 from pyfmi_models.effects import CATALOGUE, Effect
 from pyfmi_models.friction import LuGre
 from pyfmi_models.model import parameters_of
@@ -44,7 +45,18 @@ def write_gallery(folder: Path) -> None:
     piece = prepare([motion()], CUTOFF).pieces[0]
     with mpl.rc_context(STYLE):
         parts = [section(name, one, folder, piece) for name, one in sorted(shown.items(), key=lambda p: p[1].title)]
-    (folder / "effects.md").write_text("\n".join([INTRODUCTION, *parts, *of_cards_alone()]), "utf-8")
+    text = [INTRODUCTION, thumbnails(shown), *parts, *of_cards_alone()]
+    (folder / "effects.md").write_text("\n".join(text), "utf-8")
+
+
+def thumbnails(shown: dict[str, Effect]) -> str:
+    """Return all pictures small, each a link to its effect."""
+    named = sorted(shown.items(), key=lambda pair: pair[1].title)
+    cells = (
+        f'<a href="#{name}"><img src="../_images/{name}.svg" alt="" loading="lazy">{one.title}</a>'
+        for name, one in named
+    )
+    return "\n".join(["```{raw} html", '<div class="thumbnails">', *cells, "</div>", "```", ""])
 
 
 INTRODUCTION = f"""# Gallery of effects
@@ -96,8 +108,21 @@ def _parts(name: str, one: Effect, folder: Path, piece: Piece) -> Iterator[str]:
     rivals = ", ".join(f"[{CATALOGUE[rival][0].title.lower()}](#{rival})" for rival in one.rivals if rival in CATALOGUE)
     yield f"*Told from {rivals or 'the others'}:* {one.told_apart_by or 'nothing else looks like it'}."
     yield f"*What to do:* {one.action}"
+    yield from _repairs(name)
     yield _table(one)
     yield f"*Literature:* {from_code or LITERATURE[name]}"
+
+
+def _repairs(name: str) -> Iterator[str]:
+    """Yield what to check at the machine, in order, and the repair by kind of machine."""
+    if (known := repairs_of(name)) is None:
+        raise ValueError(f"{name} has no checks and repairs")
+    yield "*Three checks, the quickest first:*"
+    for number, check in enumerate(known.checks, 1):
+        results = (f"   - {seen[:1].upper()}{seen[1:]}: {means}." for seen, means in check.results)
+        yield "\n".join([f"{number}. {check.do}", "", *results])
+    rows = (f"| {MACHINES[kind]} | {text} |" for kind, text in known.by_machine.items())
+    yield "\n".join(["| Machine | Repair |", "|---|---|", *rows])
 
 
 def described(form: type[Effect]) -> tuple[str, str]:

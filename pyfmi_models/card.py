@@ -27,13 +27,18 @@ from pyfmi_models.numbers import LARGEST, LARGEST_GIVEN, LEAST, LONGEST_NAME, MO
 Part = TypeVar("Part")
 
 
+MachineKind = Literal["rotary_table", "ball_screw", "belt", "harmonic_drive", "direct_drive", "hydraulic"]
+"""What moves the axis; a report names the repair for it."""
+
+
 class MountSection(Section):
-    """`[mount]`: name, motion, inertia [kg m2 or kg], torque limit [N m or N]."""
+    """`[mount]`: name, motion, inertia [kg m2 or kg], torque limit [N m or N], kind of machine (None: not said)."""
 
     name: str = Field(default="mount", max_length=LONGEST_NAME)
     motion: Literal["rotary", "linear"] = "rotary"
     inertia: float = Field(ge=LEAST, le=LARGEST_GIVEN)
     torque_limit: float = Field(default=1e6, ge=LEAST, le=LARGEST_GIVEN)
+    machine: MachineKind | None = None
 
 
 class EncoderSection(Section):

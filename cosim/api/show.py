@@ -10,6 +10,7 @@ from cosim.support.errors import FmuError, InputError
 from cosim.support.html import facts as html_facts
 from cosim.support.html import table as html_table
 from cosim.support.html import text as html_text
+from cosim.support.near import did_you_mean
 from cosim.support.plain import Json
 from cosim.system.variant import ssp_of
 
@@ -61,8 +62,10 @@ def show(
 ) -> Shown:
     """Tell what a recording, FMU, SSP, scenario or card holds; one that is shipped is given by its name.
 
+    The id of an effect ("cogging") tells what it is, three checks at the machine and the repair by kind of machine.
+
     Args:
-        source: a path, the name of a shipped scenario or card, or a `Recording`.
+        source: a path, the name of a shipped scenario or card, the id of an effect, or a `Recording`.
         columns: of a recording's file, our name to its name.
         units: of a recording's file, our name to the unit in it.
         layout: CSV format; see `Recording.read`.
@@ -222,11 +225,20 @@ def _toml(file: str) -> tuple[Facts, Tables]:
 
     if file in shipped_cards():
         return _card(file)
+    from cosim.api.show_effect import effects, of_effect
+
+    if file in effects() and not path.exists():
+        return of_effect(file)
     if path.exists():
         kinds = "a recording, FMU, SSP, scenario, card, sweep, or a folder of a run, diagnosis or sweep"
         raise InputError(f"{file} is unsupported: cosim show takes {kinds}.", culprit=file)
-    choices = (*shipped_scenarios(), *shipped_cards())
-    raise InputError(f"{file} does not exist; shipped are: {', '.join(choices)}.", culprit=file, choices=choices)
+    choices = (*shipped_scenarios(), *shipped_cards(), *effects())
+    meant = did_you_mean(file, choices)
+    text = (
+        f"{file} does not exist; shipped are: {', '.join((*shipped_scenarios(), *shipped_cards()))}; and effects by "
+        f"their ids, as cogging.{meant}"
+    )
+    raise InputError(text, culprit=file, choices=choices)
 
 
 def _scenario(file: str) -> tuple[Facts, Tables]:

@@ -17,4 +17,6 @@ def cards(incomplete: str) -> list[str]:
 
 def anything(incomplete: str) -> list[str]:
     """Return what is shipped and begins so."""
-    return [*scenarios(incomplete), *cards(incomplete)]
+    from cosim.api.show_effect import effects
+
+    return [*scenarios(incomplete), *cards(incomplete), *(one for one in effects() if one.startswith(incomplete))]

@@ -24,7 +24,7 @@ EXAMPLES = {
         "cosim investigate sidereal --card paper_mount --machine axis.toml --budget 120s",
         "cosim investigate axis_scenario.toml --card axis.toml --limits speed=0.2 torque=20",
     ),
-    "show": ("cosim show recording.csv", "cosim show axis.toml --json"),
+    "show": ("cosim show recording.csv", "cosim show cogging"),
     "run": ("cosim run sidereal", "cosim run sidereal --set controller.kp=400 --stop 5 --out tuned"),
     "export": ("cosim export paper_mount", "cosim export axis.toml --fmi 3 --ssp --out fmus"),
     "sweep": ("cosim sweep gains.toml", "cosim sweep gains.toml --workers 4 --out gains"),

@@ -21,7 +21,8 @@ def show(
     file: Annotated[
         str,
         typer.Argument(
-            help="A recording, FMU, SSP, scenario or card, or the name of a shipped one.", autocompletion=anything
+            help="A recording, FMU, SSP, scenario, card, folder of results, name of a shipped one, or an effect.",
+            autocompletion=anything,
         ),
     ],
     columns: Annotated[list[str] | None, typer.Option("--columns", help="Recording: our name = the file's.")] = None,
@@ -32,7 +33,7 @@ def show(
     as_json: Annotated[bool, typer.Option("--json", help="Print it as JSON.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Overwrite the picture.")] = False,
 ) -> None:
-    """Show a recording and the options to use it with, an FMU, a scenario or a card."""
+    """Show a recording and the options to use it with, an FMU, a scenario, a card, or an effect with its repair."""
     from cosim.api.show import WIRES
     from cosim.api.show import show as shown_of
 

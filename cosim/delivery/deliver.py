@@ -255,6 +255,8 @@ def _provenance(train: Sequence[Recording], heldout: Sequence[Recording], card: 
 def _source_of(card: Card) -> CardSource:
     path = Path(card.path)
     named = CardSource(name=path.name, path=card.path)
+    if card.mount.machine:
+        named["machine"] = card.mount.machine
     return named | CardSource(sha256=sha256(path)) if path.is_file() else named
 
 

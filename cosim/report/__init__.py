@@ -2,13 +2,15 @@
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from cosim.diagnosis.answer.result import Diagnosis
+if TYPE_CHECKING:
+    from cosim.diagnosis.answer.result import Diagnosis
 
 __all__ = ["render", "write_report"]
 
 
-def render(diagnosis: Diagnosis) -> str:
+def render(diagnosis: "Diagnosis") -> str:
     """Return the page as text. matplotlib and jinja2 are imported here, not with the package."""
     import matplotlib
     from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -25,7 +27,7 @@ def render(diagnosis: Diagnosis) -> str:
     return pages.get_template("report.html.j2").render(values).lstrip()
 
 
-def write_report(diagnosis: Diagnosis, path: Path) -> Path:
+def write_report(diagnosis: "Diagnosis", path: Path) -> Path:
     """Write the page and return its path; a file that is there already is replaced, never left half written."""
     partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
     partial.write_text(render(diagnosis), encoding="utf-8")

@@ -9,6 +9,7 @@ from cosim.report.equations import equation
 from cosim.report.lead import led
 from cosim.report.next_experiment import is_about, to_record
 from cosim.report.quantities import Scales
+from cosim.report.repairs import Check, repairs_of
 from cosim.report.sheet import Picture
 
 NOTHING_YET = "Nothing yet: it did not hold on the validation run."
@@ -39,6 +40,8 @@ class Shown:
     sentences: tuple[str, ...]
     rows: tuple[tuple[str, str], ...]
     numbers: tuple[Numbers, ...]
+    checks: tuple[Check, ...]
+    repairs: tables.Table
     picture: Picture | None
     do: str
     likely: str
@@ -56,8 +59,16 @@ def block(one: words.Block, diagnosis: Diagnosis, scales: Scales, picture: Pictu
     rows += [("Ruled out", _plainly(first.ruled_out)), ("Less likely", _plainly(first.less_likely))]
     closed = tuple(_numbers(finding) for finding in one.findings)
     filled = tuple((name, text) for name, text in rows if text)
-    sizes = words.sized(first)
-    return Shown(one, tuple(filter(None, said)), filled, closed, picture, do(one, diagnosis), _likely(first), *sizes)
+    checks, repair = _at_the_machine(first, diagnosis)
+    texts = do(one, diagnosis), _likely(first), *words.sized(first)
+    return Shown(one, tuple(filter(None, said)), filled, closed, checks, repair, picture, *texts)
+
+
+def _at_the_machine(finding: Finding, diagnosis: Diagnosis) -> tuple[tuple[Check, ...], tables.Table]:
+    """Return the checks of an effect in their order, and its repair by kind of machine."""
+    known = repairs_of(finding.effect) if finding.answer in ("found", "ambiguous") else None
+    rows = known.of(diagnosis.motion, words.machine(diagnosis)) if known else {}
+    return known.checks if known else (), tables.Table(("Machine", "Repair"), tuple(rows.items()))
 
 
 def _likely(first: Finding) -> str:
@@ -123,7 +134,9 @@ def do(one: words.Block, diagnosis: Diagnosis) -> str:
     own = [finding.effect for finding in one.findings]
     if one.answer == "ambiguous" and is_about(diagnosis, own) and (order := to_record(diagnosis)):
         return words.started(order)
-    files = words.delivered(diagnosis)
+    files, known = words.delivered(diagnosis), repairs_of(one.first.effect)
+    if known and (kind := words.machine(diagnosis)):
+        return next(iter(known.of(diagnosis.motion, kind).values()), one.first.action)
     return one.first.action or (f"Use {files[0]}" if files and one.answer == "found" else "")
 
 

@@ -17,17 +17,14 @@ def heading(diagnosis: Diagnosis, model: str = "the model") -> str:
         case "withheld":
             return "Check the recordings first: no effect can be named"
         case "unknown":
-            return (
-                f"{_open(diagnosis, model)}, and something unknown"
-                if _named(diagnosis)
-                else _unknown_heading(diagnosis)
-            )
+            return f"{_open(diagnosis, model)}; {_REST}" if _named(diagnosis) else _unknown_heading(diagnosis)
         case "none":
             return f"Nothing missing that {_these(diagnosis)} can show"
     return _open(diagnosis, model)
 
 
 _UNKNOWN = "Something is missing, and it is none of the effects cosim knows"
+_REST = "part of the error fits no known effect"
 _SHAKEN = "Something shakes the machine all the time, and the motion does not cause it"
 _NOT_CONFIRMED = "Something is missing that no known effect explains on the validation runs"
 
@@ -53,9 +50,25 @@ def _open(diagnosis: Diagnosis, model: str) -> str:
         more = f", perhaps {count(alone).lower()} more" if alone else ""
         return f"{_missing(found, model)}{more}"
     if any(len(block.findings) > 1 for block in asked):
-        return "Something is missing, with more than one possible cause"
+        return _rivals(asked, model)
     many = count(len(asked))
     return f"{many} effect{'s' if len(asked) != 1 else ''} may be missing from {model}"
+
+
+def _rivals(asked: list[Block], model: str) -> str:
+    """Name the possible causes where they are two; how sure it is follows what they have together."""
+    together = min(sum(one.probability for one in block.findings) for block in asked)
+    sure = "likely missing" if together < SURE else "missing"
+    verb = f"are {sure}" if len(asked) > 1 else f"is {sure}"
+    said = (
+        f"{count(len(asked))} effect{'s' if len(asked) > 1 else ''} {verb if together >= LIKELY else 'may be missing'}"
+    )
+    if len(asked) > 1:
+        return f"{said} from {model}, with more than one possible cause"
+    causes = asked[0].findings
+    if len(causes) > 2:
+        return f"{said} from {model}, with {count(len(causes)).lower()} possible causes"
+    return f"{said} from {model}: {' or '.join(lowered(one.title) for one in causes)}"
 
 
 def _missing(found: list[Finding], model: str) -> str:

@@ -139,6 +139,11 @@ def model(diagnosis: Diagnosis) -> str:
     return str(made.get("base_fmu", "")).split(" (")[0] or str(made.get("card", {}).get("name", ""))
 
 
+def machine(diagnosis: Diagnosis) -> str:
+    """Return the kind of machine that the card names; empty where it names none."""
+    return diagnosis.provenance.get("card", {}).get("machine", "")
+
+
 def delivered(diagnosis: Diagnosis) -> tuple[str, ...]:
     """List the files of the better model, the one to use first: beside an FMU of another team its correction."""
     made = diagnosis.improved

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isfinite
 
+from cosim.report.repairs import MACHINES
 from cosim.support.errors import InputError, UnitError
 from cosim.support.units import unit
 
@@ -16,6 +17,8 @@ FRICTIONS = {
     "none": "none that matters",
 }
 """Laws that the form offers, in plain words; a card as text may name any."""
+KINDS = {"": "not said", **MACHINES}
+"""What moves the axis: the report names the repair for it."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +63,11 @@ def card_of(form: Mapping[str, str]) -> str:
     """Return the text of a card (InputError: one sentence for every field that is wrong)."""
     motion, friction = form.get("motion", "rotary"), form.get("friction", "coulomb")
     name = form.get("name", "").strip() or "axis"
+    mount = [f"name = {json.dumps(name, ensure_ascii=False)}", f"motion = {json.dumps(motion)}"]
+    if machine := form.get("machine", ""):
+        mount.append(f"machine = {json.dumps(machine)}")
     sections: dict[str, list[str]] = {
-        "mount": [f"name = {json.dumps(name, ensure_ascii=False)}", f"motion = {json.dumps(motion)}"],
+        "mount": mount,
         "friction": [f"model = {json.dumps(friction)}"],
     }
     wrong = []

@@ -47,6 +47,22 @@ def test_every_effect_has_equation_words_advice_and_literature(gallery: Any, nam
     assert literature or gallery.LITERATURE[name]
 
 
+def test_the_gallery_has_a_picture_checks_and_repairs_of_each_effect_and_a_small_picture_that_leads_there(
+    gallery: Any, tmp_path: Path
+) -> None:
+    gallery.write_gallery(tmp_path)
+    text = (tmp_path / "effects.md").read_text("utf-8")
+    for name in TRIED:
+        drawn = (tmp_path / f"{name}.svg").read_text("utf-8")
+        assert drawn.count("<path") + drawn.count("<use") + drawn.count("<circle") + drawn.count("<polyline") > 5
+        part = text.split(f"\n({name})=\n")[1].split("\n(")[0]
+        assert f"{{figure}} {name}.svg" in part
+        assert len(re.findall(r"^[123]\. ", part, re.M)) == 3
+        assert len(re.findall(r"^   - .+: .+\.$", part, re.M)) >= 6
+        assert "| Machine | Repair |" in part
+        assert f'<a href="#{name}"><img src="../_images/{name}.svg"' in text
+
+
 def test_no_literature_is_told_twice(gallery: Any) -> None:
     assert set(gallery.LITERATURE) <= set(TRIED)
     last = {form.id: form for form in FORMS if form.id in TRIED}

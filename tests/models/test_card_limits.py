@@ -37,6 +37,7 @@ def test_what_a_card_does_not_say_is_what_the_documentation_says() -> None:
         "motion": "rotary",
         "inertia": 1.0,
         "torque_limit": 1e6,
+        "machine": None,
     }
     assert EncoderSection().model_dump() == {"counts_per_rev": 0.0, "noise_rms": 0.0, "ratio": 1.0}
 

@@ -265,7 +265,7 @@ def test_a_proposed_friction_law_is_told_on_page_and_terminal_and_the_bases_own_
 
 def test_something_unknown_stands_beside_what_is_named() -> None:
     both = replace(diagnosis("two"), verdict=("cogging", "friction_asymmetry", "unknown"), depends_on=("time",))
-    assert lead.heading(both).endswith("effects are missing from the model, and something unknown")
+    assert lead.heading(both).endswith("effects are missing from the model; part of the error fits no known effect")
     said = " ".join(lead.lead(both, Scales.of(both)))
     assert "cogging (0.42 N·m)" in said
     assert len(lead.lead(both, Scales.of(both))) == 2
@@ -273,4 +273,4 @@ def test_something_unknown_stands_beside_what_is_named() -> None:
     assert "The remaining error correlates with: time" in summary(both)
     rivals = tuple(finding for finding in both.findings if finding.answer != "found")
     open_question = replace(both, findings=rivals, verdict=("gravity_unbalance", "unknown"))
-    assert "more than one possible cause, and something unknown" in lead.heading(open_question)
+    assert lead.heading(open_question).endswith("; part of the error fits no known effect")

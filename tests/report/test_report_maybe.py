@@ -31,16 +31,32 @@ def said(whole: Diagnosis) -> str:
     [
         ((*FOUND, MAYBE), False, "Two effects are missing from the model, perhaps one more"),
         ((*FOUND, *RIVALS), False, "Two effects are missing from the model"),
-        ((*FOUND, MAYBE), True, "Two effects are missing from the model, perhaps one more, and something unknown"),
+        (
+            (*FOUND, MAYBE),
+            True,
+            "Two effects are missing from the model, perhaps one more; part of the error fits no known effect",
+        ),
         ((MAYBE,), False, "One effect may be missing from the model"),
-        ((MAYBE,), True, "One effect may be missing from the model, and something unknown"),
-        ((MAYBE, *RIVALS), False, "Something is missing, with more than one possible cause"),
+        ((MAYBE,), True, "One effect may be missing from the model; part of the error fits no known effect"),
+        ((MAYBE, *RIVALS), False, "Two effects may be missing from the model, with more than one possible cause"),
+        (RIVALS, False, "One effect is missing from the model: gravity unbalance or encoder eccentricity"),
     ],
 )
 def test_the_heading_counts_what_was_found_and_what_may_be_apart(
     findings: tuple[Finding, ...], unknown: bool, heading: str
 ) -> None:
     assert lead.heading(of(*findings, unknown=unknown)) == heading
+
+
+def test_a_heading_of_rivals_is_as_sure_as_they_are_together() -> None:
+    doubtful, likely = (tuple(replace(one, probability=p) for one in RIVALS) for p in (0.1, 0.3))
+    causes = "gravity unbalance or encoder eccentricity"
+    rest = "part of the error fits no known effect"
+    assert lead.heading(of(*doubtful, unknown=True)) == f"One effect may be missing from the model: {causes}; {rest}"
+    assert lead.heading(of(*likely)) == f"One effect is likely missing from the model: {causes}"
+    third = replace(RIVALS[1], effect="cogging", title="Cogging")
+    three = replace(of(*RIVALS, third), ambiguous_with=(tuple(one.effect for one in (*RIVALS, third)),))
+    assert lead.heading(three) == "One effect is missing from the model, with three possible causes"
 
 
 def test_page_and_terminal_use_one_word_for_what_may_be() -> None:

@@ -115,11 +115,12 @@ class Source(TypedDict, total=False):
 
 
 class CardSource(TypedDict, total=False):
-    """The card that a diagnosis started from; no hash where it was no file."""
+    """The card that a diagnosis started from; no hash where it was no file, no kind of machine where it says none."""
 
     name: str
     path: str
     sha256: str
+    machine: str
 
 
 class Provenance(TypedDict, total=False):

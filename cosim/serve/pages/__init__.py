@@ -16,7 +16,7 @@ from cosim.reading import LAYOUT
 from cosim.serve.chart import Chart, chart
 from cosim.serve.desk import OURS, Desk
 from cosim.serve.folder import plain_files
-from cosim.serve.form import FIELDS, FRICTIONS, MOTIONS
+from cosim.serve.form import FIELDS, FRICTIONS, KINDS, MOTIONS
 from cosim.serve.job import Job
 from cosim.serve.store import UnreadableJobError
 from cosim.support.files import in_bytes
@@ -149,6 +149,7 @@ def _draft(desk: Desk, job: Job) -> Parsed:
         "fields": FIELDS,
         "motions": MOTIONS,
         "frictions": FRICTIONS,
+        "kinds": KINDS,
         "ours": {name: MEANINGS.get(name, name) for name in OURS},
         "layout": {name: HINTS[name] for name in LAYOUT},
         "suffixes": SUFFIXES,

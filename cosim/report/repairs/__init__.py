@@ -1,0 +1,73 @@
+"""What to check on a machine where an effect was detected, and what to repair: a TOML file an effect, beside this.
+
+Three checks, the quickest first, each with at least two results and what each of them means; then the repair by kind of
+machine. Report, documentation and `cosim show EFFECT` read it from here, so that a sentence is written once.
+"""
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+
+__all__ = ["MACHINES", "Check", "Repairs", "machines_of", "repairs_of"]
+
+MACHINES: Mapping[str, str] = {
+    "rotary_table": "rotary table, telescope axis",
+    "ball_screw": "ball screw, lead screw",
+    "belt": "belt, rack, cable drive",
+    "harmonic_drive": "robot joint with harmonic drive",
+    "direct_drive": "direct drive",
+    "hydraulic": "hydraulic cylinder",
+}
+"""Kinds of machines as `[mount] machine` of a card names them, and as a reader knows them."""
+MOTIONS: Mapping[str, tuple[str, ...]] = {
+    "rotary": ("rotary_table", "belt", "harmonic_drive", "direct_drive"),
+    "linear": ("ball_screw", "belt", "direct_drive", "hydraulic"),
+}
+"""Kinds that turn, and kinds that move along."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One thing to do at the machine, and what each of its results means, as (result, meaning)."""
+
+    do: str
+    results: tuple[tuple[str, str], ...]
+
+
+@dataclass(frozen=True)
+class Repairs:
+    """The checks of one effect in their order, and its repair by kind of machine (keys of `MACHINES`)."""
+
+    checks: tuple[Check, ...]
+    by_machine: Mapping[str, str]
+
+    def of(self, motion: str, machine: str = "") -> dict[str, str]:
+        """Return the repairs that fit an axis, by what a reader calls the machine.
+
+        Args:
+            motion: "rotary" or "linear".
+            machine: a key of `MACHINES` where the card says it: then only that one.
+        """
+        kinds = machines_of(motion, machine)
+        return {MACHINES[kind]: self.by_machine[kind] for kind in kinds if kind in self.by_machine}
+
+
+def machines_of(motion: str, machine: str = "") -> tuple[str, ...]:
+    """Return the kinds of machines that an axis may be: the one its card names, else all that move so."""
+    return (machine,) if machine else MOTIONS[motion]
+
+
+@lru_cache(maxsize=64)
+def repairs_of(effect: str) -> Repairs | None:
+    """Return what is known of an effect by its id; None where nothing is written, as of an effect of your own."""
+    file = files("cosim.report.repairs") / f"{effect}.toml"
+    if not effect.isidentifier() or not file.is_file():
+        return None
+    read = tomllib.loads(file.read_text("utf-8"))
+    checks = tuple(
+        Check(one["do"], tuple((result["seen"], result["means"]) for result in one["results"]))
+        for one in read["checks"]
+    )
+    return Repairs(checks, read["repair"])
