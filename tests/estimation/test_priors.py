@@ -1,5 +1,8 @@
 """Priors of evidence: a number that is a place costs the same wherever the encoder has its zero."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -10,7 +13,7 @@ from cosim.diagnosis.search.stages import margin, stage
 from cosim.estimation.prepare import prepare
 from cosim.estimation.priors import trust
 from cosim.estimation.problem import Problem
-from pyfmi_models.friction import Coulomb
+from pyfmi_models.friction import Coulomb, FrictionLaw, Stribeck
 from pyfmi_models.mount import Axis, Mount
 
 AXIS = Mount(name="axis", axis=Axis(inertia=0.6), friction=Coulomb(Fc=1.1, sigma2=0.3))
@@ -53,3 +56,29 @@ def test_a_place_may_lie_anywhere_in_the_motion() -> None:
         mount, free, values = AXIS, ("cable_wrap.home", "cable_wrap.stiffness", "spot.q_center"), (1e-9, 2.0, 0.0)
 
     assert trust(Found(), 0.4).tolist() == [0.4, 2.0, 0.4]  # type: ignore[arg-type]
+
+
+def trusted(law: FrictionLaw, **values: float) -> list[float]:
+    mount = Mount(name="axis", axis=Axis(inertia=0.6), friction=law)
+    found: Any = SimpleNamespace(mount=mount, free=tuple(values), values=tuple(values.values()))
+    return [float(one) for one in trust(found, 0.4)]
+
+
+def test_a_level_may_be_as_far_off_as_it_is_large_and_a_shape_of_the_law_by_a_tenth() -> None:
+    """Where the torque is linear in a number its tangent holds anywhere; that of a shape, only near the fit."""
+    law = Stribeck(Fc=1.1, Fs=1.5, Vs=0.02, delta=2.0, sigma2=0.3)
+    found = trusted(law, **{"friction.Fc": -1.1, "friction.Fs": 1.5, "friction.Vs": 0.02, "friction.sigma2": 0.3})
+    assert found == pytest.approx([1.1, 0.15, 0.002, 0.3])
+
+
+def test_a_number_of_one_direction_is_a_level_and_one_of_an_effect_is_trusted_by_its_size() -> None:
+    law = Stribeck(Fc=1.1, Fs=1.5, Vs=0.02, delta=2.0, sigma2=0.3)
+    found = trusted(
+        law, **{"friction.Vs.negative": 0.02, "cogging.amplitude": -0.4, "drag.Vs": 0.5, "axis.inertia": 2.0}
+    )
+    assert found == pytest.approx([0.02, 0.4, 0.5, 2.0])
+
+
+def test_a_phase_may_be_off_by_a_radian_and_a_number_that_is_nothing_by_next_to_nothing() -> None:
+    found = trusted(Coulomb(Fc=1.1), **{"cogging.phase": 3.0, "cogging.amplitude": 0.0})
+    assert found == [1.0, 1e-12]

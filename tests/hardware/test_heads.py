@@ -178,6 +178,16 @@ def test_the_mean_goes_on_without_a_step_whichever_head_stops_answering_when() -
         assert np.abs(np.diff(found) - np.diff(way)).max() <= 1
 
 
+@pytest.mark.parametrize("at", [0, 1000, -1000, 2**31 - 2, 2**32 - 2])
+@pytest.mark.parametrize("quarters", range(-9, 10))
+def test_the_mean_is_rounded_to_the_nearest_count_wherever_the_axis_is_and_halves_up(at: int, quarters: int) -> None:
+    """A mean that is cut towards zero would be half a count late in one direction and none in the other."""
+    offsets = [quarters // 4 + (k < quarters % 4) for k in range(4)]
+    assert sum(offsets) == quarters
+    found, _ = combined(at + np.array([[0] * 4, offsets]))
+    assert found[1] - found[0] == np.floor(quarters / 4 + 0.5)
+
+
 def test_heads_where_no_wire_brings_them_are_refused() -> None:
     with pytest.raises(HardwareError, match='heads = 4, and only adapter = "simulated" brings'):
         changed(SIMULATED, "mine.toml", adapter="udp://127.0.0.1:5000", encoder={"heads": 4})

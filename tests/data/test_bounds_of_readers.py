@@ -1,0 +1,184 @@
+"""Each bound of a reader: what just fits is read, one more is refused, before it takes memory."""
+
+import json
+import tracemalloc
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pyarrow as pa
+import pytest
+from pyarrow import parquet
+from scipy.io import savemat
+
+from cosim.data import limits
+from cosim.data.binary import hdf5, matlab, numpy_files
+from cosim.data.binary import parquet as parquet_files
+from cosim.data.limits import Allowance, allowed_by, check_cells, check_columns, check_text, check_unpacked, within
+from cosim.data.text import json_records
+from cosim.data.text.reader import read_text
+from cosim.support.errors import RecordingError
+
+ROWS, COLUMNS = 120, 3
+TABLE = {name: np.linspace(k, k + 1.5, ROWS) for k, name in enumerate(("t", "tau", "q"))}
+PATH = Path("run")
+
+
+def allowing(numbers: float, raised: int = 1) -> Allowance:
+    return Allowance(1000, raised, numbers * limits.NUMBER, 60.0)
+
+
+def hdf5_of(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        for name, values in TABLE.items():
+            file[name] = values
+
+
+def short() -> pa.Table:
+    """Four bytes a number: so the count of numbers is met before that of bytes."""
+    return pa.table({name: values.astype(np.float32) for name, values in TABLE.items()})
+
+
+def rows() -> list[list[float]]:
+    return np.column_stack(list(TABLE.values())).tolist()
+
+
+def records() -> str:
+    return json.dumps([dict(zip(TABLE, row, strict=True)) for row in rows()])
+
+
+WRITERS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object], int]] = {
+    "parquet": (lambda path: parquet.write_table(short(), path), parquet_files.read, 0),
+    "h5": (hdf5_of, hdf5.read, 0),
+    "mat": (lambda path: savemat(path, TABLE), matlab.read, 0),
+    "npz": (lambda path: np.savez(path, **TABLE), numpy_files.read, COLUMNS * 128 // limits.NUMBER),
+    "csv": (
+        lambda path: path.write_text("t,tau,q\n" + "".join(f"{a},{b},{c}\n" for a, b, c in rows())),
+        read_text,
+        0,
+    ),
+}
+"""How a table is written in each format, its reader, and numbers that the headers of its parts are as long as."""
+
+
+@pytest.mark.parametrize("format_", WRITERS)
+def test_a_table_that_just_fits_is_read_and_one_number_more_is_refused(format_: str, tmp_path: Path) -> None:
+    write, read, heads = WRITERS[format_]
+    path = tmp_path / f"run.{format_}"
+    write(path)
+    exact = ROWS * COLUMNS + heads
+    with within(allowing(exact)):
+        found = read(path).values  # type: ignore[attr-defined]
+    np.testing.assert_allclose(np.asarray(found["q"], float), TABLE["q"], rtol=1e-6)
+    with within(allowing(exact - 1)), pytest.raises(RecordingError, match="limit=2"):
+        read(path)
+
+
+LARGE = 400_000
+"""Numbers of a column that packs to next to nothing."""
+
+
+def packed_hdf5(path: Path) -> None:
+    with h5py.File(path, "w") as file:
+        for name in TABLE:
+            file.create_dataset(name, data=np.zeros(LARGE), compression="gzip", chunks=(1000,))
+
+
+PACKED: dict[str, Callable[[Path], object]] = {
+    "h5": packed_hdf5,
+    "mat": lambda path: savemat(path, dict.fromkeys(TABLE, np.zeros(LARGE)), do_compression=True),
+    "npz": lambda path: np.savez_compressed(path, **dict.fromkeys(TABLE, np.zeros(LARGE))),
+}
+
+
+@pytest.mark.parametrize("format_", PACKED)
+def test_too_many_numbers_are_refused_before_they_take_memory(format_: str, tmp_path: Path) -> None:
+    path = tmp_path / f"run.{format_}"
+    PACKED[format_](path)
+    tracemalloc.start()
+    try:
+        with within(allowing(10_000)), pytest.raises(RecordingError, match="limit="):
+            WRITERS[format_][1](path)
+        assert tracemalloc.get_traced_memory()[1] < LARGE * limits.NUMBER, "not even one column"
+    finally:
+        tracemalloc.stop()
+
+
+def test_records_of_json_are_counted_as_a_table(tmp_path: Path) -> None:
+    path = tmp_path / "run.json"
+    path.write_text(records())
+    with within(allowing(1e6)):
+        assert len(json_records.read(path).values["q"]) == ROWS
+    with within(allowing(ROWS * COLUMNS - 1)), pytest.raises(RecordingError, match="limit="):
+        json_records.read(path)
+
+
+@pytest.mark.parametrize(
+    ("check", "most"),
+    [
+        (lambda count: check_columns(PATH, count), 10_000),
+        (lambda count: check_cells(PATH, count, 1), 25_000_000),
+        (lambda count: check_cells(PATH, 1, count), 10_000),
+        (lambda count: check_cells(PATH, 2_500, count), 10_000),
+        (lambda count: check_unpacked(PATH, count), 200_000_000),
+        (lambda count: check_text(PATH, count), 1_000_000_000),
+    ],
+)
+def test_a_bound_is_the_documented_number_and_the_next_one_is_beyond(check: Callable[[int], None], most: int) -> None:
+    check(most)
+    with pytest.raises(RecordingError):
+        check(most + 1)
+    with within(allowing(1e12, raised=3)):
+        if most not in (25_000_000, 200_000_000):  # those are the allowance's own
+            check(3 * most)
+            with pytest.raises(RecordingError):
+                check(3 * most + 1)
+
+
+@pytest.mark.parametrize(("size", "times"), [(1, 1), (50_000_000, 1), (75_000_000, 1.5), (500_000_000, 10)])
+def test_a_larger_file_may_take_as_much_more_up_to_two_gigabytes(size: int, times: float) -> None:
+    for raised in (1, 7):
+        found = Allowance.of(size, raised)
+        assert found.unpacked == pytest.approx(raised * 2e8 * times)
+        assert found.seconds == pytest.approx(raised * 10 * times)
+    assert Allowance.of(10 * size + 5_000_000_000).unpacked == 2e9
+
+
+@pytest.mark.parametrize(("said", "factor"), [("", 1), ("1", 1), ("2", 2), ("1000", 1000)])
+def test_limits_are_raised_by_whole_factors_up_to_a_thousand(said: str, factor: int, tmp_path: Path) -> None:
+    path = tmp_path / "run.csv"
+    path.write_text("t\n")
+    assert allowed_by(path, said).raised == factor
+    for wrong in ("0", "1001"):
+        with pytest.raises(RecordingError, match="from 1 to 1,000"):
+            allowed_by(path, wrong)
+
+
+@pytest.mark.parametrize(("held", "factor"), [(101, 2), (200, 2), (201, 3)])
+def test_a_refusal_names_the_least_factor_that_would_do(held: int, factor: int) -> None:
+    with within(allowing(100)), pytest.raises(RecordingError, match=rf"--layout limit={factor}\."):
+        check_cells(PATH, held, 1)
+    with within(allowing(100 * factor, raised=factor)):
+        check_cells(PATH, held, 1)
+
+
+def test_a_refusal_names_no_factor_that_is_none() -> None:
+    with within(allowing(100)), pytest.raises(RecordingError, match="limit=1000"):
+        check_cells(PATH, 100_000, 1)
+    with within(allowing(100)), pytest.raises(RecordingError) as raised:
+        check_cells(PATH, 100_001, 1)
+    assert "--layout" not in str(raised.value)
+
+
+@pytest.mark.parametrize(("depth", "fits"), [(hdf5.DEEPEST, True), (hdf5.DEEPEST + 1, False)])
+def test_groups_of_hdf5_lie_a_hundred_deep_and_no_deeper(depth: int, fits: bool, tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        for name, values in TABLE.items():
+            file[name] = values
+        file.create_group("/".join(["g"] * depth))
+    if fits:
+        assert set(hdf5.read(tmp_path / "run.h5").values) == set(TABLE)
+    else:
+        with pytest.raises(RecordingError, match="more than 100 groups"):
+            hdf5.read(tmp_path / "run.h5")

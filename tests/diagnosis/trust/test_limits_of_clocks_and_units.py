@@ -1,0 +1,124 @@
+"""From which lag on two clocks are said and withhold names, and from which factor on a unit is refused."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.trust.clocks import ClockOffset
+from cosim.diagnosis.trust.explanations import Explanation
+from cosim.diagnosis.trust.judgement import Judgement, stated
+from cosim.diagnosis.trust.likelihood import Evidence, Reference
+from cosim.support.errors import RecordingError
+
+MS = 1e-3
+
+
+@pytest.mark.parametrize(
+    ("lag", "low", "high", "late", "too_late"),
+    [
+        (10, 8, 12, True, False),
+        (8, 8, 12, False, False),  # lags are tried in steps of 2 ms
+        (10, 6, 14, False, False),
+        (-10, -12, -8, True, False),
+        (16, 16, 20, True, False),
+        (18, 16, 20, True, True),
+        (18, 14, 22, True, False),
+        (-18, -20, -16, True, True),
+        (40, 30, 58, True, True),
+        (40, 30, 60, False, False),  # what is not excluded reaches the end of what was tried
+        (12, -2, 26, False, False),
+        (0, -2, 2, False, False),
+    ],
+)
+def test_a_lag_is_late_from_ten_milliseconds_and_no_drives_from_eighteen(
+    lag: float, low: float, high: float, late: bool, too_late: bool
+) -> None:
+    found = ClockOffset(lag * MS, low * MS, high * MS)
+    assert (found.is_late, found.is_too_late) == (late, too_late)
+
+
+@pytest.mark.parametrize(
+    ("removed", "least", "late", "too_late"),
+    [
+        (0.19, 0.19, False, False),
+        (0.20, 0.20, True, False),
+        (0.69, 0.69, True, False),
+        (0.70, 0.70, True, True),
+        (0.90, -0.24, True, True),
+        (0.90, -0.26, False, False),
+    ],
+)
+def test_a_lag_counts_by_the_share_that_it_removes_and_is_denied_by_a_recording_that_it_makes_worse(
+    removed: float, least: float, late: bool, too_late: bool
+) -> None:
+    found = ClockOffset(0.024, 0.020, 0.028, removed, least)
+    assert (found.is_late, found.is_too_late) == (late, too_late)
+
+
+def judgement(
+    factor: float, probability: float, kind: Any = "position_scale", option: str = "--units q=x"
+) -> Judgement:
+    """One explanation beside "right", of which the recording is a plain sine."""
+    t = np.arange(4000) / 200
+    v = np.sin(1.7 * t) + 0.5 * np.sin(4.1 * t)
+    run = Recording("run", {"t": t, "q": np.cumsum(v) / 200, "tau": np.gradient(v, t) + 0.5 * np.sign(v)})
+    right = Explanation(kind=None, what="recording and card are right", prior=1.0, is_slip=False)
+    wrong = Explanation(kind=kind, what='"q" is in x', prior=0.1, factor=factor, option=option)
+    evidence = Evidence([run], Reference(1.0, 0.5))
+    return Judgement((run,), evidence, (right, wrong), (1 - probability, probability))
+
+
+@pytest.mark.parametrize(
+    ("factor", "probability", "refused"),
+    [
+        (10.1, 0.91, True),
+        (1 / 10.1, 0.91, True),
+        (9.9, 0.99, False),
+        (1 / 9.9, 0.99, False),
+        (57.3, 0.91, True),
+        (57.3, 0.89, False),
+        (1000.0, 0.89, False),
+    ],
+)
+def test_a_unit_is_refused_where_it_is_wrong_by_more_than_ten_and_surely(
+    factor: float, probability: float, refused: bool
+) -> None:
+    one = judgement(factor, probability)
+    if refused:
+        with pytest.raises(RecordingError, match="Use --units q=x"):
+            stated(one)
+    else:
+        assert "--units q=x" in stated(one).statement
+
+
+@pytest.mark.parametrize(
+    ("kind", "option", "refused"),
+    [("time_unit", "--units t=ms", True), ("torque_scale", "--units tau=mN.m", False), ("position_scale", "", False)],
+)
+def test_only_a_scale_of_position_or_time_that_an_option_puts_right_is_refused(
+    kind: str, option: str, refused: bool
+) -> None:
+    one = judgement(1000.0, 0.99, kind, option)
+    if refused:
+        with pytest.raises(RecordingError, match=option):
+            stated(one)
+    else:
+        assert stated(one).finding == kind
+
+
+@pytest.mark.parametrize(("probability", "blocks"), [(0.51, True), (0.49, False)])
+def test_a_slip_that_is_likelier_than_not_withholds_names(probability: float, blocks: bool) -> None:
+    assert stated(judgement(2.0, probability)).blocks_naming is blocks
+
+
+@pytest.mark.parametrize(("probability", "alone"), [(0.96, True), (0.94, False)])
+def test_a_cause_is_stated_alone_only_where_it_is_sure(probability: float, alone: bool) -> None:
+    said = stated(judgement(2.0, probability)).statement
+    assert ("Either" in said) is not alone
+
+
+@pytest.mark.parametrize(("probability", "told"), [(0.031, 2), (0.029, 1)])
+def test_an_alternative_of_three_percent_is_listed_and_none_below(probability: float, told: int) -> None:
+    assert len(stated(judgement(2.0, probability)).alternatives) == told

@@ -1,0 +1,223 @@
+"""What keeps an axis safe, cycle by cycle: the torque that it orders, and what takes that away."""
+
+import sys
+
+import pytest
+from axis_bench import QUANTUM, STATUSWORDS, STEP, Bench
+
+from cosim.hardware.words import ASK_ENABLE, ASK_ESTOP, ASK_QUICK_STOP, ASK_RESET, FAULTS, LIMITED, LIMITS, SLEWED
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
+
+
+def torques(bench: Bench, cycles: int, request: int = ASK_ENABLE) -> list[float]:
+    return [bench.cycle(request).torque for _ in range(cycles)]
+
+
+def commanding(torque: float, limits: dict[str, float] | None = None, **changes: object) -> Bench:
+    """An axis in operation whose controller commands a torque; the cycle that entered is over."""
+    bench = Bench(limits, **changes)
+    bench.command = lambda _: torque
+    return bench.enabled()
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_whatever_is_commanded_the_torque_after_enabling_grows_from_zero_along_the_ramp(sign: float) -> None:
+    bench = Bench({"torque": 40.0}, ramp=8)
+    bench.command = lambda _: sign * 1e4
+    bench.enabled()
+    assert torques(bench, 10) == [sign * 5.0 * n for n in (*range(1, 9), 8, 8)]
+
+
+def test_the_ramp_begins_anew_with_each_entry_into_operation() -> None:
+    bench = commanding(1e4, {"torque": 40.0}, ramp=8)
+    torques(bench, 20)
+    bench.cycle(ASK_ESTOP)
+    assert torques(bench, 3, 0) == [0.0] * 3
+    bench.cycle(ASK_RESET)
+    while bench.axis.state != 4:
+        assert bench.axis.torque == 0
+        bench.cycle()
+    assert torques(bench, 4) == [5.0, 10.0, 15.0, 20.0]
+    assert bench.restored == 2, "and the controller with its state from before its first tick"
+    assert bench.stepped == pytest.approx(3 * STEP)
+
+
+def test_a_command_within_the_ramp_is_ordered_as_it_is() -> None:
+    bench = commanding(4.0, {"torque": 40.0}, ramp=8)
+    record = bench.cycle()
+    assert (record.torque, record.notes & (LIMITED | SLEWED)) == (4.0, 0)
+
+
+@pytest.mark.parametrize("command", [10.0, 10.000001, 1e300, -10.000001])
+def test_the_torque_never_exceeds_its_limit(command: float) -> None:
+    bench = commanding(command, {"torque": 10.0})
+    record = bench.cycle()
+    assert record.torque == max(-10.0, min(10.0, command))
+    assert bool(record.notes & LIMITED) == (abs(command) > 10)
+
+
+def test_the_torque_changes_by_the_slew_limit_a_cycle_at_most_either_way() -> None:
+    bench = commanding(10.0, {"slew": 3.0 / STEP})
+    assert torques(bench, 5) == pytest.approx([3, 6, 9, 10, 10])
+    bench.command = lambda _: -10.0
+    record = bench.cycle()
+    assert record.notes & SLEWED
+    assert [record.torque, *torques(bench, 2)] == pytest.approx([7, 4, 1])
+
+
+def test_a_quick_stop_takes_the_torque_to_zero_along_its_own_slew_and_then_leaves() -> None:
+    bench = commanding(10.0, stop_slew=3.0 / STEP)
+    torques(bench, 2)
+    found = [bench.cycle(ASK_ENABLE | ASK_QUICK_STOP) for _ in range(6)]
+    assert [one.torque for one in found] == pytest.approx([7, 4, 1, 0, 0, 0])
+    assert [one.state for one in found] == [5, 5, 5, 5, 1, 1]
+    assert torques(bench, 5) == [0.0] * 5, "what was asked before is forgotten: enable needs an edge"
+
+
+def test_who_takes_back_his_wish_to_enable_stops_the_axis_along_the_same_ramp() -> None:
+    bench = commanding(10.0, stop_slew=3.0 / STEP)
+    torques(bench, 2)
+    assert torques(bench, 5, 0) == pytest.approx([7, 4, 1, 0, 0])
+    assert bench.axis.state == 1
+
+
+@pytest.mark.parametrize("request_", [ASK_ENABLE, ASK_ENABLE | ASK_RESET])
+def test_after_power_on_nothing_but_a_reset_and_then_an_edge_enables(request_: int) -> None:
+    bench = Bench()
+    bench.cycle(request_)
+    for _ in range(10):
+        bench.cycle(request_)
+    assert bench.axis.state == 7
+    assert bench.axis.faults == 1 << list(FAULTS).index("power_up")
+
+
+def test_an_axis_goes_up_one_state_a_cycle_and_waits_for_its_drive_in_each() -> None:
+    bench = Bench(patience=4)
+    for request in (0, 0, ASK_RESET, ASK_ENABLE):
+        bench.cycle(request)
+    stuck = {"statusword": STATUSWORDS[1]}
+    assert bench.axis.state == 2
+    states = [bench.cycle(feedback=stuck).state for _ in range(6)]
+    assert states == [2, 2, 2, 2, 6, 7], "within its patience it waits, then that is a fault"
+    assert bench.axis.faults == 1 << list(FAULTS).index("drive_state")
+
+
+FAILURES = {
+    "estop": {"request": ASK_ENABLE | ASK_ESTOP},
+    "overspeed": {"feedback": {"counts": 11}},
+    "encoder_jump": {"feedback": {"counts": 6}},
+    "following_error": {"reference": 21 * QUANTUM},
+    "drive_fault": {"feedback": {"statusword": STATUSWORDS[7]}},
+    "drive_state": {"feedback": {"statusword": STATUSWORDS[3]}},
+    "adapter_failed": {"status": 1},
+    "heartbeat_lost": {"request": ASK_ENABLE | 16},
+}
+NARROW = {"speed": 10.5 * QUANTUM / STEP, "jump": 5.5 * QUANTUM, "following_error": 20.5 * QUANTUM}
+
+
+@pytest.mark.parametrize("fault", FAILURES)
+def test_each_fault_takes_the_torque_away_in_the_cycle_in_which_it_is_seen(fault: str) -> None:
+    narrow = NARROW | {"jump": 1.0} if fault == "overspeed" else NARROW
+    bench = commanding(10.0, narrow)
+    assert torques(bench, 3) == [10.0] * 3
+    record = bench.cycle(**({"request": ASK_ENABLE} | FAILURES[fault]))
+    assert (record.torque, record.state, record.controlword) == (0.0, 6, 0)
+    assert record.faults & 1 << list(FAULTS).index(fault)
+    assert torques(bench, 5) == [0.0] * 5
+    assert bench.axis.state == 7
+
+
+@pytest.mark.parametrize(
+    "well",
+    [
+        {"feedback": {"counts": 5}},
+        {"reference": 20 * QUANTUM},
+        {"feedback": {"torque": 11.0}},
+        {"read": 1},
+    ],
+)
+def test_what_is_just_within_its_limit_takes_nothing_away(well: dict[str, object]) -> None:
+    bench = commanding(10.0, NARROW | {"torque_mismatch": 1.0})
+    torques(bench, 3)
+    assert bench.cycle(**well).torque == 10.0  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("fault", "bad", "limit"),
+    [
+        ("frame_lost", {"read": 1}, "lost_limit"),
+        ("encoder_stale", {"feedback": {"encoder": 0}}, "stale_limit"),
+        ("torque_mismatch", {"feedback": {"torque": 11.1}}, "mismatch_limit"),
+    ],
+)
+@pytest.mark.parametrize("most", [0, 3])
+def test_what_may_last_some_cycles_is_a_fault_in_the_next_one(
+    fault: str, bad: dict[str, object], limit: str, most: int
+) -> None:
+    bench = commanding(10.0, {"torque_mismatch": 1.0}, **{limit: most})
+    torques(bench, 3)
+    bench.cycle(feedback={"encoder": 0})
+    found = [bench.cycle(**bad) for _ in range(most + 1)]  # type: ignore[arg-type]
+    assert [one.torque for one in found] == [10.0] * most + [0.0]
+    assert found[-1].faults == 1 << list(FAULTS).index(fault)
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_a_limit_is_only_tightened_in_operation_and_set_freely_at_rest(name: str) -> None:
+    place = LIMITS.index(name)
+    bench = Bench()
+    before = bench.axis.limit[place]
+    bench.cycle(0, change=place + 1, value=2 * before)
+    assert (bench.axis.limit[place], bench.axis.refused) == (2 * before, 0)
+    bench.enabled()
+    for value, expected, refused in (
+        (3 * before, 2 * before, 1),
+        (2 * before, 2 * before, 1),
+        (before, before, 1),
+        (-1.0, before, 2),
+        (float("nan"), before, 3),
+        (0.0, 0.0, 3),
+    ):
+        bench.cycle(change=place + 1, value=value)
+        assert (bench.axis.limit[place], bench.axis.refused) == (expected, refused)
+
+
+def test_a_late_cycle_holds_the_torque_and_as_many_as_the_limit_in_a_row_stop_the_axis() -> None:
+    bench = commanding(10.0, stop_slew=3.0 / STEP, late_limit=64)
+    bench.cycle()
+    assert [bench.cycle(late=1).torque, bench.cycle(late=0).torque, bench.cycle(late=2).torque] == [10.0] * 3
+    assert bench.cycle(late=1).torque == pytest.approx(7.0), "three in a row: a quick stop"
+    assert bench.axis.state == 5
+
+
+@pytest.mark.parametrize(("apart", "fault"), [(33, False), (32, True)])
+def test_late_cycles_within_the_window_are_a_fault(apart: int, fault: bool) -> None:
+    bench = commanding(10.0, late_limit=4, late_window=98)
+    for _ in range(3):
+        bench.cycle(late=1)
+        torques(bench, apart - 1)
+    record = bench.cycle(late=1)
+    assert bool(record.faults & 1 << list(FAULTS).index("deadline")) == fault
+
+
+def test_a_command_that_is_no_number_or_a_step_that_fails_orders_nothing() -> None:
+    for fault in ("not_a_number", "controller_failed"):
+        bench = commanding(10.0)
+        torques(bench, 2)
+        if fault == "not_a_number":
+            bench.command = lambda _: float("nan")
+        else:
+            bench.status = 3
+        record = bench.cycle()
+        assert (record.torque, record.state) == (0.0, 6)
+        assert record.faults == 1 << list(FAULTS).index(fault)
+
+
+def test_the_controller_reads_the_position_in_radians_of_this_very_cycle() -> None:
+    bench = commanding(0.0)
+    bench.command = lambda position: position
+    bench.counts = 3
+    assert bench.cycle().command == pytest.approx(3 * QUANTUM)
+    bench.counts = -2
+    assert bench.cycle().command == pytest.approx(-2 * QUANTUM)
