@@ -258,15 +258,6 @@ def test_units_of_different_kinds_do_not_mix() -> None:
         unit("furlong")
 
 
-def test_a_measured_file_of_others_is_read() -> None:
-    path = Path(__file__).parents[3] / "shared" / "recordings" / "emps" / "estimation.parquet"
-    if not path.exists():
-        pytest.skip("the measured recordings are not on this machine")
-    recording = Recording.read(path, {"tau": "force", "q_d": "q_ref"}, {"q": "m", "tau": "N"})
-    assert (len(recording), recording.gaps, recording.quality()) == (24841, (), ())
-    np.testing.assert_allclose(recording.sample_time, 1e-3, rtol=1e-3)
-
-
 def test_hdf5_is_read_whatever_its_groups(tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     with h5py.File(tmp_path / "run.h5", "w") as file:

@@ -11,6 +11,7 @@ import jsonschema
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from measured_like import read
 from wandering import axis, recorded, wander
 
 from bench.diagnosis import null_case
@@ -71,13 +72,9 @@ class TestAnswers:
         assert found.heldout.confidence_interval[0] > 0
 
 
-DATA = Path(__file__).resolve().parents[3] / "shared" / "recordings" / "emps"
-
-
-@pytest.mark.skipif(not DATA.exists(), reason="the measured recordings are not beside this checkout")
 def test_a_measured_axis_has_direction_dependent_friction_and_a_delay() -> None:
     card = read_card("emps")
-    train, held = (Recording.read(DATA / f"{n}.parquet", card.columns) for n in ("estimation", "validation_pulses"))
+    train, held = (read("emps", n, card.columns) for n in ("estimation", "validation_pulses"))
     found = diagnose([train], [held], card).diagnosis
     delay = next(finding for finding in found.findings if finding.effect == "delay")
     assert {"friction_asymmetry", "delay"} <= set(found.verdict)
