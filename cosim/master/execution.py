@@ -128,7 +128,9 @@ class Execution:
     def _write(self, rows: np.ndarray) -> None:
         first, count = self.writer.rows, rows.shape[1]
         if count:
-            t = self.plan.start + np.arange(first, first + count) * self.plan.decimation * self.plan.step
+            decimation = self.plan.decimation
+            t = np.arange(first * decimation, (first + count) * decimation, decimation) * self.plan.step
+            t += self.plan.start
             columns = zip(self.wiring.records, self.plan.columns, rows, strict=False)
             self.writer.write({"t": t} | {name: self._told(column, row) for name, column, row in columns})
             for one, row in zip(self.proven, rows[len(self.wiring.records) :], strict=True):
