@@ -32,8 +32,8 @@ def card(motion: str) -> Card:
 
 
 def recorded(seed: int, force: float = FORCE) -> Recording:
-    """16 s of a carriage that swings, with the noise of its drive and of its scale."""
-    dice, t = np.random.default_rng(seed), np.arange(0, 16, 1 / 250)
+    """12 s of a carriage that swings, with the noise of its drive and of its scale."""
+    dice, t = np.random.default_rng(seed), np.arange(0, 12, 1 / 250)
     waves = [(0.09, 0.23), (0.035, 0.61), (0.012, 1.7)]
     tones = [(a, 2 * np.pi * f, dice.uniform(0, 2 * np.pi)) for a, f in waves]
     q = sum(a * np.sin(w * t + p) for a, w, p in tones)

@@ -33,9 +33,9 @@ TRUE = {
 }
 
 
-def recorded(rng: np.random.Generator, name: str) -> Recording:
+def recorded(rng: np.random.Generator, name: str, seconds: float = SECONDS) -> Recording:
     """A motion of two tones and the torque of the true machine, with noise that forgets itself in 0.3 s."""
-    t, (q, v, a) = np.arange(int(SECONDS * HERTZ)) / HERTZ, np.zeros((3, int(SECONDS * HERTZ)))
+    t, (q, v, a) = np.arange(int(seconds * HERTZ)) / HERTZ, np.zeros((3, int(seconds * HERTZ)))
     for size, slow, fast in ((0.8, 0.15, 0.25), (0.15, 0.4, 0.6)):
         w, phase = 2 * np.pi * rng.uniform(slow, fast), rng.uniform(0, 2 * np.pi)
         tone = size * np.exp(1j * (w * t + phase))
@@ -71,7 +71,7 @@ def test_ranges_of_95_per_cent_hold_what_is_true_in_95_per_cent() -> None:
 def test_the_ranges_that_are_printed_are_made_of_these_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever they are: here 0.01 each."""
     rng = np.random.default_rng(3)
-    one, two, three = (recorded(rng, name) for name in ("one", "two", "three"))
+    one, two, three = (recorded(rng, name, 20.0) for name in ("one", "two", "three"))
     monkeypatch.setattr("cosim.diagnosis.diagnose.standard_errors", lambda fit, *_: dict.fromkeys(fit.free, 0.01))
     found = [each for each in diagnose([one, two], [three], CARD).diagnosis.findings if each.answer == "found"]
     assert found

@@ -72,7 +72,7 @@ def test_too_little_motion_tells_nothing() -> None:
 
 @pytest.mark.parametrize(("effect", "told"), [("vibration", True), (None, False)])
 def test_a_diagnosis_calls_it_unknown(effect: str | None, told: bool, tmp_path: Path) -> None:
-    write_given(make_case(4, [effect] if effect else [], duration=30.0), tmp_path)
+    write_given(make_case(4, [effect] if effect else [], duration=30.0, rate_hz=500), tmp_path)
     card = read_card(str(tmp_path / "card.toml"))
     read = [Recording.read(tmp_path / f"{name}.parquet") for name in ("train_1", "train_2", "heldout")]
     answer: Any = as_json(diagnose(read[:2], read[2:], card).diagnosis)

@@ -76,7 +76,7 @@ CARD = parse_card(
 
 def shaken(seed: int, late: float, shake: float) -> Recording:
     """An axis on a ground that shakes at 7.3 Hz, where its loop no longer holds it; the position `late` [s]."""
-    t = np.arange(7_500) / 250
+    t = np.arange(3_000) / 250
     w = 2 * np.pi * 7.3
     tones = [(0.5, 0.7 + 0.1 * seed, 0.0), (0.2, 1.9, seed), (0.08, 5.3, 2 * seed), (0.006 * shake, w, 0.9)]
     moves = [[size * o**k * np.sin(o * t + p + k * np.pi / 2) for size, o, p in tones] for k in range(3)]
