@@ -151,6 +151,7 @@ def screws(folder: Path) -> Iterator[Machine]:
                 unit="%",
                 bar=1.5 if drive == "lead_screw" else 2.8,
                 first_look=look,
+                units=("t=s",),
             )
 
 

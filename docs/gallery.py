@@ -65,6 +65,7 @@ Every effect that a card may hold and a diagnosis looks for, drawn from the code
 are those of the [report](../report.md): an axis of 2 kg m² with friction of 1 N·m and 3 N·m·s/rad moves to and fro for
 {SECONDS} s, with rests. Orange is the model without the effect, blue with it. An effect torque *resists*: it stands
 on the right of J q'' = τ − friction − loads − effects with a minus.
+Measured machines: [gallery of machines](../machines.md).
 """
 
 

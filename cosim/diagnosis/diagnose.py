@@ -12,6 +12,7 @@ from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.answer.scores import Scores
 from cosim.diagnosis.decide.decision import Decision, decide, rest_rules, shaking_rules
 from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.effects.load_dependent_friction import at_own_level
 from cosim.diagnosis.evidence.adequacy import friction_level
 from cosim.diagnosis.evidence.band import in_band
 from cosim.diagnosis.evidence.comparison import Comparison
@@ -362,6 +363,6 @@ def _verdict(found: Sequence[Finding], decision: Decision) -> tuple[str, ...]:
 def _improved(card: Card, mount: Mount) -> Card:
     """Write the fitted numbers and the added effects into a card; a known load stays in its own section."""
     load = mount.effects[0] if card.unbalance and isinstance(mount.effects[0], GravityUnbalance) else None
-    effects = mount.effects[1:] if load else mount.effects
+    effects = [at_own_level(effect, mount) for effect in (mount.effects[1:] if load else mount.effects)]
     section = card.mount.model_copy(update={"inertia": float(mount.axis.inertia)})
     return replace(card, mount=section, friction=mount.friction, unbalance=load, effects=tuple(effects))

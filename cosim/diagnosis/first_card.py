@@ -20,7 +20,7 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.evidence.band import in_band
 from cosim.diagnosis.search.sizes import Z95, standard_errors
 from cosim.diagnosis.trust.balance import Balance
-from cosim.estimation.blocks import Blocks
+from cosim.estimation.blocks import Blocks, covariance
 from cosim.estimation.fit import Fit, fit
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import weights
@@ -33,6 +33,8 @@ CLEAR = 3.0
 """Standard errors that a number must be away from nothing to be taken as determined; noise alone: 1 in 370."""
 MATTERS = 0.05
 """Share of the error energy that a constant torque or a weight must remove: less is for a diagnosis to judge."""
+ALIKE = 0.9
+"""Correlation from which two numbers share what they explain: the error of each is 2.3 times what it is alone."""
 LITTLE = 0.5
 """Share of the torque's energy below which the card is not yet a model of the axis, which is said."""
 LEAST_TRAVEL = 0.35
@@ -158,7 +160,20 @@ def _is_clear(problem: Problem, without: Fit, tried: Fit) -> bool:
     name = f"{prefix}.{effect.main.parameter}"
     value, error = tried.parameters().get(name, 0.0), errors.get(name, np.inf)
     gained = 1 - (problem.error(tried) / max(problem.error(without), 1e-300)) ** 2
-    return abs(value) > CLEAR * error and gained > MATTERS
+    return abs(value) > CLEAR * error and gained > MATTERS and _is_apart(problem, tried, name)
+
+
+def _is_apart(problem: Problem, tried: Fit, name: str) -> bool:
+    """Whether a number is told apart from the sizes of the effects before: over a short way a weight is a constant."""
+    spread = covariance(
+        tried.slopes * problem.weight[:, None], tried.residual * problem.weight, Blocks.of(problem.prepared)
+    )
+    error = np.sqrt(np.maximum(np.diag(spread), 1e-300))
+    parts = tried.mount.components().items()
+    sizes = {f"{prefix}.{part.main.parameter}" for prefix, part in parts if isinstance(part, Effect)} - {name}
+    own = tried.free.index(name)
+    others = [place for place, other in enumerate(tried.free) if other in sizes]
+    return all(abs(spread[own, place]) < ALIKE * error[own] * error[place] for place in others)
 
 
 def _numbers(problem: Problem, found: Fit, inertia: float | None, linear: bool) -> list[Number]:

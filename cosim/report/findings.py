@@ -4,6 +4,7 @@ import re
 from dataclasses import dataclass
 
 from cosim.diagnosis.answer.result import Diagnosis, Finding, is_special
+from cosim.diagnosis.measure.advice import without_model
 from cosim.report import tables, words
 from cosim.report.equations import equation
 from cosim.report.lead import led
@@ -137,6 +138,8 @@ def do(one: words.Block, diagnosis: Diagnosis) -> str:
     files, known = words.delivered(diagnosis), repairs_of(one.first.effect)
     if known and (kind := words.machine(diagnosis)):
         return next(iter(known.of(diagnosis.motion, kind).values()), one.first.action)
+    if one.first not in diagnosis.in_model:
+        return without_model(one.first.action)
     return one.first.action or (f"Use {files[0]}" if files and one.answer == "found" else "")
 
 

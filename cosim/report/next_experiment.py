@@ -9,8 +9,8 @@ from cosim.report.quantities import Scales
 
 SMALL = 0.1
 """A difference below this share of the noise takes longer to show than a recording lasts."""
-FURTHER = "record motion that goes further or faster than in these recordings, where the axis may"
-FURTHER_STILL = "Where the axis may go further or faster than in these recordings, record that instead."
+FURTHER = "record motion that goes further or faster than in these recordings, if the axis allows it"
+FURTHER_STILL = "If the axis allows it, record motion that goes further or faster than in these recordings instead."
 
 
 def next_experiment(diagnosis: Diagnosis, scales: Scales) -> dict[str, object] | None:

@@ -64,12 +64,12 @@ SAID = 2
 
 
 def _doubts(diagnosis: Diagnosis) -> dict[str, object]:
-    """Return alarms, which keep effects from being named, each with what is folded; and remarks, all folded."""
-    alarms = [one.statement for one in diagnosis.sanity if one.blocks_naming]
-    cut = [re.split(r"(?<=[.!?]) (?=[A-Z])", text) for text in alarms]
+    """Return alarms and other doubts, each with what is folded; and remarks, which stand below the answer."""
+    alarms, others, remarks = words.doubts(diagnosis)
+    cut = [re.split(r"(?<=[.!?]) (?=[A-Z])", text) for text in (*alarms, *others)]
     return {
         "careful": [(" ".join(parts[:SAID]), " ".join(parts[SAID:])) for parts in cut],
-        "remarks": [one.statement for one in diagnosis.sanity if not one.blocks_naming],
+        "remarks": remarks,
     }
 
 

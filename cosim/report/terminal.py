@@ -19,6 +19,7 @@ from cosim.report.words import (
     Block,
     blocks,
     delivered,
+    doubts,
     law,
     left_out,
     lowered,
@@ -49,7 +50,7 @@ def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -
     title = printable(_title(diagnosis))
     parts = [
         [f"\033[1m{line}\033[0m" if bold else line for line in textwrap.wrap(title, WIDTH)],
-        _doubts(diagnosis, out),
+        _doubts(diagnosis),
         [line for block in blocks(diagnosis) for line in _to_do(block, diagnosis)],
         _files(diagnosis, scales, out),
         [""],
@@ -62,20 +63,27 @@ def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -
         _formulas(diagnosis),
         _wrapped(law(diagnosis), 0),
         _error(diagnosis, scales),
+        _remarks(diagnosis, out),
         _next(diagnosis),
         _wrote(diagnosis),
     ]
     return "\n".join(line for part in parts for line in part)
 
 
-def _doubts(diagnosis: Diagnosis, out: Path | None) -> list[str]:
-    """Return alarms and the first remarks; where there is a report, it holds the others."""
-    ranked = sorted(diagnosis.sanity, key=lambda one: not one.blocks_naming)
-    alarms = sum(one.blocks_naming for one in ranked)
-    shown = ranked[: alarms + REMARKS] if out and REPORT in diagnosis.files else ranked
-    lines = [line for one in shown for line in _ordered("Careful" if one.blocks_naming else "Note", one.statement)]
-    rest = len(ranked) - len(shown)
-    return lines + (_ordered("Note", f"{rest} more remark{'s' if rest > 1 else ''} in {REPORT}") if rest else [])
+def _doubts(diagnosis: Diagnosis) -> list[str]:
+    """Return what to read before the answer, what keeps effects from being named first."""
+    alarms, others, _ = doubts(diagnosis)
+    told = [("Careful", text) for text in alarms] + [("Note", text) for text in others]
+    return [line for word, text in told for line in _ordered(word, text)]
+
+
+def _remarks(diagnosis: Diagnosis, out: Path | None) -> list[str]:
+    """Return the first remarks on recordings and card; where there is a report, it holds the others."""
+    remarks = doubts(diagnosis)[2]
+    shown = remarks[:REMARKS] if out and REPORT in diagnosis.files else remarks
+    rest = len(remarks) - len(shown)
+    more = [f"{rest} more remark{'s' if rest > 1 else ''} in {REPORT}"] if rest else []
+    return [line for text in (*shown, *more) for line in _ordered("Note", text)]
 
 
 def _ordered(word: str, text: str) -> list[str]:

@@ -50,6 +50,20 @@ MEANINGS = (
 )
 
 
+REMARKS = frozenset(
+    (
+        "base_far_from_card",
+        "encoder_step",
+        "half_sample",
+        "little_motion",
+        "no_set_point",
+        "not_determined",
+        "single_readings",
+    )
+)
+"""Doubts that only say what would make the answer better; all others are read before it."""
+
+
 @dataclass(frozen=True)
 class Block:
     """What the reader sees as one finding: an effect, or several that cannot be told apart."""
@@ -131,6 +145,16 @@ def _block(findings: tuple[Finding, ...]) -> Block:
         return Block(first.title, first.answer, ANSWERS.get(first.answer, first.answer), findings)
     title = " or ".join([first.title, *(lowered(rival.title) for rival in findings[1:])])
     return Block(title, first.answer, f"{count(len(findings))} possible causes", findings)
+
+
+def doubts(diagnosis: Diagnosis) -> tuple[list[str], list[str], list[str]]:
+    """Return alarms, which keep effects from being named; other doubts to read before the answer; remarks for after."""
+    alarms = [one.statement for one in diagnosis.sanity if one.blocks_naming]
+    others = [one for one in diagnosis.sanity if not one.blocks_naming]
+    graver, remarks = (
+        [one.statement for one in others if (one.finding in REMARKS) is is_remark] for is_remark in (False, True)
+    )
+    return alarms, graver, remarks
 
 
 def model(diagnosis: Diagnosis) -> str:

@@ -1,6 +1,6 @@
 """Friction that grows with the load on the bearing."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import casadi as ca
@@ -21,7 +21,7 @@ class LoadDependentFriction(FrictionEffect):
 
     id: ClassVar[str] = "load_dependent_friction"
     title: ClassVar[str] = "Load-dependent friction"
-    equation: ClassVar[str] = "F (1 + c |load|)"
+    equation: ClassVar[str] = "F + c |load|"
     main: ClassVar[Main] = Main("coulomb_per_Nm", 100.0, "% of the load")
     to_record: ClassVar[str] = "record with two different loads"
     rivals: ClassVar[tuple[str, ...]] = ("position_friction", "gravity_unbalance")
@@ -56,3 +56,8 @@ class LoadScaledFriction(LoadDependentFriction):
     def level(self, level: Scalar, motion: Motion) -> Scalar:
         """`level (1 + c |payload| / at_level)`."""
         return level * (1 + self.coulomb_per_Nm * ca.fabs(motion.payload) / self.at_level)
+
+    def told_at(self, level: float) -> "LoadScaledFriction":
+        """Return the same friction, its rise told at another Coulomb level [N m]."""
+        rise = float(self.coulomb_per_Nm) * level / float(self.at_level)
+        return replace(self, coulomb_per_Nm=rise, at_level=level)

@@ -57,7 +57,7 @@ def test_a_verb_that_was_nearly_hit_is_suggested(
     ("text", "sentence"),
     [
         (CARD.replace("inertia", "inertai"), "[mount] inertai is not a key of a card; keys are: name, motion,"),
-        (CARD.replace("inertia", "inertai"), 'torque_limit. Did you mean "inertia"?'),
+        (CARD.replace("inertia", "inertai"), 'torque_limit, machine. Did you mean "inertia"?'),
         (CARD + "[encoder]\ncounts = 3\n", 'Did you mean "counts_per_rev"?'),
         (CARD + "[fricton]\n", 'Did you mean "friction"?'),
         (CARD.replace("coulomb", "coulom"), 'Did you mean "coulomb"?'),

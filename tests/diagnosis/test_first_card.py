@@ -21,13 +21,15 @@ NOISE, READING = 0.02, 1e-6
 """Of the torque [N m] and of the position [rad], RMS."""
 
 
-def table(seed: int, offset: float = 0.0, weight: float = 0.0, seconds: float = SECONDS) -> pd.DataFrame:
+def table(
+    seed: int, offset: float = 0.0, weight: float = 0.0, seconds: float = SECONDS, reach: float = 1.0
+) -> pd.DataFrame:
     """Swings of an axis of which everything is known, in both directions, with stops between."""
     dice = np.random.default_rng(seed)
     t = np.arange(round(seconds * RATE)) / RATE
     waves = [(0.9, 0.13), (0.35, 0.41), (0.12, 0.97)]
     phases = dice.uniform(0, 2 * np.pi, len(waves))
-    parts = [(a, 2 * np.pi * f, p) for (a, f), p in zip(waves, phases, strict=True)]
+    parts = [(reach * a, 2 * np.pi * f, p) for (a, f), p in zip(waves, phases, strict=True)]
     q = sum(a * np.sin(w * t + p) for a, w, p in parts)
     v = sum(a * w * np.cos(w * t + p) for a, w, p in parts)
     acceleration = sum(-a * w**2 * np.sin(w * t + p) for a, w, p in parts)
@@ -123,3 +125,17 @@ def test_two_files_and_no_option_give_an_answer(
         r"No card was given; it is estimated from the recordings: inertia (1\.9\d*|2(\.0\d*)?) kg", said.err
     )
     assert Path("cosim_out/run1-1/card.toml").exists()
+
+
+def test_over_a_short_way_a_weight_and_a_constant_are_one_and_over_a_long_way_both_are_there() -> None:
+    """Both together had 1.7 times the weight of a measured arm, each far from its standard error."""
+    short, long = (
+        cosim.card([table(seed, offset=1.0, weight=4.0, reach=reach) for seed in (6, 7)], motion="rotary").card
+        for reach in (0.25, 1.5)
+    )
+    assert short.unbalance is not None
+    assert not short.effects
+    assert long.unbalance is not None
+    assert float(long.unbalance.mgl) == pytest.approx(4.0, rel=0.05)
+    (offset,) = long.effects
+    assert float(offset.torque) == pytest.approx(1.0, rel=0.05)  # type: ignore[attr-defined]

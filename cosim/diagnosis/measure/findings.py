@@ -8,6 +8,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.result import Finding, Trace
 from cosim.diagnosis.effects import hypothesis_of, named
+from cosim.diagnosis.effects.load_dependent_friction import at_own_level
 from cosim.diagnosis.measure.advice import advice
 from cosim.diagnosis.measure.locate import where
 from cosim.diagnosis.search.renaming import is_renamed
@@ -40,7 +41,7 @@ def accepted(
     alike = [effect for effect in mount.effects if effect.id == one.effect.id][-len(one.effects) :]
     effect = max(alike, key=lambda own: float(getattr(own, "amplitude", 0.0)))
     harmonics = [other for other in alike if other is not effect]
-    numbers = numbers_of(effect, mount, errors)
+    effect, numbers = _at_own_level(effect, numbers_of(effect, mount, errors), mount)
     own = hypothesis_of(effect)
     ranges = {n: (numbers.values[n] - Z95 * e, numbers.values[n] + Z95 * e) for n, e in numbers.errors.items()}
     size, size_range = _size(effect, numbers, mount)
@@ -112,6 +113,16 @@ def rival_finding(rival: CandidateFit, probability: float, mount: Mount) -> Find
         told_apart_by=effect.told_apart_by,
         action=advice(effect, False, mount.motion),
     )
+
+
+def _at_own_level(effect: Effect, numbers: Numbers, mount: Mount) -> tuple[Effect, Numbers]:
+    """Return an effect and its numbers as they are told beside the fitted level of friction."""
+    told = at_own_level(effect, mount)
+    if told is effect:
+        return effect, numbers
+    values = {variable.name: float(variable.start) for variable in parameters_of(told)}
+    errors = {name: error * values[name] / numbers.values[name] for name, error in numbers.errors.items()}
+    return told, Numbers(values, errors)
 
 
 def measured_as(row: Finding, first: Finding, mount: Mount) -> Finding:

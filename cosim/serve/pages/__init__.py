@@ -62,12 +62,14 @@ NAMED = 4
 """Recordings that the history names; of more it says how many."""
 FILES = (
     ("report.html", "Report", "one page, alone"),
-    ("card.toml", "Model card", "the better one"),
+    ("card.toml", "Model card", ""),
     ("diagnosis.json", "JSON", "the same for programs"),
     ("missing_torque.parquet", "Missing torque", "one row a sample, with its band"),
     ("next_experiment.toml", "Next experiment", "a scenario"),
 )
 """What a diagnosis writes, beside FMUs."""
+CARDS = {True: "with the effects", False: "refitted, nothing added"}
+"""What the card is that is written, by whether the model is improved."""
 
 
 def home_page(desk: Desk, problem: str = "", status: int = 200) -> Response:
@@ -193,8 +195,9 @@ def _begun(desk: Desk, job: Job) -> Parsed:
 
 def _results(desk: Desk, job: Job) -> Iterator[dict[str, str]]:
     """Yield the files of a result that can be downloaded, the improved FMUs among them."""
-    there = plain_files(desk.store.result(job.id)).values() if job.state == "done" else ()
-    told = {name: (title, text) for name, title, text in FILES}
+    there = list(plain_files(desk.store.result(job.id)).values()) if job.state == "done" else []
+    better = any(path.suffix == ".fmu" for path in there)
+    told = {name: (title, text or CARDS[better]) for name, title, text in FILES}
     for path in sorted(there, key=lambda one: ([*told, one.name].index(one.name), one.name)):
         kind = "FMI 2" if "fmi2" in path.stem else "FMI 3"
         title, text = told.get(

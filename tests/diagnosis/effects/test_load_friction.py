@@ -7,12 +7,16 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.answer.result import Finding
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
+from cosim.diagnosis.effects.load_dependent_friction import at_own_level
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.measure.absent import not_found
+from cosim.diagnosis.measure.findings import _at_own_level
+from cosim.diagnosis.search.sizes import Numbers
 from cosim.diagnosis.search.stages import Stage, best_of, refitted
 from cosim.estimation.fit import Fit
 from pyfmi_models.card import Card, parse_card
-from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction
+from pyfmi_models.effects import Motion
+from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction, LoadScaledFriction
 
 BASE = '[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\nsigma2 = 3.0\n'
 PHASE = 0.2
@@ -72,3 +76,18 @@ def test_what_is_above_such_a_bound_is_found_with_its_size_and_far_below_it_is_n
     assert (best is not None) is seen
     if seen:
         assert one.effect.coulomb_per_Nm == pytest.approx(rise, rel=0.15)  # type: ignore[attr-defined]
+
+
+def test_the_rise_is_told_beside_the_level_that_was_fitted_not_beside_the_one_the_fit_began_with() -> None:
+    mount = parse_card(BASE.replace("Fc = 1.0", "Fc = 0.75"), "card.toml").plant()
+    begun = LoadScaledFriction(coulomb_per_Nm=0.1, at_level=1.25)
+    told = at_own_level(begun, mount)
+    assert isinstance(told, LoadScaledFriction)
+    assert (told.coulomb_per_Nm, told.at_level) == pytest.approx((0.06, 0.75))
+    for payload in (0.0, 3.0):
+        motion = Motion(t=0.0, q=0.0, v=1.0, angle=0.0, payload=payload)
+        assert float(told.level(0.75, motion)) == pytest.approx(float(begun.level(0.75, motion)))
+    numbers = Numbers({"coulomb_per_Nm": 0.1, "at_level": 1.25}, {"coulomb_per_Nm": 0.01})
+    assert _at_own_level(begun, numbers, mount)[1].errors == pytest.approx({"coulomb_per_Nm": 0.006})
+    plain = LoadDependentFriction(coulomb_per_Nm=0.1)
+    assert at_own_level(plain, mount) is plain
