@@ -25,7 +25,8 @@ from cosim.plots.style import STYLE
 from cosim.report.figures_dynamic import effect as draw
 from cosim.report.quantities import Scales
 from cosim.report.repairs import MACHINES, repairs_of
-from pyfmi_models.effects import CATALOGUE, Effect
+from pyfmi_models.effects import CATALOGUE, Effect, GravityUnbalance, LocalFriction
+from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.friction import LuGre
 from pyfmi_models.model import parameters_of
 
@@ -36,12 +37,19 @@ COLOURS = {"ink": "#1A1A1A", "before": "#CC6A00", "after": "#00558C", "grey": "#
 COLOURS |= {"shade": "#EEF0F1", "band": "#8A939B", "grid": "#E3E6E8", "hatch": "#A9B0B6", "paper": "#FFFFFF"}
 
 
+SHOWN: dict[str, Effect] = {
+    "position_friction": LocalFriction(q_center=-0.8, width=0.1, relative_amplitude=1.0),
+    "compliance": Compliance(antiresonance_hz=2.5, resonance_hz=4.0),
+}
+"""Numbers that this motion shows well, where those of the tests do not."""
+
+
 def write_gallery(folder: Path) -> None:
     """Write `effects.md` and its pictures into a folder."""
     import matplotlib as mpl
 
     folder.mkdir(exist_ok=True)
-    shown = {form.id: form for form in EXAMPLES if form.id in TRIED}
+    shown = {form.id: SHOWN.get(form.id, form) for form in EXAMPLES if form.id in TRIED}
     piece = prepare([motion()], CUTOFF).pieces[0]
     with mpl.rc_context(STYLE):
         parts = [section(name, one, folder, piece) for name, one in sorted(shown.items(), key=lambda p: p[1].title)]
@@ -89,7 +97,7 @@ def of_cards_alone() -> Iterator[str]:
 
 def _said(one: Effect, literature: str) -> Iterator[tuple[str, str]]:
     yield "Equation", f"`{one.equation}`" if one.equation else ""
-    yield "Told apart by", f"{one.told_apart_by}."
+    yield "How to distinguish", f"{one.told_apart_by}."
     yield "What to do", one.action
     yield "Literature", literature
 
@@ -107,7 +115,7 @@ def _parts(name: str, one: Effect, folder: Path, piece: Piece) -> Iterator[str]:
     yield f"*Equation:* `{one.equation}`"
     yield _picture(name, one, folder, piece)
     rivals = ", ".join(f"[{CATALOGUE[rival][0].title.lower()}](#{rival})" for rival in one.rivals if rival in CATALOGUE)
-    yield f"*Told from {rivals or 'the others'}:* {one.told_apart_by or 'nothing else looks like it'}."
+    yield f"*How to distinguish it from {rivals or 'the others'}:* {one.told_apart_by or 'nothing else looks like it'}."
     yield f"*What to do:* {one.action}"
     yield from _repairs(name)
     yield _table(one)
@@ -177,9 +185,10 @@ def _picture(name: str, one: Effect, folder: Path, piece: Piece) -> str:
 
 def samples(one: Effect, piece: Piece) -> Samples:
     """Return what a recording of an axis with an effect shows, beside the model without and with it."""
-    law = BRISTLES if one.id in ("presliding", "dwell_breakaway") else LAW
+    law = BRISTLES if one.id == "dwell_breakaway" else LAW
+    beside = (GravityUnbalance(mgl=4.0, phase=0.2),) if one.id == "load_dependent_friction" else ()
     rng, nothing = np.random.default_rng(1), np.zeros(0)
-    plain, whole = mount(friction=law), mount(one, friction=law)
+    plain, whole = mount(*beside, friction=law), mount(*beside, one, friction=law)
     base, full = (Inverse(each, ()).torque(piece, nothing)[0] for each in (plain, whole))
     noise = piece.lowpass(rng.normal(0, 4 * NOISE, len(piece.t))[:, None])[:, 0]
     rows = piece.inside

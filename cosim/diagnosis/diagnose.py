@@ -12,7 +12,7 @@ from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.answer.scores import Scores
 from cosim.diagnosis.decide.decision import Decision, decide, rest_rules, shaking_rules
 from cosim.diagnosis.decide.policy import POLICY
-from cosim.diagnosis.effects.load_dependent_friction import at_own_level
+from cosim.diagnosis.effects.candidates import at_own_level
 from cosim.diagnosis.evidence.adequacy import friction_level
 from cosim.diagnosis.evidence.band import in_band
 from cosim.diagnosis.evidence.comparison import Comparison

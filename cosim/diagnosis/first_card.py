@@ -169,8 +169,8 @@ def _is_apart(problem: Problem, tried: Fit, name: str) -> bool:
         tried.slopes * problem.weight[:, None], tried.residual * problem.weight, Blocks.of(problem.prepared)
     )
     error = np.sqrt(np.maximum(np.diag(spread), 1e-300))
-    parts = tried.mount.components().items()
-    sizes = {f"{prefix}.{part.main.parameter}" for prefix, part in parts if isinstance(part, Effect)} - {name}
+    prefix_of = {id(part): prefix for prefix, part in tried.mount.components().items()}
+    sizes = {f"{prefix_of[id(effect)]}.{effect.main.parameter}" for effect in tried.mount.effects[:-1]}
     own = tried.free.index(name)
     others = [place for place, other in enumerate(tried.free) if other in sizes]
     return all(abs(spread[own, place]) < ALIKE * error[own] * error[place] for place in others)

@@ -18,6 +18,7 @@ from cosim.report.figures_effect import (
     folded,
     keep_turning,
     load,
+    plain_decades,
     position,
     rest_and_motion,
 )
@@ -145,7 +146,8 @@ def breakaway(finding: Finding, chosen: Samples, scales: Scales) -> Picture | No
     window = max(3, int(0.3 * rate(chosen)))
     for error, colour, mark in ((chosen.before, BEFORE, "s"), (chosen.after, AFTER, "o")):
         peak = [float(np.max(np.abs(error[s : s + window]))) * scales.torque.factor for s in starts]
-        axes.semilogx(rest, peak, mark, ms=6, mfc="white" if mark == "s" else colour, mec=colour)
+        axes.plot(rest, peak, mark, ms=6, mfc="white" if mark == "s" else colour, mec=colour)
+    plain_decades(axes)
     axes.set_xlabel("rest before the start [s]")
     heading(axes, f"error at break-away [{scales.torque.unit}]")
     caption = f"{len(starts)} starts, one mark each. Squares before, dots after."

@@ -112,14 +112,19 @@ def speeds(calm: Samples, falls: float) -> Array:
     return np.geomspace(min(low, 0.5 * top), max(top, 3 * falls), 12)
 
 
-def logarithmic(axes: "Axes", falls: float) -> None:
-    """Make the axis of speed logarithmic, with a mark at the speed over which friction falls."""
+def plain_decades(axes: "Axes") -> None:
+    """Make the lower axis logarithmic, its numbers written out: 0.3, 1, 3."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1, 3)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def logarithmic(axes: "Axes", falls: float) -> None:
+    """Make the axis of speed logarithmic, with a mark at the speed over which friction falls."""
+    plain_decades(axes)
     axes.axvline(falls, color=GREY, lw=1, ls=(0, (1, 2)))
 
 

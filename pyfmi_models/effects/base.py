@@ -116,6 +116,10 @@ class Effect(Part):
         """Say over which range of what the effect was learned from data; empty for an effect with an equation."""
         return ""
 
+    def told_at(self, level: float) -> Self:
+        """Return the same effect, numbers that are told beside a Coulomb level told beside this one [N m]."""
+        return self
+
     def leading(self) -> Main:
         """The number that says how large the effect with these numbers is."""
         return self.main

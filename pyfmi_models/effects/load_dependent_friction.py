@@ -1,7 +1,7 @@
 """Friction that grows with the load on the bearing."""
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import casadi as ca
 
@@ -57,7 +57,7 @@ class LoadScaledFriction(LoadDependentFriction):
         """`level (1 + c |payload| / at_level)`."""
         return level * (1 + self.coulomb_per_Nm * ca.fabs(motion.payload) / self.at_level)
 
-    def told_at(self, level: float) -> "LoadScaledFriction":
+    def told_at(self, level: float) -> Self:
         """Return the same friction, its rise told at another Coulomb level [N m]."""
         rise = float(self.coulomb_per_Nm) * level / float(self.at_level)
         return replace(self, coulomb_per_Nm=rise, at_level=level)

@@ -85,6 +85,12 @@ def contact_level(mount: Mount) -> float:
     return of_both_ways(getattr(mount.friction, "Fc", None))
 
 
+def at_own_level(effect: Effect, mount: Mount) -> Effect:
+    """Return an effect told beside the level that the mount has; that which began the fit was the base's."""
+    level = contact_level(mount)
+    return effect.told_at(level) if level else effect
+
+
 def has(mount: Mount, kind: type[Any]) -> bool:
     """Whether a mount holds an effect of a kind."""
     return any(isinstance(effect, kind) for effect in mount.effects)

@@ -14,12 +14,6 @@ from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction, 
 from pyfmi_models.mount import Mount
 
 
-def at_own_level(effect: Effect, mount: Mount) -> Effect:
-    """Return an effect with its rise told at the level that the mount has; that which began the fit was the base's."""
-    level = contact_level(mount)
-    return effect.told_at(level) if isinstance(effect, LoadScaledFriction) and level else effect
-
-
 class LoadFriction(Hypothesis[LoadDependentFriction]):
     """A rise of the level alone, or of level and viscous friction alike."""
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.result import Finding, Trace
 from cosim.diagnosis.effects import hypothesis_of, named
-from cosim.diagnosis.effects.load_dependent_friction import at_own_level
+from cosim.diagnosis.effects.candidates import at_own_level
 from cosim.diagnosis.measure.advice import advice
 from cosim.diagnosis.measure.locate import where
 from cosim.diagnosis.search.renaming import is_renamed

@@ -7,7 +7,7 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.answer.result import Finding
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
-from cosim.diagnosis.effects.load_dependent_friction import at_own_level
+from cosim.diagnosis.effects.candidates import at_own_level
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.measure.absent import not_found
 from cosim.diagnosis.measure.findings import _at_own_level
