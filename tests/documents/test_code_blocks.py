@@ -48,7 +48,7 @@ def each(*languages: str) -> pytest.MarkDecorator:
 def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the files that examples name."""
     folder = tmp_path_factory.mktemp("blocks")
-    texts = list(example.recordings().values())
+    texts = [text[: len(text) // 2].rpartition("\n")[0] for text in example.recordings().values()]
     for name, text in zip(("run1.csv", "run2.csv", "run3.csv"), texts, strict=True):
         (folder / name).write_text(text, "utf-8")
     for name, text in zip(("night_1.csv", "night_2.csv", "night_3.csv"), texts, strict=True):
