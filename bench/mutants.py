@@ -1,29 +1,36 @@
 """Small errors planted in the code, one at a time: do the tests notice?
 
-    python bench/reach.py --out FILE
-    python bench/mutants.py --seed 1 --count 160 --reach FILE --out results/robustness [--journal FILE]
-    python bench/mutants.py --journal FILE --ask MODULE=FILE_OF_TESTS ... --out results/robustness
+    python bench/mutants.py --seed 1 --count 150 --journal FILE --out results/robustness [--groups fmi ...]
+    python bench/mutants.py --seed 1 --count 150 --journal FILE --out results/robustness --so-far [--remarks FILE.toml]
+    python bench/mutants.py --journal FILE --out results/robustness --seconds 60 --ask MODULE:LINE=FILE_OF_TESTS ...
 
-A mutant is a module with one operator, number or truth value changed, or one call left out (`mutations.py`). It is
-written into a copy of the tree, and tests run there until one fails, for `BUDGET` seconds (`mutants_choice.py`): those
-that call the function which was changed, the cheapest of each kind first; of what is declared outside of functions
-`DECLARING`, then those that name or use it, the nearest first; without `--reach`, or where none is known, the files of
-tests nearest to the module, by imports and names. Killed: a test failed that passes without the error, or no longer
-ended. Survived: none did. Which test calls what is not always seen (a test that finds made what one before it made
-calls less), so a survivor may be asked whole files more, by `--ask`.
+Each room of the product is a group (`GROUPS`), and of each as many errors are drawn: the kinds of `mutations.KINDS` in
+turn, the place by chance, so that numbers, of which there are most, do not outweigh the rest. An error is written into
+a copy of the tree (of C the libraries are built anew there), and files of tests run, the likeliest first
+(`mutants_choice.py`), for so many seconds of a processor.
+
+Noticed: a test failed that passes without the error, or no longer ended. Survived: none did. What does not compile is
+no error to plant; another one is drawn in its place.
 """
 
 import argparse
 import json
 import os
 import re
+import resource
+import signal
+import subprocess
 import sys
 import tempfile
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from itertools import zip_longest
+from math import ceil
 from pathlib import Path
 from random import Random
 from shutil import copytree, ignore_patterns, rmtree
+from time import monotonic
 
 import casadi  # noqa: F401  what is loaded here need not be loaded in each fork
 import fmpy  # noqa: F401
@@ -32,193 +39,241 @@ import pyarrow.parquet  # noqa: F401
 import pytest
 import scipy.signal  # noqa: F401
 
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "tests/tools")]
+sys.path[:0] = [str(Path(__file__).parent)]
 
-from mutants_choice import around, belonging, calling  # noqa: E402
-from mutants_fork import HOME, QUIET, TOO_LONG, Server, function_of, limited, prepared  # noqa: E402
+import mutations  # noqa: E402
+import mutations_c  # noqa: E402
+from mutants_choice import HOME, asked  # noqa: E402
 from mutants_page import Sample, Tried, journalled, written  # noqa: E402
-from mutations import mutated, sites  # noqa: E402
-from reach import Reached, read  # noqa: E402
 
 GROUPS = {
-    "models": (
-        "pyfmi_models/*.py",
-        "pyfmi_models/adrc/*.py",
-        "pyfmi_models/friction/*.py",
-        "pyfmi_models/effects/*.py",
+    "models": ("pyfmi_models/*.py", "pyfmi_models/[adf]*/*.py", "pyfmi_models/effects/*.py", "cosim/models/*.py"),
+    "export": ("pyfmi_models/export/*.py", "pyfmi_models/export/c/*.c"),
+    "fmi": ("cosim/fmi/*.py",),
+    "system": ("cosim/system/**/*.py",),
+    "master": ("cosim/master/*.py",),
+    "loop": ("cosim/master/loop/[!b]*.py", "cosim/master/loop/*.c"),
+    "data": ("cosim/data/**/*.py", "cosim/support/*.py"),
+    "estimation": ("cosim/estimation/**/*.py", "cosim/estimation/**/*.c"),
+    "decide": tuple(f"cosim/diagnosis/{one}/*.py" for one in ("decide", "evidence", "search", "measure")),
+    "effects": (
+        "cosim/diagnosis/*.py",
+        *(f"cosim/diagnosis/{one}/*.py" for one in ("effects", "terms", "trust", "answer")),
     ),
-    "master": ("cosim/master/*.py", "cosim/master/loop/[!b]*.py"),
-    "hardware": ("cosim/hardware/*.py",),
-    "decision": (
-        "cosim/diagnosis/decide/decision.py",
-        "cosim/diagnosis/evidence/marginal.py",
-        "cosim/diagnosis/evidence/adequacy.py",
-        "cosim/diagnosis/search/rivals.py",
-        "cosim/diagnosis/search/admissibility.py",
-        "cosim/diagnosis/search/proof.py",
-    ),
+    "report": ("cosim/report/*.py", "cosim/plots/*.py"),
+    "delivery": ("cosim/delivery/*.py", "cosim/simulators/*.py", "cosim/nesting/*.py", "cosim/nesting/c/*.c"),
+    "hardware": ("cosim/hardware/*.py", "cosim/hardware/*.c"),
+    "interface": ("cosim/cli/*.py", "cosim/api/*.py"),
+    "exchange": ("cosim/calibration/*.py", "cosim/experiments/*.py", "cosim/sweeps/*.py", "cosim/investigation/*.py"),
 }
-"""Modules whose tests are tested; from each group as many mutants."""
-NO_SUCH_TEST = "ERROR: not found: "
-"""What pytest says of a name that no test has: no error was noticed there."""
-LOST = ("FAILED", "ERROR")
-"""What pytest says of a test that noticed."""
-DECLARING = ("test_parameter_ranges.py", "test_machine_ranges.py")
-"""Tests of what a module only declares, which calls none of its functions: asked of lines outside of functions."""
+"""Rooms of the product; of each as many errors are drawn."""
+QUIET = ("-n0", "-q", "-x", "-p", "no:cacheprovider", "--no-header", "--tb=no", "-rfE", "--timeout=60")
+OURS = (
+    "cosim",
+    "cosim_studies",
+    "pyfmi_models",
+    "mutants",
+    "mutants_page",
+    "mutants_choice",
+    "mutations",
+    "mutations_c",
+)
+"""What a fork loads anew, from the tree with the error."""
+BUILD = "cosim/master/loop/build_hook.py"
 
 
-def drawn(seed: int, count: int) -> Iterator[tuple[str, Path, int]]:
-    """Group, module and number of the site of each mutant, the groups in turn: a part of them is a fair sample."""
-    dice, lists = Random(seed), []
-    for group, patterns in GROUPS.items():
-        modules = sorted(path for pattern in patterns for path in HOME.glob(pattern))
-        every = [(group, path, site) for path in modules for site in range(len(sites(path.read_text("utf-8"))))]
-        lists.append(dice.sample(every, min(len(every), -(-count // len(GROUPS)))))
-    for turn in range(max(map(len, lists))):
-        yield from (one[turn] for one in lists if turn < len(one))
+def read(path: Path) -> tuple[str, list[mutations.Site]]:
+    """The text of a module or a C file, and the places in it where errors can be planted."""
+    source = path.read_text("utf-8")
+    return source, (mutations_c if path.suffix == ".c" else mutations).sites(source)
 
 
-def copied(folder: Path) -> Path:
-    """Copy the tree, with its compiled libraries."""
-    ignored = ignore_patterns(".git", ".venv", "__pycache__", "build", "results", ".*_cache")
-    return Path(copytree(HOME, folder / "tree", ignore=ignored))
+def drawn(seed: int, groups: Sequence[str] = tuple(GROUPS)) -> Iterator[tuple[str, Path, int]]:
+    """Group, module and number of a place, without an end: the groups in turn, so that a part is a fair sample."""
+    lists = [_of_group(seed, group) for group in groups]
+    for turn in zip_longest(*lists):
+        yield from (one for one in turn if one)
 
 
-def noticed(tree: Path, tests: Sequence[str], without: Iterable[str] = ()) -> str:
-    """Run files of tests in a tree, one after the other, until one fails; what `failed` says of it."""
-    return next(filter(None, (failed(tree, [name], without) for name in tests)), "")
+def _of_group(seed: int, group: str) -> list[tuple[str, Path, int]]:
+    """All errors of a group, in the order in which they are drawn: kinds in turn, places by chance."""
+    dice, kinds = Random(f"{seed} {group}"), dict[str, list[tuple[str, Path, int]]]()
+    for path in sorted({path for pattern in GROUPS[group] for path in HOME.glob(pattern)}):
+        for number, site in enumerate(read(path)[1]):
+            kinds.setdefault(site.kind, []).append((group, path, number))
+    found = [dice.sample(kinds[kind], len(kinds[kind])) for kind in dice.sample(sorted(kinds), len(kinds))]
+    return [one for turn in zip_longest(*found) for one in turn if one]
 
 
-def failed(tree: Path, tests: Sequence[str], without: Iterable[str] = ()) -> str:
-    """Run tests, some left out, until one fails; its name "(time)" where they did not end, or nothing."""
-    said = tree / "said"
-    pid = os.fork()
-    if not pid:
-        os._exit(_tested(tree, tests, said, without))
-    code = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
-    if code in TOO_LONG:
-        return f"{tests[0]} (time)"
-    if code in (0, 5):  # 5: no tests here
-        return ""
-    text = said.read_text("utf-8", "replace")
-    if NO_SUCH_TEST in text:
-        raise SystemExit(f"{tree}: of the tests that are asked some are not there: {text[-300:]}")
-    lost = [one.split(" - ")[0] for one in text.splitlines() if one.startswith(LOST)]
-    named = re.search(r"tests/((?:\w+/)*test_\w+\.py::.*)", lost[-1]) if lost else None
-    return named[1] if named else tests[0]
+class Tree:
+    """A copy of the work tree in which one error at a time is planted."""
 
+    def __init__(self, folder: Path, seconds: float) -> None:
+        ignored = ignore_patterns(".git", ".venv", "__pycache__", "build", ".*_cache")
+        self.place, self.seconds = Path(copytree(HOME, folder / "tree", ignore=ignored)), seconds
+        self._broken: set[str] = set()  # tests that fail here without an error too
+        self._sound: dict[str, float] = {}  # tests, and whole files, that passed once, and their seconds
 
-def _tested(tree: Path, tests: Sequence[str], said: Path, without: Iterable[str]) -> int:
-    """Run tests here, in a fork that has all but the tree loaded already; what pytest ends with."""
-    limited()
-    prepared(tree, said)
-    left_out = [f"--deselect=tests/{one}" for one in without]
-    return int(pytest.main([*QUIET, "-x", *left_out, *(f"tests/{name}" for name in tests)]))
-
-
-class Asking:
-    """Who asks tests: those that call a function, in the server, else in a fork that loads all anew.
-
-    Args:
-        tree: a copy, in which errors are planted.
-        reached: which test calls what; without it the nearest files are asked.
-    """
-
-    def __init__(self, tree: Path, reached: Sequence[Reached] = ()) -> None:
-        self.tree = tree
-        self._broken: set[str] = set()  # tests that fail in the copy without an error too
-        files = sorted({one.test.split("::")[0].removeprefix("tests/") for one in reached})
-        self._server = Server(tree, files) if files else None
-        there = self._server.tests if self._server else frozenset()
-        self._reached = [one for one in reached if one.test.removeprefix("tests/") in there]
-
-    def attempt(self, group: str, path: Path, site: int, files: Sequence[str] = ()) -> Tried:
-        """Plant one error, run the tests (or whole files of them), take it back."""
-        source, place, module = path.read_text("utf-8"), self.tree / path.relative_to(HOME), str(path.relative_to(HOME))
-        line, change, text = mutated(source, site)
+    def attempt(self, group: str, path: Path, number: int, more: Sequence[str] = ()) -> Tried | None:
+        """Plant an error, ask tests (or those files that are named), take it back; None where it does not compile."""
+        source, module = path.read_text("utf-8"), str(path.relative_to(HOME))
+        site, text = (mutations_c if path.suffix == ".c" else mutations).mutated(source, number)
+        begun, (named, files) = monotonic(), ([], list(more)) if more else asked(path, source, site.line)
         while True:
-            known = calling(module, source, line, () if files else self._reached)
-            known = tuple(one for one in known if one not in self._broken)
             try:
-                place.write_text(text, "utf-8")
-                declares = not files and not around(source, line)
-                witness = noticed(self.tree, DECLARING, self._broken) if declares else ""
-                if not witness and known:
-                    witness = self._failed(known, module, source, line)
-                elif not witness:
-                    witness = noticed(self.tree, files or belonging(path), self._broken)
+                if not self._written(module, text):
+                    return None
+                witness = self._noticed(named, files)
             finally:
-                place.write_text(source, "utf-8")
-            if not witness or witness.endswith("(time)") or not self._failed([witness]):
-                return Tried(group, module, site, line, change, witness)
-            if witness in self._broken:
-                raise SystemExit(f"{witness} fails in the tree as it is")
+                self._written(module, source)
+            if not witness or self._is_sound(witness):
+                seconds = round(monotonic() - begun, 1)
+                return Tried(group, module, number, site.line, site.kind, site.change, witness, seconds)
+            if not named:
+                files = files[files.index(witness.split("::")[0]) :]
+            named = [one for one in named if one not in self._broken]
+
+    def _written(self, module: str, text: str) -> bool:
+        """Write a file and build the libraries that have it in them; whether they compile."""
+        (self.place / module).write_text(text, "utf-8")
+        if not module.endswith(".c") or not module.startswith("cosim"):
+            return True
+        code = f"import sys; sys.path.insert(0, {str(Path(BUILD).parent)!r}); import build_hook as b\n"
+        code += f"for target, sources in b.LIBRARIES.items():\n    if {module!r} in sources:\n"
+        code += "        b.compile_library([b.ROOT / one for one in sources], b.ROOT / (target + b.SUFFIX))\n"
+        done = subprocess.run(
+            [sys.executable, "-c", code], cwd=self.place, env=os.environ | {"PYTHONPATH": ""}, capture_output=True
+        )
+        return done.returncode == 0
+
+    def _noticed(self, named: Sequence[str], files: Sequence[str]) -> str:
+        """The first test that fails: of those named, together, then of files one by one, as long as the time lasts."""
+        left = self.seconds
+        for tests in [*([named] if named else []), *([file] for file in files)]:
+            if left <= 1:
+                return ""
+            witness, spent = self._failed(tests, left)
+            if witness:
+                return witness
+            left -= spent
+        return ""
+
+    def _failed(self, tests: Sequence[str], left: float) -> tuple[str, float]:
+        """Run tests for so many seconds of a processor; what failed there, and seconds; "(time)": what used to end."""
+        said = self.place / "said"
+        pid = os.fork()
+        if not pid:  # whatever happens there, nothing of the bench goes on in the fork
+            try:
+                os._exit(self._tested(tests, said, ceil(left)))
+            finally:
+                os._exit(4)
+        _, status, usage = os.wait4(pid, 0)
+        end_all(pid)
+        code, spent = os.waitstatus_to_exitcode(status), usage.ru_utime + usage.ru_stime
+        known = self._sound.get(" ".join(tests))
+        if code == -signal.SIGXCPU:
+            return (f"{tests[0]} (time)" if known and known < left / 2 else ""), spent
+        if code in (0, 5):  # 5: no tests here
+            self._sound |= dict.fromkeys((*tests, " ".join(tests)), spent)
+            return "", spent
+        lost = re.findall(
+            r"^(?:FAILED|ERROR) tests/(\S+?\.py(?:::.*?)?)(?: - .*)?$", said.read_text("utf-8", "replace"), re.M
+        )
+        return (lost[0] if lost else tests[0]), spent
+
+    def _tested(self, tests: Sequence[str], said: Path, most: int) -> int:
+        """Run tests here, in a fork that has all but the tree loaded already; what pytest ends with."""
+        os.setsid()
+        os.chdir(self.place)
+        os.environ |= {"PYTHONPATH": str(self.place), "OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
+        sys.dont_write_bytecode = True
+        resource.setrlimit(resource.RLIMIT_CPU, (most, most + 5))
+        sys.path[:] = [str(self.place), *(one for one in sys.path if not _is_of_home(one))]
+        for module in [one for one in sys.modules if one.split(".")[0] in OURS]:
+            del sys.modules[module]
+        with said.open("w") as output:
+            os.dup2(output.fileno(), 1)
+            os.dup2(output.fileno(), 2)
+        left_out = [f"--deselect=tests/{one}" for one in self._broken]
+        return int(pytest.main([*QUIET, *left_out, *(f"tests/{one}" for one in tests)]))
+
+    def _is_sound(self, witness: str) -> bool:
+        """Whether a test passes without the error; one that does not is asked no more."""
+        if witness.endswith(" (time)") or self._sound.keys() & {witness, witness.split("[")[0], witness.split("::")[0]}:
+            return True
+        again, _ = self._failed([witness], 60)
+        if again:
             self._broken.add(witness)
+        return not again
 
-    def _failed(self, tests: Sequence[str], module: str = "", source: str = "", line: int = 0) -> str:
-        function = function_of(source, line) if module else ""
-        found = self._server.failed(tests, module, function) if self._server and (function or not module) else None
-        return failed(self.tree, tests) if found is None else found
 
-    def close(self) -> None:
-        """End the server, if there is one."""
-        if self._server:
-            self._server.close()
+def _is_of_home(folder: str) -> bool:
+    """Whether modules there are those of which a copy is changed; a virtual environment may lie in their tree."""
+    return (folder == str(HOME) or folder.startswith(str(HOME) + os.sep)) and not folder.startswith(sys.prefix + os.sep)
+
+
+def end_all(group: int) -> None:
+    """End what a file of tests left behind: it had a session of its own."""
+    with suppress(ProcessLookupError):
+        os.killpg(group, signal.SIGKILL)
+
+
+def todo(seed: int, count: int, groups: Sequence[str], tried: Iterable[Tried]) -> Iterator[tuple[str, Path, int]]:
+    """The errors of a sample that were not tried yet; one more a group for each that did not compile."""
+    done = {(one.module, one.site) for one in tried}
+    for group, path, number in drawn(seed, groups):
+        if len(done) >= count:
+            return
+        if (key := (str(path.relative_to(HOME)), number)) not in done:
+            yield group, path, number
+            done.add(key)
+
+
+def todo_again(ask: Sequence[str], tried: Sequence[Tried]) -> Iterator[tuple[str, Path, int, tuple[str, ...]]]:
+    """The survivors for which a file of tests is named: the choice of tests does not see all that are near."""
+    named = dict(one.split("=") for one in ask)
+    for one in tried:
+        if not one.noticed and (file := named.get(f"{one.module}:{one.line}")):
+            yield one.group, HOME / one.module, one.site, (file,)
 
 
 def main() -> None:
-    """Plant, count, and write the table."""
+    """Plant, count, and write the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--count", type=int, default=160)
-    parser.add_argument("--reach", type=Path, help="file that reach.py wrote")
-    parser.add_argument("--journal", type=Path, help="file of what is done: a run that ended early goes on from there")
-    parser.add_argument("--ask", nargs="*", default=[], help="MODULE=FILE: tests that survivors there are asked too")
+    parser.add_argument("--count", type=int, default=150)
+    parser.add_argument("--seconds", type=float, default=20, help="of a processor that the tests of an error may take")
+    parser.add_argument("--groups", nargs="+", choices=GROUPS, default=list(GROUPS))
+    parser.add_argument("--journal", type=Path, required=True, help="file of what is done: a run goes on from there")
+    parser.add_argument("--ask", nargs="+", default=[], help="MODULE:LINE=FILE: tests that a survivor is asked too")
     parser.add_argument("--remarks", type=Path, help="what is known of survivors (.toml): why, by MODULE:LINE")
     parser.add_argument("--page", default="mutants.md", help="name of the page")
-    parser.add_argument("--so-far", action="store_true", help="only write the table of what the journal has")
+    parser.add_argument("--so-far", action="store_true", help="only write the page of what the journal has")
     parser.add_argument("--out", type=Path, required=True)
     given = parser.parse_args()
-    if given.so_far:
-        told(given, journalled(given.journal))
-        return
-    folder = Path(tempfile.mkdtemp(prefix="mutants-"))
-    reached = read(given.reach) if given.reach else []
-    journal = given.journal or folder / "journal"
-    try:
-        asking = Asking(copied(folder), reached)
-        again = todo_again(given.ask, journalled(journal))
-        for group, path, site, files in again if given.ask else todo(given.seed, given.count, journal):
-            tried = asking.attempt(group, path, site, files)
-            print(f"{tried.module}:{tried.line} {tried.change}: {tried.noticed or 'SURVIVED'}", flush=True)
-            with journal.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(vars(tried)) + "\n")
-        asking.close()
-        tried_all = journalled(journal)
-    finally:
-        rmtree(folder, ignore_errors=True)
-    told(given, tried_all)
-
-
-def todo(seed: int, count: int, journal: Path) -> Iterator[tuple[str, Path, int, tuple[str, ...]]]:
-    """The mutants of a sample that the journal does not have."""
-    for group, path, site in drawn(seed, count):
-        if (str(path.relative_to(HOME)), site) not in {(one.module, one.site) for one in journalled(journal)}:
-            yield group, path, site, ()
-
-
-def todo_again(asked: Sequence[str], tried: Sequence[Tried]) -> list[tuple[str, Path, int, tuple[str, ...]]]:
-    """The survivors in modules for which files of tests are named, with these."""
-    named = [one.split("=") for one in asked]
-    files = {one.module: tuple(file for module, file in named if module == one.module) for one in tried}
-    left = [one for one in tried if not one.noticed and files[one.module]]
-    return [(one.group, HOME / one.module, one.site, files[one.module]) for one in left]
-
-
-def told(given: argparse.Namespace, tried: Sequence[Tried]) -> None:
-    """Write the page."""
+    if not given.so_far:
+        folder = Path(tempfile.mkdtemp(prefix="mutants-"))
+        try:
+            run(Tree(folder, given.seconds), given)
+        finally:
+            rmtree(folder, ignore_errors=True)
     remarks = tomllib.loads(given.remarks.read_text("utf-8")) if given.remarks else {}
-    written(tried, Sample(given.seed, given.count), given.out / given.page, remarks)
+    sample = Sample(given.seed, given.count, given.seconds)
+    written(journalled(given.journal), sample, given.out / given.page, remarks)
+
+
+def run(tree: Tree, given: argparse.Namespace) -> None:
+    """Try what is left of a sample; each goes into the journal at once."""
+    tried_before = journalled(given.journal)
+    new = ((*one, ()) for one in todo(given.seed, given.count, given.groups, tried_before))
+    for group, path, number, more in todo_again(given.ask, tried_before) if given.ask else new:
+        tried = tree.attempt(group, path, number, more)
+        if tried is None:
+            print(f"{path.relative_to(HOME)}: {number} does not compile", flush=True)
+            continue
+        print(f"{tried.module}:{tried.line} {tried.kind} {tried.change}: {tried.noticed or 'SURVIVED'}", flush=True)
+        with given.journal.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(vars(tried)) + "\n")
 
 
 if __name__ == "__main__":

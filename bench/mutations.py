@@ -1,11 +1,16 @@
-"""One small error in the text of a module: an operator, a number or a truth value changed, a call left out.
+"""One small error in the text of a module, of ten kinds: `KINDS` names them. Of C files: mutations_c.py.
 
 What is only said is left as it is: docstrings, texts, annotations, what is raised, decorators.
 """
 
 import ast
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
 
+KINDS = ("comparison", "number", "operator", "truth", "call", "sign", "index", "unit", "swap", "default")
+"""A comparison turned, a number changed, an operator, a truth value or and/or, a call left out, a minus or `not` left
+out, an index off by one, a factor of a thousand, two arguments swapped, a default changed."""
 COMPARED: dict[type[ast.cmpop], tuple[type[ast.cmpop], ...]] = {
     ast.Lt: (ast.LtE, ast.GtE),
     ast.LtE: (ast.Lt, ast.Gt),
@@ -31,70 +36,105 @@ COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
 }
 SAID = ("say", "told", "put")
 """Calls that only tell people something."""
-Site = tuple[ast.AST, Callable[[], None], str]
+SCALES = frozenset(10.0**power for power in (-9, -6, -3, 3, 6, 9)) | {60.0, 3600.0, 180.0}
+"""Numbers that turn one unit into another."""
+LARGER = 1.2
+"""By which a number that is no whole one is changed: a test whose tolerance hides this factor hides an error."""
+Plant = Callable[[], None]
+
+
+@dataclass(frozen=True)
+class Site:
+    """A place where an error can be planted: its line, the kind of error, and what is changed."""
+
+    line: int
+    kind: str
+    change: str
 
 
 def sites(source: str) -> list[Site]:
     """Every place of a module where an error can be planted, in the order of the text."""
-    return list(_sites(ast.parse(source)))
+    return [site for site, _ in _sites(ast.parse(source))]
 
 
-def mutated(source: str, site: int) -> tuple[int, str, str]:
-    """Return the line of a site, what is changed there, and the text of the module with that error."""
+def mutated(source: str, number: int) -> tuple[Site, str]:
+    """Return a site by its number, and the text of the module with that error."""
     tree = ast.parse(source)
-    node, plant, change = list(_sites(tree))[site]
+    site, plant = list(_sites(tree))[number]
     plant()
-    return node.lineno, change, ast.unparse(ast.fix_missing_locations(tree))  # type: ignore[attr-defined]
+    return site, ast.unparse(ast.fix_missing_locations(tree))
 
 
-def _sites(node: ast.AST) -> Iterator[Site]:
+def _sites(node: ast.AST, default: bool = False) -> Iterator[tuple[Site, Plant]]:
     for name, value in ast.iter_fields(node):
         if name in ("annotation", "returns", "decorator_list") or isinstance(node, ast.Raise | ast.JoinedStr):
             continue
         children = value if isinstance(value, list) else [value]
+        given = name in ("defaults", "kw_defaults") or (isinstance(node, ast.AnnAssign) and name == "value")
         for child in children:
             if isinstance(child, ast.AST):
-                yield from _here(child)
-                yield from _sites(child)
+                for kind, plant, change in _here(child, default or given, isinstance(node, ast.Subscript | ast.Slice)):
+                    yield Site(child.lineno, kind, change), plant  # type: ignore[attr-defined]
+                yield from _sites(child, default or given)
         if name == "body" and isinstance(value, list):
             yield from _left_out(value)
 
 
-def _here(node: ast.AST) -> Iterator[Site]:
+def _here(node: Any, default: bool, index: bool) -> Iterator[tuple[str, Plant, str]]:
     if isinstance(node, ast.Compare) and len(node.ops) == 1:
         for other in COMPARED[type(node.ops[0])]:
-            yield node, _setting(node, "ops", [other()]), f"{_shown(node)} -> {other.__name__}"
+            yield "comparison", _setting(node, "ops", [other()]), f"{_shown(node)} -> {other.__name__}"
     elif isinstance(node, ast.BinOp) and type(node.op) in COMPUTED and not _is_text(node):
         other_op = COMPUTED[type(node.op)]
-        yield node, _setting(node, "op", other_op()), f"{_shown(node)} -> {other_op.__name__}"
+        yield "operator", _setting(node, "op", other_op()), f"{_shown(node)} -> {other_op.__name__}"
     elif isinstance(node, ast.BoolOp):
         opposite = ast.Or() if isinstance(node.op, ast.And) else ast.And()
-        yield node, _setting(node, "op", opposite), f"{_shown(node)} -> {type(opposite).__name__}"
+        yield "truth", _setting(node, "op", opposite), f"{_shown(node)} -> {type(opposite).__name__}"
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
-        yield node, _setting(node, "op", ast.UAdd()), f"{_shown(node)} -> without minus"
+        yield "sign", _setting(node, "op", ast.UAdd()), f"{_shown(node)} -> without minus"
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
         twice = ast.UnaryOp(ast.Not(), node.operand)
-        yield node, _setting(node, "operand", twice), f"{_shown(node)} -> without not"
+        yield "sign", _setting(node, "operand", twice), f"{_shown(node)} -> without not"
+    elif isinstance(node, ast.Call) and len(node.args) >= 2 and not _is_alike(node.args):
+        yield "swap", _setting(node, "args", [node.args[1], node.args[0], *node.args[2:]]), f"{_shown(node)} -> swapped"
     elif isinstance(node, ast.Constant) and isinstance(node.value, bool):
-        yield node, _setting(node, "value", not node.value), f"{node.value} -> {not node.value}"
+        kind = "default" if default else "truth"
+        yield kind, _setting(node, "value", not node.value), f"{node.value} -> {not node.value}"
     elif isinstance(node, ast.Constant) and isinstance(node.value, int | float):
-        yield node, _setting(node, "value", node.value + 1), f"{node.value} -> {node.value + 1}"
+        kind = "default" if default else "index" if index else "number"
+        other = changed(node.value)
+        yield kind, _setting(node, "value", other), f"{node.value} -> {other}"
+        if node.value in SCALES:
+            yield "unit", _setting(node, "value", node.value * 1000), f"{node.value} -> {node.value * 1000}"
 
 
-def _left_out(body: list[ast.stmt]) -> Iterator[Site]:
+def changed(value: float) -> float:
+    """Another number: a whole one and one more, any other and a fifth more."""
+    return value + 1 if isinstance(value, int) or value == 0 else float(f"{value * LARGER:.12g}")
+
+
+def _left_out(body: list[ast.stmt]) -> Iterator[tuple[Site, Plant]]:
     """Statements that are a call alone, which may be left out."""
     for place, one in enumerate(body):
         call = one.value if isinstance(one, ast.Expr) else None
         if isinstance(call, ast.Call) and not ast.unparse(call.func).split(".")[-1].startswith(SAID):
-            yield one, _placing(body, place), f"{_shown(one)} -> left out"
+            yield Site(one.lineno, "call", f"{_shown(one)} -> left out"), _placing(body, place)
 
 
-def _setting(node: ast.AST, name: str, value: object) -> Callable[[], None]:
+def _setting(node: ast.AST, name: str, value: object) -> Plant:
     return lambda: setattr(node, name, value)
 
 
-def _placing(body: list[ast.stmt], place: int) -> Callable[[], None]:
+def _placing(body: list[ast.stmt], place: int) -> Plant:
     return lambda: body.__setitem__(place, ast.Pass())
+
+
+def _is_alike(arguments: list[ast.expr]) -> bool:
+    """Whether the first two arguments cannot be swapped, or to no effect: the same, spread, a text or a function."""
+    first, second = arguments[:2]
+    no = (ast.Starred, ast.JoinedStr, ast.Lambda, ast.GeneratorExp)
+    text = any(isinstance(one, ast.Constant) and isinstance(one.value, str) for one in (first, second))
+    return text or isinstance(first, no) or isinstance(second, no) or ast.unparse(first) == ast.unparse(second)
 
 
 def _is_text(node: ast.BinOp) -> bool:

@@ -73,14 +73,11 @@ PAGES = {
     "robustness/fuzz_valgrind.md": "python bench/fuzz.py --watch valgrind --examples 80 --out valgrind"
     " && cp valgrind/fuzz.md results/robustness/fuzz_valgrind.md",
     "robustness/kills.md": BENCH.format("kills.py --trials 50 --seed 1920", "robustness"),
-    "robustness/mutants.md": "python bench/mutants.py --seed 6521 --count 200 --reach FILE"
-    " --remarks results/robustness/mutants_remarks.toml --out results/robustness",
-    "robustness/mutants_first.md": "python bench/mutants.py --seed 61018 --count 200 --reach FILE"
-    " --page mutants_first.md --out results/robustness",
-    "robustness/mutants_second.md": "python bench/mutants.py --seed 61019 --count 200 --reach FILE"
-    " --page mutants_second.md --out results/robustness",
-    "robustness/mutants_third.md": "python bench/mutants.py --seed 61020 --count 200 --reach FILE"
-    " --page mutants_third.md --out results/robustness",
+    "robustness/mutants.md": BENCH.format(
+        "mutants.py --seed 44001 --count 150 --seconds 12 --journal FILE"
+        " --remarks results/robustness/mutants_remarks.toml",
+        "robustness",
+    ),
     "robustness/serve.md": BENCH.format("serve.py --drops 100 --rounds 3 --seed 17", "robustness"),
     "stiffness/README.md": "python -m cosim_studies.stiffness --out results/stiffness --force",
 }

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cosim.data.held import held_columns, notes, rows_held
-from cosim.data.own_rate import at_own_rate
+from cosim.data.own_rate import _mean, at_own_rate
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import diagnose
 from pyfmi_models.card import parse_card
@@ -104,6 +104,16 @@ def test_its_own_rate_has_the_new_readings_themselves_and_the_mean_torque_betwee
     middle = rows[5] + np.arange(-4, 5)
     expected = (whole["tau"][middle].sum() + (whole["tau"][rows[5] - 5] + whole["tau"][rows[5] + 5]) / 2) / 10
     assert slow["tau"][5] == pytest.approx(expected, rel=1e-9)
+
+
+def test_the_mean_at_the_ends_is_that_of_the_part_of_its_interval_that_was_recorded() -> None:
+    """A reading holds around its time, the first from half a row before it on: of 10 ms there are 5.5 at the ends."""
+    t = np.arange(1001) / 1000
+    for spike, place in ((0, 0), (1000, -1)):
+        torque = np.where(np.arange(1001) == spike, 11.0, 0.0)
+        found = _mean(t, torque, np.arange(0, 1.001, 0.01), 0.01)
+        assert found[place] == pytest.approx(11.0 / 5.5)
+        assert np.count_nonzero(np.abs(found) > 1e-9) == 1
 
 
 def test_a_slow_torque_is_taken_when_it_is_new_and_not_half_an_interval_late() -> None:

@@ -97,7 +97,7 @@ def test_a_stop_and_go_rests_for_different_times_whatever_the_time() -> None:
         rests = t[starts[1:4]] - t[stops[:3]]
         assert len(starts) >= (4 if seconds < 10 else 6)
         assert rests[2] > least  # long enough for a contact to settle
-        assert rests[2] / rests[0] == pytest.approx(10.0, rel=0.25)  # 3 s after 0.3 s, or a share of both
+        assert rests[2] / rests[0] == pytest.approx(10.0, rel=0.02)  # 3 s after 0.3 s, or a share of both
 
 
 def test_a_recording_that_overshoots_is_named() -> None:

@@ -61,6 +61,13 @@ def test_a_step_that_is_no_multiple_of_the_fmus_own_is_noted_with_both_lengths(
 
 
 @VERSIONS
+@pytest.mark.parametrize(("off", "noted"), [(0.0, False), (5e-7, False), (2e-6, True), (-2e-6, True), (1e-4, True)])
+def test_a_multiple_is_one_to_a_millionth(make: Make, version: int, off: float, noted: bool) -> None:
+    """What a decimal loses as a double is no other step; a ten-thousandth of it is."""
+    assert bool(notes(make("gain", version, **OWN[version]), 0.03 * (1 + off))) is noted
+
+
+@VERSIONS
 @pytest.mark.parametrize(("step", "every"), [(0.01, 1), (0.03, 1), (0.001, 20)])
 def test_a_step_that_is_a_multiple_is_not(make: Make, version: int, step: float, every: int) -> None:
     assert notes(make("gain", version, **OWN[version]), step, every) == []

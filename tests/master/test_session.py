@@ -50,6 +50,16 @@ def test_a_controller_in_python_acts_in_the_next_step(scenario: Path) -> None:
         assert mine["plant.y"] != given["plant.y"]
 
 
+def test_a_step_is_one_tick_unless_it_is_said_how_many(scenario: Path) -> None:
+    with cosim.open(scenario) as session:
+        session.step()
+        assert session.tick == 1
+        session.step(3)
+        assert session.tick == 4
+        session.step(0)
+        assert session.tick == 4
+
+
 def test_an_input_without_a_wire_keeps_what_it_is_given(scenario: Path) -> None:
     with cosim.open(scenario) as session:
         session["plant.b"] = 0.25

@@ -12,7 +12,7 @@ from fmpy.simulation import instantiate_fmu
 from cosim.api.export import export
 from pyfmi_models.card import read_card
 from pyfmi_models.errors import ExportError
-from pyfmi_models.export.c_function import c_files
+from pyfmi_models.export.c_function import c_files, export_c
 
 STRICT = ("-std=c99", "-pedantic", "-Wall", "-Wextra", "-Werror", "-O2", "-ffp-contract=off")
 STEP, ROWS = 2.0**-9, 400
@@ -88,3 +88,16 @@ def test_a_step_that_is_none_changes_nothing_and_says_so(tmp_path: Path) -> None
 def test_a_controller_is_no_joint() -> None:
     with pytest.raises(ExportError, match="sampled"):
         c_files(read_card("paper_mount").controller_model())
+
+
+def test_files_that_are_there_are_only_replaced_with_force(tmp_path: Path) -> None:
+    model = read_card("paper_mount").plant().model()
+    export_c(model, tmp_path / "c")
+    source = next((tmp_path / "c").glob("detmath.c"))
+    whole = source.read_bytes()
+    source.write_text("mine")
+    with pytest.raises(ExportError, match="exists; use force"):
+        export_c(model, tmp_path / "c")
+    assert source.read_text() == "mine"
+    export_c(model, tmp_path / "c", force=True)
+    assert source.read_bytes() == whole

@@ -52,8 +52,8 @@ def test_a_near_side_that_stops_is_left_for_as_long_as_the_gap_is_wide() -> None
     met = t[np.flatnonzero((t > 1.01) & (np.abs(passed) > 1e-3))[0]] - 1
     assert met == pytest.approx((0.1 - np.sqrt(0.1**2 - 2 * 0.05 * 0.02)) / 0.05, abs=5e-3)
     caught = t > 1.01
-    # What it still had of speed goes, and does not come back: the contact is well damped.
-    assert DT * passed[caught].sum() == pytest.approx(-FAR * (0.1 - 0.05 * met), rel=0.3)
+    # What it still had of speed goes; the contact is well damped, so that at most a fifth of it comes back.
+    assert 1.0 < DT * passed[caught].sum() / (-FAR * (0.1 - 0.05 * met)) < 1.2
 
 
 @pytest.mark.parametrize("rows", [1, 2, 5])
@@ -96,4 +96,4 @@ def test_a_concealed_play_is_named_with_its_gap(tmp_path: Path) -> None:
     play = next(effect for effect in found.card.effects if isinstance(effect, Backlash))
     true = case.truth["effects"][0]["parameters"]
     assert play.gap_rad == pytest.approx(true["gap_rad"], rel=0.1)
-    assert play.load_share == pytest.approx(true["load_share"], rel=0.25)
+    assert play.load_share == pytest.approx(true["load_share"], rel=0.1)

@@ -4,16 +4,20 @@ Between a late torque and a late reading the reading's own lag behind the set po
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.effects.timing_attribution import attributed, reading_lag
 from cosim.diagnosis.search.instrumental_variable import DECISIVE, misfits_of
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Prepared, prepare
-from pyfmi_models.effects import ActuatorLag, Delay
+from pyfmi_models.effects import ActuatorLag, Delay, Effect
+from pyfmi_models.effects.clock_skew import ClockSkew
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
@@ -83,3 +87,18 @@ def test_a_loop_that_trails_by_itself_leaves_it_open_as_does_a_set_point_that_wa
     blind = replace(prepared, pieces=tuple(replace(piece, extras={}) for piece in prepared.pieces))
     assert attributed(blind, 5e-3, 1e-3) == "either"
     assert attributed(blind, 0.5e-3, 1e-3) == "drive"
+
+
+@pytest.mark.parametrize(
+    ("effect", "seconds"),
+    [
+        (Delay(delay_ms=4.0), 4e-3),
+        (ActuatorLag(time_constant_ms=6.0), 6e-3),
+        (ClockSkew(offset_ms=-5.0, drift_ppm=0.0), 5e-3),
+        (ClockSkew(offset_ms=5.0, drift_ppm=0.0), None),  # the reading is early
+        (ClockSkew(offset_ms=-5.0, drift_ppm=-100.0), 7e-3),  # 4 ms in 40 s, 2 ms in their middle
+    ],
+)
+def test_what_makes_a_torque_late_says_by_how_many_seconds(effect: Effect, seconds: float | None) -> None:
+    problem: Any = SimpleNamespace(seconds=40.0, sample_time=1e-3)
+    assert hypothesis_of(effect).late(problem, effect) == (None if seconds is None else pytest.approx(seconds))

@@ -41,7 +41,7 @@ def band_limited(given: Prepared, low: float, high: float, seed: int = 2) -> Arr
 def test_a_trembling_floor_is_told_with_level_and_band() -> None:
     given = prepared()
     found = shaken(given, 0.3 * band_limited(given, 3, 6), 1.0, BANDS)
-    assert found.level == pytest.approx(0.3, rel=0.15)
+    assert found.level == pytest.approx(0.3, rel=0.1)
     assert 0.5 * found.level < found.least < found.level
     assert (found.low, found.high) == (pytest.approx(3, abs=0.5), pytest.approx(6, abs=0.7))
 

@@ -76,4 +76,6 @@ def test_the_band_of_the_torque_is_that_of_two_passes_wherever_the_motion_is_rea
     narrow, wide = (prepare(RUNS, Band(10.0, motion)).pieces[0] for motion in (0.0, 28.0))
     assert narrow.gain(10.0) == pytest.approx(0.25, rel=0.01)
     assert wide.gain(10.0) == pytest.approx(0.25, rel=0.01)
-    assert len(wide.kept) == pytest.approx(len(narrow.kept), rel=0.2)
+    assert 0.88 * len(narrow.kept) < len(wide.kept) < len(narrow.kept), (
+        "a tenth more lies beside the ends of a filter more"
+    )

@@ -42,7 +42,7 @@ def worth(more: float, weight: float, policy: Policy = POLICY) -> float:
 def test_what_explains_slow_motion_is_worth_the_same_whatever_inertia_fast_motion_has() -> None:
     alike = worth(0.0, 2.0)
     assert alike > 100
-    assert worth(0.03, 2.0) == pytest.approx(alike, rel=0.3)
+    assert worth(0.03, 2.0) == pytest.approx(alike, rel=0.15)  # 11 % more: the noise is another
 
 
 def test_without_that_freedom_it_would_pay_for_the_fast_motion() -> None:

@@ -93,7 +93,7 @@ def test_the_formula_of_what_was_missing_is_proposed_in_the_place_of_its_table()
     assert "exp(−((q − centre)/width)²)" in said["equation"]
     assert numbers["width"] == pytest.approx(0.15, rel=0.1)
     assert -numbers["k1"] / numbers["k2"] == pytest.approx(20.0, abs=0.5)
-    assert numbers["k2"] == pytest.approx(0.075, rel=0.15)
+    assert numbers["k2"] == pytest.approx(0.075, rel=0.08)
 
 
 def test_what_a_drive_holds_back_is_told_over_the_command_that_the_model_needs() -> None:
@@ -125,7 +125,8 @@ def test_what_is_sure_but_a_small_share_of_the_rest_or_of_a_name_does_not_say_un
 def test_the_size_of_a_term_is_that_of_what_was_missing() -> None:
     found = learned(iron)
     assert found is not None
-    assert found.size == pytest.approx(1.0, rel=0.35)  # the base gives a part of its Coulomb level
+    # A quarter more than the 1.0 N m that were planted, as its table goes; a factor of 1.1 more or less is noticed.
+    assert found.size == pytest.approx(1.25, rel=0.1)
 
 
 @pytest.mark.parametrize("extra", [nothing, wanders])

@@ -197,4 +197,5 @@ def test_noise_is_measured_at_each_speed_and_not_by_what_is_there_for_a_while() 
     rng, speed = np.random.default_rng(0), np.linspace(0, 1, 8000)
     left = (1 + 4 * speed) * rng.standard_normal(8000)
     left[rng.random(8000) < 0.1] *= 30
-    assert noise_at(speed, left, np.array([0.1, 0.9])) == pytest.approx([1.4, 4.6], rel=0.25)
+    # A tenth of the rows that is far off moves a median of sizes by 12 %; a bin of some hundred knows it to 5 %.
+    assert noise_at(speed, left, np.array([0.1, 0.9])) == pytest.approx(1.12 * np.array([1.4, 4.6]), rel=0.1)
