@@ -9,15 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from browsing import PATIENCE, browser, check_by_axe
+from browsing import PATIENCE, VIEWS, browser, check_by_axe
 from commands import call, scenario
-from report_example import diagnosis
+from report_example import report_of
 from tiny_fmu import tiny
 
 from cosim.data.recording import Recording
 from cosim.investigation.page import write_page
 from cosim.investigation.story import Answered, Moved, Story
-from cosim.report import render
 from pyfmi_models.card import read_card
 from pyfmi_models.export.codegen import generate
 from pyfmi_models.export.documentation import documentation
@@ -133,18 +132,20 @@ def test_a_picture_of_correlations_says_what_its_colours_mean() -> None:
 
 
 REPORTS = {
-    "two": ("two", "rotary"),
-    "none": ("none", "rotary"),
-    "unknown": ("unknown", "rotary"),
-    "linear": ("two", "linear"),
+    "two": ("two", "rotary", VIEWS),
+    "none": ("none", "rotary", VIEWS[:1]),
+    "unknown": ("unknown", "rotary", VIEWS[2:]),
+    "linear": ("two", "linear", VIEWS[1:2]),
 }
+"""Styles and widths are those of one template: each way of looking at one report, each other report in one way."""
 
 
 @pytest.mark.parametrize("kind", REPORTS)
 def test_axe_finds_nothing_in_a_report_on_a_desk_on_a_phone_or_in_the_dark(
     browser: Any, kind: str, tmp_path: Path
 ) -> None:
-    check_by_axe(browser, render(diagnosis(*REPORTS[kind])), tmp_path)
+    *which, views = REPORTS[kind]
+    check_by_axe(browser, report_of(*which), tmp_path, views)
 
 
 @pytest.mark.parametrize("part", ["plant", "controller"])
@@ -167,7 +168,7 @@ def test_axe_finds_nothing_in_the_page_of_an_investigation(browser: Any, tmp_pat
 
 def test_a_report_is_small_and_soon_ready(browser: Any, tmp_path: Path) -> None:
     """Time of the page's own thread on a processor, so that other work on this machine does not count."""
-    html = render(diagnosis("two"))
+    html = report_of("two")
     assert len(html.encode()) <= 1_000_000
     (tmp_path / "report.html").write_text(html, "utf-8")
     page = browser.new_page(viewport={"width": 1280, "height": 800})
@@ -182,7 +183,7 @@ def test_a_report_is_small_and_soon_ready(browser: Any, tmp_path: Path) -> None:
 
 
 def test_the_explorer_has_at_least_three_ticks_on_each_side(browser: Any, tmp_path: Path) -> None:
-    (tmp_path / "report.html").write_text(render(diagnosis("two")), "utf-8")
+    (tmp_path / "report.html").write_text(report_of("two"), "utf-8")
     page = browser.new_page(viewport={"width": 390, "height": 844})
     page.set_default_timeout(PATIENCE)
     page.add_init_script(
@@ -200,7 +201,7 @@ def test_the_explorer_has_at_least_three_ticks_on_each_side(browser: Any, tmp_pa
 
 
 def test_no_printed_page_holds_a_single_row(browser: Any, tmp_path: Path) -> None:
-    (tmp_path / "report.html").write_text(render(diagnosis("two")), "utf-8")
+    (tmp_path / "report.html").write_text(report_of("two"), "utf-8")
     page = browser.new_page()
     page.set_default_timeout(PATIENCE)
     page.goto((tmp_path / "report.html").as_uri())
@@ -216,7 +217,7 @@ def test_no_printed_page_holds_a_single_row(browser: Any, tmp_path: Path) -> Non
 
 def test_what_a_sign_of_a_legend_means_is_printed_too(browser: Any, tmp_path: Path) -> None:
     """A browser prints no backgrounds unless it is told to, and some signs are nothing else."""
-    (tmp_path / "report.html").write_text(render(diagnosis("two")), "utf-8")
+    (tmp_path / "report.html").write_text(report_of("two"), "utf-8")
     page = browser.new_page()
     page.goto((tmp_path / "report.html").as_uri())
     page.emulate_media(media="print")

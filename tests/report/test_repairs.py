@@ -8,7 +8,7 @@ from typing import get_args
 import pytest
 from effect_examples import EXAMPLES
 from plain_words import unplain
-from report_example import FOUND, REST, diagnosis
+from report_example import FOUND, REST, diagnosis, report_of
 
 from cosim.api.show import show
 from cosim.diagnosis.effects import TRIED
@@ -49,7 +49,7 @@ def test_kinds_of_machines_are_those_of_a_card() -> None:
 
 
 def test_the_report_has_checks_and_the_repairs_that_fit_the_motion() -> None:
-    html = render(diagnosis("two"))
+    html = report_of("two")
     known = repairs_of("friction_asymmetry")
     assert known
     assert all(check.do.split(",")[0] in html for check in known.checks)
@@ -64,7 +64,7 @@ def test_a_card_that_names_the_machine_has_its_repair_on_first_screen_and_termin
     whole = replace(diagnosis("two"), provenance=made | {"card": made["card"] | {"machine": "harmonic_drive"}})  # type: ignore[typeddict-item]
     assert "Check the brake&#39;s air gap and the output seal" in render(whole).split("<h2>Findings")[0]
     assert "Friction asymmetry: check the brake's air gap" in summary(whole)
-    assert "Check clamp brake and lip seal" in render(diagnosis("two"))
+    assert "Check clamp brake and lip seal" in report_of("two")
 
 
 def test_show_tells_an_effect_and_of_a_slip_the_one_that_was_meant() -> None:

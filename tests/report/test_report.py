@@ -9,13 +9,13 @@ import sys
 import time
 import zlib
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from report_example import FOUND, REST, RIVALS, diagnosis
+from report_example import report_of as page
 
 from cosim.diagnosis.effects import TRIED
 from cosim.diagnosis.measure.breakdown import part, samples
@@ -25,12 +25,6 @@ from cosim.report.explorer import payload
 from cosim.report.quantities import Scales
 from cosim.report.tables import numbers
 from cosim.report.terminal import summary
-
-
-@cache
-def page(kind: str = "two", motion: str = "rotary") -> str:
-    return render(diagnosis(kind, motion))
-
 
 CASES = [("two", "rotary"), ("none", "rotary"), ("unknown", "rotary"), ("two", "linear")]
 KINDS = pytest.mark.parametrize(("kind", "motion"), CASES)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from learned_told import TOLD
-from report_example import diagnosis
+from report_example import diagnosis, report_of
 
 from cosim.diagnosis.answer.result import Diagnosis
 from cosim.report import render
@@ -55,7 +55,7 @@ def test_a_model_with_a_table_is_not_called_unchanged() -> None:
 
 @pytest.mark.parametrize("kind", ["two", "none", "unknown"])
 def test_where_nothing_was_asked_nothing_is_said(kind: str) -> None:
-    assert 'class="nameless"' not in render(diagnosis(kind))
+    assert 'class="nameless"' not in report_of(kind)
 
 
 def test_a_table_that_does_not_help_is_said_to_be_left_out() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 import pytest
-from report_example import FOUND, REST, RIVALS, diagnosis
+from report_example import FOUND, REST, RIVALS, diagnosis, report_of
 from report_text import text_of
 
 from cosim.delivery.deliver import as_json, chosen_of_sets
@@ -229,11 +229,11 @@ def test_the_terminal_begins_with_the_verdict_what_to_do_and_the_file_to_open() 
 
 @pytest.mark.parametrize("kind", ["two", "none", "unknown"])
 def test_at_most_900_words_stand_before_anything_is_unfolded(kind: str) -> None:
-    assert len(text_of(render(diagnosis(kind))).split()) <= 900
+    assert len(text_of(report_of(kind)).split()) <= 900
 
 
 def test_what_the_first_screen_says_is_not_said_again() -> None:
-    read = text_of(render(diagnosis("two")))
+    read = text_of(report_of("two"))
     for said in (
         "Turning forward takes 0.26 N·m more than backward.",
         "Check clamp brake and lip seal",
@@ -251,18 +251,18 @@ def test_doubts_about_the_recordings_stand_before_the_answer() -> None:
 
 
 def test_a_held_out_recording_and_the_noise_have_swatches_of_their_own() -> None:
-    html = render(diagnosis("two"))
+    html = report_of("two")
     assert '<span class="noise">noise band, 95 %</span><span class="held">not used for fitting</span>' in html
 
 
 def test_the_explorer_has_a_legend() -> None:
-    explorer = render(diagnosis("two")).split('id="explorer"')[1].split("<canvas")[0]
+    explorer = report_of("two").split('id="explorer"')[1].split("<canvas")[0]
     for said in ("measured", "before, refitted", "with the two effects", "not used for fitting"):
         assert f">{said}</span>" in explorer
 
 
 def test_figures_take_their_colours_from_the_page_which_may_be_dark() -> None:
-    html = render(diagnosis("two"))
+    html = report_of("two")
     figures: Any = re.findall(r"<svg.*?</svg>", html, re.S)
     assert "prefers-color-scheme: dark" in html
     assert all(not re.search("#1a1a1a|#cc6a00|#00558c|#ffffff", one) for one in figures if " plate" not in one[:200])

@@ -98,11 +98,14 @@ def violations(page: Page, script: str) -> list[tuple[str, str, list[str]]]:
     return [(one["id"], one["impact"], [node["html"][:120] for node in one["nodes"]]) for one in found]
 
 
-def check_by_axe(browser: Any, html: str, folder: Path) -> None:
+VIEWS = ((SIZES["desk"], "light"), (SIZES["phone"], "light"), (SIZES["desk"], "dark"))
+
+
+def check_by_axe(browser: Any, html: str, folder: Path, views: Sequence[tuple[tuple[int, int], Any]] = VIEWS) -> None:
     """Nothing is found, and nothing is wider than the screen, with everything unfolded."""
     script = axe_script()
     (folder / "page.html").write_text(html, "utf-8")
-    for (width, height), scheme in ((SIZES["desk"], "light"), (SIZES["phone"], "light"), (SIZES["desk"], "dark")):
+    for (width, height), scheme in views:
         page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme, bypass_csp=True)
         page.set_default_timeout(PATIENCE)
         page.goto((folder / "page.html").as_uri())

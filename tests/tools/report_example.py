@@ -7,6 +7,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.result import Diagnosis, Finding, HeldOut, Region, Trace, Where
 from cosim.diagnosis.measure.breakdown import parts
+from cosim.report import render
 
 RATE, SECONDS = 1000, 60
 FLOOR = 0.16
@@ -150,3 +151,9 @@ def diagnosis(kind: str = "two", motion: Any = "rotary", mount: str = "C1 rotary
         provenance=PROVENANCE, seconds=12.3,
         improved={"card": "card.toml", "fmu": "mount_improved.fmu", "speed": [0.35, 1.57]} if kind == "two" else {},
     )  # fmt: skip
+
+
+@cache
+def report_of(kind: str = "two", motion: Any = "rotary") -> str:
+    """Its report, made once: pictures take a second."""
+    return render(diagnosis(kind, motion))
