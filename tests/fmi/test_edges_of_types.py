@@ -1,6 +1,7 @@
 """The edges of FMI's types: the least and the greatest value arrive, the next one beyond is refused."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from simulating import simulate
 
 from cosim.fmi.component import Port
 from cosim.fmi.types import limits, refusal
+from cosim.fmi.values import prepared
 from cosim.support.errors import FmuError, StepError, WiringError
 from cosim.system.conversions import check_wire
 from cosim.system.wire import Wire
@@ -139,3 +141,18 @@ def test_a_boolean_takes_zero_and_one(value: float, fits: bool, mirror: dict[int
     else:
         with pytest.raises(StepError, match="a Boolean takes 0 or 1"):
             fed(mirror, "Boolean", [0.0, value, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("value", "inside"),
+    [(True, 1.0), (False, 0.0), ("true", 1.0), ("false", 0.0), (1, 1.0), (0, 0.0), (1.0, 1.0), (0.0, 0.0)],
+)
+def test_a_boolean_parameter_is_true_or_false_as_it_is_written(value: Any, inside: float) -> None:
+    port = Port("b", 0, "parameter", type="Boolean")
+    assert prepared(port, value, "m.b") == [bool(inside)]
+
+
+@pytest.mark.parametrize("value", [2, -1, 0.5, "True", "yes", "", None])
+def test_a_boolean_parameter_that_is_neither_is_refused(value: Any) -> None:
+    with pytest.raises(FmuError, match="it must be true or false"):
+        prepared(Port("b", 0, "parameter", type="Boolean"), value, "m.b")
