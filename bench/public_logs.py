@@ -247,7 +247,11 @@ def _wrong(truth: Mapping[str, str], seen: Answer) -> dict[str, str]:
         return {}
     found: dict[str, str] = {}
     for role in ROLES:
-        if role not in seen.ranges or (role == "q_d" and not truth["q_d"]):
+        if role not in seen.ranges:
+            if truth[role] and (role in ("tau", "q") or (role == "v" and not truth["q"])):
+                found[role] = f"{role} is not served"
+            continue
+        if role == "q_d" and not truth["q_d"]:
             continue
         low, high = seen.ranges[role]
         if not truth[role]:

@@ -72,22 +72,38 @@ def preview(path: Path, options: Mapping[str, Mapping[str, str]] | None = None) 
 
 
 def _judged(path: Path, own: str, found: Columns, said: Options, undecided: tuple[str, ...]) -> Preview:
-    refused, name = "", named(path)
-    required: tuple[str, ...] = REQUIRED
+    """The file as an axis; else as what it holds of one: a torque or a position without the other, or a table."""
     try:
-        timed = rows_of_one(path, found, said["columns"], said["units"], said["layout"], required)
-        recording = Recording.judged(path, name, timed, own, said["columns"], said["units"], required)
+        return _read(path, own, found, said, undecided, REQUIRED)
     except (UndecidedError, ManyRecordingsError):
         raise
     except RecordingError as error:
-        refused, required = str(error), ()
-        there = {"t", *found.values, *said["columns"]}  # a table has our names only where they are given
-        said = said | {"units": {ours: text for ours, text in said["units"].items() if ours in there}}
-        timed = rows_of_one(path, found, said["columns"], said["units"], said["layout"], required)
+        refused = str(error)
+    there = {"t", *found.values, *said["columns"]}  # a table has our names only where they are given
+    said = said | {"units": {ours: text for ours, text in said["units"].items() if ours in there}}
+    for rule in REQUIRED:
+        try:
+            return _read(path, own, found, said, undecided, (rule,), refused)
+        except RecordingError:
+            continue
+    return _read(path, own, found, said, undecided, (), refused)
+
+
+def _read(
+    path: Path,
+    own: str,
+    found: Columns,
+    said: Options,
+    undecided: tuple[str, ...],
+    required: tuple[str, ...],
+    refused: str = "",
+) -> Preview:
+    timed = rows_of_one(path, found, said["columns"], said["units"], said["layout"], required)
+    if refused:
         table = assign(path, timed, said["columns"], said["units"], required)
         if "t" in table.values:
             check_slow(path, table.values["t"], table.sources["t"], table.units.get("t", ""))
-        recording = Recording.judged(path, name, timed, own, said["columns"], said["units"], required)
+    recording = Recording.judged(path, named(path), timed, own, said["columns"], said["units"], required)
     served = assign(path, timed, said["columns"], said["units"], required)
-    served = with_speed(path, timed, served, said["units"]) if required else served
+    served = with_speed(path, timed, served, said["units"]) if required == REQUIRED else served
     return Preview(recording, timed, served.sources, said, undecided, refused)
