@@ -9,6 +9,7 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.first_card import FirstCard, Motion, Number, first_card
 from cosim.plots.quantities import number
 from cosim.reading import check_kind
+from cosim.support.errors import InputError
 from cosim.support.files import check_free, replacing
 from cosim.support.html import text as html_text
 from cosim.support.plain import JsonObject
@@ -113,12 +114,23 @@ def card(
     taken = read_all(recordings, "recording", columns, units, layout)
     kind, assumed = kind_of(taken, motion)
     check_kind(taken, kind)
+    _check_once(taken)
     found = first_card(taken, kind, inertia, on_progress)
     notes = ((assumed,) if assumed else ()) + found.notes
     made = CardResult(found, _card(found, taken), notes)
     if file is not None:
         made.write(file, force)
     return made
+
+
+def _check_once(recordings: Sequence[Recording]) -> None:
+    """Refuse a file that is given twice: it would tell everything more precisely than it does (InputError)."""
+    seen: dict[tuple[str, str], str] = {}
+    for one in recordings:
+        if one.sha256 and one.identity in seen:
+            text = f"{one.name} and {seen[one.identity]} are the same recording; give each once."
+            raise InputError(text, culprit=one.name)
+        seen[one.identity] = one.name
 
 
 def kind_of(recordings: Sequence[Recording], motion: str) -> tuple[Motion, str]:
@@ -143,7 +155,7 @@ def _card(found: FirstCard, recordings: Sequence[Recording]) -> Card:
     section = MountSection(name=recordings[0].name, motion=mount.motion, inertia=float(mount.axis.inertia))
     origin = {"estimated_by": f"mount-cosim {__version__}", "recordings": [one.name for one in recordings]}
     return Card(
-        path=recordings[0].name,
+        path="the estimated card",
         mount=section,
         friction=mount.friction,
         unbalance=loads[0] if loads else None,

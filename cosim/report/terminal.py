@@ -30,7 +30,11 @@ from cosim.report.words import (
 
 WIDTH = 80
 REPORT = "report.html"
-WORDS = {"found": ANSWERS["found"].lower(), "ambiguous": ANSWERS["ambiguous"].lower(), "not_proven": "unproven"}
+WORDS = {
+    "found": ANSWERS["found"].lower(),
+    "ambiguous": ANSWERS["ambiguous"].lower(),
+    "not_proven": ANSWERS["not_proven"].lower(),
+}
 NAME, SIZE, RANGE = 21, 12, 16
 REMARKS = 3
 """Remarks on recordings and card that the terminal prints."""

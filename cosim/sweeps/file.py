@@ -22,6 +22,12 @@ OWN = ("run", "seconds", "status", "reason")
 """Columns of every table."""
 
 
+KEPT = (
+    ' It says what is kept of each run, for example: [statistics] error = { signal = "q_d", minus = "q", kind = "rms" }'
+)
+"""What to write where nothing is kept."""
+
+
 class _File(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
@@ -78,7 +84,9 @@ def read_sweep(path: Path) -> Sweep:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise SweepError(f"{path} is not valid TOML: {error}.", culprit=str(path)) from error
     except ValidationError as error:
-        raise SweepError(**complaint(error, str(path), "a sweep", _keys)) from error
+        said = complaint(error, str(path), "a sweep", _keys)
+        said["message"] += KEPT if said["message"].endswith('"statistics" is missing.') else ""
+        raise SweepError(**said) from error
     variations = {name: _variation(name, given, path) for name, given in raw.vary.items()}
     _check_names(path, variations, raw.statistics)
     beside = path.parent / raw.scenario

@@ -40,6 +40,8 @@ def whole(time: float, step: float, path: str, key: str) -> int:
     if ticks > COUNT:
         message = f"{path}: {key} = {time:g} s is {ticks:.3g} steps of {step:g} s; {COUNT:,} can be counted."
         raise ScenarioError(message, culprit=key, value=time)
+    if time <= 0:
+        raise ScenarioError(f"{path}: {key} = {time:g} must be above 0 s.", culprit=key, value=time)
     if ticks < 1 or abs(time / step - ticks) > 1e-6 * ticks:
         raise ScenarioError(
             f"{path}: {key} = {time} is not a whole number of steps of {step} s.", culprit=key, value=time

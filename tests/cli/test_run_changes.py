@@ -53,7 +53,7 @@ def test_the_command_takes_several_numbers_and_a_stop(scenario: Path, capsys: py
         (["--set", "controller.k=soft"], "--set controller.k=soft: it must be a number, true or false."),
         (["--set", "controller.k=1", "--set", "controller.k=2"], "--set controller.k is given twice"),
         (["--stop", "0.2505"], "stop = 0.2505 is not a whole number of steps of 0.001 s."),
-        (["--stop", "-1"], "stop = -1.0 is not a whole number of steps"),
+        (["--stop", "-1"], "stop = -1 must be above 0 s."),
     ],
 )
 def test_what_cannot_be_set_is_one_sentence(

@@ -139,3 +139,10 @@ def test_over_a_short_way_a_weight_and_a_constant_are_one_and_over_a_long_way_bo
     assert float(long.unbalance.mgl) == pytest.approx(4.0, rel=0.05)
     (offset,) = long.effects
     assert float(offset.torque) == pytest.approx(1.0, rel=0.05)  # type: ignore[attr-defined]
+
+
+def test_a_recording_that_is_given_twice_is_refused_and_an_estimated_card_is_called_so() -> None:
+    once = table(8)
+    with pytest.raises(InputError, match="recording 2 and recording 1 are the same recording; give each once"):
+        cosim.card([once, once.copy()], motion="rotary")
+    assert cosim.card(once, motion="rotary").card.path == "the estimated card"

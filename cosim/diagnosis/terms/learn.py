@@ -99,11 +99,11 @@ class Learned:
 
     def sentence(self) -> str:
         """Say it to a mechanic."""
-        depends, (low, high) = ", and on ".join(self.quantities), self.interval
-        error = f"held-out error {self.before:.2g} → {self.after:.2g} {self.unit}"
+        depends, (low, high) = ", and ".join(self.quantities), self.interval
+        error = f"validation error {self.before:.2g} → {self.after:.2g} {self.unit}"
         if not self.helps:
             return (
-                f"A table over {depends} was tried outside the catalogue and is not in the model: {error}, "
+                f"A lookup table over {depends} was tried for the rest and is not in the model: {error}, "
                 "not clearly less, or more on one recording."
             )
         said = f"Something that depends on {depends}, {self.size:.2g} {self.unit}; modelled as a table"
