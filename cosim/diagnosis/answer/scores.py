@@ -41,6 +41,8 @@ class TermScores:
     """Share of the training residual energy that it removes which it removes away from turns."""
     plain: float = 1.0
     """Share of the training residual energy that it removes."""
+    uneven: float | None = None
+    """Of the friction level over position: what it moves the level by, relative to it (RMS)."""
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import exp
+from math import exp, sqrt
 
 from cosim.diagnosis.answer.ledger import Rule, all_pass
 from cosim.diagnosis.answer.scores import EffectScores, LearnedScores, ResidualScores, Scores, TermScores
@@ -50,6 +50,8 @@ def decide(scores: Scores, policy: Policy) -> Decision:
     """
     found, learned = _of_rest(scores.effects, scores.rest, policy), scores.learned
     if found.is_unknown or not learned or not _says_unknown(learned, least_left(scores.effects, policy), policy):
+        return found
+    if set(learned.quantities) <= of_any_machine(scores.rest, policy):
         return found
     return beside_rest(scores.effects, learned.quantities, policy)
 
@@ -191,10 +193,12 @@ def rest_rules(effects: Sequence[EffectScores], residual: ResidualScores, policy
     )
     for name, value, limit in shares:
         yield Rule(name, value > limit, value, limit)
-    yield Rule("another cause explains more than a name", bool(residual.in_place), note=", ".join(residual.in_place))
+    causes = _in_place(residual, policy)
+    yield Rule("another cause explains more than a name", bool(causes), note=", ".join(causes))
     doubtful = doubted(effects, residual, policy)
     least = least_left([one for one in effects if one.effect not in doubtful], policy)
-    for term in residual.terms:
+    slight = of_any_machine(residual, policy)
+    for term in (one for one in residual.terms if one.name not in slight):
         outcome, limit = _is_no_misfit(term, least, policy), max(least, _floor_of(term, policy))
         yield Rule(f"error follows {term.name}", outcome, term.evidence, limit, "nats")
 
@@ -214,6 +218,18 @@ def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:
     return term.evidence >= max(least, _floor_of(term, policy))
 
 
+def of_any_machine(residual: ResidualScores, policy: Policy) -> set[str]:
+    """Terms of a friction level that is no more uneven than any machine's; a wave's RMS is its amplitude by sqrt 2."""
+    least = policy.least_uneven / sqrt(2)
+    return {term.name for term in residual.terms if term.uneven is not None and term.uneven < least}
+
+
+def _in_place(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
+    """What explains more than a name did, and is more than any machine has."""
+    slight = of_any_machine(residual, policy)
+    return tuple(name for name in residual.in_place if name not in slight)
+
+
 def _floor_of(term: TermScores, policy: Policy) -> float:
     """Evidence that a term must have: the less, the more the held-out recordings agree."""
     if term.share >= policy.follows:
@@ -228,8 +244,8 @@ def _floor_of(term: TermScores, policy: Policy) -> float:
 
 def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
     """Quantities that the residual follows elsewhere, the best first; where there is none, how it goes over time."""
-    if residual.in_place:
-        return residual.in_place
+    if causes := _in_place(residual, policy):
+        return causes
     best = max((one.share for one in residual.terms), default=0.0)
     least = max(policy.follows, policy.halved * best)
     ranked = sorted(residual.terms, key=lambda one: -one.share)

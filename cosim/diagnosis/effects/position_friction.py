@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from cosim.diagnosis.answer.result import Where
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.base import (
     Hypothesis,
     Reach,
@@ -65,6 +66,15 @@ class FrictionRipple(Hypothesis[PeriodicFriction]):
         """At all positions."""
         return visited(reach)
 
+    def is_plausible(self, effect: PeriodicFriction, mount: Mount) -> bool:
+        """The largest of its waves is more than any machine is uneven by."""
+        waves = [one for one in mount.effects if isinstance(one, PeriodicFriction)]
+        return max(float(one.relative_amplitude) for one in (effect, *waves)) >= POLICY.least_uneven
+
+    def least(self, sample_time: float) -> float:
+        """What any machine is uneven by."""
+        return POLICY.least_uneven
+
     def is_settled(self, mount: Mount) -> bool:
         """Never: there may be further waves."""
         return False
@@ -99,6 +109,10 @@ class RoughSpot(Hypothesis[LocalFriction]):
     def shows(self, effect: LocalFriction, mount: Mount, prepared: Prepared) -> bool:
         """A spot that the contact bends across, or that no recording resolves, is a place where the axis rested."""
         return float(effect.width) >= max(bend(mount.friction), least_way(prepared))
+
+    def is_plausible(self, effect: LocalFriction, mount: Mount) -> bool:
+        """It is more than any machine is uneven by."""
+        return abs(float(effect.relative_amplitude)) >= POLICY.least_uneven
 
     def where(self, effect: LocalFriction, reach: Reach) -> Where:
         """Two widths to each side of its centre."""

@@ -10,6 +10,10 @@ from cosim.estimation.fit import Fit
 from cosim.estimation.least_squares import projected
 from cosim.estimation.prepare import Array
 from cosim.estimation.residuals import away_from_turns
+from cosim.support.statistics import rms
+
+LEVEL = "friction level over position"
+"""Name of the term of a friction level that is not the same everywhere."""
 
 
 def flexible_terms(comparison: Comparison, found: Fit, held: Predictive) -> list[TermScores]:
@@ -30,6 +34,7 @@ def _scored(
     problem = comparison.problem
     columns = term.columns(problem.prepared)
     evidence, beta = comparison.group(found, columns)
+    uneven = _uneven(comparison, columns @ beta) if name == LEVEL else None
     pair = np.column_stack([found.residual, found.residual - columns @ beta])
     without, with_it = projected(pair * problem.weight[:, None], found.slopes * problem.weight[:, None]).T
     away = away_from_turns(problem, with_it, without)
@@ -39,4 +44,10 @@ def _scored(
     # The base was bent to what is missing in training, so its own parameters are free beside what is predicted.
     left = projected(np.column_stack([residual, after]) * held.weight[:, None], slopes * held.weight[:, None])
     before, now = (left**2).sum(0)
-    return TermScores(name, evidence, gain, 1 - float(now) / max(float(before), 1e-300), away, plain)
+    return TermScores(name, evidence, gain, 1 - float(now) / max(float(before), 1e-300), away, plain, uneven)
+
+
+def _uneven(comparison: Comparison, torque: Array) -> float:
+    """Torque of a term of the friction level, relative to that level, both RMS over the rows that count."""
+    counted = comparison.problem.weight > 0
+    return rms(torque[counted]) / max(rms(comparison.nuisances.level[counted]), 1e-300)
