@@ -51,7 +51,7 @@ def limits(diagnosis: Diagnosis, scales: Scales) -> Table:
         for finding in (one for one in diagnosis.findings if one.answer == answer):
             groups.setdefault((answer, _from(finding, least)), []).append(finding)
     rows = [(_titles(group), ANSWERS[answer], said) for (answer, said), group in groups.items()]
-    return Table(("Effect", "Answer", "Would have shown from"), tuple(rows))
+    return Table(("Effect", "Answer", "Would have shown from"), tuple(rows), (), "stack named limits")
 
 
 def _titles(group: Sequence[Finding]) -> str:

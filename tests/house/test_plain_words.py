@@ -12,6 +12,7 @@ from typer.main import get_command
 
 import cosim
 from cosim.cli import VERBS, application
+from cosim.diagnosis.effects.base import UNSEEN
 from cosim.report import render
 from cosim.report.terminal import summary
 from pyfmi_models.effects import FORMS
@@ -42,6 +43,7 @@ def test_the_help_of_a_verb_is_in_plain_words(verb: str) -> None:
 
 
 def test_what_is_said_of_effects_is_in_plain_words() -> None:
+    assert not unplain(UNSEEN)
     for form in FORMS:
         assert not unplain(f"{form.title} {form.action} {form.action_linear} {form.told_apart_by} {form.to_record}")
     for effect in EXAMPLES:

@@ -212,7 +212,7 @@ HELD = "the model has it already"
 NO_FRICTION = "the card says that there is no friction"
 NO_POSITION = "no position was recorded"
 NOT_DETERMINED = "these recordings do not determine what it is a share of, the"
-UNSEEN = "no size of it would have shown in these recordings"
+UNSEEN = "these recordings do not excite it"
 RESTLESS = "a friction law that says nothing about rest cannot tell it from"
 """Reasons why an effect cannot be tested; the last one goes on with the effect that was found."""
 

@@ -83,7 +83,7 @@ def test_without_a_bound_the_reason_stands_in_place_of_the_band(prepared: Prepar
     finding = _absent("cogging", None, ROTARY, prepared, "")
     assert finding.bound is not None
     assert (finding.answer, finding.bound.value) == ("not_testable", None)
-    assert finding.evidence == finding.bound.reason == "no size of it would have shown in these recordings"
+    assert finding.evidence == finding.bound.reason == "these recordings do not excite it"
 
 
 def concealed(effect: Effect, prepared: Prepared, mount: Mount = ROTARY) -> list[float]:

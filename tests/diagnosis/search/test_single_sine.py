@@ -83,7 +83,7 @@ def gravity(stroke: Stroke, mgl: float) -> tuple[Finding, Fit]:
 def test_a_weight_that_the_inertia_took_is_not_testable_on_a_short_sine() -> None:
     one, base = gravity(Stroke(0.1), 1.0)
     assert base.mount.axis.inertia == pytest.approx(INERTIA - 1.0 / SLOW**2, rel=0.02)
-    assert (one.answer, one.evidence) == ("not_testable", "no size of it would have shown in these recordings")
+    assert (one.answer, one.evidence) == ("not_testable", "these recordings do not excite it")
     assert one.action == "record at least half a turn, slowly, with stops"
 
 
