@@ -186,13 +186,17 @@ def _is_remark(text: str) -> bool:
     return text.lstrip().startswith(("#", "%", "//")) or not any(one.isdigit() for one in text)
 
 
+SMALL = 4_000_000
+"""Bytes that are read without threads: one that still lets go of the text while the process ends takes it down."""
+
+
 def _read(body: bytes, layout: Layout, odd: Any) -> Any:
     return csv.read_csv(
         pa.BufferReader(body),
         read_options=csv.ReadOptions(
             column_names=[str(number) for number in range(layout.count)],
             block_size=len(body) + 1,
-            use_threads=odd is None,  # rows are numbered only without threads
+            use_threads=odd is None and len(body) > SMALL,  # rows are numbered only without threads
         ),
         parse_options=csv.ParseOptions(
             delimiter="\t" if layout.separator == " " else layout.separator, invalid_row_handler=odd
