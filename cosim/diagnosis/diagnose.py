@@ -362,7 +362,7 @@ def _verdict(found: Sequence[Finding], decision: Decision) -> tuple[str, ...]:
 
 def _improved(card: Card, mount: Mount) -> Card:
     """Write the fitted numbers and the added effects into a card; a known load stays in its own section."""
-    load = mount.effects[0] if card.unbalance and isinstance(mount.effects[0], GravityUnbalance) else None
+    load = mount.effects[0] if card.unbalance and type(mount.effects[0]) is GravityUnbalance else None
     effects = [at_own_level(effect, mount) for effect in (mount.effects[1:] if load else mount.effects)]
     section = card.mount.model_copy(update={"inertia": float(mount.axis.inertia)})
     return replace(card, mount=section, friction=mount.friction, unbalance=load, effects=tuple(effects))
