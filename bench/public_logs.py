@@ -205,6 +205,8 @@ def _judge(truth: Mapping[str, str], first: Answer, last: Answer, asked: Asked, 
         return "crash", said[-200:]
     questions = {key for _, key in asked}
     wrong = _wrong(truth, first)
+    if questions and "as an axis" in first.facts:  # which channels are joined, and so its length, is still open
+        wrong.pop("t", None)
     silent = [text for key, text in wrong.items() if not ({key, *_clock(key)} & {*questions, *(k for _, k in stated)})]
     if first.ranges and silent:
         return "misread", "; ".join(silent)
@@ -248,7 +250,8 @@ def _wrong(truth: Mapping[str, str], seen: Answer) -> dict[str, str]:
     found: dict[str, str] = {}
     for role in ROLES:
         if role not in seen.ranges:
-            if truth[role] and (role in ("tau", "q") or (role == "v" and not truth["q"])):
+            needed = role in ("tau", "q") or (role == "v" and not truth["q"])
+            if truth[role] and needed and "as an axis" not in seen.facts:
                 found[role] = f"{role} is not served"
             continue
         if role == "q_d" and not truth["q_d"]:

@@ -78,14 +78,15 @@ def _judged(path: Path, own: str, found: Columns, said: Options, undecided: tupl
     except (UndecidedError, ManyRecordingsError):
         raise
     except RecordingError as error:
-        refused = str(error)
+        refused, lacking = str(error), error.value
     there = {"t", *found.values, *said["columns"]}  # a table has our names only where they are given
     said = said | {"units": {ours: text for ours, text in said["units"].items() if ours in there}}
-    for rule in REQUIRED:
+    if lacking in REQUIRED and lacking not in found.lacks:
         try:
-            return _read(path, own, found, said, undecided, (rule,), refused)
+            rest = tuple(rule for rule in REQUIRED if rule != lacking)
+            return _read(path, own, found, said, undecided, rest, refused)
         except RecordingError:
-            continue
+            pass  # then nothing of it is served
     return _read(path, own, found, said, undecided, (), refused)
 
 

@@ -68,8 +68,8 @@ class FrictionRipple(Hypothesis[PeriodicFriction]):
 
     def is_plausible(self, effect: PeriodicFriction, mount: Mount) -> bool:
         """The largest of its waves is more than any machine is uneven by."""
-        waves = [one for one in mount.effects if isinstance(one, PeriodicFriction)]
-        return max(float(one.relative_amplitude) for one in (effect, *waves)) >= POLICY.least_uneven
+        waves = [one for one in (effect, *mount.effects) if type(one) is type(effect)]
+        return max(float(getattr(one, "relative_amplitude", 0.0)) for one in waves) >= POLICY.least_uneven
 
     def least(self, sample_time: float) -> float:
         """What any machine is uneven by."""
