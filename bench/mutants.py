@@ -116,7 +116,8 @@ class Tree:
 
     def attempt(self, group: str, path: Path, number: int, more: Sequence[str] = ()) -> Tried | None:
         """Plant an error, ask tests (or those files that are named), take it back; None where it does not compile."""
-        source, module = path.read_text("utf-8"), str(path.relative_to(HOME))
+        module = str(path.relative_to(HOME))
+        source = (self.place / module).read_text("utf-8")  # the work tree may have moved on
         site, text = (mutations_c if path.suffix == ".c" else mutations).mutated(source, number)
         begun, (named, files) = monotonic(), ([], list(more)) if more else asked(path, source, site.line)
         while True:

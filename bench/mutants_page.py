@@ -58,7 +58,12 @@ def page(tried: Sequence[Tried], sample: Sample, command: str, remarks: Mapping[
         f"{len(tried)} of {sample.count} planned, in the order in which they were drawn, "
         f"{sample.seconds:g} s of tests each;"
     ]
-    lines += [f"{late} of the noticed because a test no longer ended. In brackets: 95 % intervals (Wilson).", ""]
+    lines += [f"{late} of the noticed because a test no longer ended. In brackets: 95 % intervals (Wilson)."]
+    lines += [
+        "What is equivalent counts as survived, as does what only a test notices that was written after the draw; so",
+        "the rate is a lower bound of what the whole suite notices, which is asked in that time in part.",
+        "",
+    ]
     lines += ["| room | errors | noticed | survived | rate |", "|---|--:|--:|--:|--:|", *_rows(tried, "group"), ""]
     lines += ["| kind | errors | noticed | survived | rate |", "|---|--:|--:|--:|--:|", *_rows(tried, "kind"), ""]
     lines += ["## Survivors", "", "| module | line | kind | change | what is known of it |", "|---|--:|---|---|---|"]

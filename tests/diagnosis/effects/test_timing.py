@@ -102,3 +102,21 @@ def test_a_loop_that_trails_by_itself_leaves_it_open_as_does_a_set_point_that_wa
 def test_what_makes_a_torque_late_says_by_how_many_seconds(effect: Effect, seconds: float | None) -> None:
     problem: Any = SimpleNamespace(seconds=40.0, sample_time=1e-3)
     assert hypothesis_of(effect).late(problem, effect) == (None if seconds is None else pytest.approx(seconds))
+
+
+@pytest.mark.parametrize(
+    ("effect", "trails", "degenerate"),
+    [
+        (ClockSkew(offset_ms=-5.2, drift_ppm=0.0), 5e-3, False),  # the reading trails by it: two clocks
+        (ClockSkew(offset_ms=-5.0, drift_ppm=0.0), 0.0, True),  # it does not: a drive
+        (ClockSkew(offset_ms=5.0, drift_ppm=0.0), 0.0, False),  # no torque is late
+        (Delay(delay_ms=5.2), 5e-3, True),
+        (Delay(delay_ms=5.0), 0.0, False),
+        (ActuatorLag(time_constant_ms=0.1), 0.0, True),  # less than time stamps can be trusted for
+    ],
+)
+def test_a_lag_is_no_clocks_where_it_lies_in_the_drive_and_no_drives_where_it_lies_in_the_clocks(
+    effect: Effect, trails: float, degenerate: bool
+) -> None:
+    problem: Any = SimpleNamespace(seconds=40.0, sample_time=1e-3, prepared=trailing(trails))
+    assert hypothesis_of(effect).is_degenerate(problem, effect) is degenerate

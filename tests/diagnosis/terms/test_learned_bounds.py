@@ -9,10 +9,11 @@ from test_unknown import Array, Extra, iron
 
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.terms.candidate_terms import candidate_terms, resolved
-from cosim.diagnosis.terms.grams import columns_of, with_terms
+from cosim.diagnosis.terms.grams import columns_of, grams_of, with_terms
 from cosim.diagnosis.terms.learn import _judged
 from cosim.diagnosis.terms.select import LEAST_EVIDENCE, paths
 from cosim.estimation.inverse import Inverse, stacked
+from cosim.support.statistics import rms
 from pyfmi_models.effects.learned import LearnedFriction, LearnedViscous
 from pyfmi_models.effects.learned_drive import LearnedDrive, LearnedGain
 from pyfmi_models.effects.learned_memory import LearnedHysteresis
@@ -100,3 +101,20 @@ def test_terms_need_evidence_each() -> None:
 
     assert LEAST_EVIDENCE > 5
     assert paths(Scores(), range(4)) == []
+
+
+def test_a_coefficient_that_is_a_torque_is_as_large_as_the_friction_level_and_a_share_is_one() -> None:
+    """What the search takes for size one: in the unit of the torque, or relative to the level that it changes."""
+    comparison, base, _ = parts(warm_place)
+    prepared = comparison.problem.prepared
+    terms = list(candidate_terms(base.mount, prepared))[:12]
+    grams = grams_of(comparison, base, [columns_of(base.mount, one, prepared) for one in terms], terms)
+    level = rms(comparison.nuisances.level)
+    assert {one.in_torque for one in terms} == {True, False}
+    assert level > 1.5, "of 2 N m"
+    place = 0
+    for one in terms:
+        sizes = one.prior[one.prior > 0] * (level if one.in_torque else 1.0)
+        assert grams.unit[place : place + len(sizes)] == pytest.approx(sizes)
+        place += len(sizes)
+    assert place == len(grams.unit)
