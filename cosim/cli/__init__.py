@@ -26,6 +26,7 @@ from cosim.cli.help import epilog, group_of, listed
 from cosim.cli.settings import PAIRS, Settings, read_settings
 from cosim.support.errors import CosimError, InputError
 from cosim.support.interrupts import Terminated, end_well, is_interrupted, is_terminated
+from cosim.support.suffixes import RECORDINGS
 from cosim.support.system_errors import surroundings
 from cosim.support.terminal import abandon_stdout, finish_stdout, keep_stdout, put, say
 from cosim.support.version import __version__
@@ -35,11 +36,6 @@ SEVERAL = ("--columns", "--units", "--layout", "--variables", "--limits", "--set
 """Options that may be followed by several name=value pairs."""
 NAMES = ("--free",)
 """Options that may be followed by several names, up to the next option or file."""
-SUFFIXES = (
-    *(".csv", ".gz", ".tsv", ".txt", ".log", ".dat", ".lvm", ".json", ".parquet", ".npz", ".npy"),
-    *(".mat", ".h5", ".hdf5", ".mf4", ".mcap", ".bag", ".db3"),
-)
-"""Suffixes of recordings, which no name of a parameter has."""
 INTERRUPTED, TERMINATED = 130, 143
 """Exit codes."""
 NONE = Settings()
@@ -169,7 +165,7 @@ def repeated(arguments: Sequence[str]) -> list[str]:
 def is_file(argument: str) -> bool:
     """Whether an argument names a file: one that is there, in a folder, or with the suffix of a recording."""
     path = argument.partition(":")[0]
-    return os.path.exists(path) or os.sep in argument or path.lower().endswith(SUFFIXES)
+    return os.path.exists(path) or os.sep in argument or path.lower().endswith(RECORDINGS)
 
 
 def application(arguments: Sequence[str], debug: bool = False, settings: Settings = NONE) -> typer.Typer:

@@ -21,6 +21,7 @@ from cosim.serve.job import Job
 from cosim.serve.store import UnreadableJobError
 from cosim.support.files import in_bytes
 from cosim.support.plain import Parsed
+from cosim.support.suffixes import RECORDINGS
 
 STATES = {
     "draft": "not started",
@@ -44,7 +45,7 @@ HINTS = {
     "limit": "3: three times as much",
 }
 """Examples of what a layout may say."""
-SUFFIXES = ".csv,.gz,.parquet,.mat,.h5,.hdf5,.mf4,.mcap,.db3,.txt,.log,.dat,.tsv,.lvm,.asc,.toml"
+SUFFIXES = ",".join(dict.fromkeys("." + one.rpartition(".")[2] for one in (*RECORDINGS, ".toml")))
 """Kinds of files that a file dialogue offers first."""
 CARD = """[mount]
 name = "azimuth"
