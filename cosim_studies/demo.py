@@ -49,7 +49,7 @@ def run_demo(out: Path, command: str, on_progress: Callable[[str], None]) -> Dem
     on_progress("building FMUs of plant and controller")
     plant, _ = export_pair(card, out / "fmus")
     on_progress("co-simulating plant and controller at 0.1 ms, checking the stiff integration")
-    with Loops(card, [heldout]) as loops, beside(integration, card) as table:
+    with Loops(card, [heldout]) as loops, in_own_process(integration, card) as table:
         loops.close("nominal", card.plant(), plant)
         outcome = diagnose(train, [heldout], card, on_progress, loops.close)
         found = deliver(outcome, train, [heldout], card, out / "diagnosis", command, loops, on_progress)
@@ -66,7 +66,7 @@ def integration(card: Card) -> str:
 
 
 @contextmanager
-def beside(function: Callable[[Card], str], card: Card) -> Iterator[Future[str]]:
+def in_own_process(function: Callable[[Card], str], card: Card) -> Iterator[Future[str]]:
     """Call a function in a process of its own, which ends with the block, while this one goes on."""
     cell = Cell()
     with ThreadPoolExecutor(1) as thread, closing(cell):

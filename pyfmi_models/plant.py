@@ -40,10 +40,10 @@ def plant(mount: Assembly) -> Model:
 def _parts(mount: Assembly) -> str:
     """What an axis has, in words: its friction, then its effects."""
     friction = "no" if mount.friction.key == "none" else mount.friction.key
-    return ", ".join([f"{friction} friction", *dict.fromkeys(_told(one, mount) for one in mount.effects)])
+    return ", ".join([f"{friction} friction", *dict.fromkeys(_effect_label(one, mount) for one in mount.effects)])
 
 
-def _told(effect: Effect, mount: Assembly) -> str:
+def _effect_label(effect: Effect, mount: Assembly) -> str:
     """Name an effect, and the range that it was learned in."""
     return f"{effect.id.replace('_', ' ')} {effect.learned_in(mount.motion == 'linear')}".rstrip()
 

@@ -172,8 +172,8 @@ def diagnose(
     given = _read(train, heldout, card, Written(columns, units, layout), motion, on_progress)
     given = replace(given, with_possible=with_possible)
     if fmu is not None:
-        given = _beside(_black_box(fmu, variables or {}), given, on_progress)
-    way = _delivered if folder and not quick else _found
+        given = _with_base(_black_box(fmu, variables or {}), given, on_progress)
+    way = _delivered if folder and not quick else _diagnosed
     with _anew(folder if force else None):
         return way(given, folder, command, _Listeners(on_progress, on_answer))
 
@@ -243,7 +243,7 @@ def _read(
 ) -> _Given:
     """Read the card, and the recordings as it calls their columns; check that they belong together."""
     believed, notes = card if isinstance(card, Card) or card is None else read_card(card), []
-    written = written.beside(believed.columns if believed else {})
+    written = written.with_columns_of(believed.columns if believed else {})
     fitted, held = (read_all(some, kind, *written) for some, kind in ((train, "train"), (heldout, "heldout")))
     check_split(fitted, held)
     if not held:
@@ -256,7 +256,7 @@ def _read(
     return _Given(fitted, held, believed, notes=tuple(notes))
 
 
-def _beside(box: BlackBox, given: _Given, on_progress: Callable[[str], None]) -> _Given:
+def _with_base(box: BlackBox, given: _Given, on_progress: Callable[[str], None]) -> _Given:
     """Put the card that is most like an FMU in its place."""
     base = as_base(box, given.train, given.heldout, given.card, on_progress)
     correction = Correction(box, base.card, *motion_of(given.train[0]))
@@ -266,11 +266,11 @@ def _beside(box: BlackBox, given: _Given, on_progress: Callable[[str], None]) ->
         heldout=base.heldout,
         card=base.card,
         more=correction.deliver,
-        base=box.told,
+        base=box.label,
     )
 
 
-def _found(given: _Given, out: Path | None, command: str, listeners: _Listeners) -> DiagnosisResult:
+def _diagnosed(given: _Given, out: Path | None, command: str, listeners: _Listeners) -> DiagnosisResult:
     """Diagnose, and write the answer and the card where there is a folder."""
     found = find(given.train, given.heldout, given.card, listeners.on_progress, with_possible=given.with_possible)
     outcome = _noted(found, given.notes)

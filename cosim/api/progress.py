@@ -51,7 +51,7 @@ class Staged:
     def __call__(self, text: str) -> None:
         """Tell what is being done."""
         self._now = self._stage(text)
-        left = self._left()
+        left = self._remaining()
         said = f", about {left:.0f} s left" if left is not None else ""
         self._tell(f"stage {self._now + 1} of {len(self._stages)}: {text}{said}")
 
@@ -63,7 +63,7 @@ class Staged:
         others = [number for number, stage in enumerate(self._stages) if not stage.begins]
         return max(self._now, others[0]) if others and self._now + 1 >= others[0] else self._now
 
-    def _left(self) -> float | None:
+    def _remaining(self) -> float | None:
         """Seconds to go, from what the stages before have taken; None while little is known."""
         spent = self._clock() - self._began
         done = sum(stage.share for stage in self._stages[: self._now])

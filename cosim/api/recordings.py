@@ -54,7 +54,7 @@ class Written(NamedTuple):
     units: Mapping[str, str] | None = None
     layout: Mapping[str, str] | None = None
 
-    def beside(self, columns: Mapping[str, str]) -> "Written":
+    def with_columns_of(self, columns: Mapping[str, str]) -> "Written":
         """The same with a card's columns, which come after those that are given."""
         return self._replace(columns=dict(columns) | dict(self.columns or {}))
 

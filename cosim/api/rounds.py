@@ -47,7 +47,9 @@ class Rounds:
             self._rounds, self._moved = self._rounds + 1, 0
         self._stage = now
         self._tell(
-            "; ".join(filter(None, [f"stage {self._number} of {self._most()}: {text}", self._so_far(), self._left()]))
+            "; ".join(
+                filter(None, [f"stage {self._number} of {self._most()}: {text}", self._so_far(), self._time_left()])
+            )
         )
 
     def before(self, on_step: Callable[[Moved | Answered], None]) -> Callable[[Moved | Answered], None]:
@@ -87,7 +89,7 @@ class Rounds:
             return ""
         return f"best so far: {self._best.words}, validation error {self._best.before:.3g} -> {self._best.after:.3g}"
 
-    def _left(self) -> str:
+    def _time_left(self) -> str:
         """Say how long it takes at most, from what the rounds before have taken; "" in the first round."""
         if not self._rounds:
             return ""

@@ -25,13 +25,13 @@ def result(path: Path) -> Told | None:
     """
     if path.is_dir():
         found = [name for name in _READERS if (path / name).is_file()]
-        return _told(path / found[0]) if found else None
+        return _read_result(path / found[0]) if found else None
     if path.name not in _READERS or not path.is_file() or (path.name == TABLE and not _is_sweep(path)):
         return None
-    return _told(path)
+    return _read_result(path)
 
 
-def _told(path: Path) -> Told:
+def _read_result(path: Path) -> Told:
     """Read a file of ours; what in it is not as we write it is a sentence (InputError)."""
     try:
         return _READERS[path.name](path)

@@ -7,7 +7,7 @@ import numpy as np
 
 from cosim.checks import recordings, shared
 from cosim.checks.plant import LAW, Equations, mount_of, numbers_of
-from cosim.checks.suite import Check, Checks, NotApplicable, require, told
+from cosim.checks.suite import Check, Checks, NotApplicable, reported, require
 from cosim.diagnosis.effects import TRIED
 from pyfmi_models.effects import CATALOGUE, Effect, FrictionEffect, GravityUnbalance
 
@@ -31,7 +31,7 @@ def checks_of(effect: Effect) -> Checks:
         "fits_itself": recordings.fits_itself,
         "found_where_concealed": recordings.found_where_concealed,
     }
-    listed: list[tuple[str, Check]] = [(name, told(partial(check, effect))) for name, check in checks.items()]
+    listed: list[tuple[str, Check]] = [(name, reported(partial(check, effect))) for name, check in checks.items()]
     return Checks(type(effect).__name__, listed)
 
 

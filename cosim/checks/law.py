@@ -8,7 +8,7 @@ import numpy as np
 
 from cosim.checks import recordings, shared
 from cosim.checks.plant import Array
-from cosim.checks.suite import Check, Checks, NotApplicable, require, told
+from cosim.checks.suite import Check, Checks, NotApplicable, reported, require
 from pyfmi_models.friction import LAWS, FrictionLaw
 from pyfmi_models.model import Pair, parameters_of
 
@@ -35,7 +35,7 @@ def checks_of(law: FrictionLaw) -> Checks:
         "fmu": shared.fmu,
         "fits_itself": recordings.fits_itself,
     }
-    listed: list[tuple[str, Check]] = [(name, told(partial(check, law))) for name, check in checks.items()]
+    listed: list[tuple[str, Check]] = [(name, reported(partial(check, law))) for name, check in checks.items()]
     return Checks(type(law).__name__, listed)
 
 

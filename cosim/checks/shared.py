@@ -89,14 +89,14 @@ def derivatives(part: Part) -> None:
         column = starts + LEAST_FIELD * sizes * rng.standard_normal(len(sizes)) * (rng.random(len(sizes)) < 0.7) * free
         column = np.clip(column, low + 2 * BESIDE * sizes, high - 2 * BESIDE * sizes)
         way, h = sizes * rng.standard_normal(len(sizes)) * free, BESIDE
-        (ahead, _), (behind, _), (_, slopes) = (equations.at(one) for one in _beside(column, h * way))
+        (ahead, _), (behind, _), (_, slopes) = (equations.at(one) for one in _neighbours(column, h * way))
         scale = np.abs(slopes) @ np.abs(way) + 1e-9
         apart.append(float(np.max(np.abs((ahead - behind) / (2 * h) - slopes @ way) / scale)))
     worst = sorted(inf if isnan(one) else one for one in apart)[round(ALLOWED * DIRECTIONS) - 1]
     require(worst < BETWEEN, f"derivatives differ from differences by {worst:.1g}, relative; do the equations step?")
 
 
-def _beside(column: Array, step: Array) -> tuple[Array, Array, Array]:
+def _neighbours(column: Array, step: Array) -> tuple[Array, Array, Array]:
     return column + step, column - step, column
 
 

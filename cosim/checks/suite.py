@@ -89,7 +89,7 @@ def require(holds: object, sentence: str) -> None:
         raise CheckError(sentence)
 
 
-def told(check: Check) -> Check:
+def reported(check: Check) -> Check:
     """Let an error inside the class that is checked fail the check, in one sentence that names the error."""
 
     @wraps(check)

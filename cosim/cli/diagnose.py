@@ -73,7 +73,7 @@ def diagnose(
     _check_single(workers, cluster)
     out = out or default_out(Path(train[0]).resolve().stem)
     one = One(train, heldout or [], card, out, propose, force, shared)
-    found = _found(one, variables)
+    found = _diagnosed(one, variables)
     for note in found.notes:
         say(note)
     from cosim.report.terminal import proposed, summary
@@ -97,7 +97,7 @@ class One(NamedTuple):
     options: dict[str, object]
 
 
-def _found(one: One, variables: list[str] | None) -> "DiagnosisResult":
+def _diagnosed(one: One, variables: list[str] | None) -> "DiagnosisResult":
     """Read, diagnose and write, and show how it goes."""
     from cosim.api.diagnose import diagnose as find
     from cosim.reading import pairs_of

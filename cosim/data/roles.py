@@ -137,11 +137,11 @@ def _is(name: str, *kinds: str) -> bool:
 
 def _is_one(name: str, kind: str) -> bool:
     last = re.split(r"[./]", name)[-1]
-    name = last if kind in QUANTITIES and any(_told(last, one) for one in QUANTITIES) else name
-    return _told(name, kind)
+    name = last if kind in QUANTITIES and any(_names_kind(last, one) for one in QUANTITIES) else name
+    return _names_kind(name, kind)
 
 
-def _told(name: str, kind: str) -> bool:
+def _names_kind(name: str, kind: str) -> bool:
     words, whole = words_of(name), "".join(words_of(name))
     if kind == "current" and (any(one in whole for one in _NOUNS) or any(word in _NOUN_WORDS for word in words)):
         return False  # `current_position` is where it is now

@@ -122,18 +122,18 @@ def without_empty(
     left = blank | ends | between
     if not left.any() or (between.any() and EMPTY not in layout):
         return found  # it is asked what becomes of rows between others, by their number in the file
-    notes = [_told(path, "without any value", blank)] if blank.any() else []
+    notes = [_dropped_note(path, "without any value", blank)] if blank.any() else []
     lacking = [name for name, rows in lacks.items() if (rows & ~blank).any()]
     if lacking:
         said = listed(tuple(f'"{name}"' for name in lacking))
-        notes.append(_told(path, f"in which {said} has no value", bad & ~blank))
+        notes.append(_dropped_note(path, f"in which {said} has no value", bad & ~blank))
     values = {name: column[~left] for name, column in found.values.items()}
     restarts = tuple(row - int(left[:row].sum()) for row in found.restarts)
     start = "" if left[0] else found.start
     return replace(found, values=values, notes=(*found.notes, *notes), start=start, restarts=restarts)
 
 
-def _told(path: Path, which: str, rows: np.ndarray) -> str:
+def _dropped_note(path: Path, which: str, rows: np.ndarray) -> str:
     count, first = int(rows.sum()), int(np.flatnonzero(rows)[0]) + 1
     said = f"{count:,} rows {which} were" if count > 1 else f"one row {which} was"
     return f"{path.stem}: {said} left out; the first is row {first:,}."

@@ -65,7 +65,7 @@ def read_clock(path: Path, column: np.ndarray, name: str, stated: str, servo: bo
     notes: tuple[str, ...] = ()
     if not unit and servo:
         unit = _of_sampling(path, column, name)
-        notes = _told(path, column, name, unit)
+        notes = _unit_note(path, column, name, unit)
     values, start, origin = _since_first(column, unit)
     return Clock(values, unit, start, notes, origin)
 
@@ -160,7 +160,7 @@ def _of_sampling(path: Path, column: np.ndarray, name: str) -> str:
     raise questions.rates(path, name, step, lasting, said)
 
 
-def _told(path: Path, column: np.ndarray, name: str, unit: str) -> tuple[str, ...]:
+def _unit_note(path: Path, column: np.ndarray, name: str, unit: str) -> tuple[str, ...]:
     if not unit:
         return ()
     rate = 1 / (float(np.median(np.diff(column.astype(np.float64)))) * SECONDS[unit])

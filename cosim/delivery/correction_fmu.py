@@ -47,7 +47,7 @@ class Correction:
         fmi = self._fmi
         model = correction(self.like.plant(), better.plant())
         export_fmu(model, out / "correction.fmu", fmi=fmi, force=True)
-        told: Improved = {"correction": "correction.fmu", "base_fmu": self.box.told}
+        told: Improved = {"correction": "correction.fmu", "base_fmu": self.box.label}
         if left := left_out(better.plant()):
             told["not_in_correction"] = list(left)
         refused = self._refused()

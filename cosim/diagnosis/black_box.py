@@ -57,7 +57,7 @@ class BlackBox:
     variables: Mapping[str, Alias] = field(default_factory=dict)
 
     @property
-    def told(self) -> str:
+    def label(self) -> str:
         """Name and content of the FMU."""
         return f"{self.fmu.name} (SHA-256 {sha256(self.fmu)[:12]})"
 
@@ -106,7 +106,7 @@ def as_base(
     like = _likeness([piece for pieces in followed[:fitted] for piece in pieces], card)
     misfits = [_misfits(pieces, like.plant()) for pieces in followed]
     unlike = rms(np.concatenate([misfit for one in misfits[:fitted] for misfit in one]))
-    note = f"The base is {box.told}; the card that is most like it needs another torque by {unlike:.3g} RMS."
+    note = f"The base is {box.label}; the card that is most like it needs another torque by {unlike:.3g} RMS."
     beside = [_without(one, pieces, misfit) for one, pieces, misfit in zip(recordings, followed, misfits, strict=True)]
     beside[0] = replace(beside[0], notes=(*beside[0].notes, note))
     return Base(tuple(beside[:fitted]), tuple(beside[fitted:]), like, unlike)

@@ -20,7 +20,7 @@ from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.measure.absent import not_found, undecided
 from cosim.diagnosis.measure.breakdown import parts
 from cosim.diagnosis.measure.broadband import broadband_entry
-from cosim.diagnosis.measure.experiment import Experiment, best, told
+from cosim.diagnosis.measure.experiment import Experiment, best, in_words
 from cosim.diagnosis.measure.findings import accepted, measured_as, rival_finding, taken_finding
 from cosim.diagnosis.measure.law_selection import proposed_law
 from cosim.diagnosis.measure.locate import regions
@@ -167,7 +167,7 @@ def diagnose(
         _with_search(described, answer, examined, heldout),
         sanity=(*of_delivered(sanity, problem, mounts[0]), *not_determined_doubts(unknown)),
         not_determined=unknown,
-        next_experiment=told(experiment, card.controller is not None) if experiment else {},
+        next_experiment=in_words(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,
     )
     return Outcome(diagnosis, delivered, first, refitted, named, experiment, learned.stated() if learned else ())

@@ -112,7 +112,7 @@ class Equations:
         level, near = this.level(motion, own), this.inertia(this.axis.inertia, motion, own)
         torque = near * s["a"] + ca.jacobian(near, motion.q) * motion.v**2 / 2
         torque += this.law.contact(own["friction"], motion.v, level) + this.viscous(motion, own)
-        torque = self._true(_asked(this, torque + this.loads(motion, own), motion))
+        torque = self._true(_command(this, torque + this.loads(motion, own), motion))
         rows = ca.vertcat(torque, ca.jacobian(torque, s["state"]).T, ca.jacobian(torque, s["free"]).T)
         return Tape.of(ca.vertcat(self._column, s["state"]), s["p"], rows)
 
@@ -241,7 +241,7 @@ def _carried(kept: Array, change: Mapping[int, Array], before: Sequence[Slopes])
     return Slopes(live, recurrence(kept, drift))
 
 
-def _asked(this: Mount, needed: Any, motion: Motion) -> Any:
+def _command(this: Mount, needed: Any, motion: Motion) -> Any:
     """Command [N m] for which drives that follow at once give what is needed: Newton's method, from what is needed.
 
     Past a knee the first step is exact where the drive is linear again; the others serve the bend.

@@ -72,10 +72,10 @@ def moving(found: Sequence[Neighbour], table: Mapping[str, Array], dt: float, cu
 def is_alone(own: Motion, other: Motion) -> bool:
     """Whether a neighbour moves by itself: its position does not follow the axis, even late, nor its acceleration."""
     (q, v, a), (position, _, acceleration) = own, other
-    return _left(np.column_stack([q, v]), position) > ALONE and _left(a[:, None], acceleration) > ALONE
+    return _own_share(np.column_stack([q, v]), position) > ALONE and _own_share(a[:, None], acceleration) > ALONE
 
 
-def _left(own: Array, column: Array) -> float:
+def _own_share(own: Array, column: Array) -> float:
     known = np.column_stack([own, np.ones(len(column))])
     known = known / (np.sqrt((known**2).sum(0)) + 1e-300)
     centred = column - column.mean()

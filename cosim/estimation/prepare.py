@@ -119,7 +119,7 @@ class Piece:
         return own**2 * (gain(hertz, self.dt, self.motion) if self.motion > self.cutoff else 1.0)
 
     @cached_property
-    def asked(self) -> bool:
+    def is_asked(self) -> bool:
         """Whether its motion was asked for: a set point tells, else a speed that is not constant."""
         return "q_d" in self.extras or not self.is_steady
 

@@ -104,12 +104,12 @@ def _shifts(times: Array, reference: Array, simulated: Array) -> list[tuple[floa
     for lag in range(1, min(LAGS, len(times) // 4) + 1):
         step = float(np.median(np.diff(times))) * lag
         words = f"{lag} row{'s' * (lag > 1)} ({step:.4g} s)"
-        found.append((_left(simulated[lag:], reference[:-lag], len(times)), f"it is {words} late"))
-        found.append((_left(simulated[:-lag], reference[lag:], len(times)), f"it is {words} early"))
+        found.append((_scaled_norm(simulated[lag:], reference[:-lag], len(times)), f"it is {words} late"))
+        found.append((_scaled_norm(simulated[:-lag], reference[lag:], len(times)), f"it is {words} early"))
     return found
 
 
-def _left(one: Array, other: Array, count: int) -> float:
+def _scaled_norm(one: Array, other: Array, count: int) -> float:
     """Norm of a difference, scaled to `count` rows."""
     return float(np.linalg.norm(one - other) * sqrt(count / len(one)))
 

@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from signal import Signals
 from typing import Any
 
-from cosim.fmi.handlers import HANDLERS, Handling, left
+from cosim.fmi.handlers import HANDLERS, Handling, changed_signals
 from cosim.fmi.process import ARITHMETIC, PROPERTIES, Property, in_words, streams_kept, threads
 
 PATIENCE = 0.2
@@ -121,7 +121,7 @@ class Guard:
 
     def _leave(self, before: Handling, now: Handling) -> None:
         """Remember which handlers are left to the component, with those before its first."""
-        for number in left(before, now):
+        for number in changed_signals(before, now):
             first = self._installed.get(number, (before.of(number), None))[0]
             self._installed[number], self._handled[number] = (first, now.addresses[number]), None
 

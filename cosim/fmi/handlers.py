@@ -87,7 +87,7 @@ class Handlers:
             LIBC.sigaltstack(ctypes.addressof(one), None)
 
 
-def left(before: Handling, now: Handling) -> list[int]:
+def changed_signals(before: Handling, now: Handling) -> list[int]:
     """List the signals whose handlers were changed and are left so; 0 is the stack."""
     return [number for number in _changed(before, now) if not _is_ours(number)]
 

@@ -113,7 +113,7 @@ class EthercatDrive(PythonAdapter):
             raise HardwareError(message, culprit="ethercat.position", value=self._given.position)
         self._slave = master.slaves[self._given.position]
         self._slave.config_func = self._configure
-        self._asked("its PDOs", master.config_map)
+        self._ask("its PDOs", master.config_map)
         self._fits()
         if self._given.distributed_clock:
             master.config_dc()
@@ -162,7 +162,7 @@ class EthercatDrive(PythonAdapter):
                 message = f"{self._name} has {len(image)} bytes of {side} and the mapping {layout.size}."
                 raise HardwareError(message, culprit=f"ethercat.{side}", value=len(image))
 
-    def _asked(self, what: str, call: Any) -> None:
+    def _ask(self, what: str, call: Any) -> None:
         try:
             call()
         except Exception as error:  # pysoem's own exceptions have no common base

@@ -62,7 +62,7 @@ def _holds(room: Room, half: float) -> bool:
 
 def slow_sweep(room: Room) -> Motion:
     """From end to end as slowly as the time allows; shorter where even full speed would not do."""
-    left, way = _left(room), _way(room)
+    left, way = _seconds_to_move(room), _way(room)
     ramps = 3 / room.acceleration
     speed = min(room.speed, 2 * way / (left + sqrt(max(left**2 - 4 * ramps * way, 0.0))))
     share = way / (2 * room.reach)
@@ -72,15 +72,15 @@ def slow_sweep(room: Room) -> Motion:
     return Motion("slow sweep", "a slow sweep from end to end and back", (Rest(FADE), *moves, back, Rest(rest)))
 
 
-def _left(room: Room) -> float:
+def _seconds_to_move(room: Room) -> float:
     """Seconds for three moves: there, over, back."""
     return room.seconds - 2 * FADE - 3 / JERK
 
 
 def _way(room: Room) -> float:
     """From here to one end, to the other and back here; as much of it as full speed does in the time."""
-    fastest = min(room.speed, _left(room) * room.acceleration / 6)
-    return min(2 * room.reach, LEAST_ROOM * fastest * (_left(room) - 3 * fastest / room.acceleration))
+    fastest = min(room.speed, _seconds_to_move(room) * room.acceleration / 6)
+    return min(2 * room.reach, LEAST_ROOM * fastest * (_seconds_to_move(room) - 3 * fastest / room.acceleration))
 
 
 def _lasts(parts: list[Part]) -> float:

@@ -146,7 +146,7 @@ class Investigation:
             step = replace(step, left=self.limits.left_in(recording))
             self.log.append(step)
         self.recordings[step.role].append(recording)
-        self._told(step)
+        self._report(step)
         return step.left
 
     def _round(self) -> tuple[End | None, Sequence[Question]]:
@@ -156,7 +156,7 @@ class Investigation:
         number = len(self.steps)
         known = self.log.answered(number)
         if known and all(self.log.moved(number + k) for k in (1, 2)):
-            self._told(known)
+            self._report(known)
             return self._moved([None, None]), ()
         open_ = self._diagnosed(number)
         if not open_:
@@ -179,7 +179,7 @@ class Investigation:
         step = known or Answered.of(number, self.outcome.diagnosis, asked, perf_counter() - begun)
         if not known:
             self.log.append(step)
-        self._told(step)
+        self._report(step)
         return asked
 
     def _movable(self, asked: Sequence[Question]) -> Sequence[Question]:
@@ -273,7 +273,7 @@ class Investigation:
     def _spent(self) -> float:
         return sum(one.seconds for one in self.steps if isinstance(one, Moved))
 
-    def _told(self, step: Moved | Answered) -> None:
+    def _report(self, step: Moved | Answered) -> None:
         self.steps.append(step)
         self.on_step(step)
 

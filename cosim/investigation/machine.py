@@ -106,7 +106,7 @@ class CoSimulated:
         """Where the set point of the scenario begins, as the controller is told it."""
         return self._start + self._offset
 
-    def asked(self) -> Sampled:
+    def own_motion(self) -> Sampled:
         """The scenario's own set point, absolute, at every tick."""
         q, v, a = self.own().sampled(self.scenario.step * np.arange(self.scenario.ticks, dtype=float))
         return q + self.home, v, a

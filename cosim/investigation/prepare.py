@@ -86,7 +86,7 @@ def given(
 def _limits(loop: CoSimulated, drive: Driven | None, card: Card, wanted: Mapping[str, str], seconds: float) -> Limits:
     """Those of the scenario's own set point and of the card, and others where they are given."""
     band = sqrt(card.controller.kp) / (2 * pi) if card.controller else None
-    asked = loop.asked()
+    asked = loop.own_motion()
     own = 0.0 if drive else frequency_of(*asked[1:], loop.scenario.step)
     found = Limits.visited(asked, card.mount.torque_limit, band, own).with_given(wanted)
     found = drive.within(found) if drive else found

@@ -132,13 +132,13 @@ class Execution:
             t = np.arange(first * decimation, (first + count) * decimation, decimation) * self.plan.step
             t += self.plan.start
             columns = zip(self.wiring.records, self.plan.columns, rows, strict=False)
-            self.writer.write({"t": t} | {name: self._told(column, row) for name, column, row in columns})
+            self.writer.write({"t": t} | {name: self._decoded(column, row) for name, column, row in columns})
             for one, row in zip(self.proven, rows[len(self.wiring.records) :], strict=True):
                 one.see(t, row)
         if self.plan.pool is not None:
             self.plan.pool.sweep(np.concatenate([self.plan.bus[list(self.plan.named)], self.loop.held]))
 
-    def _told(self, column: Column, row: np.ndarray) -> np.ndarray:
+    def _decoded(self, column: Column, row: np.ndarray) -> np.ndarray:
         """Return a row of a column with what its numbers name in the place of them."""
         found: np.ndarray = self.plan.pool.column(row, column.kind) if column.kind else row
         return found

@@ -98,7 +98,7 @@ def lead(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     return [sentence for sentence in _LEADS[verdict(diagnosis)](diagnosis, scales) if sentence]
 
 
-def _found(diagnosis: Diagnosis, scales: Scales) -> list[str]:
+def _detected(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     found = [block for block in blocks(diagnosis) if block.answer == "found"]
     said = _stated(found[0]) if len(found) == 1 else f"The model lacks {_listed(found)}."
     if more := _either(diagnosis, "a further error"):
@@ -186,7 +186,7 @@ def _withheld(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     return ["An effect fitted now would only make up for this error of the recordings.", NO_MODEL]
 
 
-_LEADS = {"withheld": _withheld, "found": _found, "either": _rival, "none": _nothing, "unknown": _unknown}
+_LEADS = {"withheld": _withheld, "found": _detected, "either": _rival, "none": _nothing, "unknown": _unknown}
 
 
 def _numbers(diagnosis: Diagnosis, scales: Scales) -> str:

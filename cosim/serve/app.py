@@ -75,7 +75,7 @@ def make_app(desk: Desk, token: str, port: int) -> Starlette:
         UnknownJobError: _unknown,
         UnreadableJobError: _unreadable,
         HTTPException: _failed,
-        ClientDisconnect: _left,
+        ClientDisconnect: _disconnected,
         OSError: there.refused,
         Exception: _broken,
     }
@@ -215,7 +215,7 @@ def _failed(request: Request, error: Exception) -> Response:
     return PlainTextResponse(error.detail, error.status_code, headers=error.headers)
 
 
-def _left(request: Request, error: Exception) -> Response:
+def _disconnected(request: Request, error: Exception) -> Response:
     return PlainTextResponse("The upload was broken off.", 400)
 
 

@@ -33,7 +33,7 @@ class Chart:
     width: int = WIDTH
 
     @property
-    def left(self) -> int:
+    def left_edge(self) -> int:
         """Left end of the area."""
         return LEFT
 
@@ -61,7 +61,7 @@ def chart(
 ) -> Chart:
     """Draw lines, each abscissae and ordinates, over the ranges of both axes."""
     empty = Chart((), (), {}, height)
-    across, up = _mapped(x, empty.left, empty.right), _mapped(y, empty.bottom, empty.top)
+    across, up = _mapped(x, empty.left_edge, empty.right), _mapped(y, empty.bottom, empty.top)
     drawn = {
         name: " ".join(f"{across(a):.1f},{up(b):.1f}" for a, b in zip(*line, strict=True) if isfinite(b))
         for name, line in lines.items()

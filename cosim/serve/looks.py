@@ -31,7 +31,7 @@ def look(path: str, options: Options) -> Parsed:
     file = Path(path)
     try:
         seen = preview(file, options)
-        return _told(file, seen)
+        return _facts_of(file, seen)
     except ManyRecordingsError as error:
         rows = sum(one.rows for one in error.runs)
         return {"problem": _said(error, file), "parts": {one.which: one.rows / rows for one in error.runs}}
@@ -84,7 +84,7 @@ def shipped_card(name: str) -> str:
     return (files("pyfmi_models") / "cards" / f"{name}.toml").read_text("utf-8")
 
 
-def _told(file: Path, seen: Preview) -> Parsed:
+def _facts_of(file: Path, seen: Preview) -> Parsed:
     told = {name: str(value).replace(str(file), file.name) for name, value in facts(seen).items()}
     for name in [one for one in told if one.startswith(("note ", "undecided ", "as an axis", "option", "sha256"))]:
         del told[name]

@@ -134,9 +134,9 @@ class Queue:
     def _diagnosed(self, job: Job) -> Answer:
         recordings = self._store.folder(job.id) / "recordings"
         order = job_order(job, recordings, self._store.card(job), self._store.result(job.id))
-        return answer_of(self._cell.call(self._function, order, on_message=self._told, overdue=self._given_up))
+        return answer_of(self._cell.call(self._function, order, on_message=self._receive, overdue=self._given_up))
 
-    def _told(self, kind: str, content: Any) -> None:
+    def _receive(self, kind: str, content: Any) -> None:
         if kind == "answer":
             self.progress.answer = answer_of(content)
         else:

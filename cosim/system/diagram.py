@@ -115,10 +115,10 @@ def _what(scenario: Scenario, owner: str) -> str:
 def origin(component: Any) -> str:
     """Say where a component comes from; what was built from a card or model is told by that, not by its place here."""
     built = component.model or (f"the {component.part} of {component.card}" if component.card else "")
-    return str(built or _told(component.fmu) or component.python)
+    return str(built or _fmu_label(component.fmu) or component.python)
 
 
-def _told(fmu: Any) -> str:
+def _fmu_label(fmu: Any) -> str:
     """Name an FMU; one that was unpacked into the cache by its place in the archive that it came from."""
     if fmu is None or not Path(fmu).is_relative_to(cache_home()):
         return str(fmu or "")

@@ -118,16 +118,16 @@ def _sindy(train: Sequence[Trace], held: Trace, turn: float) -> Parsed:
             found = stlsq(threshold=threshold, unbias=False).fit(columns / scale, target[:, None] / size)
         return np.asarray(np.ravel(found.coef_) * size / scale / sizes)
 
-    def left(trace: Trace, weights: Array) -> float:
+    def rest(trace: Trace, weights: Array) -> float:
         return rms(trace.missing - library[trace.name] @ weights)
 
     def left_out(threshold: float) -> float:
-        return sum(left(one, fit([other for other in train if other is not one], threshold)) for one in train)
+        return sum(rest(one, fit([other for other in train if other is not one], threshold)) for one in train)
 
     best = min(THRESHOLDS, key=left_out) if len(train) > 1 else THRESHOLDS[-1]
     weights = fit(train, best)
     terms_left = int(np.count_nonzero(weights))
-    return {"heldout_rms": left(held, weights), "alarm": terms_left > 0, "terms": terms_left, "threshold": best}
+    return {"heldout_rms": rest(held, weights), "alarm": terms_left > 0, "terms": terms_left, "threshold": best}
 
 
 def _shortened(columns: Array, target: Array) -> tuple[Array, Array]:

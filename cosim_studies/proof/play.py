@@ -69,9 +69,9 @@ class CaseRunner:
             truth = _made(maker, case, self.seconds, folder, self.rough)
             made = perf_counter() - begun
             opened = self._sealed(case, truth)
-            said = _asked(user, self.tool, folder)
+            said = _call_tool(user, self.tool, folder)
             knows = bool(truth["effects"]) and said["status"] == "ok"
-            best = _asked(user, ceiling, folder, truth["effects"], truth["mount"]) if knows else {"seconds": 0.0}
+            best = _call_tool(user, ceiling, folder, truth["effects"], truth["mount"]) if knows else {"seconds": 0.0}
         seconds = {"make": made, "tool": said.pop("seconds"), "ceiling": best.pop("seconds")}
         return head | opened | said | {"ceiling": best.get("answer", best), "seconds": seconds}
 
@@ -104,7 +104,7 @@ def _made(maker: Cell, case: CaseSpec, seconds: float, folder: str, rough: bool)
     return truth
 
 
-def _asked(user: Cell, function: Callable[..., Any], *arguments: Any) -> Parsed:
+def _call_tool(user: Cell, function: Callable[..., Any], *arguments: Any) -> Parsed:
     """Call in the tool's process; whatever goes wrong there is an answer too."""
     begun, said = perf_counter(), Parsed()
     try:

@@ -34,13 +34,13 @@ class Bar:
     least: float | None = None
     most: float | None = None
 
-    def asked(self) -> str:
+    def bar_text(self) -> str:
         """What was asked, in words."""
         return f">= {self.least:g}" if self.least is not None else f"<= {self.most:g}" if self.most is not None else ""
 
     def met(self, value: float | None) -> bool | None:
         """Whether a value is on the right side; None where nothing was asked or found."""
-        if value is None or not self.asked():
+        if value is None or not self.bar_text():
             return None
         return value >= self.least if self.least is not None else bool(self.most is not None and value <= self.most)
 
@@ -139,7 +139,7 @@ def judged(bar: Bar, rows: Rows) -> Parsed:
     head = {"key": bar.key, "title": bar.title, **found.as_json()}
     sides = {bar.met(value) for value in (found.value, found.low, found.high)}
     sure = len(sides) == 1 and (found.low != found.high or found.n >= FEW)
-    return head | {"asked": bar.asked(), "met": bar.met(found.value), "sure": sure}
+    return head | {"asked": bar.bar_text(), "met": bar.met(found.value), "sure": sure}
 
 
 def confusion(rows: Rows) -> dict[str, dict[str, int]]:

@@ -33,10 +33,10 @@ def answer(folder: str) -> JsonObject:
     """Diagnose, and let the baselines have a look at the same residual."""
     card, train, held = given(folder)
     found = diagnose(train, [held], card).diagnosis
-    return told(found) | {"baselines": compared(found.traces, 2 * pi if card.mount.motion == "linear" else 1.0)}
+    return scored(found) | {"baselines": compared(found.traces, 2 * pi if card.mount.motion == "linear" else 1.0)}
 
 
-def told(found: Diagnosis) -> JsonObject:
+def scored(found: Diagnosis) -> JsonObject:
     """What of `diagnosis.json` is scored, and the window of time of each recording that was looked at."""
     whole: Parsed = as_json(found)
     parts = ("effect", "answer", "probability", "parameters", "where")

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from cosim.diagnosis.answer.scores import ResidualScores, TermScores
-from cosim.diagnosis.decide.decision import Gain, is_left, stands
+from cosim.diagnosis.decide.decision import Gain, is_left, is_validated
 from cosim.diagnosis.decide.policy import POLICY, Policy
 from cosim.diagnosis.search.stages import least
 
@@ -92,7 +92,7 @@ def test_what_nulls_and_machines_with_something_unnamed_showed(
     ],
 )
 def test_what_an_effect_must_show_held_out(gain: Gain, share: float, expected: bool) -> None:
-    assert stands(gain, share, POLICY) is expected
+    assert is_validated(gain, share, POLICY) is expected
 
 
 def is_enough(evidence: float, gain: float, policy: Policy = POLICY) -> bool:
@@ -122,9 +122,9 @@ def test_the_constants_that_succeed_two_old_ones_cannot_be_nothing() -> None:
     `clearly_predicted` and `halved` held out.
     """
     by_chance = Gain(0.5, 0.1, 0.1)
-    assert not stands(by_chance, 0.1, POLICY)
-    assert stands(by_chance, 0.1, replace(POLICY, clearly_predicted=0.02))
-    assert stands(by_chance, 0.1, replace(POLICY, halved=0.02))
+    assert not is_validated(by_chance, 0.1, POLICY)
+    assert is_validated(by_chance, 0.1, replace(POLICY, clearly_predicted=0.02))
+    assert is_validated(by_chance, 0.1, replace(POLICY, halved=0.02))
     assert not is_enough(5.0, 0.1)
     assert is_enough(5.0, 0.1, replace(POLICY, least_evidence=0.0))
     assert is_enough(5.0, 0.1, replace(POLICY, large_gain=0.02, evidence_if_large=0.0))
@@ -139,6 +139,6 @@ def test_what_held_out_recordings_hardly_notice_must_be_seen_in_their_error(
     nats: float, removed: float, is_true: bool
 ) -> None:
     """Of 255 names of two generators; others that were false had 7.9 nats and .12, 4.9 and .14."""
-    assert stands(Gain(nats, removed, removed), 0.3, POLICY) is is_true
-    assert not stands(Gain(7.9, 0.258, 0.118), 0.757, POLICY)
-    assert stands(Gain(12.5, 0.1, 0.1), 0.609, POLICY)
+    assert is_validated(Gain(nats, removed, removed), 0.3, POLICY) is is_true
+    assert not is_validated(Gain(7.9, 0.258, 0.118), 0.757, POLICY)
+    assert is_validated(Gain(12.5, 0.1, 0.1), 0.609, POLICY)

@@ -82,3 +82,12 @@ def test_what_is_named_is_there() -> None:
 def test_what_is_not_there_is_noticed(text: str) -> None:
     assert untrue(text)
     assert not untrue("cosim.data.recording.Recording of cosim/data/recording.py, `recording.py`")
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_function_has_a_name_that_could_mean_anything(package: str) -> None:
+    vague = re.compile(r"\bdef _?(told|beside|left|stands|found|aside|asked)\(")
+    found = [
+        f"{path}: {name}" for path in (ROOT / package).rglob("*.py") for name in vague.findall(path.read_text("utf-8"))
+    ]
+    assert not found

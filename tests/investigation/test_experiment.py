@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.measure.experiment import best, motions, scenario, told
+from cosim.diagnosis.measure.experiment import best, in_words, motions, scenario
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.system.scenario import read_scenario
 from pyfmi_models.card import read_card
@@ -59,5 +59,5 @@ def test_the_scenario_is_one_that_cosim_run_reads(night: Prepared, tmp_path: Pat
     read = read_scenario(tmp_path / "next_experiment.toml")
     assert set(read.records) == {"tau", "q", "q_d"}
     assert read.stop == 40.0
-    assert told(found, True)["scenario"] == "next_experiment.toml"
-    assert "scenario" not in told(found, False)
+    assert in_words(found, True)["scenario"] == "next_experiment.toml"
+    assert "scenario" not in in_words(found, False)

@@ -20,7 +20,7 @@ from cosim_studies.proof.generator import FAMILIES, OUTSIDE
 from cosim_studies.proof.ledger import enlist, listed
 from cosim_studies.proof.page import page, proof
 from cosim_studies.proof.seal import Seals, canonical, salt_of, seal
-from cosim_studies.proof.tool import told
+from cosim_studies.proof.tool import scored
 
 
 def test_a_deck_is_drawn_from_its_seed_alone_and_a_longer_one_begins_alike() -> None:
@@ -102,7 +102,7 @@ def test_what_makes_cases_shares_nothing_with_what_is_tested() -> None:
 
 def test_what_a_diagnosis_says_is_what_is_scored() -> None:
     found = diagnosis("two")
-    said = json.loads(json.dumps(told(found), allow_nan=False))
+    said = json.loads(json.dumps(scored(found), allow_nan=False))
     case = row("several", ["cogging", "friction_asymmetry"], []) | {"answer": said}
     assert (marks.exact(case), marks.hits(case), marks.verdict(case)) == (True, 2, found.verdict)
     offered = [(one.probability, one.effect) for one in found.findings if one.answer in ("found", "ambiguous")]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cosim.data.binary.packages import beside, is_table
+from cosim.data.binary.packages import as_columns, is_table
 from cosim.data.clocks import grouped, owners
 from cosim.data.columns import Columns
 from cosim.data.limits import check_cells, listed
@@ -60,7 +60,7 @@ def with_clocks(path: Path, found: Mapping[str, np.ndarray], units: Mapping[str,
 def _vectors(found: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return the numeric arrays as vectors, longer than one."""
     numeric = {name: value for name, value in found.items() if value.dtype.kind in "fiub" and value.size > 1}
-    tables = {name: beside(value) for name, value in numeric.items()}
+    tables = {name: as_columns(value) for name, value in numeric.items()}
     return {
         f"{name}_{k + 1}" if is_table(numeric[name].shape) else name: table[:, k]
         for name, table in tables.items()

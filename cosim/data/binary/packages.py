@@ -36,7 +36,7 @@ def vectors(path: Path, found: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
     A table counts once: many columns of gains must not outnumber the few vectors of a recording.
     """
-    signals = {name: beside(value) for name, value in found.items() if value.dtype.kind in "fiub"}
+    signals = {name: as_columns(value) for name, value in found.items() if value.dtype.kind in "fiub"}
     lengths = Counter(len(one) for one in signals.values() if len(one) > 1)
     rows = lengths.most_common(1)[0][0] if lengths else 0
     kept = {name: value for name, value in signals.items() if len(value) == rows}
@@ -65,7 +65,7 @@ def opaque(path: Path) -> RecordingError:
     return RecordingError(f"{text}.", culprit=str(path))
 
 
-def beside(value: np.ndarray) -> np.ndarray:
+def as_columns(value: np.ndarray) -> np.ndarray:
     """Signals of an array as columns (rows, k); none of what is neither a vector nor a table."""
     if value.ndim == 1:
         return value[:, None]

@@ -168,7 +168,7 @@ def held_out_rules(gain: Gain, share: float, policy: Policy) -> Iterator[Rule]:
     yield Rule("share of what the base leaves", matters, share, policy.least_share)
 
 
-def stands(gain: Gain, share: float, policy: Policy) -> bool:
+def is_validated(gain: Gain, share: float, policy: Policy) -> bool:
     """Whether an effect stands on the held-out recordings."""
     return all_pass(held_out_rules(gain, share, policy))
 

@@ -37,7 +37,7 @@ class Cable(Hypothesis[CableWrap]):
             def start(c: Array, hardening: float = hardening) -> Effect:
                 stiffness = float(c[0] + c[1])
                 home = float(c @ homes) / stiffness if stiffness > 0 else float(np.mean(homes))
-                home = float(np.clip(home, *_beside(span)))
+                home = float(np.clip(home, *_home_range(span)))
                 return CableWrap(stiffness=max(stiffness, 1e-9), home=home, hardening=hardening)
 
             pair = tuple(CableWrap(stiffness=0.0, home=home, hardening=hardening) for home in homes)
@@ -54,6 +54,6 @@ class Cable(Hypothesis[CableWrap]):
         return not low - room <= float(effect.home) <= high + room
 
 
-def _beside(span: Span) -> tuple[float, float]:
+def _home_range(span: Span) -> tuple[float, float]:
     """Positions where a home may be."""
     return float(span.q.min()) - BESIDE * span.reach, float(span.q.max()) + BESIDE * span.reach

@@ -113,7 +113,7 @@ def span_of(mount: Mount, prepared: Prepared, residual: Array, level: Array) -> 
         detectable=detectable_band(prepared),
         seconds=max(float(piece.t[-1] - piece.t[0]) for piece in prepared.pieces),
         extras=common,
-        asked=any(piece.asked for piece in prepared.pieces),
+        asked=any(piece.is_asked for piece in prepared.pieces),
         prepared=prepared,
     )
 

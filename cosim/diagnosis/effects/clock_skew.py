@@ -66,5 +66,5 @@ class Clocks(Hypothesis[ClockSkew]):
 
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """Nothing asks."""
-        asked = any(piece.asked for piece in prepared.pieces)
+        asked = any(piece.is_asked for piece in prepared.pieces)
         return super().why_not(mount, prepared) if asked else NOTHING_ASKED

@@ -81,7 +81,7 @@ class LateTorque(Hypothesis[Drive]):
 
     def why_not(self, mount: Mount, prepared: Prepared) -> str:
         """Nothing asks, or the drive has something alike already."""
-        if not any(piece.asked for piece in prepared.pieces):
+        if not any(piece.is_asked for piece in prepared.pieces):
             return NOTHING_ASKED
         if has(mount, DriveEffect):
             return "the model has an effect of the drive already, from which it cannot be told"

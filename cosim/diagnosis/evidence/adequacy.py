@@ -64,8 +64,8 @@ def share_beside(comparison: Comparison, found: Fit, residual_there: Array, held
     """
     prepared, nuisances = comparison.problem.prepared, comparison.nuisances.columns
     trained, clear_there = comparison.problem.weight * far_from_turns(prepared), _clear_there(comparison, held)
-    left = _beside(found.residual, trained, nuisances)
-    there = _beside(residual_there, clear_there, held.nuisances.columns)
+    left = _unexplained(found.residual, trained, nuisances)
+    there = _unexplained(residual_there, clear_there, held.nuisances.columns)
     sizes = (_lasting(left, trained, prepared), _lasting(there, clear_there, held.prepared))
     return max(sizes) / _friction(comparison, trained)
 
@@ -104,7 +104,7 @@ def _friction(comparison: Comparison, clear: Array) -> float:
     return max(level, LEAST_FRICTION * torque, 1e-300)
 
 
-def _beside(residual: Array, weight: Array, columns: Array) -> Array:
+def _unexplained(residual: Array, weight: Array, columns: Array) -> Array:
     """What no combination of columns explains of a residual, at the rows that count."""
     root = np.sqrt(weight)
     left = projected(root * residual, root[:, None] * columns)

@@ -83,7 +83,7 @@ def predicted(prepared: Prepared, mount: Mount, narrow: float) -> float:
     model = [[piece.a for piece in pieces], *waves]
     filtered = [[piece.lowpass(one) for piece, one in zip(pieces, own, strict=True)] for own in model]
     columns = np.column_stack([_above(pieces, narrow, own) for own in filtered])
-    plain, whole = (_left(torque, columns[:, :many], parts) for many in (1, len(model)))
+    plain, whole = (_cross_validated(torque, columns[:, :many], parts) for many in (1, len(model)))
     return 1 - float(whole @ whole) / max(float(plain @ plain), 1e-300)
 
 
@@ -93,7 +93,7 @@ def _above(pieces: Sequence[Piece], narrow: float, signals: Sequence[Array]) -> 
     return np.concatenate(high)
 
 
-def _left(torque: Array, columns: Array, parts: npt.NDArray[np.int64]) -> Array:
+def _cross_validated(torque: Array, columns: Array, parts: npt.NDArray[np.int64]) -> Array:
     """What a fit to all other parts leaves of each."""
     left = torque.copy()
     for part in np.unique(parts):

@@ -83,8 +83,8 @@ class Comparison:
         """Set up from the refitted base: noise over speed is what the base leaves beside the best of every effect."""
         prepared, weight = problem.prepared, problem.weight
         nuisances = discrepancy(base.mount, prepared, policy)
-        known, residual = _beside(problem, base, nuisances)
-        offered = _Offered.beside(problem, base, nuisances, residual)
+        known, residual = _tangents_and_rest(problem, base, nuisances)
+        offered = _Offered.after(problem, base, nuisances, residual)
         counted = (weight > 0).astype(float)
         best: dict[type[Effect], tuple[float, Array]] = {}
         for one, columns in zip(offered.tried, offered.columns, strict=True):
@@ -234,8 +234,8 @@ class Comparison:
         """Score every candidate beside a fitted structure."""
         own = self.offered.pop(found, None)
         if not own:
-            residual = _beside(self.problem, found, self.nuisances)[1]
-            own = _Offered.beside(self.problem, found, self.nuisances, residual)
+            residual = _tangents_and_rest(self.problem, found, self.nuisances)[1]
+            own = _Offered.after(self.problem, found, self.nuisances, residual)
         return self.score(found, own.tried, own.columns)
 
     def score(self, found: Fit, tried: Sequence[Candidate], groups: Sequence[Array]) -> list[Screened]:
@@ -319,12 +319,12 @@ class _Offered(NamedTuple):
     columns: Sequence[Array]
 
     @classmethod
-    def beside(cls, problem: Problem, found: Fit, nuisances: Discrepancy, residual: Array) -> "_Offered":
+    def after(cls, problem: Problem, found: Fit, nuisances: Discrepancy, residual: Array) -> "_Offered":
         tried = candidates(found.mount, problem.prepared, residual, np.abs(nuisances.level))
         return cls(tried, columns_of(found.mount, tried, problem.prepared, found.values))
 
 
-def _beside(problem: Problem, found: Fit, nuisances: Discrepancy) -> tuple[Array, Array]:
+def _tangents_and_rest(problem: Problem, found: Fit, nuisances: Discrepancy) -> tuple[Array, Array]:
     """Tangents of a fit with the nuisances, at the rows that count, and what they leave of its residual there."""
     counted = (problem.weight > 0).astype(float)
     known = np.column_stack([found.slopes, nuisances.columns]) * counted[:, None]

@@ -54,7 +54,7 @@ def forms(found: Fit, own: int, prepared: Prepared) -> Forms | None:
     )
     for group in groups.values():
         rest = tuple(one for one in mount.effects if not any(one is other for other in group))
-        torque = _left(prepared, replace(mount, effects=rest)) - with_all
+        torque = _residual(prepared, replace(mount, effects=rest)) - with_all
         shapes = np.column_stack([*_shapes(group[0], prepared)])
         columns.append(torque[:, None] * shapes / sqrt(shapes.shape[1]))
         placed.append(tuple(range(first, first + shapes.shape[1])))
@@ -62,7 +62,7 @@ def forms(found: Fit, own: int, prepared: Prepared) -> Forms | None:
     return Forms(np.column_stack(columns), tuple(placed), tuple(groups))
 
 
-def _left(prepared: Prepared, mount: Mount) -> Array:
+def _residual(prepared: Prepared, mount: Mount) -> Array:
     """What a mount leaves at the kept rows."""
     pieces = zip(residuals(prepared, mount), prepared.pieces, strict=True)
     return np.concatenate([one[piece.kept] for one, piece in pieces])

@@ -90,7 +90,7 @@ class Concealment:
         after = self._marginal(grams, np.concatenate([base, place]), groups, hidden.prior, now)
         evidence = after.log_likelihood - now.log_likelihood - hidden.price
         tangents = np.arange(1, self._own)
-        removed = _left(grams.sum(0), tangents) - _left(grams.sum(0), np.concatenate([tangents, place]))
+        removed = _energy(grams.sum(0), tangents) - _energy(grams.sum(0), np.concatenate([tangents, place]))
         noise = float(self._comparison.floor @ self._comparison.bands.count)
         return Worth(evidence, self._plain_share(hidden, weights), removed / max(noise, 1e-300))
 
@@ -150,7 +150,7 @@ def _concealed(grams: Array, place: Any, weights: Array) -> Array:
     return np.asarray(out)
 
 
-def _left(gram: Array, rows: Any) -> float:
+def _energy(gram: Array, rows: Any) -> float:
     """Energy of the first column that least squares on some others leaves."""
     towards = gram[rows, 0]
     return float(gram[0, 0] - towards @ np.linalg.lstsq(gram[np.ix_(rows, rows)], towards, rcond=1e-12)[0])

@@ -84,7 +84,7 @@ def best(main: Mount, rival: Mount, separates: tuple[str, ...], prepared: Prepar
     return found if found.difference > 0 else None
 
 
-def told(experiment: Experiment, has_controller: bool) -> NextExperiment:
+def in_words(experiment: Experiment, has_controller: bool) -> NextExperiment:
     """The experiment as it stands in diagnosis.json; without a controller in the card there is no scenario to run."""
     words: NextExperiment = {
         "separates": list(experiment.separates),
@@ -191,4 +191,4 @@ def _toml(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
-__all__ = ["SCENARIO", "Experiment", "Visited", "best", "motions", "scenario", "told"]
+__all__ = ["SCENARIO", "Experiment", "Visited", "best", "in_words", "motions", "scenario"]

@@ -70,7 +70,7 @@ def noise_at(speed: Array, residual: Array, wanted: Array) -> Array:
 def flagged(residuals: Sequence[Residual]) -> list[Spans]:
     """Spans of each piece in which the residual is loud."""
     least = CLEAR_MOTION * max(float(np.abs(one.v).max()) for one in residuals)
-    cells = [_cells(one, left, least) for one, left in zip(residuals, _left(residuals, least), strict=True)]
+    cells = [_cells(one, left, least) for one, left in zip(residuals, _robust_residuals(residuals, least), strict=True)]
     known = [cell for cell, one in zip(cells, residuals, strict=True) if one.fitted]
     names = ("speed", "residual", "after")
     speed, residual, after = (np.concatenate([cell[name][cell["moving"] > 0] for cell in known]) for name in names)
@@ -86,7 +86,7 @@ def flagged(residuals: Sequence[Residual]) -> list[Spans]:
     return [_spans(cell, noise(cell["speed"]), loud) for cell in cells]
 
 
-def _left(residuals: Sequence[Residual], least: float) -> list[Array]:
+def _robust_residuals(residuals: Sequence[Residual], least: float) -> list[Array]:
     """What the base leaves when it is fitted by least absolute deviations to the clear motion of what may be fitted."""
     slopes = np.concatenate([one.slopes for one in residuals if one.fitted])
     residual = np.concatenate([one.residual for one in residuals if one.fitted])

@@ -81,7 +81,7 @@ def in_time(problem: Problem, one: Fitted) -> bool:
     if not hypothesis_of(one.effect).is_timing:
         return True
     pieces = problem.prepared.pieces
-    counted = np.concatenate([np.full(len(piece.kept), piece.asked) for piece in pieces]) & (problem.weight > 0)
+    counted = np.concatenate([np.full(len(piece.kept), piece.is_asked) for piece in pieces]) & (problem.weight > 0)
     owner = problem.prepared.recording_of
     rows = np.flatnonzero(counted[1:] & counted[:-1] & (owner[1:] == owner[:-1]))
     left, all_of_it = (np.diff(x)[rows] for x in (one.fit.residual, problem.prepared.stacked("tau")))

@@ -38,7 +38,7 @@ def prove(comparison: Comparison, examined: Examined, held: Predictive) -> Proof
     """
     order = sorted(examined.effects, key=lambda one: -one.own.evidence)
     chosen, some = _longest(comparison, examined, order, held)
-    chosen, standing, gains = _told(comparison, examined, chosen, some, held)
+    chosen, standing, gains = _with_size(comparison, examined, chosen, some, held)
     predicted = {one.effect.id: 0.0 for one in order} | {name: gain.nats for name, gain in gains.items()}
     removes = {name: gain.narrow for name, gain in gains.items()}
     return Proof(chosen, tuple(standing), predicted, tuple(one for one in order if one not in standing), removes)
@@ -47,14 +47,14 @@ def prove(comparison: Comparison, examined: Examined, held: Predictive) -> Proof
 def without(comparison: Comparison, examined: Examined, proof: Proof, out: AcceptedEffect, held: Predictive) -> Proof:
     """The proof of what is left where one of the effects that stand is taken out."""
     rest = [one for one in proof.standing if one is not out]
-    chosen, standing, gains = _told(comparison, examined, _with(comparison.problem, examined, rest), rest, held)
+    chosen, standing, gains = _with_size(comparison, examined, _with(comparison.problem, examined, rest), rest, held)
     fallen = tuple(one for one in rest if one not in standing)
     predicted = proof.predicted | {name: gain.nats for name, gain in gains.items()}
     removes = {name: gain.narrow for name, gain in gains.items()}
     return Proof(chosen, tuple(standing), predicted, (*proof.unproven, *fallen), removes)
 
 
-def _told(
+def _with_size(
     comparison: Comparison, examined: Examined, chosen: Fit, some: Sequence[AcceptedEffect], held: Predictive
 ) -> tuple[Fit, list[AcceptedEffect], dict[str, Gain]]:
     """The effects that stand, but for those of which recordings tell no size, unless they surely predict."""
@@ -77,7 +77,7 @@ def _standing(
     problem = comparison.problem
     gains = {one.effect.id: _gain(problem, chosen, one, some, held) for one in some}
     nats = {one.effect.id: gains[one.effect.id].nats for one in some}
-    falling = [one for one in some if not _stands(comparison, examined, chosen, one, gains[one.effect.id])]
+    falling = [one for one in some if not _is_validated(comparison, examined, chosen, one, gains[one.effect.id])]
     if not falling:
         return chosen, list(some), gains
     out = {min(group, key=lambda one: nats[one.effect.id]).effect.id for group in (falling, some)}
@@ -89,7 +89,7 @@ def _standing(
     return best, kept, gains | known
 
 
-def _stands(comparison: Comparison, examined: Examined, chosen: Fit, one: AcceptedEffect, gain: Gain) -> bool:
+def _is_validated(comparison: Comparison, examined: Examined, chosen: Fit, one: AcceptedEffect, gain: Gain) -> bool:
     """Whether an effect stands on the held-out recordings, and is still what its name says in the structure there."""
     rules = until_refused(_validation(comparison, examined, chosen, one, gain))
     comparison.enter(one.effect.id, chosen, one.own.plain_gain)

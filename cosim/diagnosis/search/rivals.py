@@ -80,16 +80,16 @@ def examine(comparison: Comparison, found: Search, refits: InTurn = IN_TURN) -> 
     for _ in range(ROUNDS):
         effects, better = _round(comparison, chosen, known, refits)
         if better is None:
-            better = _grown(comparison, effects, _beside(comparison, chosen, known, refits))
+            better = _grown(comparison, effects, _stage_after(comparison, chosen, known, refits))
         if better is None:
             break
         chosen = better
     else:  # swaps went in a circle: what stands is examined as it is
         effects = [_challenged(comparison, chosen, group, known, refits) for group in grouped(comparison, chosen)]
-    return Examined(found.base, chosen, tuple(effects), _beside(comparison, chosen, known, refits))
+    return Examined(found.base, chosen, tuple(effects), _stage_after(comparison, chosen, known, refits))
 
 
-def _beside(comparison: Comparison, fit: Fit, known: dict[tuple[str, ...], Stage], refits: InTurn) -> Stage:
+def _stage_after(comparison: Comparison, fit: Fit, known: dict[tuple[str, ...], Stage], refits: InTurn) -> Stage:
     """What was tried beside a structure, found once."""
     if _names(fit) not in known:
         known[_names(fit)] = stage(comparison, fit, refits)
@@ -147,7 +147,7 @@ def _challenged(
     problem = comparison.problem
     refits.on_progress(group[0].title)
     rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
-    beside = _beside(comparison, problem.fit(replace(chosen.mount, effects=rest), 45), known, refits)
+    beside = _stage_after(comparison, problem.fit(replace(chosen.mount, effects=rest), 45), known, refits)
     own = weighed(comparison, chosen, beside.current, effect=group[0])
     others = [one for one in beside.tried if one.effect.id != group[0].id]
     rivals = [one for one in others if _is_admissible(comparison, one)]

@@ -37,7 +37,7 @@ class Unseen:
         """Mean square of each block."""
         return np.array([float(np.mean(error[own] ** 2)) for own in self.blocks.rows])
 
-    def left(self, formula: Formula, moved: Array) -> Array:
+    def residual(self, formula: Formula, moved: Array) -> Array:
         """Weighted error with a formula, the base moved as it was in training."""
         value = formula.value(self.rows.quantities)
         return np.asarray(self.rows.left - self.rows.unit * value - self.rows.slopes @ moved)
@@ -49,7 +49,7 @@ class Unseen:
 
     def is_as_good(self, formula: Formula, moved: Array) -> bool:
         """Whether the loss is within a standard error of the table's, and most of what that gained is kept."""
-        own, table, nothing = (self.losses(one) for one in (self.left(formula, moved), self.table, self.nothing))
+        own, table, nothing = (self.losses(one) for one in (self.residual(formula, moved), self.table, self.nothing))
         error = float(np.std(table, ddof=1) / np.sqrt(len(table))) if len(table) > 1 else 0.0
         gained = nothing.mean() - own.mean() >= KEPT * (nothing.mean() - table.mean())
         return bool(own.mean() <= table.mean() + error and gained)

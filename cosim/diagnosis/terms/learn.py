@@ -91,7 +91,7 @@ class Learned:
 
     def judged_in(self, band: Prepared, without: Mount) -> "Learned":
         """The same with its errors on recordings in another band, in which too it must help."""
-        old, new = (np.concatenate(_left(band, one)) for one in (without, self.mount))
+        old, new = (np.concatenate(_held_out(band, one)) for one in (without, self.mount))
         interval = interval_of(old, new, band.pieces[0].dt)
         helps = self.helps and interval[0] > 0
         told = replace(self, before=rms(old), after=rms(new), interval=interval, cutoff=band.cutoff)
@@ -185,7 +185,7 @@ def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], 
     whole, effects = allowed(comparison, found, terms)
     if not effects:
         return None
-    pairs = list(zip(_left(held.protocol, found.mount), _left(held.protocol, whole), strict=True))
+    pairs = list(zip(_held_out(held.protocol, found.mount), _held_out(held.protocol, whole), strict=True))
     left = [np.concatenate(parts) for parts in zip(*pairs, strict=True)]
     before, after = map(rms, left)
     gain = held.log_likelihood(held.residual(whole)) - held.log_likelihood(held.residual(found.mount))
@@ -211,7 +211,7 @@ def allowed(
     return found.mount, ()
 
 
-def _left(held: Prepared, mount: Mount) -> list[Array]:
+def _held_out(held: Prepared, mount: Mount) -> list[Array]:
     """What a model leaves of each held-out recording, by the protocol."""
     pieces = held.pieces
     left = [one[piece.inside] for one, piece in zip(residuals(held, mount), pieces, strict=True)]

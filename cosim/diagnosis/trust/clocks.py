@@ -100,7 +100,7 @@ class _Left(NamedTuple):
 
 def clock_offset(balances: Sequence[Balance]) -> ClockOffset:
     """Find the lag of the position behind the torque that balances recordings best, with any friction."""
-    lefts = [_left(one) for one in balances]
+    lefts = [_misfit(one) for one in balances]
     likelihood = np.sum([_likelihood(one, left) for one, left in zip(balances, lefts, strict=True)], axis=0)
     near = LAGS[likelihood >= likelihood.max() - ALIKE]
     best, none = int(likelihood.argmax()), len(LAGS) // 2
@@ -131,7 +131,7 @@ def clocks(balances: Sequence[Balance], names: str) -> tuple[Sanity, ...]:
     return (Sanity(finding="clocks", statement=text, alternatives=causes, blocks_naming=found.is_too_late),)
 
 
-def _left(balance: Balance) -> _Left:
+def _misfit(balance: Balance) -> _Left:
     torque, columns = _shifted(balance), balance.columns(balance.own_order)
     inside = (far_from_turns(balance.prepared) > 0) & np.all(np.isfinite(torque), axis=1)
     if inside.sum() < LEAST_ROWS * columns.shape[1]:

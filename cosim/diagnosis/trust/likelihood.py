@@ -88,7 +88,7 @@ class Evidence:
             + self._rate(rate)
             + self._limit(explanation)
         )
-        return found + sum(_beside(slope, position, explanation.time, kind) for kind, slope in self._slopes)
+        return found + sum(_slip_likelihood(slope, position, explanation.time, kind) for kind, slope in self._slopes)
 
     def balance(self, time: float) -> Balance:
         """The torque balance where time counts `time` to a second."""
@@ -188,7 +188,7 @@ def _droops(recording: Recording) -> bool:
     return bool(np.corrcoef(left, recording["tau"])[0, 1] > DRIVEN)
 
 
-def _beside(slope: float, position: float, time: float, kind: str) -> float:
+def _slip_likelihood(slope: float, position: float, time: float, kind: str) -> float:
     """Log-likelihood of such a slope: the slip is in one of the columns, or in both."""
     ticks = 1 / time if kind == "v" else 1.0
     found = [exp(-0.5 * (log(abs(slope) / (each * ticks)) / ALIKE) ** 2) for each in {1.0, position}]

@@ -120,7 +120,7 @@ def summary(found: Identified, card: Card) -> str:
         lines += [line for name in found.map.fits for line in _mapped(found.map, name)]
     for name, one in found.presliding.items():
         lines.append(f"Presliding step {name}, {one.torque:.3g} N.m (or N)")
-        lines += [line for way, fit in (("linear", one.linear), ("direct", one.direct)) for line in _told(way, fit)]
+        lines += [line for way, fit in (("linear", one.linear), ("direct", one.direct)) for line in _lines_of(way, fit)]
     if found.best:
         best = found.best
         lines.append(f"Output error in closed loop, best of {len(found.output_error)} starts")
@@ -143,7 +143,7 @@ def _mapped(found: FrictionMap, name: str) -> list[str]:
     return [line, f"  Mind, {name}: {rule}: within {band:.2g} N.m or N (95 %)."]
 
 
-def _told(name: str, fit: Estimate) -> list[str]:
+def _lines_of(name: str, fit: Estimate) -> list[str]:
     """One fit as lines: its numbers, and what the recording cannot tell."""
     return [f"  {name:9}{_numbers(fit)}", *(f"  Mind, {name}: {warning}" for warning in fit.warnings)]
 

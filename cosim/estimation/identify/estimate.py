@@ -146,7 +146,7 @@ def determined(found: Estimate, model: Model, card: Array, limits: Array | None 
             raise InputError(f"these recordings determine none of {', '.join(found.names)}.")
         rough = replace(best, names=tuple(found.names[k] for k in kept), start=found.start[kept])
         rough = replace(rough, values=np.delete(best.values, worst), covariance=np.eye(len(kept)))
-        best = settle(rough, _beside(model, own, kept), edges[kept])
+        best = settle(rough, _restricted(model, own, kept), edges[kept])
     held = {name: float(own[k]) for k, name in enumerate(found.names) if k not in kept}
     return replace(best, held=held)
 
@@ -162,7 +162,7 @@ def _least_certain(found: Estimate, card: Array, limits: Array) -> int | None:
     return worst if share[worst] > UNCERTAIN else None
 
 
-def _beside(model: Model, numbers: Array, kept: Sequence[int]) -> Model:
+def _restricted(model: Model, numbers: Array, kept: Sequence[int]) -> Model:
     """A model of some of its numbers, the others as given."""
 
     def some(values: Array) -> Outputs:

@@ -81,7 +81,7 @@ def identify(
     started = _started(card, free, found_map, found_steps)
     found_outputs = _tried(not_done, "output error", lambda: _outputs(moves, started, free, options, on_progress)) or ()
     improved = _with_estimate(started, found_outputs[0]) if found_outputs else started
-    sure = {*_found(found_map, found_steps), *(found_outputs[0].names if found_outputs else ())}
+    sure = {*_determined(found_map, found_steps), *(found_outputs[0].names if found_outputs else ())}
     kept = tuple(name for name in free if name not in sure)
     if len(kept) == len(free):
         raise InputError(f"Nothing can be identified of {', '.join(free)}: {' '.join(not_done)}".rstrip(": "))
@@ -152,10 +152,10 @@ def _outputs(
 
 def _started(card: Card, free: tuple[str, ...], found: FrictionMap | None, steps: dict[str, Presliding]) -> Card:
     """The card with the map's static friction and the bristles of the presliding steps, where those are free."""
-    return with_numbers(card, {name: value for name, value in _found(found, steps).items() if name in free})
+    return with_numbers(card, {name: value for name, value in _determined(found, steps).items() if name in free})
 
 
-def _found(found: FrictionMap | None, steps: Mapping[str, Presliding]) -> dict[str, float]:
+def _determined(found: FrictionMap | None, steps: Mapping[str, Presliding]) -> dict[str, float]:
     """Numbers of the map and of the presliding steps that these determine, by full name."""
     numbers: dict[str, float] = {}
     for direction, fit in found.fits.items() if found else ():

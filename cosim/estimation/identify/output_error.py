@@ -137,13 +137,13 @@ def fit_outputs(
 
     def one(number: int) -> Estimate:
         found = explore(machine.free, own * factors[number - 1], model, limits, LOOK)
-        on_progress(f"output error, start {number} of {starts}: {_told(found)}")
+        on_progress(f"output error, start {number} of {starts}: {_summary(found)}")
         return found
 
     with ThreadPoolExecutor(max_workers=2) as pool:
         looked = sorted(pool.map(one, range(1, starts + 1)), key=_size)
     best = settle(looked[0], model, limits)
-    on_progress(f"output error, best start settled: {_told(best)}")
+    on_progress(f"output error, best start settled: {_summary(best)}")
     return [best, *looked[1:]]
 
 
@@ -151,5 +151,5 @@ def _size(found: Estimate) -> float:
     return float(np.sum(np.log(found.rms)))
 
 
-def _told(found: Estimate) -> str:
+def _summary(found: Estimate) -> str:
     return f"{found.evaluations} simulations, RMS {', '.join(f'{value:.3g}' for value in found.rms)}"

@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from cosim.diagnosis.evidence import adequacy
-from cosim.diagnosis.evidence.adequacy import _beside, _cells, _hats, _lasting, _rms, _slow
+from cosim.diagnosis.evidence.adequacy import _cells, _hats, _lasting, _rms, _slow, _unexplained
 from cosim.diagnosis.evidence.marginal import Group, _size, marginal
 from cosim.diagnosis.search.admissibility import _way_back
 from cosim.estimation.residuals import away_from_turns, removed_at_rest
@@ -88,7 +88,7 @@ def test_beside_columns_is_what_weighted_least_squares_leave() -> None:
     root = np.sqrt(weight)
     fitted = np.linalg.lstsq(root[:, None] * columns, root * residual, rcond=None)[0]
     expected = np.where(weight > 0, residual - columns @ fitted, 0.0)
-    np.testing.assert_allclose(_beside(residual, weight, columns), expected, atol=1e-9)
+    np.testing.assert_allclose(_unexplained(residual, weight, columns), expected, atol=1e-9)
 
 
 @pytest.mark.parametrize("seconds", [0.0, 0.5, 1.4, 4.0, 7.6])
