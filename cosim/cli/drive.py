@@ -55,6 +55,9 @@ def virtual_drive(
     from cosim.hardware.machine import changed
     from cosim.hardware.virtual import VirtualDrive, parse_injection
 
+    if 0 < counts_per_turn < 1:
+        message = f"--counts-per-turn {counts_per_turn:g}: a turn has one count at least."
+        raise HardwareError(message, culprit="--counts-per-turn", value=counts_per_turn)
     given = machine_of(machine, key=key)
     faults = [one.model_dump() for one in given.inject] + [parse_injection(one) for one in inject or []]
     given = changed(given, "--inject", inject=faults)

@@ -120,13 +120,29 @@ class Forked:
             library().hardware_release(self._session)
 
 
+LONGEST_CYCLE = 10.0
+"""A loop in real time goes round at least so often [s]: no drive waits longer for an order."""
+
+
+def period_of(step: float) -> int:
+    """Return the cycle of a step [s] in ns.
+
+    Raises:
+        HardwareError: no clock goes by such steps.
+    """
+    if not 1e-6 <= step <= LONGEST_CYCLE:
+        message = f"step {step:g} s: a loop in real time has cycles of 1e-06 s to {LONGEST_CYCLE:g} s."
+        raise HardwareError(message, culprit="step", value=step)
+    return round(step * 1e9)
+
+
 def bare_clock(step: float, spin_us: float, seconds: float) -> tuple[int, int, float]:
     """Run the clock of a loop, and nothing else, in a thread: what a loop on this computer can hope for.
 
     Returns:
         Edges in all, those that were missed, and the worst wake-up in us.
     """
-    session = CSession(period=round(step * 1e9), spin=round(spin_us * 1000))
+    session = CSession(period=period_of(step), spin=round(spin_us * 1000))
     thread = Thread(target=library().hardware_bare, args=(session, round(seconds / step)))
     thread.start()
     thread.join()

@@ -21,7 +21,7 @@ import numpy as np
 from cosim.hardware.axis import cycles_of, make_axis, story_of
 from cosim.hardware.blackbox import BlackBox
 from cosim.hardware.library import library, shared
-from cosim.hardware.loops import Called, Forked, Loop, Threaded
+from cosim.hardware.loops import Called, Forked, Loop, Threaded, period_of
 from cosim.hardware.machine import Machine
 from cosim.hardware.structures import CSample, CSession
 from cosim.hardware.transport import Transport, open_transport
@@ -235,7 +235,7 @@ class Session:
             box=ctypes.pointer(self._box.box),
             setpoint=wired.setpoints.ctypes.data,
             setpoints=wired.setpoints.shape[1],
-            period=0 if self._fast else round(step * 1e9),
+            period=0 if self._fast else period_of(step),
             spin=round(self.machine.clock.spin_us * 1000),
             waits=self.machine.adapter == "simulated",
             heartbeat_limit=cycles_of(reactions.heartbeat_ms, step),

@@ -13,6 +13,7 @@ from time import sleep
 from cosim.fmi.component import FATAL
 from cosim.fmi.fmu import FmuComponent
 from cosim.hardware.library import library
+from cosim.hardware.loops import period_of
 from cosim.hardware.machine import Machine
 from cosim.hardware.simulated import Plant, make_drive
 from cosim.hardware.structures import COUNTED, KEY, CAdapter, CVirtual
@@ -48,7 +49,7 @@ class VirtualDrive:
         lockstep: its time is that of the orders; no clock, and no watchdog but in ticks of the orders.
 
     Raises:
-        HardwareError: the port is taken, the key is none, or the plant does not start.
+        HardwareError: the port is taken, the key is none, no clock has such a step, or the plant does not start.
     """
 
     def __init__(
@@ -62,6 +63,7 @@ class VirtualDrive:
         port: int = 0,
         lockstep: bool = False,
     ) -> None:
+        period = 0 if lockstep else period_of(step)
         self._adapter, self._plant, key = CAdapter(), plant, key_of(machine.key_file)
         self.drive, self._kept = make_drive(plant, machine, step, quantum, self._adapter)
         self._socket = listen(host, port)
@@ -69,7 +71,7 @@ class VirtualDrive:
         self.virtual = CVirtual(
             drive=ctypes.pointer(self.drive),
             socket=self._socket.fileno(),
-            period=0 if lockstep else round(step * 1e9),
+            period=period,
             watchdog=round(machine.watchdog_ms * 1e6),
             lease=round(max(machine.watchdog_ms * 1e6, LEASE)),
             ahead=max(self.drive.watchdog, AHEAD),
