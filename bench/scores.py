@@ -15,6 +15,7 @@ RESULTS = Path(__file__).parents[1] / "results"
 PAGE = RESULTS / "SCORES.md"
 SCORED = {
     "proof/README.md": "proof/proof.json",
+    "proof/rough.md": "proof/rough.json",
     "proof/baselines.md": "proof/baselines.json",
     "abroad/README.md": "abroad/abroad.json",
     "learned/README.md": "learned/learned.json",
