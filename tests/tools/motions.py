@@ -37,7 +37,7 @@ class Motion:
                 q=place,
                 v=v,
                 inside=slice(1, -1),
-                asked=wanted,
+                is_asked=wanted,
                 **rows,
             )
             for v, place, wanted in zip(speeds, q, asked, strict=True)

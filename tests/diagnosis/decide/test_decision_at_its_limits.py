@@ -15,8 +15,8 @@ from cosim.diagnosis.decide.decision import (
     doubted,
     followed,
     is_left,
+    is_validated,
     open_rivals,
-    stands,
 )
 from cosim.diagnosis.decide.policy import POLICY
 
@@ -101,7 +101,7 @@ def test_a_rival_at_the_margin_of_a_set_is_beaten() -> None:
     ],
 )
 def test_an_effect_stands_from_its_limits_on(gain: Gain, share: float, expected: bool) -> None:
-    assert stands(gain, share, ROUND) is expected
+    assert is_validated(gain, share, ROUND) is expected
 
 
 @pytest.mark.parametrize(
