@@ -10,7 +10,7 @@ from cosim.diagnosis.answer.doubt_entry import not_determined_doubts
 from cosim.diagnosis.answer.entries import BroadbandEntry
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.answer.scores import Scores
-from cosim.diagnosis.decide.decision import Decision, decide, rest_rules, shaking_rules
+from cosim.diagnosis.decide.decision import Decision, beyond_any_machine, decide, rest_rules, shaking_rules
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.candidates import at_own_level
 from cosim.diagnosis.evidence.adequacy import friction_level
@@ -232,7 +232,8 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
     signals = traces(train, heldout, models)
     found = _findings(answer, signals)
     bias = loop_bias(prepared, answer.chosen, problem.weight)
-    policy, left = answer.comparison.policy, answer.scores.rest
+    policy = answer.comparison.policy
+    left = beyond_any_machine(answer.scores.rest, policy)
     rest = (*rest_rules(answer.scores.effects, left, policy), *shaking_rules(left, policy))
     enter_answer(answer.comparison, answer.proof.chosen, found, rest, decision.is_unknown)
     return Diagnosis(

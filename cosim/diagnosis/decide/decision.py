@@ -1,7 +1,7 @@
 """The decision, from scores alone: what is named, what stays open, whether something unknown is left. No data here."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp, sqrt
 
 from cosim.diagnosis.answer.ledger import Rule, all_pass
@@ -48,10 +48,11 @@ def decide(scores: Scores, policy: Policy) -> Decision:
 
     Pure: scores that were stored are decided again in less than a millisecond, by this policy or another.
     """
-    found, learned = _of_rest(scores.effects, scores.rest, policy), scores.learned
+    rest, learned = beyond_any_machine(scores.rest, policy), scores.learned
+    found = _of_rest(scores.effects, rest, policy)
     if found.is_unknown or not learned or not _says_unknown(learned, least_left(scores.effects, policy), policy):
         return found
-    if set(learned.quantities) <= of_any_machine(scores.rest, policy):
+    if set(learned.quantities) <= {term.name for term in scores.rest.terms} - {term.name for term in rest.terms}:
         return found
     return beside_rest(scores.effects, learned.quantities, policy)
 
@@ -193,12 +194,10 @@ def rest_rules(effects: Sequence[EffectScores], residual: ResidualScores, policy
     )
     for name, value, limit in shares:
         yield Rule(name, value > limit, value, limit)
-    causes = _in_place(residual, policy)
-    yield Rule("another cause explains more than a name", bool(causes), note=", ".join(causes))
+    yield Rule("another cause explains more than a name", bool(residual.in_place), note=", ".join(residual.in_place))
     doubtful = doubted(effects, residual, policy)
     least = least_left([one for one in effects if one.effect not in doubtful], policy)
-    slight = of_any_machine(residual, policy)
-    for term in (one for one in residual.terms if one.name not in slight):
+    for term in residual.terms:
         outcome, limit = _is_no_misfit(term, least, policy), max(least, _floor_of(term, policy))
         yield Rule(f"error follows {term.name}", outcome, term.evidence, limit, "nats")
 
@@ -218,16 +217,15 @@ def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:
     return term.evidence >= max(least, _floor_of(term, policy))
 
 
-def of_any_machine(residual: ResidualScores, policy: Policy) -> set[str]:
-    """Terms of a friction level that is no more uneven than any machine's; a wave's RMS is its amplitude by sqrt 2."""
+def beyond_any_machine(residual: ResidualScores, policy: Policy) -> ResidualScores:
+    """The rest without what any machine has: a friction level that is a little uneven over position.
+
+    `least_uneven` is an amplitude; the RMS of a wave is that by sqrt 2.
+    """
     least = policy.least_uneven / sqrt(2)
-    return {term.name for term in residual.terms if term.uneven is not None and term.uneven < least}
-
-
-def _in_place(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
-    """What explains more than a name did, and is more than any machine has."""
-    slight = of_any_machine(residual, policy)
-    return tuple(name for name in residual.in_place if name not in slight)
+    slight = {term.name for term in residual.terms if term.uneven is not None and term.uneven < least}
+    terms = [term for term in residual.terms if term.name not in slight]
+    return replace(residual, terms=terms, in_place=tuple(name for name in residual.in_place if name not in slight))
 
 
 def _floor_of(term: TermScores, policy: Policy) -> float:
@@ -244,8 +242,8 @@ def _floor_of(term: TermScores, policy: Policy) -> float:
 
 def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
     """Quantities that the residual follows elsewhere, the best first; where there is none, how it goes over time."""
-    if causes := _in_place(residual, policy):
-        return causes
+    if residual.in_place:
+        return residual.in_place
     best = max((one.share for one in residual.terms), default=0.0)
     least = max(policy.follows, policy.halved * best)
     ranked = sorted(residual.terms, key=lambda one: -one.share)
