@@ -35,7 +35,7 @@ SECONDS = 3.0
 
 
 @dataclass(frozen=True)
-class Told:
+class Drawn:
     """A machine with what was said of it."""
 
     machine: Shown
@@ -52,7 +52,7 @@ def main() -> int:
     pictures.mkdir(parents=True, exist_ok=True)
     told = []
     for machine in MACHINES if not given.only else [one for one in MACHINES if one.id in given.only]:
-        told.append(Told(machine, diagnosed(machine, given.data)))
+        told.append(Drawn(machine, diagnosed(machine, given.data)))
         draw(told[-1], pictures / f"{machine.id}.png")
         print(machine.title, "|", heading(told[-1].found), flush=True)
     (given.out / "machines.md").write_text(page(told), "utf-8")
@@ -90,7 +90,7 @@ def _written(path: Path, table: Any) -> Path:
     return path
 
 
-def draw(told: Told, path: Path) -> None:
+def draw(told: Drawn, path: Path) -> None:
     """Draw the torque of the worst seconds, and the error over what the missing physics depends on."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
@@ -151,7 +151,7 @@ def _noun(found: Diagnosis) -> str:
     return "torque" if found.motion == "rotary" else "force"
 
 
-def page(told: Sequence[Told]) -> str:
+def page(told: Sequence[Drawn]) -> str:
     """The page as Markdown: small pictures, then a section a machine."""
     cells = [
         f"[![{one.machine.title}](machines/{one.machine.id}.png) {one.machine.title}](#{one.machine.id})"
@@ -174,7 +174,7 @@ Made by `python bench/gallery.py --data ../shared/recordings --out docs`; more m
 """
 
 
-def section(told: Told) -> str:
+def section(told: Drawn) -> str:
     """What is known of a machine, what is said of it, by how much the error falls, where the data are from."""
     found, machine, scales = told.found, told.machine, Scales.of(told.found)
     held, unit = found.heldout, scales.torque

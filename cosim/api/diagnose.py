@@ -204,7 +204,7 @@ def _written(folder: Path) -> dict[Path, int]:
 
 @contextmanager
 def _anew(folder: Path | None) -> Iterator[None]:
-    """Remove in the end what was there and was not written over: beside a new answer it tells of another one."""
+    """Remove in the end what was there and was not written over: it belongs to another answer."""
     before = _written(folder) if folder else {}
     yield
     for path, written in before.items():

@@ -191,7 +191,7 @@ def identify(
 
 
 def _check_none(model: ForModels) -> None:
-    """Refuse beside a card what goes with an FMU or a system (InputError)."""
+    """Refuse, where a card is fitted, what goes with an FMU or a system (InputError)."""
     _check_names(model)
     if given := sorted(name for name, value in model.items() if value is not None):
         raise InputError(f"{', '.join(given)}: of an FMU or a system, not of a card; leave it out.", culprit=given[0])

@@ -4,12 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import TYPE_CHECKING
 
+from cosim.api.show_results import Shown
 from cosim.support.plain import Json
 
 if TYPE_CHECKING:
     from pyfmi_models.effects import Effect
-
-Told = tuple[dict[str, Json], dict[str, Sequence[Mapping[str, Json]]]]
 
 
 def effects() -> tuple[str, ...]:
@@ -17,7 +16,7 @@ def effects() -> tuple[str, ...]:
     return tuple(sorted(_catalogue()))
 
 
-def of_effect(name: str) -> Told:
+def of_effect(name: str) -> Shown:
     """Return facts and tables of an effect by its id: parameters, checks in their order, repair by kind of machine."""
     from cosim.report.repairs import MACHINES, repairs_of
 

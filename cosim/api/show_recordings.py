@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from cosim.api.show_results import Told
+from cosim.api.show_results import Shown
 from cosim.data.preview import preview
 from cosim.data.recording import Recording
 from cosim.data.runs import Run, taken
@@ -14,7 +14,7 @@ from cosim.support.plain import Json
 Row = Mapping[str, Json]
 
 
-def of_file(path: Path, options: Mapping[str, Mapping[str, str]], picture: str | Path | None, force: bool) -> Told:
+def of_file(path: Path, options: Mapping[str, Mapping[str, str]], picture: str | Path | None, force: bool) -> Shown:
     """Tell what a recording's file holds, and draw it where a picture is asked for."""
     try:
         seen = preview(path, options)
@@ -24,7 +24,7 @@ def of_file(path: Path, options: Mapping[str, Mapping[str, str]], picture: str |
     return ({"recording": str(path)} | told.facts(seen) | drawn, {"columns": told.rows(seen.recording, seen.sources)})
 
 
-def _of_many(path: Path, runs: Sequence[Run]) -> Told:
+def _of_many(path: Path, runs: Sequence[Run]) -> Shown:
     """Tell of the recordings that a file holds, and how one is taken."""
     rows: list[Row] = [
         {"number": f"#{number}", "recording": one.which, "rows": one.rows, "duration": f"{one.seconds:.6g} s"}
@@ -38,7 +38,7 @@ def _of_many(path: Path, runs: Sequence[Run]) -> Told:
     return facts, {"recordings": rows}
 
 
-def of_recording(recording: Recording, picture: str | Path | None, force: bool) -> Told:
+def of_recording(recording: Recording, picture: str | Path | None, force: bool) -> Shown:
     """Tell what a recording holds."""
     drawn = {"picture": str(told.draw(recording, {}, Path(picture), force))} if picture else {}
     tables: dict[str, Sequence[Row]] = {"columns": told.rows(recording)}

@@ -11,13 +11,13 @@ from cosim.support.plain import Json, Parsed
 if TYPE_CHECKING:
     from cosim.plots.sweep import Results
 
-Told = tuple[dict[str, Json], dict[str, Sequence[Mapping[str, Json]]]]
+Shown = tuple[dict[str, Json], dict[str, Sequence[Mapping[str, Json]]]]
 DIAGNOSIS, RUN, TABLE = "diagnosis.json", "run.json", "table.parquet"
 FIRST = 20
 """Runs of a sweep that are listed, the best first."""
 
 
-def result(path: Path) -> Told | None:
+def result(path: Path) -> Shown | None:
     """Return facts and tables of a folder or file that a verb wrote; None for anything else.
 
     Raises:
@@ -31,7 +31,7 @@ def result(path: Path) -> Told | None:
     return _read_result(path)
 
 
-def _read_result(path: Path) -> Told:
+def _read_result(path: Path) -> Shown:
     """Read a file of ours; what in it is not as we write it is a sentence (InputError)."""
     try:
         return _READERS[path.name](path)
@@ -51,7 +51,7 @@ def _document(path: Path, *keys: str) -> Parsed:
     return told
 
 
-def _diagnosis(path: Path) -> Told:
+def _diagnosis(path: Path) -> Shown:
     told = _document(path, "verdict", "effects", "heldout")
     held = told["heldout"]
     facts: dict[str, Json] = {
@@ -81,7 +81,7 @@ def _short(held: Mapping[str, Any], name: str) -> str:
     return f"{value:.3g}" if isinstance(value, float | int) else "?"
 
 
-def _run(path: Path) -> Told:
+def _run(path: Path) -> Shown:
     told = _document(path, "steps", "seconds")
     facts: dict[str, Json] = {"run": str(path.parent), "scenario": str(told.get("scenario", ""))}
     tracked = [str(one["statement"]) for one in told.get("tracking", ()) if "statement" in one]
@@ -105,7 +105,7 @@ def _is_sweep(path: Path) -> bool:
         return False
 
 
-def _sweep(path: Path) -> Told:
+def _sweep(path: Path) -> Shown:
     if not _is_sweep(path):
         raise InputError(f"{path} is no table of a sweep.", culprit=str(path))
     from cosim.plots.sweep import read_results
@@ -130,7 +130,7 @@ def _ranked(results: "Results") -> list[Mapping[str, Json]]:
     ]
 
 
-def sweep_file(path: Path) -> Told:
+def sweep_file(path: Path) -> Shown:
     """Return what a sweep file asks for."""
     from cosim.sweeps.file import read_sweep
 
@@ -144,4 +144,4 @@ def sweep_file(path: Path) -> Told:
     return facts, {}
 
 
-_READERS: dict[str, Callable[[Path], Told]] = {DIAGNOSIS: _diagnosis, RUN: _run, TABLE: _sweep}
+_READERS: dict[str, Callable[[Path], Shown]] = {DIAGNOSIS: _diagnosis, RUN: _run, TABLE: _sweep}

@@ -47,14 +47,14 @@ class Correction:
         fmi = self._fmi
         model = correction(self.like.plant(), better.plant())
         export_fmu(model, out / "correction.fmu", fmi=fmi, force=True)
-        told: Improved = {"correction": "correction.fmu", "base_fmu": self.box.label}
+        entry: Improved = {"correction": "correction.fmu", "base_fmu": self.box.label}
         if left := left_out(better.plant()):
-            told["not_in_correction"] = list(left)
+            entry["not_in_correction"] = list(left)
         refused = self._refused()
         if refused:
-            return told | Improved(no_ssp=refused)
+            return entry | Improved(no_ssp=refused)
         export_ssp(self._system(better), out / "improved.ssp", fmi=fmi, force=True)
-        return told | Improved(ssp="improved.ssp")
+        return entry | Improved(ssp="improved.ssp")
 
     @property
     def _fmi(self) -> Literal[2, 3]:

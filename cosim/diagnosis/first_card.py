@@ -164,7 +164,7 @@ def _is_clear(problem: Problem, without: Fit, tried: Fit) -> bool:
 
 
 def _is_apart(problem: Problem, tried: Fit, name: str) -> bool:
-    """Whether a number is told apart from the sizes of the effects before: over a short way a weight is a constant."""
+    """Whether a number is separable from the sizes of the effects before: over a short way a weight is a constant."""
     spread = covariance(
         tried.slopes * problem.weight[:, None], tried.residual * problem.weight, Blocks.of(problem.prepared)
     )

@@ -175,7 +175,7 @@ def _unknown(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     found = [block for block in blocks(diagnosis) if block.answer == "found"]
     own = next((stated(finding) for finding in diagnosis.findings if finding.effect == "unknown"), "")
     others = [f for f in diagnosis.findings if f.effect != "unknown" and f.answer in ("not_seen", "not_proven")]
-    subject = f"Beside {_listed(found)} an error remains that" if found else "The error is one that"
+    subject = f"With {_listed(found)} an error remains that" if found else "The error is one that"
     none = f"{subject} none of the {len(others)} {'other ' if found else ''}known effects tested here explains."
     numbers = improvement(diagnosis, scales) if diagnosis.learned else _numbers(diagnosis, scales)
     return [own if own and not found else none, numbers.removesuffix(".") + _written(diagnosis) + "."]

@@ -77,8 +77,8 @@ def summary(diagnosis: Diagnosis, bold: bool = False, out: Path | None = None) -
 def _doubts(diagnosis: Diagnosis) -> list[str]:
     """Return what to read before the answer, what keeps effects from being named first."""
     alarms, others, _ = doubts(diagnosis)
-    told = [("Careful", text) for text in alarms] + [("Note", text) for text in others]
-    return [line for word, text in told for line in _ordered(word, text)]
+    marked = [("Careful", text) for text in alarms] + [("Note", text) for text in others]
+    return [line for word, text in marked for line in _ordered(word, text)]
 
 
 def _remarks(diagnosis: Diagnosis, out: Path | None) -> list[str]:

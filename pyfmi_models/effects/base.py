@@ -117,7 +117,7 @@ class Effect(Part):
         return ""
 
     def told_at(self, level: float) -> Self:
-        """Return the same effect, numbers that are told beside a Coulomb level told beside this one [N m]."""
+        """Return the same effect, with numbers that are relative to a Coulomb level made relative to this one [N m]."""
         return self
 
     def leading(self) -> Main:

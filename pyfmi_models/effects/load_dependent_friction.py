@@ -58,6 +58,6 @@ class LoadScaledFriction(LoadDependentFriction):
         return level * (1 + self.coulomb_per_Nm * ca.fabs(motion.payload) / self.at_level)
 
     def told_at(self, level: float) -> Self:
-        """Return the same friction, its rise told at another Coulomb level [N m]."""
+        """Return the same friction, its rise given at another Coulomb level [N m]."""
         rise = float(self.coulomb_per_Nm) * level / float(self.at_level)
         return replace(self, coulomb_per_Nm=rise, at_level=level)

@@ -86,7 +86,7 @@ def contact_level(mount: Mount) -> float:
 
 
 def at_own_level(effect: Effect, mount: Mount) -> Effect:
-    """Return an effect told beside the level that the mount has; that which began the fit was the base's."""
+    """Return an effect with numbers relative to the level that the mount has; the fit began with the base's."""
     level = contact_level(mount)
     return effect.told_at(level) if level else effect
 

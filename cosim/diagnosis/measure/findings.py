@@ -116,13 +116,13 @@ def rival_finding(rival: CandidateFit, probability: float, mount: Mount) -> Find
 
 
 def _at_own_level(effect: Effect, numbers: Numbers, mount: Mount) -> tuple[Effect, Numbers]:
-    """Return an effect and its numbers as they are told beside the fitted level of friction."""
-    told = at_own_level(effect, mount)
-    if told is effect:
+    """Return an effect and its numbers relative to the fitted level of friction."""
+    relative = at_own_level(effect, mount)
+    if relative is effect:
         return effect, numbers
-    values = {variable.name: float(variable.start) for variable in parameters_of(told)}
+    values = {variable.name: float(variable.start) for variable in parameters_of(relative)}
     errors = {name: error * values[name] / numbers.values[name] for name, error in numbers.errors.items()}
-    return told, Numbers(values, errors)
+    return relative, Numbers(values, errors)
 
 
 def measured_as(row: Finding, first: Finding, mount: Mount) -> Finding:
