@@ -36,6 +36,8 @@ COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
 }
 SAID = ("say", "told", "put")
 """Calls that only tell people something."""
+COMMUTING = ("max", "min", "maximum", "minimum", "fmax", "fmin", "hypot", "gcd", "isclose", "array_equal")
+"""Calls to which the order of two arguments means nothing."""
 SCALES = frozenset(10.0**power for power in (-9, -6, -3, 3, 6, 9)) | {60.0, 3600.0, 180.0}
 """Numbers that turn one unit into another."""
 LARGER = 1.2
@@ -95,7 +97,7 @@ def _here(node: Any, default: bool, index: bool) -> Iterator[tuple[str, Plant, s
     elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
         twice = ast.UnaryOp(ast.Not(), node.operand)
         yield "sign", _setting(node, "operand", twice), f"{_shown(node)} -> without not"
-    elif isinstance(node, ast.Call) and len(node.args) >= 2 and not _is_alike(node.args):
+    elif isinstance(node, ast.Call) and len(node.args) >= 2 and not _is_alike(node):
         yield "swap", _setting(node, "args", [node.args[1], node.args[0], *node.args[2:]]), f"{_shown(node)} -> swapped"
     elif isinstance(node, ast.Constant) and isinstance(node.value, bool):
         kind = "default" if default else "truth"
@@ -129,9 +131,11 @@ def _placing(body: list[ast.stmt], place: int) -> Plant:
     return lambda: body.__setitem__(place, ast.Pass())
 
 
-def _is_alike(arguments: list[ast.expr]) -> bool:
+def _is_alike(call: ast.Call) -> bool:
     """Whether the first two arguments cannot be swapped, or to no effect: the same, spread, a text or a function."""
-    first, second = arguments[:2]
+    first, second = call.args[:2]
+    if ast.unparse(call.func).split(".")[-1] in COMMUTING:
+        return True
     no = (ast.Starred, ast.JoinedStr, ast.Lambda, ast.GeneratorExp)
     text = any(isinstance(one, ast.Constant) and isinstance(one.value, str) for one in (first, second))
     return text or isinstance(first, no) or isinstance(second, no) or ast.unparse(first) == ast.unparse(second)

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator
 
-from mutations import SCALES, Site, changed
+from mutations import COMMUTING, SCALES, Site, changed
 
 TURNED = {"<": ("<=", ">="), "<=": ("<", ">"), ">": (">=", "<="), ">=": (">", "<"), "==": ("!=",), "!=": ("==",)}
 COMPUTED = {"+": "-", "-": "+", "*": "/", "/": "*", "%": "*", "&": "|", "+=": "-=", "-=": "+="}
@@ -63,7 +63,7 @@ def _others(kind: str, text: str, found: re.Match[str]) -> Iterator[tuple[str, s
         yield kind, repr(changed(value))
         if value in SCALES:
             yield "unit", repr(value * 1000)
-    elif kind == "swap" and found["first"] != found["second"]:
+    elif kind == "swap" and found["first"] != found["second"] and text.split("(")[0] not in COMMUTING:
         yield kind, text.replace(f"({found['first']}, {found['second']}", f"({found['second']}, {found['first']}")
 
 

@@ -24,7 +24,7 @@ def clamp(x: float = -1.5) -> float:
     check(x)
     if x > LIMIT and not x == 7:
         raise ValueError(f"{x + 1} is more than {LIMIT * 2}")
-    return max(-LIMIT, x * 2) if x is not None else x[1] % 1000.0 == True
+    return clip(min(-LIMIT, x * 2), LIMIT) if x is not None else x[1] % 1000.0 == True
 '''
 C = """/* A file: 1 + 1 is said only. */
 #include "limit.h"
@@ -33,7 +33,7 @@ static double clamp(double x, const double *limit)
 {
     check(x);
     if (x > limit[0] && !(x == 7)) {
-        return within(x, 1e3) + 2.5; /* x - 1 */
+        return within(x, 1e3) + fmax(x, 2.5); /* x - 1 */
     }
     return -x * (double)known("a < b");
 }
@@ -58,7 +58,7 @@ def test_every_kind_of_error_is_planted_and_each_changes_one_place() -> None:
         ("sign", "not x == 7 -> without not"),
         ("comparison", "x == 7 -> NotEq"),
         ("number", "7 -> 8"),
-        ("swap", "max(-LIMIT, x * 2) -> swapped"),
+        ("swap", "clip(min(-LIMIT, x * 2), LIMIT) -> swapped"),
         ("sign", "-LIMIT -> without minus"),
         ("operator", "x * 2 -> Div"),
         ("number", "2 -> 3"),

@@ -3,12 +3,14 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from cosim.diagnosis.answer.scores import EffectScores, LearnedScores, ResidualScores, Scores, TermScores
 from cosim.diagnosis.decide.decision import decide
 from cosim.diagnosis.decide.policy import POLICY
+from cosim.support.errors import InputError
 
 EFFECT = EffectScores("cogging", 80.0, {"position_friction": 2.0, "gravity_unbalance": 41.5}, {
     "cogging": 0.7, "position_friction": 0.6, "gravity_unbalance": 0.1,
@@ -27,6 +29,14 @@ CASES = [
 def test_stored_scores_are_decided_as_they_were(scores: Scores) -> None:
     stored = json.loads(json.dumps(scores.as_json()))
     assert decide(Scores.of_json(stored), POLICY) == decide(scores, POLICY)
+
+
+@pytest.mark.parametrize(
+    "stored", [None, [], {}, {"effects": [], "rest": {}}, {"effects": [1], "rest": {}, "learned": 0}]
+)
+def test_what_is_no_score_is_said_in_one_sentence(stored: Any) -> None:
+    with pytest.raises(InputError, match='take what stands under "scores"'):
+        Scores.of_json(stored)
 
 
 def test_another_policy_may_decide_otherwise() -> None:

@@ -4,7 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, cast
 
+from cosim.support.errors import InputError
 from cosim.support.plain import JsonObject
+
+FIELDS = ("effects", "rest", "learned")
+"""What plain data of scores have."""
 
 
 @dataclass(frozen=True)
@@ -96,9 +100,17 @@ class Scores:
 
     @classmethod
     def of_json(cls, entry: Mapping[str, Any]) -> "Scores":
-        """The scores that plain data describe."""
-        rest, learned = dict(entry["rest"]), entry["learned"]
-        rest["terms"] = [TermScores(**one) for one in rest["terms"]]
-        rest["in_place"] = tuple(rest["in_place"])
-        known = LearnedScores(**{**learned, "quantities": tuple(learned["quantities"])}) if learned else None
-        return cls([EffectScores(**one) for one in entry["effects"]], ResidualScores(**rest), known)
+        """The scores that plain data describe.
+
+        Raises:
+            InputError: it is not what `as_json` wrote.
+        """
+        try:
+            rest, learned = dict(entry["rest"]), entry["learned"]
+            rest["terms"] = [TermScores(**one) for one in rest["terms"]]
+            rest["in_place"] = tuple(rest["in_place"])
+            known = LearnedScores(**{**learned, "quantities": tuple(learned["quantities"])}) if learned else None
+            return cls([EffectScores(**one) for one in entry["effects"]], ResidualScores(**rest), known)
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            said = 'scores: not those of a diagnosis; take what stands under "scores" in its diagnosis.json'
+            raise InputError(said, culprit="scores", value=entry, choices=FIELDS) from error
