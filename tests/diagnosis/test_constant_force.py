@@ -7,7 +7,9 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import Outcome, diagnose
+from cosim.diagnosis.effects import named
 from cosim.diagnosis.search import stages
+from cosim.estimation.prepare import prepare
 from pyfmi_models.card import Card, parse_card
 from pyfmi_models.effects import Effect, TorqueOffset
 from pyfmi_models.effects.constant_force import ConstantForce
@@ -44,7 +46,7 @@ def recorded(seed: int, force: float = FORCE) -> Recording:
 
 
 @cache
-def outcome(motion: str) -> Outcome:
+def outcome() -> Outcome:
     with pytest.MonkeyPatch.context() as patched:
         own = stages.refitted
 
@@ -53,11 +55,11 @@ def outcome(motion: str) -> Outcome:
             return own(comparison, current, effect, many)  # type: ignore[arg-type]
 
         patched.setattr(stages, "refitted", counted)
-        return diagnose([recorded(1), recorded(2)], [recorded(3)], card(motion))
+        return diagnose([recorded(1), recorded(2)], [recorded(3)], card("linear"))
 
 
 def test_a_constant_of_a_linear_axis_is_told_as_a_set_of_two() -> None:
-    found = outcome("linear").diagnosis
+    found = outcome().diagnosis
     assert found.ambiguous_with == (("torque_offset", "constant_force"),)
     first, second = (next(one for one in found.findings if one.effect == name) for name in found.ambiguous_with[0])
     assert first.parameters["torque"] == second.parameters["force"] == pytest.approx(FORCE, rel=0.01)
@@ -73,19 +75,19 @@ def test_a_constant_of_a_linear_axis_is_told_as_a_set_of_two() -> None:
 
 
 def test_the_card_holds_one_of_both_and_the_better_error() -> None:
-    (held,) = outcome("linear").card.effects
+    (held,) = outcome().card.effects
     assert isinstance(held, TorqueOffset)
-    assert outcome("linear").diagnosis.heldout.after_rms < 0.05 * outcome("linear").diagnosis.heldout.before_rms
+    assert outcome().diagnosis.heldout.after_rms < 0.05 * outcome().diagnosis.heldout.before_rms
 
 
 def test_what_was_fitted_once_is_not_fitted_again() -> None:
-    outcome("linear")
+    outcome()
     assert any(isinstance(one, TorqueOffset) for one in TRIED)
     assert not any(isinstance(one, ConstantForce) for one in TRIED)
 
 
 def test_an_axis_that_turns_has_a_torque_offset_alone() -> None:
-    found = outcome("rotary").diagnosis
-    assert "constant_force" not in {name for names in found.ambiguous_with for name in names}
-    (row,) = (one for one in found.findings if one.effect == "constant_force")
-    assert (row.answer, row.evidence) == ("not_testable", "on an axis that turns a constant is called a torque offset")
+    weight, plant = named("constant_force"), card("rotary").plant()
+    assert weight.renamed(TorqueOffset(torque=FORCE), plant) is None
+    said = weight.why_not(plant, prepare([recorded(1)], 20.0))
+    assert said == "on an axis that turns a constant is called a torque offset"

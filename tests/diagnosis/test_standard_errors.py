@@ -21,7 +21,8 @@ from pyfmi_models.effects.quadratic_drag import QuadraticDrag
 from pyfmi_models.mount import Mount
 
 HERTZ, SECONDS, MACHINES = 100, 60.0, 40
-CARD = parse_card('[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\nsigma2 = 3.0\n', "c.toml")
+TEXT = '[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\nsigma2 = 3.0\n'
+CARD = parse_card(TEXT, "c.toml")
 TRUE = {
     "axis.inertia": 2.1,
     "friction.Fc": 1.1,
@@ -68,13 +69,23 @@ def test_ranges_of_95_per_cent_hold_what_is_true_in_95_per_cent() -> None:
     assert 0.91 < np.mean(inside) < 0.99
 
 
+KNOWN = """
+[[effects]]
+effect = "torque_offset"
+torque = -0.2
+[[effects]]
+effect = "quadratic_drag"
+coefficient = 0.4
+"""
+
+
 def test_the_ranges_that_are_printed_are_made_of_these_errors(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever they are: here 0.01 each."""
-    rng = np.random.default_rng(3)
+    """Whatever they are: here 0.01 each. The card knows all but the weight."""
+    rng, card = np.random.default_rng(3), parse_card(TEXT + KNOWN, "c.toml")
     one, two, three = (recorded(rng, name, 20.0) for name in ("one", "two", "three"))
     monkeypatch.setattr("cosim.diagnosis.diagnose.standard_errors", lambda fit, *_: dict.fromkeys(fit.free, 0.01))
-    found = [each for each in diagnose([one, two], [three], CARD).diagnosis.findings if each.answer == "found"]
-    assert found
-    for each in found:
-        assert set(each.standard_errors.values()) == {0.01}
-        assert [high - low for low, high in each.ranges.values()] == pytest.approx([2 * 1.96 * 0.01] * len(each.ranges))
+    found = [each for each in diagnose([one, two], [three], card).diagnosis.findings if each.answer == "found"]
+    assert [each.effect for each in found] == ["gravity_unbalance"]
+    assert found[0].standard_errors == {"mgl": 0.01, "phase": 0.01}
+    for low, high in found[0].ranges.values():
+        assert high - low == pytest.approx(2 * 1.96 * 0.01)

@@ -45,22 +45,24 @@ def each(*languages: str) -> pytest.MarkDecorator:
 
 
 @pytest.fixture(scope="module")
-def prepared(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the files that examples name."""
+def prepared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder with the files that examples name; recordings are the first ten seconds of the example's."""
     folder = tmp_path_factory.mktemp("blocks")
-    texts = [text[: len(text) // 2].rpartition("\n")[0] for text in example.recordings().values()]
-    for name, text in zip(("run1.csv", "run2.csv", "run3.csv"), texts, strict=True):
-        (folder / name).write_text(text, "utf-8")
-    for name, text in zip(("night_1.csv", "night_2.csv", "night_3.csv"), texts, strict=True):
-        (folder / name).write_text(text, "utf-8")
+    short = {name: "\n".join([*text.split("\n")[:2001], ""]) for name, text in example.recordings().items()}
+    texts = list(short.values())
     (folder / "all").mkdir()
+    for name in ("run", "night_"):
+        for number, text in enumerate(texts, 1):
+            (folder / f"{name}{number}.csv").write_text(text, "utf-8")
     for name, text in zip(("north_1.csv", "north_2.csv", "south_1.csv", "south_2.csv"), texts * 2, strict=False):
-        (folder / "all" / name).write_text(text[: len(text) // 3].rpartition("\n")[0], "utf-8")
+        (folder / "all" / name).write_text(text, "utf-8")
     (folder / "axis.toml").write_text(example.CARD, "utf-8")
     for path in cosim.export("paper_mount", folder / "fmus", fmi=3).fmus:
         part = "plant" if "plant" in path.name else "controller"
         path.rename(folder / f"{part}.fmu")
-    return folder
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(example, "recordings", lambda: short)
+        yield folder
 
 
 @each("python")

@@ -94,7 +94,8 @@ def axe_script() -> str:
 def violations(page: Page, script: str) -> list[tuple[str, str, list[str]]]:
     """What axe-core finds: rule, impact, and the elements."""
     page.evaluate(script)
-    found = page.evaluate("(rules) => axe.run(document, { runOnly: rules })", RULES)["violations"]
+    call = "(rules) => axe.run(document, { runOnly: rules, resultTypes: ['violations'], preload: false })"
+    found = page.evaluate(call, RULES)["violations"]
     return [(one["id"], one["impact"], [node["html"][:120] for node in one["nodes"]]) for one in found]
 
 

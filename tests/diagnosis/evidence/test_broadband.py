@@ -70,14 +70,15 @@ def test_too_little_motion_tells_nothing() -> None:
     assert shaken(short, band_limited(short, 3, 6), 1.0, BANDS).level == 0
 
 
-@pytest.mark.parametrize(("effect", "told"), [("vibration", True), (None, False)])
-def test_a_diagnosis_calls_it_unknown(effect: str | None, told: bool, tmp_path: Path) -> None:
-    write_given(make_case(4, [effect] if effect else [], duration=30.0, rate_hz=500), tmp_path)
+def test_a_diagnosis_calls_it_unknown(tmp_path: Path) -> None:
+    """Nothing of the kind is told of nulls: the stored answers, test_net.py."""
+    write_given(make_case(4, ["vibration"], duration=30.0, rate_hz=500), tmp_path)
     card = read_card(str(tmp_path / "card.toml"))
     read = [Recording.read(tmp_path / f"{name}.parquet") for name in ("train_1", "train_2", "heldout")]
     answer: Any = as_json(diagnose(read[:2], read[2:], card).diagnosis)
-    rows = [one for one in answer["effects"] if one["effect"] == "broadband_disturbance"]
-    assert ("unknown" in answer["verdict"]) == told == bool(rows) == bool(answer["broadband_disturbance"])
+    assert "broadband_disturbance" in [one["effect"] for one in answer["effects"]]
+    assert "unknown" in answer["verdict"]
+    assert answer["broadband_disturbance"]
     reasons = dict(why(answer, [Trial.of_json(one) for one in answer["ledger"]]))
-    assert ("random disturbance at any motion relative to friction" in reasons["unknown"]) == told
-    assert reasons.get("broadband_disturbance", "").startswith("possible, p ") == told
+    assert "random disturbance at any motion relative to friction" in reasons["unknown"]
+    assert reasons["broadband_disturbance"].startswith("possible, p ")
