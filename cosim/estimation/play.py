@@ -13,8 +13,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from cosim.estimation.compiled import CompiledWalk
+from cosim.estimation.kernels import done, library
 from cosim.estimation.prepare import Array, Piece, Prepared
+from cosim.estimation.rowwise import Stepwise
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.base import Coupling
 from pyfmi_models.model import fields_of
@@ -31,13 +32,19 @@ def stepped_torque(couplings: Sequence[Coupling], far: Sequence[float], v: Array
 
     For several couplings of one kind at once: (couplings, rows).
     """
-    names = fields_of(couplings[0])
-    numbers = [
-        [one, *(getattr(coupling, name) for name in names)] for coupling, one in zip(couplings, far, strict=True)
-    ]
-    columns = np.vstack([v[:-1], v[1:], np.full(len(v) - 1, dt)])
     kind: Any = type(couplings[0])
-    passed = _walk(kind, names)(columns, np.array(numbers))[:, -1]
+    names = fields_of(couplings[0])
+    numbers = np.array(
+        [[one, *(getattr(coupling, name) for name in names)] for coupling, one in zip(couplings, far, strict=True)],
+        float,
+    )
+    passed, kernels, speed = np.empty((len(numbers), len(v))), library(), np.ascontiguousarray(v)
+    if kind is Backlash and kernels is not None and hasattr(kernels, "play_run"):
+        given = speed.ctypes.data, len(v) - 1, dt, numbers.ctypes.data, len(numbers), passed.ctypes.data
+        done(kernels.play_run(*given))
+    else:
+        walk, columns = walk_of(kind, names), np.vstack([v[:-1], v[1:], np.full(len(v) - 1, dt)])
+        passed[:] = [walk(columns, one)[-1] for one in numbers]
     # A step's torque is that of its middle: a row has half of the step before it and half of the one after it.
     return np.asarray((passed + np.column_stack([passed[:, 1:], passed[:, -1]])) / 2 - np.outer(far, a))
 
@@ -61,7 +68,7 @@ def _searched(piece: Piece, plays: Sequence[Backlash]) -> Array:
 
 
 @cache
-def _walk(kind: type[Coupling], names: tuple[str, ...]) -> CompiledWalk:
+def walk_of(kind: Any, names: tuple[str, ...]) -> Stepwise:
     """The states and the torque passed on, from speeds before and after each step and dt."""
     column, numbers = ca.SX.sym("column", 3), ca.SX.sym("numbers", 1 + len(names))
     play = kind(**{name: numbers[1 + k] for k, name in enumerate(names)})
@@ -69,4 +76,4 @@ def _walk(kind: type[Coupling], names: tuple[str, ...]) -> CompiledWalk:
     before, after, dt = ca.vertsplit(column)
     twist, rate, *further = ca.vertsplit(state)[:-1]
     twist, speed, *others = play.advance(twist, before - rate, further, after, dt, numbers[0])
-    return CompiledWalk(state, column, numbers, ca.vertcat(twist, after - speed, *others))
+    return Stepwise(state, column, numbers, ca.vertcat(twist, after - speed, *others))

@@ -2,7 +2,7 @@
 
 import ctypes
 import sys
-from ctypes import POINTER, c_int, c_longlong, c_void_p
+from ctypes import POINTER, c_double, c_int, c_longlong, c_void_p
 from functools import cache
 from pathlib import Path
 
@@ -24,6 +24,7 @@ class CTape(ctypes.Structure):
 ARGUMENTS = {
     "tape_run": [POINTER(CTape), c_void_p, c_void_p, c_longlong, c_void_p],
     "filter_run": [c_void_p, c_longlong, c_longlong, c_longlong, c_void_p, c_void_p, c_longlong],
+    "play_run": [c_void_p, c_longlong, c_double, c_void_p, c_longlong, c_void_p],
     "recurrence_run": [c_void_p, c_void_p, c_longlong, c_longlong, c_void_p],
     "marginal_run": [
         *(c_void_p, c_void_p, c_longlong, c_longlong, c_void_p, c_void_p, c_void_p, c_longlong),
@@ -38,6 +39,8 @@ def library() -> ctypes.CDLL | None:
     try:
         found = ctypes.CDLL(str(Path(__file__).with_name(f"_kernels{SUFFIX}")))
         for name, arguments in ARGUMENTS.items():
+            if name == "play_run" and not hasattr(found, name):
+                continue  # a work tree's library that was built before it had plays: they are walked in Python
             function = getattr(found, name)
             function.argtypes, function.restype = arguments, c_int
     except (OSError, AttributeError):

@@ -6,47 +6,50 @@
 
 enum { LANES = 8, SECTION = 6 };
 
-typedef double Lane[LANES];
-
-/* One way through second-order sections, in transposed direct form II, as SciPy's `sosfilt` orders the operations. */
-INLINE void pass(Lane *rows, long long count, long long step, const double *sections,
-                                                       const double *settled, long many) {
-    Lane early[many], late[many];
+/* One way through second-order sections, in transposed direct form II, as SciPy's `sosfilt` orders the operations;
+ * `wide` signals stand side by side in each row. */
+INLINE void pass(double *rows, long long count, long long step, const double *sections, const double *settled,
+                 long many, int wide) {
+    double early[many][wide], late[many][wide];
     for (long s = 0; s < many; s++)
-        for (int j = 0; j < LANES; j++) {
-            early[s][j] = settled[2 * s] * rows[0][j];
-            late[s][j] = settled[2 * s + 1] * rows[0][j];
+        for (int j = 0; j < wide; j++) {
+            early[s][j] = settled[2 * s] * rows[j];
+            late[s][j] = settled[2 * s + 1] * rows[j];
         }
-    for (long long k = 0; k != count * step; k += step) {
-        Lane x;
-        for (int j = 0; j < LANES; j++) x[j] = rows[k][j];
+    for (double *row = rows; row != rows + wide * step * count; row += wide * step) {
+        double x[wide];
+        for (int j = 0; j < wide; j++) x[j] = row[j];
         for (long s = 0; s < many; s++) {
             const double *c = sections + SECTION * s;
-            for (int j = 0; j < LANES; j++) {
+            for (int j = 0; j < wide; j++) {
                 double y = c[0] * x[j] + early[s][j];
                 early[s][j] = c[1] * x[j] - c[4] * y + late[s][j];
                 late[s][j] = c[2] * x[j] - c[5] * y;
                 x[j] = y;
             }
         }
-        for (int j = 0; j < LANES; j++) rows[k][j] = x[j];
+        for (int j = 0; j < wide; j++) row[j] = x[j];
     }
 }
 
-INLINE void both_ways(Lane *rows, long long count, const double *sections,
-                                                            const double *settled, long many) {
-    pass(rows, count, 1, sections, settled, many);
-    pass(rows + count - 1, count, -1, sections, settled, many);
+INLINE void both_ways(double *rows, long long count, const double *sections, const double *settled, long many,
+                      int wide) {
+    pass(rows, count, 1, sections, settled, many, wide);
+    pass(rows + wide * (count - 1), count, -1, sections, settled, many, wide);
 }
 
-static void both_ways_plain(Lane *rows, long long count, const double *sections, const double *settled, long many) {
-    both_ways(rows, count, sections, settled, many);
+static void both_ways_one(double *rows, long long count, const double *sections, const double *settled, long many) {
+    both_ways(rows, count, sections, settled, many, 1);
+}
+
+static void both_ways_plain(double *rows, long long count, const double *sections, const double *settled, long many) {
+    both_ways(rows, count, sections, settled, many, LANES);
 }
 
 #if defined(__x86_64__)
-__attribute__((target("avx2"))) static void both_ways_wide(Lane *rows, long long count, const double *sections,
+__attribute__((target("avx2"))) static void both_ways_wide(double *rows, long long count, const double *sections,
                                                            const double *settled, long many) {
-    both_ways(rows, count, sections, settled, many);
+    both_ways(rows, count, sections, settled, many, LANES);
 }
 #else
 #define both_ways_wide both_ways_plain
@@ -57,21 +60,22 @@ __attribute__((target("avx2"))) static void both_ways_wide(Lane *rows, long long
 EXPORT int filter_run(double *signals, long long many, long long rows, long long edge, const double *sections,
                       const double *settled, long long count) {
     long long whole = rows + 2 * edge;
-    Lane *lanes = malloc((size_t)whole * sizeof *lanes);
-    int wide = is_wide();
+    int wide = many == 1 ? 1 : LANES; /* one signal alone, which may be long, takes no more memory than it must */
+    double *lanes = malloc((size_t)(whole * wide) * sizeof *lanes);
     if (!lanes) return 1;
-    for (long long first = 0; first < many; first += LANES) {
-        for (int j = 0; j < LANES; j++) { /* lanes without a signal repeat the last one */
+    for (long long first = 0; first < many; first += wide) {
+        for (int j = 0; j < wide; j++) { /* lanes without a signal repeat the last one */
             const double *x = signals + rows * (first + j < many ? first + j : many - 1);
+            double *lane = lanes + j;
             for (long long k = 0; k < edge; k++) {
-                lanes[k][j] = 2 * x[0] - x[edge - k];
-                lanes[edge + rows + k][j] = 2 * x[rows - 1] - x[rows - 2 - k];
+                lane[wide * k] = 2 * x[0] - x[edge - k];
+                lane[wide * (edge + rows + k)] = 2 * x[rows - 1] - x[rows - 2 - k];
             }
-            for (long long k = 0; k < rows; k++) lanes[edge + k][j] = x[k];
+            for (long long k = 0; k < rows; k++) lane[wide * (edge + k)] = x[k];
         }
-        (wide ? both_ways_wide : both_ways_plain)(lanes, whole, sections, settled, (long)count);
-        for (int j = 0; j < LANES && first + j < many; j++)
-            for (long long k = 0; k < rows; k++) signals[rows * (first + j) + k] = lanes[edge + k][j];
+        (wide == 1 ? both_ways_one : is_wide() ? both_ways_wide : both_ways_plain)(lanes, whole, sections, settled, (long)count);
+        for (int j = 0; j < wide && first + j < many; j++)
+            for (long long k = 0; k < rows; k++) signals[rows * (first + j) + k] = lanes[wide * (edge + k) + j];
     }
     free(lanes);
     return 0;

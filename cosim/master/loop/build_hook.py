@@ -23,7 +23,7 @@ _DETMATH = tuple(f"pyfmi_models/export/c/{name}.c" for name in ("detmath", "detm
 LIBRARIES = {
     "cosim/master/loop/_loop": (*(f"cosim/master/loop/{name}.c" for name in _LOOP), *_DETMATH),
     "cosim/estimation/kernels/_kernels": (
-        *(f"cosim/estimation/kernels/{name}.c" for name in ("tape", "filter", "marginal")),
+        *(f"cosim/estimation/kernels/{name}.c" for name in ("tape", "filter", "marginal", "play")),
         *_DETMATH,
     ),
     "cosim_studies/proof/_machine": ("cosim_studies/proof/truth.c",),
