@@ -4,7 +4,7 @@ Names: `t` [s], `tau` [N.m, or N on a linear axis], `q` [rad or m] or a measured
 `temperature` [degC]; any further column is kept. SI inside. Messages count rows from 1, the header not counted.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Hashable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -223,6 +223,11 @@ class Recording:
     def duration(self) -> float:
         """Time from the first to the last sample in s."""
         return float(self.t[-1] - self.t[0])
+
+    @cached_property
+    def found(self) -> dict[Hashable, float]:
+        """Numbers that somebody found in its rows and will ask for again, by what they are."""
+        return {}
 
     @cached_property
     def sample_time(self) -> float:

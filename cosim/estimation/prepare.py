@@ -10,9 +10,9 @@ linear in the motion, so what a narrow filter smears is a misfit of every law. T
 the band is the same.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from math import sqrt
 from typing import NamedTuple
 
@@ -259,7 +259,7 @@ def _spans(recording: Recording, cutoff: float) -> list[slice]:
 
 
 def _pieces(recording: Recording, index: int, band: Band, others: Sequence[Neighbour]) -> list[Piece]:
-    step = resolution(recording["q"]) if "q" in recording else 0.0
+    step = _once(recording, "step", lambda: resolution(recording["q"])) if "q" in recording else 0.0
     return [replace(_piece(recording, index, span, band, others), step=step) for span in _spans(recording, band.cutoff)]
 
 
@@ -269,6 +269,8 @@ def _piece(recording: Recording, index: int, span: slice, band: Band, others: Se
     cutoff, first = band.cutoff, max(band)
     tau = lowpass(table["tau"], dt, first)
     q, v, a = _motion(table, dt, first)
+    reading = "q" if "q" in table else "v"
+    noise = [_once(recording, (x, span.start, span.stop), partial(_density, table[x], dt)) for x in (reading, "tau")]
     each = max(1, int(1 / (8 * first * dt)))
     coarse, t = dt * each, grid[::each].copy()  # copies: what is thinned must not keep all rows alive
     return Piece(
@@ -286,9 +288,16 @@ def _piece(recording: Recording, index: int, span: slice, band: Band, others: Se
         extras={n: c[::each].copy() for n, c in table.items() if n not in ("t", "tau", "q", "v")},
         neighbours={name: one[::each].copy() for name, one in motions(others, table, dt, first).items()},
         moving=moving(others, table, dt, first) if len(grid) > LEAST_ROWS else frozenset(),
-        reading_noise=_density(table["q" if "q" in table else "v"], dt),
-        torque_noise=_density(table["tau"], dt),
+        reading_noise=noise[0],
+        torque_noise=noise[1],
     )
+
+
+def _once(recording: Recording, what: Hashable, find: Callable[[], float]) -> float:
+    """A number that a recording has in any band: it takes all its rows, and a diagnosis reads it in some ten bands."""
+    if what not in recording.found:
+        recording.found[what] = find()
+    return recording.found[what]
 
 
 def _density(column: Array, dt: float) -> float:
