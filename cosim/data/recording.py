@@ -225,7 +225,7 @@ class Recording:
         return float(self.t[-1] - self.t[0])
 
     @cached_property
-    def found(self) -> dict[Hashable, float]:
+    def known_numbers(self) -> dict[Hashable, float]:
         """Numbers that somebody found in its rows and will ask for again, by what they are."""
         return {}
 

@@ -295,9 +295,9 @@ def _piece(recording: Recording, index: int, span: slice, band: Band, others: Se
 
 def _once(recording: Recording, what: Hashable, find: Callable[[], float]) -> float:
     """A number that a recording has in any band: it takes all its rows, and a diagnosis reads it in some ten bands."""
-    if what not in recording.found:
-        recording.found[what] = find()
-    return recording.found[what]
+    if what not in recording.known_numbers:
+        recording.known_numbers[what] = find()
+    return recording.known_numbers[what]
 
 
 def _density(column: Array, dt: float) -> float:

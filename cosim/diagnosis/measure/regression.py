@@ -50,11 +50,12 @@ def kernel(rows: Array, target: Array, ridge: float = 1e-2) -> Model:
         powers -= half
         return np.asarray(np.exp(powers, out=powers))
 
-    columns = np.empty((len(rows), len(centres)))
-    for into, part in zip(_chunks(columns), _chunks(rows), strict=True):
-        into[:] = lifted(part)
-    normal = columns.T @ columns
-    weights = np.linalg.solve(normal + ridge * np.trace(normal) / len(normal) * np.eye(len(normal)), columns.T @ target)
+    normal, right = np.zeros((len(centres), len(centres))), np.zeros(len(centres))
+    for part, own in zip(_chunks(rows), _chunks(target), strict=True):
+        columns = lifted(part)
+        normal += columns.T @ columns
+        right += columns.T @ own
+    weights = np.linalg.solve(normal + ridge * np.trace(normal) / len(normal) * np.eye(len(normal)), right)
     return lambda others: np.concatenate([lifted(part) @ weights for part in _chunks(others)])
 
 
