@@ -25,7 +25,16 @@ from cosim.diagnosis.measure.findings import accepted, measured_as, rival_findin
 from cosim.diagnosis.measure.law_selection import proposed_law
 from cosim.diagnosis.measure.locate import regions
 from cosim.diagnosis.measure.loop_bias import loop_bias
-from cosim.diagnosis.measure.protocol import CUTOFF, Structures, heldout_rms, judge, judged_band, of_the_best, traces
+from cosim.diagnosis.measure.protocol import (
+    CUTOFF,
+    Structures,
+    band_of,
+    heldout_rms,
+    judge,
+    judged_band,
+    of_the_best,
+    traces,
+)
 from cosim.diagnosis.measure.regression import black_box_rms
 from cosim.diagnosis.measure.withheld import without_names
 from cosim.diagnosis.search.alternatives import prove_sets
@@ -50,7 +59,7 @@ from cosim.estimation.determined import limited, with_held
 from cosim.estimation.fit import Fit
 from cosim.estimation.half_sample import are_even, moved, torque_late
 from cosim.estimation.not_determined import not_determined
-from cosim.estimation.prepare import Band, prepare, quality
+from cosim.estimation.prepare import prepare, quality
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import weights
 from pyfmi_models.card import Card
@@ -200,7 +209,7 @@ def _with_search(described: Diagnosis, answer: Answer, examined: Examined, heldo
     """
     held, many = described.heldout, 2 ** len(examined.effects)
     interval = of_the_best(held.confidence_interval, held.before_rms - held.after_rms, many)
-    band, whole = Band(held.cutoff_hz, held.motion_hz), answer.proof.chosen
+    band, whole = band_of(held), answer.proof.chosen
     unvetoed = heldout_rms(heldout, examined.chosen.mount, band)
     possible = None if whole is answer.chosen else heldout_rms(heldout, whole.mount, band)
     tested = global_test(answer.comparison, examined.base).as_json()
@@ -229,7 +238,8 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
     problem, decision = answer.comparison.problem, answer.decision
     prepared, linear = problem.prepared, problem.mount.motion == "linear"
     models = answer.models()
-    signals = traces(train, heldout, models)
+    held = judge(heldout, models, prepared.band)
+    signals = traces(train, heldout, models, band_of(held))
     found = _findings(answer, signals)
     bias = loop_bias(prepared, answer.chosen, problem.weight)
     policy = answer.comparison.policy
@@ -239,7 +249,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
     return Diagnosis(
         verdict=_verdict(found, decision),
         findings=tuple(found),
-        heldout=replace(judge(heldout, models, prepared.band), black_box_rms=black_box_rms(signals)),
+        heldout=replace(held, black_box_rms=black_box_rms(signals)),
         traces=signals,
         parts=parts(signals),
         regions=regions(signals, False, linear),
@@ -278,7 +288,8 @@ def _with_learned(
         refused = tried.refused() if tried else NOTHING_TRIED
         return replace(named, not_learned=refused) if answer.decision.is_unknown else named
     problem, models = answer.comparison.problem, answer.models(tried.mount)
-    signals, held = traces(train, heldout, models), judge(heldout, models, problem.prepared.band)
+    held = judge(heldout, models, problem.prepared.band)
+    signals = traces(train, heldout, models, band_of(held))
     return replace(
         named,
         learned=tried.as_json(),

@@ -12,9 +12,11 @@ def payload(diagnosis: Diagnosis, scales: Scales) -> JsonObject:
     traces = [trace for trace in diagnosis.traces if trace.t.size > 1]
     seconds = sum(float(trace.t[-1] - trace.t[0]) for trace in traces) or 1.0
     torque, noun = scales.torque.unit, "torque" if diagnosis.motion == "rotary" else "force"
+    models = [("before", "before", (6, 3)), ("after", "after", ())][: 2 if diagnosis.adds_physics else 1]
+    errors = [("lost", "before", ()), ("left", "after", ())][: len(models)]
     sheets = (
-        Sheet(f"{noun} [{torque}]", 0.45, [("tau", "ink", ()), ("before", "before", (6, 3)), ("after", "after", ())]),
-        Sheet(f"error: measured minus model [{torque}]", 0.32, [("lost", "before", ()), ("left", "after", ())]),
+        Sheet(f"{noun} [{torque}]", 0.45, [("tau", "ink", ()), *models]),
+        Sheet(f"error: measured minus model [{torque}]", 0.32, errors),
         Sheet(f"position [{scales.position.unit}]", 0.23, [("q", "ink", ())]),
     )
     return {

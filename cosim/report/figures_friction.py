@@ -45,17 +45,17 @@ class Curves:
 
 def curves(diagnosis: Diagnosis) -> Curves | None:
     """Return both curves; None where the numbers of the base are not at hand, or its law has no steady sliding."""
-    before = _law(diagnosis, REFITTED)
-    after = _law(diagnosis, IMPROVED)
+    before = law_with(diagnosis, REFITTED)
+    after = law_with(diagnosis)
     if before is None or after is None or before.key == "none":
         return None
     told = [one for one in diagnosis.in_model if named(one.effect).view == "keep turning"]
-    effects = [effect for one in told if (effect := _effect(one)) is not None]
+    effects = [effect for one in told if (effect := effect_of(one)) is not None]
     return Curves(_force(before, ()), _force(after, tuple(effects)))
 
 
-def _law(diagnosis: Diagnosis, which: int) -> FrictionLaw | None:
-    """The law of the base with the numbers at one stage."""
+def law_with(diagnosis: Diagnosis, which: int = IMPROVED) -> FrictionLaw | None:
+    """Return the law of the base with the numbers at one stage; None where they are not at hand."""
     kind = LAWS.get(str(diagnosis.friction_law.get("base", "")))
     if kind is None:
         return None
@@ -75,8 +75,8 @@ def _law(diagnosis: Diagnosis, which: int) -> FrictionLaw | None:
         return None
 
 
-def _effect(finding: Finding) -> Effect | None:
-    """The effect with the numbers that were found."""
+def effect_of(finding: Finding) -> Effect | None:
+    """Return the effect with the numbers that were found; None where they do not fit its equation."""
     forms = CATALOGUE.get(finding.effect, ())
     for form in forms:
         if set(finding.parameters) <= {item.name for item in fields(form)}:

@@ -90,9 +90,10 @@ def overlay(trace: Trace, span: tuple[float, float], scales: Scales, width: int 
     unit = scales.torque
     cut = (trace.t >= span[0]) & (trace.t <= span[1])
     t, buckets = trace.t[cut], max(60, int((width - 54) * 0.4))
-    for y, style in zip((trace.tau, trace.before, trace.after), _LINES, strict=True):
+    models = (trace.before,) if np.array_equal(trace.before, trace.after) else (trace.before, trace.after)
+    for y, style in zip((trace.tau, *models), _LINES, strict=False):
         top.plot(*thin(t, y[cut] * unit.factor, buckets), **style)
-    for y, colour in ((trace.missing, BEFORE), (trace.tau - trace.after, AFTER)):
+    for y, colour in zip((trace.tau - model for model in models), (BEFORE, AFTER), strict=False):
         low.plot(*thin(t, y[cut] * unit.factor, buckets), color=colour, lw=1.2)
     low.axhline(0, color=GREY, lw=0.8, zorder=1)
     heading(top, f"{_noun(unit.unit)} [{unit.unit}]")
@@ -102,7 +103,8 @@ def overlay(trace: Trace, span: tuple[float, float], scales: Scales, width: int 
         axes.locator_params(axis="y", nbins=5)
     top.tick_params(labelbottom=False)
     low.set_xlabel("time [s]")
-    words = f"Measured, model before and model after, {span[0]:.1f} to {span[1]:.1f} s of {trace.name}."
+    names = "model before and model after" if models[1:] else "model"
+    words = f"Measured and {names}, {span[0]:.1f} to {span[1]:.1f} s of {trace.name}."
     return sheet.picture(words, words)
 
 

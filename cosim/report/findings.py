@@ -54,6 +54,8 @@ def block(one: words.Block, diagnosis: Diagnosis, scales: Scales, picture: Pictu
     """Return what is printed of one finding; what the first screen says of it is not said again."""
     first = one.first
     said = [words.stated(finding) for finding in one.findings if finding.effect not in led(diagnosis)]
+    if one.answer == "not_proven":
+        said = [f"In the training runs alone: {words.lowered(text)}" for text in said if text]
     if one.answer == "ambiguous":
         said = [*words.either(said), _in_model(diagnosis, *one.findings)]
     rows = [("Where", where(first, scales)), ("How to distinguish", _apart(one))]

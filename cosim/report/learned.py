@@ -42,7 +42,7 @@ def _what(diagnosis: Diagnosis) -> str:
     quantities = " and on ".join(diagnosis.learned["quantities"])
     return (
         f"The rest depends on {quantities}. What makes it is not known, so it is modelled as a table learned from the "
-        "training recordings: part of the improved model, and constant beyond the range that was seen."
+        "training recordings: part of the improved model, and constant beyond the range of these recordings."
     )
 
 
@@ -53,10 +53,10 @@ def _rows(diagnosis: Diagnosis, scales: Scales) -> Iterator[tuple[str, str]]:
     low, high = told["interval"]
     band = f"below {told['cutoff_hz']:.3g} Hz"
     change = f"{unit.number(told['before'])} → {unit.text(told['after'])}"
-    yield "Unseen runs", f"error {change}, less by {unit.span(low, high)} (95 %), {band}"
+    yield "Validation runs", f"error {change}, less by {unit.span(low, high)} (95 %), {band}"
     for one in told.get("formula", ()):
         yield "Formula", f"{one['equation']}; {_numbers_of(one)}. As good on validation runs; proposed, in no model."
-    yield "Seen", minus("; ".join(told["range"])).replace(" degC", " °C").replace("N.m", "N·m")
+    yield "Range of the data", minus("; ".join(told["range"])).replace(" degC", " °C").replace("N.m", "N·m")
 
 
 def _numbers_of(formula: FormulaEntry) -> str:
@@ -92,7 +92,7 @@ def _curve(axes: "Axes", table: TableEntry, scales: Scales) -> str:
     axes.axhline(0, color=GREY, lw=0.8, zorder=1)
     axes.locator_params(axis="y", nbins=5)
     axes.set_xlabel(_labelled(str(table.get("over", "command" if "command" in table else "what the term says")), unit))
-    heading(axes, _labelled(table["kind"] if table["kind"] != "drive" else "not given", shown))
+    heading(axes, _labelled(table["kind"] if table["kind"] != "drive" else "not delivered", shown))
     line = "the table" if len(_where(table)) else "as the term says"
     return f"Dots: mean of what training recordings leave without it, 95 % bars. Line: {line}."
 

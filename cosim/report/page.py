@@ -15,6 +15,7 @@ from cosim.report import tables, unknown, words
 from cosim.report.explorer import payload
 from cosim.report.figures_dynamic import effect
 from cosim.report.figures_friction import friction
+from cosim.report.figures_own import own
 from cosim.report.figures_proof import looked_for, proof
 from cosim.report.figures_time import WIDE, overlay, recording
 from cosim.report.figures_where import plane, region, strongest
@@ -54,6 +55,7 @@ def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, o
         "parts_table": tables.parts(rows, scales),
         "added": diagnosis.adds_physics,
         "with_effects": _with_effects(diagnosis),
+        "compared": _compared(diagnosis),
         "box": _box(diagnosis, [row.label for row in rows if row.change == "worse"], scales),
         "noun": "torque" if diagnosis.motion == "rotary" else "force",
     }
@@ -96,7 +98,14 @@ def _with_effects(diagnosis: Diagnosis) -> str:
         return "with what was learned" if not held else "with the effects and what was learned"
     if held and words.verdict(diagnosis) == "either":
         return "with the likeliest cause"
-    return {0: "after (nothing added)", 1: "with the effect"}.get(held, f"with the {words.count(held).lower()} effects")
+    return "with the effect" if held == 1 else f"with the {words.count(held).lower()} effects"
+
+
+def _compared(diagnosis: Diagnosis) -> list[tuple[str, str]]:
+    """Return lines over time and their names: where nothing was added there is one model, not twice the same."""
+    if not diagnosis.adds_physics:
+        return [("", "measured"), ("before", "model, refitted")]
+    return [("", "measured"), ("before", "before, refitted"), ("after", _with_effects(diagnosis))]
 
 
 def _box(diagnosis: Diagnosis, worse: list[str], scales: Scales) -> dict[str, str] | None:
@@ -106,7 +115,7 @@ def _box(diagnosis: Diagnosis, worse: list[str], scales: Scales) -> dict[str, st
         return None
     proven = words.proven_range(diagnosis, scales)
     text = (
-        f"is proven {proven}. Elsewhere, keep the delivered model."
+        f"is proven {proven}. Outside this range it is not validated: use the original model there."
         if proven
         else "is proven on the validation runs only."
     )
@@ -124,9 +133,9 @@ def _findings(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str
 
 
 def _picture(finding: Finding, diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> Picture | None:
-    """Draw the view in which an effect shows; friction over speed as curves where the numbers of its law are known."""
+    """Draw the view in which an effect shows; where the model holds it, its own curve with what was measured of it."""
     curved = friction(finding, diagnosis, chosen, scales) if named(finding.effect).view == "keep turning" else None
-    return curved or effect(finding, chosen, scales)
+    return curved or own(finding, diagnosis, chosen, scales) or effect(finding, chosen, scales)
 
 
 def _middle(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:
@@ -186,12 +195,13 @@ def _black_box(diagnosis: Diagnosis, scales: Scales) -> str:
 
 
 def _places(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> Iterator[Picture]:
-    after = {other.axis: other for other in diagnosis.regions_after}
+    after = {other.axis: other for other in diagnosis.regions_after} if diagnosis.adds_physics else {}
     for before in diagnosis.regions[:MOST_REGIONS]:
         yield region(before, after.get(before.axis), scales)
     if chosen.t.size > 200 and (top := strongest(chosen)) > 0:
         yield plane("before", chosen, chosen.before, scales, top)
-        yield plane("after", chosen, chosen.after, scales, top)
+        if diagnosis.adds_physics:
+            yield plane("after", chosen, chosen.after, scales, top)
 
 
 def _time(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, object]:

@@ -80,6 +80,11 @@ def judged_band(recordings: Sequence[Recording], models: Structures, band: Band)
     return prepare(recordings, band if is_above or is_noise(own, protocol) else CUTOFF)
 
 
+def band_of(held: HeldOut) -> Band:
+    """Band in which the held-out errors are given: pictures and parts beside them are of the same."""
+    return Band(held.cutoff_hz, held.motion_hz)
+
+
 def heldout_rms(recordings: Sequence[Recording], mount: Mount, band: float | Band = CUTOFF) -> float:
     """RMS of the torque residual of one model by the protocol, in its band or another [Hz]."""
     prepared = prepare(recordings, band)
@@ -123,9 +128,11 @@ def of_the_best(interval: tuple[float, float], value: float, many: int) -> tuple
     return low, high
 
 
-def traces(train: Sequence[Recording], heldout: Sequence[Recording], models: Structures) -> tuple[Trace, ...]:
-    """Signals of all recordings for pictures and for the file of missing torque."""
-    prepared = [prepare([recording], CUTOFF) for recording in (*train, *heldout)]
+def traces(
+    train: Sequence[Recording], heldout: Sequence[Recording], models: Structures, band: float | Band = CUTOFF
+) -> tuple[Trace, ...]:
+    """Signals of all recordings for pictures and for the file of missing torque, in the band that was judged."""
+    prepared = [prepare([recording], band) for recording in (*train, *heldout)]
     pieces = [_residuals(one, models, number < len(train)) for number, one in enumerate(prepared)]
     spans = iter(flagged([one for parts in pieces for one in parts]))
     intervals = [tuple(span for _ in parts for span in next(spans)) for parts in pieces]

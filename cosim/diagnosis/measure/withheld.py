@@ -9,7 +9,7 @@ from cosim.diagnosis.answer.result import Diagnosis, Finding
 from cosim.diagnosis.effects import TRIED
 from cosim.diagnosis.measure.breakdown import parts
 from cosim.diagnosis.measure.locate import regions
-from cosim.diagnosis.measure.protocol import Structures, judge, traces
+from cosim.diagnosis.measure.protocol import Structures, band_of, judge, traces
 from cosim.estimation.determined import limited
 from cosim.estimation.not_determined import not_determined
 from cosim.estimation.prepare import quality
@@ -37,11 +37,12 @@ def without_names(
     base, limits = limited(problem, base)
     unknown = not_determined(problem, limits)
     models, linear = Structures(problem.mount, base, base), problem.mount.motion == "linear"
-    signals = traces(train, heldout, models)
+    held = judge(heldout, models, problem.prepared.band)
+    signals = traces(train, heldout, models, band_of(held))
     return Diagnosis(
         verdict=("unknown",),
         findings=tuple(_untestable(name) for name in TRIED),
-        heldout=judge(heldout, models, problem.prepared.band),
+        heldout=held,
         traces=signals,
         parts=parts(signals),
         regions=regions(signals, False, linear),

@@ -8,8 +8,9 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.delivery.missing_torque import write_missing_torque
-from cosim.diagnosis.measure.breakdown import samples
-from cosim.diagnosis.measure.protocol import Structures, traces
+from cosim.diagnosis.measure.breakdown import parts, samples
+from cosim.diagnosis.measure.protocol import Structures, band_of, judge, traces
+from cosim.estimation.prepare import Band
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
@@ -54,3 +55,15 @@ def test_the_report_judges_every_row_that_the_protocol_judges() -> None:
     judged = samples((trace,))
     assert len(judged.t) == len(trace.t)
     assert np.sqrt(np.mean(judged.before**2)) == np.sqrt(np.mean(trace.missing**2))
+
+
+def test_errors_by_part_are_of_the_band_in_which_the_whole_was_judged() -> None:
+    """A torque that is mostly noise above 8 Hz is judged below that; its parts, read beside it, must be too."""
+    calm = recording("noisy")
+    loud = np.gradient(np.random.default_rng(1).normal(0, 8, len(calm)))
+    run = Recording("noisy", {**calm.table, "tau": calm.table["tau"] + loud})
+    models = Structures(MOUNT, MOUNT, MOUNT)
+    held = judge([run], models, Band(8.0))
+    assert held.cutoff_hz == 8.0
+    whole, *_ = parts(traces([run], [run], models, band_of(held)))
+    assert whole.before == pytest.approx(held.before_rms, rel=1e-9)
