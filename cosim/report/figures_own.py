@@ -22,8 +22,7 @@ from cosim.report.figures_friction import effect_of, law_with
 from cosim.report.quantities import Scales
 from cosim.report.sheet import Picture, degrees, heading
 from cosim.report.words import lowered
-from pyfmi_models.effects.base import Effect, FrictionEffect, LoadEffect
-from pyfmi_models.friction import FrictionLaw, Frictionless
+from pyfmi_models.friction import Frictionless
 from pyfmi_models.mount import Axis, Mount
 
 if TYPE_CHECKING:
@@ -38,27 +37,24 @@ VIEWS = ("position", "one pitch", "slow and fast")
 def own_torque(finding: Finding, diagnosis: Diagnosis) -> Torque | None:
     """Return the torque of a finding with the numbers found; None where it is no function of position and speed."""
     first = effect_of(finding)
-    if not isinstance(first, (LoadEffect, FrictionEffect)) or first.inputs() or first.states():
+    if first is None or first.inputs() or first.states():
         return None
-    more = tuple(replace(first, **harmonic) for harmonic in finding.harmonics)
-    if isinstance(first, LoadEffect):
-        return _difference(diagnosis, None, (first, *more))
-    law = law_with(diagnosis)
-    return None if law is None or law.key == "none" else _difference(diagnosis, law, (first, *more))
-
-
-def _difference(diagnosis: Diagnosis, law: FrictionLaw | None, effects: tuple[Effect, ...]) -> Torque:
-    """What effects add to the torque of a law, or to nothing."""
+    effects = (first, *(replace(first, **harmonic) for harmonic in finding.harmonics))
     q, v = ca.SX.sym("q"), ca.SX.sym("v")
-    plain = Mount(name="own", motion=diagnosis.motion, axis=Axis(inertia=1.0), friction=law or Frictionless())
-    ends = []
-    for mount in (plain, replace(plain, effects=effects)):
-        motion = mount.at(0.0, q, v)
-        this = mount.with_symbols({one.name: one.start for one in mount.parameters()}, v)
-        rubs = this.level(motion) * ca.sign(v) + this.viscous(motion) if law else 0.0
-        ends.append(this.loads(motion) + rubs)
-    torque = ca.Function("own", [q, v], [ends[1] - ends[0]])
+    law = law_with(diagnosis) or Frictionless()
+    plain = Mount(name="own", motion=diagnosis.motion, axis=Axis(inertia=1.0), friction=law)
+    without, whole = (_torque(mount, q, v) for mount in (plain, replace(plain, effects=effects)))
+    if ca.is_equal(without, whole, 8):
+        return None
+    torque = ca.Function("own", [q, v], [whole - without])
     return lambda at, speed: np.asarray(torque.map(at.size)(at[None], speed[None])).ravel()
+
+
+def _torque(mount: Mount, q: ca.SX, v: ca.SX) -> ca.SX:
+    """Loads and steady friction of a mount."""
+    motion = mount.at(0.0, q, v)
+    this = mount.with_symbols({one.name: one.start for one in mount.parameters()}, v)
+    return ca.SX(this.loads(motion) + this.level(motion) * ca.sign(v) + this.viscous(motion))
 
 
 def own(finding: Finding, diagnosis: Diagnosis, chosen: Samples, scales: Scales) -> Picture | None:
@@ -70,7 +66,8 @@ def own(finding: Finding, diagnosis: Diagnosis, chosen: Samples, scales: Scales)
         return None
     pick = np.linspace(0, shown.q.size - 1, min(MOST_ROWS, shown.q.size)).astype(int)
     shown = Samples(*(getattr(shown, name)[pick] for name in Samples.__dataclass_fields__))
-    resists = isinstance(effect_of(finding), FrictionEffect)
+    ahead = torque(shown.q, np.abs(shown.v))
+    resists = not np.allclose(torque(shown.q, -np.abs(shown.v)), ahead)
     side = np.sign(shown.v) if resists else np.ones_like(shown.v)
     model = side * torque(shown.q, shown.v) * scales.torque.factor
     measured = model + side * shown.after * scales.torque.factor

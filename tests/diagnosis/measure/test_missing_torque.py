@@ -60,7 +60,7 @@ def test_the_report_judges_every_row_that_the_protocol_judges() -> None:
 def test_errors_by_part_are_of_the_band_in_which_the_whole_was_judged() -> None:
     """A torque that is mostly noise above 8 Hz is judged below that; its parts, read beside it, must be too."""
     calm = recording("noisy")
-    loud = np.gradient(np.random.default_rng(1).normal(0, 8, len(calm)))
+    loud = np.gradient(np.random.default_rng(1).normal(0, 800, len(calm)))
     run = Recording("noisy", {**calm.table, "tau": calm.table["tau"] + loud})
     models = Structures(MOUNT, MOUNT, MOUNT)
     held = judge([run], models, Band(8.0))
