@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
-from cosim.diagnosis.answer.doubt_entry import not_determined_doubts
+from cosim.diagnosis.answer.doubt_entry import Sanity, not_determined_doubts
 from cosim.diagnosis.answer.entries import BroadbandEntry
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.answer.scores import Scores
@@ -53,9 +53,10 @@ from cosim.diagnosis.terms.spelled import Spelled
 from cosim.diagnosis.trust.admission import admit
 from cosim.diagnosis.trust.denied import beyond_denial, without_denied
 from cosim.diagnosis.trust.doubts import doubts, of_base, of_delivered, single_readings
-from cosim.diagnosis.trust.limits import half_sample
+from cosim.diagnosis.trust.limits import end_stop, half_sample
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.determined import limited, with_held
+from cosim.estimation.end_stops import pushes, without
 from cosim.estimation.fit import Fit
 from cosim.estimation.half_sample import are_even, moved, torque_late
 from cosim.estimation.not_determined import not_determined
@@ -146,13 +147,12 @@ def diagnose(
         RecordingError: the recordings cannot belong to this card (units), or are too short.
     """
     started = time.perf_counter()
-    given, train, heldout = (*train, *heldout), [*map(as_analysed, train)], [*map(as_analysed, heldout)]
-    admit(card.plant(), train, heldout)
-    sanity = (*doubts(train, heldout, card), *single_readings(given, (*train, *heldout)))
+    train, heldout, sanity = _admitted(train, heldout, card)
     on_progress("refitting the base")
     problem, base, late = _refitted(train, heldout, card)
+    sanity += half_sample((*train, *heldout), late, problem.sample_time)
     train, heldout = [moved(one, late) for one in train], [moved(one, late) for one in heldout]
-    sanity = (*sanity, *half_sample(given, late, problem.sample_time), *of_base(problem, base.mount, train, heldout))
+    sanity += of_base(problem, base.mount, train, heldout)
     refitted = _improved(card, limited(problem, base.mount)[0])
     on_model_ready("before", refitted.plant())
     if any(one.blocks_naming for one in beyond_denial(sanity)):
@@ -180,6 +180,20 @@ def diagnose(
         seconds=time.perf_counter() - started,
     )
     return Outcome(diagnosis, delivered, first, refitted, named, experiment, learned.stated() if learned else ())
+
+
+def _admitted(
+    train: Sequence[Recording], heldout: Sequence[Recording], card: Card
+) -> tuple[list[Recording], list[Recording], tuple[Sanity, ...]]:
+    """The recordings as they are analysed, without what pushes against an end stop, and what is doubtful of them."""
+    read, free, stops = [[*map(as_analysed, some)] for some in (train, heldout)], [], []
+    admit(card.plant(), read[0], read[1])
+    sanity = (*doubts(read[0], read[1], card), *single_readings((*train, *heldout), (*read[0], *read[1])))
+    for some in read:
+        found = pushes(some, card.plant())
+        free.append(without(some, found))
+        stops += [end_stop(one, some, card.mount.motion) for one in found]
+    return free[0], free[1], (*sanity, *stops)
 
 
 def _refitted(train: Sequence[Recording], heldout: Sequence[Recording], card: Card) -> tuple[Problem, Fit, float]:

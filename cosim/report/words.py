@@ -55,6 +55,7 @@ REMARKS = frozenset(
         "base_far_from_card",
         "encoder_step",
         "half_sample",
+        "end_stop",
         "little_motion",
         "no_set_point",
         "not_determined",

@@ -20,6 +20,7 @@ Kind = Literal[
     "single_readings",
     "encoder_step",
     "half_sample",
+    "end_stop",
     "no_set_point",
     "little_motion",
 ]

@@ -4,13 +4,14 @@ A coarse encoder's step limits it, no set point beside the position, and no moti
 """
 
 from collections.abc import Sequence
-from math import pi, sqrt
+from math import degrees, pi, sqrt
 
 import numpy as np
 
 from cosim.data.recording import Recording
 from cosim.data.resolution import SEEN_STEPS, resolution
 from cosim.diagnosis.answer.doubt_entry import Sanity
+from cosim.estimation.end_stops import Push
 from cosim.estimation.prepare import Prepared
 from cosim.estimation.row_weights import far_from_turns
 from pyfmi_models.mount import Mount
@@ -50,6 +51,18 @@ def rounding_torque(recording: Recording, step: float, inertia: float, band: flo
     share = 2 * band * recording.sample_time / 5
     acceleration = step / sqrt(12) * (2 * pi * band) ** 2 * sqrt(share)
     return inertia * acceleration / max(float(np.std(recording["tau"])), 1e-300)
+
+
+def end_stop(found: Push, recordings: Sequence[Recording], motion: str) -> Sanity:
+    """Say that recordings push against something at an end of the travel, and that nothing is judged there."""
+    names = ", ".join(dict.fromkeys(recordings[number].name for number, *_ in found.spans))
+    linear = motion == "linear"
+    at, unit = (f"{1e3 * found.at:.4g} mm", "N") if linear else (f"{degrees(found.at):.4g}°", "N·m")
+    text = (
+        f"{names}: at {at}, an end of the travel, the axis hardly moves and pushes with {found.torque:.3g} {unit} more "
+        f"than friction and load take ({found.seconds:.2g} s in all): an end stop. Nothing is judged there."
+    )
+    return Sanity(finding="end_stop", statement=text)
 
 
 def half_sample(recordings: Sequence[Recording], late: float, sample_time: float) -> tuple[Sanity, ...]:
