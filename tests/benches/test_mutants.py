@@ -99,10 +99,11 @@ def test_in_c_each_error_changes_one_token_and_nothing_that_is_only_said() -> No
 
 
 def test_the_same_seed_draws_the_same_errors_from_every_room_and_of_every_kind() -> None:
-    some = {seed: list(islice(mutants.drawn(seed), 150)) for seed in (1, 2)}
-    assert some[1] == list(islice(mutants.drawn(1), 150))
+    groups = ("fmi", "loop", "hardware")
+    some = {seed: list(islice(mutants.drawn(seed, groups), 150)) for seed in (1, 2)}
+    assert some[1] == list(islice(mutants.drawn(1, groups), 150))
     assert some[1] != some[2]
-    assert [group for group, *_ in some[1][:15]] == list(mutants.GROUPS)
+    assert [group for group, *_ in some[1][:6]] == 2 * list(groups)
     kinds = {mutants.read(path)[1][number].kind for _, path, number in some[1]}
     assert kinds == set(KINDS)
     assert any(path.suffix == ".c" for _, path, _ in some[1])
@@ -169,10 +170,10 @@ def noticed(folder: Path) -> None:
     (home / "tests" / "test_broken.py").write_text("def test_broken():\n    assert False\n")
     this = tree(folder, home)
     for number, site in enumerate(mutants.read(home / "held.py")[1]):
-        for files in (["test_idle.py"], ["test_broken.py", "test_idle.py", "test_looks.py"]):
+        for files in (["test_idle.py"], ["test_broken.py", "test_idle.py", "test_looks.py"])[number > 0 :]:
             mutants.asked = lambda *_, files=files: ([], files)
             tried = this.attempt("held", home / "held.py", number)
-            survives = len(files) == 1 or site.change in ("min(x, 3) + 0 -> Sub", "min(x, 3) -> swapped")
+            survives = len(files) == 1 or site.change == "min(x, 3) + 0 -> Sub"
             assert tried
             assert tried.noticed == ("" if survives else "test_looks.py::test_looks"), (tried, files)
     assert (this.place / "held.py").read_text() == (home / "held.py").read_text()

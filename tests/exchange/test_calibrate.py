@@ -70,9 +70,8 @@ def test_the_verb_writes_numbers_an_fmu_that_has_them_and_a_report(fmus, folder,
     assert verb(*given) == 2, "nothing is overwritten"
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
-def test_a_parameter_that_changes_nothing_and_a_pair_that_acts_as_a_product_are_named(fmus, seed):
-    done = found(recorded(fmus[3], TRUTH, seed), fmu=fmus[3], free=["J", "kt", "gear", "idle"], starts=2)
+def test_a_parameter_that_changes_nothing_and_a_pair_that_acts_as_a_product_are_named(fmus):
+    done = found(recorded(fmus[3], TRUTH), fmu=fmus[3], free=["J", "kt", "gear", "idle"], starts=2)
     assert "idle changes nothing that was recorded." in done.not_determined
     assert any("kt" in one and "gear" in one and "product" in one for one in done.not_determined)
     assert math.isinf(done.standard_errors["idle"])
