@@ -139,13 +139,10 @@ def test_the_step_of_an_encoder_is_seen_and_noise_has_none(step: float) -> None:
 def test_a_diagnosis_leaves_them_out_before_anything_is_fitted() -> None:
     from cosim.diagnosis.diagnose import diagnose
 
-    good = motion(rate=200.0)
-    bad = spoiled(good, "q", slice(2000, 2001), -3.14)
+    bad = spoiled(motion(rate=200.0), "q", slice(2000, 2001), -3.14)
     card = parse_card('[mount]\ninertia = 4.5\n[friction]\nmodel = "coulomb"\nFc = 1.8\nsigma2 = 1.1\n', "card.toml")
-    held = replace(bad, name="heldout")
-    found = diagnose([bad], [held], card).diagnosis
-    clean = diagnose([good], [replace(good, name="heldout")], card).diagnosis
-    assert found.heldout.before_rms == pytest.approx(clean.heldout.before_rms, rel=0.05)
-    assert found.verdict == clean.verdict
+    found = diagnose([bad], [replace(bad, name="heldout")], card).diagnosis
+    assert found.verdict == ()
+    assert found.heldout.before_rms < 0.1, "a twentieth of the friction level; the false reading alone makes 1 N m"
     assert [one.finding for one in found.sanity][:2] == ["single_readings", "single_readings"]
     assert any("row 2,001" in note for note in found.data_quality)

@@ -142,26 +142,10 @@ def test_a_positive_offset_pushes_backward() -> None:
     assert "forward" in TorqueOffset(torque=-0.7).statement()
 
 
-def test_cogging_has_its_cycles_amplitude_and_phase() -> None:
-    effect = Cogging(cycles_per_rev=24, amplitude=0.5, phase=0.3)
-    q = np.linspace(0, 2 * np.pi, 24 * 64 + 1)
-    torque = np.array([float(effect.load(motion(x))) for x in q])
-    np.testing.assert_allclose(torque, 0.5 * np.cos(24 * q + 0.3), atol=1e-12)
-    assert torque.max() - torque.min() == pytest.approx(2 * 0.5, rel=1e-2)  # half the peak-to-peak value
-    assert np.sum(np.diff(np.sign(torque)) > 0) == 24
-
-
 def test_cycles_of_a_linear_axis_are_per_metre() -> None:
     effect = Cogging(cycles_per_rev=4, amplitude=1.0)
     for q, load in ((0.0, 1.0), (0.125, -1.0), (0.25, 1.0), (1.0, 1.0)):
         assert acceleration(effect, q=q, motion="linear") == pytest.approx(-load / 2.0, abs=1e-12)
-
-
-def test_unbalance_pulls_back_to_the_bottom() -> None:
-    effect = GravityUnbalance(mgl=1.5, phase=0.2)
-    assert acceleration(effect, q=-0.2) == pytest.approx(0, abs=1e-12)
-    assert acceleration(effect, q=-0.2 + 0.1) == pytest.approx(-1.5 * np.sin(0.1) / 2)
-    assert acceleration(effect, q=-0.2 - 0.1) == pytest.approx(1.5 * np.sin(0.1) / 2)
 
 
 # Friction
@@ -178,20 +162,6 @@ def test_friction_that_is_not_there_cannot_be_multiplied(effect: FrictionEffect)
 # Drive
 
 
-@DRIVES
-def test_the_drive_passes_a_constant_command_whole(drive: DriveEffect) -> None:
-    A, B, C, D = state_space(drive)
-    assert (C @ np.linalg.solve(-A, B) + D).item() == pytest.approx(1.0, rel=1e-12)
-    assert np.all(np.linalg.eigvals(A).real < 0)
-    assert D.item() == 0  # a step in the command is no step in the torque
-
-
-def test_the_lags_response_is_that_of_its_own_state() -> None:
-    lag, omega = ActuatorLag(time_constant_ms=4.0), np.logspace(-1, 4, 50)
-    np.testing.assert_allclose(lag.response(omega), frequency_response(lag, omega), rtol=1e-12)
-    assert abs(lag.response(np.array([250.0]))[0]) == pytest.approx(np.sqrt(0.5))  # at omega T = 1
-
-
 def test_the_delays_states_follow_the_dead_time_over_a_controllers_band() -> None:
     delay, turn = Delay(delay_ms=4.0), np.linspace(0.01, 1.3, 60)  # omega T
     exact, ours = delay.response(turn / 4e-3), frequency_response(delay, turn / 4e-3)
@@ -206,13 +176,6 @@ def test_the_delays_states_have_the_moments_of_a_dead_time(order: int) -> None:
     A, B, C, _ = state_space(Delay(delay_ms=1000.0))
     term = -C @ np.linalg.matrix_power(np.linalg.inv(A), order + 1) @ B
     assert term.item() == pytest.approx((-1.0) ** order / float(np.prod(np.arange(1, order + 1))), rel=1e-9)
-
-
-def test_a_ramp_arrives_late_by_the_delay() -> None:
-    A, B, C, _ = state_space(Delay(delay_ms=4.0))
-    slope = np.linalg.solve(-A, B)  # states under a ramp of 1 N m/s: slope t + rest
-    rest = np.linalg.solve(A, slope)
-    assert (C @ rest).item() == pytest.approx(-4e-3, rel=1e-12)
 
 
 @DRIVES

@@ -10,15 +10,13 @@ from cosim.diagnosis.effects import TRIED
 from cosim.diagnosis.trust.admission import check_effects
 from cosim.support.errors import InputError
 from pyfmi_models.card import parse_card
-from pyfmi_models.effects import CATALOGUE, GravityUnbalance, LocalFriction
+from pyfmi_models.effects import CATALOGUE, GravityUnbalance
 from pyfmi_models.effects.concave_viscous import ConcaveViscous
 from pyfmi_models.effects.dead_band import DeadBand
 from pyfmi_models.effects.gear_friction import GearFriction
 from pyfmi_models.effects.known_load import KnownLoad
-from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction
 from pyfmi_models.effects.rough_spot import RoughSpot
 from pyfmi_models.effects.torque_droop import TorqueDroop, WarmTorqueDroop
-from pyfmi_models.effects.torque_saturation import TorqueSaturation
 from pyfmi_models.errors import CardError
 
 ASKED = """
@@ -40,14 +38,6 @@ def test_a_diagnosis_asks_for_what_it_did_and_for_none_of_these() -> None:
     assert set(TRIED) == set(ASKED.split())
     assert not set(OF_CARDS) & set(TRIED)
     assert set(OF_CARDS) <= set(CATALOGUE)
-
-
-def test_a_dead_band_takes_its_width_of_large_commands_and_most_of_small_ones() -> None:
-    drive = DeadBand(band=0.5)
-    given = np.array([float(drive.applied((), u)) for u in (-20.0, -0.1, 0.0, 0.1, 20.0)])
-    np.testing.assert_allclose(given[[0, 2, 4]], [-19.5, 0.0, 19.5], atol=1e-12)
-    assert given[3] == pytest.approx(-given[1])
-    assert 0.0 < given[3] < 0.1 * 0.1
 
 
 @pytest.mark.parametrize("softness", [0.2, 0.25, 2.0])
@@ -76,28 +66,6 @@ def test_far_above_its_speed_viscous_friction_is_a_power_and_far_below_a_line(ex
 
 WEIGHT = GravityUnbalance(mgl=2.0, phase=0.3)
 GEAR = GearFriction(driving=0.6, driven=0.2)
-
-
-@pytest.mark.parametrize("v", [-0.5, -0.01, 0.02, 0.7])
-@pytest.mark.parametrize("q", [-2.0, -0.3, 0.4, 1.2, 5.0])
-def test_a_gear_rubs_by_its_load_and_otherwise_lifting_than_lowering(q: float, v: float) -> None:
-    load = 2.0 * np.sin(q + 0.3)
-    level = 1.0 + (0.6 if load * v > 0 else 0.2) * abs(load)
-    assert friction(WEIGHT, GEAR, position=q, speed=v) == pytest.approx(level * np.sign(v) + 3 * v, rel=1e-12)
-
-
-def test_at_rest_a_gear_has_the_mean_of_both() -> None:
-    motion = mount(WEIGHT, GEAR).at(0.0, 0.4, 0.0)
-    assert float(mount(WEIGHT, GEAR).level(motion)) == pytest.approx(1.0 + 0.4 * 2.0 * np.sin(0.7), rel=1e-12)
-    assert friction(WEIGHT, GEAR, position=0.4, speed=0.0) == 0.0
-
-
-@pytest.mark.parametrize("v", [-0.3, 0.3])
-def test_a_gear_alike_both_ways_is_friction_that_depends_on_the_load(v: float) -> None:
-    alike, same = GearFriction(driving=0.3, driven=0.3), LoadDependentFriction(coulomb_per_Nm=0.3)
-    for q in (-2.0, 0.1, 1.3):
-        expected = friction(WEIGHT, same, position=q, speed=v)
-        assert friction(WEIGHT, alike, position=q, speed=v) == pytest.approx(expected, rel=1e-14)
 
 
 @pytest.mark.parametrize("load", [-4.0, 4.0])
@@ -137,15 +105,6 @@ def test_a_rough_spot_is_another_forward_than_backward(v: float, motion: str) ->
     assert [units[f"rough_spot.{name}"] for name in ("q_center", "width", "forward")] == ["m", "m", "1"]
 
 
-def test_a_spot_alike_both_ways_is_the_local_form_of_friction_over_position() -> None:
-    alike = RoughSpot(q_center=0.3, width=0.1, forward=0.8, backward=0.8)
-    same = LocalFriction(q_center=0.3, width=0.1, relative_amplitude=0.8)
-    for q in (0.1, 0.3, 0.44):
-        for v in (-0.2, 0.0, 0.2):
-            expected = friction(same, position=q, speed=v)
-            assert friction(alike, position=q, speed=v) == pytest.approx(expected, rel=1e-14)
-
-
 # Droop
 
 
@@ -166,15 +125,6 @@ def test_a_drive_that_droops_loses_its_share_at_the_rated_torque_and_more_always
     assert float(drive.applied((), 8.0)) == pytest.approx((1 - droop) * 8.0, rel=1e-12)
 
 
-def test_a_small_droop_is_a_line_over_the_torque_where_a_saturation_has_a_knee() -> None:
-    """At half the knee, or half the rated torque: the one has lost half its share, the other nothing."""
-    for command in (2.0, 4.0, 8.0):
-        lost = 1 - float(TorqueDroop(droop=0.02, rated_torque=8.0).applied((), command)) / command
-        assert lost == pytest.approx(0.02 * command / 8.0, abs=0.02 * 0.05)
-    assert float(TorqueSaturation(knee_torque=8.0, slope=0.3).applied((), 4.0)) == pytest.approx(4.0, rel=1e-9)
-    assert float(TorqueDroop(droop=0.3, rated_torque=8.0).applied((), 4.0)) < 0.85 * 4.0
-
-
 @pytest.mark.parametrize("degrees", [-30.0, 20.0, 80.0])
 def test_warm_magnets_give_less(degrees: float) -> None:
     drive = WarmTorqueDroop(droop=0.1, rated_torque=8.0, per_degC=-0.002)
@@ -184,11 +134,6 @@ def test_warm_magnets_give_less(degrees: float) -> None:
     units = {one.name: one.unit for one in mount(drive, motion="linear").parameters()}
     assert [units[f"torque_droop.{name}"] for name in ("rated_torque", "droop", "per_degC")] == ["N", "1", "1/K"]
     assert found == pytest.approx(drooped(5.0, 0.1, 8.0) * (1 - 0.002 * (degrees - 20)), rel=1e-12)
-
-
-def test_however_hot_a_drive_keeps_a_tenth_of_its_torque_constant() -> None:
-    model = mount(WarmTorqueDroop(droop=0.0, rated_torque=8.0, per_degC=-0.05)).model()
-    assert evaluate(model, tau=5.0, temperature=500.0)["applied"] == pytest.approx(0.5)
 
 
 def test_a_card_takes_the_form_with_a_temperature_by_its_key() -> None:

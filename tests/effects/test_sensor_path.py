@@ -18,24 +18,6 @@ def applied(effect: TorqueSaturation, command: float) -> float:
     return evaluate(mount(effect).model(), tau=command)["applied"]
 
 
-@pytest.mark.parametrize("side", [-1, 1])
-def test_below_the_knee_all_of_the_command_arrives_and_beyond_it_the_slope(side: int) -> None:
-    for command in (0.0, 0.1, 2.0, 4.0):
-        assert side * applied(KNEE, side * command) == pytest.approx(command, abs=1e-5)
-    for command in (6.0, 9.0, 1e3):
-        assert side * applied(KNEE, side * command) == pytest.approx(5 + 0.4 * (command - 5), abs=1e-5)
-
-
-def test_the_knee_is_smooth_and_odd() -> None:
-    commands = np.linspace(-8, 8, 1601)
-    found = np.array([applied(KNEE, one) for one in commands])
-    np.testing.assert_allclose(found, -found[::-1], atol=1e-12)
-    slope = np.gradient(found, commands)
-    assert np.all((slope > 0.4 - 1e-3) & (slope < 1 + 1e-9))
-    assert np.abs(np.diff(slope)).max() < 0.02  # a corner would jump by 0.6
-    assert applied(KNEE, 5.0) == pytest.approx(5 - 0.6 * 0.1 * np.log(2))
-
-
 def test_without_a_slope_no_more_than_the_knee_arrives() -> None:
     assert applied(TorqueSaturation(knee_torque=5.0), 1e4) == pytest.approx(5.0)
     assert applied(TorqueSaturation(knee_torque=5.0), -1e4) == pytest.approx(-5.0)
@@ -44,14 +26,6 @@ def test_without_a_slope_no_more_than_the_knee_arrives() -> None:
 def test_the_torque_limit_acts_before_the_knee() -> None:
     model = mount(KNEE, axis=Axis(inertia=INERTIA, torque_limit=6.0)).model()
     assert evaluate(model, tau=100.0)["applied"] == pytest.approx(5.4, abs=1e-4)
-
-
-@pytest.mark.parametrize("q", [-2.0, 0.0, 0.7])
-def test_an_eccentric_disc_errs_once_and_twice_per_encoder_turn(q: float) -> None:
-    found = evaluate(mount(DISC).model(), position=q)
-    a = 8 * q + 0.3
-    assert found["q"] - q == pytest.approx(1e-3 * np.sin(a) + 2e-4 * np.sin(2 * a))
-    assert found["q_true"] == q
 
 
 def test_encoder_turns_of_a_linear_axis_are_per_metre() -> None:

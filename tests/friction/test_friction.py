@@ -15,7 +15,6 @@ from pyfmi_models.card import parse_card, read_card
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.errors import CardError
 from pyfmi_models.friction import LAWS, Coulomb, Dahl, Frictionless, LuGre, MaxwellSlip, Stribeck
-from pyfmi_models.friction.base import stribeck_decay
 from pyfmi_models.model import Pair, parameters_of, symbols_of, with_symbols
 
 LUGRE, MAXWELL = EXAMPLES["lugre"], EXAMPLES["maxwell_slip"]
@@ -36,18 +35,6 @@ def moves(distance: float, count: int = 2000) -> Array:
     return np.full(count, distance / count)
 
 
-@pytest.mark.parametrize("v", [-0.3, -0.002, 5e-5, 0.04])
-@pytest.mark.parametrize("z", [-2.0, 0.0, 3.0])
-def test_lugre_is_the_equations_of_the_contract(v: float, z: float) -> None:
-    """Written out by hand, with z as the torque sigma0 z."""
-    g = 2.322 + (3.322 - 2.322) * np.exp(-((abs(v) / 0.04129) ** 1.292))
-    rate = v - abs(v) * z / g
-    this = numeric(LUGRE)
-    assert this("level", [z], v)[0] == pytest.approx(g, rel=1e-9)
-    assert this("torque", [z], v)[0] == pytest.approx(z + 497.0 * rate + 32.77 * v, rel=1e-9)
-    assert this("rate", [z], v)[0] == pytest.approx(9.23e4 * rate, rel=1e-9)
-
-
 @given(v=speeds, share=st.floats(-1, 1))
 @settings(max_examples=50, deadline=None)
 def test_lugre_without_damping_and_peak_is_dahl_with_exponent_one(v: float, share: float) -> None:
@@ -56,15 +43,6 @@ def test_lugre_without_damping_and_peak_is_dahl_with_exponent_one(v: float, shar
     dahl = numeric(Dahl(sigma0=9.23e4, Fc=2.322, sigma2=32.77))
     for name in ("level", "torque", "rate", "advance"):
         assert dahl(name, [2.322 * share], v) == pytest.approx(plain(name, [2.322 * share], v), rel=1e-12, abs=1e-10)
-
-
-@pytest.mark.parametrize("v", [-0.3, 5e-5])
-@pytest.mark.parametrize("F", [-2.0, 0.0, 1.5])
-@pytest.mark.parametrize("n", [0.5, 1.0, 1.7, 3.0])
-def test_dahl_is_equation_3_of_the_paper_with_the_sign_of_the_speed(v: float, F: float, n: float) -> None:
-    u = 1 - F / 2.322 * np.sign(v)
-    expected = 9.23e4 * np.sign(u) * abs(u) ** n * v
-    assert numeric(replace(DAHL, n=n))("rate", [F], v)[0] == pytest.approx(expected, rel=1e-12)
 
 
 @pytest.mark.parametrize("n", [0.5, 0.99, 1 - 1e-5, 1.0, 1 + 3e-5, 1.7, 2.0, 5.0])
@@ -117,18 +95,6 @@ def test_with_its_default_spread_maxwell_slip_loads_like_dahl() -> None:
     x = np.cumsum(moves(8 * BEND))
     torque, _ = pulled(plain, moves(8 * BEND))
     assert np.abs(torque / 2.322 - (1 - np.exp(-x / BEND))).max() < 0.062
-
-
-@pytest.mark.parametrize("v", [-0.3, -1e-3, 1e-5, 0.05])
-def test_the_damping_of_maxwell_slip_is_sigma1_for_the_elements_that_stick(v: float) -> None:
-    """Written out by hand: stuck elements all give sigma1 v; each that slips takes its share of the stiffness away."""
-    law = replace(SHARP, sigma2=0.0)
-    this, k, level = numeric(law), ca.DM(law.stiffness()).full().ravel(), float(law.level(v))
-    assert this("torque", np.zeros(law.elements), v)[0] == pytest.approx(law.sigma1 * v, rel=1e-12)
-    for slipping in (1, 5, law.elements):
-        state = np.where(np.arange(law.elements) < slipping, np.sign(v) * level / law.elements, 0.0)
-        damping = law.sigma1 * k[slipping:].sum() / law.sigma0
-        assert this("torque", state, v)[0] == pytest.approx(state.sum() + damping * v, rel=1e-9)
 
 
 @pytest.mark.parametrize("reached", [0.2, 0.8, 2.0, 6.0])
@@ -194,12 +160,6 @@ def test_without_break_away_level_there_is_no_stribeck_term(law: LuGre | Stribec
 @pytest.mark.parametrize("law", [Frictionless(), Coulomb(Fc=2.0), LUGRE.steady()], ids=lambda law: law.key)
 def test_a_law_without_memory_is_its_own_static_map(law: Any) -> None:
     assert law.steady() is law
-
-
-@pytest.mark.parametrize("delta", [0.5, 1.0, 1.29, 2.0, 5.0])
-def test_the_stribeck_decay_is_its_formula(delta: float) -> None:
-    expected = np.exp(-((SPEEDS / 0.04) ** delta))
-    np.testing.assert_allclose([float(stribeck_decay(v, 0.04, delta)) for v in -SPEEDS], expected, rtol=1e-5, atol=0)
 
 
 def test_a_pair_is_two_parameters_and_the_direction_picks_one() -> None:

@@ -105,16 +105,6 @@ def test_fading_damping_wastes_power_in_every_state_at_every_speed_and_level(
     assert float(law.contact(state, v, level)) * v - stored >= -1e-12 * level * v
 
 
-def test_fading_damping_is_lugres_at_rest_and_gone_in_fast_motion() -> None:
-    state, level = 1.0, 2.5
-    for law in (FADING, replace(FADING, Vd=0.02)):
-        assert float(law.contact(state, 1e-7, level)) == pytest.approx(float(LUGRE.contact(state, 1e-7, level)))
-        assert float(law.contact(state, 10.0, level)) == pytest.approx(state)
-    slow = replace(FADING, Vd=0.02)
-    damping = 497.0 * np.exp(-1.0) * (0.02 - 0.02 * state / level)
-    assert float(slow.contact(state, 0.02, level)) == pytest.approx(state + damping)
-
-
 def test_a_card_with_a_law_that_is_not_passive_says_so() -> None:
     """The shipped numbers are the paper's; 214 = 497 (3.322 - 2.322) / 2.322."""
     facts, _ = describe("paper_mount")

@@ -89,16 +89,6 @@ def test_steady_sliding_forgets_the_past_and_is_the_laws_static_map(law: Frictio
         assert after[0] == pytest.approx(still("torque", [], v)[0], rel=1e-9)
 
 
-@laws({key: EXAMPLES[key] for key in ("none", "coulomb", "static", "dahl", "lugre", "maxwell_slip")})
-def test_the_static_map_is_stribecks_formula(law: FrictionLaw) -> None:
-    numbers = {name: getattr(law, name, None) for name in ("Fc", "Fs", "Vs", "delta", "sigma2")}
-    Fc, Fs, Vs, delta, sigma2 = (value or 0.0 for value in numbers.values())
-    for v in (3e-3, 0.04, 0.7):
-        level = Fc + (Fs - Fc) * np.exp(-((v / Vs) ** delta)) if Vs else Fc
-        torque = numeric(law.steady())("torque", [], v)[0]
-        assert torque == pytest.approx(level + sigma2 * v, rel=1e-8)  # 1e-12 is added to |v/Vs| before the power
-
-
 @laws(WITH_MEMORY)
 def test_no_state_of_a_contact_touches_another(law: FrictionLaw) -> None:
     """The diagnosis counts on it when it carries derivatives along a recording."""

@@ -45,25 +45,6 @@ def move(model: Model, tau: Torque, end: float, speed: float = 0.0) -> np.ndarra
     return np.asarray(found.y)
 
 
-def test_a_constant_torque_without_friction_makes_a_parabola() -> None:
-    t = np.linspace(0, 2, 501)
-    q, v = move(mount().model(), lambda t: 0.6, 2.0, speed=-0.01)
-    np.testing.assert_allclose(v, -0.01 + 0.6 / J * t, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(q, -0.01 * t + 0.5 * 0.6 / J * t**2, rtol=0, atol=1e-9)
-
-
-def test_viscous_friction_makes_the_speed_decay_with_inertia_over_viscosity() -> None:
-    t = np.linspace(0, 2, 501)
-    _, v = move(mount(Coulomb(Fc=0.0, sigma2=45.0)).model(), lambda t: 0.0, 2.0, speed=0.5)
-    np.testing.assert_allclose(v, 0.5 * np.exp(-45.0 / J * t), rtol=1e-7)
-
-
-def test_coulomb_friction_stops_the_axis_after_its_kinetic_energy_is_used_up() -> None:
-    q, v = move(mount(Coulomb(Fc=2.0)).model(), lambda t: 0.0, 2.0, speed=0.1)
-    assert q[-1] == pytest.approx(0.5 * J * 0.1**2 / 2.0, rel=1e-3)  # J v^2 / 2 = Fc q; the smoothed sign adds 1e-5
-    assert abs(v[-1]) < 1e-9
-
-
 @pytest.mark.parametrize(
     "effects", [(), (FrictionAsymmetry(level_asymmetry=0.2),), (ActuatorLag(time_constant_ms=20),)], ids=len
 )
@@ -115,16 +96,6 @@ def test_the_drive_gives_no_more_than_its_limit(tau: float) -> None:
     rates, outputs = evaluate(model, 0, [0, 0], tau)
     assert outputs["applied"] == np.clip(tau, -5, 5)
     assert rates[1] == pytest.approx(np.clip(tau, -5, 5) / J)
-
-
-def test_a_disturbance_resists_and_is_not_limited_by_the_drive() -> None:
-    model = mount(axis=Axis(inertia=J, torque_limit=5.0)).model()
-    assert evaluate(model, 0, [0, 0], 2.0, disturbance=9.0)[0][1] == pytest.approx((2.0 - 9.0) / J)
-
-
-def test_loads_add_up_and_resist() -> None:
-    model = mount(Frictionless(), TorqueOffset(torque=1.0), Cogging(cycles_per_rev=4, amplitude=0.5)).model()
-    assert evaluate(model, 0, [0, 0], 0.0)[0][1] == pytest.approx(-1.5 / J)
 
 
 @pytest.mark.parametrize("v", [-0.2, 0.2])

@@ -12,7 +12,7 @@ from scipy.signal import butter, filtfilt
 from cosim_studies.proof import truth
 from cosim_studies.proof.demo import demo_case
 from cosim_studies.proof.generator import FAMILIES, OUTSIDE, Case, make_case, write_case
-from cosim_studies.proof.truth import BLOCKS, TICK, Array, Drive
+from cosim_studies.proof.truth import BLOCKS, Array, Drive
 
 FRICTION = {
     **{"coulomb": 2.0, "breakaway": 3.0, "stribeck_speed": 0.02, "stribeck_power": 2.0, "viscous": 5.0},
@@ -85,63 +85,6 @@ def test_the_axis_rests_below_break_away_and_slides_above(blend: float) -> None:
     assert freed["angle"][-1] > 0.05
 
 
-def test_a_pendulum_with_varying_inertia_keeps_its_energy() -> None:
-    swing = {"inertia_swing": 0.4, "inertia_cycles": 2, "inertia_phase": 0.3, "unbalance": 5.0}
-    out = truth.simulate(SMOOTH | swing, still(100_000, start=1.2))
-    q, v = out["angle"], out["speed"]
-    energy = 0.5 * 2.0 * (1 + 0.4 * np.cos(2 * q + 0.3)) * v**2 - 5 * np.cos(q)
-    assert np.ptp(energy) < 5e-4 * 5
-
-
-def test_a_spring_swings_as_the_closed_form_says() -> None:
-    out = truth.simulate(SMOOTH | {"cable": 50.0, "offset": 1.0}, still(50_000, start=0.1))
-    expected = -0.02 + 0.12 * np.cos(5 * np.arange(50_000) * TICK)
-    assert np.max(np.abs(out["angle"] - expected)) < 2e-5
-
-
-def test_two_masses_ring_at_the_resonance() -> None:
-    parts = {"load_inertia": 1.0, "drive_stiffness": (2 * np.pi * 20) ** 2, "drive_damping": 0.2}
-    push = np.where(np.arange(40_000) < 10, -5.0, 0.0)
-    speed = truth.simulate(SMOOTH | parts, still(40_000, push=push))["speed"]
-    spectrum = np.abs(np.fft.rfft((speed - speed.mean()) * np.hanning(speed.size)))
-    assert np.argmax(spectrum) / 4.0 == pytest.approx(20 * np.sqrt(1.5), abs=0.25)
-
-
-def test_inside_the_gap_the_motor_feels_its_own_inertia_only() -> None:
-    parts = {"load_inertia": 2.0, "drive_stiffness": 1e5, "drive_damping": 1e3, "gap": 1e-2}
-    out = truth.simulate(SMOOTH | parts, still(20_000, push=-1.0))
-    rate = np.gradient(out["speed"], TICK)
-    assert rate[500] == pytest.approx(1 / 2, rel=1e-3)
-    assert rate[-100:].mean() == pytest.approx(1 / 4, rel=1e-2)
-
-
-def test_a_longer_rest_costs_its_logarithm_in_break_away() -> None:
-    mount = FRICTION | {"dwell_torque": 0.3, "dwell_time": 0.1, "dwell_length": 1e-2, "breakaway": 2.0, "viscous": 0.0}
-    mount["damping"] = 0.0
-
-    def peak(rest: float) -> float:
-        slide = np.linspace(0, 0.1, 20_000)
-        path = np.concatenate([slide, np.full(round(rest / 1e-4), 0.1), 0.1 + slide])
-        return float(truth.rub(mount, path, 1e-4)[-20_000:].max())
-
-    assert peak(8) - peak(1) == pytest.approx(0.3 * np.log(8.1 / 1.1), rel=0.1)
-
-
-def test_warm_grease_is_thin() -> None:
-    mount = FRICTION | {"thermal_viscous": -0.05, "thermal_level": -0.02}
-    cold, warm = (truth.rub(mount, np.linspace(0, 1, 20_000), 1e-4, degrees)[-1] for degrees in (20.0, 30.0))
-    assert cold - warm == pytest.approx(2 * (1 - np.exp(-0.2)) + 2.5 * (1 - np.exp(-0.5)), rel=1e-3)
-
-
-def test_asymmetry_and_a_rough_spot_scale_the_level() -> None:
-    mount = FRICTION | {"breakaway": 2.0, "viscous": 0.0, "level_asymmetry": 0.2}
-    forth, back = (truth.rub(mount, sign * np.linspace(0, 1, 20_000), 1e-4)[-1] for sign in (1, -1))
-    assert [forth, back] == pytest.approx([2.4, -1.6], rel=1e-4)
-    spot = mount | {"level_asymmetry": 0.0, "spot_relative": 0.5, "spot_center": 0.5, "spot_width": 0.05}
-    torque = truth.rub(spot, np.linspace(0, 1, 20_000), 1e-4)
-    assert torque[[10_000, 19_999]] == pytest.approx([3.0, 2.0], rel=1e-3)
-
-
 @pytest.mark.parametrize("seed", range(3))
 def test_a_null_needs_inertia_and_friction_and_nothing_else(seed: int) -> None:
     case = make_case(seed, duration=12)
@@ -170,14 +113,6 @@ def test_cogging_is_a_line_over_position() -> None:
     line = np.linalg.lstsq(columns, command - need, rcond=None)[0]
     assert np.hypot(*line[:2]) == pytest.approx(found["fundamental"], rel=0.1)
     assert np.arctan2(line[1], line[0]) == pytest.approx(found["phase"], abs=0.1)
-
-
-def test_a_periodic_disturbance_is_a_line_over_time() -> None:
-    case = make_case(6, ["periodic_disturbance"], duration=12)
-    found = case.truth["effects"][0]["parameters"]
-    table, command, need = torques(case, 0)
-    turn = np.exp(-2j * np.pi * found["frequency_hz"] * table.t.to_numpy())
-    assert 2 * abs(np.mean(turn * (command - need))) == pytest.approx(found["amplitude"], rel=0.1)
 
 
 def test_eccentricity_is_in_the_reading_only() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores, TermScores
-from cosim.diagnosis.decide.decision import decide, doubted, least_left, open_rivals
+from cosim.diagnosis.decide.decision import decide, least_left, open_rivals
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.evidence.comparison import Comparison
@@ -97,30 +97,6 @@ def test_what_was_surely_learned_is_unknown_too_and_names_stay() -> None:
 def test_what_is_left_must_be_more_than_what_the_equations_of_strong_names_lack() -> None:
     assert least_left([], POLICY) == 0.0
     assert least_left([scores("cogging", 60.0), scores("cable_wrap", 200.0)], POLICY) == POLICY.imitation * 200.0
-
-
-def test_what_the_held_out_recordings_contradict_is_unknown_only_where_training_is_sure() -> None:
-    def is_unknown(evidence: float, share: float, predicted: float = 0.0) -> bool:
-        term = TermScores("temperature", evidence, predicted, share)
-        return decide(Scores([], ResidualScores(0.0, 0.0, [term])), POLICY).is_unknown
-
-    assert not is_unknown(POLICY.floor_alone + 5, -2 * POLICY.contradicted)
-    assert not is_unknown(POLICY.floor_alone + 5, 0.0, -2 * POLICY.denied * POLICY.floor_alone)
-    assert is_unknown(POLICY.floor_alone + 5, 0.0)
-    assert not is_unknown(POLICY.floor + 5, 0.0)
-    assert is_unknown(POLICY.floor + 5, 2 * POLICY.supported)
-    assert is_unknown(POLICY.sure_floor, -2 * POLICY.contradicted)
-    assert is_unknown(POLICY.least_followed, POLICY.follows)
-    assert not is_unknown(POLICY.least_followed, POLICY.follows / 2)
-    assert not is_unknown(POLICY.least_followed - 1, 0.9)
-
-
-def test_a_weak_name_beside_a_rest_as_large_may_imitate_it_and_a_strong_one_does_not() -> None:
-    residual = ResidualScores(0.0, 0.0, [TermScores("position", POLICY.floor + 10, 3.0, 0.2)])
-    weak, strong = scores("cogging", 2 * POLICY.floor), scores("delay", 50 * POLICY.floor)
-    assert doubted([weak, strong], residual, POLICY) == ("cogging",)
-    assert doubted([scores("cogging", 2 * POLICY.floor, explains=0.9)], residual, POLICY) == ()
-    assert doubted([weak, strong], QUIET, POLICY) == ()
 
 
 def problem(speed: Array, **columns: Array) -> Problem:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.decide.decision import Gain, is_validated
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.evidence.comparison import Comparison
@@ -103,35 +102,6 @@ def test_an_offset_is_told_beside_friction_and_load_of_another_day(factor: float
 def test_what_raises_the_held_out_error_does_not_predict() -> None:
     v = np.sin(np.arange(SECONDS * RATE) / RATE)
     assert predicted(held_out(white(3), v), TorqueOffset(torque=0.05)) < 0
-
-
-def test_a_small_effect_beside_a_large_one_must_be_surer_than_one_that_matters() -> None:
-    assert is_validated(Gain(POLICY.clearly_predicted + 1, 0.1, 0.1), 2 * POLICY.least_share, POLICY)
-    assert not is_validated(Gain(POLICY.clearly_predicted + 1, 0.1, 0.1), POLICY.least_share / 2, POLICY)
-    assert is_validated(Gain(POLICY.sure_predicted + 1, 0.1, 0.1), POLICY.least_share / 2, POLICY)
-    assert not is_validated(Gain(POLICY.clearly_predicted - 1, 0.1, 0.1), 0.9, POLICY)
-
-
-@pytest.mark.parametrize(("narrow", "wide", "holds"), [(0.26, 0.4, True), (0.4, 0.24, False), (0.24, 0.4, False)])
-def test_a_quarter_of_the_error_is_enough_where_the_likelihood_says_so_too(
-    narrow: float, wide: float, holds: bool
-) -> None:
-    assert is_validated(Gain(POLICY.least_predicted, narrow, wide), 0.9, POLICY) is holds
-    assert not is_validated(Gain(POLICY.least_predicted - 0.1, narrow, wide), 0.9, POLICY)
-
-
-def test_what_halves_the_error_stands_where_the_likelihood_cannot_tell() -> None:
-    half = POLICY.halved
-    assert is_validated(Gain(-1.0, half, half), 0.9, POLICY)
-    assert not is_validated(Gain(-1.0, half, half - 0.01), 0.9, POLICY)
-    assert not is_validated(Gain(-POLICY.floor, 0.69, 0.69), 0.9, POLICY)
-    assert is_validated(Gain(-POLICY.floor, 0.9, 0.9), 0.9, POLICY), "where next to nothing is left it is not asked"
-
-
-def test_an_effect_that_raises_the_plain_error_does_not_stand_whatever_its_likelihood() -> None:
-    for plain, protocol in ((-0.1, 0.1), (0.1, -0.1), (-0.01, -0.01)):
-        assert not is_validated(Gain(10 * POLICY.sure_predicted, plain, protocol), 0.9, POLICY)
-    assert is_validated(Gain(10 * POLICY.sure_predicted, -0.01, 0.3), 0.9, POLICY)
 
 
 def test_a_diagnosis_never_ends_with_a_model_that_is_worse_than_the_base(tmp_path: Path) -> None:
