@@ -31,8 +31,7 @@ from cosim.diagnosis.evidence.comparison import Comparison, Screened
 from cosim.diagnosis.measure.protocol import Structures, traces
 from cosim.diagnosis.search.rivals import examine
 from cosim.diagnosis.search.stages import InTurn, search
-from cosim.diagnosis.trust.denied import without_denied
-from cosim.diagnosis.trust.doubts import doubts, of_base
+from cosim.diagnosis.trust.doubts import doubts, of_base, without_denied
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Band, Prepared, prepare
 from cosim.estimation.problem import Problem

@@ -3,21 +3,21 @@
 Files are written one by one, each complete or absent; the report comes last and names the others.
 """
 
+import itertools
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from cosim.data.recording import Recording
 from cosim.delivery.closed_loop import Loops
 from cosim.delivery.experiment import of_recording, with_experiment
-from cosim.delivery.missing_torque import write_missing_torque
 from cosim.diagnosis.answer.entries import CardSource, Improved, Provenance, Source
-from cosim.diagnosis.answer.result import Diagnosis, Finding, HeldOut
+from cosim.diagnosis.answer.result import Array, Diagnosis, Finding, HeldOut, Trace
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.effects import named
 from cosim.diagnosis.measure.broadband import broadband_finding
@@ -321,3 +321,47 @@ def _domains(found: Diagnosis) -> tuple[Domain, Domain]:
     position, speed = ("m", "m/s") if found.motion == "linear" else ("rad", "rad/s")
     (slow, fast), (left, right) = _proven_range(found)["speed"], _proven_range(found)["position"]
     return Domain("speed", slow, fast, speed, "v"), Domain("position", left, right, position, "q")
+
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+ROWS = 2**19
+"""Rows that are made and written at a time."""
+HOLE = 1.5
+"""A step of a trace longer than this many of its usual steps is a hole: nothing was judged inside."""
+
+
+def write_missing_torque(traces: Sequence[Trace], recordings: Sequence[Recording], path: Path) -> None:
+    """Write for each row what the refitted base leaves, its 95 % band, and what the effects leave, in N m (N).
+
+    Values are null where the diagnosis says nothing: where filters settle at the ends of a recording, inside gaps and
+    beside them, at readings that were left out.
+    """
+    from pyarrow import parquet
+
+    tables = (one for both in zip(traces, recordings, strict=True) for one in _tables(*both))
+    first = next(tables)
+    with replacing(path, True) as partial, parquet.ParquetWriter(partial, first.schema) as file:
+        for one in itertools.chain([first], tables):
+            file.write_table(one)
+
+
+def _tables(trace: Trace, recording: Recording) -> Iterator["pa.Table"]:
+    """The rows of a recording, some at a time: all columns together are as large as the recording itself."""
+    import pyarrow as pa
+
+    signals = {"missing_torque": trace.missing, "band": trace.band, "after": trace.tau - trace.after}
+    for first in range(0, len(recording), ROWS):
+        t = recording.t[first : first + ROWS]
+        silent, names = ~covered(trace.t, t), pa.array([recording.name]).take(pa.array(np.zeros(len(t), int)))
+        columns = {n: pa.array(np.interp(t, trace.t, signal), mask=silent) for n, signal in signals.items()}
+        yield pa.table({"recording": names, "t": t, **columns})
+
+
+def covered(known: Array, wanted: Array) -> np.ndarray:
+    """Which wanted times lie between two neighbouring known times, (rows,) of bool."""
+    steps = np.diff(known)
+    whole = np.concatenate([[False], steps <= HOLE * float(np.median(steps)), [False]])
+    after = np.searchsorted(known, wanted, "right")
+    return np.asarray(whole[after] | (known[after - 1] == wanted))

@@ -51,8 +51,7 @@ from cosim.diagnosis.search.stages import InTurn, search
 from cosim.diagnosis.terms.learn import NOTHING_TRIED, Learned, learn
 from cosim.diagnosis.terms.spelled import Spelled
 from cosim.diagnosis.trust.admission import admit
-from cosim.diagnosis.trust.denied import beyond_denial, without_denied
-from cosim.diagnosis.trust.doubts import doubts, of_base, of_delivered, single_readings
+from cosim.diagnosis.trust.doubts import beyond_denial, doubts, of_base, of_delivered, single_readings, without_denied
 from cosim.diagnosis.trust.limits import end_stop, half_sample
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.determined import limited, with_held

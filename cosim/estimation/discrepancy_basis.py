@@ -51,11 +51,11 @@ def last_reversal(q: Array, least: float) -> tuple[Index, Array]:
     return turned, direction
 
 
-def since_reversal(t: Array, v: Array) -> Array:
-    """Seconds since the speed last changed its sign, or since the start, at each row."""
+def since_reversal(x: Array, v: Array) -> Array:
+    """Change of x, a time or a place, since the speed last changed its sign, or since the start, at each row."""
     turned = np.flatnonzero(np.diff(np.sign(v), prepend=np.sign(v[:1])) != 0)
-    last = np.concatenate([[0], turned])[np.searchsorted(turned, np.arange(len(t)), side="right")]
-    return np.asarray(t - t[last])
+    last = np.concatenate([[0], turned])[np.searchsorted(turned, np.arange(len(x)), side="right")]
+    return np.asarray(x - x[last])
 
 
 def speed_shapes(piece: Piece, top: float) -> Array:

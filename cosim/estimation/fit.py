@@ -8,6 +8,10 @@ and a prior that keeps what the recordings cannot tell at the card's number,
 the log-normal prior of the base's positive parameters beside as many independent errors as the misfit has, whose size
 is not known. What a law of friction misses it misses in each stroke again, so these are no more in longer recordings;
 where the model is right the prior fades with the residual.
+
+A fit moves free parameters in units of their own, values = matrix u, low <= u <= high. Where an effect says that one
+parameter is above another by a factor at least (`Effect.ordered`), u holds what the upper one has beyond that, and the
+bound on u keeps it from going below zero.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,12 +23,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from cosim.estimation.coordinates import coordinates
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.least_squares import least_squares
 from cosim.estimation.prepare import Array, Piece
 from cosim.estimation.tonal_disturbance import phases_of
 from cosim.support.statistics import rms
+from pyfmi_models.effects import Effect
 from pyfmi_models.model import Pair, Recorded, Variable, fields_of, unfitted_of
 from pyfmi_models.mount import Mount
 
@@ -277,3 +281,32 @@ class _Prior(NamedTuple):
         size, (pull, own) = float(np.linalg.norm(rest)), self(values)
         grows = rest @ slopes / size if size else np.zeros(len(values))
         return np.asarray(np.diag(size * own) + np.outer(pull, grows))
+
+
+@dataclass(frozen=True)
+class Coordinates:
+    """The matrix (parameters, parameters) and the bounds of u."""
+
+    matrix: Array
+    low: Array
+    high: Array
+
+    def of(self, values: Array) -> Array:
+        """The u of these values, a little inside its bounds."""
+        u = np.linalg.solve(self.matrix, values)
+        return np.asarray(np.clip(u, np.nextafter(self.low, 0) + 1e-9, np.nextafter(self.high, 0) - 1e-9))
+
+
+def coordinates(mount: Mount, free: Sequence[str], scale: Array, edges: tuple[Array, Array]) -> Coordinates:
+    """Coordinates of the free parameters, given their units and their lowest and highest values."""
+    matrix, low, high = np.diag(scale), edges[0] / scale, edges[1] / scale
+    for lower, upper, factor in _ordered(mount, free):
+        matrix[upper, lower] = factor * scale[lower]
+        low[upper], high[upper] = 0.0, (edges[1][upper] - factor * edges[0][lower]) / scale[upper]
+    return Coordinates(matrix, low, high)
+
+
+def _ordered(mount: Mount, free: Sequence[str]) -> list[tuple[int, int, float]]:
+    """Numbers of the free parameters that must not cross, lower and upper, and the least factor between them."""
+    found = [(f"{own}.{a}", f"{own}.{b}", least) for own, part in mount.of_kind(Effect) for a, b, least in part.ordered]
+    return [(free.index(a), free.index(b), least) for a, b, least in found if a in free and b in free]

@@ -1,17 +1,24 @@
-"""The block of one finding: plain sentence, what the mechanic needs, and closed numbers for the engineer."""
+"""The block of one finding: plain sentence, what the mechanic needs, and closed numbers for the engineer.
+
+Beside them what is left where training never was: what acts there alone (a torque limit, a cable's end) was never
+fitted.
+"""
 
 import re
 from dataclasses import dataclass
 
-from cosim.diagnosis.answer.result import Diagnosis, Finding, is_special
-from cosim.diagnosis.measure.advice import without_model
+import numpy as np
+
+from cosim.diagnosis.answer.result import Array, Diagnosis, Finding, Trace, is_special
+from cosim.diagnosis.measure.findings import without_model
+from cosim.plots.quantities import Scale
 from cosim.report import tables, words
-from cosim.report.equations import equation
 from cosim.report.lead import led
 from cosim.report.next_experiment import is_about, to_record
 from cosim.report.quantities import Scales
 from cosim.report.repairs import Check, repairs_of
 from cosim.report.sheet import Picture
+from cosim.report.tables import equation
 
 NOTHING_YET = "Nothing yet: it did not hold on the validation run."
 PROBABILITY = (
@@ -155,3 +162,49 @@ def _numbers(finding: Finding) -> Numbers:
     lines += [f"Would have shown from {limit}."] if limit else []
     lines.append("Ranges: 95 %, robust to errors that are alike within a block.")
     return Numbers(finding.title, equation(finding.effect), tables.numbers(finding), tuple(lines))
+
+
+MOST = 0.5
+"""Share of the held-out error energy, from which on it is said where it lies. Unit: 1."""
+DENSER = 2.0
+"""Energy of a row there, at least, relative to that of a row on average: more ground alone is no reason. Unit: 1."""
+
+
+def untrained(diagnosis: Diagnosis, scales: Scales) -> str:
+    """Say that most of the held-out error lies beyond what training had of positions, speeds or torques; or nothing."""
+    trained = [trace for trace in diagnosis.traces if not trace.heldout]
+    held = [trace for trace in diagnosis.traces if trace.heldout]
+    if not trained or not held:
+        return ""
+    left = _stacked(held, "tau") - _stacked(held, "after")
+    told = [
+        (*_beyond(_stacked(held, axis), left, _edges(trained, axis)), name, _edges(trained, axis), unit)
+        for axis, name, unit in (
+            ("q", "positions", scales.position),
+            ("v", "speeds", scales.speed),
+            ("tau", "torques", scales.torque),
+        )
+    ]
+    energy, rows, name, edges, unit = max(told, key=lambda one: one[0])
+    return _sentence(energy, rows, name, edges, unit) if energy >= MOST and energy >= DENSER * rows else ""
+
+
+def _stacked(traces: list[Trace], axis: str) -> Array:
+    return np.concatenate([getattr(trace, axis) for trace in traces])
+
+
+def _edges(traces: list[Trace], axis: str) -> tuple[float, float]:
+    values = _stacked(traces, axis)
+    return float(np.nanmin(values)), float(np.nanmax(values))
+
+
+def _beyond(values: Array, left: Array, edges: tuple[float, float]) -> tuple[float, float]:
+    """Shares of the energy and of the rows outside the edges."""
+    outside, whole = (values < edges[0]) | (values > edges[1]), float(np.nansum(left**2))
+    return (float(np.nansum(left[outside] ** 2)) / whole if whole else 0.0), float(np.mean(outside))
+
+
+def _sentence(energy: float, rows: float, name: str, edges: tuple[float, float], unit: Scale) -> str:
+    where = f"at {name} outside {unit.span(*edges)}, which the fit never had ({100 * rows:.0f} % of the time)"
+    part = f"{100 * energy:.0f} % of the error energy on validation runs"
+    return f"{part} lies {where}: what acts there alone cannot be named without training data."

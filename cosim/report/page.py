@@ -1,4 +1,4 @@
-"""Everything the template prints, put together from a diagnosis."""
+"""Everything the template prints, put together from a diagnosis, and the recordings for its explorer."""
 
 import re
 from collections.abc import Iterator
@@ -9,23 +9,22 @@ import numpy as np
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.effects import named
 from cosim.diagnosis.measure.breakdown import Samples, bars, samples, worst
-from cosim.plots.explorer import script_of_page
+from cosim.plots.explorer import Sheet, record, script_of_page
 from cosim.plots.quantities import joined
 from cosim.report import tables, unknown, words
-from cosim.report.explorer import payload
 from cosim.report.figures_dynamic import effect
 from cosim.report.figures_friction import friction
 from cosim.report.figures_own import own
 from cosim.report.figures_proof import looked_for, proof
 from cosim.report.figures_time import WIDE, overlay, recording
 from cosim.report.figures_where import plane, region, strongest
-from cosim.report.findings import block
+from cosim.report.findings import block, untrained
 from cosim.report.lead import heading, lead
 from cosim.report.learned import nameless
 from cosim.report.next_experiment import next_experiment
 from cosim.report.quantities import Scales
 from cosim.report.sheet import Picture
-from cosim.report.untrained import untrained
+from cosim.support.plain import JsonObject
 
 MOST_RECORDINGS, MOST_REGIONS = 6, 12
 
@@ -262,3 +261,37 @@ def _refitted(diagnosis: Diagnosis) -> Iterator[str]:
         yield "imprecise friction law, biases the fit."
     elif tested:
         yield "An instrumental-variable test with the set point does not move them: the loop did not bias the fit."
+
+
+def payload(diagnosis: Diagnosis, scales: Scales) -> JsonObject:
+    """Return what `explorer.js` reads."""
+    traces = [trace for trace in diagnosis.traces if trace.t.size > 1]
+    seconds = sum(float(trace.t[-1] - trace.t[0]) for trace in traces) or 1.0
+    torque, noun = scales.torque.unit, "torque" if diagnosis.motion == "rotary" else "force"
+    models = [("before", "before", (6, 3)), ("after", "after", ())][: 2 if diagnosis.adds_physics else 1]
+    errors = [("lost", "before", ()), ("left", "after", ())][: len(models)]
+    sheets = (
+        Sheet(f"{noun} [{torque}]", 0.45, [("tau", "ink", ()), *models]),
+        Sheet(f"error: measured minus model [{torque}]", 0.32, errors),
+        Sheet(f"position [{scales.position.unit}]", 0.23, [("q", "ink", ())]),
+    )
+    return {
+        "sheets": [sheet.as_json() for sheet in sheets],
+        "differences": [["lost", "tau", "before"], ["left", "tau", "after"]],
+        "recordings": [_packed(trace, scales, seconds) for trace in traces],
+        "first": "after",
+        "open": next((i for i, trace in enumerate(traces) if trace.heldout), 0),
+    }
+
+
+def _packed(trace: Trace, scales: Scales, seconds: float) -> JsonObject:
+    torque = scales.torque.factor
+    signals = {
+        "tau": trace.tau * torque,
+        "before": trace.before * torque,
+        "after": trace.after * torque,
+        "q": trace.q * scales.position.factor,
+    }
+    packed = record(trace.name, trace.t, signals, float(trace.t[-1] - trace.t[0]) / seconds)
+    spans = {"before": worst(trace, trace.missing), "after": worst(trace, trace.tau - trace.after)}
+    return {**packed, "heldout": trace.heldout, "spans": {key: list(span) for key, span in spans.items()}}

@@ -1,7 +1,9 @@
-"""The tables of the page, as rows of text."""
+"""The tables of the page, as rows of text, and what the catalogues say there of effects and of the base."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from math import inf
+from typing import Any
 
 import numpy as np
 
@@ -9,9 +11,12 @@ from cosim.diagnosis.answer.entries import Source
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Part, Trace
 from cosim.diagnosis.measure.breakdown import bars
 from cosim.plots.quantities import decimals, number, raised, scale_of
-from cosim.report.equations import base_unit, least
 from cosim.report.quantities import Scales
 from cosim.report.words import ANSWERS, limit, lowered, shows_from, sized, started, unseen_torque
+from pyfmi_models.assembly import LINEAR_UNITS, Axis
+from pyfmi_models.effects import CATALOGUE, Effect
+from pyfmi_models.friction import LAWS
+from pyfmi_models.model import Variable
 
 
 @dataclass(frozen=True)
@@ -178,3 +183,30 @@ def unseen(diagnosis: Diagnosis) -> tuple[str, str]:
     head += ", limits in the table below" if named["not_seen"] else ""
     sentences = [f"{started(words[answer])}: {', '.join(names)}." for answer, names in named.items() if names]
     return "; ".join([head, *counts[1:]]), " ".join(sentences)
+
+
+def equation(effect: str) -> str:
+    """The equation; an effect torque resists. Empty for what is no effect."""
+    return _form(effect).equation
+
+
+def least(effect: str, parameter: str) -> float:
+    """The least value that a parameter of an effect may have; of what is no effect, any."""
+    return next((one.low for one in _declared(_form(effect), parameter)), -inf)
+
+
+def base_unit(parameter: str, motion: str) -> str:
+    """The unit of a number of the base, `axis.inertia` or `friction.Fc.positive`; empty where none is known."""
+    group, name, *_ = [*parameter.split("."), ""]
+    parts = (Axis,) if group == "axis" else LAWS.values()
+    unit = next((one.unit for part in parts for one in _declared(part, name)), "")
+    return LINEAR_UNITS.get(unit, unit) if motion == "linear" else unit
+
+
+def _declared(part: Any, name: str) -> Iterator[Variable]:
+    """What a class of parts declares of the parameter of this name, if it has one."""
+    return (item.metadata["variable"] for item in fields(part) if item.name == name and "variable" in item.metadata)
+
+
+def _form(effect: str) -> type[Effect]:
+    return CATALOGUE.get(effect, (Effect,))[0]

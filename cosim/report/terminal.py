@@ -9,11 +9,10 @@ from typing import TextIO
 
 from cosim.diagnosis.answer.result import Diagnosis, Finding
 from cosim.plots.quantities import spelled
-from cosim.report.findings import do, where
+from cosim.report.findings import do, untrained, where
 from cosim.report.lead import heading
 from cosim.report.next_experiment import to_record
 from cosim.report.quantities import Scales
-from cosim.report.untrained import untrained
 from cosim.report.words import (
     ANSWERS,
     Block,

@@ -11,8 +11,8 @@ from report_text import text_of
 from cosim.diagnosis.answer.result import Diagnosis, Finding
 from cosim.diagnosis.measure.breakdown import samples
 from cosim.plots.style import STYLE
-from cosim.report.explorer import payload
 from cosim.report.figures_own import own, own_torque
+from cosim.report.page import payload
 from cosim.report.quantities import Scales
 from cosim.report.sheet import Picture
 

@@ -21,7 +21,7 @@ from cosim.diagnosis.effects import TRIED
 from cosim.diagnosis.measure.breakdown import part, samples
 from cosim.plots.style import thin
 from cosim.report import lead, render, words, write_report
-from cosim.report.explorer import payload
+from cosim.report.page import payload
 from cosim.report.quantities import Scales
 from cosim.report.tables import numbers
 from cosim.report.terminal import summary

@@ -14,7 +14,7 @@ from cosim.diagnosis.answer.result import Sanity
 from cosim.plots.quantities import spelled
 from cosim.report import render, words
 from cosim.report.lead import heading, lead
-from cosim.report.motion import motion
+from cosim.report.next_experiment import motion
 from cosim.report.quantities import Scales
 from cosim.report.tables import limits
 from cosim.report.terminal import summary

@@ -13,9 +13,8 @@ from report_text import text_of
 
 from cosim.delivery.deliver import as_json, chosen_of_sets
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Where
-from cosim.diagnosis.measure.advice import advice
 from cosim.diagnosis.measure.breakdown import samples
-from cosim.diagnosis.measure.findings import visible_from
+from cosim.diagnosis.measure.findings import advice, visible_from
 from cosim.diagnosis.search.sizes import Numbers
 from cosim.plots.style import STYLE
 from cosim.report import lead, render, words

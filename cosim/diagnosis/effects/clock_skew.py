@@ -7,8 +7,7 @@ import numpy as np
 
 from cosim.diagnosis.effects.base import Hypothesis, Seen
 from cosim.diagnosis.effects.candidates import Candidate, Span, has
-from cosim.diagnosis.effects.delay_and_lag import NOTHING_ASKED
-from cosim.diagnosis.effects.timing_attribution import attributed
+from cosim.diagnosis.effects.delay_and_lag import NOTHING_ASKED, attributed
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Effect

@@ -1,5 +1,9 @@
-"""From structures to sentences: findings of effects that stand, that rival them, or that were not proven."""
+"""From structures to sentences: findings of effects that stand, that rival them, or that were not proven.
 
+What to do about an effect is its own advice, less what holds only where the improved model has the effect.
+"""
+
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import ceil, floor, log10
@@ -9,7 +13,6 @@ import numpy as np
 from cosim.diagnosis.answer.result import Finding, Trace
 from cosim.diagnosis.effects import hypothesis_of, named
 from cosim.diagnosis.effects.candidates import at_own_level
-from cosim.diagnosis.measure.advice import advice
 from cosim.diagnosis.measure.locate import where
 from cosim.diagnosis.search.renaming import is_renamed
 from cosim.diagnosis.search.rivals import AcceptedEffect
@@ -177,3 +180,18 @@ def _units(effect: Effect, mount: Mount) -> dict[str, str]:
 def unit_on(unit: str, mount: Mount) -> str:
     """A unit as it is printed: that of force and length on a linear axis."""
     return (LINEAR_UNITS.get(unit, unit) if mount.motion == "linear" else unit).replace("N.m", "N·m")
+
+
+NAMES_MODEL = re.compile(r"(?:(?P<clause>[;,])|(?<=\.))[^.;,]*\buse the improved model\b[^.;,]*\.?$", re.IGNORECASE)
+
+
+def advice(effect: Effect, in_model: bool, motion: str) -> str:
+    """Return the action on a "rotary" or "linear" axis; an effect that the improved model lacks is not sent to it."""
+    linear = motion == "linear" and effect.action_linear
+    action = effect.action_linear if linear else effect.action
+    return action if in_model else without_model(action)
+
+
+def without_model(action: str) -> str:
+    """Return an action that does not send to the improved model."""
+    return NAMES_MODEL.sub(lambda found: "." if found["clause"] else "", action)

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.diagnosis.terms.dictionary import user_columns
-from cosim.diagnosis.terms.followed import followed
+from cosim.diagnosis.terms.dictionary import followed, user_columns
 from cosim.estimation.prepare import Array, Prepared
 from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque, LearnedViscous
 from pyfmi_models.effects.learned_base import LearnedEffect

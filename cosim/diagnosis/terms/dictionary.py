@@ -1,7 +1,8 @@
 """What a residual may follow: shapes of recorded quantities, by plain names, none of them an effect.
 
 Smooth and general: waves over the position, speed, acceleration, time since the start and since the last reversal,
-long hysteresis, user columns, and products of those with the position.
+long hysteresis, user columns, and products of those with the position. Acceleration and way travelled no moment tells:
+they are followed along the motion, as the plant's own states do (`learned_base.py`).
 """
 
 from collections.abc import Callable
@@ -10,9 +11,11 @@ from functools import partial
 
 import numpy as np
 
-from cosim.estimation.discrepancy_basis import last_reversal, stop_operators
+from cosim.estimation.discrepancy_basis import last_reversal, since_reversal, stop_operators
 from cosim.estimation.prepare import Array, Piece, Prepared
+from cosim.estimation.rowwise import recurrence
 from cosim.support.statistics import column_rms
+from pyfmi_models.effects.learned_base import SEEN_WITHIN
 
 PRODUCT_WAVES = 4
 """Waves over the range of positions in a product with another quantity."""
@@ -201,3 +204,18 @@ def made(prepared: Prepared, make: Maker) -> Array:
         rows = piece.lowpass(np.column_stack(shapes))[piece.kept] if shapes else np.empty((len(piece.kept), 0))
         parts.append(rows)
     return np.concatenate(parts)
+
+
+def followed(name: str, piece: Piece) -> Array:
+    """The acceleration or the way travelled at all rows of a piece."""
+    if name == "way":
+        return np.concatenate([[0.0], np.cumsum(np.abs(piece.v[1:] + piece.v[:-1]) / 2 * piece.dt)])
+    keep = np.exp(-piece.dt / SEEN_WITHIN)
+    middle = np.concatenate([[0.0], (piece.v[1:] + piece.v[:-1]) / 2])
+    past = recurrence(np.full(len(middle), keep), (1 - keep) * middle[None])[0, 1:]
+    return np.asarray((piece.v - past) / SEEN_WITHIN)
+
+
+def since(name: str, piece: Piece) -> Array:
+    """The time or the way since the last reversal, or since the start, at all rows of a piece."""
+    return np.abs(since_reversal(piece.t if name == "time since reversal" else piece.q, piece.v))

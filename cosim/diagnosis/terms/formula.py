@@ -8,19 +8,25 @@ and is proposed where its loss is within a standard error of the table's.
 References: Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973) 413; Breiman et al., CART (1984), 3.4.3 for the rule.
 """
 
+import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import least_squares
 
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.terms.forms import FADE, FORMS, SECOND, Form
-from cosim.diagnosis.terms.partial import Partial
-from cosim.estimation.blocks import sandwich
+from cosim.diagnosis.terms.partial import Partial, faded, partial, without
+from cosim.estimation.blocks import Blocks, sandwich
+from cosim.estimation.fit import Fit
+from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array
-from cosim.support.statistics import Z95
+from cosim.support.statistics import Z95, rms
+from pyfmi_models.effects.learned_base import LearnedEffect
+from pyfmi_models.mount import Mount
 
 ROWS = 1500
 """Rows of the search; the formula that is found is fitted to all."""
@@ -157,7 +163,7 @@ class Search:
         low, high = _bounds(formula, self.rows.quantities)
         found = [
             least_squares(
-                partial(self.beyond, formula),
+                functools.partial(self.beyond, formula),
                 np.clip(starts[k], low + 1e-9 * (high - low), high - 1e-9 * (high - low)),
                 bounds=(low, high),
                 x_scale=high - low,
@@ -266,3 +272,76 @@ def _bounds(formula: Formula, quantities: Sequence[Array]) -> tuple[Array, Array
 def interval(value: float, error: float) -> list[float]:
     """95 % range of a number."""
     return [value - Z95 * error, value + Z95 * error]
+
+
+KEPT = 0.8
+"""Share of the table's held-out gain that a formula must keep."""
+LARGEST = 3.0
+"""RMS of what a formula says, at most, relative to what is left without it. A larger one lives by what it takes out of
+the base: a loss of all of the drive's torque, and a machine that needs none, leave no error either."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unseen:
+    """Held-out rows of a term, and the weighted errors there: with the table, and without any term."""
+
+    rows: Rows
+    blocks: Blocks
+    table: Array
+    nothing: Array
+
+    def losses(self, error: Array) -> Array:
+        """Mean square of each block."""
+        return np.array([float(np.mean(error[own] ** 2)) for own in self.blocks.rows])
+
+    def residual(self, formula: Formula, moved: Array) -> Array:
+        """Weighted error with a formula, the base moved as it was in training."""
+        value = formula.value(self.rows.quantities)
+        return np.asarray(self.rows.left - self.rows.unit * value - self.rows.slopes @ moved)
+
+    def is_of_its_size(self, formula: Formula) -> bool:
+        """Whether a formula says no more than what there is to be said."""
+        said = self.rows.unit * formula.value(self.rows.quantities)
+        return rms(said) <= LARGEST * rms(self.rows.left)
+
+    def is_as_good(self, formula: Formula, moved: Array) -> bool:
+        """Whether the loss is within a standard error of the table's, and most of what that gained is kept."""
+        own, table, nothing = (self.losses(one) for one in (self.residual(formula, moved), self.table, self.nothing))
+        error = float(np.std(table, ddof=1) / np.sqrt(len(table))) if len(table) > 1 else 0.0
+        gained = nothing.mean() - own.mean() >= KEPT * (nothing.mean() - table.mean())
+        return bool(own.mean() <= table.mean() + error and gained)
+
+
+def proposed(part: Partial, train: Rows, unseen: Unseen) -> Formula | None:
+    """The shortest formula that is as good as the table; None where none is."""
+    return first_as_good(fading(train) if part.effect.since() else shortest(train), part, train, unseen)
+
+
+def first_as_good(formulas: Sequence[Formula], part: Partial, train: Rows, unseen: Unseen) -> Formula | None:
+    """The first of some formulas, fitted to all rows of training, that is as good as the table."""
+    for formula in formulas:
+        found = complete(formula, train, part)
+        if found and unseen.is_of_its_size(found[0]) and unseen.is_as_good(*found):
+            return found[0]
+    return None
+
+
+def formula_of(
+    learned: Mount, effect: LearnedEffect, found: Fit, comparison: Comparison, held: Predictive
+) -> Formula | None:
+    """The formula of a learned effect of a mount; None where none is as good, or it goes round a loop."""
+    problem = comparison.problem
+    rows = faded if effect.since() else partial
+    if effect.of_one() is None and not effect.since():
+        return None
+    part, there = (
+        rows(learned, effect, prepared, weight)
+        for prepared, weight in ((problem.prepared, problem.weight), (held.prepared, held.weight))
+    )
+    moving = found.free if effect.at_once else ()  # a line of the command is a scale of all numbers of the base at once
+    inverse = Inverse(without(learned, effect), moving)  # with the table in it a level's slope would be the table
+    slopes, own = (
+        stacked(inverse, prepared.pieces, inverse.present)[1] for prepared in (problem.prepared, held.prepared)
+    )
+    errors = (held.weight * held.residual(mount) for mount in (learned, found.mount))
+    return proposed(part, Rows.of(part, slopes), Unseen(Rows.of(there, own), there.blocks, *errors))

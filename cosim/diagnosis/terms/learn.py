@@ -15,10 +15,9 @@ from cosim.diagnosis.answer.scores import LearnedScores
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.error import interval_of
 from cosim.diagnosis.evidence.predictive import Predictive
-from cosim.diagnosis.terms.agreement import formula_of
 from cosim.diagnosis.terms.candidate_terms import CandidateTerm, candidate_terms
 from cosim.diagnosis.terms.dictionary import OF_LAW
-from cosim.diagnosis.terms.formula import Formula
+from cosim.diagnosis.terms.formula import Formula, formula_of
 from cosim.diagnosis.terms.grams import columns_of, grams_of
 from cosim.diagnosis.terms.partial import partial
 from cosim.diagnosis.terms.select import begun, fitted, paths

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from cosim.diagnosis.answer.entries import BinsEntry
-from cosim.diagnosis.terms.followed import followed, since_reversal
+from cosim.diagnosis.terms.dictionary import followed, since
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
@@ -96,7 +96,7 @@ def faded(mount: Mount, effect: LearnedEffect, prepared: Prepared, weight: Array
     """Rows of a term that fades after a reversal, over the time or the way since then: f changes the friction level."""
     bare = without(mount, effect)
     base, doubled = needed(bare, prepared), replace(bare, effects=(*bare.effects, DOUBLED))
-    over = np.concatenate([since_reversal(effect.since(), piece)[piece.kept] for piece in prepared.pieces])
+    over = np.concatenate([since(effect.since(), piece)[piece.kept] for piece in prepared.pieces])
     left, unit = prepared.stacked("tau") - base, needed(doubled, prepared) - base
     return Partial(effect, over, None, left, unit, weight, Blocks.of(prepared))
 

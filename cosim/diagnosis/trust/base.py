@@ -1,10 +1,20 @@
-"""Does the refitted base leave the card? What a fit has to bend that far is often all that is wrong."""
+"""Is it the machine of the card, and one machine in all recordings? Its refitted base, its load and its inertia tell.
+
+What a fit has to bend that far is often all that is wrong.
+"""
 
 from collections.abc import Mapping, Sequence
+from math import degrees, hypot, log
 from typing import Final
 
+import numpy as np
+
 from cosim.diagnosis.answer.doubt_entry import Alternative, Sanity
+from cosim.diagnosis.trust.balance import Balance, Estimate
+from cosim.estimation.prepare import Array
 from cosim.plots.quantities import raised
+from cosim.support.statistics import rms
+from pyfmi_models.effects import GravityUnbalance
 from pyfmi_models.model import Variable
 from pyfmi_models.mount import Mount
 
@@ -88,3 +98,83 @@ def _is_felt(name: str, before: Mapping[str, Variable], after: Mapping[str, Vari
 
 
 _TORQUES = ("friction.Fc", "friction.sigma2")
+
+
+OTHER = 0.5
+"""Share of the card's load from which a difference is another load: masses and lever arms are weighed and measured, to
+a tenth or so, not guessed as friction is."""
+
+
+def load_far_from_card(card: Mount, refitted: Mount, positions: Array) -> tuple[Sanity, ...]:
+    """Say of a load off the axis that the refitted base turns it into another one.
+
+    Args:
+        card: the base as delivered.
+        refitted: the same structure with fitted numbers.
+        positions: where the axis was recorded [rad]: two loads that pull alike there are the same load.
+    """
+    before, after = (dict(mount.of_kind(GravityUnbalance)) for mount in (card, refitted))
+    both = [(load, after[name]) for name, load in before.items() if name in after]
+    return tuple(
+        Sanity(
+            finding=BASE_FAR,
+            statement=f"Refitted, the known load is another than the card's ({_words(one)} → {_words(other)}): where "
+            "the axis was recorded they differ by more than half of it. Possible causes: another payload or "
+            "counterweight, or another zero of the position.",
+        )
+        for one, other in both
+        if rms(_pull(other, positions) - _pull(one, positions)) > OTHER * rms(_pull(one, positions))
+    )
+
+
+def _pull(load: GravityUnbalance, positions: Array) -> Array:
+    """Torque of a load [N m]."""
+    return np.asarray(float(load.mgl) * np.sin(positions + float(load.phase)))
+
+
+def _words(load: GravityUnbalance) -> str:
+    return f"{float(load.mgl):.3g} N·m at {degrees(float(load.phase)):.0f}°"
+
+
+INERTIA, FRICTION = log(1.6), log(3.0)
+"""Factors by which inertia and friction of one machine may differ: it varies with position, and warms up."""
+SURELY = 3.0
+"""Standard errors by which they must differ beyond that."""
+OTHER_CAUSES = (
+    Alternative(what="another payload, or another machine", likelihood=0.7),
+    Alternative(what="another unit or gear ratio in one of the files", likelihood=0.3),
+)
+"""No recording tells these apart; files of one machine are mostly exported alike."""
+
+
+def other_machine(train: Sequence[Balance], heldout: Sequence[Balance]) -> tuple[Sanity, ...]:
+    """Say which held-out recordings are of another machine than all training recordings."""
+    found = []
+    for held in heldout:
+        told = [_difference(one, held) for one in train]
+        if told and all(told):
+            name, text = held.recordings[0].name, told[0]
+            said = (
+                f"{name} is held out, and is not of the machine of the training recordings: {text}. It proves nothing "
+                "about that machine."
+            )
+            found.append(Sanity(finding="other_machine", statement=said, alternatives=OTHER_CAUSES))
+    return tuple(found)
+
+
+def _difference(train: Balance, held: Balance) -> str:
+    """How a held-out recording differs from one of training; empty where it does not."""
+    solved = [one.solution(one.own_order) for one in (train, held)]
+    pairs = [[getattr(one, name) for one in solved] for name in ("inertia", "coulomb")]
+    for words, (before, after), most in zip(("inertia", "friction"), pairs, (INERTIA, FRICTION), strict=True):
+        if _differs(before, after, most):
+            return f"its {words} is {after.value / before.value:.2g} times that of {train.recordings[0].name}"
+    return ""
+
+
+def _differs(before: Estimate, after: Estimate, most: float) -> bool:
+    """Whether two positive numbers differ by more than a factor and their errors allow."""
+    if min(before.value, after.value) <= 0:
+        return False
+    error = hypot(before.error / before.value, after.error / after.value)
+    return abs(log(after.value / before.value)) > most + SURELY * error

@@ -1,22 +1,26 @@
-"""Everything that is doubtful about recordings beside a card, in two steps: before the base is fitted, and after."""
+"""Everything that is doubtful about recordings beside a card, in two steps: before the base is fitted, and after.
 
-from collections.abc import Sequence
+The model with its effects may deny one: what is missing from a plain balance looks like two clocks.
+"""
+
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.doubt_entry import Sanity
+from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.search.stages import Stage
 from cosim.diagnosis.trust.balance import Balance
-from cosim.diagnosis.trust.base import BASE_FAR, base_far_from_card
-from cosim.diagnosis.trust.clocks import clocks
+from cosim.diagnosis.trust.base import BASE_FAR, base_far_from_card, load_far_from_card, other_machine
+from cosim.diagnosis.trust.clocks import LATE, clocks
 from cosim.diagnosis.trust.judgement import judged
 from cosim.diagnosis.trust.likelihood import Reference
 from cosim.diagnosis.trust.limits import encoder_step, little_motion, no_set_point
-from cosim.diagnosis.trust.load import load_far_from_card
-from cosim.diagnosis.trust.other_machine import other_machine
-from cosim.estimation.fit import edges_of
+from cosim.estimation.fit import Fit, edges_of
 from cosim.estimation.problem import Problem
 from pyfmi_models.card import Card
+from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount
 
 ASSUMED = '" was taken for '
@@ -87,3 +91,36 @@ def single_readings(given: Sequence[Recording], used: Sequence[Recording]) -> tu
     """Say of recordings as they were `given`, and as they are `used`, which readings were false."""
     said = [" ".join(after.notes[len(before.notes) :]) for before, after in zip(given, used, strict=True)]
     return tuple(Sanity(finding="single_readings", statement=text) for text in said if text)
+
+
+def beyond_denial(sanity: Sequence[Sanity]) -> tuple[Sanity, ...]:
+    """Doubts that no model can settle: a unit, a sign, another machine."""
+    return tuple(one for one in sanity if one.finding != "clocks")
+
+
+def without_denied(sanity: Sequence[Sanity], chosen: Fit, beside: Stage) -> tuple[Sanity, ...]:
+    """Leave out that position and torque are not of one time, where the model that stands wants no such lag.
+
+    A ripple over the position, a shaking ground or friction that creeps look late to a balance of inertia, friction and
+    load. The model knows more: beside its effects, what is late is of that size or is not there.
+
+    Args:
+        sanity: what is doubted.
+        chosen: the structure that stands.
+        beside: what was tried beside it.
+    """
+    latest = max((abs(lag) for lag in _lags(chosen, beside)), default=0.0)
+    return tuple(sanity) if latest >= LATE / 2 else beyond_denial(sanity)
+
+
+def _lags(chosen: Fit, beside: Stage) -> Iterator[float]:
+    """Lags [s] of the structure, and those that gained anything beside it."""
+    yield from (_lag(effect) for effect in chosen.mount.effects if hypothesis_of(effect).is_timing)
+    for one in beside.tried:
+        if one.evidence > 0 and hypothesis_of(one.effect).is_timing:
+            yield _lag(one.fit.mount.effects[-1])
+
+
+def _lag(effect: Effect) -> float:
+    """Seconds by which a timing effect is late; all of them count in milliseconds."""
+    return float(getattr(effect, effect.main.parameter)) / 1e3

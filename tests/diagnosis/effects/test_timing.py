@@ -12,7 +12,7 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.effects import hypothesis_of
-from cosim.diagnosis.effects.timing_attribution import attributed, reading_lag
+from cosim.diagnosis.effects.delay_and_lag import attributed, reading_lag
 from cosim.diagnosis.search.instrumental_variable import DECISIVE, misfits_of
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Prepared, prepare

@@ -7,7 +7,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.delivery.missing_torque import write_missing_torque
+from cosim.delivery.deliver import write_missing_torque
 from cosim.diagnosis.measure.breakdown import parts, samples
 from cosim.diagnosis.measure.protocol import Structures, band_of, judge, traces
 from cosim.estimation.prepare import Band

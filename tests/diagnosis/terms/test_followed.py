@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.diagnosis.terms.followed import followed, since_reversal
+from cosim.diagnosis.terms.dictionary import followed, since
 from pyfmi_models.effects.learned_base import SEEN_WITHIN
 
 DT = 1e-3
@@ -38,7 +38,7 @@ def test_the_way_grows_whichever_way_the_axis_moves() -> None:
 def test_time_and_way_count_from_the_last_reversal_or_the_start() -> None:
     piece = moving(0.5 * np.sin(T), 0.5 * np.cos(T))
     turned = np.searchsorted(T, np.pi / 2)
-    time, way = since_reversal("time since reversal", piece), since_reversal("way since reversal", piece)
+    time, way = since("time since reversal", piece), since("way since reversal", piece)
     for k in (500, 1500):
         assert (time[k], way[k]) == (pytest.approx(T[k]), pytest.approx(0.5 * np.sin(T[k])))
     assert time[turned] == pytest.approx(0.0, abs=1.5 * DT)

@@ -6,9 +6,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cosim.diagnosis.terms.agreement import Unseen, proposed
 from cosim.diagnosis.terms.forms import FORMS
-from cosim.diagnosis.terms.formula import Formula, Rows, Shape
+from cosim.diagnosis.terms.formula import Formula, Rows, Shape, Unseen, proposed
 from cosim.diagnosis.terms.partial import Partial
 from cosim.diagnosis.terms.spelled import Spelled
 from cosim.estimation.blocks import Blocks

@@ -8,7 +8,7 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.doubt_entry import Sanity
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.trust.denied import beyond_denial, without_denied
+from cosim.diagnosis.trust.doubts import beyond_denial, without_denied
 from pyfmi_models.card import parse_card
 from pyfmi_models.effects import Delay, Effect, TorqueOffset
 from pyfmi_models.effects.clock_skew import ClockSkew

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.trust.base import base_far_from_card
+from cosim.diagnosis.trust.base import base_far_from_card, load_far_from_card
 from cosim.diagnosis.trust.limits import encoder_step, little_motion, no_set_point
-from cosim.diagnosis.trust.load import load_far_from_card
 from cosim.estimation.fit import edges_of
 from cosim.estimation.prepare import prepare
 from pyfmi_models.effects import GravityUnbalance

@@ -11,11 +11,11 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
 from cosim.diagnosis.trust.balance import Balance
+from cosim.diagnosis.trust.base import other_machine
 from cosim.diagnosis.trust.clocks import ClockOffset, clock_offset, clocks
 from cosim.diagnosis.trust.doubts import doubts
 from cosim.diagnosis.trust.judgement import Judgement, _groups, judged
 from cosim.diagnosis.trust.likelihood import Reference
-from cosim.diagnosis.trust.other_machine import other_machine
 from cosim.support.errors import RecordingError
 from cosim_studies.proof.generator import make_case, to_toml
 from pyfmi_models.card import Card, parse_card
