@@ -11,7 +11,7 @@ from cosim.api.recordings import Source, read
 from cosim.data.overlay import aligned
 from cosim.data.recording import Recording
 from cosim.master.result import RunResult
-from cosim.plots.compare import Difference, Overlay, figure_of, write_figure, write_page
+from cosim.plots.compare import Difference, Overlay, figure_of, in_share, write_figure, write_page
 from cosim.plots.digest import in_words
 from cosim.plots.quantities import number, scale_of
 from cosim.support.errors import InputError
@@ -139,7 +139,7 @@ def _named(recordings: list[Recording]) -> list[Recording]:
 def _sentence(one: Difference, first: str) -> str:
     scale = scale_of(one.unit, abs(one.largest))
     rms, largest = (number(scale.factor * value, 3) for value in (one.rms, one.largest))
-    relative = f", {100 * one.relative:.3g} %" if isfinite(one.relative) else ""
+    relative = f", {in_share(one.relative)}" if isfinite(one.relative) else ""
     unit = f" {in_words(scale.unit)}" if scale.unit else ""
     apart = f"{rms}{unit} RMS{relative}; largest {largest} at {one.at:.6g} s"
     return f"{one.column}: {one.other} differs from {first} by {apart}"

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.plots.digest import in_words
 from cosim.plots.explorer import INKS, Sheet, record, script_of_page
 from cosim.plots.quantities import number, scale_of
 from cosim.plots.style import AFTER, BEFORE, GREY, MEASURED, STYLE, Array
@@ -17,6 +18,8 @@ from cosim.support.version import __version__
 COLOURS = (MEASURED, BEFORE, AFTER, GREY)
 PANEL = (9.0, 1.7)
 """Inches of one panel."""
+DASHES = (7, 4)
+"""Of what lies over the first, which would hide it where they agree [px]."""
 AROUND = 0.02
 """Share of the time that is shown on each side of the largest difference."""
 
@@ -156,9 +159,20 @@ def _lead(overlay: Overlay) -> str:
 def _row(one: Difference) -> dict[str, str]:
     scale = scale_of(one.unit, abs(one.largest))
     rms, largest = (number(scale.factor * value, 3) for value in (one.rms, one.largest))
-    relative = "–" if not np.isfinite(one.relative) else f"{100 * one.relative:.3g} %"
-    row = {"column": one.column, "other": one.other, "unit": scale.unit or "1", "rms": rms, "relative": relative}
+    relative = "–" if not np.isfinite(one.relative) else in_share(one.relative)
+    row = {
+        "column": one.column,
+        "other": one.other,
+        "unit": in_words(scale.unit) or "1",
+        "rms": rms,
+        "relative": relative,
+    }
     return row | {"largest": largest, "at": f"{one.at:.6g}"}
+
+
+def in_share(ratio: float) -> str:
+    """Return a ratio in per cent, or from ten on as so many times."""
+    return f"{100 * ratio:.3g} %" if ratio < 10 else f"{number(ratio, 3)} times"
 
 
 def payload(overlays: Mapping[str, Overlay]) -> dict[str, Any]:
@@ -169,7 +183,7 @@ def payload(overlays: Mapping[str, Overlay]) -> dict[str, Any]:
     """
     first = next(iter(overlays.values()))
     keys = [f"r{k}" for k in range(len(first.names))]
-    lines = [(key, INKS[k % len(INKS)], ()) for k, key in enumerate(keys)]
+    lines = [(key, INKS[k % len(INKS)], DASHES if k else ()) for k, key in enumerate(keys)]
     gaps = [(f"d{k}", INKS[k % len(INKS)], ()) for k in range(1, len(keys))]
     sheets = (Sheet("", 0.62, lines), Sheet("", 0.38, gaps))
     share = 1 / sum(len(one.columns) for one in overlays.values())
@@ -199,4 +213,4 @@ def _record(overlay: Overlay, name: str, label: str, share: float) -> dict[str, 
 
 
 def _titled(title: str, unit: str) -> str:
-    return f"{title} [{unit}]" if unit else title
+    return f"{title} [{in_words(unit)}]" if unit else title

@@ -136,6 +136,8 @@
     button.addEventListener("click", () => show(...(record.spans[button.dataset.to] || [record.start, record.start + record.length])));
   }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => view && draw());
+  addEventListener("beforeprint", () => { canvas.style.width = "680px"; if (view) draw(); }); // drawn at the width of a sheet, its letters stay letters
+  addEventListener("afterprint", () => { canvas.style.width = ""; if (view) draw(); });
   new ResizeObserver(() => view && draw()).observe(canvas);
   box.hidden = false;
   await open(data.open);

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 MOST_ROWS, LEAST_ROWS = 4_000_000, 20
 """Rows of a recording that are looked at whole (a column of so many is 32 MB), and from which there is much to see."""
 MOST_COLUMNS = 40
+KEY = (
+    '<p class="key"><span><i style="background: var(--after)"></i>the column</span> '
+    '<span><i style="background: var(--grey)"></i>its set point, dashed</span></p>'
+)
 SHEETS = (Sheet("", 1.0, (("column", "after", ()), ("set point", "grey", (5, 3)))),)
 
 
@@ -51,6 +55,7 @@ def explorer(recording: Path, small: Digest) -> tuple[str, str, str]:
     parts = [
         '<h2>Look closer</h2><div id="explorer" hidden><div class="bar"><select aria-label="Column"></select>',
         '<button data-to="all">All of it</button></div>',
+        KEY if any("set point" in str(one["signals"]) for one in records) else "",
         '<canvas tabindex="0" role="img" aria-label="The chosen column over time."></canvas>',
         '<p class="quiet">Drag to zoom, double-click for all of it. Keys: arrows move, + and − zoom. ',
         "Printing shows the current view.</p></div>",
@@ -73,15 +78,24 @@ def _records(file: "ParquetFile", small: Digest) -> Iterator[JsonObject]:
     t = _column(file, "t")
     if len(t) < LEAST_ROWS or not t[-1] > t[0]:
         return
+    share = 1 / (len(names) + len(asked))
+    for axis in small.axes:
+        if axis.error and axis.measured in asked and axis.error not in file.schema_arrow.names:
+            error = _column(file, asked[axis.measured]) - _column(file, axis.measured)
+            yield _record(axis.error, t, {"column": error}, small.lines[axis.error].unit, share)
     for name in names:
-        values = _column(file, name)
-        scale = scale_of(small.lines[name].unit, float(np.nanmax(np.abs(values), initial=0.0)))
-        signals = {"column": values * scale.factor}
+        signals = {"column": _column(file, name)}
         if name in asked:
-            signals["set point"] = _column(file, asked[name]) * scale.factor
-        unit = in_words(scale.unit)
-        titles = [f"{name} [{unit}]" if unit else name]
-        yield {**record(name, t, signals, 1 / len(names)), "titles": list(titles)}
+            signals["set point"] = _column(file, asked[name])
+        yield _record(name, t, signals, small.lines[name].unit, share)
+
+
+def _record(name: str, t: Array, signals: dict[str, Array], unit: str, share: float) -> JsonObject:
+    """One entry of the list, in the unit that fits its first signal."""
+    scale = scale_of(unit, float(np.nanmax(np.abs(signals["column"]), initial=0.0)))
+    shown = {key: values * scale.factor for key, values in signals.items()}
+    printed = in_words(scale.unit)
+    return {**record(name, t, shown, share), "titles": [f"{name} [{printed}]" if printed else name]}
 
 
 def _column(file: "ParquetFile", name: str) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from cosim.data.formats import ORIGIN_KEY
 from cosim.plots.chart import Chart
 from cosim.plots.digest import ERROR, Axis, Digest, Line, digest, in_words
-from cosim.plots.quantities import Scale, number, scale_of
+from cosim.plots.quantities import Scale, joined, number, scale_of
 from cosim.plots.run_explorer import explorer, policy
 from cosim.plots.style import AFTER, BEFORE, MEASURED
 from cosim.support.files import replacing
@@ -39,13 +39,18 @@ def write_page(path: Path, recording: Path, scenario: Scenario, statistics: Fact
     origin = _origin(recording)
     small = digest(recording)
     closer, more, script = explorer(recording, small)
-    parts = [*_head(scenario, statistics, origin), *_pictures(small), closer, *_foot(scenario, statistics, origin)]
+    parts = [
+        *_head(scenario, small, statistics, origin),
+        *_pictures(small),
+        closer,
+        *_foot(scenario, statistics, origin),
+    ]
     style = more + (files("cosim") / "plots" / "run_page.css").read_text("utf-8")
-    head = '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
-    head += (policy(script) if script else "") + f"<style>{style}</style>"
+    rules = '<meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
+    rules += (policy(script) if script else "") + f"<style>{style}</style>"
     title = f"<title>{escape(scenario.name)}</title>"
     with replacing(path, force) as partial:
-        text = f'<!doctype html><html lang="en">{head}{title}<body><main>{"".join(parts)}</main></body></html>\n'
+        text = f'<!doctype html><html lang="en">{rules}{title}<body><main>{"".join(parts)}</main></body></html>\n'
         partial.write_text(text, "utf-8")
     return path
 
@@ -57,22 +62,44 @@ def _origin(recording: Path) -> Facts:
     return found
 
 
-def _head(scenario: Scenario, statistics: Facts, origin: Facts) -> Iterator[str]:
-    facts = {
-        "simulated": f"{statistics['simulated_seconds']:,.6g} s",
-        "steps": f"{statistics['steps']:,} of {scenario.step * 1e3:g} ms",
-        "computed in": f"{statistics['seconds']:.3g} s",
-        "times real time": f"{statistics['ratio_to_real_time']:,.3g}",
-        "a step, with recording": f"{statistics['microseconds_per_step']:.3g} µs",
-        "warnings": f"{statistics['warnings']:,}",
-    }
+def _head(scenario: Scenario, small: Digest, statistics: Facts, origin: Facts) -> Iterator[str]:
     yield f"<h1>{escape(scenario.name)}</h1><p>{escape(scenario.description)}</p>"
     yield f'<p class="quiet">{escape(str(origin.get("command", "")))} · {escape(str(origin["version"]))}</p>'
-    shown = "".join(f"<span><b>{value}</b>{name}</span>" for name, value in facts.items())
-    yield f'<div class="facts">{shown}</div>'
+    shown = "".join(f"<span><b>{value}</b>{escape(name)}</span>" for value, name in _facts(small, statistics))
+    yield f'<div class="facts">{shown}</div><p class="quiet">{_speed(scenario, statistics)}</p>'
     idle = statistics["unconnected"]
     notes = [*statistics["notes"], *([f"Not connected, at their start: {', '.join(idle)}."] if idle else [])]
     yield "".join(f'<p class="quiet">{escape(note)}</p>' for note in notes)
+
+
+def _facts(small: Digest, statistics: Facts) -> Iterator[tuple[str, str]]:
+    """What the run showed, as (value, name): how well each axis followed its set point, and the largest torque."""
+    for axis in small.axes:
+        before = f"{axis.name.replace('_', ' ')}: " if axis.name else ""
+        if axis.error:
+            scale, _ = _largest(small.lines[axis.error])
+            rms = sqrt(small.lines[axis.error].squares / small.rows)
+            yield joined(number(rms * scale.factor, 3), scale.unit), f"{before}RMS tracking error"
+        for role, name in ((axis.error, "largest error"), (axis.columns.get("tau", ""), "largest torque")):
+            if role:
+                yield _largest(small.lines[role])[1], f"{before}{name}"
+    yield f"{statistics['simulated_seconds']:,.6g} s", "simulated"
+
+
+def _largest(line: Line) -> tuple[Scale, str]:
+    """The scale of a column, and its largest value by size."""
+    scale = _scale(line)
+    return scale, joined(number(max(map(abs, line.span)) * scale.factor, 3), scale.unit)
+
+
+def _speed(scenario: Scenario, statistics: Facts) -> str:
+    """How fast it was computed."""
+    warned = f"{statistics['warnings']:,} warnings" if statistics["warnings"] else "no warnings"
+    return (
+        f"{statistics['steps']:,} steps of {scenario.step * 1e3:g} ms, computed in {statistics['seconds']:.3g} s: "
+        f"{statistics['ratio_to_real_time']:,.3g} times real time, {statistics['microseconds_per_step']:.3g} µs a step "
+        f"with recording; {warned}."
+    )
 
 
 def _pictures(small: Digest) -> Iterator[str]:
@@ -163,7 +190,7 @@ def _table(small: Digest) -> str:
         cells = "".join(f'<td class="n">{number(value * scale.factor, 4)}</td>' for value in values)
         note = " (set point minus position)" if name in made else ""
         rows.append(f"<tr><td>{escape(name)}{note}</td><td>{escape(scale.unit)}</td>{cells}</tr>")
-    head = "".join(f'<th class="n">{name}</th>' for name in ("least", "greatest", "mean", "RMS"))
+    head = "".join(f'<th class="n">{name}</th>' for name in ("smallest", "largest", "mean", "RMS"))
     table = f"<table><tr><th>column</th><th>unit</th>{head}</tr>{''.join(rows)}</table>"
     return _wide("All columns", table)
 

@@ -1,5 +1,6 @@
 """The page of a run shows what was recorded: nothing is lost by thinning, and nothing needs the network."""
 
+import json
 import re
 from pathlib import Path
 from xml.etree import ElementTree
@@ -157,6 +158,21 @@ def test_a_page_has_every_picture_and_says_what_ran(page: str) -> None:
     assert "A note with &lt;angles&gt;." in page
     assert "kind = &quot;sine&quot;" in page
     assert "controller.y" in page or "controller" in page
+
+
+def test_a_page_leads_with_the_tracking_error_and_says_the_speed_in_a_line_below(page: str) -> None:
+    facts = re.search(r'<div class="facts">(.*?)</div><p class="quiet">(.*?)</p>', page)
+    assert facts is not None
+    names = re.findall(r"</b>([^<]*)<", facts[1])
+    assert names == ["RMS tracking error", "largest error", "largest torque", "simulated"]
+    assert re.match(r"<span><b>[\d.]+\xa0arcsec</b>", facts[1])
+    assert facts[2].endswith("10 times real time, 1 µs a step with recording; no warnings.")
+
+
+def test_the_explorer_opens_with_the_error_and_names_its_lines(page: str) -> None:
+    data = json.loads(re.findall(r'id="recordings">(.*?)</script>', page, re.S)[0])
+    assert data["recordings"][data["open"]]["titles"] == ["error [arcsec]"]
+    assert "its set point, dashed" in page
 
 
 def test_a_page_is_sound_and_needs_nothing_from_outside(page: str) -> None:
