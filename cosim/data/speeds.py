@@ -128,7 +128,7 @@ def _speed(path: Path, found: Columns, served: Assigned, name: str) -> Speed | N
     q, v = _si(turned["q"], served.units.get("q", "")), _si(served.values[name], _unit_of(found, served, name))
     good = np.isfinite(t) & (np.abs(q) < LARGEST) & (np.abs(v) < LARGEST)
     t, q, v = t[good], q[good], v[good]
-    return Speed(name, *_slope(t, q, v)) if len(t) >= LEAST else None
+    return Speed(name, *times_slope(t, q, v)) if len(t) >= LEAST else None
 
 
 def _unit_of(found: Columns, served: Assigned, name: str) -> str:
@@ -140,7 +140,7 @@ def _si(values: np.ndarray, text: str) -> Array:
     return np.asarray(unit(spelled(text)).to_si(values.astype(np.float64)) if text else values, dtype=np.float64)
 
 
-def _slope(t: Array, q: Array, v: Array) -> tuple[float, float]:
+def times_slope(t: Array, q: Array, v: Array) -> tuple[float, float]:
     """Return k of v = k dq/dt, and the share of the integrals of v that it explains; parts with a gap are left out."""
     edges = np.unique(np.linspace(0, len(t) - 1, min(PARTS, len(t) // 2) + 1).astype(int))
     way = np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]) * np.diff(t))])

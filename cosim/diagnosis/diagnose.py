@@ -151,7 +151,7 @@ def diagnose(
     problem, base, late = _refitted(train, heldout, card)
     sanity += half_sample((*train, *heldout), late, problem.sample_time)
     train, heldout = [moved(one, late) for one in train], [moved(one, late) for one in heldout]
-    sanity += of_base(problem, base.mount, train, heldout)
+    sanity += of_base(card, problem, base.mount, train, heldout)
     refitted = _improved(card, limited(problem, base.mount)[0])
     on_model_ready("before", refitted.plant())
     if any(one.blocks_naming for one in beyond_denial(sanity)):
@@ -173,7 +173,7 @@ def diagnose(
     described = _with_learned(_described(answer, train, heldout, card), answer, tried, train, heldout)
     diagnosis = replace(
         _with_search(described, answer, examined, heldout),
-        sanity=(*of_delivered(sanity, problem, mounts[0]), *not_determined_doubts(unknown)),
+        sanity=(*of_delivered(sanity, card, problem, mounts[0]), *not_determined_doubts(unknown)),
         not_determined=unknown,
         next_experiment=in_words(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,

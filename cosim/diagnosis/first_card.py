@@ -208,7 +208,7 @@ def _check_inertia(numbers: Sequence[Number], linear: bool) -> None:
         what = "mass" if linear else "inertia"
         raise InputError(
             f"These recordings do not determine the {what}: the axis hardly accelerates, or friction hides it. "
-            f"Give it, --inertia VALUE [{one.unit}], or record faster swings.",
+            f"Give it to a card (cosim card RUN --inertia VALUE, in {one.unit}), or record faster swings.",
             culprit="inertia",
         )
 

@@ -72,7 +72,7 @@ def steady(seed: int) -> pd.DataFrame:
 
 
 def test_what_is_not_determined_is_demanded_by_its_option() -> None:
-    with pytest.raises(InputError, match=r"do not determine the inertia: .*--inertia VALUE \[kg\.m2\]"):
+    with pytest.raises(InputError, match=r"do not determine the inertia: .*--inertia VALUE, in kg\.m2"):
         cosim.card(steady(1), motion="rotary")
     given = cosim.card(table(6), motion="rotary", inertia=2.0)
     assert given.card.mount.inertia == 2.0

@@ -11,6 +11,7 @@ Kind = Literal[
     "torque_sign",
     "time_unit",
     "position_scale",
+    "speed_scale",
     "torque_scale",
     "gear_ratio",
     "clocks",

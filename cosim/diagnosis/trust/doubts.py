@@ -33,7 +33,7 @@ def doubts(train: Sequence[Recording], heldout: Sequence[Recording], card: Card)
     Raises:
         RecordingError: a unit is wrong beyond doubt; the message names the option that puts it right.
     """
-    reference = _reference(card)
+    reference = _reference(card, [*train, *heldout])
     found = judged(train, heldout, reference)
     if not found:
         balances = [Balance([one], reference.linear) for one in (*train, *heldout)]
@@ -50,7 +50,13 @@ def assumed_units(recordings: Sequence[Recording]) -> tuple[Sanity, ...]:
     return (Sanity(finding="time_unit", statement=" ".join(said)),) if said else ()
 
 
-def _reference(card: Card) -> Reference:
+def is_estimated(card: Card, names: Sequence[str]) -> bool:
+    """Whether a card was estimated from some recordings of these names: it is no witness of them."""
+    given = card.origin.get("recordings", ()) if "estimated_by" in card.origin else ()
+    return any(name.startswith(one) for name in names for one in given)
+
+
+def _reference(card: Card, recordings: Sequence[Recording]) -> Reference:
     mount, controller = card.plant(), card.controller
     level = getattr(mount.friction, "Fc", None)
     return Reference(
@@ -59,16 +65,16 @@ def _reference(card: Card) -> Reference:
         torque_limit=float(mount.axis.torque_limit),
         record_hz=float(controller.record_hz) if controller else None,
         linear=mount.motion == "linear",
+        is_of_recordings=is_estimated(card, [one.name for one in recordings]),
     )
 
 
 def of_base(
-    problem: Problem, refitted: Mount, train: Sequence[Recording], heldout: Sequence[Recording]
+    card: Card, problem: Problem, refitted: Mount, train: Sequence[Recording], heldout: Sequence[Recording]
 ) -> tuple[Sanity, ...]:
     """What the refitted base says of card and recordings, and what these recordings cannot show."""
-    bounds = edges_of(problem.mount, problem.prepared.pieces)
     return (
-        *base_far_from_card(problem.mount, refitted, bounds, problem.top_speed),
+        *_far(card, problem, refitted),
         *load_far_from_card(problem.mount, refitted, problem.prepared.stacked("q")),
         *encoder_step([*train, *heldout], problem.mount, problem.prepared.cutoff),
         *little_motion(problem.prepared),
@@ -76,15 +82,21 @@ def of_base(
     )
 
 
-def of_delivered(sanity: Sequence[Sanity], problem: Problem, delivered: Mount) -> tuple[Sanity, ...]:
+def _far(card: Card, problem: Problem, mount: Mount) -> tuple[Sanity, ...]:
+    """Numbers of the base that leave the card's, unless these were estimated from the same recordings."""
+    if is_estimated(card, problem.prepared.names):
+        return ()
+    return base_far_from_card(problem.mount, mount, edges_of(problem.mount, problem.prepared.pieces), problem.top_speed)
+
+
+def of_delivered(sanity: Sequence[Sanity], card: Card, problem: Problem, delivered: Mount) -> tuple[Sanity, ...]:
     """The same doubts, where what is said of the base's numbers is judged on the delivered model.
 
     A base alone bends its numbers to stand in for what is missing: an inertia 8 times the card's beside a weight that
     nobody knew of.
     """
-    bounds = edges_of(problem.mount, problem.prepared.pieces)
     kept = [one for one in sanity if one.finding != BASE_FAR]
-    return (*base_far_from_card(problem.mount, delivered, bounds, problem.top_speed), *kept)
+    return (*_far(card, problem, delivered), *kept)
 
 
 def single_readings(given: Sequence[Recording], used: Sequence[Recording]) -> tuple[Sanity, ...]:

@@ -35,6 +35,8 @@ class Explanation:
     is_counted: bool = False
     """Whether `position` is too uncertain to say where gravity comes back."""
     time: float = 1.0
+    speed: float = 1.0
+    """How many times too large the measured speed is; where there is a position nothing else reads it."""
     inertia: float = CARD_INERTIA
     friction: float = CARD_FRICTION
     option: str = ""
@@ -82,13 +84,16 @@ GEARS = (3, 4, 5, 6, 7, 8, 9, 10, 12, 14, 16, 18, 20, 24, 30, 36, 40, 50, 60, 72
 TIMES = {"ms": (1e3, 0.01), "us": (1e6, 0.006), "ns": (1e9, 0.002)}
 
 
-def explanations(linear: bool, reading: str, stated: Collection[str] = ()) -> Iterator[Explanation]:
+def explanations(
+    linear: bool, reading: str, stated: Collection[str] = (), speed_off: float = 1.0
+) -> Iterator[Explanation]:
     """All explanations for an axis.
 
     Args:
         linear: whether it is one that moves straight.
         reading: "q", or "v" where a speed was measured.
         stated: columns whose unit was stated; theirs is not doubted.
+        speed_off: how many times the slope of the position a measured speed is, 1 where they agree.
     """
     yield RIGHT
     yield from CARDS
@@ -101,6 +106,45 @@ def explanations(linear: bool, reading: str, stated: Collection[str] = ()) -> It
         yield Explanation(
             kind="time_unit", what=what, prior=prior, time=factor, factor=factor, option=f"--units t={unit}"
         )
+    yield from _halves(reading) if speed_off == 1.0 else _contradiction(speed_off, linear)
+
+
+def _halves(reading: str) -> Iterator[Explanation]:
+    """A radius for a diameter, a quadrature that is not counted."""
+    for factor, how, prior in ((2.0, "twice too large", 0.01), (0.5, "half as large as it should be", 0.005)):
+        yield Explanation(
+            kind="position_scale", what=f'"{reading}" is {how}', prior=prior, position=factor, factor=factor
+        )
+
+
+def _contradiction(k: float, linear: bool) -> Iterator[Explanation]:
+    """Speed, position and time of which one must be wrong, as a speed is k times the slope of the position.
+
+    A speed is wrong more often (an estimate of a drive, another shaft); a time or a position is in published records.
+    """
+    length = "m" if linear else "rad"
+    yield Explanation(
+        kind="speed_scale",
+        what=f'"v" is {k:.3g} times the speed, and position and time are right',
+        prior=0.02,
+        speed=k,
+        factor=k,
+        is_slip=False,
+    )
+    yield Explanation(
+        kind="time_unit",
+        what=f'time is stretched by {k:.3g} (--units "t={1 / k:.4g} s")',
+        prior=0.007,
+        time=k,
+        factor=k,
+    )
+    yield Explanation(
+        kind="position_scale",
+        what=f'"q" is {1 / k:.3g} times the position (--units "q={k:.4g} {length}")',
+        prior=0.005,
+        position=1 / k,
+        factor=1 / k,
+    )
 
 
 def _positions(linear: bool, reading: str) -> Iterator[Explanation]:
@@ -113,10 +157,6 @@ def _positions(linear: bool, reading: str) -> Iterator[Explanation]:
             position=factor,
             factor=factor,
             option=f"--units {reading}={unit}",
-        )
-    for factor, how, prior in ((2.0, "twice too large", 0.01), (0.5, "half as large as it should be", 0.005)):
-        yield Explanation(
-            kind="position_scale", what=f'"{reading}" is {how}', prior=prior, position=factor, factor=factor
         )
     for factor in np.exp(np.arange(log(200.0), log(1e7), GRID)).tolist():
         yield Explanation(

@@ -47,7 +47,7 @@ class Judgement:
         evidence = Evidence(list(recordings), reference)
         reading = "q" if all("q" in one for one in recordings) else "v"
         stated = [name for name in (reading, "tau") if all(name in one.units for one in recordings)]
-        table = tuple(explanations(reference.linear, reading, stated))
+        table = tuple(explanations(reference.linear, reading, stated, evidence.speed_off))
         prior = np.array([log(one.prior) for one in table])
         score = prior + np.array([evidence.of(one) for one in table])
         if not np.isfinite(score).any():  # too short to say anything
@@ -161,10 +161,14 @@ def _causes(told: Sequence[tuple[Explanation, Alternative]]) -> str:
 
 def _fact(judgement: Judgement) -> str:
     """What torque and motion imply, in the units as they are stated."""
-    known = judgement.evidence.reference
+    known, off = judgement.evidence.reference, judgement.evidence.speed_off
+    slope = f'"v" is {off:.3g} times the slope of "q"'
+    if off != 1.0 and known.is_of_recordings:
+        return slope
     found = judgement.evidence.balance(1.0).solution(0.0 if known.linear else 1.0)
     unit, force = ("kg", "N") if known.linear else ("kg m2", "N m")
     said = f"torque and motion imply an inertia of {found.inertia.value:.3g} {unit} (card: {known.inertia:.3g})"
     if known.coulomb:
         said += f" and a friction of {found.coulomb.value:.3g} {force} (card: {known.coulomb:.3g})"
+    said = f"{slope}, and {said}" if off != 1.0 else said
     return said if found.explained > MOSTLY else f"{said}, and explain {found.explained:.0%} of it"

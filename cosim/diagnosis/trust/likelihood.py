@@ -16,9 +16,9 @@ from math import copysign, exp, log, pi
 import numpy as np
 
 from cosim.data.recording import Recording
+from cosim.data.speeds import times_slope
 from cosim.diagnosis.trust.balance import Balance, Estimate
-from cosim.diagnosis.trust.explanations import ANY_INERTIA, Explanation
-from cosim.estimation.filters import derivative
+from cosim.diagnosis.trust.explanations import ANY_FRICTION, ANY_INERTIA, Explanation
 from cosim.estimation.prepare import LEAST_SECONDS, Array
 
 MOST_GRAVITY = 6.0
@@ -28,6 +28,8 @@ MOST_SIGN = 12.0
 MOST_BESIDE = 10.0
 """Nats of a column that tells the same twice."""
 MOST_LIMIT = 8.0
+CONTRADICTS = 0.2
+"""|ln| of that slope from which one of the two columns, or the time, is wrong; loops and filters are within a tenth."""
 ALIKE = 0.1
 """Spread of ln(slope) of a column on one that tells the same: loops follow their set points to that."""
 FOLLOWS = 0.95
@@ -58,6 +60,16 @@ class Reference:
     torque_limit: float = float("inf")
     record_hz: float | None = None
     linear: bool = False
+    is_of_recordings: bool = False
+    """Whether it was estimated from these recordings: then it is no witness of their units, and may be any number."""
+
+    def spread_of_inertia(self, explanation: Explanation) -> float:
+        """Spread of ln(truth / reference) of the inertia under an explanation."""
+        return ANY_INERTIA if self.is_of_recordings else explanation.inertia
+
+    def spread_of_friction(self, explanation: Explanation) -> float:
+        """The same of the friction."""
+        return ANY_FRICTION if self.is_of_recordings else explanation.friction
 
 
 class Evidence:
@@ -78,9 +90,9 @@ class Evidence:
         order = self._order(explanation)
         solution, known = balance.solution(order), self.reference
         torque, position = explanation.torque, explanation.position
-        found = _gain(solution.inertia, known.inertia * torque / position, explanation.inertia)
+        found = _gain(solution.inertia, known.inertia * torque / position, known.spread_of_inertia(explanation))
         if known.coulomb:
-            found += _gain(solution.coulomb, known.coulomb * torque, explanation.friction)
+            found += _gain(solution.coulomb, known.coulomb * torque, known.spread_of_friction(explanation))
         found -= float(np.logaddexp(0.0, -copysign(1.0, torque) * np.clip(solution.sign, -MOST_SIGN, MOST_SIGN)))
         found += (
             self._size(balance, explanation)
@@ -88,7 +100,7 @@ class Evidence:
             + self._rate(rate)
             + self._limit(explanation)
         )
-        return found + sum(_slip_likelihood(slope, position, explanation.time, kind) for kind, slope in self._slopes)
+        return found + sum(_slip_likelihood(slope, explanation, kind) for kind, slope in self._slopes)
 
     def balance(self, time: float) -> Balance:
         """The torque balance where time counts `time` to a second."""
@@ -98,7 +110,7 @@ class Evidence:
 
     def _size(self, balance: Balance, explanation: Explanation) -> float:
         """The torque beside what the reference needs for such a motion; loads and balanced springs are the spread."""
-        spread = SIZES if explanation.inertia < ANY_INERTIA else ANY_SIZES
+        spread = SIZES if self.reference.spread_of_inertia(explanation) < ANY_INERTIA else ANY_SIZES
         needed = self.reference.inertia * balance.acceleration / explanation.position + (self.reference.coulomb or 0.0)
         off = log(balance.torque / abs(explanation.torque) / needed) / spread
         return -0.5 * off**2 - log(spread)
@@ -135,6 +147,12 @@ class Evidence:
         """Torque that hardly any row exceeds."""
         return max(float(np.quantile(np.abs(one["tau"]), 0.999)) for one in self._recordings)
 
+    @property
+    def speed_off(self) -> float:
+        """How many times the slope of the position a measured speed is; 1 where none says otherwise."""
+        slopes = [abs(slope) for kind, slope in self._slopes if kind == "v"]
+        return 1 / slopes[0] if slopes and abs(log(slopes[0])) > CONTRADICTS else 1.0
+
     @cached_property
     def _slopes(self) -> list[tuple[str, float]]:
         """Slopes of the position on the set point, and of its derivative on a measured speed, where they follow."""
@@ -143,8 +161,8 @@ class Evidence:
             if "q" in one and "q_d" in one and not _droops(one):
                 found += [("q_d", slope) for slope in _slope(one["q"], one["q_d"])]
             if "q" in one and "v" in one:
-                speed = derivative(one["q"], one.sample_time)
-                found += [("v", slope) for slope in _slope(speed, one["v"])]
+                times, share = times_slope(one.t, one["q"], one["v"])
+                found += [("v", 1 / times)] if share > FOLLOWS else []
         return found
 
 
@@ -188,8 +206,8 @@ def _droops(recording: Recording) -> bool:
     return bool(np.corrcoef(left, recording["tau"])[0, 1] > DRIVEN)
 
 
-def _slip_likelihood(slope: float, position: float, time: float, kind: str) -> float:
+def _slip_likelihood(slope: float, slip: Explanation, kind: str) -> float:
     """Log-likelihood of such a slope: the slip is in one of the columns, or in both."""
-    ticks = 1 / time if kind == "v" else 1.0
-    found = [exp(-0.5 * (log(abs(slope) / (each * ticks)) / ALIKE) ** 2) for each in {1.0, position}]
+    ticks = 1 / (slip.time * slip.speed) if kind == "v" else 1.0
+    found = [exp(-0.5 * (log(abs(slope) / (each * ticks)) / ALIKE) ** 2) for each in {1.0, slip.position}]
     return max(log(sum(found) / len(found) + 1e-300), -MOST_BESIDE)

@@ -8,7 +8,7 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.diagnosis.trust.balance import Balance
 from cosim.diagnosis.trust.explanations import RIGHT
-from cosim.diagnosis.trust.judgement import Judgement
+from cosim.diagnosis.trust.judgement import Judgement, judged
 from cosim.diagnosis.trust.likelihood import Reference
 
 
@@ -63,3 +63,36 @@ def test_of_numbers_that_are_not_told_no_residual_tells_the_sign() -> None:
     a, q = np.gradient(v, t), np.cumsum(v) / 100
     long = Balance([Recording("long", {"t": t, "q": q, "tau": 2 * a + 1.2 * np.sign(v) + 3 * v})]).solution(1.0)
     assert long.sign > 15
+
+
+def beside_speed(t: float = 1.0, q: float = 1.0, v: float = 1.0) -> Recording:
+    """The recording above with its speed, and columns that are so many times too large."""
+    true = waving(0.0)
+    speed = np.gradient(true["q"], true.t)
+    return Recording("run", {"t": t * true.t, "q": q * true["q"], "tau": true["tau"], "v": v * speed})
+
+
+@pytest.mark.parametrize(
+    ("wrong", "finding", "blocks", "option"),
+    [
+        ({"v": 2.0}, "speed_scale", False, ""),
+        ({"v": 5 / 3}, "speed_scale", False, ""),
+        ({"t": 2.0}, "time_unit", True, "t=0.5 s"),
+        ({"q": 0.4}, "position_scale", True, "q=2.5 rad"),
+    ],
+)
+def test_where_speed_position_and_time_contradict_the_card_says_which_is_wrong(
+    wrong: dict[str, float], finding: str, blocks: bool, option: str
+) -> None:
+    (said,) = judged([beside_speed(**wrong)], [], Reference(1.0, 4.0))
+    assert said.finding == finding
+    assert said.blocks_naming == blocks
+    assert option in said.alternatives[0].what
+
+
+def test_where_no_card_knows_all_three_are_named() -> None:
+    """A card that was estimated from the same recording has the same fault."""
+    (said,) = judged([beside_speed(t=2.0)], [], Reference(4.0, 4.0, is_of_recordings=True))
+    assert [one.what.split()[0] for one in said.alternatives] == ['"v"', "time", '"q"']
+    assert not said.blocks_naming
+    assert judged([beside_speed()], [], Reference(9.0, 4.0, is_of_recordings=True)) == ()
