@@ -12,7 +12,7 @@ from cosim.fmi.component import Port
 from cosim.fmi.description import INTERFACES, describe, own_step_of
 from cosim.fmi.sound import inherited
 from cosim.fmi.variables import ports_of
-from cosim.support.errors import CosimError, InputError
+from cosim.support.errors import InputError
 from cosim.sweeps.address import Address, addresses
 from cosim.system.scenario import Scenario
 from cosim.system.sections import ComponentSection
@@ -106,11 +106,6 @@ def unknown(option: str, name: str, source: Path, choices: Iterable[str], what: 
     listed = ", ".join(have[:SHOWN]) + (f" and {len(have) - SHOWN} more" if len(have) > SHOWN else "")
     text = f'{option} "{name}": {source} has no such variable; {what}: {listed or "none"}.'
     return InputError(text, culprit=name, value=name, choices=have)
-
-
-def check_runs(error: CosimError, subject: Subject) -> InputError:
-    """The error of a model that cannot be simulated with the numbers that were given."""
-    return InputError(f"{subject.source} cannot be calibrated: with the numbers it starts from, {error}")
 
 
 def _interface(description: Any, wanted: str) -> str:

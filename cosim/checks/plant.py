@@ -1,10 +1,10 @@
 """The plant in which a law or an effect is checked: numbers for it, and values and derivatives of its equations."""
 
 from collections.abc import Sequence
-from dataclasses import MISSING, dataclass, fields, replace
+from dataclasses import MISSING, dataclass, fields
 from functools import cached_property
 from itertools import pairwise
-from math import isfinite, nan
+from math import isfinite
 from typing import Any, TypeVar
 
 import casadi as ca
@@ -112,10 +112,3 @@ def numbers_of(part: Any) -> dict[str, float]:
         value = getattr(part, name)
         found[name] = sum(value) / 2 if isinstance(value, Pair) else float(value)
     return found
-
-
-def with_number(part: Part, name: str, value: float = nan) -> Part:
-    """A part with another number."""
-    change: Any = replace
-    made: Part = change(part, **{name: value})
-    return made

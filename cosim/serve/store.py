@@ -27,7 +27,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from cosim.serve.folder import CLOSED, check_plain, read_plain
-from cosim.serve.job import Job, Upload, job_of
+from cosim.serve.job import Job, job_of
 from cosim.serve.views import CARD_NOT_SEEN, CARD_VIEW, NOT_SEEN, no_view, view_of
 from cosim.support.errors import InputError, OutputError
 from cosim.support.files import directory, replacing
@@ -139,14 +139,6 @@ class Store:
             except OSError:
                 self._unwritten[name] = replace(self.get(name), **values)
                 return self._unwritten[name]
-
-    def put_upload(self, name: str, file: str, **values: Any) -> Job:
-        """Give one recording of a job new values (as `change`)."""
-
-        def changed(one: Upload) -> Upload:
-            return replace(one, **values) if one.name == file else one
-
-        return self.change(name, lambda job: replace(job, uploads=tuple(map(changed, job.uploads))))
 
     def folder(self, name: str) -> Path:
         """Return the folder of a job (UnknownJobError: there is none of this name)."""

@@ -61,16 +61,6 @@ def test_the_loop_is_that_of_its_equation_however_fast_the_motion_is(numbers: di
     assert np.abs(expected).max() <= (effect.A / (effect.beta + effect.gamma)) ** (1 / effect.n) + 1e-9
 
 
-def test_along_one_way_the_loop_has_closed_forms() -> None:
-    """An exponential for n = 1; for n = 2: a hyperbolic tangent; back with gamma = beta: a straight line."""
-    way = np.linspace(0, 0.2, 2001)
-    one, two = BoucWen(torque=1.0, stroke=0.05), BoucWen(torque=1.0, stroke=0.05, A=2.0, beta=0.3, gamma=0.2, n=2.0)
-    np.testing.assert_allclose(by_rates(one, way, 1e-3), 1 - np.exp(-way / 0.05), atol=1e-5)
-    np.testing.assert_allclose(by_rates(two, way, 1e-3), 2 * np.tanh(1.0 * way / 0.05), atol=1e-5)
-    back = by_rates(one, -np.linspace(0, 0.02, 201), 1e-3, z=1.0)
-    np.testing.assert_allclose(back, 1 - np.linspace(0, 0.4, 201), atol=1e-12)
-
-
 @pytest.mark.parametrize("numbers", [*SHAPES, {"beta": 0.5, "gamma": -0.49}, {"beta": 2.0, "gamma": 2.0, "n": 3.0}])
 def test_a_loop_never_gives_more_than_it_took(numbers: dict[str, float]) -> None:
     """Also from a state that no motion from zero reaches: at most z^2 T stroke / (2 A)."""

@@ -1,12 +1,11 @@
 """Learned terms: tables as data in a card, the same in NumPy, CasADi and FMU; what they may not do."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
-from effect_examples import EXAMPLES, LAW, evaluate, mount, simulate
+from effect_examples import EXAMPLES, evaluate, mount, simulate
 from export_models import Driver
 
 from pyfmi_models.card import parse_card
@@ -38,12 +37,6 @@ def test_a_card_keeps_every_digit_of_a_table(effect) -> None:
     assert back.effects == (effect, effect)
 
 
-def test_a_table_over_position_is_its_sum_of_waves() -> None:
-    effect, q = LearnedTorque(**OVER_POSITION), np.linspace(-2, 3, 101)
-    found = [float(effect.load(mount(effect).at(0.0, one, 0.3))) for one in q]
-    np.testing.assert_allclose(found, table((q + 1) / 2.2, effect.torque), atol=1e-13)
-
-
 def test_a_table_is_drawn_over_the_range_that_was_seen_and_one_of_the_turn_over_all_of_it() -> None:
     at, torque = LearnedTorque(**OVER_POSITION).values(5)
     np.testing.assert_allclose(at, np.linspace(-1.0, 1.2, 5))
@@ -67,17 +60,6 @@ def test_a_table_over_the_turn_repeats_after_it() -> None:
     np.testing.assert_allclose(found, 0.1 + 0.4 * np.cos(q) - 0.3 * np.sin(q) + 0.2 * np.sin(2 * q), atol=1e-13)
 
 
-def test_a_product_table_is_friction_over_position_and_temperature() -> None:
-    effect = next(one for one in LEARNED if isinstance(one, LearnedFriction))
-    here = mount(effect)
-    for q, degrees in ((0.3, 22.0), (-0.9, 40.0), (5.0, 10.0)):
-        x, y = np.clip((q + 1) / 2.2, 0, 1), np.clip((degrees - 15) / 20, 0, 1)
-        waves = np.outer(np.cos(np.pi * np.arange(3) * x), np.cos(np.pi * np.arange(2) * y))
-        expected = np.exp(waves.ravel() @ effect.level_change)
-        found = float(here.level(here.at(0.0, q, 0.1, {"temperature": degrees}))) / float(LAW.Fc)
-        assert found == pytest.approx(expected, rel=1e-13)
-
-
 @pytest.mark.parametrize("viscous", [0.0, 1.0])
 def test_viscous_friction_that_is_learned_is_that_much_more_and_never_drives(viscous: float) -> None:
     """3 N m at 0.5 rad/s where there is more; where there is less, above zero however large the table."""
@@ -90,17 +72,6 @@ def test_viscous_friction_that_is_learned_is_that_much_more_and_never_drives(vis
         assert float(more.viscous(viscous * v, here)) == pytest.approx(viscous * v + 6.0 * v, rel=1e-9)
         assert float(less.viscous(viscous * v, here)) == pytest.approx(viscous**2 / (viscous + 6.0) * v, abs=1e-9)
     assert float(less.viscous(0.0, mount(less).at(0.0, 0.1, 0.0))) == 0.0
-
-
-def test_what_goes_over_the_acceleration_follows_it_by_a_state() -> None:
-    """A steady acceleration of 1.5 rad/s2, seen after some times of 0.02 s; from it, half of the range."""
-    effect = LearnedViscous(over="acceleration", seen=(-2.0, 2.0), viscous_torque=(0.0, 0.3), at_speed=1.0)
-    here, dt, state = mount(effect).at(0.0, 0.0, 0.0), 1e-3, 0.0
-    for k in range(300):
-        state += dt * float(ca.DM(effect.rate(here._replace(v=1.5e-3 * k, state=[state]))))
-    p = lambda s: s / (abs(s) + 0.6)  # noqa: E731
-    expected = 0.3 * np.cos(np.pi * (p(1.5) + p(2.0)) / (2 * p(2.0)))
-    assert float(effect.table(here._replace(v=1.5 * 0.3, state=[state]))) == pytest.approx(expected, rel=0.05)
 
 
 def test_what_goes_over_the_way_counts_it_there_and_back() -> None:
@@ -141,15 +112,6 @@ def test_a_gain_that_is_learned_asks_for_more_command_where_the_motor_is_weak() 
     assert "way" in replace(effect, over="way").broken_rule()
 
 
-def test_a_drive_gives_its_command_less_the_table() -> None:
-    effect = next(one for one in LEARNED if isinstance(one, LearnedDrive))
-    command = np.linspace(-30, 30, 41)
-    p = lambda s: s / (np.abs(s) + 1.0)  # noqa: E731
-    missing = table((p(command) - p(-20.0)) / (p(20.0) - p(-20.0)), effect.missing)
-    found = [float(effect.applied((), one)) for one in command]
-    np.testing.assert_allclose(found, command - missing, atol=1e-13)
-
-
 @pytest.mark.parametrize("over", ["position", "speed", "input.load"])
 def test_beyond_its_range_a_table_is_constant_and_its_slope_is_continuous(over: str) -> None:
     effect = LearnedTorque(over=over, seen=(-0.4, 0.8), torque=(0.1, 0.5, -0.7, 0.3))
@@ -173,28 +135,6 @@ def test_an_input_of_the_plant_is_what_a_table_goes_over() -> None:
     assert [one.name for one in model.inputs] == ["tau", "disturbance", "load"]
     heavy, light = (evaluate(model, load=load)["der(speed)"] for load in (10.0, 0.0))
     assert (heavy - light) * 2.0 == pytest.approx(2.0)
-
-
-def test_hysteresis_takes_energy_over_a_round_trip_and_gives_none() -> None:
-    effect = LearnedHysteresis(strokes=(0.1, 0.4), torque=(0.2, 0.3))
-    t = np.linspace(0, 3, 30001)
-    v = 0.8 * 2 * np.pi * np.cos(2 * np.pi * t)
-    state, work, dt = np.zeros(2), [], t[1]
-    for one in v:
-        motion = mount(effect).at(0.0, 0.0, one)._replace(state=state)
-        work.append(float(effect.load(motion)) * one * dt)
-        state = state + dt * np.array(ca.DM(effect.rate(motion))).ravel()
-    turn = np.array(work)[-10000:]
-    assert 0.5 * 4 * 0.8 * 0.5 < turn.sum() < 4 * 0.8 * 0.5
-    assert np.cumsum(work).min() > -1e-9
-
-
-def test_after_a_reversal_friction_comes_back_to_its_level() -> None:
-    effect = LearnedAfterReversal(ways=(0.1,), level_change=(0.5,))
-    here = mount(effect)
-    settled, turned = (float(here.level(here.at(0.0, 0.0, 0.2), {"learned": [memory]})) for memory in (1.0, -1.0))
-    assert settled == pytest.approx(1.0)
-    assert turned == pytest.approx(np.exp(0.5))
 
 
 @pytest.mark.parametrize("kind", [LearnedAfterReversal, LearnedHysteresis])
@@ -273,13 +213,3 @@ def test_nonsense_is_refused_in_one_sentence(table: str, rule: str) -> None:
     assert rule in str(caught.value)
     assert str(caught.value).startswith("a.toml: [[effects]] number 1 (learned)")
     assert "\n" not in str(caught.value)
-
-
-def test_a_card_with_a_table_exports(tmp_path: Path) -> None:
-    from pyfmi_models.export import export_fmu
-
-    card = parse_card(
-        f'{CARD}[[effects]]\neffect = "learned"\nover = "position"\nseen = [0, 1]\ntorque = [1, 2]\n', "a"
-    )
-    path = export_fmu(card.plant().model(), tmp_path / "a.fmu", fmi=2)
-    assert path.stat().st_size > 1000
