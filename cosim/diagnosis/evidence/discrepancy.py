@@ -46,6 +46,8 @@ def discrepancy(mount: Mount, prepared: Prepared, policy: Policy) -> Discrepancy
     stops = stops - np.outer(level, level @ stops / max(float(level @ level), 1e-300))
     wander = _wander(level, prepared, policy)
     columns = np.column_stack([size * stops, size * speeds, wander])
+    if size <= 0:  # without friction there is nothing that laws could disagree on
+        return Discrepancy(columns[:, :0], (), level)
     edges = np.cumsum([0, stops.shape[1], speeds.shape[1], wander.shape[1]])
     priors = (policy.shape_prior, policy.shape_prior, policy.wander_prior)
     names = ("stops", "speeds", "wander")
@@ -53,7 +55,7 @@ def discrepancy(mount: Mount, prepared: Prepared, policy: Policy) -> Discrepancy
         Shapes(tuple(range(first, last)), prior, name)
         for first, last, prior, name in zip(edges, edges[1:], priors, names, strict=False)
     ]
-    return Discrepancy(columns, tuple(groups) if size > 0 else (), level)
+    return Discrepancy(columns, tuple(groups), level)
 
 
 def _wander(level: Array, prepared: Prepared, policy: Policy) -> Array:

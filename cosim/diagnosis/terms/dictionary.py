@@ -23,6 +23,8 @@ OF_LAW = ("speed", "rate of torque")
 """Terms that say nothing of the unknown: a friction law's own misfit, and time stamps a fraction of a sample off."""
 REPEATS = 0.02
 """Share of a column's energy that torque and motion must leave for it to be a quantity of its own."""
+ROUNDING = 1e-12
+"""Relative change of a column below which it is constant but for the rounding of numbers and filters."""
 TURN = 5e-4
 """Share of the range of positions by which a motion must come back to count as reversed."""
 
@@ -163,7 +165,14 @@ def _nothing(_: Piece) -> list[Array]:
 def user_columns(prepared: Prepared) -> dict[str, Column]:
     """Columns that are neither torque nor motion under another name, centred, of unit size."""
     common = set.intersection(*(set(piece.extras) for piece in prepared.pieces)) - {"q_d", "v"}
-    return {name: _centred(prepared, name) for name in sorted(common) if not _repeats(prepared, name)}
+    useful = (name for name in sorted(common) if _varies(prepared, name) and not _repeats(prepared, name))
+    return {name: _centred(prepared, name) for name in useful}
+
+
+def _varies(prepared: Prepared, name: str) -> bool:
+    """Whether a column changes in training: what only changes later foretells nothing."""
+    whole = np.concatenate([piece.extras[name] for piece in prepared.pieces])
+    return bool(np.ptp(whole) > ROUNDING * np.abs(whole).max())
 
 
 def _repeats(prepared: Prepared, name: str) -> bool:
