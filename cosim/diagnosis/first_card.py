@@ -18,13 +18,14 @@ import numpy as np
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
 from cosim.diagnosis.evidence.band import in_band
-from cosim.diagnosis.search.sizes import Z95, standard_errors
+from cosim.diagnosis.search.sizes import standard_errors
 from cosim.diagnosis.trust.balance import Balance
 from cosim.estimation.blocks import Blocks, covariance
 from cosim.estimation.fit import Fit, fit
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import weights
 from cosim.support.errors import InputError, RecordingError
+from cosim.support.statistics import Z95
 from pyfmi_models.effects import Effect, GravityUnbalance, TorqueOffset
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount

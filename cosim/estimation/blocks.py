@@ -35,7 +35,7 @@ class Blocks:
         return cls(tuple(rows), np.array(recording))
 
 
-def sandwich(columns: Array, left: Array, blocks: Blocks, rcond: float) -> Array:
+def sandwich(columns: Array, left: Array, blocks: Blocks, rcond: float = 1e-10) -> Array:
     """Covariance of least-squares coefficients that holds whatever the noise is like within a block.
 
         B (sum of s s') B n / (n - 1),   B = (X'X)^+,   s = X_block' left_block
@@ -60,4 +60,4 @@ def covariance(slopes: Array, left: Array, blocks: Blocks) -> Array:
     """
     size = np.sqrt((slopes**2).sum(0))
     scale = np.where(size > 0, size, 1.0)
-    return np.asarray(sandwich(slopes / scale, left, blocks, rcond=1e-10) / np.outer(scale, scale))
+    return np.asarray(sandwich(slopes / scale, left, blocks) / np.outer(scale, scale))

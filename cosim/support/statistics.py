@@ -26,7 +26,9 @@ def hann(length: int) -> Array:
     return np.hanning(length)
 
 
-def bootstrap_range(statistic: Callable[[Index], Array], count: int, draws: int, seed: int = 0) -> tuple[float, float]:
+def bootstrap_range(
+    statistic: Callable[[Index], Array], count: int, draws: int = 400, seed: int = 0
+) -> tuple[float, float]:
     """95 % percentile range of a statistic of independent blocks, drawn with replacement.
 
     Args:

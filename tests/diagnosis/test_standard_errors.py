@@ -9,12 +9,13 @@ from scipy.signal import lfilter
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import diagnose
-from cosim.diagnosis.search.sizes import Z95, standard_errors
+from cosim.diagnosis.search.sizes import standard_errors
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import weights
+from cosim.support.statistics import Z95
 from pyfmi_models.card import parse_card
 from pyfmi_models.effects import GravityUnbalance, TorqueOffset
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag

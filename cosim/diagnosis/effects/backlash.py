@@ -10,7 +10,7 @@ from scipy.ndimage import uniform_filter1d
 
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach, Seen, with_numbers
-from cosim.diagnosis.effects.candidates import Candidate, Span, columns_of, has, of_both_ways, span_of
+from cosim.diagnosis.effects.candidates import SHARE, Candidate, Span, columns_of, has, of_both_ways, span_of
 from cosim.diagnosis.effects.tuning import refound, restarted
 from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.play import far_torques
@@ -23,8 +23,6 @@ from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.model import Variable
 from pyfmi_models.mount import Mount
 
-SHARE = 0.3
-"""Share of the inertia that is behind the play of a middling candidate."""
 LEAST_SHARE = 0.09
 """Share of the inertia below which nothing is driven through the play. In nulls of two generators it was .077 at most
 in four of five, true ones were found at .11 and more (seeds 1494289175, 560194608)."""

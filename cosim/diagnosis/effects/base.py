@@ -227,12 +227,14 @@ def turn(mount: Mount) -> float:
     return 1.0 if mount.motion == "linear" else 2 * pi
 
 
+LEAST_CYCLES = 1.5
+"""A ripple with fewer cycles a turn is an unbalance."""
 WAVES, LEAST_STROKE, PASSED = 4, 1.5, 0.8
 """Numbers of cycles that are concealed, from so many over the visited positions to what the filter passes of them at
 the median speed: this share of the cutoff."""
 
 
-def cycles_shown(mount: Mount, span: Span, lowest: float, highest: float = math.inf) -> list[float]:
+def cycles_shown(mount: Mount, span: Span, lowest: float = LEAST_CYCLES, highest: float = math.inf) -> list[float]:
     """Cycles a turn (a metre) between what a stroke holds and what the band passes."""
     speed = np.abs(span.v)
     moving = speed[speed > 0.02 * span.top]

@@ -20,6 +20,9 @@ from pyfmi_models.effects import Effect, SensorEffect
 from pyfmi_models.model import Pair
 from pyfmi_models.mount import Mount
 
+SHARE = 0.3
+"""Share of the inertia that is behind the spring or the play of a middling candidate."""
+
 
 @dataclass(frozen=True)
 class Candidate:

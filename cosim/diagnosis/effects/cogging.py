@@ -6,6 +6,7 @@ from typing import ClassVar
 
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import (
+    LEAST_CYCLES,
     Hypothesis,
     Reach,
     Seen,
@@ -20,9 +21,6 @@ from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Cogging, Effect
 from pyfmi_models.mount import Mount
-
-LEAST_CYCLES = 1.5
-"""A ripple with fewer cycles a turn is an unbalance."""
 
 
 class Ripple(Hypothesis[Cogging]):
@@ -49,7 +47,7 @@ class Ripple(Hypothesis[Cogging]):
 
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """All that a stroke holds and the band passes."""
-        return with_cycles(tried, cycles_shown(mount, span, LEAST_CYCLES))
+        return with_cycles(tried, cycles_shown(mount, span))
 
     def looked(self, seen: Seen, mount: Mount) -> str:
         """Between which cycles."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from cosim.diagnosis.effects.base import Evidence, Hypothesis, Seen
-from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.candidates import SHARE, Candidate, Span, has
 from cosim.diagnosis.effects.tuning import refound
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse, stacked
@@ -19,8 +19,6 @@ from pyfmi_models.effects.compliance import Compliance, LoadSideCompliance
 from pyfmi_models.friction import Frictionless
 from pyfmi_models.mount import Mount
 
-SHARE = 0.3
-"""Share of the inertia that is behind the spring of a middling candidate."""
 RESONANCES = np.geomspace(0.6, 4.0, 5)
 """Resonances that are looked at with the encoder on the load, relative to the cutoff of the filter ..."""
 EVEN = 0.5

@@ -26,9 +26,6 @@ from cosim.estimation.visible import bend, least_way
 from pyfmi_models.effects import Effect, LocalFriction, PeriodicFriction
 from pyfmi_models.mount import Mount
 
-LEAST_CYCLES = 1.5
-"""Cycles a turn from which a ripple is concealed."""
-
 
 class FrictionRipple(Hypothesis[PeriodicFriction]):
     """Friction that rises and falls so many times a turn."""
@@ -56,7 +53,7 @@ class FrictionRipple(Hypothesis[PeriodicFriction]):
 
     def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
         """All that a stroke holds and the band passes."""
-        return with_cycles(tried, cycles_shown(mount, span, LEAST_CYCLES))
+        return with_cycles(tried, cycles_shown(mount, span))
 
     def looked(self, seen: Seen, mount: Mount) -> str:
         """Between which cycles."""

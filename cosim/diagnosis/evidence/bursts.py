@@ -24,7 +24,6 @@ ABOVE = 3.0
 NONE = 1e-6
 """Mean square of a speed, relative to the largest, and of an acceleration, relative to reaching that within a window,
 below which it is none. Unit: 1."""
-TINY = 1e-300
 
 
 def burst_share(comparison: Comparison, found: Fit) -> float:
@@ -40,7 +39,7 @@ def burst_share(comparison: Comparison, found: Fit) -> float:
     if known.sum() < LEAST_WINDOWS:
         return 0.0
     energy = np.full(len(windows), np.nan)
-    least = NONE * float(windows[known, 1].max()) * np.array([0.0, 1.0, seconds**-2]) + TINY
+    least = NONE * float(windows[known, 1].max()) * np.array([0.0, 1.0, seconds**-2]) + 1e-300
     energy[known] = _beside_motion(np.log(np.maximum(windows[known], least)))
     above = np.maximum(_lasting(energy)[known] - ABOVE * np.median(energy[known]), 0.0)
     return float(above.sum() / energy[known].sum())
@@ -57,7 +56,7 @@ def _windows(piece: Piece, rest: Array, clear: Array, seconds: float) -> Array:
 
 def _beside_motion(logs: Array) -> Array:
     """Energies relative to what a quadratic in the logarithms of speed and acceleration foretells."""
-    speed, acceleration = ((one - one.mean()) / (one.std() + TINY) for one in logs[:, 1:].T)
+    speed, acceleration = ((one - one.mean()) / (one.std() + 1e-300) for one in logs[:, 1:].T)
     shapes = (speed, acceleration, speed**2, acceleration**2, speed * acceleration)
     columns = np.column_stack([np.ones(len(logs)), *shapes])
     return np.asarray(np.exp(logs[:, 0] - columns @ np.linalg.lstsq(columns, logs[:, 0], rcond=None)[0]))

@@ -14,9 +14,6 @@ NOISY = 3.0
 BLOCK_SECONDS = 1.0
 
 
-RESAMPLES = 400
-
-
 def is_noise(narrow: Sequence[float], wide: Sequence[float]) -> bool:
     """Whether of any model's error energy most lies above the band of the analysis: noise of the reading, a late clock.
 
@@ -34,5 +31,4 @@ def interval_of(before: Array, after: Array, dt: float) -> tuple[float, float]:
     return bootstrap_range(
         lambda drawn: np.asarray(np.sqrt(squares[0][drawn].mean(1)) - np.sqrt(squares[1][drawn].mean(1))),
         count,
-        RESAMPLES,
     )

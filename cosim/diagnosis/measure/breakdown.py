@@ -15,7 +15,6 @@ from cosim.diagnosis.answer.result import Part, Trace
 from cosim.support.statistics import Array, Index, bootstrap_range, rms
 
 Mask = npt.NDArray[np.bool_]
-DRAWS = 400
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,7 @@ def change_range(chosen: Samples) -> tuple[float, float]:
         before, after, count = sums[:, drawn].sum(axis=2)
         return np.asarray(np.sqrt(before / count) - np.sqrt(after / count))
 
-    return bootstrap_range(gained, sums.shape[1], DRAWS)
+    return bootstrap_range(gained, sums.shape[1])
 
 
 def slow(v: Array) -> float:

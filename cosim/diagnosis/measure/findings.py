@@ -16,8 +16,9 @@ from cosim.diagnosis.effects.candidates import at_own_level
 from cosim.diagnosis.measure.locate import where
 from cosim.diagnosis.search.renaming import is_renamed
 from cosim.diagnosis.search.rivals import AcceptedEffect
-from cosim.diagnosis.search.sizes import Z95, Numbers, numbers_of
+from cosim.diagnosis.search.sizes import Numbers, numbers_of
 from cosim.diagnosis.search.stages import CandidateFit
+from cosim.support.statistics import Z95
 from pyfmi_models.effects import CATALOGUE, Effect
 from pyfmi_models.model import parameters_of
 from pyfmi_models.mount import LINEAR_UNITS, Mount

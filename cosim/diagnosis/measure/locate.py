@@ -13,20 +13,18 @@ import numpy as np
 from cosim.diagnosis.answer.result import Region, Trace, Where
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.effects.base import Reach
+from cosim.diagnosis.search.instrumental_variable import SEGMENT
 from cosim.estimation.discrepancy_basis import since_reversal
 from cosim.estimation.prepare import Array
 from cosim.estimation.row_weights import least_speed
-from cosim.support.statistics import hann
+from cosim.support.statistics import Z95, hann
 from pyfmi_models.effects import Effect
 
 BINS = 40
-Z95 = 1.96
 MOVE = 1.0
 """Seconds of a move that are ascribed to the rest before it."""
 LEAST_REST = 0.1
 """Shorter standstill [s] is a reversal."""
-SEGMENT = 4.0
-"""Seconds of a segment of a spectrum."""
 OCTAVES = 0.5
 LOWEST, HIGHEST = 0.5, 32.0
 """Hz: the bands of frequency, half an octave each."""

@@ -17,6 +17,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from cosim.diagnosis.answer.entries import BiasEntry
+from cosim.diagnosis.search.commanded import BLOCK_SECONDS
 from cosim.diagnosis.search.instrumental_variable import on_set_point
 from cosim.estimation.blocks import Blocks, sandwich
 from cosim.estimation.fit import Fit
@@ -27,8 +28,6 @@ SIGNIFICANT = 0.01
 MOVES = 0.05
 """A parameter moves if instruments put it further off than this share, and than `CLEARLY` standard errors."""
 CLEARLY = 3.0
-BLOCK_SECONDS = 2.0
-"""Longer than the residual remembers, short enough for many."""
 TOLD = 0.5
 """Share of a derivative's energy that the set point must explain, else it says nothing of the parameter."""
 RCOND = 1e-8

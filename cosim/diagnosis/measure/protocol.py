@@ -23,11 +23,10 @@ from cosim.estimation.least_squares import projected
 from cosim.estimation.prepare import Array, Band, Piece, Prepared, prepare
 from cosim.estimation.residuals import residuals
 from cosim.estimation.row_weights import least_speed
-from cosim.support.statistics import rms
+from cosim.support.statistics import Z95, rms
 from pyfmi_models.mount import Mount
 
 CUTOFF = 30.0
-Z95 = 1.96
 
 
 @dataclass(frozen=True)

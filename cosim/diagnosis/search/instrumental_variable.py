@@ -34,7 +34,7 @@ Complex = npt.NDArray[np.complex128]
 Misfits = dict[str, float]
 TWINS: tuple[type[Drive], ...] = (Delay, ActuatorLag)
 SEGMENT = 4.0
-"""Seconds of a segment of the cross-spectra; segments overlap by half."""
+"""Seconds of a segment of a spectrum; those of cross-spectra overlap by half."""
 LOWEST = 0.4
 """Hz: below this no drive effect shows."""
 SMOOTH = 5

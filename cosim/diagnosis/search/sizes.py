@@ -10,11 +10,10 @@ from cosim.estimation.blocks import Blocks, covariance
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
+from cosim.support.statistics import Z95
 from pyfmi_models.effects import Effect
 from pyfmi_models.model import Variable, parameters_of
 from pyfmi_models.mount import Mount
-
-Z95 = 1.96
 
 
 @dataclass(frozen=True)

@@ -30,14 +30,11 @@ from pyfmi_models.mount import Mount
 
 ROWS = 1500
 """Rows of the search; the formula that is found is fitted to all."""
-REFINED = 1
-"""Starts of the grid that are refined."""
 BETTER = 1e-3
 """Share of the loss that a longer formula must remove in training to be asked at all."""
 BEST = 4
 """Single shapes that sums are made with."""
 STEPS = 40
-RCOND = 1e-10
 
 
 @dataclass(frozen=True)
@@ -154,25 +151,21 @@ class Search:
         return np.asarray(self.target - (columns / size) @ found)
 
     def fitted(self, formula: Formula) -> tuple[float, Formula]:
-        """The loss and the formula with the best inner numbers, from a grid of starts."""
+        """The loss and the formula with the best inner numbers, from the best start of a grid."""
         starts = list(_starts(formula, self.rows.quantities))
         losses = [float(np.sum(self.beyond(formula, one) ** 2)) for one in starts]
-        order = np.argsort(losses)[:REFINED]
+        best = int(np.argmin(losses))
         if not formula.forms:
             return losses[0], formula
         low, high = _bounds(formula, self.rows.quantities)
-        found = [
-            least_squares(
-                functools.partial(self.beyond, formula),
-                np.clip(starts[k], low + 1e-9 * (high - low), high - 1e-9 * (high - low)),
-                bounds=(low, high),
-                x_scale=high - low,
-                max_nfev=STEPS,
-            )
-            for k in order
-        ]
-        best = min(found, key=lambda one: float(one.cost))
-        return 2 * float(best.cost), replace(formula, inner=tuple(map(float, best.x)))
+        found = least_squares(
+            functools.partial(self.beyond, formula),
+            np.clip(starts[best], low + 1e-9 * (high - low), high - 1e-9 * (high - low)),
+            bounds=(low, high),
+            x_scale=high - low,
+            max_nfev=STEPS,
+        )
+        return 2 * float(found.cost), replace(formula, inner=tuple(map(float, found.x)))
 
 
 def fading(rows: Rows) -> list[Formula]:
@@ -208,7 +201,7 @@ def complete(formula: Formula, rows: Rows, part: Partial) -> tuple[Formula, Arra
     inner = _inner_slopes(whole, rows)
     scale = np.linalg.norm(inner, axis=0) + 1e-300
     every = np.column_stack([inner / scale, columns / size])
-    variance = np.diag(sandwich(every, rows.left - columns @ beta, part.blocks, RCOND))
+    variance = np.diag(sandwich(every, rows.left - columns @ beta, part.blocks))
     spread = np.where(variance >= 0, np.sqrt(np.abs(variance)), np.nan)  # less than none: nothing is known
     errors = spread / np.concatenate([scale, size])
     told = tuple(map(float, errors[: inner.shape[1] + many]))

@@ -22,6 +22,7 @@ from cosim.estimation.identify.estimate import Array, Estimate, Model, Outputs, 
 from cosim.estimation.prepare import choose_cutoff, prepare
 from cosim.estimation.rowwise import Rowwise, Tape
 from cosim.support.errors import InputError
+from cosim.support.statistics import Z95
 from pyfmi_models.friction import FrictionLaw, Stribeck
 from pyfmi_models.model import Pair, Scalar, fields_of, parameters_of
 
@@ -36,7 +37,6 @@ CUT = 0.07
 LEAST_ROWS = 50
 NOTHING = 1e-3
 """Start of a number that the card has at zero, in units of its nominal value: a search of logarithms cannot leave 0."""
-Z95 = 1.96
 
 
 class Samples(NamedTuple):
