@@ -45,6 +45,7 @@ PAGES = {
     "master/README.md": BENCH.format("master_step.py", "master"),
     "master/before.md": "python bench/master_before.py --before OLD --pairs 7 --steps 500000 --out results/master",
     "master/coupling.md": BENCH.format("coupling.py", "master"),
+    "master/engine.md": "python -m bench.engine --before OLD --out results/master",
     "master/demo.md": BENCH.format("demo_time.py", "master"),
     "master/diagnosis_cost.md": BENCH.format("diagnosis_cost.py", "master"),
     "master/fmu_step.md": BENCH.format("fmu_step.py", "master"),
