@@ -29,7 +29,7 @@ from cosim.diagnosis.effects import candidates, hypothesis_of
 from cosim.diagnosis.effects.candidates import columns_of, span_of
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.measure.bounds import SeenFrom, bounds
-from cosim.diagnosis.measure.hidden import Member, members
+from cosim.diagnosis.measure.concealment import Member, members
 from cosim.diagnosis.search.stages import admission, is_minor, least, refitted
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse

@@ -20,8 +20,8 @@ from cosim.diagnosis.answer.entries import CardSource, Improved, Provenance, Sou
 from cosim.diagnosis.answer.result import Array, Diagnosis, Finding, HeldOut, Trace
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.effects import named
-from cosim.diagnosis.measure.broadband import broadband_finding
 from cosim.diagnosis.measure.experiment import SCENARIO, scenario
+from cosim.diagnosis.measure.findings import broadband_finding
 from cosim.diagnosis.measure.protocol import CUTOFF
 from cosim.estimation.neighbours import as_inputs
 from cosim.fmi.domain import KEY, Domain, entries_of

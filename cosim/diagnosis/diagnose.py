@@ -17,11 +17,10 @@ from cosim.diagnosis.evidence.adequacy import friction_level
 from cosim.diagnosis.evidence.band import in_band
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
-from cosim.diagnosis.measure.absent import not_found, undecided
+from cosim.diagnosis.measure.bounds import not_found, undecided
 from cosim.diagnosis.measure.breakdown import parts
-from cosim.diagnosis.measure.broadband import broadband_entry
 from cosim.diagnosis.measure.experiment import Experiment, best, in_words
-from cosim.diagnosis.measure.findings import accepted, measured_as, rival_finding, taken_finding
+from cosim.diagnosis.measure.findings import accepted, broadband_entry, measured_as, rival_finding, taken_finding
 from cosim.diagnosis.measure.law_selection import proposed_law
 from cosim.diagnosis.measure.locate import regions
 from cosim.diagnosis.measure.loop_bias import loop_bias

@@ -2,15 +2,19 @@
 
 A real contact is neither LuGre nor Coulomb. Its misfit has these shapes: bristles that slip at other distances (stop
 operators) and a level that varies with speed in another way. Offered to the fit as nuisances with every candidate,
-they keep an imprecise friction law from being taken for a missing effect.
+they keep an imprecise friction law from being taken for a missing effect; so does how torque changes with the level.
 """
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
+from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Piece, Prepared
+from pyfmi_models.effects import PeriodicFriction
+from pyfmi_models.mount import Mount
 
 Index = npt.NDArray[np.int64]
 
@@ -73,3 +77,13 @@ def discrepancy_basis(prepared: Prepared) -> tuple[Array, Array]:
     stops = [piece.lowpass(stop_operators(piece, distances))[piece.kept] for piece in prepared.pieces]
     speeds = [piece.lowpass(speed_shapes(piece, top))[piece.kept] for piece in prepared.pieces]
     return np.concatenate(stops), np.concatenate(speeds)
+
+
+def friction_level(mount: Mount, prepared: Prepared) -> Array:
+    """Derivative of the needed torque by a relative change of the friction level, at the kept rows."""
+    if mount.friction.key == "none":
+        return np.zeros(len(prepared.recording_of))
+    scaled = PeriodicFriction(cycles_per_rev=0.0, relative_amplitude=0.0, phase=0.0)
+    extended = replace(mount, effects=(*mount.effects, scaled))
+    name = f"{list(extended.components())[-1]}.relative_amplitude"
+    return stacked(Inverse(extended, (name,)), prepared.pieces, np.zeros(1))[1][:, 0]

@@ -5,7 +5,7 @@ import numpy as np
 from cosim.diagnosis.answer.result import Array, Diagnosis, Finding, Region
 from cosim.diagnosis.decide.decision import IN_BURSTS
 from cosim.diagnosis.measure.breakdown import bars
-from cosim.diagnosis.measure.broadband import ACTION
+from cosim.diagnosis.measure.findings import ACTION
 from cosim.report.figures_where import NAMES, runs
 from cosim.report.next_experiment import is_about, to_record
 from cosim.report.quantities import Scales

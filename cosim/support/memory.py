@@ -8,7 +8,7 @@ from contextlib import contextmanager
 
 TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3
 """Numbers of glibc's options (mallopt, malloc.h)."""
-LARGEST, KEPT = 16 * 2**20, 2**28
+LARGEST, KEPT = 16 * 2**20, 2**27
 """Largest block taken from the heap, and free bytes that the heap may hold: what models are evaluated on is smaller,
 the raw columns of long recordings are larger and go back at once."""
 

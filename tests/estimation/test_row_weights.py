@@ -8,8 +8,7 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.estimation.prepare import Prepared, prepare
-from cosim.estimation.row_weights import remembers, weights
-from cosim.estimation.visible import least_way
+from cosim.estimation.row_weights import least_way, remembers, weights
 from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.friction import LAWS, Coulomb, LuGre
 from pyfmi_models.mount import Axis, Mount

@@ -16,7 +16,7 @@ from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.play import far_torques
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
-from cosim.estimation.visible import least_way
+from cosim.estimation.row_weights import least_way
 from cosim.support.statistics import rms
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.backlash import Backlash

@@ -22,7 +22,7 @@ from cosim.diagnosis.effects.base import (
 from cosim.diagnosis.effects.candidates import Candidate, Span, has
 from cosim.diagnosis.effects.periodogram import peaks
 from cosim.estimation.prepare import Array, Prepared
-from cosim.estimation.visible import bend, least_way
+from cosim.estimation.row_weights import bend, least_way
 from pyfmi_models.effects import Effect, LocalFriction, PeriodicFriction
 from pyfmi_models.mount import Mount
 

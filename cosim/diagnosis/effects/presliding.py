@@ -12,7 +12,7 @@ from cosim.diagnosis.effects.tuning import refound, revived
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
-from cosim.estimation.visible import held_level, least_way
+from cosim.estimation.row_weights import held_level, least_way
 from pyfmi_models.effects import Effect
 from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.mount import Mount

@@ -20,7 +20,7 @@ import numpy.typing as npt
 from scipy.fft import dct, idct
 
 from cosim.diagnosis.evidence.bands import passed, reading_torque
-from cosim.diagnosis.evidence.windows import LEAST_ROWS, window_means
+from cosim.diagnosis.evidence.bursts import LEAST_ROWS, window_means
 from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.row_weights import far_from_turns, least_speed
 

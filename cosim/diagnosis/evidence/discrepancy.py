@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.diagnosis.decide.policy import Policy
-from cosim.estimation.discrepancy_basis import discrepancy_basis
-from cosim.estimation.level import friction_level
+from cosim.estimation.discrepancy_basis import discrepancy_basis, friction_level
 from cosim.estimation.prepare import Array, Prepared
 from cosim.support.statistics import rms
 from pyfmi_models.mount import Mount

@@ -13,7 +13,7 @@ from cosim.diagnosis.decide.decision import decide, least_left, open_rivals
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.evidence.comparison import Comparison
-from cosim.diagnosis.measure.absent import not_found
+from cosim.diagnosis.measure.bounds import not_found
 from cosim.diagnosis.search.admissibility import in_time, is_degenerate
 from cosim.diagnosis.search.stages import CandidateFit
 from cosim.estimation.fit import Fit

@@ -9,7 +9,7 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
 from cosim.diagnosis.effects.candidates import at_own_level
 from cosim.diagnosis.evidence.comparison import Comparison
-from cosim.diagnosis.measure.absent import not_found
+from cosim.diagnosis.measure.bounds import not_found
 from cosim.diagnosis.measure.findings import _at_own_level
 from cosim.diagnosis.search.sizes import Numbers
 from cosim.diagnosis.search.stages import Stage, best_of, refitted

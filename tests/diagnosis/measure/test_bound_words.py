@@ -7,8 +7,7 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.effects import candidates, hypothesis_of
 from cosim.diagnosis.effects.base import Seen
 from cosim.diagnosis.effects.candidates import span_of
-from cosim.diagnosis.measure.absent import _absent
-from cosim.diagnosis.measure.bounds import SeenFrom
+from cosim.diagnosis.measure.bounds import SeenFrom, _absent
 from cosim.estimation.prepare import Prepared, prepare
 from pyfmi_models.effects import Cogging, Effect, PeriodicFriction
 from pyfmi_models.effects.compliance import Compliance, LoadSideCompliance

@@ -11,7 +11,7 @@ from cosim.diagnosis.answer.result import Finding
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
 from cosim.diagnosis.evidence.comparison import Comparison
-from cosim.diagnosis.measure.absent import not_found
+from cosim.diagnosis.measure.bounds import not_found
 from cosim.diagnosis.search.sizes import standard_errors
 from cosim.diagnosis.search.stages import margin, refitted
 from cosim.estimation.blocks import Blocks
