@@ -16,6 +16,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
+from itertools import chain
 from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
@@ -68,7 +69,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path)
     given = parser.parse_args()
     rows = []
-    for row in [*sizes(), *costs(given.skip), *compared(given.before, given.skip)]:
+    for row in chain(sizes(), costs(given.skip), compared(given.before, given.skip)):
         rows.append(row)
         print(*row, sep=" | ", flush=True)
     if given.out:
