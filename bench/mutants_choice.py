@@ -61,16 +61,21 @@ def distances(test: Path) -> dict[Path, int]:
     return found
 
 
+def functions(source: str, line: int) -> list[tuple[int, str]]:
+    """Functions around a line of Python, each with its length."""
+    return [
+        (node.end_lineno - node.lineno, node.name)
+        for node in ast.walk(ast.parse(source))
+        if isinstance(node, ast.FunctionDef) and node.end_lineno and node.lineno <= line <= node.end_lineno
+    ]
+
+
 def told(source: str, line: int, is_c: bool) -> str:
     """The name of the innermost function around a line, or of what it declares; empty where that says nothing."""
     if is_c:
         heads = [re.match(r"[\w ]*?[ *](\w+)\([^;]*$", text) for text in source.split("\n")[:line]]
         return next((one[1] for one in reversed(heads) if one and not one.string.startswith((" ", "/"))), "")
-    around = [
-        (node.end_lineno - node.lineno, node.name)
-        for node in ast.walk(ast.parse(source))
-        if isinstance(node, ast.FunctionDef) and node.end_lineno and node.lineno <= line <= node.end_lineno
-    ]
+    around = functions(source, line)
     declared = re.match(r"\s*(\w+)\b[^=(]*=", source.split("\n")[line - 1])
     name = min(around)[1] if around else declared[1] if declared else ""
     return "" if name in COMMON or name.startswith("__") else name.lstrip("_")
@@ -94,7 +99,7 @@ def asked(module: Path, source: str, line: int) -> tuple[list[str], list[str]]:
         shared = len(words & set(re.split(r"[_\W]", test.stem)[1:]))
         near = steps - 4 * named - 2 * shared - 2 * mirror - (module.stem in text)
         ranked.append((near, len(text), str(place)))
-    declares = not is_c and not name.islower()
+    declares = not is_c and not functions(source, line)
     first = [test for place, test in DECLARING.items() if declares and folder.startswith(place)]
     found = list(dict.fromkeys([*first, *(one for *_, one in sorted(ranked))]))
     return [one for file in found[:TOGETHER] for one in naming(file, name)][:MANY], found

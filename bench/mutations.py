@@ -71,6 +71,8 @@ def _sites(node: ast.AST, default: bool = False) -> Iterator[tuple[Site, Plant]]
     for name, value in ast.iter_fields(node):
         if name in ("annotation", "returns", "decorator_list") or isinstance(node, ast.Raise | ast.JoinedStr):
             continue
+        if isinstance(node, ast.keyword) and node.arg == "strict":  # of `zip`: for whoever reads
+            continue
         children = value if isinstance(value, list) else [value]
         given = name in ("defaults", "kw_defaults") or (isinstance(node, ast.AnnAssign) and name == "value")
         for child in children:

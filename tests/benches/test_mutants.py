@@ -21,7 +21,7 @@ SOURCE = '''
 LIMIT: int = 3
 def clamp(x: float = -1.5) -> float:
     """Hold x between -LIMIT and LIMIT."""
-    check(x)
+    check(zip(x, strict=True))
     if x > LIMIT and not x == 7:
         raise ValueError(f"{x + 1} is more than {LIMIT * 2}")
     return clip(min(-LIMIT, x * 2), LIMIT) if x is not None else x[1] % 1000.0 == True
@@ -32,6 +32,7 @@ C = """/* A file: 1 + 1 is said only. */
 static double clamp(double x, const double *limit)
 {
     check(x);
+    free(x);
     if (x > limit[0] && !(x == 7)) {
         return within(x, 1e3) + fmax(x, 2.5); /* x - 1 */
     }
@@ -51,7 +52,7 @@ def test_every_kind_of_error_is_planted_and_each_changes_one_place() -> None:
         ("default", "3 -> 4"),
         ("sign", "-1.5 -> without minus"),
         ("default", "1.5 -> 1.8"),
-        ("call", "check(x) -> left out"),
+        ("call", "check(zip(x, strict=True)) -> left out"),
         ("comparison", "x > LIMIT -> GtE"),
         ("comparison", "x > LIMIT -> LtE"),
         ("truth", "x > LIMIT and (not x == 7) -> Or"),
@@ -123,6 +124,7 @@ def test_every_room_of_the_product_has_its_errors() -> None:
         ("cosim/hardware/replay.py", "def replay(", "hardware/test_hardware_replay.py"),
         ("pyfmi_models/adrc/controller.py", "def _tick(", "adrc/test_adrc_ticks.py"),
         ("cosim/fmi/types.py", "INTEGERS = ", "fmi/test_edges_of_types.py"),
+        ("pyfmi_models/friction/maxwell_slip.py", "    sigma1: ", "models/test_parameter_ranges.py"),
         ("cosim/hardware/heads.c", "EXPORT bool heads_combine", "hardware/test_heads.py"),
         ("cosim/estimation/priors.py", "def _trust(", "estimation/test_priors.py"),
     ],

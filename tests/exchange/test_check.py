@@ -97,6 +97,10 @@ def test_the_later_draft_with_its_kind_of_analysis_is_read_and_other_kinds_are_n
     done = cosim.check(other)
     assert "not run  chirp" in str(done)
     assert "SteadyState" in str(done)
+    listed = {"fmi-ls-manifest.xml": manifest(("application/x-of-others", "b.oth", "experiment")), "b.oth": "?"}
+    foreign = str(cosim.check(with_files(motor(folder, 3), folder / "foreign.fmu", listed)))
+    assert "not run  b.oth" in foreign
+    assert "b.oth is of type application/x-of-others, and read here are:" in foreign
 
 
 def test_a_parameter_set_of_an_experiment_is_applied(folder, made):

@@ -73,10 +73,10 @@ def names_of(make):
     return unknowns, knowns
 
 
-def ask(driver, which, unknowns, knowns, seed):
-    """Directional: seed of the knowns -> change of the unknowns; adjoint: the other way."""
+def ask(driver, which, unknowns, knowns, seed, more=0):
+    """Directional: seed of the knowns -> change of the unknowns; adjoint: the other way; room for `more` results."""
     references = [(ctypes.c_uint * len(part))(*(driver.references[one] for one in part)) for part in (unknowns, knowns)]
-    count = len(knowns if which == "Adjoint" else unknowns)
+    count = len(knowns if which == "Adjoint" else unknowns) + more
     result = (ctypes.c_double * count)()
     sizes = [ctypes.c_size_t(len(part)) for part in (unknowns, knowns, seed)] + [ctypes.c_size_t(count)]
     lengths = (sizes[2:3], sizes[3:]) if driver.fmi == 3 else ((), ())
@@ -176,6 +176,17 @@ def test_adjoint_derivatives_refuse_what_directional_ones_refuse():
     controller = models.Driver(models.controller(), library(models.controller), 3).start()
     assert ask(controller, "Adjoint", ["command"], ["wanted"], [1.0])[0] == "error"
     assert "a sampled model has no partial derivatives" in controller.messages[-1][2]
+
+
+@pytest.mark.parametrize("which", ["Directional", "Adjoint"])
+def test_derivatives_take_and_give_as_many_numbers_as_there_are_variables(which):
+    driver = initializing(models.lugre, 3)
+    unknowns, knowns = names_of(models.lugre)
+    many = len(unknowns if which == "Adjoint" else knowns)
+    for seeds, more in ((many + 1, 0), (many, 1), (many, -1)):
+        assert ask(driver, which, unknowns, knowns, [1.0] * seeds, more)[0] == "error"
+        assert driver.messages[-1][2].endswith("scalar variables")
+    assert ask(driver, which, unknowns, knowns, [1.0] * many)[0] == "ok"
 
 
 def test_fmpy_reads_the_flag_and_gets_the_adjoint(tmp_path):

@@ -95,6 +95,7 @@ def test_elements_of_maxwell_slip_are_stiff_in_a_row_and_each_follows_its_part_o
         torque = state.sum() + S1 * sum(rates) / S0
         assert float(law.contact(ca.DM(state), v, level(v))) == pytest.approx(torque, rel=1e-9)
         assert float(law.level(v)) == pytest.approx(level(v), rel=1e-9)
+        assert float(law.viscous(v)) == pytest.approx(S2 * v, rel=1e-12)
     assert MaxwellSlip.elements == 8
     assert [one.name for one in law.states()] == [f"element_{k}" for k in range(1, 9)]
     assert {one.nominal for one in law.states()} == {0.1}
