@@ -28,6 +28,7 @@ from cosim.diagnosis.search.side_by_side import side_by_side
 from cosim.fmi.alias import Alias
 from cosim.reading import check_kind
 from cosim.report.answer_figure import answer_figure
+from cosim.report.repairs import for_machine
 from cosim.report.terminal import summary
 from cosim.support.errors import InputError
 from cosim.support.files import check_directory
@@ -273,7 +274,7 @@ def _with_base(box: BlackBox, given: _Given, on_progress: Callable[[str], None])
 def _diagnosed(given: _Given, out: Path | None, command: str, listeners: _Listeners) -> DiagnosisResult:
     """Diagnose, and write the answer and the card where there is a folder."""
     found = find(given.train, given.heldout, given.card, listeners.on_progress, with_possible=given.with_possible)
-    outcome = _noted(found, given.notes)
+    outcome = _noted(found, given)
     listeners.on_answer(outcome.diagnosis)
     done = without_files(outcome.diagnosis)
     if out:
@@ -288,7 +289,7 @@ def _delivered(given: _Given, out: Path | None, command: str, listeners: _Listen
     with Loops(card, heldout) as loops, side_by_side(listeners.on_progress) as refits:
         loops.close("nominal", card.plant())
         found = find(train, heldout, card, listeners.on_progress, loops.close, refits, given.with_possible)
-        outcome = _noted(found, given.notes)
+        outcome = _noted(found, given)
         listeners.on_answer(outcome.diagnosis)
         done = deliver(
             outcome, train, heldout, card, out, command, loops, listeners.on_progress, given.more, given.base
@@ -296,9 +297,10 @@ def _delivered(given: _Given, out: Path | None, command: str, listeners: _Listen
     return _result(done, outcome, given)
 
 
-def _noted(outcome: Outcome, notes: tuple[str, ...]) -> Outcome:
-    found = outcome.diagnosis
-    return replace(outcome, diagnosis=replace(found, data_quality=(*notes, *found.data_quality)))
+def _noted(outcome: Outcome, given: _Given) -> Outcome:
+    """Add what was said while reading, and what to do on the kind of machine that the card names."""
+    found = for_machine(outcome.diagnosis, given.card.mount.machine or "")
+    return replace(outcome, diagnosis=replace(found, data_quality=(*given.notes, *found.data_quality)))
 
 
 def _result(done: Diagnosis, outcome: Outcome, given: _Given) -> DiagnosisResult:

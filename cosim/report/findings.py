@@ -144,9 +144,7 @@ def do(one: words.Block, diagnosis: Diagnosis) -> str:
     own = [finding.effect for finding in one.findings]
     if one.answer == "ambiguous" and is_about(diagnosis, own) and (order := to_record(diagnosis)):
         return words.started(order)
-    files, known = words.delivered(diagnosis), repairs_of(one.first.effect)
-    if known and (kind := words.machine(diagnosis)):
-        return next(iter(known.of(diagnosis.motion, kind).values()), one.first.action)
+    files = words.delivered(diagnosis)
     if one.first not in diagnosis.in_model:
         return without_model(one.first.action)
     return one.first.action or (f"Use {files[0]}" if files and one.answer == "found" else "")

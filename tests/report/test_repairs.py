@@ -11,10 +11,12 @@ from plain_words import unplain
 from report_example import FOUND, REST, diagnosis, report_of
 
 from cosim.api.show import show
+from cosim.delivery.deliver import as_json
 from cosim.diagnosis.effects import TRIED
 from cosim.report import render
-from cosim.report.repairs import MACHINES, MOTIONS, machines_of, repairs_of
+from cosim.report.repairs import MACHINES, MOTIONS, for_machine, machines_of, repairs_of
 from cosim.report.terminal import summary
+from cosim.serve.work import in_words
 from cosim.support.errors import InputError
 from pyfmi_models.card import MachineKind
 
@@ -59,9 +61,15 @@ def test_the_report_has_checks_and_the_repairs_that_fit_the_motion() -> None:
     assert "Three checks" not in render(replace(diagnosis("two"), findings=(unsure, *REST), verdict=()))
 
 
-def test_a_card_that_names_the_machine_has_its_repair_on_first_screen_and_terminal() -> None:
+def test_a_card_that_names_the_machine_has_its_repair_on_first_screen_terminal_and_page_and_in_json() -> None:
     made = diagnosis("two").provenance
     whole = replace(diagnosis("two"), provenance=made | {"card": made["card"] | {"machine": "harmonic_drive"}})  # type: ignore[typeddict-item]
+    whole = for_machine(whole, "harmonic_drive")
+    repair = whole.findings[1].action
+    assert repair.startswith("Check the brake's air gap")
+    assert repair in [row["action"] for row in in_words(whole)["findings"]]
+    assert repair in [one["action"] for one in as_json(whole)["effects"]]  # type: ignore[call-overload,index,union-attr]
+    assert [one.action for one in for_machine(whole, "").findings] == [one.action for one in whole.findings]
     assert "Check the brake&#39;s air gap and the output seal" in render(whole).split("<h2>Findings")[0]
     assert "Friction asymmetry: check the brake's air gap" in summary(whole)
     assert "Check clamp brake and lip seal" in report_of("two")

@@ -6,11 +6,15 @@ machine. Report, documentation and `cosim show EFFECT` read it from here, so tha
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.resources import files
+from typing import TYPE_CHECKING
 
-__all__ = ["MACHINES", "Check", "Repairs", "machines_of", "repairs_of"]
+if TYPE_CHECKING:
+    from cosim.diagnosis.answer.result import Diagnosis
+
+__all__ = ["MACHINES", "Check", "Repairs", "for_machine", "machines_of", "repairs_of"]
 
 MACHINES: Mapping[str, str] = {
     "rotary_table": "rotary table, telescope axis",
@@ -71,3 +75,19 @@ def repairs_of(effect: str) -> Repairs | None:
         for one in read["checks"]
     )
     return Repairs(checks, read["repair"])
+
+
+def for_machine(diagnosis: "Diagnosis", machine: str) -> "Diagnosis":
+    """Return a diagnosis that says of each effect, detected or possible, what to do on one kind of machine.
+
+    Args:
+        diagnosis: with the effects' own actions, which fit any machine.
+        machine: a key of `MACHINES`; "" leaves the actions as they are.
+    """
+    if not machine:
+        return diagnosis
+    told = []
+    for one in diagnosis.findings:
+        known = repairs_of(one.effect) if one.answer in ("found", "ambiguous") else None
+        told.append(replace(one, action=known.by_machine.get(machine, one.action)) if known else one)
+    return replace(diagnosis, findings=tuple(told))
