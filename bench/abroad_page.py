@@ -187,8 +187,8 @@ def page(found: Mapping[str, Any]) -> str:
             for one in found["scores"]
         ),
         "",
-        "`not sure`: the interval holds the bar. Shares have Wilson's interval, the rest a bootstrap over cases. Where",
-        "nothing is concealed, unknown is a false alarm too; a crash is wrong everywhere but there.",
+        "`inconclusive`: the interval holds the bar. Shares have Wilson's interval, the rest a bootstrap over cases.",
+        "Where nothing is concealed, unknown is a false alarm too; a crash is wrong everywhere but there.",
         "",
         "## By family",
         "",

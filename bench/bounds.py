@@ -153,7 +153,7 @@ def page(found: Sequence[dict[str, Any]], given: argparse.Namespace, seconds: fl
         f"{sum(r['effect'] == name for r in found)} |"
         for name in names
     ]
-    held = "reached" if low >= BAR else "not sure" if high >= BAR else "missed"
+    held = "reached" if low >= BAR else "inconclusive" if high >= BAR else "missed"
     return "\n".join(
         [
             "# Bounds of what was not seen: concealed at the bound, found?",

@@ -35,7 +35,7 @@ def page() -> str:
         "# Scores",
         "",
         "Written by `python bench/scores.py` from the JSON next to each page, no number by hand. In brackets: 95 %",
-        "intervals. *not sure*: the bar lies inside the interval. How to rebuild: [README.md](README.md).",
+        "intervals. *inconclusive*: the bar lies inside the interval. How to rebuild: [README.md](README.md).",
     ]
     for name, file in SCORED.items():
         lines += ["", *section(name, read(file))]

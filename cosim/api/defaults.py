@@ -22,12 +22,12 @@ def split(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Record
     """
     if len(recordings) > 1:
         *train, last = recordings
-        said = f"{last.name}, the last of {len(recordings)} recordings, is kept out of the fit and proves the result"
+        said = f"{last.name}, the last of {len(recordings)} recordings, is for validation and not fitted"
         return train, [last], f"{said}; --heldout chooses another."
     (one,) = recordings
     first = int(KEPT * len(one))
     parts = [_rows(one, slice(0, first), "begin"), _rows(one, slice(first, None), "end")]
-    said = f"{one.name} is the only recording: its first {100 * KEPT:.0f} % are fitted, the rest proves the result"
+    said = f"{one.name} is the only recording: its first {100 * KEPT:.0f} % are fitted, the rest is for validation"
     return parts[:1], parts[1:], f"{said}, which is weaker than a second recording (--heldout)."
 
 

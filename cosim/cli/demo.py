@@ -19,7 +19,7 @@ def demo(
         bool, typer.Option("--verbose", "-v", help="Also print how exact the integration inside the FMU is.")
     ] = False,
 ) -> None:
-    """Export, co-simulate, meet a recording with concealed physics, find it, prove it, write the better FMU."""
+    """Export FMUs, co-simulate, diagnose recordings of a machine with effects its card lacks, write the better FMU."""
     from cosim.report.terminal import summary
     from cosim.support.files import check_free
     from cosim_studies.demo import TABLE, run_demo
@@ -27,11 +27,11 @@ def demo(
     keep_freed_memory()
     check_free(out, force)
     started = time.perf_counter()
-    with stage("cosim demo: a night's recordings of a mount that has physics its card does not know") as progress:
+    with stage("cosim demo: recordings of a mount with effects that its card lacks") as progress:
         done = run_demo(out, f"cosim demo --out {out}", progress.tell)
     put(summary(done.diagnosis, out=out / "diagnosis"))
     put(
-        f"\nIn closed loop on the held-out set point, simulated against recorded torque, RMS [N·m]:\n"
+        f"\nClosed loop on the set point of the validation run, RMS of simulated minus recorded torque [N·m]:\n"
         f"{done.before.torque:.3g} with the card's FMU, {done.after.torque:.3g} with the improved one"
     )
     if verbose:

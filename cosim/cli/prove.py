@@ -54,7 +54,8 @@ def prove(
     if as_json:
         put_json(found)
     else:
-        put("\n".join(_line(score) for score in found["scores"]))
+        head = f"{'score':<64} {'value [95 % range]':<22} {'target':<8} result"
+        put("\n".join([head, *(_line(score) for score in found["scores"])]))
     say(f"read {out / 'README.md'}")
 
 
@@ -78,4 +79,4 @@ def _line(score: dict[str, object]) -> str:
     """One score on one line."""
     from cosim_studies.proof.page import estimate, met
 
-    return f"{score['title']:<64} {estimate(score):<22} {score['asked']:<8} {met(score, 'MISSED')}".rstrip()
+    return f"{score['title']:<64} {estimate(score):<22} {score['asked']:<8} {met(score, 'missed')}".rstrip()

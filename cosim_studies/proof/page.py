@@ -146,9 +146,9 @@ def page(found: Mapping[str, Any]) -> str:
 
 
 def met(one: Mapping[str, Any], missed: str = "**missed**") -> str:
-    """Whether the bar is met; "not sure" where the interval holds the bar, whatever the value."""
+    """Whether the bar is met; "inconclusive" where the interval holds the bar, whatever the value."""
     word = {True: "met", False: missed, None: ""}[one["met"]]
-    return word if one["sure"] or not word else "not sure"
+    return word if one["sure"] or not word else "inconclusive"
 
 
 def estimate(one: Mapping[str, Any]) -> str:

@@ -102,7 +102,7 @@ def test_of_several_recordings_the_last_is_kept_and_a_single_one_is_cut() -> Non
     several = [cosim.read(table(seed), name=f"run {seed}") for seed in (1, 2, 3)]
     train, held, said = split(several)
     assert (train, held) == (several[:2], several[2:])
-    assert said.startswith("run 3, the last of 3 recordings, is kept out of the fit")
+    assert said.startswith("run 3, the last of 3 recordings, is for validation")
     (first,), (rest,), said = split(several[:1])
     assert len(first) + len(rest) == len(several[0])
     assert first.t[-1] < rest.t[0]
@@ -120,7 +120,7 @@ def test_two_files_and_no_option_give_an_answer(
     assert not left.value.code
     said = capsys.readouterr()
     assert json.loads(said.out)["verdict"] == []
-    assert "run2, the last of 2 recordings, is kept out of the fit and proves the result" in said.err
+    assert "run2, the last of 2 recordings, is for validation and not fitted" in said.err
     assert re.search(
         r"No card was given; it is estimated from the recordings: inertia (1\.9\d*|2(\.0\d*)?) kg", said.err
     )

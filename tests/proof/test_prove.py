@@ -178,7 +178,7 @@ def test_wrong_wishes_end_with_one_sentence(wrong, message, tmp_path, capsys) ->
 
 @pytest.mark.parametrize(
     ("met", "sure", "said"),
-    [(True, True, "met"), (True, False, "not sure"), (False, True, "MISSED"), (False, False, "not sure")],
+    [(True, True, "met"), (True, False, "inconclusive"), (False, True, "missed"), (False, False, "inconclusive")],
 )
 def test_the_terminal_says_whether_more_cases_could_turn_a_bar(met: bool, sure: bool, said: str) -> None:
     score = {"title": "right", "value": 0.9, "low": 0.8, "high": 1.0, "asked": ">= 0.9", "met": met, "sure": sure}

@@ -28,7 +28,7 @@ def test_a_card_is_estimated_from_the_recordings(client: TestClient, desk: Desk)
     job = new(client)
     assert "there is none yet" in act(client, job, "estimate").text
     put(client, job, "one.csv", example.recordings()[example.NAMES[0]].encode())
-    assert "Of the only recording the end is kept out of the fit" in client.get(job).text
+    assert "The end of the only recording is for validation" in client.get(job).text
     act(client, job, "estimate")
     text = desk.card_text(desk.store.get(id_of(job)))
     inertia = float(re.findall(r"^inertia = ([\d.]+)", text, re.MULTILINE)[0])
@@ -46,7 +46,7 @@ def test_the_last_of_several_recordings_proves_where_none_was_chosen(client: Tes
     job = new(client)
     for name in ("a.csv", "b.csv"):
         put(client, job, name, example.recordings()[example.NAMES[0]].encode())
-    assert "b.csv, the last one, is kept out of the fit" in client.get(job).text
+    assert "b.csv, the last one, is for validation" in client.get(job).text
 
 
 def test_the_form_asks_for_two_numbers_of_an_axis_with_coulomb_friction() -> None:

@@ -173,8 +173,8 @@ def _proof(job: Job) -> str:
     if not used or any(one.role == "heldout" for one in job.uploads):
         return ""
     if used[1:]:
-        return f"{used[-1]}, the last one, is kept out of the fit and proves the result; choose another one above."
-    return "Of the only recording the end is kept out of the fit and proves the result: a second recording proves more."
+        return f"{used[-1]}, the last one, is for validation and not fitted; choose another one above."
+    return "The end of the only recording is for validation and not fitted; a second recording would validate better."
 
 
 def _begun(desk: Desk, job: Job) -> Parsed:
