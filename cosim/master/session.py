@@ -4,6 +4,7 @@ What is set acts in the next step. An output keeps the value it was given for th
 it anew; an input that no wire feeds keeps it until it is set again.
 """
 
+import warnings
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
@@ -23,6 +24,7 @@ from cosim.master.loop import CompiledLoop, make_loop
 from cosim.master.opening import started, wiring_of
 from cosim.master.output import kept, writer_of
 from cosim.master.planning import make_plan
+from cosim.master.proven import proven_of, said_of, with_records
 from cosim.support.errors import StepError, WiringError
 from cosim.system.plan import Plan
 from cosim.system.system import System
@@ -39,6 +41,10 @@ MOST = 1000
 """Outputs that are put on the bus although nothing reads them."""
 FEW = 64
 """Steps of one call from which the surroundings of the process are checked after it, which takes as long as these."""
+
+
+class OutsideProvenRangeWarning(UserWarning):
+    """A system stepped by hand has left the range in which one of its components is proven."""
 
 
 class Session:
@@ -63,12 +69,18 @@ class Session:
             self._stack = stack.pop_all()
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: object = None, *_: object) -> None:
+        outside = self.outside if kind is None else ()
         self._stack.close()
+        for sentence in outside:
+            warnings.warn(sentence, OutsideProvenRangeWarning, stacklevel=2)
 
     def _open(self, stack: ExitStack) -> None:
         system, self._tick, self.ended = self._system, 0, ""
         wiring = _in_hand(wiring_of(stack, system))
+        self._proven, self._watched, self._seen_rows = proven_of(wiring), 0, 0
+        self._recorded = len(wiring.records)
+        wiring = replace(wiring, records=with_records(wiring, self._proven))
         self._plan = plan = make_plan(wiring, system.step, system.decimation, system.start)
         settings = started(wiring, system, plan)
         self._given, self._guard = Given(wiring, plan), guard_of(plan)
@@ -179,6 +191,21 @@ class Session:
             ) from None
 
     @property
+    def outside(self) -> tuple[str, ...]:
+        """A sentence for each range, in which a component is proven, that recorded rows have left: when, and how far.
+
+        The end of the `with` warns of them (`OutsideProvenRangeWarning`), once.
+        """
+        row_time = self._plan.decimation * self._plan.step
+        for rows in self._rows[self._watched :] if self._proven else ():
+            t = self._plan.start + (self._seen_rows + np.arange(rows.shape[1])) * row_time
+            for one, values in zip(self._proven, rows[self._recorded :], strict=True):
+                one.see(t, values)
+            self._seen_rows += rows.shape[1]
+        self._watched = len(self._rows)
+        return tuple(said_of(self._proven))
+
+    @property
     def recording(self) -> Recording:
         """What was recorded so far: the rows that are complete, by the columns of the system."""
         rows = np.concatenate([np.empty((len(self._plan.columns), 0)), *self._rows], axis=1)
@@ -186,7 +213,8 @@ class Session:
         t = self._plan.start + np.arange(rows.shape[1]) * self._plan.decimation * self._plan.step
         writer.write({"t": t} | dict(zip(self._wiring.records, rows, strict=True)))
         found = kept(writer, self._system.name)
-        table = {name: values for name, values in found.table.items() if not name.startswith(SEEN)}
+        own = {"t", *self._system.records}
+        table = {name: values for name, values in found.table.items() if name in own}
         return replace(found, table=table)
 
 

@@ -10,6 +10,7 @@ from motor_fmu import motor
 
 import cosim
 from cosim.fmi.domain import KEY, Domain, domains_of, entries_of
+from cosim.master.session import OutsideProvenRangeWarning
 from pyfmi_models.card import read_card
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.export.related import identified, references
@@ -64,6 +65,28 @@ def test_a_run_says_the_first_time_and_variable(folder):
     assert "proven -6.283 to 6.283" in speed
     assert outside[0] in str(done)
     assert list(done.recording.columns) == ["t", "phi"], "nothing more is recorded"
+
+
+def test_a_system_in_hand_says_it_while_it_is_stepped_and_warns_at_the_end(folder):
+    def stepped():
+        with cosim.open(folder / "system.toml") as s:
+            s.step(50)
+            assert s.outside == ()
+            s.step(150)
+            assert [one.split(" leaves")[0] for one in s.outside] == ["a.speed", "a.i"]
+            assert "a is proven at 1.51 s: 3.02 A, proven -3 to 3" in s.outside[1]
+            assert s.outside == s.outside, "asked twice it is the same"
+            assert list(s.recording.columns) == ["t", "phi"], "nothing more is recorded"
+
+    with pytest.warns(OutsideProvenRangeWarning, match="leaves the range") as warned:
+        stepped()
+    assert len(warned) == 2
+
+
+def test_a_system_in_hand_within_the_range_says_nothing(folder):
+    with cosim.open(folder / "system.toml") as s:
+        s.step(50)
+        assert s.outside == ()
 
 
 def test_a_run_within_the_range_says_nothing(folder):
