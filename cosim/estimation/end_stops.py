@@ -28,6 +28,8 @@ SLOW = 5 * CLEAR_MOTION
 STEEP = 3.0
 """How much more torque the contact must take than the model lacks between one and three `DEPTH` from the end: of what
 goes with the square of the position that is 1.1. Unit: 1."""
+HELD = 0.5
+"""Share of a visit to the end in which it must push: an axis that works there moves. Unit: 1."""
 CELL = 0.05
 """Seconds over which a first look averages. Unit: s."""
 MOST = 0.9
@@ -126,7 +128,8 @@ def _spans(prepared: Prepared, near: Rows, pushing: Rows) -> Iterator[tuple[int,
         first, t = rows.stop, piece.t[piece.kept]
         edges = np.flatnonzero(np.diff(np.concatenate([[0], near[rows].astype(np.int8), [0]])))
         for start, end in edges.reshape(-1, 2).tolist():
-            if pushing[rows][start:end].sum() * piece.dt * piece.stride >= LEAST_SECONDS:
+            held = pushing[rows][start:end]
+            if held.mean() >= HELD and held.sum() * piece.dt * piece.stride >= LEAST_SECONDS:
                 yield piece.recording, float(t[start]), float(t[end - 1])
 
 

@@ -208,8 +208,18 @@ def prepare(recordings: Sequence[Recording], band: float | Band) -> Prepared:
     read = Band(cutoff, motion if motion > cutoff else 0.0)
     others = _neighbours(recordings)
     pieces = [piece for index, one in enumerate(recordings) for piece in _pieces(one, index, read, others)]
+    pieces = [piece for piece in pieces if len(piece.kept)]
+    _check_left(recordings, pieces)
     has_position = all("q" in recording for recording in recordings)
     return Prepared(tuple(r.name for r in recordings), tuple(pieces), cutoff, has_position, read.motion, others)
+
+
+def _check_left(recordings: Sequence[Recording], pieces: Sequence[Piece]) -> None:
+    """Refuse a recording of which nothing may be judged (RecordingError)."""
+    for index, one in enumerate(recordings):
+        if not any(piece.recording == index for piece in pieces):
+            text = f"Nothing of {one.name} may be judged: single readings, rests or end stops are all there is."
+            raise RecordingError(text, culprit=one.name)
 
 
 def _neighbours(recordings: Sequence[Recording]) -> tuple[Neighbour, ...]:

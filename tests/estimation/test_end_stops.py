@@ -78,3 +78,13 @@ def test_without_a_position_nothing_is_said():
     run = recorded(Stop)
     speed = Recording("run", {"t": run.t, "tau": run["tau"], "v": np.gradient(run["q"], STEP)})
     assert pushes([speed], MOUNT) == ()
+
+
+def test_an_axis_that_works_at_one_end_does_not_push_there():
+    """It turns far away and back, then moves to and fro within the last hundredth of the travel."""
+    t = np.arange(0, 30, STEP)
+    far = np.where(t < 15, 30 * np.sin(np.pi * t / 15) ** 2, 0.0)
+    near = np.where(t > 16, 0.3 * np.sin(2.1 * (t - 16)), 0.0)
+    v = np.gradient(near - far, STEP)
+    tau = 0.5 * np.gradient(v, STEP) + 2.0 * np.tanh(v / 0.01) + 1.5 * np.tanh(v) + 4.0 * np.tanh(near / 0.05)
+    assert pushes([Recording("run", {"t": t, "tau": tau, "q": near - far})], MOUNT) == ()
