@@ -253,12 +253,15 @@ def _telling(recording: Recording, cutoff: float) -> float:
         held = sum(recording.t[span.stop - 1] - recording.t[span.start] for span in spans)
         if spans and held >= COVERED * recording.duration:
             return band
-    rule = f"pieces without holes must be {LEAST_SECONDS:g} s and {TURNED + 1} rows long and hold half of a recording"
-    raise RecordingError(
-        f"{recording.name} has {len(recording.gaps)} holes in time, and {rule}; record it in even steps.",
-        culprit=recording.name,
-        value=len(recording.gaps),
-    )
+    least = f"{LEAST_SECONDS:g} s and {TURNED + 1} rows"
+    if count := len(recording.gaps):
+        text = (
+            f"{recording.name} has {count} holes in time, and pieces without holes must be {least} long and hold half"
+        )
+        text += " of a recording; record it in even steps."
+    else:
+        text = f"{recording.name} is {recording.duration:.3g} s in {len(recording)} rows; {least} are needed at least."
+    raise RecordingError(text, culprit=recording.name, value=count)
 
 
 def _spans(recording: Recording, cutoff: float) -> list[slice]:
