@@ -10,7 +10,7 @@ from typing import TextIO
 from cosim.diagnosis.answer.result import Diagnosis, Finding
 from cosim.plots.quantities import spelled
 from cosim.report.findings import do, untrained, where
-from cosim.report.lead import heading
+from cosim.report.lead import heading, in_motion
 from cosim.report.next_experiment import to_record
 from cosim.report.quantities import Scales
 from cosim.report.words import (
@@ -208,7 +208,7 @@ def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     improved = f" → {after} (with what was learned)" if diagnosis.learned else improved
     possible = f"; {unit.number(held.possible_rms)} with what is only possible" if held.possible_rms is not None else ""
     text = f"Validation RMS error [{unit.unit}]: {before} (refitted card){improved}{possible}; noise floor {noise}"
-    return _wrapped(text, 0)
+    return _wrapped(text + in_motion(diagnosis.heldout, scales), 0)
 
 
 def _next(diagnosis: Diagnosis) -> list[str]:

@@ -105,3 +105,14 @@ def test_a_rival_that_removes_more_is_said_to_fit_worse(share: str, why: str) ->
     said = dict(block(blocks(whole)[0], whole, Scales.of(whole), None).rows)["Less likely"]
     assert why in said
     assert ("decides" in said) == (share == "90.7")
+
+
+def test_where_rests_are_most_of_the_error_that_of_clear_motion_is_told() -> None:
+    """A law without memory says nothing about rest: an error of its own level there is no fault of the model."""
+    told = {"before_rms": 0.05, "after_rms": 0.05}
+    whole = diagnosis("none")
+    held = replace(whole.heldout, before_rms=0.46, after_rms=0.46, sliding=told)
+    resting = replace(whole, heldout=held)
+    assert "0.05 in clear motion" in " ".join(summary(resting).split())
+    near = replace(whole, heldout=replace(held, sliding={"before_rms": 0.4, "after_rms": 0.4}))
+    assert "in clear motion" not in " ".join(summary(near).split())
