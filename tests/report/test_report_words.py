@@ -113,6 +113,6 @@ def test_where_rests_are_most_of_the_error_that_of_clear_motion_is_told() -> Non
     whole = diagnosis("none")
     held = replace(whole.heldout, before_rms=0.46, after_rms=0.46, sliding=told)
     resting = replace(whole, heldout=held)
-    assert "0.05 in clear motion" in " ".join(summary(resting).split())
+    assert "0.050 in clear motion" in " ".join(summary(resting).split())
     near = replace(whole, heldout=replace(held, sliding={"before_rms": 0.4, "after_rms": 0.4}))
     assert "in clear motion" not in " ".join(summary(near).split())
