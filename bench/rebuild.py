@@ -76,11 +76,14 @@ PAGES = {
     "robustness/fuzz_valgrind.md": "python bench/fuzz.py --watch valgrind --examples 80 --out valgrind"
     " && cp valgrind/fuzz.md results/robustness/fuzz_valgrind.md",
     "robustness/kills.md": BENCH.format("kills.py --trials 50 --seed 1920", "robustness"),
-    "robustness/mutants.md": BENCH.format(
-        "mutants.py --seed 44001 --count 150 --seconds 12 --journal FILE"
-        " --remarks results/robustness/mutants_remarks.toml",
-        "robustness",
-    ),
+    **{
+        f"robustness/{page}": BENCH.format(
+            f"mutants.py --seed {seed} --count 30 --seconds 12 --journal FILE --page {page}"
+            " --remarks results/robustness/mutants_remarks.toml",
+            "robustness",
+        )
+        for page, seed in (("mutants.md", 29001), ("mutants_2.md", 29002))
+    },
     "robustness/serve.md": BENCH.format("serve.py --drops 100 --rounds 3 --seed 17", "robustness"),
     "stiffness/README.md": "python -m cosim_studies.stiffness --out results/stiffness --force",
 }

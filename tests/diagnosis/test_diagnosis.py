@@ -12,6 +12,7 @@ import jsonschema
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from fmpy import read_model_description
 from measured_like import read
 from wandering import axis, recorded, wander
 
@@ -107,7 +108,10 @@ class TestCommand:
         assert "not passive" in printed["data_quality"][0]
         assert "Notes on the card and the recordings" in page
         assert "it is not passive" in page
-        assert len(list(out.glob("*.fmu"))) == 2
+        versions = {
+            path.stem[-5:] == "_fmi2": read_model_description(str(path)).fmiVersion for path in out.glob("*.fmu")
+        }
+        assert versions == {False: "3.0", True: "2.0"}
         assert self.run(self.arguments(folder, out)) == 2
         assert "exists already" in capsys.readouterr().err
 

@@ -72,6 +72,7 @@ def test_a_chirp_of_a_few_micrometres_is_not_told_in_metres() -> None:
 
 def test_names_of_people_keep_their_capitals_inside_a_sentence() -> None:
     assert [words.lowered(title) for title in ("Stribeck friction", "Delay")] == ["Stribeck friction", "delay"]
+    assert words.started("motor torque") == "Motor torque"
 
 
 def test_measured_points_are_black_and_the_improved_model_is_blue() -> None:
