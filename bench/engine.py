@@ -149,12 +149,15 @@ def compared(before: Path | None, skip: list[str]) -> Iterator[Row]:
         yield Row("their geometric mean", "<= 1/5", f"{float(np.exp(np.mean(np.log(ratios)))):.2f}")
 
 
-def used(root: Path | None, words: list[str]) -> Used:
+def used(root: Path, words: list[str]) -> Used:
     """What Python uses for some words with the packages of a checkout."""
     threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS")}
-    environment = os.environ | threads | {"PYTHONPATH": str(root)}
+    environment = os.environ | threads | {"PYTHONPATH": str(root.resolve())}
     with tempfile.TemporaryFile("w+") as told:
-        process = subprocess.Popen([sys.executable, *words], stdout=subprocess.DEVNULL, stderr=told, env=environment)
+        command, quiet = [sys.executable, *words], subprocess.DEVNULL
+        process = subprocess.Popen(
+            command, stdout=quiet, stderr=told, env=environment, cwd=root
+        )  # `-m` looks there first
         _, _, spent = os.wait4(process.pid, 0)
         told.seek(0)
         return Used(spent.ru_utime + spent.ru_stime, spent.ru_maxrss / 1e3, told.read())
