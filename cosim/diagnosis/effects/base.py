@@ -22,7 +22,7 @@ Hypotheses are stateless; a new one is a new file in this folder, and nothing el
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from math import pi
 from typing import Any, ClassVar, Generic, Literal, NamedTuple, TypeVar
@@ -227,30 +227,6 @@ def turn(mount: Mount) -> float:
     return 1.0 if mount.motion == "linear" else 2 * pi
 
 
-LEAST_CYCLES = 1.5
-"""A ripple with fewer cycles a turn is an unbalance."""
-WAVES, LEAST_STROKE, PASSED = 4, 1.5, 0.8
-"""Numbers of cycles that are concealed, from so many over the visited positions to what the filter passes of them at
-the median speed: this share of the cutoff."""
-
-
-def cycles_shown(mount: Mount, span: Span, lowest: float = LEAST_CYCLES, highest: float = math.inf) -> list[float]:
-    """Cycles a turn (a metre) between what a stroke holds and what the band passes."""
-    speed = np.abs(span.v)
-    moving = speed[speed > 0.02 * span.top]
-    passed = PASSED * span.cutoff * turn(mount) / max(float(np.median(moving)) if len(moving) else 0.0, 1e-300)
-    low = max(LEAST_STROKE * turn(mount) / max(span.reach, 1e-300), lowest if mount.motion == "rotary" else 0.0)
-    high = min(passed, highest)
-    return np.geomspace(low, high, WAVES).tolist() if high > low else []
-
-
-def with_cycles(tried: Sequence[Candidate], cycles: Sequence[float]) -> Iterator[Candidate]:
-    """The first candidate of a ripple with other numbers of cycles."""
-    for first in tried[:1]:
-        for one in cycles:
-            yield with_numbers(first, cycles_per_rev=one)
-
-
 def with_numbers(one: Candidate, **numbers: float) -> Candidate:
     """A candidate with other nonlinear numbers."""
     change: Any = replace
@@ -262,8 +238,55 @@ def of_that_size(one: Candidate, **numbers: float) -> Candidate:
     return replace(with_numbers(one, **numbers), linear=())
 
 
-def in_cycles_a_turn(seen: Seen, mount: Mount) -> str:
-    """Between which cycles a bound holds."""
-    per = "a metre" if mount.motion == "linear" else "a turn"
-    low, high = (f"{one:.3g}" if one < 1000 else f"{one:.0f}" for one in (seen.low, seen.high))
-    return f"at {low if low == high else f'{low} to {high}'} cycles {per}; not testable above"
+LEAST_CYCLES = 1.5
+"""A ripple with fewer cycles a turn is an unbalance."""
+WAVES, LEAST_STROKE, PASSED = 4, 1.5, 0.8
+"""Numbers of cycles that are concealed, from so many over the visited positions to what the filter passes of them at
+the median speed: this share of the cutoff."""
+
+
+class Cyclic(Hypothesis[Form]):
+    """An effect with so many cycles a turn (a metre), each number of them a member of its kind."""
+
+    member: ClassVar[str] = "cycles_per_rev"
+    shown: ClassVar[tuple[float, float]] = (LEAST_CYCLES, math.inf)
+    """Cycles a turn from which and up to which one is concealed."""
+
+    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
+        """All that a stroke holds and the band passes."""
+        speed, (lowest, highest) = np.abs(span.v), self.shown
+        moving = speed[speed > 0.02 * span.top]
+        passed = PASSED * span.cutoff * turn(mount) / max(float(np.median(moving)) if len(moving) else 0.0, 1e-300)
+        low = max(LEAST_STROKE * turn(mount) / max(span.reach, 1e-300), lowest if mount.motion == "rotary" else 0.0)
+        high = min(passed, highest)
+        cycles = np.geomspace(low, high, WAVES).tolist() if high > low else []
+        return [with_numbers(first, cycles_per_rev=one) for first in tried[:1] for one in cycles]
+
+    def looked(self, seen: Seen, mount: Mount) -> str:
+        """Between which cycles a bound holds."""
+        per = "a metre" if mount.motion == "linear" else "a turn"
+        low, high = (f"{one:.3g}" if one < 1000 else f"{one:.0f}" for one in (seen.low, seen.high))
+        return f"at {low if low == high else f'{low} to {high}'} cycles {per}; not testable above"
+
+
+class Rippled(Cyclic[Form]):
+    """One that may have further waves, whole multiples of its cycles among them."""
+
+    view = "one pitch"
+
+    def wave(self, cycles: float) -> Candidate:
+        """A candidate with so many cycles."""
+        raise TypeError(f"{type(self).__name__} has no wave")
+
+    def multiple(self, ripple: Form, k: int) -> Candidate | None:
+        """So many times the cycles."""
+        cycles = float(getattr(ripple, self.member))
+        return self.wave(k * cycles) if cycles > 0 else None
+
+    def where(self, effect: Form, reach: Reach) -> Where:
+        """At all positions that were visited."""
+        return visited(reach)
+
+    def is_settled(self, mount: Mount) -> bool:
+        """Never: there may be further waves."""
+        return False

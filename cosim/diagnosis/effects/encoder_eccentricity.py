@@ -1,6 +1,6 @@
 """An encoder disc off its centre."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from math import atan2, hypot, pi
 from typing import Any, ClassVar
@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from cosim.diagnosis.decide.policy import POLICY
-from cosim.diagnosis.effects.base import Evidence, Hypothesis, Seen, cycles_shown, in_cycles_a_turn, with_cycles
+from cosim.diagnosis.effects.base import Cyclic, Evidence
 from cosim.diagnosis.effects.candidates import Candidate, Span, has
 from cosim.diagnosis.effects.periodogram import peaks
 from cosim.diagnosis.effects.tuning import in_cycles, restarted
@@ -19,19 +19,17 @@ from pyfmi_models.effects import Effect
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
 from pyfmi_models.mount import Mount
 
-MOST_CYCLES = 40.0
-"""Cycles a turn up to which a false reading is concealed."""
-
 MOST_SLOPE = 0.25
 """Error of the reading for a way, relative to it: a disc of radius R off by e errs by e/R of the way, twice that with
 an oval one; a quarter is no disc any more, but a ripple whose torque the reading would have to make. Unit: 1."""
 
 
-class Eccentricity(Hypothesis[EncoderEccentricity]):
+class Eccentricity(Cyclic[EncoderEccentricity]):
     """A false reading once a turn of the disc."""
 
     forms = (EncoderEccentricity,)
-    member: ClassVar[str] = "cycles_per_rev"
+    shown: ClassVar[tuple[float, float]] = (1.0, 40.0)
+    """Bearing and disc make no more."""
     rank: ClassVar[float] = 22
     view = "slow and fast"
 
@@ -66,14 +64,6 @@ class Eccentricity(Hypothesis[EncoderEccentricity]):
         """The reading goes on where the axis does: it errs by less of the way than `MOST_SLOPE`."""
         slope = effect.amplitude_rad * effect.cycles_per_rev * (1 + 2 * abs(effect.second))
         return bool(slope < MOST_SLOPE)
-
-    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
-        """Few cycles: bearing and disc make no more."""
-        return with_cycles(tried, cycles_shown(mount, span, 1.0, MOST_CYCLES))
-
-    def looked(self, seen: Seen, mount: Mount) -> str:
-        """Between which cycles."""
-        return in_cycles_a_turn(seen, mount)
 
 
 def halved(problem: Problem, disc: Any) -> list[EncoderEccentricity]:

@@ -9,16 +9,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.decide.policy import POLICY
-from cosim.diagnosis.effects.base import (
-    Hypothesis,
-    Reach,
-    Seen,
-    cycles_shown,
-    in_cycles_a_turn,
-    turn,
-    visited,
-    with_cycles,
-)
+from cosim.diagnosis.effects.base import Hypothesis, Reach, Rippled, turn
 from cosim.diagnosis.effects.candidates import Candidate, Span, has
 from cosim.diagnosis.effects.periodogram import peaks
 from cosim.estimation.prepare import Array, Prepared
@@ -27,41 +18,23 @@ from pyfmi_models.effects import Effect, LocalFriction, PeriodicFriction
 from pyfmi_models.mount import Mount
 
 
-class FrictionRipple(Hypothesis[PeriodicFriction]):
+class FrictionRipple(Rippled[PeriodicFriction]):
     """Friction that rises and falls so many times a turn."""
 
     forms = (PeriodicFriction,)
     tables = ("friction level over position",)
-    member: ClassVar[str] = "cycles_per_rev"
     rank: ClassVar[float] = 3
-    view = "one pitch"
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Strongest cycles of what changes its sign with the speed."""
         if mount.friction.key == "none":
             return
         for cycles in peaks(span, span.residual * np.sign(span.v), lowest=0.3):
-            yield _wave(cycles)
-
-    def multiple(self, ripple: PeriodicFriction, k: int) -> Candidate | None:
-        """So many times the cycles."""
-        return _wave(k * float(ripple.cycles_per_rev)) if ripple.cycles_per_rev > 0 else None
+            yield self.wave(cycles)
 
     def way_back(self, effect: PeriodicFriction, mount: Mount) -> float:
         """Half a wave: where motion goes one way, friction over position is a torque over position."""
         return turn(mount) / (2 * float(effect.cycles_per_rev)) if effect.cycles_per_rev > 0 else 0.0
-
-    def concealed(self, mount: Mount, span: Span, tried: Sequence[Candidate]) -> Iterable[Candidate]:
-        """All that a stroke holds and the band passes."""
-        return with_cycles(tried, cycles_shown(mount, span))
-
-    def looked(self, seen: Seen, mount: Mount) -> str:
-        """Between which cycles."""
-        return in_cycles_a_turn(seen, mount)
-
-    def where(self, effect: PeriodicFriction, reach: Reach) -> Where:
-        """At all positions."""
-        return visited(reach)
 
     def is_plausible(self, effect: PeriodicFriction, mount: Mount) -> bool:
         """The largest of its waves is more than any machine is uneven by."""
@@ -72,9 +45,15 @@ class FrictionRipple(Hypothesis[PeriodicFriction]):
         """What any machine is uneven by."""
         return POLICY.least_uneven
 
-    def is_settled(self, mount: Mount) -> bool:
-        """Never: there may be further waves."""
-        return False
+    def wave(self, cycles: float) -> Candidate:
+        """Friction with so many cycles."""
+
+        def start(c: Array) -> Effect:
+            size = min(hypot(*c), 0.9)
+            return PeriodicFriction(cycles_per_rev=cycles, relative_amplitude=size, phase=atan2(-c[1], c[0]))
+
+        pair = tuple(PeriodicFriction(cycles_per_rev=cycles, relative_amplitude=0.0, phase=p) for p in (0.0, -pi / 2))
+        return Candidate("position_friction", pair, ("relative_amplitude",), start)
 
 
 class RoughSpot(Hypothesis[LocalFriction]):
@@ -115,14 +94,3 @@ class RoughSpot(Hypothesis[LocalFriction]):
         """Two widths to each side of its centre."""
         span = (effect.q_center - 2 * effect.width, effect.q_center + 2 * effect.width)
         return Where(axis="position", description=f"around {effect.q_center:.4g}", regions=(span,))
-
-
-def _wave(cycles: float) -> Candidate:
-    """Friction with so many cycles a turn."""
-
-    def start(c: Array) -> Effect:
-        size = min(hypot(*c), 0.9)
-        return PeriodicFriction(cycles_per_rev=cycles, relative_amplitude=size, phase=atan2(-c[1], c[0]))
-
-    pair = tuple(PeriodicFriction(cycles_per_rev=cycles, relative_amplitude=0.0, phase=p) for p in (0.0, -pi / 2))
-    return Candidate("position_friction", pair, ("relative_amplitude",), start)
