@@ -29,7 +29,7 @@ def proof(diagnosis: Diagnosis, rows: tuple[Part, ...], scales: Scales) -> Pictu
     for place, row in enumerate(rows):
         _pair(axes, place, row, factor)
     _rows(axes, [_short(row.label) for row in rows])
-    axes.set_xlabel(f"RMS {_quantity(diagnosis)} error [{unit}]")
+    axes.set_xlabel(f"RMS {scales.noun} error [{unit}]")
     return sheet.picture(proof_words(rows), proof_words(rows))
 
 
@@ -68,10 +68,6 @@ def _rows(axes: "Axes", labels: list[str]) -> None:
 
 def _short(text: str, most: int = 18) -> str:
     return text if len(text) <= most else text[: most - 1] + "…"
-
-
-def _quantity(diagnosis: Diagnosis) -> str:
-    return "torque" if diagnosis.motion == "rotary" else "force"
 
 
 def proof_words(rows: tuple[Part, ...]) -> str:

@@ -96,7 +96,7 @@ def overlay(trace: Trace, span: tuple[float, float], scales: Scales, width: int 
     for y, colour in zip((trace.tau - model for model in models), (BEFORE, AFTER), strict=False):
         low.plot(*thin(t, y[cut] * unit.factor, buckets), color=colour, lw=1.2)
     low.axhline(0, color=GREY, lw=0.8, zorder=1)
-    heading(top, f"{_noun(unit.unit)} [{unit.unit}]")
+    heading(top, f"{scales.noun} [{unit.unit}]")
     heading(low, f"error: measured minus model [{unit.unit}]")
     for axes in (top, low):
         axes.set_xlim(*span)
@@ -113,7 +113,3 @@ _LINES: tuple[Style, ...] = (
     {"color": BEFORE, "lw": 1.6, "dashes": (4, 2)},
     {"color": AFTER, "lw": 1.6},
 )
-
-
-def _noun(unit: str) -> str:
-    return "torque" if unit.endswith("N·m") else "force"

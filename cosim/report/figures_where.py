@@ -35,7 +35,7 @@ def region(before: Region, after: Region | None, scales: Scales) -> Picture:
     else:
         caption = _along(axes, before, after, scales, name)
     axes.axhline(0, color=GREY, lw=0.8, zorder=1)
-    heading(axes, f"{before.measure} {_noun(scales)} [{scales.torque.unit}]")
+    heading(axes, f"{before.measure} {scales.noun} [{scales.torque.unit}]")
     axes.locator_params(axis="y", nbins=5)
     return sheet.picture(f"Missing over {name}, before and after. {caption}", caption, f"Over {name}")
 
@@ -145,7 +145,3 @@ def _cells(axes: "Axes", mean: Array, q: Array, v: Array, top: float, colour: st
 
 def _plain(text: str) -> str:
     return "".join(letter for letter in text if letter.isalnum()) or "axis"
-
-
-def _noun(scales: Scales) -> str:
-    return "torque" if scales.torque.unit.endswith("N·m") else "force"

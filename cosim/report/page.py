@@ -56,7 +56,7 @@ def _first(diagnosis: Diagnosis, scales: Scales, chosen: Samples) -> dict[str, o
         "with_effects": _with_effects(diagnosis),
         "compared": _compared(diagnosis),
         "box": _box(diagnosis, [row.label for row in rows if row.change == "worse"], scales),
-        "noun": "torque" if diagnosis.motion == "rotary" else "force",
+        "noun": scales.noun,
     }
 
 
@@ -267,11 +267,11 @@ def payload(diagnosis: Diagnosis, scales: Scales) -> JsonObject:
     """Return what `explorer.js` reads."""
     traces = [trace for trace in diagnosis.traces if trace.t.size > 1]
     seconds = sum(float(trace.t[-1] - trace.t[0]) for trace in traces) or 1.0
-    torque, noun = scales.torque.unit, "torque" if diagnosis.motion == "rotary" else "force"
+    torque = scales.torque.unit
     models = [("before", "before", (6, 3)), ("after", "after", ())][: 2 if diagnosis.adds_physics else 1]
     errors = [("lost", "before", ()), ("left", "after", ())][: len(models)]
     sheets = (
-        Sheet(f"{noun} [{torque}]", 0.45, [("tau", "ink", ()), *models]),
+        Sheet(f"{scales.noun} [{torque}]", 0.45, [("tau", "ink", ()), *models]),
         Sheet(f"error: measured minus model [{torque}]", 0.32, errors),
         Sheet(f"position [{scales.position.unit}]", 0.23, [("q", "ink", ())]),
     )

@@ -33,6 +33,11 @@ class Scales:
             2 * pi if rotary else 1.0,
         )
 
+    @property
+    def noun(self) -> str:
+        """What the drive gives: a torque, or the force of a linear axis."""
+        return "torque" if self.torque.unit.endswith("N·m") else "force"
+
     def labelled(self, parts: tuple[Part, ...]) -> tuple[Part, ...]:
         """Return the parts with classes of speed called by their speeds."""
         return tuple(replace(one, label=self.speed.span(*one.speeds)) if one.speeds else one for one in parts)
