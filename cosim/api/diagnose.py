@@ -5,9 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cosim.api.defaults import estimated, split
 from cosim.api.progress import Staged, stages_of
@@ -38,6 +36,9 @@ from cosim.support.notebook import shows_progress
 from cosim.support.plain import JsonObject
 from pyfmi_models.card import Card, read_card
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 @dataclass(frozen=True, repr=False)
 class DiagnosisResult:
@@ -64,16 +65,16 @@ class DiagnosisResult:
         return self.diagnosis.findings
 
     @property
-    def ledger(self) -> pd.DataFrame:
+    def ledger(self) -> "pd.DataFrame":
         """Every structure that was fitted, a row each: evidence, held-out gain, and the rule that refuses it."""
         return frame(self.diagnosis.ledger)
 
-    def frame(self) -> pd.DataFrame:
+    def frame(self) -> "pd.DataFrame":
         """Return the findings as a table, a row an effect, with answer, probability, size and its range."""
         return findings_frame(self.findings)
 
     @property
-    def missing_torque(self) -> pd.DataFrame:
+    def missing_torque(self) -> "pd.DataFrame":
         """What the refitted card leaves (`missing`, `band`) and what the effects leave (`after`), a row a sample.
 
         Torques in N.m (N on a linear axis); `band` is the half width of the 95 % band.

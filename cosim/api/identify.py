@@ -4,9 +4,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, TypedDict, Unpack, overload
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack, overload
 
 from cosim.api.calibrate import CalibrateResult, calibrate, subject_of
 from cosim.api.recordings import Source, read_all
@@ -22,6 +20,9 @@ from cosim.support.html import text as html_text
 from cosim.support.plain import JsonObject
 from cosim.system.scenario import Scenario
 from pyfmi_models.card import Card, read_card
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True, repr=False)
@@ -45,8 +46,10 @@ class IdentifyResult:
         """Return everything as plain data, as identify.json holds it."""
         return deliver.as_json(self.identified, self.given)
 
-    def frame(self) -> pd.DataFrame:
+    def frame(self) -> "pd.DataFrame":
         """Return the numbers as a table, a row a parameter: `parameter`, `given`, `value`, `unit`."""
+        import pandas as pd
+
         before = {one.name: float(one.start) for one in self.given.plant().parameters()}
         known = self.card.plant().parameters()
         rows = [(one.name, before.get(one.name), float(one.start), one.unit) for one in known]

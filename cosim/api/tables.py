@@ -1,26 +1,33 @@
 """Answers as pandas tables."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
 
 from cosim.diagnosis.answer.result import Finding, Trace
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 FINDINGS = ("effect", "title", "answer", "probability", "size", "range", "action")
 MISSING = ("recording", "heldout", "t", "q", "v", "missing", "band", "after")
 
 
-def findings_frame(findings: Sequence[Finding]) -> pd.DataFrame:
+def findings_frame(findings: Sequence[Finding]) -> "pd.DataFrame":
     """Return findings as a table, a row an effect, in their rank."""
+    import pandas as pd
+
     rows = [
         (one.effect, one.title, one.answer, one.probability, one.size, one.size_range, one.action) for one in findings
     ]
     return pd.DataFrame(rows, columns=list(FINDINGS))
 
 
-def missing_frame(traces: Sequence[Trace]) -> pd.DataFrame:
+def missing_frame(traces: Sequence[Trace]) -> "pd.DataFrame":
     """Return the missing torque of all recordings, a row a sample that was judged."""
+    import pandas as pd
+
     parts = [
         pd.DataFrame(
             {

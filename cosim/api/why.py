@@ -5,12 +5,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
-
-import pandas as pd
+from typing import TYPE_CHECKING, Any
 
 from cosim.diagnosis.answer.ledger import Trial
 from cosim.support.errors import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 DOCUMENT = "diagnosis.json"
 
@@ -53,8 +54,10 @@ def read_ledger(place: str | Path) -> Written:
         raise InputError(text, culprit=str(path)) from error
 
 
-def frame(trials: Sequence[Trial]) -> pd.DataFrame:
+def frame(trials: Sequence[Trial]) -> "pd.DataFrame":
     """The ledger as a table, a row a trial; `refused_by` is the name of the first rule that refuses."""
+    import pandas as pd
+
     rows = []
     for one in trials:
         row = one.as_json()

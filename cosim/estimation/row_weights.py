@@ -9,7 +9,6 @@ from math import pi
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import minimum_filter1d
 
 from cosim.data.resolution import SEEN_STEPS
 from cosim.estimation.prepare import Array, Piece, Prepared
@@ -76,8 +75,10 @@ def _far(piece: Piece, least: float) -> Array:
     """1 where the motion is clear for a period of the cutoff before and after a row, else 0."""
     clear = np.abs(piece.v) > least
     clear &= np.diff(np.sign(piece.v), prepend=np.sign(piece.v[:1])) == 0
-    width = 2 * max(1, round(1 / (piece.cutoff * piece.dt))) + 1
-    return np.asarray(minimum_filter1d(clear.astype(np.uint8), width), float)
+    around, rows = max(1, round(1 / (piece.cutoff * piece.dt))), np.arange(len(clear))
+    others = np.concatenate([[0], np.cumsum(~clear)])
+    near = others[np.minimum(rows + around + 1, len(clear))] - others[np.maximum(rows - around, 0)]
+    return np.asarray(near == 0, float)
 
 
 def _says(law: FrictionLaw, v: Array, least: float) -> Array:

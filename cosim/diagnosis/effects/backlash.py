@@ -6,7 +6,6 @@ from itertools import islice
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach, Seen, with_numbers
@@ -219,6 +218,8 @@ def _around(values: Array, middle: float) -> Array:
 
 def _alike(columns: Array, span: Span, window: float = 0.0) -> Array:
     """Share of the residual that each column explains beyond what inertia and friction may, averaged over a window."""
+    from scipy.ndimage import uniform_filter1d  # a tenth of a second that nothing before the search needs
+
     rows = max(1, round(window / float(np.median(np.diff(span.t)))))
     columns, base, residual = (uniform_filter1d(one, rows, axis=0) for one in (columns, _plain(span), span.residual))
     own = columns - base @ np.linalg.lstsq(base, columns, rcond=None)[0]
