@@ -175,8 +175,8 @@ def in_motion(held: HeldOut, scales: Scales) -> str:
 
 
 def _unknown(diagnosis: Diagnosis, scales: Scales) -> list[str]:
-    """Say what is detected beside it, that no other effect explains the rest, and how large the error is."""
-    found = [block for block in blocks(diagnosis) if block.answer == "found"]
+    """Say what the model holds beside it, that no other effect explains the rest, and how large the error is."""
+    found = [block for block in blocks(diagnosis) if block.answer == "found" or block.first in diagnosis.in_model]
     own = next((stated(finding) for finding in diagnosis.findings if finding.effect == "unknown"), "")
     others = [f for f in diagnosis.findings if f.effect != "unknown" and f.answer in ("not_seen", "not_proven")]
     subject = f"With {_listed(found)} an error remains that" if found else "The error is one that"

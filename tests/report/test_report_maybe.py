@@ -70,6 +70,13 @@ def test_page_and_terminal_use_one_word_for_what_may_be() -> None:
     assert "; a further error may come from cable wrap (its probability is 0.49)." in said(whole)
 
 
+def test_what_has_no_name_is_told_as_what_stays_beside_the_rivals_that_the_model_holds() -> None:
+    held = replace(of(*RIVALS, unknown=True), delivered=(RIVALS[0].effect,))
+    assert said(held).startswith("With gravity unbalance or encoder eccentricity")
+    assert "an error remains that none of the" in said(held)
+    assert said(replace(held, delivered=())).startswith("The error is one that none of the")
+
+
 def test_the_lead_names_every_open_question() -> None:
     pair = tuple(replace(one, effect=f"other_{one.effect}", title=f"Other {one.title.lower()}") for one in RIVALS)
     sets = tuple(tuple(one.effect for one in rivals) for rivals in (RIVALS, pair))
