@@ -230,7 +230,8 @@ def _toml(file: str) -> tuple[Facts, Tables]:
     if file in effects() and not path.exists():
         return of_effect(file)
     if path.exists():
-        kinds = "a recording, FMU, SSP, scenario, card, sweep, or a folder of a run, diagnosis or sweep"
+        folders = "run, diagnosis, sweep, comparison or benchmark"
+        kinds = f"a recording, FMU, SSP, scenario, card, sweep, or a folder of a {folders}"
         raise InputError(f"{file} is unsupported: cosim show takes {kinds}.", culprit=file)
     choices = (*shipped_scenarios(), *shipped_cards(), *effects())
     meant = did_you_mean(file, choices)

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
 
 Shown = tuple[dict[str, Json], dict[str, Sequence[Mapping[str, Json]]]]
 DIAGNOSIS, RUN, TABLE = "diagnosis.json", "run.json", "table.parquet"
+COMPARISON, PROOF = "compare.json", "proof.json"
 FIRST = 20
 """Runs of a sweep that are listed, the best first."""
 
@@ -28,6 +29,8 @@ def result(path: Path) -> Shown | None:
         return _read_result(path / found[0]) if found else None
     if path.name not in _READERS or not path.is_file() or (path.name == TABLE and not _is_sweep(path)):
         return None
+    if path.name in _KEYS and not _holds(path, _KEYS[path.name]):
+        return None  # a recording that happens to have this name
     return _read_result(path)
 
 
@@ -93,6 +96,48 @@ def _run(path: Path) -> Shown:
     return facts | dict(found), {}
 
 
+def _rounded(value: Json) -> Json:
+    """A number as it is read; what is none as it is."""
+    return float(f"{value:.4g}") if isinstance(value, float) else value
+
+
+def _holds(path: Path, keys: tuple[str, ...]) -> bool:
+    try:
+        _document(path, *keys)
+    except InputError:
+        return False
+    return True
+
+
+def _comparison(path: Path) -> Shown:
+    told = _document(path, *_KEYS[COMPARISON])
+    first = str(told["recordings"][0])
+    facts: dict[str, Json] = {
+        "comparison": str(path),
+        "of": ", ".join(map(str, told["recordings"])),
+        "in common": f"{told['span'][0]:.6g} to {told['span'][1]:.6g} s, {told['rows']:,} rows",
+    }
+    page = path.with_name("compare.html")
+    facts |= {"open": str(page)} if page.is_file() else {}
+    names = ("column", "other", "unit", "rms", "largest", "at")
+    rows = [{name: _rounded(one[name]) for name in names} for one in told["differences"]]
+    return facts, {f"differences from {first}": rows}
+
+
+def _proof(path: Path) -> Shown:
+    told = _document(path, *_KEYS[PROOF])
+    facts: dict[str, Json] = {
+        "blind benchmark": str(path),
+        "cases": f"{told['played']} of {told['cases']}, seed {told['seed']}",
+        "made by": str(told["command"]),
+    }
+    page = path.with_name("README.md")
+    facts |= {"read": str(page)} if page.is_file() else {}
+    names = {"score": "title", "value": "value", "from": "low", "to": "high", "cases": "n", "target": "asked"}
+    rows = [{name: _rounded(one.get(key)) for name, key in names.items()} for one in told["scores"]]
+    return facts, {"scores, with 95 % ranges": rows}
+
+
 def _is_sweep(path: Path) -> bool:
     from pyarrow import parquet
 
@@ -144,4 +189,12 @@ def sweep_file(path: Path) -> Shown:
     return facts, {}
 
 
-_READERS: dict[str, Callable[[Path], Shown]] = {DIAGNOSIS: _diagnosis, RUN: _run, TABLE: _sweep}
+_KEYS = {COMPARISON: ("recordings", "span", "rows", "differences"), PROOF: ("played", "cases", "scores", "command")}
+"""What a file must hold to be ours, where its name alone does not say so."""
+_READERS: dict[str, Callable[[Path], Shown]] = {
+    DIAGNOSIS: _diagnosis,
+    RUN: _run,
+    TABLE: _sweep,
+    COMPARISON: _comparison,
+    PROOF: _proof,
+}

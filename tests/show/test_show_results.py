@@ -59,7 +59,7 @@ def test_a_run_is_shown_from_its_folder(tmp_path: Path) -> None:
 
 
 def test_a_folder_of_nothing_is_refused_with_what_can_be_shown(tmp_path: Path) -> None:
-    with pytest.raises(cosim.InputError, match="a folder of a run, diagnosis or sweep"):
+    with pytest.raises(cosim.InputError, match="a folder of a run, diagnosis, sweep"):
         cosim.show(tmp_path)
 
 
@@ -99,3 +99,27 @@ def sweep(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "two.toml").write_text(SWEEP, "utf-8")
     cosim.sweep(folder / "two.toml", folder / "out", workers=1)
     return folder
+
+
+def test_a_comparison_is_shown_from_its_folder_and_its_file_and_another_file_of_its_name_is_not(tmp_path: Path) -> None:
+    t = [0.01 * k for k in range(200)]
+    one, other = ({"t": t, "a": [k + shift for k in t], "b": t} for shift in (0.0, 0.25))
+    cosim.compare(one, other, out=tmp_path / "over")
+    for path in (tmp_path / "over", tmp_path / "over" / "compare.json"):
+        shown = cosim.show(path)
+        assert shown.facts["open"] == str(tmp_path / "over" / "compare.html")
+        (table,) = shown.tables.values()
+        assert [(row["column"], row["rms"]) for row in table] == [("a", 0.25), ("b", 0.0)]
+    foreign = tmp_path / "compare.json"
+    foreign.write_text(json.dumps([{"t": k, "tau": 1.0, "q": 2.0 * k} for k in t]), "utf-8")
+    assert cosim.show(foreign).facts["recording"] == str(foreign)
+
+
+def test_a_blind_benchmark_is_shown_by_its_scores(tmp_path: Path) -> None:
+    score = {"title": "false alarms", "value": 0.0, "low": 0.0, "high": 0.65761, "n": 2, "asked": "<= 0.02"}
+    told = {"played": 2, "cases": 2, "seed": 1, "command": "cosim prove --cases 2", "scores": [score]}
+    (tmp_path / "proof.json").write_text(json.dumps(told), "utf-8")
+    shown = cosim.show(tmp_path)
+    assert shown.facts["cases"] == "2 of 2, seed 1"
+    (row,) = shown.tables["scores, with 95 % ranges"]
+    assert row == {"score": "false alarms", "value": 0.0, "from": 0.0, "to": 0.6576, "cases": 2, "target": "<= 0.02"}
