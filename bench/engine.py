@@ -73,6 +73,7 @@ def main() -> None:
         rows.append(row)
         print(*row, sep=" | ", flush=True)
     if given.out:
+        given.out.mkdir(parents=True, exist_ok=True)
         (given.out / "engine.md").write_text(page(rows), "utf-8")
 
 
