@@ -36,6 +36,7 @@ PAGES = {
     "identify/README.md": BENCH.format("identification.py --seed 100", "identify"),
     "identify/foreign_calibration.md": "python bench/foreign_calibration.py --fmus DIR --out results/identify"
     " && python bench/foreign_machine.py --data DIR --out results/identify",
+    "identify/modelica.md": "python bench/modelica_calibration.py edrive_mass.fmu --out results/identify/modelica.json",
     "investigate/README.md": BENCH.format("investigate.py --seed 544123761 --cases 48", "investigate"),
     "investigate/limits.md": BENCH.format("investigate_limits.py --runs 1000 --seed 1950420578", "investigate"),
     "learned/README.md": "python bench/learned_terms.py --cases 3 --nulls 100 --seed 431857433 --data FOLDER"
