@@ -78,7 +78,7 @@ class Grams:
     def marginal(self, chosen: Sequence[int], which: Sequence[int]) -> Marginal:
         """Marginal likelihood of tangents, nuisances and the chosen terms on some recordings, with their sizes."""
         kept = [0, *(1 + k for k in range(self.many)), *(1 + k for k in self._places(chosen))]
-        grams = self.parts[which].sum(0)[:, kept][:, :, kept]
+        grams = self._summed(which, kept)
         groups, first = list(self.nuisances), self.many
         for one in chosen:
             last = first + len(self._places([one]))
@@ -95,7 +95,7 @@ class Grams:
         """
         sizes = self.marginal(chosen, which).sizes[len(self.nuisances) :]
         kept = [0, *(1 + k for k in range(len(self.trust))), *(1 + k for k in self._places(chosen))]
-        gram = self.plain[which].sum(0)[kept][:, kept]
+        gram = self.plain[np.ix_(which, kept, kept)].sum(0)
         spread = [np.full(len(self._places([one])), max(size, 1e-6)) for one, size in zip(chosen, sizes, strict=True)]
         precision = 1 / np.concatenate([self.trust, *spread]) ** 2
         effective = float(self._rows(which)[1].sum())
@@ -111,6 +111,11 @@ class Grams:
     def _places(self, chosen: Sequence[int]) -> list[int]:
         return [k for one in chosen for k in range(self.columns[one].start, self.columns[one].stop)]
 
+    def _summed(self, which: Sequence[int], kept: Sequence[int]) -> Array:
+        """Matrices of some columns, all of some recordings together; the others are not touched, which may be many."""
+        bands = range(self.parts.shape[1])
+        return np.asarray(self.parts[np.ix_(which, bands, kept, kept)].sum(0))
+
     def _rows(self, which: Sequence[int]) -> tuple[Array, Array]:
         count = self.count[which].sum(0) + 1e-9
         return count, count / (1 + count / self.coarsening)
@@ -123,7 +128,7 @@ class Grams:
         own = np.zeros((len(kept), 1 + far - tangents))
         own[: len(places), 0] = [1.0, *-beta]
         own[len(places) :, 1:] = np.eye(far - tangents)
-        grams = own.T @ self.parts[which].sum(0)[:, kept][:, :, kept] @ own
+        grams = own.T @ self._summed(which, kept) @ own
         groups = [Group(np.asarray(one.columns) - tangents, one.prior) for one in self.nuisances]
         free = np.ones(far - tangents)
         return marginal(grams, free, groups, *self._rows(which), self.floor).log_likelihood
