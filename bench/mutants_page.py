@@ -59,6 +59,7 @@ def page(tried: Sequence[Tried], sample: Sample, command: str, remarks: Mapping[
         f"{sample.seconds:g} s of tests each;"
     ]
     lines += [f"{late} of the noticed because a test no longer ended. In brackets: 95 % intervals (Wilson)."]
+    lines += [remarks["sample"]] if "sample" in remarks else []
     lines += [
         "What is equivalent counts as survived, as does what only a test notices that was written after the draw; so",
         "the rate is a lower bound of what the whole suite notices, which is asked in that time in part.",
@@ -91,7 +92,7 @@ def commit() -> str:
 
 
 def written(tried: Sequence[Tried], sample: Sample, out: Path, remarks: Mapping[str, str]) -> None:
-    """Write the page; `remarks` say what is known of a survivor, by module and line."""
+    """Write the page; `remarks` say what is known of a survivor, by module and line, and of the `sample`."""
     asked = f"--seed {sample.seed} --count {sample.count} --seconds {sample.seconds:g} --journal FILE"
     out.parent.mkdir(parents=True, exist_ok=True)
     with replacing(out, force=True) as partial:
