@@ -15,6 +15,7 @@ NAMES = {
     "sigma2": ("viscous friction", "constant speeds, fast and slow"),
     "Fs": ("break-away level", "slow motion and reversals"),
     "Vs": ("Stribeck speed", "slow motion and reversals"),
+    "delta": ("Stribeck exponent", "slow motion and reversals"),
     "sigma0": ("stiffness before break-away", "small reversals"),
     "sigma1": ("damping before break-away", "small reversals"),
 }
@@ -28,6 +29,8 @@ class NotDetermined:
     variable: Variable
     value: float
     limit: Limited | None = None
+    is_simulated: bool = True
+    """Whether all numbers could be fitted at once; without a simulated loop `identify` has only its other ways."""
 
     def as_json(self) -> JsonObject:
         """The entry as JSON holds it: `limit` is "highest", "lowest", or null where nothing is known."""
@@ -40,7 +43,13 @@ class NotDetermined:
         name = self.variable.name
         words, motion = next((NAMES[part] for part in name.split(".") if part in NAMES), ("number", ""))
         record = f" Recordings of {motion} would determine it." if motion else ""
-        value, given = (joined(number(one, 3), raised(self.variable.unit)) for one in (self.value, self.variable.start))
+        value, given = (
+            joined(number(one, 3), raised(self.variable.unit.removeprefix("1")))
+            for one in (self.value, self.variable.start)
+        )
+        if not self.is_simulated:
+            by = f"Without a simulated loop no way here determines the {words} ({name}): the card's {value} is kept"
+            return f"{by}; cosim diagnose refits it from the torque."
         if not self.limit:
             return f"These recordings do not determine the {words} ({name}): the card's {value} is kept.{record}"
         most = "most" if self.limit.is_highest else "least"

@@ -68,7 +68,8 @@ def as_json(found: Identified, card: Card) -> JsonObject:
 def not_determined(found: Identified, card: Card) -> list[NotDetermined]:
     """Numbers that were to be identified and that nothing determines: the given card's are kept."""
     known = {variable.name: variable for variable in card.plant().parameters()}
-    return [NotDetermined(known[name], known[name].start) for name in found.kept]
+    simulated = bool(found.output_error)
+    return [NotDetermined(known[name], known[name].start, is_simulated=simulated) for name in found.kept]
 
 
 def _comment(found: Identified, card: Card) -> str:
