@@ -96,7 +96,7 @@ class Replay:
         self.base = self.problem.fit(problem.mount, 75)
         self.sanity = (
             *doubts(self.train, self.held, card),
-            *of_base(self.problem, self.base.mount, self.train, self.held),
+            *of_base(card, self.problem, self.base.mount, self.train, self.held),
         )
         self.usual = self._comparison(POLICY)
         self.ready: dict[Band | float, Prepared] = {}

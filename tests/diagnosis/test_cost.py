@@ -82,3 +82,13 @@ def test_freed_memory_stays_for_the_next_array() -> None:
         for kept in (True, False)
     ]
     assert faults[0] < faults[1] / 2
+
+
+def test_a_direction_that_training_never_had_ends_no_black_box() -> None:
+    """A motor that turns one way in training and both ways in validation: that feature has no spread."""
+    random = np.random.default_rng(0)
+    rows, others = (np.column_stack([random.normal(size=n), np.ones(n)]) for n in (400, 50))
+    others[:25, 1] = -1.0
+    found = kernel(rows, rows[:, 0])(others)
+    assert np.isfinite(found).all()
+    assert np.abs(found[25:] - others[25:, 0]).max() < 0.2

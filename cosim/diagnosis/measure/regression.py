@@ -17,6 +17,8 @@ EVERY = 4
 """Rows of a trace for each row that is fitted: the trace is filtered at 30 Hz and has eight rows a period of that."""
 CENTRES, MOST_ROWS = 800, 20_000
 """Rows that a kernel is placed at, and rows that it is fitted to."""
+ROUNDING = 1e-12
+"""Spread of a feature, relative to its size, below which it is constant but for rounding. Unit: 1."""
 CHUNK = 256
 """Rows lifted at once: they stay in the cache."""
 
@@ -38,7 +40,8 @@ def kernel(rows: Array, target: Array, ridge: float = 1e-2) -> Model:
 
     k(x, c) = exp(-|x - c|^2 / 2) of features scaled to unit spread; ridge relative to the mean of the normal matrix.
     """
-    middle, spread = rows.mean(0), rows.std(0) + 1e-300
+    middle, spread = rows.mean(0), rows.std(0)
+    spread = np.where(spread > ROUNDING * np.abs(rows).max(0), spread, 1.0)  # one way only, in training
     centres = ((rows - middle) / spread)[:: max(1, len(rows) // CENTRES)]
 
     half = (centres**2).sum(1) / 2
