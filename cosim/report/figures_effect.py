@@ -194,8 +194,9 @@ def _split(finding: Finding, chosen: Samples, scales: Scales, groups: list[tuple
     axes = sheet.axes()
     x = chosen.q * scales.position.factor
     edges = np.linspace(x.min(), x.max(), 33)
+    added = not np.array_equal(chosen.before, chosen.after)
     for _, mask, style in groups:
-        for residual, colour in ((chosen.before, BEFORE), (chosen.after, AFTER)):
+        for residual, colour in ((chosen.before, BEFORE), (chosen.after, AFTER))[: 1 + added]:
             mean = curve(x[mask], residual[mask] * scales.torque.factor, edges)
             axes.plot(mean.x, mean.mean, color=colour, ls=style, lw=1.8)
     axes.axhline(0, color=GREY, lw=0.8, zorder=1)
@@ -203,7 +204,8 @@ def _split(finding: Finding, chosen: Samples, scales: Scales, groups: list[tuple
     axes.set_xlabel(f"position [{scales.position.unit}]")
     axes.locator_params(axis="y", nbins=5)
     heading(axes, f"mean error [{scales.torque.unit}]")
-    caption = f"Orange before, blue after. Solid: {groups[0][0]}; dotted: {groups[1][0]}."
+    models = "Orange before, blue after." if added else "The refitted model."
+    caption = f"{models} Solid: {groups[0][0]}; dotted: {groups[1][0]}."
     return sheet.picture(f"{finding.title}, error over position. {caption}", caption)
 
 
