@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from hashlib import sha256
 from math import isfinite
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from cosim.api.recordings import Source, read
 from cosim.calibration import deliver
@@ -22,6 +23,9 @@ from cosim.support.plain import JsonObject
 from cosim.support.version import __version__
 from cosim.sweeps.portable_job import files_of
 from cosim.system.scenario import Scenario, read_scenario
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,14 @@ class CalibrateResult:
     def not_determined(self) -> tuple[str, ...]:
         """Sentences on what the recordings do not determine."""
         return tuple(one.statement for one in self.calibrated.uncertainty.not_determined)
+
+    def frame(self) -> "pd.DataFrame":
+        """Return a data frame: a row a number, its start, value and standard error (inf: not determined)."""
+        import pandas as pd
+
+        free = self.calibrated.free
+        rows = {one.name: (one.start, self.numbers[one.name], self.standard_errors[one.name]) for one in free}
+        return pd.DataFrame.from_dict(rows, orient="index", columns=["start", "value", "standard_error"])
 
     def as_json(self) -> JsonObject:
         """Return everything but the columns as plain data, as identified.json holds it."""

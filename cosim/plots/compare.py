@@ -163,7 +163,7 @@ def _row(one: Difference) -> dict[str, str]:
     row = {
         "column": one.column,
         "other": one.other,
-        "unit": in_words(scale.unit) or "1",
+        "unit": in_words(scale.unit) or "not stated",
         "rms": rms,
         "relative": relative,
     }

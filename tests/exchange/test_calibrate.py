@@ -46,6 +46,7 @@ def test_the_true_numbers_lie_within_three_standard_errors(fmus, version):
     done = found(recorded(fmus[version], TRUTH), fmu=fmus[version], free=list(TRUTH), starts=2)
     for name, value in TRUTH.items():
         assert abs(done.numbers[name] - value) < 3 * done.standard_errors[name] < 0.2 * value
+        assert done.frame().loc[name, "value"] == done.numbers[name]
     assert not done.not_determined
 
 
