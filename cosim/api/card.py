@@ -111,16 +111,26 @@ def card(
     file = None if out is None else Path(out)
     if file is not None:
         check_free(file, force)
-    taken = read_all(recordings, "recording", columns, units, layout)
-    kind, assumed = kind_of(taken, motion)
-    check_kind(taken, kind)
-    _check_once(taken)
-    found = first_card(taken, kind, inertia, on_progress)
-    notes = ((assumed,) if assumed else ()) + found.notes
-    made = CardResult(found, _card(found, taken), notes)
+    made = estimated_card(read_all(recordings, "recording", columns, units, layout), motion, inertia, on_progress)
     if file is not None:
         made.write(file, force)
     return made
+
+
+def estimated_card(
+    taken: Sequence[Recording],
+    motion: str = "",
+    inertia: float | None = None,
+    on_progress: Callable[[str], None] = lambda text: None,
+    is_asked: bool = True,
+) -> CardResult:
+    """The same of recordings that are read; `is_asked` as for `first_card`."""
+    kind, assumed = kind_of(taken, motion)
+    check_kind(taken, kind)
+    _check_once(taken)
+    found = first_card(taken, kind, inertia, on_progress, is_asked)
+    notes = ((assumed,) if assumed else ()) + found.notes
+    return CardResult(found, _card(found, taken), notes)
 
 
 def _check_once(recordings: Sequence[Recording]) -> None:

@@ -22,6 +22,7 @@ from cosim.diagnosis.search.sizes import standard_errors
 from cosim.diagnosis.trust.balance import Balance
 from cosim.estimation.blocks import Blocks, covariance
 from cosim.estimation.fit import Fit, fit
+from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import weights
 from cosim.support.errors import InputError, RecordingError
@@ -82,6 +83,7 @@ def first_card(
     motion: Motion,
     inertia: float | None = None,
     on_progress: OnProgress = lambda _: None,
+    is_asked: bool = True,
 ) -> FirstCard:
     """Estimate an axis.
 
@@ -90,9 +92,11 @@ def first_card(
         motion: "rotary" or "linear".
         inertia: where it is known [kg m2, kg]; it is not fitted then.
         on_progress: called with a few words before each fit.
+        is_asked: whether an inertia that the recordings do not determine is asked for; else it is taken from their
+            limit and said, where that is a part of the torque: then it hardly acts in these motions.
 
     Raises:
-        RecordingError: too little motion, or the recordings do not determine the inertia and none is given.
+        RecordingError: too little motion, or the recordings do not determine the inertia and it is asked for.
     """
     linear = motion == "linear"
     recordings = [as_analysed(one) for one in recordings]
@@ -105,8 +109,9 @@ def first_card(
         if _is_clear(problem, best, tried):
             best = tried
     numbers = tuple(_numbers(problem, best, inertia, linear))
-    _check_inertia(numbers, linear)
     tau = problem.weight * problem.prepared.stacked("tau")
+    if is_asked or not _is_small(problem, tau, numbers):
+        _check_inertia(numbers, linear)
     left = problem.weight * best.residual
     explained = 1 - float(left @ left) / max(float(tau @ tau), 1e-300)
     return FirstCard(_held(best.mount, numbers), numbers, explained, tuple(_notes(numbers, explained)))
@@ -197,10 +202,26 @@ def _linear(unit: str) -> str:
 
 def _held(mount: Mount, numbers: Sequence[Number]) -> Mount:
     """The mount without what the recordings do not determine: friction that is not seen is none."""
-    open_ = {one.name for one in numbers if not one.is_determined}
+    open_ = {one.name: one for one in numbers if not one.is_determined}
     law = mount.friction
+    if unknown := open_.get("axis.inertia"):
+        mount = replace(mount, axis=replace(mount.axis, inertia=_within(unknown)))
     zero = {name: 0.0 for name in ("Fc", "sigma2") if f"friction.{name}" in open_}
     return replace(mount, friction=replace(law, **zero))  # type: ignore[arg-type]
+
+
+def _is_small(problem: Problem, tau: Array, numbers: Sequence[Number]) -> bool:
+    """Whether the axis speeds up and its inertia takes at most a part of the torque, whatever it is."""
+    if all(piece.is_steady for piece in problem.prepared.pieces):
+        return False
+    inertia = next(one for one in numbers if one.name == "axis.inertia")
+    most = inertia.range[1] * float(np.linalg.norm(problem.weight * problem.prepared.stacked("a")))
+    return most < (1 - LITTLE) * float(np.linalg.norm(tau))
+
+
+def _within(inertia: Number) -> float:
+    """What is taken for an inertia that is not determined: its estimate, or half of what it may be at most."""
+    return max(inertia.value, inertia.range[1] / 2)
 
 
 def _check_inertia(numbers: Sequence[Number], linear: bool) -> None:
@@ -216,6 +237,10 @@ def _check_inertia(numbers: Sequence[Number], linear: bool) -> None:
 
 def _notes(numbers: Sequence[Number], explained: float) -> list[str]:
     notes = []
+    inertia = next(one for one in numbers if one.name == "axis.inertia")
+    if not inertia.is_determined:
+        said = f"{_within(inertia):.3g} {inertia.unit} is taken (95 %: at most {inertia.range[1]:.3g})"
+        notes.append(f"The recordings hardly show the inertia: {said}. --card with the true one is better.")
     for name, words in (("friction.Fc", "Coulomb friction"), ("friction.sigma2", "viscous friction")):
         if not next(one for one in numbers if one.name == name).is_determined:
             notes.append(f"The recordings do not determine the {words}; the card has none.")

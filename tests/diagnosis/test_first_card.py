@@ -79,6 +79,29 @@ def test_what_is_not_determined_is_demanded_by_its_option() -> None:
     assert "inertia: 2.000 kg.m2, as given" in str(given)
 
 
+def slow(seed: int) -> pd.DataFrame:
+    """Swings in which friction hides the inertia: it takes 3e-5 N m, the noise is far more."""
+    t = np.arange(round(SECONDS * RATE)) / RATE
+    q = 0.5 * np.sin(0.25 * t + seed)
+    v = np.gradient(q, t)
+    noise = np.random.default_rng(seed).normal(0, 0.5, len(t))
+    tau = 0.001 * np.gradient(v, t) + 1.5 * np.tanh(v / 1e-3) + 3.0 * v + noise
+    return pd.DataFrame({"t": t, "tau": tau, "q": q})
+
+
+def test_a_diagnosis_without_a_card_goes_on_where_the_inertia_is_not_seen_and_says_what_it_took() -> None:
+    with pytest.raises(InputError, match="do not determine the inertia"):
+        cosim.card([slow(1), slow(2)], motion="rotary")
+    found = cosim.diagnose([slow(1), slow(2)], slow(3), motion="rotary")
+    assert found.missing == ()
+    with pytest.raises(InputError, match="do not determine the inertia"):
+        cosim.diagnose([steady(1)], steady(2), motion="rotary")
+    said = " ".join(found.diagnosis.data_quality)
+    assert "The recordings hardly show the inertia" in said
+    assert 0 < found.card.mount.inertia < 2.0
+    assert found.card.friction.Fc == pytest.approx(1.5, rel=0.05)  # type: ignore[attr-defined]
+
+
 def test_units_say_whether_an_axis_turns_and_without_them_it_is_said() -> None:
     assert cosim.card(table(7)).notes[0].startswith("No unit says whether the axis turns")
     assert cosim.card(table(7), units={"q": "mm", "tau": "N"}).card.mount.motion == "linear"
