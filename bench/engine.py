@@ -154,14 +154,14 @@ def used(root: Path, words: list[str]) -> Used:
     """What Python uses for some words with the packages of a checkout."""
     threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS")}
     environment = os.environ | threads | {"PYTHONPATH": str(root.resolve())}
-    with tempfile.TemporaryFile("w+") as told:
+    with tempfile.TemporaryFile("w+") as errors:
         command, quiet = [sys.executable, *words], subprocess.DEVNULL
         process = subprocess.Popen(
-            command, stdout=quiet, stderr=told, env=environment, cwd=root
+            command, stdout=quiet, stderr=errors, env=environment, cwd=root
         )  # `-m` looks there first
         _, _, spent = os.wait4(process.pid, 0)
-        told.seek(0)
-        return Used(spent.ru_utime + spent.ru_stime, spent.ru_maxrss / 1e3, told.read())
+        errors.seek(0)
+        return Used(spent.ru_utime + spent.ru_stime, spent.ru_maxrss / 1e3, errors.read())
 
 
 def page(rows: list[Row]) -> str:

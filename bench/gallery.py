@@ -50,12 +50,12 @@ def main() -> int:
         return 0
     pictures = given.out / "machines"
     pictures.mkdir(parents=True, exist_ok=True)
-    told = []
+    drawn = []
     for machine in MACHINES if not given.only else [one for one in MACHINES if one.id in given.only]:
-        told.append(Drawn(machine, diagnosed(machine, given.data)))
-        draw(told[-1], pictures / f"{machine.id}.png")
-        print(machine.title, "|", heading(told[-1].found), flush=True)
-    (given.out / "machines.md").write_text(page(told), "utf-8")
+        drawn.append(Drawn(machine, diagnosed(machine, given.data)))
+        draw(drawn[-1], pictures / f"{machine.id}.png")
+        print(machine.title, "|", heading(drawn[-1].found), flush=True)
+    (given.out / "machines.md").write_text(page(drawn), "utf-8")
     return 0
 
 
@@ -90,17 +90,17 @@ def _written(path: Path, table: Any) -> Path:
     return path
 
 
-def draw(told: Drawn, path: Path) -> None:
+def draw(drawn: Drawn, path: Path) -> None:
     """Draw the torque of the worst seconds, and the error over what the missing physics depends on."""
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
-    found, scales = told.found, Scales.of(told.found)
+    found, scales = drawn.found, Scales.of(drawn.found)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(8.6, 3.3), layout="constrained", dpi=DPI)
         left, right = figure.subplots(1, 2)
         _over_time(left, found, scales)
-        _over(right, found, scales, told.machine.over)
+        _over(right, found, scales, drawn.machine.over)
         figure.savefig(path, metadata={"Software": None})
     from PIL import Image
 
@@ -151,16 +151,16 @@ def _noun(found: Diagnosis) -> str:
     return "torque" if found.motion == "rotary" else "force"
 
 
-def page(told: Sequence[Drawn]) -> str:
+def page(drawn: Sequence[Drawn]) -> str:
     """The page as Markdown: small pictures, then a section a machine."""
     cells = [
         f"[![{one.machine.title}](machines/{one.machine.id}.png) {one.machine.title}](#{one.machine.id})"
-        for one in told
+        for one in drawn
     ]
     cells += [""] * (-len(cells) % COLUMNS)
     rows = [" | ".join(cells[k : k + COLUMNS]) for k in range(0, len(cells), COLUMNS)]
     table = [f"| {rows[0]} |", f"|{'---|' * COLUMNS}", *(f"| {row} |" for row in rows[1:])]
-    return "\n".join([INTRODUCTION, *table, "", *(section(one) for one in told)])
+    return "\n".join([INTRODUCTION, *table, "", *(section(one) for one in drawn)])
 
 
 INTRODUCTION = """# Gallery of machines
@@ -174,9 +174,9 @@ Made by `python bench/gallery.py --data ../shared/recordings --out docs`; more m
 """
 
 
-def section(told: Drawn) -> str:
+def section(drawn: Drawn) -> str:
     """What is known of a machine, what is said of it, by how much the error falls, where the data are from."""
-    found, machine, scales = told.found, told.machine, Scales.of(told.found)
+    found, machine, scales = drawn.found, drawn.machine, Scales.of(drawn.found)
     held, unit = found.heldout, scales.torque
     before, noise = (unit.number(value) for value in (held.before_rms, held.floor_rms))
     after = joined(unit.number(held.after_rms), unit.unit)

@@ -53,7 +53,7 @@ def main() -> int:
     begun, dice = process_time(), np.random.default_rng(given.seed)
     cases = [case(given.fmu.resolve(), dice) for _ in range(given.cases)]
     errors = [abs(error) for one in cases for error in one["errors"]]
-    told = {
+    result = {
         "cases": len(cases),
         "within_2_standard_errors": float(np.mean([error <= 2 for error in errors])),
         "of": len(errors),
@@ -61,8 +61,8 @@ def main() -> int:
         "processor_seconds_a_case": (process_time() - begun) / len(cases),
         "rows": cases,
     }
-    given.out.write_text(json.dumps(told, indent=1) + "\n", "utf-8")
-    print(json.dumps({key: value for key, value in told.items() if key != "rows"}))
+    given.out.write_text(json.dumps(result, indent=1) + "\n", "utf-8")
+    print(json.dumps({key: value for key, value in result.items() if key != "rows"}))
     return 0
 
 

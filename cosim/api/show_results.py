@@ -45,24 +45,24 @@ def _read_result(path: Path) -> Shown:
 
 def _document(path: Path, *keys: str) -> Parsed:
     try:
-        told = json.loads(path.read_text("utf-8"))
+        document = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise InputError(f"{path} cannot be read: {error}.", culprit=str(path)) from error
-    if not isinstance(told, dict) or not set(keys) <= set(told):
+    if not isinstance(document, dict) or not set(keys) <= set(document):
         text = f"{path} is named as a file of this project, and lacks {' and '.join(keys)}."
         raise InputError(text, culprit=str(path))
-    return told
+    return document
 
 
 def _diagnosis(path: Path) -> Shown:
-    told = _document(path, "verdict", "effects", "heldout")
-    held = told["heldout"]
+    document = _document(path, "verdict", "effects", "heldout")
+    held = document["heldout"]
     facts: dict[str, Json] = {
         "diagnosis": str(path),
-        "missing": ", ".join(told["verdict"]) or "nothing that these recordings can show",
+        "missing": ", ".join(document["verdict"]) or "nothing that these recordings can show",
         "validation RMS error": f"{_short(held, 'before_rms')} (refitted card) -> {_short(held, 'after_rms')} "
         f"(improved card); noise floor {_short(held, 'floor_rms')}",
-        "made by": str(told.get("provenance", {}).get("command", "")),
+        "made by": str(document.get("provenance", {}).get("command", "")),
     }
     report = path.with_name("report.html")
     facts |= {"open": str(report)} if report.is_file() else {}
@@ -74,7 +74,7 @@ def _diagnosis(path: Path) -> Shown:
             "probability": f"{one.get('probability', 0.0):.2f}" if one["answer"] in ("found", "ambiguous") else "",
             "statement": one.get("statement", ""),
         }
-        for one in told["effects"]
+        for one in document["effects"]
     ]
     return {name: value for name, value in facts.items() if value}, {"effects": rows}
 
@@ -85,12 +85,12 @@ def _short(held: Mapping[str, Any], name: str) -> str:
 
 
 def _run(path: Path) -> Shown:
-    told = _document(path, "steps", "seconds")
-    facts: dict[str, Json] = {"run": str(path.parent), "scenario": str(told.get("scenario", ""))}
-    tracked = [str(one["statement"]) for one in told.get("tracking", ()) if "statement" in one]
+    document = _document(path, "steps", "seconds")
+    facts: dict[str, Json] = {"run": str(path.parent), "scenario": str(document.get("scenario", ""))}
+    tracked = [str(one["statement"]) for one in document.get("tracking", ()) if "statement" in one]
     facts |= {f"tracking {k}" if tracked[1:] else "tracking": text for k, text in enumerate(tracked, 1)}
-    facts |= {"simulated": f"{told.get('simulated_seconds', 0.0):.6g} s in {told['steps']:,} steps"}
-    facts |= {f"note {k}": str(note) for k, note in enumerate(told.get("notes", ()), 1)}
+    facts |= {"simulated": f"{document.get('simulated_seconds', 0.0):.6g} s in {document['steps']:,} steps"}
+    facts |= {f"note {k}": str(note) for k, note in enumerate(document.get("notes", ()), 1)}
     beside = {"recording": "recording.parquet", "pictures": "run.html"}
     found = {kind: str(path.with_name(name)) for kind, name in beside.items() if path.with_name(name).is_file()}
     return facts | dict(found), {}
@@ -110,31 +110,31 @@ def _holds(path: Path, keys: tuple[str, ...]) -> bool:
 
 
 def _comparison(path: Path) -> Shown:
-    told = _document(path, *_KEYS[COMPARISON])
-    first = str(told["recordings"][0])
+    document = _document(path, *_KEYS[COMPARISON])
+    first = str(document["recordings"][0])
     facts: dict[str, Json] = {
         "comparison": str(path),
-        "of": ", ".join(map(str, told["recordings"])),
-        "in common": f"{told['span'][0]:.6g} to {told['span'][1]:.6g} s, {told['rows']:,} rows",
+        "of": ", ".join(map(str, document["recordings"])),
+        "in common": f"{document['span'][0]:.6g} to {document['span'][1]:.6g} s, {document['rows']:,} rows",
     }
     page = path.with_name("compare.html")
     facts |= {"open": str(page)} if page.is_file() else {}
     names = ("column", "other", "unit", "rms", "largest", "at")
-    rows = [{name: _rounded(one[name]) for name in names} for one in told["differences"]]
+    rows = [{name: _rounded(one[name]) for name in names} for one in document["differences"]]
     return facts, {f"differences from {first}": rows}
 
 
 def _proof(path: Path) -> Shown:
-    told = _document(path, *_KEYS[PROOF])
+    document = _document(path, *_KEYS[PROOF])
     facts: dict[str, Json] = {
         "blind benchmark": str(path),
-        "cases": f"{told['played']} of {told['cases']}, seed {told['seed']}",
-        "made by": str(told["command"]),
+        "cases": f"{document['played']} of {document['cases']}, seed {document['seed']}",
+        "made by": str(document["command"]),
     }
     page = path.with_name("README.md")
     facts |= {"read": str(page)} if page.is_file() else {}
     names = {"score": "title", "value": "value", "from": "low", "to": "high", "cases": "n", "target": "asked"}
-    rows = [{name: _rounded(one.get(key)) for name, key in names.items()} for one in told["scores"]]
+    rows = [{name: _rounded(one.get(key)) for name, key in names.items()} for one in document["scores"]]
     return facts, {"scores, with 95 % ranges": rows}
 
 

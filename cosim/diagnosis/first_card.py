@@ -210,11 +210,15 @@ def _held(mount: Mount, numbers: Sequence[Number]) -> Mount:
     return replace(mount, friction=replace(law, **zero))  # type: ignore[arg-type]
 
 
+def _inertia_of(numbers: Sequence[Number]) -> Number:
+    return next(one for one in numbers if one.name == "axis.inertia")
+
+
 def _is_small(problem: Problem, tau: Array, numbers: Sequence[Number]) -> bool:
     """Whether the axis speeds up and its inertia takes at most a part of the torque, whatever it is."""
     if all(piece.is_steady for piece in problem.prepared.pieces):
         return False
-    inertia = next(one for one in numbers if one.name == "axis.inertia")
+    inertia = _inertia_of(numbers)
     most = inertia.range[1] * float(np.linalg.norm(problem.weight * problem.prepared.stacked("a")))
     return most < (1 - LITTLE) * float(np.linalg.norm(tau))
 
@@ -225,7 +229,7 @@ def _within(inertia: Number) -> float:
 
 
 def _check_inertia(numbers: Sequence[Number], linear: bool) -> None:
-    one = next(one for one in numbers if one.name == "axis.inertia")
+    one = _inertia_of(numbers)
     if not one.is_determined:
         what = "mass" if linear else "inertia"
         raise InputError(
@@ -237,7 +241,7 @@ def _check_inertia(numbers: Sequence[Number], linear: bool) -> None:
 
 def _notes(numbers: Sequence[Number], explained: float) -> list[str]:
     notes = []
-    inertia = next(one for one in numbers if one.name == "axis.inertia")
+    inertia = _inertia_of(numbers)
     if not inertia.is_determined:
         said = f"{_within(inertia):.3g} {inertia.unit} is taken (95 %: at most {inertia.range[1]:.3g})"
         notes.append(f"The recordings hardly show the inertia: {said}. --card with the true one is better.")

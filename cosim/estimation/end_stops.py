@@ -61,7 +61,7 @@ def pushes(recordings: Sequence[Recording], mount: Mount) -> tuple[Push, ...]:
     if not _may_push(recordings):
         return ()
     prepared = prepare(recordings, choose_cutoff(recordings, float(mount.axis.inertia)))
-    problem = Problem(mount, prepared, weights(mount.friction, prepared), recordings[0].sample_time)
+    problem = Problem(mount, prepared, weights(mount.friction, prepared), max(one.sample_time for one in recordings))
     base, found = problem.fit(mount, 30), tuple[Push, ...]()
     for _ in range(ROUNDS):
         now = tuple(_contacts(prepared, base.residual))

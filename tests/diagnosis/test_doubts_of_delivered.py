@@ -33,3 +33,11 @@ def test_an_inertia_that_stood_in_for_a_weight_is_no_doubt_once_the_weight_is_th
     assert [one.finding for one in said] == ["base_far_from_card", "no_set_point"]
     own = card(estimated_by="mount-cosim", recordings=["run"])
     assert [one.finding for one in doubts.of_delivered(before, own, problem, axis(45.0))] == ["no_set_point"]
+
+
+def test_a_card_is_no_witness_of_its_own_recordings_and_their_parts_alone() -> None:
+    own = card(estimated_by="mount-cosim", recordings=["run1"])
+    assert doubts.is_estimated(own, ["run1"])
+    assert doubts.is_estimated(own, ["run1 (begin)"])
+    assert not doubts.is_estimated(own, ["run10", "run2"])
+    assert not doubts.is_estimated(card(recordings=["run1"]), ["run1"])

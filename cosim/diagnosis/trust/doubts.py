@@ -51,9 +51,9 @@ def assumed_units(recordings: Sequence[Recording]) -> tuple[Sanity, ...]:
 
 
 def is_estimated(card: Card, names: Sequence[str]) -> bool:
-    """Whether a card was estimated from some recordings of these names: it is no witness of them."""
+    """Whether a card was estimated from some recordings of these names, or a part of one: it is no witness of them."""
     given = card.origin.get("recordings", ()) if "estimated_by" in card.origin else ()
-    return any(name.startswith(one) for name in names for one in given)
+    return any(name == one or name.startswith(f"{one} (") for name in names for one in given)
 
 
 def _reference(card: Card, recordings: Sequence[Recording]) -> Reference:

@@ -6,7 +6,7 @@ and Coulomb friction F then looks like one with J T / P and F T (time put right 
 """
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import exp, log, pi
 
 import numpy as np
@@ -123,28 +123,12 @@ def _contradiction(k: float, linear: bool) -> Iterator[Explanation]:
     A speed is wrong more often (an estimate of a drive, another shaft); a time or a position is in published records.
     """
     length = "m" if linear else "rad"
-    yield Explanation(
-        kind="speed_scale",
-        what=f'"v" is {k:.3g} times the speed, and position and time are right',
-        prior=0.02,
-        speed=k,
-        factor=k,
-        is_slip=False,
-    )
-    yield Explanation(
-        kind="time_unit",
-        what=f'time is stretched by {k:.3g} (--units "t={1 / k:.4g} s")',
-        prior=0.007,
-        time=k,
-        factor=k,
-    )
-    yield Explanation(
-        kind="position_scale",
-        what=f'"q" is {1 / k:.3g} times the position (--units "q={k:.4g} {length}")',
-        prior=0.005,
-        position=1 / k,
-        factor=1 / k,
-    )
+    slip = Explanation(kind="time_unit", what=f'time is stretched by {k:.3g} (--units "t={1 / k:.4g} s")', prior=0.007)
+    speed = f'"v" is {k:.3g} times the speed, and position and time are right'
+    place = f'"q" is {1 / k:.3g} times the position (--units "q={k:.4g} {length}")'
+    yield replace(slip, kind="speed_scale", what=speed, prior=0.02, speed=k, factor=k, is_slip=False)
+    yield replace(slip, time=k, factor=k)
+    yield replace(slip, kind="position_scale", what=place, prior=0.005, position=1 / k, factor=1 / k)
 
 
 def _positions(linear: bool, reading: str) -> Iterator[Explanation]:
