@@ -72,7 +72,7 @@ def _head(story: Story, command: str, linear: bool) -> Iterator[str]:
         f"{_force(linear)}, held-out error, first": f"{first.after:.3g}",
         f"{_force(linear)}, held-out error, last": f"{last.after:.3g}",
     }
-    yield f"<h1>{escape(last.words[0].upper() + last.words[1:])}</h1><p>{escape(SENTENCES[story.ended])}</p>"
+    yield f"<h1>{escape(story.answer)}</h1><p>{escape(SENTENCES[story.ended])}</p>"
     yield f'<p class="quiet">{escape(command)} · {escape(__version__)}</p>'
     shown = "".join(f"<span><b>{value}</b>{name}</span>" for name, value in facts.items())
     yield f'<div class="facts">{shown}</div>'

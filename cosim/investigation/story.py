@@ -91,6 +91,13 @@ class Story:
         return next(one for one in reversed(self.steps) if isinstance(one, Answered))
 
     @property
+    def answer(self) -> str:
+        """The last answer as a heading, with the set that it is one of: a name among others is none."""
+        words, questions = self.last.words, zip(self.last.open, self.last.kinds, strict=True)
+        sets = "; ".join(statement for statement, kind in questions if kind == "set")
+        return words[0].upper() + words[1:] + (f" (open: {sets})" if sets else "")
+
+    @property
     def further(self) -> float:
         """Seconds of motion after the first answer."""
         return sum(one.seconds for one in self.steps[self.steps.index(self.first) :] if isinstance(one, Moved))
@@ -122,10 +129,8 @@ class Story:
         return "\n".join([*lines, *refused, SENTENCES[self.ended], *more, self._total()])
 
     def _total(self) -> str:
-        said = self.last.words
-        return (
-            f"{said[0].upper()}{said[1:]}; {self.seconds:.0f} s of motion, {self.further:.0f} s after the first answer"
-        )
+        motion = f"{self.seconds:.0f} s of motion, {self.further:.0f} s after the first answer"
+        return f"{self.answer}; {motion}"
 
 
 def line_of(one: Moved | Answered) -> str:

@@ -3,7 +3,7 @@
 import re
 
 from cosim.api.rounds import Rounds
-from cosim.investigation.story import Answered, Moved
+from cosim.investigation.story import Answered, Moved, Story
 
 DIAGNOSIS = ("refitting the base", "Delay (1 of 2)", "proving on the recording that was not fitted")
 
@@ -51,3 +51,13 @@ def test_the_time_to_go_comes_down_in_later_rounds() -> None:
     left = [int(found[1]) for line in said if (found := re.search(r"at most about (\d+) s left", line))]
     assert left[-1] < left[0]
     assert 0 < left[-1] <= 6
+
+
+def test_a_name_that_is_one_of_a_set_heads_nothing_alone() -> None:
+    """The heading names the rivals; that a sure answer was not found twice is no rival."""
+    first = answer(0.3, "cogging")
+    rivals = Answered(
+        1, ("cable_wrap",), ("cable wrap or gravity unbalance", "once more"), ("set", "unconfirmed"), 1, 1, 1, 1
+    )
+    assert Story((first, rivals), "budget spent").answer == "Cable wrap (open: cable wrap or gravity unbalance)"
+    assert Story((rivals, first), "budget spent").answer == "Cogging"
