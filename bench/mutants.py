@@ -1,13 +1,14 @@
 """Small errors planted in the code, one at a time: do the tests notice?
 
-    python bench/mutants.py --seed 1 --count 150 --journal FILE --out results/robustness [--groups fmi ...]
+    python bench/mutants.py --seed 1 --count 150 --map MAP --journal FILE --out results/robustness [--groups fmi ...]
     python bench/mutants.py --seed 1 --count 150 --journal FILE --out results/robustness --so-far [--remarks FILE.toml]
     python bench/mutants.py --journal FILE --out results/robustness --seconds 60 --ask MODULE:LINE=FILE_OF_TESTS ...
 
 Each room of the product is a group (`GROUPS`), and of each as many errors are drawn: the kinds of `mutations.KINDS` in
 turn, the place by chance, so that numbers, of which there are most, do not outweigh the rest. An error is written into
-a copy of the tree (of C the libraries are built anew there), and files of tests run, the likeliest first
-(`mutants_choice.py`), for so many seconds of a processor.
+a copy of the tree (of C the libraries are built anew there), and tests run for so many seconds of a processor: those
+that are known to run the line (`--map`: mutants_map.py, mutants_chosen.py), the most focused first; without a map files
+of tests that name what was changed or are near (mutants_choice.py).
 
 Noticed: a test failed that passes without the error, or no longer ended. Survived: none did. What does not compile is
 no error to plant; another one is drawn in its place.
@@ -15,35 +16,28 @@ no error to plant; another one is drawn in its place.
 
 import argparse
 import json
-import os
 import re
-import resource
 import signal
-import subprocess
 import sys
 import tempfile
 import tomllib
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
 from itertools import zip_longest
-from math import ceil
 from pathlib import Path
 from random import Random
-from shutil import copytree, ignore_patterns, rmtree
+from shutil import copy2, copytree, ignore_patterns, rmtree
 from time import monotonic
 
-import casadi  # noqa: F401  what is loaded here need not be loaded in each fork
-import fmpy  # noqa: F401
-import pandas  # noqa: F401
-import pyarrow.parquet  # noqa: F401
 import pytest
-import scipy.signal  # noqa: F401
 
-sys.path[:0] = [str(Path(__file__).parent)]
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "cosim/master/loop")]
 
 import mutations  # noqa: E402
 import mutations_c  # noqa: E402
-from mutants_choice import HOME, asked  # noqa: E402
+from build_hook import LIBRARIES, SUFFIX, compile_library  # noqa: E402
+from mutants_choice import HOME  # noqa: E402
+from mutants_chosen import Map, chosen, read_map  # noqa: E402
+from mutants_forks import forked, preloaded  # noqa: E402
 from mutants_page import Sample, Tried, journalled, written  # noqa: E402
 
 GROUPS = {
@@ -68,31 +62,18 @@ GROUPS = {
 }
 """Rooms of the product; of each as many errors are drawn."""
 QUIET = ("-n0", "-q", "-x", "-p", "no:cacheprovider", "--no-header", "--tb=no", "-rfE", "--timeout=60")
-OURS = (
-    "cosim",
-    "cosim_studies",
-    "pyfmi_models",
-    "mutants",
-    "mutants_page",
-    "mutants_choice",
-    "mutations",
-    "mutations_c",
-)
-"""What a fork loads anew, from the tree with the error."""
-BUILD = "cosim/master/loop/build_hook.py"
+LOST = r"^(?:FAILED|ERROR) tests/(\S+?\.py(?:::.*?)?)(?: - .*)?$"
+GONE = r"^ERROR: not found: \S*?/tests/(.*)$"
+"""What pytest says of a test that failed, and of one that is there no more."""
+LOADING = 4.0
+"""Seconds of a processor in which a file of tests is loaded at most."""
+NOT_COLLECTED = "(not collected)"
 
 
 def read(path: Path) -> tuple[str, list[mutations.Site]]:
     """The text of a module or a C file, and the places in it where errors can be planted."""
     source = path.read_text("utf-8")
     return source, (mutations_c if path.suffix == ".c" else mutations).sites(source)
-
-
-def drawn(seed: int, groups: Sequence[str] = tuple(GROUPS)) -> Iterator[tuple[str, Path, int]]:
-    """Group, module and number of a place, without an end: the groups in turn, so that a part is a fair sample."""
-    lists = [_of_group(seed, group) for group in groups]
-    for turn in zip_longest(*lists):
-        yield from (one for one in turn if one)
 
 
 def _of_group(seed: int, group: str) -> list[tuple[str, Path, int]]:
@@ -108,10 +89,11 @@ def _of_group(seed: int, group: str) -> list[tuple[str, Path, int]]:
 class Tree:
     """A copy of the work tree in which one error at a time is planted."""
 
-    def __init__(self, folder: Path, seconds: float) -> None:
+    def __init__(self, folder: Path, seconds: float, known: Map | None = None) -> None:
         ignored = ignore_patterns(".git", ".venv", "__pycache__", "build", ".*_cache")
         self.place, self.seconds = Path(copytree(HOME, folder / "tree", ignore=ignored)), seconds
-        self._broken: set[str] = set()  # tests that fail here without an error too
+        self._known = known or Map()
+        self._broken: set[str] = set()  # tests that fail here without an error too, or are there no more
         self._sound: dict[str, float] = {}  # tests, and whole files, that passed once, and their seconds
 
     def attempt(self, group: str, path: Path, number: int, more: Sequence[str] = ()) -> Tried | None:
@@ -119,115 +101,79 @@ class Tree:
         module = str(path.relative_to(HOME))
         source = (self.place / module).read_text("utf-8")  # the work tree may have moved on
         site, text = (mutations_c if path.suffix == ".c" else mutations).mutated(source, number)
-        begun, (named, files) = monotonic(), ([], list(more)) if more else asked(path, source, site.line)
-        while True:
-            try:
-                if not self._written(module, text):
-                    return None
-                witness = self._noticed(named, files)
-            finally:
+        begun, left, witness = monotonic(), self.seconds, ""
+        batches = iter([[one] for one in more]) if more else chosen(self._known, path, source, site.line)
+        try:
+            if not self._written(module, text):
+                return None
+            tests = next(batches, [])
+            while tests and left > 1:
+                witness, spent = self._failed(tests, left)
+                left -= spent
+                if not witness:
+                    tests = next(batches, [])
+                    continue
                 self._written(module, source)
-            if not witness or self._is_sound(witness):
-                seconds = round(monotonic() - begun, 1)
-                return Tried(group, module, number, site.line, site.kind, site.change, witness, seconds)
-            if not named:
-                files = files[files.index(witness.split("::")[0]) :]
-            named = [one for one in named if one not in self._broken]
+                if self._is_sound(witness, tests):
+                    break
+                self._written(module, text)
+                witness, tests = "", [one for one in tests if one not in self._broken]
+        finally:
+            self._written(module, source)
+        seconds = round(monotonic() - begun, 1)
+        return Tried(group, module, number, site.line, site.kind, site.change, witness, seconds)
 
     def _written(self, module: str, text: str) -> bool:
         """Write a file and build the libraries that have it in them; whether they compile."""
-        (self.place / module).write_text(text, "utf-8")
-        if not module.endswith(".c") or not module.startswith("cosim"):
+        if (self.place / module).read_text("utf-8") == text:
             return True
-        code = f"import sys; sys.path.insert(0, {str(Path(BUILD).parent)!r}); import build_hook as b\n"
-        code += f"for target, sources in b.LIBRARIES.items():\n    if {module!r} in sources:\n"
-        code += "        b.compile_library([b.ROOT / one for one in sources], b.ROOT / (target + b.SUFFIX))\n"
-        done = subprocess.run(
-            [sys.executable, "-c", code], cwd=self.place, env=os.environ | {"PYTHONPATH": ""}, capture_output=True
-        )
-        return done.returncode == 0
-
-    def _noticed(self, named: Sequence[str], files: Sequence[str]) -> str:
-        """The first test that fails: of those named, together, then of files one by one, as long as the time lasts."""
-        left = self.seconds
-        for tests in [*([named] if named else []), *([file] for file in files)]:
-            if left <= 1:
-                return ""
-            witness, spent = self._failed(tests, left)
-            if witness:
-                return witness
-            left -= spent
-        return ""
+        (self.place / module).write_text(text, "utf-8")
+        built = [target for target, sources in LIBRARIES.items() if module in sources]
+        if text == (HOME / module).read_text("utf-8") and all((HOME / (one + SUFFIX)).exists() for one in built):
+            for one in built:  # as they were
+                copy2(HOME / (one + SUFFIX), self.place / (one + SUFFIX))
+            return True
+        try:
+            for one in built:
+                compile_library([self.place / source for source in LIBRARIES[one]], self.place / (one + SUFFIX))
+        except RuntimeError:
+            return False
+        return True
 
     def _failed(self, tests: Sequence[str], left: float) -> tuple[str, float]:
         """Run tests for so many seconds of a processor; what failed there, and seconds; "(time)": what used to end."""
         said = self.place / "said"
-        pid = os.fork()
-        if not pid:  # whatever happens there, nothing of the bench goes on in the fork
-            try:
-                os._exit(self._tested(tests, said, ceil(left)))
-            finally:
-                os._exit(4)
-        _, status, usage = os.wait4(pid, 0)
-        end_all(pid)
-        code, spent = os.waitstatus_to_exitcode(status), usage.ru_utime + usage.ru_stime
-        known = self._sound.get(" ".join(tests))
+        left_out = [f"--deselect=tests/{one}" for one in self._broken]
+        command = [*QUIET, *left_out, *(f"tests/{one}" for one in tests if one not in self._broken)]
+        code, spent = forked(lambda: int(pytest.main(command)), self.place, said, left)
         if code == -signal.SIGXCPU:
-            return (f"{tests[0]} (time)" if known and known < left / 2 else ""), spent
+            known = self._sound.get(" ".join(tests)) or self._known.seconds(tests)
+            return (f"{tests[0]} (time)" if known and known + LOADING < left / 2 else ""), spent
         if code in (0, 5):  # 5: no tests here
             self._sound |= dict.fromkeys((*tests, " ".join(tests)), spent)
             return "", spent
-        lost = re.findall(
-            r"^(?:FAILED|ERROR) tests/(\S+?\.py(?:::.*?)?)(?: - .*)?$", said.read_text("utf-8", "replace"), re.M
-        )
-        return (lost[0] if lost else tests[0]), spent
+        lost = re.findall(LOST, said.read_text("utf-8", "replace"), re.M)
+        return (lost[0] if lost else f"{tests[0]} {NOT_COLLECTED}"), spent
 
-    def _tested(self, tests: Sequence[str], said: Path, most: int) -> int:
-        """Run tests here, in a fork that has all but the tree loaded already; what pytest ends with."""
-        os.setsid()
-        os.chdir(self.place)
-        os.environ |= {"PYTHONPATH": str(self.place), "OMP_NUM_THREADS": "1", "PYTHONDONTWRITEBYTECODE": "1"}
-        sys.dont_write_bytecode = True
-        resource.setrlimit(resource.RLIMIT_CPU, (most, most + 5))
-        sys.path[:] = [str(self.place), *(one for one in sys.path if not _is_of_home(one))]
-        for module in [one for one in sys.modules if one.split(".")[0] in OURS]:
-            del sys.modules[module]
-        with said.open("w") as output:
-            os.dup2(output.fileno(), 1)
-            os.dup2(output.fileno(), 2)
-        left_out = [f"--deselect=tests/{one}" for one in self._broken]
-        return int(pytest.main([*QUIET, *left_out, *(f"tests/{one}" for one in tests)]))
-
-    def _is_sound(self, witness: str) -> bool:
+    def _is_sound(self, witness: str, tests: Sequence[str]) -> bool:
         """Whether a test passes without the error; one that does not is asked no more."""
         if witness.endswith(" (time)") or self._sound.keys() & {witness, witness.split("[")[0], witness.split("::")[0]}:
             return True
-        again, _ = self._failed([witness], 60)
+        again, _ = self._failed(tests if witness.endswith(NOT_COLLECTED) else [witness], 60)
         if again:
-            self._broken.add(witness)
+            gone = re.findall(GONE, (self.place / "said").read_text("utf-8", "replace"), re.M)
+            self._broken |= {*gone} or {witness.removesuffix(f" {NOT_COLLECTED}")}
         return not again
 
 
-def _is_of_home(folder: str) -> bool:
-    """Whether modules there are those of which a copy is changed; a virtual environment may lie in their tree."""
-    return (folder == str(HOME) or folder.startswith(str(HOME) + os.sep)) and not folder.startswith(sys.prefix + os.sep)
-
-
-def end_all(group: int) -> None:
-    """End what a file of tests left behind: it had a session of its own."""
-    with suppress(ProcessLookupError):
-        os.killpg(group, signal.SIGKILL)
-
-
-def todo(seed: int, count: int, groups: Sequence[str], tried: Iterable[Tried]) -> Iterator[tuple[str, Path, int]]:
-    """The errors of a sample that were not tried yet; one more a group for each that did not compile."""
-    done = {(one.module, one.site) for one in tried}
-    for group, path, number in drawn(seed, groups):
-        if len(done) >= count:
-            return
-        if (key := (str(path.relative_to(HOME)), number)) not in done:
-            yield group, path, number
-            done.add(key)
+def todo(seed: int, count: int, groups: Sequence[str], tried: list[Tried]) -> Iterator[tuple[str, Path, int]]:
+    """The errors of a sample until so many are in `tried`, of each group as many; what does not compile is passed."""
+    lists = {group: iter(_of_group(seed, group)) for group in groups}
+    passed = {(one.module, one.site) for one in tried}
+    while len(tried) < count:
+        group = min(groups, key=lambda one: sum(found.group == one for found in tried))
+        _, path, number = next(one for one in lists[group] if (str(one[1].relative_to(HOME)), one[2]) not in passed)
+        yield group, path, number
 
 
 def todo_again(ask: Sequence[str], tried: Sequence[Tried]) -> Iterator[tuple[str, Path, int, tuple[str, ...]]]:
@@ -243,8 +189,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--count", type=int, default=150)
-    parser.add_argument("--seconds", type=float, default=20, help="of a processor that the tests of an error may take")
+    parser.add_argument("--seconds", type=float, default=25, help="of a processor that the tests of an error may take")
     parser.add_argument("--groups", nargs="+", choices=GROUPS, default=list(GROUPS))
+    parser.add_argument("--map", type=Path, help="file of mutants_map.py: which tests run which lines")
     parser.add_argument("--journal", type=Path, required=True, help="file of what is done: a run goes on from there")
     parser.add_argument("--ask", nargs="+", default=[], help="MODULE:LINE=FILE: tests that a survivor is asked too")
     parser.add_argument("--remarks", type=Path, help="what is known of survivors (.toml): why, by MODULE:LINE")
@@ -255,7 +202,8 @@ def main() -> None:
     if not given.so_far:
         folder = Path(tempfile.mkdtemp(prefix="mutants-"))
         try:
-            run(Tree(folder, given.seconds), given)
+            preloaded()
+            run(Tree(folder, given.seconds, read_map(given.map)), given)
         finally:
             rmtree(folder, ignore_errors=True)
     remarks = tomllib.loads(given.remarks.read_text("utf-8")) if given.remarks else {}
@@ -267,12 +215,14 @@ def run(tree: Tree, given: argparse.Namespace) -> None:
     """Try what is left of a sample; each goes into the journal at once."""
     tried_before = journalled(given.journal)
     new = ((*one, ()) for one in todo(given.seed, given.count, given.groups, tried_before))
-    for group, path, number, more in todo_again(given.ask, tried_before) if given.ask else new:
+    again = todo_again(given.ask, list(tried_before))
+    for group, path, number, more in again if given.ask else new:
         tried = tree.attempt(group, path, number, more)
         if tried is None:
             print(f"{path.relative_to(HOME)}: {number} does not compile", flush=True)
             continue
         print(f"{tried.module}:{tried.line} {tried.kind} {tried.change}: {tried.noticed or 'SURVIVED'}", flush=True)
+        tried_before.append(tried)
         with given.journal.open("a", encoding="utf-8") as file:
             file.write(json.dumps(vars(tried)) + "\n")
 

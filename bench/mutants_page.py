@@ -49,39 +49,51 @@ def _rate(tried: Sequence[Tried]) -> str:
     return f"{found.value:.0%} ({found.low:.0%} to {found.high:.0%})"
 
 
+EQUIVALENT = "equivalent"
+"""How a remark begins of a survivor that changes nothing that can be seen: it is counted apart."""
+
+
 def page(tried: Sequence[Tried], sample: Sample, command: str, remarks: Mapping[str, str]) -> str:
     """The table for people, and the survivors."""
     late = sum(one.noticed.endswith("(time)") for one in tried)
     lines = ["# Small errors planted in the code", "", f"    {command}", ""]
-    lines += [f"mount-cosim {__version__}, {commit()}. What is planted and which tests are asked: `bench/mutants.py`."]
+    lines += [f"mount-cosim {__version__}, {commit()}. What is planted, and what is not: `bench/mutations.py`."]
     lines += [
-        f"{len(tried)} of {sample.count} planned, in the order in which they were drawn, "
-        f"{sample.seconds:g} s of tests each;"
+        f"{len(tried)} of {sample.count} planned, in the order in which they were drawn. Of each the tests were asked",
+        f"that run the line, focused ones first (`bench/mutants_chosen.py`), for {sample.seconds:g} s of processor;",
+        f"{late} were noticed because a test no longer ended. In brackets: 95 % intervals (Wilson).",
     ]
-    lines += [f"{late} of the noticed because a test no longer ended. In brackets: 95 % intervals (Wilson)."]
     lines += [remarks["sample"]] if "sample" in remarks else []
     lines += [
-        "What is equivalent counts as survived, as does what only a test notices that was written after the draw; so",
-        "the rate is a lower bound of what the whole suite notices, which is asked in that time in part.",
+        "What only a test notices that was written after the draw counts as survived; so the rate is a lower bound of",
+        "what the whole suite notices. What is equivalent, with its reason below, is left out of the last column.",
         "",
     ]
-    lines += ["| room | errors | noticed | survived | rate |", "|---|--:|--:|--:|--:|", *_rows(tried, "group"), ""]
-    lines += ["| kind | errors | noticed | survived | rate |", "|---|--:|--:|--:|--:|", *_rows(tried, "kind"), ""]
+    for name, title in (("group", "room"), ("kind", "kind")):
+        lines += [f"| {title} | errors | noticed | survived | rate | rate without equivalents |", "|---|" + 5 * "--:|"]
+        lines += [*_rows(tried, name, remarks), ""]
     lines += ["## Survivors", "", "| module | line | kind | change | what is known of it |", "|---|--:|---|---|---|"]
     for one in tried:
         if not one.noticed:
-            remark = remarks.get(f"{one.module}:{one.line}", "")
-            lines.append(f"| {one.module} | {one.line} | {one.kind} | `{one.change}` | {remark} |")
+            lines.append(f"| {one.module} | {one.line} | {one.kind} | `{one.change}` | {_remark(one, remarks)} |")
     return "\n".join(lines) + "\n"
 
 
-def _rows(tried: Sequence[Tried], name: str) -> list[str]:
+def _remark(one: Tried, remarks: Mapping[str, str]) -> str:
+    """What is known of a survivor: of its line, or of its line and kind where there are several."""
+    place = f"{one.module}:{one.line}"
+    return remarks.get(f"{place}:{one.kind}", remarks.get(place, ""))
+
+
+def _rows(tried: Sequence[Tried], name: str, remarks: Mapping[str, str]) -> list[str]:
     """A line for each room or kind, and one for all."""
     rows = []
     for value in [*dict.fromkeys(getattr(one, name) for one in tried), "all"]:
         here = [one for one in tried if value in (getattr(one, name), "all")]
-        killed = sum(bool(one.noticed) for one in here)
-        rows.append(f"| {value} | {len(here)} | {killed} | {len(here) - killed} | {_rate(here)} |")
+        noticed = sum(bool(one.noticed) for one in here)
+        seen = [one for one in here if one.noticed or not _remark(one, remarks).startswith(EQUIVALENT)]
+        counts = f"{len(here)} | {noticed} | {len(here) - noticed}"
+        rows.append(f"| {value} | {counts} | {_rate(here)} | {_rate(seen) if seen else '-'} |")
     return rows
 
 
@@ -93,7 +105,7 @@ def commit() -> str:
 
 def written(tried: Sequence[Tried], sample: Sample, out: Path, remarks: Mapping[str, str]) -> None:
     """Write the page; `remarks` say what is known of a survivor, by module and line, and of the `sample`."""
-    asked = f"--seed {sample.seed} --count {sample.count} --seconds {sample.seconds:g} --journal FILE"
+    asked = f"--seed {sample.seed} --count {sample.count} --seconds {sample.seconds:g} --map MAP --journal FILE"
     out.parent.mkdir(parents=True, exist_ok=True)
     with replacing(out, force=True) as partial:
         command = f"python bench/mutants.py {asked} --out results/robustness"

@@ -1,9 +1,17 @@
 """One small error in the text of a module, of ten kinds: `KINDS` names them. Of C files: mutations_c.py.
 
-What is only said is left as it is: docstrings, texts, annotations, what is raised, decorators.
+What is planted is an error. What nobody can see, or what is only said, is left as it is, by rules and not by choice:
+docstrings, texts, annotations, what is raised, decorators, `__all__` (they are said or declared for tools); calls that
+only tell something (`SAID`); how a picture looks (`DRAWN`, `LOOKS`: a person sees it, a test does not; what is
+computed for a picture is not left out); keywords that change no result (`NO_RESULT`); interfaces (a function whose
+body is a docstring alone: its implementers have their own defaults); branches of other systems, which never run here.
 """
 
 import ast
+import os
+import platform
+import re
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -34,8 +42,18 @@ COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
     ast.BitAnd: ast.BitOr,
     ast.LShift: ast.RShift,
 }
-SAID = ("say", "told", "put")
+SAID = ("say", "told", "put", "print", "echo", "debug", "info")
 """Calls that only tell people something."""
+DRAWN = re.compile(
+    r"plot|legend|grid|bar|barh|stairs|imshow|errorbar|fill_between|pcolormesh|ax[hv](line|span)|annotate|text|suptitle|"
+    r"set_(title|[xy](label|lim|ticks|scale|ticklabels)|m..or_(formatter|locator)|visible)|tick_params|locator_params|"
+    r"minorticks_off|invert_yaxis|margins|colorbar"
+)
+"""Calls that put something into a picture."""
+LOOKS = re.compile(r"colou?r|alpha|lw|linewidth|fontsize|size|marker|markersize|zorder|ls|style|pad|dpi")
+"""Keywords that say how something in a picture looks."""
+NO_RESULT = re.compile(r"strict|indent|stacklevel|repr|maxsize|daemon|timeout|markup|highlight|show_default|help")
+"""Keywords that change no result: checks of `zip` for whoever reads, shapes of texts, sizes of caches, time limits."""
 COMMUTING = ("max", "min", "maximum", "minimum", "fmax", "fmin", "hypot", "gcd", "isclose", "array_equal")
 """Calls to which the order of two arguments means nothing."""
 SCALES = frozenset(10.0**power for power in (-9, -6, -3, 3, 6, 9)) | {60.0, 3600.0, 180.0}
@@ -69,9 +87,7 @@ def mutated(source: str, number: int) -> tuple[Site, str]:
 
 def _sites(node: ast.AST, default: bool = False) -> Iterator[tuple[Site, Plant]]:
     for name, value in ast.iter_fields(node):
-        if name in ("annotation", "returns", "decorator_list") or isinstance(node, ast.Raise | ast.JoinedStr):
-            continue
-        if isinstance(node, ast.keyword) and node.arg == "strict":  # of `zip`: for whoever reads
+        if name in ("annotation", "returns", "decorator_list") or _is_unseen(node, name):
             continue
         children = value if isinstance(value, list) else [value]
         given = name in ("defaults", "kw_defaults") or (isinstance(node, ast.AnnAssign) and name == "value")
@@ -82,6 +98,39 @@ def _sites(node: ast.AST, default: bool = False) -> Iterator[tuple[Site, Plant]]
                 yield from _sites(child, default or given)
         if name == "body" and isinstance(value, list):
             yield from _left_out(value)
+
+
+def _is_unseen(node: Any, name: str) -> bool:
+    """Whether a part of the code is only said, or changes nothing that can be seen here."""
+    if isinstance(node, ast.Raise | ast.JoinedStr):
+        return True
+    if isinstance(node, ast.keyword):
+        return bool(node.arg and (LOOKS.fullmatch(node.arg) or NO_RESULT.fullmatch(node.arg)))
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
+        called = _called(node.value)
+        in_picture = DRAWN.fullmatch(called) or (called == "set" and node.value.keywords)
+        return called.startswith(SAID) or bool(in_picture)
+    if isinstance(node, ast.Assign):
+        return ast.unparse(node.targets[0]) == "__all__"
+    if isinstance(node, ast.FunctionDef):
+        return all(isinstance(one, ast.Expr) and isinstance(one.value, ast.Constant) for one in node.body)
+    return isinstance(node, ast.If) and name == {True: "orelse", False: "body"}.get(_holds_here(node.test))  # type: ignore[arg-type]
+
+
+def _holds_here(test: ast.expr) -> bool | None:
+    """What a condition on the system or the checker of types is here; None for any other."""
+    text = ast.unparse(test)
+    if text == "TYPE_CHECKING":
+        return False
+    names = {ast.unparse(one) for one in ast.walk(test) if isinstance(one, ast.Attribute | ast.Name)}
+    if not names <= {"sys", "os", "platform", "sys.platform", "os.name", "platform.machine", "platform.system"}:
+        return None
+    return bool(eval(text, {"sys": sys, "os": os, "platform": platform})) if names else None
+
+
+def _called(call: ast.Call) -> str:
+    """The last name of what is called."""
+    return ast.unparse(call.func).split(".")[-1]
 
 
 def _here(node: Any, default: bool, index: bool) -> Iterator[tuple[str, Plant, str]]:
@@ -121,7 +170,7 @@ def _left_out(body: list[ast.stmt]) -> Iterator[tuple[Site, Plant]]:
     """Statements that are a call alone, which may be left out."""
     for place, one in enumerate(body):
         call = one.value if isinstance(one, ast.Expr) else None
-        if isinstance(call, ast.Call) and not ast.unparse(call.func).split(".")[-1].startswith(SAID):
+        if isinstance(call, ast.Call) and not _is_unseen(one, ""):
             yield Site(one.lineno, "call", f"{_shown(one)} -> left out"), _placing(body, place)
 
 
@@ -136,7 +185,7 @@ def _placing(body: list[ast.stmt], place: int) -> Plant:
 def _is_alike(call: ast.Call) -> bool:
     """Whether the first two arguments cannot be swapped, or to no effect: the same, spread, a text or a function."""
     first, second = call.args[:2]
-    if ast.unparse(call.func).split(".")[-1] in COMMUTING:
+    if _called(call) in COMMUTING:
         return True
     no = (ast.Starred, ast.JoinedStr, ast.Lambda, ast.GeneratorExp)
     text = any(isinstance(one, ast.Constant) and isinstance(one.value, str) for one in (first, second))

@@ -10,6 +10,8 @@ COMPUTED = {"+": "-", "-": "+", "*": "/", "/": "*", "%": "*", "&": "|", "+=": "-
 WORDS = {"&&": "||", "||": "&&", "true": "false", "false": "true"}
 NOT_CODE = re.compile(r'/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'|^[ \t]*#.*?$|//.*?$', re.DOTALL | re.MULTILINE)
 """Comments, texts, and lines of the preprocessor."""
+SIZED = re.compile(r"^ *(?:static |const |extern |struct )*\w+ \**\w+(?:\[\w+\])+(?= =|;|,)")
+"""What declares an array: where there is room for one more, nobody sees it."""
 TOKENS = re.compile(
     r"(?<= )(?P<comparison><=|>=|==|!=|<|>)(?= )"
     r"|(?<= )(?P<operator>\+=|-=|[-+*/%&])(?= )"
@@ -38,6 +40,9 @@ def _sites(source: str) -> Iterator[tuple[Site, tuple[int, int], str]]:
     for found in TOKENS.finditer(code):
         kind = found.lastgroup or ""
         text, line = found[kind], code.count("\n", 0, found.start(kind) + (kind == "call")) + 1
+        sized = SIZED.match(code[code.rfind("\n", 0, found.start(kind)) + 1 :]) if kind == "index" else None
+        if sized and code.rfind("\n", 0, found.start(kind)) + 1 + sized.end() > found.start(kind):
+            continue
         for name, other in _others(kind, text, found):
             yield (
                 Site(line, name, f"{_around(source, line)}: {text.strip()} -> {other or 'left out'}"),

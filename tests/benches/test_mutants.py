@@ -3,7 +3,7 @@
 import ast
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
 
@@ -14,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 import mutants
 import mutations_c
 from mutants_choice import asked, told
+from mutants_page import Tried
 from mutations import KINDS, mutated, sites
 
 SOURCE = '''
@@ -26,9 +27,22 @@ def clamp(x: float = -1.5) -> float:
         raise ValueError(f"{x + 1} is more than {LIMIT * 2}")
     return clip(min(-LIMIT, x * 2), LIMIT) if x is not None else x[1] % 1000.0 == True
 '''
+NOBODY_SEES = [
+    "__all__ = ['a', 3]",
+    "axes.plot(t, 1000.0 * q, linewidth=2.5)",
+    "axes.set(xlim=(0, 3))",
+    "print(3)",
+    "x = json.dumps(y, indent=2)",
+    "x = draw(colour=0.5, fontsize=8)",
+    "class A:\n    def size(self, limit: float = 3.0) -> float:\n        'Of an interface.'",
+    "if sys.platform == 'win32':\n    x = 3",
+    "if os.name == 'posix':\n    pass\nelse:\n    x = 3",
+    "if TYPE_CHECKING:\n    x = 3",
+]
 C = """/* A file: 1 + 1 is said only. */
 #include "limit.h"
 
+static const double ends[2] = {0.5, 7};
 static double clamp(double x, const double *limit)
 {
     check(x);
@@ -74,10 +88,23 @@ def test_every_kind_of_error_is_planted_and_each_changes_one_place() -> None:
     assert {site.kind for site, _ in found} == set(KINDS)
 
 
+@pytest.mark.parametrize("source", NOBODY_SEES)
+def test_what_nobody_can_see_is_not_planted(source: str) -> None:
+    kept = [site.change for site in sites(source) if not site.change.startswith(("sys.platform", "os.name"))]
+    assert kept == []
+
+
+def test_what_is_computed_for_a_picture_and_what_runs_here_is_planted() -> None:
+    source = "y = 1000.0 * q\naxes.plot(t, y)\nevent.set()\nif os.name == 'posix':\n    z = limited(n=3)"
+    changes = {site.change for site in sites(source)}
+    assert {"1000.0 * q -> Div", "event.set() -> left out", "3 -> 4"} <= changes
+
+
 def test_in_c_each_error_changes_one_token_and_nothing_that_is_only_said() -> None:
     found = [mutations_c.mutated(C, number) for number in range(len(mutations_c.sites(C)))]
     changes = {(site.kind, site.change.rpartition(": ")[2]) for site, _ in found}
     assert changes == {
+        ("number", "0.5 -> 0.6"),
         ("call", "check(x); -> left out"),
         ("comparison", "> -> >="),
         ("comparison", "> -> <="),
@@ -101,13 +128,33 @@ def test_in_c_each_error_changes_one_token_and_nothing_that_is_only_said() -> No
 
 def test_the_same_seed_draws_the_same_errors_from_every_room_and_of_every_kind() -> None:
     groups = ("fmi", "loop", "hardware")
-    some = {seed: list(islice(mutants.drawn(seed, groups), 150)) for seed in (1, 2)}
-    assert some[1] == list(islice(mutants.drawn(1, groups), 150))
+    some = {seed: drawn(seed, 150, groups) for seed in (1, 2)}
+    assert some[1] == drawn(1, 150, groups)
     assert some[1] != some[2]
-    assert [group for group, *_ in some[1][:6]] == 2 * list(groups)
-    kinds = {mutants.read(path)[1][number].kind for _, path, number in some[1]}
-    assert kinds == set(KINDS)
-    assert any(path.suffix == ".c" for _, path, _ in some[1])
+    assert [one.group for one in some[1][:6]] == 2 * list(groups)
+    assert {one.kind for one in some[1]} == set(KINDS)
+    assert any(one.module.endswith(".c") for one in some[1])
+
+
+def drawn(seed: int, count: int, groups: tuple[str, ...]) -> list[Tried]:
+    """What a run would try, each as if it had survived."""
+    tried: list[Tried] = []
+    for group, path, number in mutants.todo(seed, count, groups, tried):
+        site = mutants.read(path)[1][number]
+        module = str(path.relative_to(mutants.HOME))
+        tried.append(Tried(group, module, number, site.line, site.kind, site.change, ""))
+    return tried
+
+
+def test_what_does_not_compile_is_passed_and_a_run_goes_on_where_it_ended() -> None:
+    whole = drawn(1, 6, ("fmi", "loop"))
+    left = [(str(path.relative_to(mutants.HOME)), number) for _, path, number in islice(gone_on(whole[:4]), 4)]
+    assert left[0] == (whole[4].module, whole[4].site)
+    assert len(set(left)) == 4, "nothing is drawn twice"
+
+
+def gone_on(tried: list[Tried]) -> Iterator[tuple[str, Path, int]]:
+    return mutants.todo(1, 6, ("fmi", "loop"), tried)
 
 
 def test_every_room_of_the_product_has_its_errors() -> None:
@@ -146,7 +193,7 @@ def test_a_line_is_part_of_the_innermost_function_or_of_what_it_declares() -> No
     assert [told(source, line, False) for line in range(1, 10)] == [
         *("LIMIT", "", "size", "grown", "inner", "inner", "grown", "", ""),
     ]
-    assert [told(C, line, True) for line in (1, 4, 7, 10)] == ["", "clamp", "clamp", "clamp"]
+    assert [told(C, line, True) for line in (1, 5, 8, 11)] == ["", "clamp", "clamp", "clamp"]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks")
@@ -173,7 +220,7 @@ def noticed(folder: Path) -> None:
     this = tree(folder, home)
     for number, site in enumerate(mutants.read(home / "held.py")[1]):
         for files in (["test_idle.py"], ["test_broken.py", "test_idle.py", "test_looks.py"])[number > 0 :]:
-            mutants.asked = lambda *_, files=files: ([], files)
+            mutants.chosen = lambda *_, files=files: iter([[one] for one in files])
             tried = this.attempt("held", home / "held.py", number)
             survives = len(files) == 1 or site.change == "min(x, 3) + 0 -> Sub"
             assert tried
@@ -187,7 +234,7 @@ def heads(folder: Path) -> None:
     source, found = mutants.read(path)
     line = source[: source.index("heads->shift + 2")].count("\n") + 1
     number = next(k for k, one in enumerate(found) if one.line == line and one.change.endswith(": 2 -> 3"))
-    mutants.asked = lambda *_: ([], ["hardware/test_heads.py"])
+    mutants.chosen = lambda *_: iter([["hardware/test_heads.py"]])
     tried = this.attempt("hardware", path, number)
     assert tried
     assert tried.noticed
