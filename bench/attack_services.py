@@ -24,14 +24,14 @@ from attack_mutations import NUMBERS, WORDS, of_bytes, of_text
 from attack_worker import Ended
 from serving import PORT, asked, client_of, headers_to, listened, new
 
-from cosim.observatory.alpaca import Server
-from cosim.observatory.indi import IndiServer
-from cosim.observatory.pointing import Pointing
-from cosim.observatory.telescope import Telescope
-from cosim.serve import looks
-from cosim.serve.actions import ACTIONS
-from cosim.serve.desk import Desk
-from cosim.serve.uploads import Limits
+from cosim_observatory.alpaca import Server
+from cosim_observatory.indi import IndiServer
+from cosim_observatory.pointing import Pointing
+from cosim_observatory.telescope import Telescope
+from cosim_serve import looks
+from cosim_serve.actions import ACTIONS
+from cosim_serve.desk import Desk
+from cosim_serve.uploads import Limits
 
 REQUESTS = 6
 """Spoilt requests of a session."""

@@ -1,8 +1,8 @@
 """The command `cosim`: verbs that take files to files.
 
-A verb `x` is the function `x` in the module `cosim.cli.x`, or the typer `app` there if it has verbs of its own. Only
-the module of the verb that is called is imported, and it imports what is heavy inside its functions: so a run needs
-neither CasADi nor a compiler.
+A verb `x` is the function `x` in the module `cosim.cli.x`, or the typer `app` there if it has verbs of its own; other
+packages plug in theirs (`cosim.support.plugins`). Only the module of the verb that is called is imported, and it
+imports what is heavy inside its functions: so a run needs neither CasADi nor a compiler.
 
 Exit codes: 0 done, 1 only where a yes or no was asked, 2 wrong use or bad input (one sentence), 130 interrupted (143 by
 SIGTERM).
@@ -13,8 +13,6 @@ import functools
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from importlib import import_module
-from importlib.util import find_spec
 from math import isfinite
 from pathlib import Path
 from types import MappingProxyType
@@ -22,9 +20,10 @@ from typing import Annotated, Any, NoReturn
 
 import typer
 
-from cosim.cli.help import epilog, group_of, listed
+from cosim.cli.help import epilog, group_of
 from cosim.cli.settings import PAIRS, Settings, read_settings
-from cosim.support.errors import CosimError, InputError
+from cosim.cli.verbs import modules, verbs
+from cosim.support.errors import CosimError, InputError, PlugInError
 from cosim.support.interrupts import Terminated, end_well, is_interrupted, is_terminated
 from cosim.support.suffixes import RECORDINGS
 from cosim.support.system_errors import surroundings
@@ -39,25 +38,6 @@ NAMES = ("--free",)
 INTERRUPTED, TERMINATED = 130, 143
 """Exit codes."""
 NONE = Settings()
-VERBS = (
-    "demo",
-    "export",
-    "run",
-    "compare",
-    "card",
-    "identify",
-    "check",
-    "diagnose",
-    "why",
-    "investigate",
-    "prove",
-    "paper",
-    "sweep",
-    "hardware",
-    "show",
-    "serve",
-    "doctor",
-)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -80,6 +60,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if ended.code == INTERRUPTED and is_terminated():
             leave(Terminated())
         raise
+    except PlugInError as error:
+        if debug:
+            raise
+        say(f"cosim: {error}")
+        sys.exit(2)
     except Exception as error:  # as a verb was loaded
         if debug or not is_of_signal(error):
             raise
@@ -108,7 +93,7 @@ def check_given(arguments: Sequence[str]) -> None:
 def settled() -> Settings:
     """Read the defaults of the folder that one stands in; what is wrong with them ends the command in a sentence."""
     try:
-        found = read_settings(VERBS)
+        found = read_settings(verbs)
     except InputError as error:
         say(f"cosim: {error}")
         sys.exit(2)
@@ -170,26 +155,26 @@ def is_file(argument: str) -> bool:
 
 def application(arguments: Sequence[str], debug: bool = False, settings: Settings = NONE) -> typer.Typer:
     """Make the command with the verb that is called, or with all that there are."""
+    called = next((argument for argument in arguments if not argument.startswith("-")), "")
+    found = dict(modules(called))
     app = typer.Typer(
         name="cosim",
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         context_settings={
             "help_option_names": ["-h", "--help"],
-            "default_map": {verb: settings.of_verb(verb) for verb in VERBS},
+            "default_map": {verb: settings.of_verb(verb) for verb in found},
         },
     )
     app.callback()(_options)
-    present = listed([verb for verb in VERBS if find_spec(f"cosim.cli.{verb}")])
-    called = [argument for argument in arguments if not argument.startswith("-")][:1]
-    for verb in [verb for verb in present if [verb] == called] or present:
-        module = import_module(f"cosim.cli.{verb}")
+    for verb, module in found.items():
+        group, examples = group_of(verb, module), epilog(verb, module)
         if isinstance(getattr(module, "app", None), typer.Typer):
             for command in module.app.registered_commands:
                 command.callback = guarded(command.callback, debug) if command.callback else None
-            app.add_typer(module.app, name=verb, rich_help_panel=group_of(verb), epilog=epilog(verb))
+            app.add_typer(module.app, name=verb, rich_help_panel=group, epilog=examples)
         else:
-            command = app.command(verb, rich_help_panel=group_of(verb), epilog=epilog(verb))
+            command = app.command(verb, rich_help_panel=group, epilog=examples)
             command(guarded(getattr(module, verb), debug, settings))
     return app
 

@@ -9,14 +9,13 @@ import typer
 from cosim.cli.drive import JsonOption, KeyOption, MachineOption, machine_of, virtual_drive
 from cosim.cli.firmware import firmware
 from cosim.cli.options import Force, Out, command_of, default_out
-from cosim.cli.supervisor import alpaca, indi
+from cosim.cli.verbs import attach
 from cosim.support.terminal import put, put_json, say
 
 app = typer.Typer(no_args_is_help=True, help="The same controller on a machine.")
 app.command()(firmware)
-app.command("alpaca")(alpaca)
-app.command("indi")(indi)
 app.command("virtual-drive")(virtual_drive)
+attach(app, "hardware")
 
 ScenarioArgument = Annotated[str, typer.Argument(help="A scenario (.toml) or the name of a shipped one: sidereal.")]
 DriveOption = Annotated[str, typer.Option("--drive", help="udp://HOST:PORT, instead of the machine's adapter.")]

@@ -1,14 +1,18 @@
-"""What `cosim --help` says beside each verb's own words: its group, and two examples of each."""
+"""What `cosim --help` says beside each verb's own words: its group, and two examples of each.
+
+A verb that another package plugs in has both in its module, as `GROUP` and `EXAMPLES`.
+"""
+
+from types import ModuleType
 
 GROUPS = {
-    "Diagnose": ("demo", "diagnose", "why", "identify", "card", "compare", "investigate", "show"),
+    "Diagnose": ("diagnose", "why", "identify", "card", "compare", "investigate", "show"),
     "Simulate": ("run", "export", "sweep", "check"),
-    "Machine": ("hardware", "serve", "doctor"),
-    "Prove": ("prove", "paper"),
+    "Machine": ("hardware", "doctor"),
 }
-"""Verbs by what they are for, in the order in which they are listed."""
+"""Verbs of this package by what they are for, in the order in which they are listed."""
+ORDER = tuple(verb for several in GROUPS.values() for verb in several)
 EXAMPLES = {
-    "demo": ("cosim demo", "cosim demo --out mine --force"),
     "diagnose": (
         "cosim diagnose monday.csv tuesday.csv",
         "cosim diagnose train.csv --heldout check.csv --card axis.toml --columns tau=force --out found",
@@ -30,25 +34,18 @@ EXAMPLES = {
     "sweep": ("cosim sweep gains.toml", "cosim sweep gains.toml --workers 4 --out gains"),
     "check": ("cosim check plant.fmu", "cosim check plant.fmu --json"),
     "hardware": ("cosim hardware check machine.toml", "cosim hardware run --help"),
-    "serve": ("cosim serve", "cosim serve --port 8123 --no-browser"),
     "doctor": ("cosim doctor", "cosim doctor --json"),
-    "prove": ("cosim prove --cases 10 --out proof", "cosim prove --seed 7 --workers 2"),
-    "paper": ("cosim paper --out tables", "cosim paper --out tables --force"),
 }
 """Two command lines of each verb: the plainest, and one with what is asked for most."""
 
 
-def group_of(verb: str) -> str:
+def group_of(verb: str, module: ModuleType) -> str:
     """The group that a verb is listed in."""
-    return next((group for group, verbs in GROUPS.items() if verb in verbs), "Other")
+    own = next((group for group, verbs in GROUPS.items() if verb in verbs), None)
+    return own or str(getattr(module, "GROUP", "Other"))
 
 
-def listed(verbs: list[str]) -> list[str]:
-    """Verbs in the order of their groups."""
-    order = [verb for several in GROUPS.values() for verb in several]
-    return sorted(verbs, key=lambda verb: order.index(verb) if verb in order else len(order))
-
-
-def epilog(verb: str) -> str:
+def epilog(verb: str, module: ModuleType) -> str:
     """The examples, as a paragraph each: what is printed below the options."""
-    return "\n\n".join(["Examples:", *(f"  {one}" for one in EXAMPLES.get(verb, ()))])
+    examples: tuple[str, ...] = EXAMPLES[verb] if verb in EXAMPLES else getattr(module, "EXAMPLES", ())
+    return "\n\n".join(["Examples:", *(f"  {one}" for one in examples)])

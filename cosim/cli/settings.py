@@ -11,7 +11,7 @@ q = "arcsec"
 """
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -54,8 +54,8 @@ class Settings:
                 raise InputError(text, culprit=name, choices=choices)
 
 
-def read_settings(verbs: Sequence[str], here: Path | None = None) -> Settings:
-    """Read the nearest file of defaults; none is no fault.
+def read_settings(verbs: Callable[[], Sequence[str]], here: Path | None = None) -> Settings:
+    """Read the nearest file of defaults; none is no fault. Which verbs there are is asked only where there is one.
 
     Raises:
         InputError: it is not TOML, a key in it is unknown, or a value is of the wrong kind.
@@ -63,11 +63,11 @@ def read_settings(verbs: Sequence[str], here: Path | None = None) -> Settings:
     folder = Path.cwd() if here is None else here
     for place in (folder, *folder.parents):
         if (path := place / FILE).is_file():
-            return _checked(path, _parsed(path), verbs)
+            return _checked(path, _parsed(path), verbs())
         if (path := place / PROJECT).is_file():
             table = _parsed(path).get("tool", {})
             if isinstance(table, dict) and "cosim" in table:
-                return _checked(path, table["cosim"], verbs)
+                return _checked(path, table["cosim"], verbs())
     return Settings()
 
 

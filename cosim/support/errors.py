@@ -17,7 +17,8 @@ CosimError                  everything this package raises on purpose
 ├── CheckError              a law or an effect of one's own fails a check
 ├── StepError               a component failed while stepping: component, tick, time, last inputs
 ├── LostComponentError      a component crashed, ended or blocked the process that it ran in
-└── MissingPackageError     an optional package is needed and not installed
+├── MissingPackageError     an optional package is needed and not installed
+└── PlugInError             what an installed package adds to this one cannot be loaded
 """
 
 from typing import Any
@@ -166,3 +167,7 @@ class LostComponentError(CosimError):
 
 class MissingPackageError(CosimError):
     """An optional package is needed and not installed; the text says how to install it."""
+
+
+class PlugInError(CosimError):
+    """What an installed package adds to this one cannot be loaded."""

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from cosim.data.formats import is_recording
-from cosim.serve.pages import SUFFIXES
 from cosim.support.suffixes import RECORDINGS
+from cosim_serve.pages import SUFFIXES
 
 
 def test_what_is_offered_is_read_and_what_is_read_is_offered(tmp_path: Path) -> None:

@@ -12,8 +12,9 @@ import pytest
 from typer.main import get_command
 
 import cosim
-from cosim.cli import VERBS, application, plugged, repeated
-from cosim.serve import example
+from cosim.cli import application, plugged, repeated
+from cosim.cli.verbs import verbs
+from cosim_serve import example
 from pyfmi_models.card import parse_card
 
 ROOT = Path(__file__).parents[2]
@@ -86,7 +87,7 @@ def typed(text: str) -> Iterator[list[str]]:
             words = shlex.split(part, comments=True)
             while words and not words[0].endswith("cosim"):
                 words = words[1:] if "cosim" in " ".join(words) else []
-            if len(words) > 1 and words[1] in VERBS:
+            if len(words) > 1 and words[1] in verbs():
                 yield words[1:]
 
 

@@ -7,18 +7,23 @@ import pytest
 from commands import call
 from typer.main import get_command
 
-from cosim.cli import VERBS, application
-from cosim.cli.help import EXAMPLES, GROUPS
+from cosim.cli import application
+from cosim.cli.help import GROUPS, epilog, group_of
 from cosim.cli.settings import read_settings
+from cosim.cli.verbs import module_of, verbs
 from cosim.support.errors import InputError
 
 
 def test_every_verb_has_a_group_and_two_examples() -> None:
-    assert sorted(verb for several in GROUPS.values() for verb in several) == sorted(VERBS)
-    assert {verb: len(lines) for verb, lines in EXAMPLES.items()} == dict.fromkeys(VERBS, 2)
+    assert {verb: len(examples(verb)) for verb in verbs()} == dict.fromkeys(verbs(), 2)
+    assert {group_of(verb, module_of(verb)) for verb in verbs()} == {*GROUPS, "Prove"}
 
 
-@pytest.mark.parametrize("line", [line for lines in EXAMPLES.values() for line in lines])
+def examples(verb: str) -> list[str]:
+    return [line.strip() for line in epilog(verb, module_of(verb)).split("\n\n")[1:]]
+
+
+@pytest.mark.parametrize("line", [line for verb in verbs() for line in examples(verb)])
 def test_every_example_of_the_help_parses(line: str) -> None:
     from cosim.cli import repeated
 
@@ -36,7 +41,7 @@ def test_every_example_of_the_help_parses(line: str) -> None:
 def test_help_lists_groups_in_their_order(capsys: pytest.CaptureFixture[str]) -> None:
     assert call("--help") == 0
     told = capsys.readouterr().out
-    places = [told.index(f"─ {group} ─") for group in GROUPS]
+    places = [told.index(f"─ {group} ─") for group in (*GROUPS, "Prove")]
     assert places == sorted(places)
 
 
@@ -59,7 +64,7 @@ def test_the_nearest_file_of_defaults_is_read(tmp_path: Path, name: str, monkeyp
     (tmp_path / "axis.toml").touch()
     (below := tmp_path / "day").mkdir()
     monkeypatch.chdir(below)
-    found = read_settings(VERBS)
+    found = read_settings(verbs)
     assert found.listed("columns") == ["tau=force"]
     assert found.of_verb("run") == {"card": str(Path("..") / "axis.toml"), "stop": 0.02}
     assert found.paths["out"] == str(Path("..") / "results")
@@ -67,7 +72,7 @@ def test_the_nearest_file_of_defaults_is_read(tmp_path: Path, name: str, monkeyp
 
 def test_another_tool_s_project_file_says_nothing(tmp_path: Path) -> None:
     (tmp_path / "pyproject.toml").write_text("[tool.other]\nx = 1\n", "utf-8")
-    assert read_settings(VERBS, tmp_path).pairs == {}
+    assert read_settings(verbs, tmp_path).pairs == {}
 
 
 @pytest.mark.parametrize(
@@ -82,7 +87,7 @@ def test_another_tool_s_project_file_says_nothing(tmp_path: Path) -> None:
 def test_a_wrong_file_of_defaults_is_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
     (tmp_path / "cosim.toml").write_text(text, "utf-8")
     with pytest.raises(InputError) as refused:
-        read_settings(VERBS, tmp_path)
+        read_settings(verbs, tmp_path)
     assert sentence in str(refused.value)
 
 

@@ -8,7 +8,7 @@ from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
-from imports import FILES, PACKAGES, ROOT, imports
+from imports import FILES, PACKAGES, PLUG_INS, ROOT, imports
 
 from cosim_studies.proof.conduct import TELLS
 
@@ -18,7 +18,7 @@ FLOORS = (
     {"cosim.fmi", "cosim.reading"},
     {"cosim.system"},
     {"cosim.master", "cosim.plots"},
-    {"cosim.nesting", "cosim.hardware", "cosim.observatory", "cosim.sweeps", "cosim.models", "cosim.estimation"},
+    {"cosim.nesting", "cosim.hardware", "cosim.sweeps", "cosim.models", "cosim.estimation"},
     {"cosim.calibration", "cosim.experiments"},
     {"cosim.diagnosis.answer"},
     {"cosim.diagnosis.decide"},
@@ -32,14 +32,14 @@ FLOORS = (
     {"cosim.report"},
     {"cosim.delivery"},
     {"cosim.investigation", "cosim.checks", "cosim.simulators"},
-    {"cosim.api", "cosim_studies"},
-    {"cosim.serve"},
+    {"cosim.api"},
     {"cosim", "cosim.cli"},
     {"cosim.__main__"},
+    set(PLUG_INS),
 )
 """The floors of the house, from the ground: what stands on one imports only from floors below."""
 FLOOR_OF = {folder: number for number, floor in enumerate(FLOORS) for folder in floor}
-HIGHEST = {"cosim", "cosim.api", "cosim.cli", "cosim.serve", "cosim_studies"}
+HIGHEST = {"cosim", "cosim.api", "cosim.cli", *PLUG_INS}
 ROOMS = {folder for floor in FLOORS for folder in floor if folder.count(".") == 2}
 KNOW_PHYSICS = (
     ROOMS | {"cosim.diagnosis", "cosim.report", "cosim.delivery", "cosim.investigation", "cosim.checks"} | HIGHEST
@@ -47,7 +47,6 @@ KNOW_PHYSICS = (
 KNOW_PHYSICS |= {"cosim.models", "cosim.estimation", "cosim.simulators", "cosim.nesting"}
 NEED_HEAVY = KNOW_PHYSICS | {"cosim.plots"}
 """Folders that may import CasADi, the compiler or matplotlib: a run needs none of them."""
-STUDY_VERBS = {f"cosim.cli.{verb}" for verb in ("demo", "paper", "prove")}
 EXPORT_READS = ("pyfmi_models.model", "pyfmi_models.errors", "pyfmi_models.export")
 C_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 C_FUNCTION = re.compile(r"^(?!static)(?:[A-Za-z_][\w *]*[ *])(\w+)\([^;{}]*\)\n\{", re.MULTILINE)
@@ -89,11 +88,14 @@ def test_a_folder_imports_only_from_floors_below(folder: str) -> None:
             assert floor(other) < floor(name), f"{name} imports {other}, which does not stand below it"
 
 
-def test_only_the_verbs_of_the_studies_import_them_and_only_when_called() -> None:
-    for name in (one for one in FILES if not belongs(one, "cosim_studies")):
-        if any(belongs(other, "cosim_studies") for other in ours(name)):
-            assert name in STUDY_VERBS, f"{name} imports a study"
-            assert not any(belongs(other, "cosim_studies") for other in imports(name, inside=False)), name
+@pytest.mark.parametrize("plug_in", PLUG_INS)
+def test_what_is_plugged_in_is_imported_by_itself_alone(plug_in: str) -> None:
+    """The trunk knows it by its entry points, another plug-in not at all; no string in the trunk names it either."""
+    for name, path in FILES.items():
+        if not belongs(name, plug_in):
+            assert not any(belongs(other, plug_in) for other in ours(name)), f"{name} imports {plug_in}"
+        if belongs(name, "cosim"):
+            assert f'"{plug_in}' not in path.read_text("utf-8") or name == "cosim.master.loop.build_hook", name
 
 
 @pytest.mark.parametrize("name", FILES)

@@ -9,19 +9,19 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("cosim", "cosim_studies", "pyfmi_models")
+PACKAGES = ("cosim", "cosim_observatory", "cosim_serve", "cosim_studies", "pyfmi_models")
 SOURCES = sorted(path for folder in (*PACKAGES, "bench", "tests") for path in (ROOT / folder).rglob("*.py"))
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "results").glob("*.md")])
 MODULES = {".".join(one.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): one for one in SOURCES}
-PATH = re.compile(r"(?<![\w/.])(?:cosim|cosim_studies|pyfmi_models|bench|tests|docs|results|\.ci)(?:/[\w.-]+)+")
+PATH = re.compile(rf"(?<![\w/.])(?:{'|'.join(PACKAGES)}|bench|tests|docs|results|\.ci)(?:/[\w.-]+)+")
 NAME = re.compile(rf"\b(?:{'|'.join(PACKAGES)})(?:\.[a-zA-Z_]\w*)+")
 BARE = re.compile(r"`(\w+\.(?:py|c|h))`")
 TO_WRITE = {"herschel_bulkley.py", "wind_load.py", "wind_load", "my_drive.py", "camera.py", "equations.c", "model.c"}
 """Files that a reader is told to write, or that an export makes."""
 MOVED = {"cosim.stiffness"}
 """Names that the changelog says were moved."""
-GROUPS = {"cosim.effects", "cosim.laws", "cosim.hypotheses"}
-"""Entry points by which packages of others bring their classes."""
+GROUPS = {"cosim.effects", "cosim.laws", "cosim.hypotheses", "cosim.verbs", "cosim.transports"}
+"""Entry points by which other packages bring their own."""
 OTHERS = {"scope_files.c", "csv_output.py"}
 """Files of other projects that a page or docstring says are read."""
 ENDINGS = ("py", "c", "toml", "fmu", "md", "so")

@@ -11,7 +11,8 @@ from report_example import diagnosis
 from typer.main import get_command
 
 import cosim
-from cosim.cli import VERBS, application
+from cosim.cli import application
+from cosim.cli.verbs import verbs
 from cosim.diagnosis.effects.base import UNSEEN
 from cosim.report import render
 from cosim.report.terminal import summary
@@ -32,7 +33,7 @@ def test_report_and_terminal_are_in_plain_words(kind: str) -> None:
     assert not unplain(summary(found))
 
 
-@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("verb", verbs())
 def test_the_help_of_a_verb_is_in_plain_words(verb: str) -> None:
     command = get_command(application([verb]))
     with command.make_context("cosim", [verb]) as context:

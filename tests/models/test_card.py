@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from effect_examples import EXAMPLES
+from imports import PACKAGES
 
 from pyfmi_models.card import Card, parse_card, read_card, shipped_cards
 from pyfmi_models.card_writer import card_text
@@ -173,7 +174,7 @@ def test_the_noise_of_the_encoder_is_kept_for_people_and_read_by_nothing_as_the_
     card = parse_card(SMALL + "[encoder]\nnoise_rms = 2e-7\n", "c")
     assert parse_card(card_text(card), "again").encoder.noise_rms == 2e-7
     root = Path(__file__).parents[2]
-    sources = [one for room in ("cosim", "cosim_studies", "pyfmi_models") for one in (root / room).rglob("*.py")]
+    sources = [one for room in PACKAGES for one in (root / room).rglob("*.py")]
     assert sources
     assert [one.name for one in sources if ".noise_rms" in one.read_text("utf-8")] == []
     assert "enters no calculation" in (root / "docs" / "card.md").read_text("utf-8")

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 
 import cosim
-from cosim.serve import example
 from cosim.support.notebook import shows_progress
+from cosim_serve import example
 
 
 @pytest.fixture

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from cosim.models.cache import with_fmus
-from cosim.observatory.alpaca import Server
-from cosim.observatory.mount import Limits, SimulatedMount
-from cosim.observatory.pointing import Pointing
-from cosim.observatory.telescope import Telescope
 from cosim.system.scenario import read_scenario
+from cosim_observatory.alpaca import Server
+from cosim_observatory.mount import Limits, SimulatedMount
+from cosim_observatory.pointing import Pointing
+from cosim_observatory.telescope import Telescope
 
 SPEED, ARCSEC = 20.0, 1 / 3600
 QUICK = Limits(velocity=radians(10), acceleration=radians(10))

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from alpaca_mount import ARCSEC, BEGUN, server, telescope, until
 
-from cosim.observatory.pointing import HORIZON
-from cosim.observatory.sky import equatorial, horizontal, sidereal_time
+from cosim_observatory.pointing import HORIZON
+from cosim_observatory.sky import equatorial, horizontal, sidereal_time
 
 __all__ = ["server", "telescope"]
 

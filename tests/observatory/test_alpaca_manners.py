@@ -4,8 +4,8 @@ import socket
 
 from alpaca_mount import server
 
-from cosim.observatory.alpaca import Server
-from cosim.observatory.telescope import HOURS, TURN, _hours
+from cosim_observatory.alpaca import Server
+from cosim_observatory.telescope import HOURS, TURN, _hours
 
 __all__ = ["server"]
 REQUEST = (

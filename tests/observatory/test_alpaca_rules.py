@@ -17,12 +17,12 @@ import numpy as np
 import pytest
 from alpaca_rules import BAD, BASE, RULES, Rule
 
-import cosim.observatory.alpaca as alpaca
-from cosim.observatory.alpaca import CONNECTIONS, Server
-from cosim.observatory.indi import IndiServer
-from cosim.observatory.pointing import DeviceError, Pointing
-from cosim.observatory.properties import PROPERTIES
-from cosim.observatory.telescope import Telescope
+import cosim_observatory.alpaca as alpaca
+from cosim_observatory.alpaca import CONNECTIONS, Server
+from cosim_observatory.indi import IndiServer
+from cosim_observatory.pointing import DeviceError, Pointing
+from cosim_observatory.properties import PROPERTIES
+from cosim_observatory.telescope import Telescope
 
 
 class Prompt:
@@ -244,7 +244,7 @@ def test_connections_are_counted_and_those_on_which_nothing_is_done_are_ended(mo
 
 
 def test_a_client_of_indi_says_little_at_a_time_and_asks_soon(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("cosim.observatory.indi.GREETING", 0.5)
+    monkeypatch.setattr("cosim_observatory.indi.GREETING", 0.5)
     with IndiServer(free(), port=0) as server:
         for text in (b"<a " + b"x" * 200_000, b"<a>" * 100, b"<getProperties>" + b"<!-- -->" * 20_000, b""):
             with socket.create_connection(("127.0.0.1", server.port), timeout=20) as wire:

@@ -19,15 +19,15 @@ from mortal import mortal
 
 from cosim.data.recording import Recording
 from cosim.models.cache import with_fmus
-from cosim.observatory.alpaca import Server
-from cosim.observatory.guide import Guide, still
-from cosim.observatory.members import ABSENT
-from cosim.observatory.mount import SimulatedMount
-from cosim.observatory.pointing import DeviceError, Pointing
-from cosim.observatory.telescope import Telescope
 from cosim.support.errors import OutputError, ScenarioError
 from cosim.system.scenario import read_scenario
 from cosim.system.wire import Wire
+from cosim_observatory.alpaca import Server
+from cosim_observatory.guide import Guide, still
+from cosim_observatory.members import ABSENT
+from cosim_observatory.mount import SimulatedMount
+from cosim_observatory.pointing import DeviceError, Pointing
+from cosim_observatory.telescope import Telescope
 
 __all__ = ["server", "telescope"]
 

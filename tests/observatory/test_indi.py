@@ -13,13 +13,13 @@ import pytest
 from mortal import mortal
 
 from cosim.models.cache import with_fmus
-from cosim.observatory.indi import CLIENTS, IndiServer
-from cosim.observatory.mount import Limits, SimulatedMount
-from cosim.observatory.pointing import DeviceError, Pointing
-from cosim.observatory.properties import number
-from cosim.observatory.telescope import Telescope
 from cosim.support.errors import OutputError
 from cosim.system.scenario import read_scenario
+from cosim_observatory.indi import CLIENTS, IndiServer
+from cosim_observatory.mount import Limits, SimulatedMount
+from cosim_observatory.pointing import DeviceError, Pointing
+from cosim_observatory.properties import number
+from cosim_observatory.telescope import Telescope
 
 DEVICE, ARCSEC = "mount-cosim simulated mount", 1 / 3600
 QUICK = Limits(velocity=radians(10), acceleration=radians(10))

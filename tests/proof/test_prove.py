@@ -10,7 +10,6 @@ from prove_rows import ROWS, row
 from report_example import diagnosis
 
 from cosim.cli import main
-from cosim.cli.prove import _line
 from cosim.support.errors import OutputError, ProofError
 from cosim.sweeps.journal import RUNS
 from cosim_studies.proof import baselines, marks
@@ -21,6 +20,7 @@ from cosim_studies.proof.ledger import enlist, listed
 from cosim_studies.proof.page import page, proof
 from cosim_studies.proof.seal import Seals, canonical, salt_of, seal
 from cosim_studies.proof.tool import scored
+from cosim_studies.verbs.prove import _line
 
 
 def test_a_deck_is_drawn_from_its_seed_alone_and_a_longer_one_begins_alike() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from imports import PACKAGES
 
 from bench.worlds.machines import assess, cases, plant
 from bench.worlds.machines.compose import compose
@@ -39,7 +40,7 @@ def test_generator_imports_nothing_of_the_project():
                 modules |= {alias.name.split(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and not node.level:
                 modules.add(node.module.split(".")[0])
-    assert not modules & {"cosim", "cosim_studies", "pyfmi_models"}
+    assert not modules & set(PACKAGES)
 
 
 def test_every_effect_of_the_catalogue_can_be_concealed():

@@ -16,8 +16,8 @@ from cosim.diagnosis.effects import TRIED
 from cosim.report import render
 from cosim.report.repairs import MACHINES, MOTIONS, for_machine, machines_of, repairs_of
 from cosim.report.terminal import summary
-from cosim.serve.work import in_words
 from cosim.support.errors import InputError
+from cosim_serve.work import in_words
 from pyfmi_models.card import MachineKind
 
 ASYMMETRY = FOUND[1]

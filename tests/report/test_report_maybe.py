@@ -9,7 +9,7 @@ from cosim.diagnosis.answer.result import Diagnosis, Finding
 from cosim.report import lead, words
 from cosim.report.quantities import Scales
 from cosim.report.terminal import summary
-from cosim.serve.work import in_words
+from cosim_serve.work import in_words
 from pyfmi_models.effects import Cogging
 
 MAYBE = replace(FOUND[1], effect="cable_wrap", title="Cable wrap", answer="ambiguous", probability=0.49)

@@ -28,12 +28,12 @@ from serving import (
 from serving import state as state_of
 from starlette.testclient import TestClient
 
-from cosim.serve.desk import Desk
-from cosim.serve.job import Upload
-from cosim.serve.server import listening
-from cosim.serve.work import Order, command, diagnose_order
 from cosim.support.errors import InputError, OutputError
 from cosim.support.lock import claimed
+from cosim_serve.desk import Desk
+from cosim_serve.job import Upload
+from cosim_serve.server import listening
+from cosim_serve.work import Order, command, diagnose_order
 
 __all__ = ["_path", "client", "desk"]
 
@@ -157,9 +157,7 @@ def test_without_its_extra_one_sentence_says_how_to_get_it(tmp_path: Path) -> No
 
 
 def test_the_verb_imports_the_server_only_when_it_is_called() -> None:
-    code = (
-        "import sys, cosim, cosim.cli.serve; print([n for n in ('starlette', 'uvicorn', 'jinja2') if n in sys.modules])"
-    )
+    code = "import sys, cosim_serve.verb; print([n for n in ('starlette', 'uvicorn', 'jinja2') if n in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=HERE.parent, check=True)
     assert done.stdout.strip() == "[]"
 
@@ -197,7 +195,7 @@ def test_a_diagnosis_names_files_as_the_user_knows_them(tmp_path: Path) -> None:
 
 
 def test_no_room_on_the_disk_is_a_sentence(client: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
-    from cosim.serve import uploads
+    from cosim_serve import uploads
 
     def full(*_: object) -> None:
         raise OutputError("3 MB are needed and the disk has 1 MB: remove older diagnoses.")

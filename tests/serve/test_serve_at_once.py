@@ -12,9 +12,9 @@ import serve_work
 from serving import _path, act, asked, client_of, desk_at, headers_to, id_of, listened, new, ready, recording, until
 from serving import state as state_of
 
-from cosim.serve.desk import Desk
-from cosim.serve.uploads import Limits
 from cosim.support.errors import InputError
+from cosim_serve.desk import Desk
+from cosim_serve.uploads import Limits
 
 __all__ = ["_path"]
 FEW = Limits(files=3, job=60_000, file=40_000)

@@ -16,7 +16,7 @@ from browsing import DESK, PATIENCE, PHONE, axe_script, browser, dropped, opened
 from mortal import mortal
 from serving import CARD, HERE, TOKEN, _path, desk_at, listened, recording, until  # skips without the extra [serve]
 
-from cosim.serve.desk import Desk
+from cosim_serve.desk import Desk
 
 __all__ = ["_path", "browser"]
 Page = Any

@@ -12,9 +12,9 @@ from report_example import diagnosis
 from serving import CARD, _path, act, client_of, desk_at, id_of, new, put, ready, recording, until
 from starlette.testclient import TestClient
 
-from cosim.serve import comparison
-from cosim.serve.chart import HEIGHT, LEFT, WIDTH, chart, ticks
-from cosim.serve.desk import Desk
+from cosim_serve import comparison
+from cosim_serve.chart import HEIGHT, LEFT, WIDTH, chart, ticks
+from cosim_serve.desk import Desk
 
 __all__ = ["_path"]
 

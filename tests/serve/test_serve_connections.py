@@ -11,8 +11,8 @@ import pytest
 import serve_work
 from serving import _path, asked, client_of, desk_at, headers_to, listened, new, until
 
-from cosim.serve import connection
-from cosim.serve.desk import Desk
+from cosim_serve import connection
+from cosim_serve.desk import Desk
 
 __all__ = ["_path"]
 

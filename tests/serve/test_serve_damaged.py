@@ -10,7 +10,7 @@ from serving import CARD, _path, act, client, desk, id_of, new, put, ready, reco
 from serving import state as state_of
 from starlette.testclient import TestClient
 
-from cosim.serve.desk import Desk
+from cosim_serve.desk import Desk
 
 __all__ = ["_path", "client", "desk"]
 FINDING = {"what": "cogging", "size": "", "range": "", "answer": "", "kind": "", "statement": "", "action": ""}

@@ -11,8 +11,8 @@ import pytest
 from mortal import mortal
 from serving import HERE, TOKEN, _path, client, client_of, desk, until
 
-from cosim.serve.desk import Desk
-from cosim.serve.door import NAME, door
+from cosim_serve.desk import Desk
+from cosim_serve.door import NAME, door
 
 __all__ = ["_path", "client", "desk"]
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="modes and /proc")

@@ -27,10 +27,10 @@ from serving import (
 from serving import state as state_of
 from starlette.testclient import TestClient
 
-from cosim.serve.desk import Desk
-from cosim.serve.looks import HEIGHT, WIDTH, line
-from cosim.serve.uploads import Limits, safe_name
 from cosim.support.errors import InputError
+from cosim_serve.desk import Desk
+from cosim_serve.looks import HEIGHT, WIDTH, line
+from cosim_serve.uploads import Limits, safe_name
 from pyfmi_models.card import parse_card
 
 __all__ = ["_path", "client", "desk"]

@@ -6,9 +6,9 @@ import pytest
 from serving import _path, act, client, desk, id_of, new, put
 from starlette.testclient import TestClient
 
-from cosim.serve import example
-from cosim.serve.desk import Desk
-from cosim.serve.form import FIELDS
+from cosim_serve import example
+from cosim_serve.desk import Desk
+from cosim_serve.form import FIELDS
 
 __all__ = ["_path", "client", "desk"]
 

@@ -6,9 +6,9 @@ import serve_work
 from serving import CARD, _path, act, client, client_of, desk, desk_at, new, put, recording, state
 from starlette.testclient import TestClient
 
-from cosim.serve.desk import Desk
-from cosim.serve.uploads import Limits
-from cosim.serve.work import command, job_order
+from cosim_serve.desk import Desk
+from cosim_serve.uploads import Limits
+from cosim_serve.work import command, job_order
 
 __all__ = ["_path", "client", "desk"]
 

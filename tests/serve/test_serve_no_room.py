@@ -12,7 +12,7 @@ from serving import CARD, _path, act, client, client_of, desk, desk_at, id_of, k
 from serving import state as state_of
 from starlette.testclient import TestClient
 
-from cosim.serve.desk import Desk
+from cosim_serve.desk import Desk
 
 __all__ = ["_path", "client", "desk"]
 FORMS: dict[str, dict[str, str]] = {

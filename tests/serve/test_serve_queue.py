@@ -24,8 +24,8 @@ from serving import (
 from serving import state as state_of
 from starlette.testclient import TestClient
 
-from cosim.serve.desk import Desk
-from cosim.serve.store import Store
+from cosim_serve.desk import Desk
+from cosim_serve.store import Store
 
 __all__ = ["_path", "client", "desk"]
 

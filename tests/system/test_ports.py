@@ -11,8 +11,8 @@ from cosim.system.ports import PortRef
 from cosim.system.wire import Record, Wire
 
 SPLIT = '.partition(".")'
-ROOT = Path(__file__).parents[2] / "cosim"
-SPEAK_OF_PORTS = ("system", "master", "hardware", "observatory", "sweeps")
+ROOT = Path(__file__).parents[2]
+SPEAK_OF_PORTS = (*(f"cosim/{one}" for one in ("system", "master", "hardware", "sweeps")), "cosim_observatory")
 SPLITS = {"ports.py": 2, "reading.py": 1}
 """The reader itself, and the number of the standard that an SSP names."""
 

@@ -4,7 +4,9 @@ import ast
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("cosim", "cosim_studies", "pyfmi_models")
+PLUG_INS = ("cosim_observatory", "cosim_serve", "cosim_studies")
+"""Packages that only entry points name."""
+PACKAGES = ("cosim", "pyfmi_models", *PLUG_INS)
 FILES = {
     ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
     for package in PACKAGES

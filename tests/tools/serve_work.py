@@ -46,8 +46,8 @@ def comparing(order: Any) -> dict[str, Any]:
     """Write what a diagnosis of two effects, or without any where it has one recording, is compared by."""
     from report_example import diagnosis
 
-    from cosim.serve import comparison
-    from cosim.serve.work import in_words
+    from cosim_serve import comparison
+    from cosim_serve.work import in_words
 
     found = diagnosis("two" if order.uploads[1:] else "none")
     quickly(order)

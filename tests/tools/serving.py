@@ -20,12 +20,12 @@ pytest.importorskip("uvicorn", reason="the extra [serve] is not installed")
 import uvicorn
 from starlette.testclient import TestClient
 
-from cosim.serve.app import make_app
-from cosim.serve.desk import Desk
-from cosim.serve.job import Job
-from cosim.serve.reader import Reader
-from cosim.serve.server import configured, listening
-from cosim.serve.uploads import Limits
+from cosim_serve.app import make_app
+from cosim_serve.desk import Desk
+from cosim_serve.job import Job
+from cosim_serve.reader import Reader
+from cosim_serve.server import configured, listening
+from cosim_serve.uploads import Limits
 
 TOKEN, PORT = "right", 8000
 HERE = Path(__file__).parents[1]

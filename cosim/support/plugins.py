@@ -1,0 +1,42 @@
+"""What installed packages add by entry points; nothing here imports them by name.
+
+    cosim.verbs        a module as those of `cosim.cli`: it has a function of the verb's name, or the typer `app`, its
+                       `GROUP` in the help and `EXAMPLES`; "hardware.alpaca" is the verb `cosim hardware alpaca`
+
+Classes of physics (`cosim.effects`, `cosim.laws`, `cosim.hypotheses`) come by the same means: `pyfmi_models.plugins`.
+"""
+
+from functools import cache
+from typing import Any
+
+from cosim.support.errors import PlugInError
+
+VERBS = "cosim.verbs"
+
+
+@cache
+def names(group: str) -> tuple[str, ...]:
+    """Names of the entry points of a group, in the order of the alphabet."""
+    return tuple(sorted(_points(group)))
+
+
+@cache
+def loaded(group: str, name: str) -> Any:
+    """Import what an entry point names.
+
+    Raises:
+        PlugInError: it cannot be imported; one sentence with its package and the reason.
+    """
+    point = _points(group)[name]
+    try:
+        return point.load()
+    except Exception as error:
+        home = point.dist.name if point.dist else point.value
+        text = f'The plug-in "{name}" of {home} cannot be loaded: {type(error).__name__}: {error}; reinstall {home}.'
+        raise PlugInError(text) from error
+
+
+def _points(group: str) -> dict[str, Any]:
+    from importlib.metadata import entry_points  # most commands need none of this
+
+    return {point.name: point for point in entry_points(group=group)}
