@@ -17,7 +17,7 @@ from pathlib import Path
 from mutants_blocks import blocks, innermost
 from mutants_choice import HOME, LOADED, asked, functions, naming, told
 
-PRODUCT = ("cosim", "pyfmi_models", "cosim_observatory", "cosim_serve", "cosim_studies")
+PRODUCT = ("cosim", "pyfmi_models", "cosim_ethercat", "cosim_observatory", "cosim_serve", "cosim_studies")
 BATCHES = ((4.0, 5), (6.0, 7), (8.0, 9))
 """Seconds and files of tests that are asked together: small at first; the last one is repeated."""
 HEAD = re.compile(r"^(?![ /#}])[\w ]*?[ *](\w+)\([^;]*$", re.M)

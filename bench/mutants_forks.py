@@ -15,7 +15,7 @@ from mutants_choice import HOME
 
 HEAVY = ("casadi", "fmpy", "pandas", "pyarrow.parquet", "scipy.signal", "scipy.optimize", "scipy.stats")
 """What is loaded here need not be loaded in each fork."""
-OURS = ("cosim", "cosim_observatory", "cosim_serve", "cosim_studies", "pyfmi_models")
+OURS = ("cosim", "cosim_ethercat", "cosim_observatory", "cosim_serve", "cosim_studies", "pyfmi_models")
 """What a fork loads anew, from the tree; with it what lies beside this file."""
 
 

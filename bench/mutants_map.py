@@ -32,7 +32,7 @@ import mutants_blocks as marks  # noqa: E402
 from mutants_choice import HOME, NOT_ASKED, SLOW  # noqa: E402
 from mutants_forks import forked, preloaded  # noqa: E402
 
-PRODUCT = ("cosim", "pyfmi_models", "cosim_observatory", "cosim_serve", "cosim_studies")
+PRODUCT = ("cosim", "pyfmi_models", "cosim_ethercat", "cosim_observatory", "cosim_serve", "cosim_studies")
 QUIET = ("-n0", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", "--timeout=100")
 
 

@@ -2,18 +2,30 @@
 
 import re
 import tomllib
+from collections.abc import Iterator
 from contextlib import suppress
+from functools import cache, partial
 from importlib.resources import files
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 from urllib.parse import urlsplit
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    SerializeAsAny,
+    ValidationError,
+    create_model,
+    model_validator,
+)
 
-from cosim.hardware.mapping import Entry, Ethercat
 from cosim.support.complaint import complaint
 from cosim.support.errors import HardwareError
 from cosim.support.plain import Parsed
+from cosim.support.plugins import TRANSPORTS, loaded, names
 from cosim.support.toml import parsed
 
 MILLISECONDS, CYCLES, LARGEST = 1e9, 10**9, 1e12
@@ -98,9 +110,16 @@ def _adapter(value: str) -> str:
     with suppress(ValueError):  # a port that is no number
         if parts.scheme == "udp" and parts.hostname and parts.port and not parts.path:
             return value
-    if value == "simulated" or re.fullmatch(r".+\.py:\w+|ethercat:\S+", value):
+    if value == "simulated" or re.fullmatch(r".+\.py:\w+", value) or plugged(value):
         return value
-    raise ValueError('an adapter is "simulated" or "udp://HOST:PORT" or "ethercat:INTERFACE" or "FILE.py:CLASS"')
+    more = "".join(f' or "{name}:..."' for name in names(TRANSPORTS))
+    raise ValueError(f'an adapter is "simulated" or "udp://HOST:PORT" or "FILE.py:CLASS"{more}')
+
+
+def plugged(adapter: str) -> str:
+    """Return the name of the plugged-in way to a drive that an adapter asks for, or "": ethercat of ethercat:eth0."""
+    name, _, rest = adapter.partition(":")
+    return name if rest.strip() and not rest.startswith("//") and name in names(TRANSPORTS) else ""
 
 
 class Machine(_Section):
@@ -116,7 +135,6 @@ class Machine(_Section):
     clock: Clock = Clock()
     encoder: Encoder = Encoder()
     inject: tuple[Inject, ...] = ()
-    ethercat: Ethercat | None = None
 
     @model_validator(mode="after")
     def _heads_are_read(self) -> "Machine":
@@ -169,20 +187,43 @@ def changed(machine: Machine, where: str, **changes: Any) -> Machine:
 
 
 def _checked(values: Parsed, where: str) -> Machine:
+    kind = _kind(values)
     try:
-        return Machine.model_validate(values)
+        return kind.model_validate(values)
     except ValidationError as error:
-        raise HardwareError(**complaint(error, where, "a machine", _keys)) from error
+        raise HardwareError(**complaint(error, where, "a machine", partial(_keys, kind))) from error
 
 
-def _keys(location: tuple[int | str, ...]) -> tuple[str, ...]:
-    sections: dict[str, type[BaseModel]] = {
-        "limits": Limits,
-        "reactions": Reactions,
-        "clock": Clock,
-        "encoder": Encoder,
-        "inject": Inject,
-        "ethercat": Ethercat,
-    }
-    section = sections.get(str(location[0]), Machine) if len(location) > 1 else Machine
-    return tuple((Entry if section is Ethercat and len(location) > 2 else section).model_fields)
+def _kind(values: Parsed) -> type[Machine]:
+    """What checks a machine file: with the sections of ways to a drive that are plugged in, where it has more keys."""
+    return _with_sections() if set(values) - set(Machine.model_fields) else Machine
+
+
+@cache
+def _with_sections() -> type[Machine]:
+    sections: Any = {name: (loaded(TRANSPORTS, name).section | None, None) for name in names(TRANSPORTS)}
+    return create_model("Machine", __base__=Machine, **sections)
+
+
+def _of_kind(values: Any) -> Any:
+    return _kind(values).model_validate(values) if isinstance(values, dict) else values
+
+
+Kept = Annotated[SerializeAsAny[Machine], BeforeValidator(_of_kind)]
+"""A machine as a part of something else, with the sections of its kind."""
+
+
+def _keys(kind: type[BaseModel], location: tuple[int | str, ...]) -> tuple[str, ...]:
+    """Keys that are legal beside a location: those of the section around it."""
+    for part in location[:-1]:
+        if isinstance(part, str):
+            kind = next(_sections(kind.model_fields[part].annotation))
+    return tuple(kind.model_fields)
+
+
+def _sections(annotation: Any) -> Iterator[type[BaseModel]]:
+    """Sections that a type of a key speaks of: of `tuple[Inject, ...]` it is Inject."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        yield annotation
+    for one in get_args(annotation):
+        yield from _sections(one)

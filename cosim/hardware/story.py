@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from cosim.data.recording import Recording
-from cosim.hardware.machine import Machine
+from cosim.hardware.machine import Kept
 from cosim.hardware.structures import INPUTS
 from cosim.hardware.wired import REFERENCE
 from cosim.support.complaint import complaint
@@ -53,7 +53,7 @@ class Story(_Said):
     encoder: str
     output: str
     units: dict[str, str]
-    machine: Machine
+    machine: Kept
     controller: Origin
     cards: dict[str, CardSaid] = {}
 

@@ -2,14 +2,14 @@
 
 from typing import Protocol
 
-from cosim.hardware.ethercat import EthercatDrive
-from cosim.hardware.machine import Machine
+from cosim.hardware.machine import Machine, plugged
 from cosim.hardware.python_adapter import PythonTransport, load_adapter
 from cosim.hardware.simulated import SimulatedDrive
 from cosim.hardware.structures import CAdapter
 from cosim.hardware.udp import UdpDrive
 from cosim.hardware.wired import Wired
 from cosim.support.plain import JsonObject
+from cosim.support.plugins import TRANSPORTS, loaded
 from cosim.system.scenario import Scenario
 
 
@@ -35,8 +35,8 @@ def open_transport(scenario: Scenario, machine: Machine, wired: Wired, fast: boo
     """
     if machine.adapter.startswith("udp://"):
         return UdpDrive(machine, scenario.step, fast)
-    if machine.adapter.startswith("ethercat:"):
-        return PythonTransport(EthercatDrive(machine, scenario.step))
     if ".py:" in machine.adapter:
         return PythonTransport(load_adapter(machine.adapter, scenario.step))
+    if name := plugged(machine.adapter):
+        return PythonTransport(loaded(TRANSPORTS, name)(machine, scenario.step))
     return SimulatedDrive(scenario, machine, wired)

@@ -2,6 +2,8 @@
 
     cosim.verbs        a module as those of `cosim.cli`: it has a function of the verb's name, or the typer `app`, its
                        `GROUP` in the help and `EXAMPLES`; "hardware.alpaca" is the verb `cosim hardware alpaca`
+    cosim.transports   a `PythonAdapter`, made of machine and cycle [s]: the way to a drive at `adapter = "NAME:PLACE"`
+                       of a machine file, whose section [NAME] is the pydantic model `section` of the class
 
 Classes of physics (`cosim.effects`, `cosim.laws`, `cosim.hypotheses`) come by the same means: `pyfmi_models.plugins`.
 """
@@ -11,7 +13,7 @@ from typing import Any
 
 from cosim.support.errors import PlugInError
 
-VERBS = "cosim.verbs"
+VERBS, TRANSPORTS = "cosim.verbs", "cosim.transports"
 
 
 @cache

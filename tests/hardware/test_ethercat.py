@@ -14,13 +14,14 @@ import numpy as np
 import pytest
 from mortal import mortal
 from on_hardware import SIMULATED, assert_safe, recorded, scenario
+from pydantic import TypeAdapter
 
-from cosim.hardware.ethercat import CHECKED_EVERY
-from cosim.hardware.machine import Machine, changed, parse_machine
-from cosim.hardware.mapping import Entry, Ethercat, Layout
+from cosim.hardware.machine import Kept, Machine, changed, parse_machine
 from cosim.hardware.replay import replay
 from cosim.hardware.session import Session, run_session
 from cosim.support.errors import HardwareError, MissingPackageError
+from cosim_ethercat.drive import CHECKED_EVERY
+from cosim_ethercat.mapping import Entry, Ethercat, Layout
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
 
@@ -229,7 +230,7 @@ def veth(monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
     made = subprocess.run(["ip", "link", "add", near, "type", "veth", "peer", "name", far], check=False) if IP else None
     if made is None or made.returncode:
         pytest.skip("virtual wires need `ip` and the rights of root")
-    monkeypatch.setattr("cosim.hardware.ethercat.FRAME_US", 200_000)  # this computer may be slow
+    monkeypatch.setattr("cosim_ethercat.drive.FRAME_US", 200_000)  # this computer may be slow
     try:
         for end in (near, far):
             subprocess.run(["ip", "link", "set", end, "up"], check=True)
@@ -265,9 +266,16 @@ def test_over_a_wire_a_slave_that_is_gone_is_a_lost_frame(tmp_path: Path, veth: 
         one.enable()
         one.track(1000)
         begun = one.status.tick
-        monkeypatch.setattr("cosim.hardware.ethercat.FRAME_US", 2000)
+        monkeypatch.setattr("cosim_ethercat.drive.FRAME_US", 2000)
         subprocess.run(["ip", "link", "set", veth, "down"], check=True)
         one.advance(20)
         subprocess.run(["ip", "link", "set", veth, "up"], check=True)
     found = recorded(tmp_path)
     assert_safe(found, "frame_lost" if "frame_lost" in one.status.faults else "adapter_failed", begun, 20)
+
+
+def test_a_session_keeps_the_section_of_the_bus_in_what_it_says_of_its_machine() -> None:
+    kept = TypeAdapter(Kept)
+    said = kept.dump_python(kept.validate_python(machine().model_dump()))
+    assert said["ethercat"]["rated_torque"] == machine().ethercat.rated_torque  # type: ignore[attr-defined]
+    assert kept.validate_python(said) == machine()

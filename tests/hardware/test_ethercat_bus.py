@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from test_ethercat import bus, machine, session
 
-from cosim.hardware.ethercat import CHECKED_EVERY, FRAME_US, STATE_US, TRIES
 from cosim.support.errors import HardwareError
+from cosim_ethercat.drive import CHECKED_EVERY, FRAME_US, STATE_US, TRIES
 
 __all__ = ["bus"]
 

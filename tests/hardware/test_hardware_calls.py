@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from cosim.hardware import ethercat
-from cosim.hardware.ethercat import EthercatDrive
-from cosim.hardware.mapping import Ethercat, Layout
 from cosim.hardware.python_adapter import Order, PythonAdapter, PythonTransport, Reading
 from cosim.hardware.structures import CFeedback, COrder
 from cosim.support.errors import HardwareError
+from cosim_ethercat import drive as ethercat
+from cosim_ethercat.drive import EthercatDrive
+from cosim_ethercat.mapping import Ethercat, Layout
 
 
 def bus(rated: float = 100.0) -> Any:

@@ -16,15 +16,15 @@ from pydantic import ValidationError
 from cosim.data.recording import Recording
 from cosim.hardware import python_adapter, structures, udp, words
 from cosim.hardware.axis import cycles_of
-from cosim.hardware.ethercat import EthercatDrive
 from cosim.hardware.machine import Inject, changed
-from cosim.hardware.mapping import Entry, Ethercat, Layout
 from cosim.hardware.move import Move, _inertia, _set_points
 from cosim.hardware.session import Session
 from cosim.hardware.simulated import _injection
 from cosim.hardware.udp import UdpDrive, Welcome, key_of
 from cosim.hardware.wired import _check_controller
 from cosim.support.errors import HardwareError
+from cosim_ethercat.drive import EthercatDrive
+from cosim_ethercat.mapping import Entry, Ethercat, Layout
 
 SOURCES = Path(structures.__file__).parent
 STEP = 1e-4

@@ -61,7 +61,7 @@ def test_a_number_beyond_its_limits_is_refused_by_its_key(key: str) -> None:
 def test_what_a_file_does_not_say_is_what_the_documentation_says() -> None:
     """docs/hardware.md; a machine in use must not change its reactions with the next version."""
     plain = Machine(name="plain", adapter="simulated", limits=SIMULATED.limits)
-    assert (plain.watchdog_ms, plain.black_box_seconds, plain.ethercat, plain.inject) == (2.0, 120.0, None, ())
+    assert (plain.watchdog_ms, plain.black_box_seconds, plain.inject) == (2.0, 120.0, ())
     assert plain.clock.model_dump() == {"spin_us": 20.0, "answer_us": 60.0, "answer_spin_us": 50.0}
     assert plain.encoder.model_dump() == {"heads": 0, "apart": 1e-4, "eccentricity": 0.0}
     assert plain.reactions.model_dump() == {

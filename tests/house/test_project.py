@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 import cosim
+import cosim_ethercat
 import cosim_observatory
 import cosim_serve
 import cosim_studies
@@ -27,7 +28,9 @@ README = (ROOT / "README.md").read_text("utf-8")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 START = "python3 -m venv .venv && .venv/bin/pip install . && .venv/bin/cosim demo"
 TEST = ".venv/bin/pip install '.[test]' && .venv/bin/pytest"
-PACKAGES = {one.__name__: one for one in (cosim, cosim_observatory, cosim_serve, cosim_studies, pyfmi_models)}
+PACKAGES = {
+    one.__name__: one for one in (cosim, cosim_ethercat, cosim_observatory, cosim_serve, cosim_studies, pyfmi_models)
+}
 SOURCES = [path for name in PACKAGES for path in (ROOT / name).rglob("*")]
 CALLED = {"sklearn": "scikit-learn"}
 """Optional packages that are installed by another name than they are imported by."""

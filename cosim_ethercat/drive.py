@@ -9,13 +9,13 @@ Not tried on a bus with a drive: tests use a stand-in for `pysoem`, and `pysoem`
 
 import struct
 from contextlib import suppress
-from typing import Any
+from typing import Any, ClassVar
 
 from cosim.hardware.machine import Machine
-from cosim.hardware.mapping import Entry, Layout
 from cosim.hardware.python_adapter import Order, PythonAdapter, Reading
 from cosim.support.errors import HardwareError, MissingPackageError
 from cosim.support.extras import install
+from cosim_ethercat.mapping import Entry, Ethercat, Layout
 
 TORQUE_MODE = 10
 """Cyclic synchronous torque, object 0x6060."""
@@ -33,12 +33,16 @@ class EthercatDrive(PythonAdapter):
         MissingPackageError: `pysoem` is not installed.
     """
 
+    section: ClassVar = Ethercat
+    """What `[ethercat]` of a machine file must hold."""
+
     def __init__(self, machine: Machine, step: float) -> None:
         super().__init__(step)
         self._name, self._interface = machine.name, machine.adapter.partition(":")[2]
-        if machine.ethercat is None:
+        given: Ethercat | None = getattr(machine, "ethercat", None)
+        if given is None:
             raise HardwareError(f'{machine.name}: adapter "{machine.adapter}" needs a section [ethercat].')
-        self._given, self._watchdog_ms = machine.ethercat, machine.watchdog_ms
+        self._given, self._watchdog_ms = given, machine.watchdog_ms
         self._check_torque(machine)
         self._out, self._in = Layout(self._given.outputs), Layout(self._given.inputs)
         self._soem = _pysoem()
