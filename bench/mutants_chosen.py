@@ -1,7 +1,7 @@
 """Which tests are asked of an error in a line: those that are known to run it (mutants_map.py), the most focused first.
 
 A line in a function is run by the tests that ran its block; one that declares something (a constant, a field) is looked
-for in the blocks that name it; one of a C function in the blocks that name it, or the exported functions that reach it.
+for in the blocks that name it; one of C that no library of ours has, in those that name the functions that reach it.
 First come tests whose own text names what was changed, then those that run the fewest blocks of the product at all, of
 a parametrised test one case before the next. They are asked in batches, so that a file is loaded once for many tests.
 Files that no map knows are asked behind them, as mutants_choice.py ranks them.
@@ -14,14 +14,12 @@ from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
-from mutants_blocks import blocks, innermost
+from mutants_blocks import HEAD, blocks, blocks_in_c, innermost
 from mutants_choice import HOME, LOADED, asked, functions, naming, told
 
 PRODUCT = ("cosim", "pyfmi_models", "cosim_ethercat", "cosim_observatory", "cosim_serve", "cosim_studies")
 BATCHES = ((4.0, 5), (6.0, 7), (8.0, 9))
 """Seconds and files of tests that are asked together: small at first; the last one is repeated."""
-HEAD = re.compile(r"^(?![ /#}])[\w ]*?[ *](\w+)\([^;]*$", re.M)
-"""The first line of a C function."""
 
 
 @dataclass(frozen=True)
@@ -90,17 +88,18 @@ def naming_blocks(name: str, modules: tuple[str, ...] = ()) -> frozenset[str]:
 
 def candidates(module: Path, source: str, line: int) -> Iterator[set[str]]:
     """Sets of blocks whose tests may notice an error in a line, the nearest first."""
-    place = str(module.relative_to(HOME))
-    if module.suffix == ".c":
+    place, is_c = str(module.relative_to(HOME)), module.suffix == ".c"
+    block = innermost(source, line, is_c)
+    if block:
+        yield {block.named(place)}
+        there = blocks_in_c(source) if is_c else blocks(source)
+        yield {one.named(place) for one in there if one.function == block.function}
+    if is_c:
         names = reaching(module, told(source, line, True))
         yield {block for name in names for block in naming_blocks(name)}
         yield {one.named(path) for path in LOADED[str(Path(place).parent)] for one in blocks(_texts()[path])}
         return
-    block = innermost(source, line)
-    if block:
-        yield {block.named(place)}
-        yield {one.named(place) for one in blocks(source) if one.function == block.function}
-    elif name := told(source, line, False):
+    if not block and (name := told(source, line, False)):
         yield set(naming_blocks(name, (place,)))
         yield set(naming_blocks(name))
     if not block:

@@ -7,8 +7,8 @@ Files of tests run there one by one, the short ones first; for each test, and ea
 map says which blocks ran and how long it took. A file that takes longer than so many seconds of a processor is known
 for the tests up to there. What is done is not done again: a run goes on where the last one ended.
 
-The map lies outside of the project. It grows old with the code, and no harm is done: blocks are known by the function
-that they are in, and what no test is known to run is asked as mutants_choice.py says.
+The map lies outside of the project. It grows old with the code, and little harm is done: blocks are known by the
+function that they are in, and are numbered anew when the next run goes on.
 """
 
 import argparse
@@ -20,17 +20,21 @@ import sys
 import tempfile
 import zlib
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 from shutil import copytree, ignore_patterns, rmtree
 from typing import Any
 
 import pytest
 
-sys.path[:0] = [str(Path(__file__).parent)]
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "cosim/master/loop")]
 
 import mutants_blocks as marks  # noqa: E402
+from build_hook import LIBRARIES, SUFFIX, compile_library  # noqa: E402
 from mutants_choice import HOME, NOT_ASKED, SLOW  # noqa: E402
 from mutants_forks import forked, preloaded  # noqa: E402
+
+from cosim.support.files import replacing  # noqa: E402
 
 PRODUCT = ("cosim", "pyfmi_models", "cosim_ethercat", "cosim_observatory", "cosim_serve", "cosim_studies")
 QUIET = ("-n0", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", "--timeout=100")
@@ -104,7 +108,22 @@ def copied(folder: Path) -> tuple[Path, list[str]]:
             path.write_text(marks.marked(source, len(names)), "utf-8")
             names += [one.named(module) for one in marks.blocks(source)]
     (place / f"{marks.SEEN_MODULE}.py").write_text(marks.MARKS, "utf-8")
-    return place, names
+    return place, names + _libraries(place, len(names))
+
+
+def _libraries(place: Path, first: int) -> list[str]:
+    """Let the C files of the libraries leave marks too, numbered from `first`; build them; names of their blocks."""
+    texts = {one: (place / one).read_text("utf-8") for one in sorted({*chain(*LIBRARIES.values())})}
+    found = {module: marks.blocks_in_c(text) for module, text in texts.items()}
+    size, number = first + sum(map(len, found.values())), first
+    for module, text in texts.items():
+        (place / module).write_text(marks.marked_in_c(text, number, size), "utf-8")
+        number += len(found[module])
+    for target, sources in LIBRARIES.items():
+        compile_library([place / one for one in sources], place / (target + SUFFIX))
+    for module, text in texts.items():  # what is copied into an FMU is as it was
+        (place / module).write_text(text, "utf-8")
+    return [one.named(module) for module, blocks in found.items() for one in blocks]
 
 
 def files_of_tests(first: list[str]) -> list[str]:
@@ -131,6 +150,21 @@ def recorded(place: Path, names: list[str], file: str, seconds: float, out: Path
     return f"{file}: {seconds:.1f} s, {'not to its end' if code < 0 else f'ended with {code}'}"
 
 
+def carried_over(path: Path, names: list[str]) -> set[str]:
+    """Let a map that is there know the blocks of today by their numbers; the files of tests that it has."""
+    head, *lines = path.read_text("utf-8").splitlines() if path.exists() else ['{"names": []}']
+    before, now = json.loads(head)["names"], {name: number for number, name in enumerate(names)}
+    old = [json.loads(one) for one in lines]
+    if before != names:
+        bit = {len(before) - 1 - k: len(names) - 1 - now[one] for k, one in enumerate(before) if one in now}
+        for one in old:
+            bits = bin(unpacked(one["blocks"]))[:1:-1]
+            one["blocks"] = packed(sum(1 << bit[k] for k, is_set in enumerate(bits) if is_set == "1" and k in bit))
+        with replacing(path, force=True) as partial:
+            partial.write_text("".join(json.dumps(one) + "\n" for one in ({"names": names}, *old)), "utf-8")
+    return {one["file"] for one in old}
+
+
 def main() -> None:
     """Record what is not recorded yet."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -143,12 +177,7 @@ def main() -> None:
     folder = Path(tempfile.mkdtemp(prefix="mutants-map-"))
     try:
         place, names = copied(folder)
-        known = given.map.read_text("utf-8").splitlines() if given.map.exists() else []
-        if not known:
-            given.map.write_text(json.dumps({"names": names}) + "\n", "utf-8")
-        elif json.loads(known[0])["names"] != names:
-            sys.exit(f"{given.map} is a map of other code: name another file, or remove it.")
-        done = {json.loads(one)["file"] for one in known[1:]}
+        done = carried_over(given.map, names)
         for file in [one for one in files_of_tests(given.first) if one not in done][: given.most]:
             print(recorded(place, names, file, given.seconds, given.map), flush=True)
     finally:

@@ -5,6 +5,7 @@ import shutil
 import struct
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -62,6 +63,28 @@ def test_a_layout_is_the_entries_one_after_the_other_little_endian_and_signed_wh
     assert raw == bytes.fromhex("0f80 00000000 feff 0a")
     assert layout.unpack(raw) == {"controlword": 0x800F, "torque": -2, "mode": 10}
     assert layout.entries[1].mapped == 0x60FE0120
+
+
+def test_what_a_machine_file_does_not_say_of_the_bus_is_what_the_documentation_says() -> None:
+    """docs/hardware.md shows the section with all defaults; subindices are 0 where none is given."""
+    text = (Path(__file__).parents[2] / "docs" / "hardware.md").read_text("utf-8")
+    shown = tomllib.loads("[ethercat]" + text.partition("```toml\n[ethercat]")[2].partition("```")[0])["ethercat"]
+    default = Ethercat(rated_torque=100.0)
+    assert Ethercat(**shown) == default
+    assert default.model_fields_set == {"rated_torque"}
+    assert shown.keys() == default.model_dump().keys()
+    assert {one.mapped & 0xFF00 for one in (*default.outputs, *default.inputs)} == {0}
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high"), [("object", 1, 0xFFFF), ("subindex", 0, 255)], ids=["object", "subindex"]
+)
+def test_an_entry_has_the_numbers_that_a_mapping_has_room_for(name: str, low: int, high: int) -> None:
+    rest = {"object": 0x6040, "bits": 16}
+    assert [getattr(Entry(**rest | {name: one}), name) for one in (low, high)] == [low, high]  # type: ignore[arg-type]
+    for beyond in (low - 1, high + 1):
+        with pytest.raises(ValueError, match=name):
+            Entry(**rest | {name: beyond})  # type: ignore[arg-type]
 
 
 def test_the_mapping_written_into_the_drive_is_that_of_the_machine_file(

@@ -3,7 +3,7 @@
 import re
 import socket
 from pathlib import Path
-from time import sleep
+from time import monotonic, process_time, sleep
 from types import SimpleNamespace
 from typing import Any
 
@@ -113,6 +113,16 @@ def test_a_bare_clock_is_asked_in_nanoseconds_and_answers_in_microseconds(monkey
     monkeypatch.setattr(loops, "library", lambda: SimpleNamespace(hardware_bare=bare))
     assert bare_clock(1.0, 20.0, 30.4) == (30, 3, 12.5)
     assert asked == [(1_000_000_000, 20_000, 30)]
+
+
+def test_a_clock_sleeps_between_its_edges_and_is_not_early() -> None:
+    """Ten cycles of 20 ms, awake for the last 20 us of each: it must not spin, whatever else the computer does."""
+    bare_clock(0.001, 0.0, 0.001)  # what is loaded once
+    began, awake = monotonic(), process_time()
+    edges, late, _ = bare_clock(0.02, 20.0, 0.2)
+    assert edges + late >= 10
+    assert monotonic() - began >= 0.02 * 9
+    assert process_time() - awake < 0.05
 
 
 def test_a_loop_without_a_clock_waits_a_second_for_its_drive_and_asks_eight_times_whether_it_is_there() -> None:
