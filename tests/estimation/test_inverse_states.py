@@ -11,9 +11,11 @@ from wandering import axis, recorded, wander
 from cosim.estimation.equations import _late
 from cosim.estimation.fit import fit
 from cosim.estimation.inverse import Inverse, stacked
-from cosim.estimation.prepare import prepare
+from cosim.estimation.prepare import Piece, prepare
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import ActuatorLag, Delay, FrictionAsymmetry
+from pyfmi_models.effects.compliance import Compliance
+from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
 from pyfmi_models.effects.thermal_viscosity import RubbedViscosity
 from pyfmi_models.friction import FrictionLaw
 from pyfmi_models.model import Recorded, parameters_of
@@ -85,6 +87,21 @@ class TestInverse:
         middle = numeric(law).along((piece.v[1:] + piece.v[:-1]) / 2, piece.dt)
         wrong, rough = (float(np.sqrt(np.mean((one - exact) ** 2))) for one in (states[:, 1:], middle))
         assert wrong < min(0.06, 1.001 * rough)
+
+    def test_a_mass_on_a_spring_follows_the_true_motion_of_the_encoder_that_is_tried(self) -> None:
+        """What is kept of a recording is that of the read motion, never that of another eccentricity."""
+        t, q, _v, a = wander(10.0)
+        spring = Compliance(antiresonance_hz=3.0, resonance_hz=4.0)
+        mount = axis(effects=(EncoderEccentricity(cycles_per_rev=9, amplitude_rad=0.01), spring))
+        inverse = Inverse(mount, ("encoder_eccentricity.amplitude_rad",))
+
+        def torque(amplitude: float, pieces: list[Piece]) -> np.ndarray:
+            return stacked(inverse, pieces, np.array([amplitude]))[0]
+
+        here, anew = (list(prepare([recorded(a, t, q)], 20.0).pieces) for _ in range(2))
+        first = torque(0.05, here)
+        np.testing.assert_array_equal(torque(0.01, here), torque(0.01, anew))
+        assert not np.allclose(first, torque(0.01, here), rtol=1e-3)
 
     @pytest.mark.parametrize(("given", "low"), [(600.0, 2.0), (0.5, 0.5)])
     def test_a_warm_up_that_the_card_gives_is_not_moved_by_a_bound(self, given: float, low: float) -> None:

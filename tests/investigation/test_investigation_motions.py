@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from cosim.data.recording import Recording
 from cosim.investigation.families import FAMILIES, fast_sweeps, fast_tone, motions, slow_sweep, stop_and_go
 from cosim.investigation.limits import Limits
-from cosim.investigation.motions import Motion, Room, Tones, room_of
+from cosim.investigation.motions import FADE, Motion, Rest, Room, Tones, room_of
 from cosim.support.errors import InputError
 
 SIZES = st.floats(1e-3, 10.0)
@@ -87,6 +87,15 @@ def test_a_sweep_goes_both_ways_as_far_as_the_time_allows(family: Callable[[Room
         reach.append(np.ptp(q))
     assert reach[1] == pytest.approx(1.8, rel=1e-3)
     assert reach[0] < 1.2
+
+
+@pytest.mark.parametrize("seconds", [4.0, 8.0, 30.0])
+@pytest.mark.parametrize("home", [0.0, 0.8])
+def test_a_slow_sweep_is_so_slow_that_it_rests_no_longer_than_it_must(seconds: float, home: float) -> None:
+    """An end is nearer than the other one, and a ramp shorter than its share: a few hundredths of a second are left."""
+    last = slow_sweep(room_of(LIMITS, home, seconds, 3, False)).parts[-1]
+    assert isinstance(last, Rest)
+    assert last.lasts == pytest.approx(FADE, abs=0.06)
 
 
 def test_a_stop_and_go_rests_for_different_times_whatever_the_time() -> None:

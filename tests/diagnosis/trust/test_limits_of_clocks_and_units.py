@@ -7,10 +7,11 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.trust.clocks import ClockOffset
-from cosim.diagnosis.trust.explanations import Explanation
+from cosim.diagnosis.trust.explanations import Explanation, explanations
 from cosim.diagnosis.trust.judgement import Judgement, stated
 from cosim.diagnosis.trust.likelihood import Evidence, Reference
 from cosim.support.errors import RecordingError
+from cosim.support.units import conversion
 
 MS = 1e-3
 
@@ -122,3 +123,34 @@ def test_a_cause_is_stated_alone_only_where_it_is_sure(probability: float, alone
 @pytest.mark.parametrize(("probability", "told"), [(0.031, 2), (0.029, 1)])
 def test_an_alternative_of_three_percent_is_listed_and_none_below(probability: float, told: int) -> None:
     assert len(stated(judgement(2.0, probability)).alternatives) == told
+
+
+@pytest.mark.parametrize("linear", [False, True])
+@pytest.mark.parametrize("reading", ["q", "v"])
+def test_a_unit_that_is_tried_is_that_of_its_name_and_the_option_puts_it_right(linear: bool, reading: str) -> None:
+    """What was read counts so many of the unit where SI counts one; `--units` takes it back."""
+    si = {"t": "s", "tau": "N" if linear else "N.m"}
+    si |= {"q": "m", "v": "m/s"} if linear else {"q": "rad", "v": "rad/s"}
+    tried = [one for one in explanations(linear, reading) if one.option]
+    assert {one.option.split()[1].split("=")[0] for one in tried} == {"t", "tau", reading}
+    for one in tried:
+        column, unit = one.option.removeprefix("--units ").split("=")
+        factor = {"t": one.time, "tau": one.torque}.get(column, one.position)
+        assert factor == one.factor
+        assert conversion(unit, si[column])[0] * factor == pytest.approx(1.0, rel=1e-12)
+        assert (one.time, one.torque, one.position).count(1.0) == 2
+
+
+@pytest.mark.parametrize(("linear", "gears"), [(False, 3 * 27), (True, 0)])
+def test_a_gear_from_3_to_300_is_tried_before_position_torque_or_both(linear: bool, gears: int) -> None:
+    found = [one for one in explanations(linear, "q") if one.kind == "gear_ratio"]
+    assert len(found) == gears
+    ratios = sorted({one.factor for one in found})
+    steps = np.diff(np.log(ratios))
+    assert not gears or (ratios[0], ratios[-1], steps.max() < 0.3) == (3.0, 300.0, True)
+    for one in found:
+        assert (one.torque, one.position) in {
+            (1.0, one.factor),
+            (1 / one.factor, one.factor),
+            (1 / one.factor, 1.0),
+        }
