@@ -13,7 +13,7 @@ from pyarrow import parquet
 from scipy.io import savemat
 
 from cosim.data import limits
-from cosim.data.binary import hdf5, matlab, numpy_files
+from cosim.data.binary import hdf5, matlab, numpy_files, packages
 from cosim.data.binary import parquet as parquet_files
 from cosim.data.limits import Allowance, allowed_by, check_cells, check_columns, check_text, check_unpacked, within
 from cosim.data.text import json_records
@@ -161,6 +161,18 @@ def test_a_refusal_names_the_least_factor_that_would_do(held: int, factor: int) 
         check_cells(PATH, held, 1)
     with within(allowing(100 * factor, raised=factor)):
         check_cells(PATH, held, 1)
+
+
+@pytest.mark.parametrize(("rows", "fits"), [(33, True), (34, False)])
+def test_vectors_and_tables_of_a_package_count_together(rows: int, fits: bool) -> None:
+    """A vector and the two columns of a table are three numbers a row, of a hundred that may be held."""
+    found = {"t": np.arange(float(rows)), "q": np.ones((rows, 2)), "gains": np.ones(7), "name": np.array(["run"])}
+    with within(allowing(100)):
+        if fits:
+            assert packages.vectors(PATH, found).keys() == {"t", "q_1", "q_2"}
+            return
+        with pytest.raises(RecordingError, match="34 rows of 3 columns"):
+            packages.vectors(PATH, found)
 
 
 def test_a_refusal_names_no_factor_that_is_none() -> None:

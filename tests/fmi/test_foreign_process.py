@@ -6,6 +6,7 @@ import platform
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from tiny_fmu import tiny
 import cosim
 from cosim.data.recording import Recording
 from cosim.fmi.guard import Guard
+from cosim.fmi.process import Variables
 
 __all__ = ["tiny"]
 
@@ -264,6 +266,27 @@ def test_a_recording_lies_where_out_says_though_an_fmu_changes_the_working_direc
         assert call("run", "moves.toml", "--out", stage, option) == 0
         made = sorted(str(one.relative_to(tmp_path)) for one in (tmp_path / stage).iterdir())
         assert made == [f"{stage}/{name}" for name in ("recording.parquet", "run.html", "run.json")]
+
+
+@pytest.mark.parametrize("through_python", [True, False])
+def test_the_local_time_is_that_of_the_time_zone_that_is_put_back(through_python: bool) -> None:
+    """C and Python keep what TZ said when they last looked; here it is a zone that no computer is in."""
+    here, environment = time.timezone, Variables()
+    before = environment.read()
+    try:
+        if through_python:
+            os.environ["TZ"] = "ELSE+3:21"
+        else:
+            os.putenv("TZ", "ELSE+3:21")
+        time.tzset()
+        assert time.timezone == 3 * 3600 + 21 * 60
+        environment.restore(before)
+        assert time.timezone == here
+        assert environment.read() == before
+    finally:
+        os.environ.pop("TZ", None)
+        os.environ.update({"TZ": before[b"TZ"].decode()} if b"TZ" in before else {})
+        time.tzset()
 
 
 def test_what_another_thread_sets_in_the_environment_meanwhile_is_no_change_of_a_component(
