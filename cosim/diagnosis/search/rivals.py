@@ -150,6 +150,9 @@ def _challenged(
     beside = _stage_after(comparison, problem.fit(replace(chosen.mount, effects=rest), 45), known, refits)
     own = weighed(comparison, chosen, beside.current, effect=group[0])
     others = [one for one in beside.tried if one.effect.id != group[0].id]
+    if len(rest) > len(problem.mount.effects):
+        standing = replace(chosen.mount, effects=rest)
+        others = [refitted_from_here(comparison, standing, beside.current, one) for one in others]
     rivals = [one for one in others if _is_admissible(comparison, one)]
     best: dict[str, CandidateFit] = {}
     for rival in rivals:
@@ -162,6 +165,17 @@ def _challenged(
     found = with_names(AcceptedEffect(group, own, beside.current, tuple(ranked), margins, contests, misfits))
     _enter(comparison, found)
     return found
+
+
+def refitted_from_here(comparison: Comparison, rest: Mount, beside: Fit, one: CandidateFit) -> CandidateFit:
+    """A rival, or its fit from the numbers that the others have in the structure that stands, where that is better.
+
+    Alone the others go where they stand in for what was taken out, and beside a rival a fit may not come back.
+    """
+    problem, effects = comparison.problem, rest.effects
+    found = problem.fit(replace(rest, effects=(*effects, one.effect)), 36)
+    again = weighed(comparison, found, beside, one.many)
+    return again if again.evidence > one.evidence else one
 
 
 def with_names(one: AcceptedEffect) -> AcceptedEffect:

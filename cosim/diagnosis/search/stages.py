@@ -47,6 +47,8 @@ class CandidateFit:
     """Share of the energy that a timing effect removes which it removes away from turns."""
     at_rest: float = 1.0
     """Share of the energy at rest that a contact that bends removes."""
+    many: int = 1
+    """How many members of its form were tried."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +165,7 @@ def weighed(
     share = 1 - float(left @ left) / max(float(before @ before), 1e-300)
     remembers = gets_memory(found.mount, current.mount)
     rest = removed_at_rest(problem.weight, found.residual, current.residual) if remembers else 1.0
-    return CandidateFit(effect, found, gain, price, share, price_of_forms, loud, away, rest)
+    return CandidateFit(effect, found, gain, price, share, price_of_forms, loud, away, rest, many)
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.comparison import NONE, Comparison
 from cosim.diagnosis.search.base_moved import owed_to_base
+from cosim.diagnosis.search.rivals import refitted_from_here
 from cosim.diagnosis.search.stages import (
     CandidateFit,
     best_of,
@@ -27,6 +28,7 @@ from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Cogging, LocalFriction, PeriodicFriction, StribeckEffect, TorqueOffset
+from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.effects.presliding import Presliding
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
@@ -112,6 +114,19 @@ def test_beside_a_strong_effect_a_further_one_must_be_stronger_than_alone() -> N
 def test_alone_what_removes_much_needs_less_evidence_than_what_removes_little() -> None:
     assert least(POLICY, 0.0, POLICY.large_gain - 0.01) == POLICY.least_evidence
     assert least(POLICY, 0.0, POLICY.large_gain) == POLICY.evidence_if_large < POLICY.least_evidence
+
+
+def test_a_rival_is_fitted_from_where_the_others_stand_too_as_alone_they_may_have_gone_astray() -> None:
+    comparison, _ = compared(lambda q, v: 1.5 * np.exp(-(((q - 0.1) / 0.04) ** 2) / 2) * np.sign(v) + q)
+    problem = comparison.problem
+    there, astray = (LocalFriction(q_center=q, width=0.04, relative_amplitude=0.7) for q in (0.1, -0.5))
+    alone = problem.fit(replace(problem.mount, effects=(astray,)), 4)
+    stuck = refitted(comparison, alone, CableWrap(stiffness=1.0, home=0.0), 3)
+    found = refitted_from_here(comparison, replace(alone.mount, effects=(there,)), alone, stuck)
+    assert (found.effect.id, found.many) == ("cable_wrap", 3)
+    assert found.evidence > stuck.evidence + 100
+    assert found.fit.rms < 0.2 * stuck.fit.rms
+    assert refitted_from_here(comparison, alone.mount, alone, found) is found
 
 
 def test_a_step_that_promises_nothing_by_either_statistic_is_not_refitted() -> None:
