@@ -76,11 +76,12 @@ def _check_declared(path: Path, metadata: Any) -> list[str]:
 def _check_texts(path: Path, table: Any) -> None:
     """Refuse texts that take more than a file may unpack to once each row has its own: one text may be in each row."""
     import pyarrow as pa
-    import pyarrow.compute as pc
 
     size = 0
     for name in table.column_names:
         for part in table[name].chunks if pa.types.is_dictionary(table[name].type) else ():
+            import pyarrow.compute as pc  # a tenth of a second that a table of numbers does not need
+
             lengths = pc.binary_length(part.dictionary)
             size += pc.sum(lengths.take(part.indices)).as_py() or 0
             check_unpacked(path, size, f"column {short(name)}")
@@ -89,9 +90,13 @@ def _check_texts(path: Path, table: Any) -> None:
 def _leaves(path: Path, name: str, column: Any) -> Iterator[tuple[str, Any]]:
     """Walk through a column to its numbers: fields of structs by name, lists of one length by number from 1."""
     import pyarrow as pa
-    import pyarrow.compute as pc
 
     kind = column.type
+    if not pa.types.is_nested(kind):
+        yield name, column
+        return
+    import pyarrow.compute as pc  # a tenth of a second that a table of numbers does not need
+
     if pa.types.is_struct(kind):
         for place, member in enumerate(kind):
             yield from _leaves(path, f"{name}.{member.name}", pc.struct_field(column, [place]))
