@@ -94,3 +94,13 @@ def derivative(x: Array, dt: float) -> Array:
     """Five-point central difference; the two rows at each end repeat the nearest one."""
     inner = (x[:-4] - 8 * x[1:-3] + 8 * x[3:-1] - x[4:]) / (12 * dt)
     return np.concatenate([inner[:1], inner[:1], inner, inner[-1:], inner[-1:]])
+
+
+def derivative_at(x: Array, dt: float, rows: npt.NDArray[np.int64], order: int = 1) -> Array:
+    """The same at some rows alone, of so high an order: of all rows of a fast recording most are not wanted."""
+    at = np.clip(rows, 2, len(x) - 3)
+
+    def value(k: int) -> Array:
+        return derivative_at(x, dt, at + k, order - 1) if order > 1 else x[at + k]
+
+    return np.asarray((value(-2) - 8 * value(-1) + 8 * value(1) - value(2)) / (12 * dt))

@@ -41,20 +41,22 @@ class Spectrum:
     """
 
     def __init__(self, columns: Array, dt: float) -> None:
-        self.rows = len(columns)
-        self.pad = min(self.rows - 1, int(0.5 / dt) + 8)
-        extended = np.pad(columns, ((self.pad, self.pad), (0, 0)), mode="reflect", reflect_type="odd")
-        fade = np.sin(np.pi / 2 * np.arange(self.pad) / self.pad)[:, None] ** 2
-        extended[: self.pad] *= fade
-        extended[len(extended) - self.pad :] *= fade[::-1]
+        self.rows, signals = len(columns), columns.T
+        pad = self.pad = min(self.rows - 1, int(0.5 / dt) + 8)
         # Zeros behind what has faded: a length without large prime factors is transformed several times faster.
-        self.length = next_fast_len(len(extended), real=True)
+        self.length = next_fast_len(self.rows + 2 * pad, real=True)
+        extended = np.zeros((len(signals), self.length))
+        fade = np.sin(np.pi / 2 * np.arange(pad) / pad) ** 2
+        extended[:, :pad] = (2 * signals[:, :1] - signals[:, pad:0:-1]) * fade
+        extended[:, pad : pad + self.rows] = signals
+        after = extended[:, pad + self.rows : 2 * pad + self.rows]
+        after[:] = (2 * signals[:, -1:] - signals[:, -2 : -pad - 2 : -1]) * fade[::-1]
         self.omega = 2 * np.pi * np.fft.rfftfreq(self.length, dt)
-        self.values = rfft(extended.T, self.length).T
+        self.values = rfft(extended)
 
     def times(self, response: npt.NDArray[np.complex128], columns: slice = slice(None)) -> Array:
         """Some of the columns after a frequency response."""
-        whole = irfft(self.values.T[columns] * response, self.length)
+        whole = irfft(self.values[columns] * response, self.length)
         return np.asarray(whole[:, self.pad : self.pad + self.rows].T)
 
 
@@ -152,12 +154,16 @@ class Inverse:
         out[count] = torque  # one signal after the other in memory is how they are filtered
         return out[count:]
 
+    @cached_property
+    def _components(self) -> dict[str, Any]:
+        return self.mount.components()
+
     def _parts(self, kind: type[Effect]) -> list[str]:
-        return [name for name, part in self.mount.components().items() if isinstance(part, kind)]
+        return [name for name, part in self._components.items() if isinstance(part, kind)]
 
     def _set(self, prefix: str, full: Array) -> Any:
         values = dict(zip(self.names, full, strict=True))
-        return with_symbols(self.mount.components()[prefix], values, 0.0, prefix)
+        return with_symbols(self._components[prefix], values, 0.0, prefix)
 
     def _bumped(self, full: Array, name: str) -> tuple[Array, float]:
         """All parameters with one of them changed a little, and by how much."""
@@ -250,7 +256,7 @@ class Inverse:
         """
         bumped = {1 + k: self._bumped(full, name) for k, name in enumerate(self.by) if name.startswith(tuple(prefixes))}
         now, *others = added([full, *(other for other, _ in bumped.values())])
-        out = columns.copy()
+        out = columns.copy("K")
         out[:, 0] += now
         for (column, (_, change)), other in zip(bumped.items(), others, strict=True):
             out[:, column] += (other - now) / change
@@ -259,7 +265,7 @@ class Inverse:
     def _undone_drive(self, columns: Array, full: Array, dt: float) -> Array:
         """Undo the linear drive effects on all columns, and add the derivatives by their parameters."""
         drives = self._parts(DriveEffect)
-        if not any(self.mount.components()[name].states() for name in drives):
+        if not any(self._components[name].states() for name in drives):
             return columns
         spectrum = Spectrum(columns, dt)
 

@@ -49,7 +49,6 @@ def stepped_torque(couplings: Sequence[Coupling], far: Sequence[float], v: Array
     return np.asarray((passed + np.column_stack([passed[:, 1:], passed[:, -1]])) / 2 - np.outer(far, a))
 
 
-@lru_cache(maxsize=6)
 def far_torques(prepared: Prepared, plays: tuple[tuple[float, float], ...], ratio: float) -> Array:
     """Torque added per far inertia at the kept rows, filtered, for (gap, deceleration by dry friction) each.
 
@@ -62,9 +61,17 @@ def far_torques(prepared: Prepared, plays: tuple[tuple[float, float], ...], rati
 
 def _searched(piece: Piece, plays: Sequence[Backlash]) -> Array:
     step = max(1, int(1 / (SEARCHED * piece.dt)))
+    if step == 1:
+        return piece.lowpass(stepped_torque(plays, [1.0] * len(plays), piece.v, piece.a, piece.dt).T)[piece.kept]
     coarse = stepped_torque(plays, [1.0] * len(plays), piece.v[::step], piece.a[::step], step * piece.dt)
     fine = np.vstack([np.interp(piece.t, piece.t[::step], one) for one in coarse])
     return piece.lowpass(fine.T)[piece.kept]
+
+
+@lru_cache(maxsize=2)
+def torques_of_grid(prepared: Prepared, plays: tuple[tuple[float, float], ...], ratio: float) -> Array:
+    """The same for a grid that is looked at again: the last two are kept."""
+    return far_torques(prepared, plays, ratio)
 
 
 @cache

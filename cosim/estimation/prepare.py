@@ -22,7 +22,7 @@ import numpy.typing as npt
 from cosim.data.neighbours import KINDS, Neighbour, neighbours
 from cosim.data.recording import GAP, Gap, Recording
 from cosim.data.resolution import resolution
-from cosim.estimation.filters import EDGE, derivative, gain, lowpass, noise_of, passes_of
+from cosim.estimation.filters import EDGE, derivative_at, gain, lowpass, noise_of, passes_of
 from cosim.estimation.neighbours import is_alone, key, motions, moving
 from cosim.support.errors import RecordingError
 from cosim.support.statistics import rms
@@ -280,19 +280,19 @@ def _piece(recording: Recording, index: int, span: slice, band: Band, others: Se
     grid, table = _on_grid(recording, span)
     dt = float(grid[-1] - grid[0]) / (len(grid) - 1)
     cutoff, first = band.cutoff, max(band)
-    tau = lowpass(table["tau"], dt, first)
-    q, v, a = _motion(table, dt, first)
+    each = max(1, int(1 / (8 * first * dt)))
+    tau = lowpass(table["tau"], dt, first)[::each].copy()  # copies: what is thinned must not keep all rows alive
+    q, v, a = _motion(table, dt, first, each)
     reading = "q" if "q" in table else "v"
     noise = [_once(recording, (x, span.start, span.stop), partial(_density, table[x], dt)) for x in (reading, "tau")]
-    each = max(1, int(1 / (8 * first * dt)))
-    coarse, t = dt * each, grid[::each].copy()  # copies: what is thinned must not keep all rows alive
+    coarse, t = dt * each, grid[::each].copy()
     return Piece(
         recording=index,
         t=t,
-        q=q[::each].copy(),
-        v=v[::each].copy(),
-        a=a[::each].copy(),
-        tau=lowpass(tau[::each], coarse, cutoff, passes_of(*band)),
+        q=q,
+        v=v,
+        a=a,
+        tau=lowpass(tau, coarse, cutoff, passes_of(*band)),
         inside=_inside(t, float(grid[0]), float(grid[-1])) & ~recording.is_masked(t, 0.5 / cutoff),
         dt=coarse,
         cutoff=cutoff,
@@ -328,13 +328,15 @@ def _on_grid(recording: Recording, span: slice) -> tuple[Array, dict[str, Array]
     return grid, {name: np.interp(grid, t, column) for name, column in table.items()}
 
 
-def _motion(table: dict[str, Array], dt: float, cutoff: float) -> tuple[Array, Array, Array]:
+def _motion(table: dict[str, Array], dt: float, cutoff: float, each: int) -> tuple[Array, Array, Array]:
+    """Position, speed and acceleration, filtered, of each so many rows; derivatives are found there alone."""
     if "q" in table:
         q = lowpass(table["q"], dt, cutoff)
-        v = derivative(q, dt)
-        return q, v, derivative(v, dt)
+        rows = np.arange(0, len(q), each)
+        return q[rows], derivative_at(q, dt, rows), derivative_at(q, dt, rows, 2)
     v = lowpass(table["v"], dt, cutoff)
-    return np.cumsum(v) * dt, v, derivative(v, dt)
+    rows = np.arange(0, len(v), each)
+    return (np.cumsum(v) * dt)[rows], v[rows], derivative_at(v, dt, rows)
 
 
 def _inside(t: Array, start: float, end: float) -> npt.NDArray[np.bool_]:

@@ -12,7 +12,7 @@ from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach, Seen, with
 from cosim.diagnosis.effects.candidates import SHARE, Candidate, Span, columns_of, has, of_both_ways, span_of
 from cosim.diagnosis.effects.tuning import refound, restarted
 from cosim.estimation.fit import Fit, with_values
-from cosim.estimation.play import far_torques
+from cosim.estimation.play import far_torques, torques_of_grid
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import least_way
@@ -85,7 +85,7 @@ class Play(Hypothesis[Backlash]):
         bent = {"load_deflection": float(f"{level / law['sigma0']:.1g}")} if law["sigma0"] and level else {}
         gaps, slowings = GAPS * span.reach, COASTING * rms(span.prepared.stacked("a"))
         grid = _grid(gaps, slowings)
-        alike = _alike(far_torques(span.prepared, grid, ratio), span)
+        alike = _alike(torques_of_grid(span.prepared, grid, ratio), span)
         likely = [(*grid[index], ratio) for index in np.argsort(alike)[: -BEST - 1 : -1]]
         for gap, slowing, drag in [_nearest(span, gaps, slowings, (LITTLE * ratio, ratio)), *likely]:
             far = SHARE * float(mount.axis.inertia)
@@ -199,11 +199,11 @@ def _grid(gaps: Array, slowings: Array) -> tuple[tuple[float, float], ...]:
 
 def _nearest(span: Span, gaps: Array, slowings: Array, ratios: Sequence[float]) -> tuple[float, float, float]:
     """Gap, deceleration, viscous over dry friction of the play that looks most like the residual, on finer grids."""
+    look = torques_of_grid
     for window in WINDOWS:
         grid = _grid(gaps, slowings)
-        alike = {
-            ratio: _alike(far_torques(span.prepared, grid, ratio), span, window) for ratio in dict.fromkeys(ratios)
-        }
+        alike = {ratio: _alike(look(span.prepared, grid, ratio), span, window) for ratio in dict.fromkeys(ratios)}
+        look = far_torques
         ratio = max(alike, key=lambda one: float(alike[one].max()))
         gap, slowing = grid[int(np.argmax(alike[ratio]))]
         gaps, slowings, ratios = _around(gaps, gap), _around(slowings, slowing), (ratio,)
