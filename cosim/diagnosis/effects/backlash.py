@@ -1,6 +1,6 @@
 """Play in the drive."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
 from typing import Any, ClassVar
@@ -199,7 +199,7 @@ def _grid(gaps: Array, slowings: Array) -> tuple[tuple[float, float], ...]:
 
 def _nearest(span: Span, gaps: Array, slowings: Array, ratios: Sequence[float]) -> tuple[float, float, float]:
     """Gap, deceleration, viscous over dry friction of the play that looks most like the residual, on finer grids."""
-    look = torques_of_grid
+    look: Callable[..., Array] = torques_of_grid
     for window in WINDOWS:
         grid = _grid(gaps, slowings)
         alike = {ratio: _alike(look(span.prepared, grid, ratio), span, window) for ratio in dict.fromkeys(ratios)}
