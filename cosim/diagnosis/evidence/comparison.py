@@ -4,7 +4,7 @@ All structures of a diagnosis are compared on the same rows, scaled by the same 
 nuisances; only their torques and tangents differ.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
@@ -34,6 +34,8 @@ from pyfmi_models.effects import Effect
 Aside = frozenset[str]
 """Names of nuisances that stand aside, because they are the effect in question."""
 NONE: Aside = frozenset()
+AT_HAND = 3
+"""Transformed columns that are kept: of a structure, of the one it is compared with, of what that one misses."""
 
 
 def aside_for(*effects: str) -> Aside:
@@ -152,7 +154,7 @@ class Comparison:
         grams, groups = self._joined(found, own, aside)
         if missed:
             first = grams.shape[1] - 1
-            grams = self._grown(grams, own, aside, self.bands.transform(missed.columns))
+            grams = self._grown(grams, own, aside, self._kept(missed, lambda: self.bands.transform(missed.columns)))
             groups = [*groups, *(Group(first + np.array(one), self.policy.form) for one in missed.groups)]
         rows = self.bands.of_forms if few else self.bands.effective
         return marginal(grams, self._free(found, grams), groups, self.bands.count, rows, self.floor)
@@ -204,10 +206,26 @@ class Comparison:
         A law is one thing to slow motion and another to fast one: where what is slow counts as noise, numbers that fit
         what is fast cost nothing, and a structure that explains what is slow would be the worse for that.
         """
-        own = self.bands.transform(np.column_stack([found.residual, found.slopes]))
-        base = np.array([name in self.base for name in found.free], bool)
-        relative = own[:, 1:][:, base] * np.abs(found.values[base])
-        return np.column_stack([own, np.where(self.bands.fast[:, None], relative, 0.0)])
+
+        def made() -> Array:
+            own = self.bands.transform(np.column_stack([found.residual, found.slopes]))
+            base = np.array([name in self.base for name in found.free], bool)
+            relative = own[:, 1:][:, base] * np.abs(found.values[base])
+            return np.column_stack([own, np.where(self.bands.fast[:, None], relative, 0.0)])
+
+        return self._kept(found, made)
+
+    @cached_property
+    def _last(self) -> dict[Fit | Forms, Array]:
+        return {}
+
+    def _kept(self, of: Fit | Forms, make: Callable[[], Array]) -> Array:
+        """Transformed columns of a structure, or of what one misses; of the last few they are at hand."""
+        found = self._last.pop(of, None)
+        self._last[of] = make() if found is None else found
+        if len(self._last) > AT_HAND:
+            del self._last[next(iter(self._last))]
+        return self._last[of]
 
     def _joined(self, found: Fit, own: Array, aside: Aside) -> tuple[Array, list[Group]]:
         """Gram matrices of own columns and the nuisances that stay, and where those are among the columns."""
