@@ -141,7 +141,7 @@ def _proof(path: Path) -> Shown:
 def _is_sweep(path: Path) -> bool:
     from pyarrow import parquet
 
-    from cosim.data.formats import ORIGIN_KEY
+    from cosim.data.columns import ORIGIN_KEY
 
     try:
         held = parquet.read_schema(path).metadata or {}

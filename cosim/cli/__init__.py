@@ -47,7 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         end_well()
         keep_stdout()
-        one_thread()
+        set_libraries()
         check_given(given)
         settings = settled()
         rest = repeated(plugged([argument for argument in given if argument != "--debug"], settings.paths))
@@ -71,11 +71,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         leave(signalled())
 
 
-def one_thread() -> None:
-    """Let linear algebra work in one thread, unless the environment says otherwise; before NumPy is loaded.
+def set_libraries() -> None:
+    """Tell libraries what suits a command, unless the environment says otherwise; before they are loaded.
 
-    Matrices here are small: a second thread makes a diagnosis no faster and takes a third more of the processor.
+    Linear algebra works in one thread: matrices here are small, and a second thread makes a diagnosis no faster and
+    takes a third more of the processor. Pydantic looks for no plug-ins of its own among all packages: that is a
+    fortieth of a short run.
     """
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     for library in ("OPENBLAS", "OMP", "MKL"):
         os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 

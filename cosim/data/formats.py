@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from cosim.data.binary import apart, hdf5, matlab, mcap, mdf, numpy_files, parquet, ros1, rosbag
-from cosim.data.columns import ORIGIN_KEY, UNIT_KEY, Columns
+from cosim.data.columns import Columns
 from cosim.data.limits import LIMIT, allowed_by, short, within
 from cosim.data.long_form import in_columns
 from cosim.data.questions import OF_ROWS
@@ -18,7 +18,7 @@ from cosim.data.text.own_times import parted
 from cosim.data.text.reader import read_text
 from cosim.support.errors import RecordingError
 
-__all__ = ["ORIGIN_KEY", "UNIT_KEY", "Columns", "read_columns", "suffix_of"]
+__all__ = ["Columns", "read_columns", "suffix_of"]
 
 CONVERTED = {
     ".tdms": "a TDMS file of LabVIEW; write it as CSV with npTDMS (tdmsinfo, to_dataframe().to_csv) or DIAdem",

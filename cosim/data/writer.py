@@ -11,7 +11,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv, parquet
 
-from cosim.data.formats import ORIGIN_KEY, UNIT_KEY
+from cosim.data.columns import ORIGIN_KEY, UNIT_KEY
 from cosim.support.errors import OutputError
 from cosim.support.files import check_free, partial_of, take_place
 from cosim.support.interrupts import uninterrupted

@@ -3,17 +3,19 @@
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cosim.data.recording import Recording
 from cosim.data.writer import MemoryWriter, StreamWriter
 from cosim.support.files import check_room as check_room_at
 from cosim.support.version import __version__
 from cosim.system.plan import Plan
 from cosim.system.system import System
 from cosim.system.wiring import Wiring
+
+if TYPE_CHECKING:
+    from cosim.data.recording import Recording
 
 Settings = Mapping[str, Mapping[str, Any]]
 
@@ -37,8 +39,10 @@ def writer_of(
     return MemoryWriter(units, dict(origin), kinds)
 
 
-def kept(writer: MemoryWriter, name: str) -> Recording:
+def kept(writer: MemoryWriter, name: str) -> "Recording":
     """Return what a writer without a file holds."""
+    from cosim.data.recording import Recording
+
     known = {key: unit for key, unit in writer.units.items() if unit}
     columns = writer.table()
     others = {key: columns[key] for key in writer.kinds}

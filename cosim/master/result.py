@@ -4,10 +4,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import NotRequired, TypedDict
+from typing import TYPE_CHECKING, NotRequired, TypedDict
 
-from cosim.data.recording import Recording
 from cosim.support.html import facts
+
+if TYPE_CHECKING:  # what reads recordings is half of what a run would load
+    from cosim.data.recording import Recording
 
 
 class Statistics(TypedDict):
@@ -43,11 +45,13 @@ class RunResult:
     name: str
     statistics: Statistics
     files: Mapping[str, Path] = field(default_factory=dict)
-    _recording: Recording | None = field(default=None, repr=False)
+    _recording: "Recording | None" = field(default=None, repr=False)
 
     @cached_property
-    def recording(self) -> Recording:
+    def recording(self) -> "Recording":
         """The recording: columns of shape (rows,) in SI; read from its file when it is first asked for."""
+        from cosim.data.recording import Recording
+
         return self._recording or Recording.read(self.files["recording"], required=())
 
     def frame(self) -> object:

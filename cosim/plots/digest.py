@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.data.formats import UNIT_KEY
+from cosim.data.columns import UNIT_KEY
 from cosim.plots.quantities import number, scale_of
 from cosim.plots.style import Array
 from cosim.support.statistics import hann

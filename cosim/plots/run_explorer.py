@@ -99,10 +99,11 @@ def _record(name: str, t: Array, signals: dict[str, Array], unit: str, share: fl
 
 
 def _column(file: "ParquetFile", name: str) -> Array:
-    """The values, from pyarrow's own memory: `to_numpy` would load pandas, a quarter of a second in each run."""
+    """The values, from pyarrow's own memory: `to_numpy` would load pandas, and `cast` pyarrow's arithmetic."""
     import pyarrow as pa
 
-    parts = [chunk.cast(pa.float64(), safe=False) for chunk in file.read(columns=[name])[name].chunks]
+    chunks, double = file.read(columns=[name])[name].chunks, pa.float64()
+    parts = [chunk if chunk.type == double else chunk.cast(double, safe=False) for chunk in chunks]
     if any(part.null_count for part in parts):
         return np.concatenate([np.asarray(part.to_pylist(), float) for part in parts])
     rows = [np.frombuffer(one.buffers()[1], np.float64)[one.offset : one.offset + len(one)] for one in parts]

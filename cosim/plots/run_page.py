@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.data.formats import ORIGIN_KEY
+from cosim.data.columns import ORIGIN_KEY
 from cosim.plots.chart import Chart
 from cosim.plots.digest import ERROR, Axis, Digest, Line, digest, in_words
 from cosim.plots.quantities import Scale, joined, number, scale_of

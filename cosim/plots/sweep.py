@@ -79,7 +79,7 @@ def read_results(table: Path) -> Results:
 
     from pyarrow import parquet
 
-    from cosim.data.formats import ORIGIN_KEY, UNIT_KEY
+    from cosim.data.columns import ORIGIN_KEY, UNIT_KEY
 
     read = parquet.read_table(table)
     origin = json.loads(read.schema.metadata[ORIGIN_KEY])

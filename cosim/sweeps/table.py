@@ -8,7 +8,7 @@ from typing import Any
 import pyarrow as pa
 from pyarrow import parquet
 
-from cosim.data.formats import ORIGIN_KEY, UNIT_KEY
+from cosim.data.columns import ORIGIN_KEY, UNIT_KEY
 from cosim.support.files import replacing
 from cosim.sweeps.job import Row
 

@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from importlib.resources import files
+from pathlib import Path
 
 import pytest
 
@@ -30,3 +31,11 @@ def test_nothing_heavy_is_loaded(arguments: list[str], heavy: tuple[str, ...]) -
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.stdout
     assert done.stderr.strip() == ""
+
+
+def test_a_run_with_its_page_loads_nothing_that_reads_recordings_fits_or_draws(tmp_path: Path) -> None:
+    heavy = ("cosim.data.formats", "pyarrow.compute", "pandas", "scipy", "casadi", "matplotlib")
+    code = CODE.format(arguments=["run", "sidereal", "--stop", "0.05", "--out", str(tmp_path)], heavy=heavy)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (tmp_path / "run.html").is_file(), done.stderr
+    assert done.stderr.splitlines()[-1] == ""

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cosim.cli import main, one_thread
+from cosim.cli import main, set_libraries
 from cosim.data.recording import Recording
 from cosim.estimation.identify.estimate import Estimate, Outputs, estimate
 from cosim.support.errors import InputError, UndecidedError
@@ -178,5 +178,5 @@ def test_linear_algebra_has_one_thread_unless_told(
     for name, value in given.items():
         monkeypatch.setenv(name, value)
     monkeypatch.setattr(os, "environ", dict(os.environ))  # what is set here ends here
-    one_thread()
+    set_libraries()
     assert os.environ["OPENBLAS_NUM_THREADS"] == threads

@@ -11,7 +11,7 @@ from pyarrow import parquet
 from sweeps import K, R, folder, run, written
 from tiny_fmu import tiny
 
-from cosim.data.formats import ORIGIN_KEY, UNIT_KEY
+from cosim.data.columns import ORIGIN_KEY, UNIT_KEY
 from cosim.data.recording import Recording
 
 __all__ = ["folder", "tiny"]
