@@ -2,6 +2,7 @@
 
     python bench/mutants.py --seed 1 --count 150 --map MAP --journal FILE --out results/robustness [--groups fmi ...]
     python bench/mutants.py --seed 1 --count 150 --journal FILE --out results/robustness --so-far [--remarks FILE.toml]
+    python bench/mutants.py --map MAP --journal FILE --out results/robustness --again
     python bench/mutants.py --journal FILE --out results/robustness --seconds 60 --ask MODULE:LINE=FILE_OF_TESTS ...
 
 Each room of the product is a group (`GROUPS`), and of each as many errors are drawn: the kinds of `mutations.KINDS` in
@@ -56,7 +57,7 @@ GROUPS = {
     ),
     "report": ("cosim/report/*.py", "cosim/plots/*.py"),
     "delivery": ("cosim/delivery/*.py", "cosim/simulators/*.py", "cosim/nesting/*.py", "cosim/nesting/c/*.c"),
-    "hardware": ("cosim/hardware/*.py", "cosim/hardware/*.c"),
+    "hardware": ("cosim/hardware/*.py", "cosim/hardware/*.c", "cosim_ethercat/*.py"),
     "interface": ("cosim/cli/*.py", "cosim/api/*.py"),
     "exchange": ("cosim/calibration/*.py", "cosim/experiments/*.py", "cosim/sweeps/*.py", "cosim/investigation/*.py"),
 }
@@ -177,11 +178,12 @@ def todo(seed: int, count: int, groups: Sequence[str], tried: list[Tried]) -> It
 
 
 def todo_again(ask: Sequence[str], tried: Sequence[Tried]) -> Iterator[tuple[str, Path, int, tuple[str, ...]]]:
-    """The survivors for which a file of tests is named: the choice of tests does not see all that are near."""
+    """The survivors, each with the file of tests that is named for it; without names all, by the map as it is now."""
     named = dict(one.split("=") for one in ask)
     for one in tried:
-        if not one.noticed and (file := named.get(f"{one.module}:{one.line}")):
-            yield one.group, HOME / one.module, one.site, (file,)
+        file = named.get(f"{one.module}:{one.line}", "")
+        if not one.noticed and (file or not named):
+            yield one.group, HOME / one.module, one.site, (file,) if file else ()
 
 
 def main() -> None:
@@ -194,6 +196,7 @@ def main() -> None:
     parser.add_argument("--map", type=Path, help="file of mutants_map.py: which tests run which lines")
     parser.add_argument("--journal", type=Path, required=True, help="file of what is done: a run goes on from there")
     parser.add_argument("--ask", nargs="+", default=[], help="MODULE:LINE=FILE: tests that a survivor is asked too")
+    parser.add_argument("--again", action="store_true", help="ask the survivors once more, by a map that has grown")
     parser.add_argument("--remarks", type=Path, help="what is known of survivors (.toml): why, by MODULE:LINE")
     parser.add_argument("--page", default="mutants.md", help="name of the page")
     parser.add_argument("--so-far", action="store_true", help="only write the page of what the journal has")
@@ -216,7 +219,7 @@ def run(tree: Tree, given: argparse.Namespace) -> None:
     tried_before = journalled(given.journal)
     new = ((*one, ()) for one in todo(given.seed, given.count, given.groups, tried_before))
     again = todo_again(given.ask, list(tried_before))
-    for group, path, number, more in again if given.ask else new:
+    for group, path, number, more in again if given.ask or given.again else new:
         tried = tree.attempt(group, path, number, more)
         if tried is None:
             print(f"{path.relative_to(HOME)}: {number} does not compile", flush=True)
