@@ -1,5 +1,6 @@
 """Any team's FMU takes a place in a scenario: its own names and units behind ours."""
 
+import re
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -9,7 +10,7 @@ import pytest
 from foreign_fmu import foreign
 from mirror_fmu import mirror
 from small_loop import TEXT
-from tiny_fmu import tiny
+from tiny_fmu import described, description, tiny
 
 from cosim.fmi.description import describe
 from cosim.fmi.variables import ports_of
@@ -67,6 +68,21 @@ def test_units_that_only_the_model_knows_are_read_from_its_definitions(tiny: dic
     sent = run(scenario(f'fmu = "{tiny[2]}"\nparameters = {{ mode = 1.0 }}', tmp_path, tiny)).recording
     row = np.flatnonzero(sent["q"])[0]
     np.testing.assert_allclose(recording["q"][row] / sent["q"][row], 1 / (2 * np.pi))
+
+
+def test_a_second_name_that_fmi_3_gives_a_variable_is_that_variable(tiny: dict[int, Path], tmp_path: Path) -> None:
+    """Wired and recorded by its alias: the same bits as by its name."""
+    alias = r'\1><Alias name="Encoder.angle" description="on the shaft"/></Float64>'
+    path = described(tiny[3], tmp_path / "theirs.fmu", re.sub(r'(<Float64 name="y"[^>]*)/>', alias, description(3)))
+    ports = ports_of(describe(path))
+    assert ports["Encoder.angle"] == replace(ports["y"], name="Encoder.angle")
+    found = []
+    for name in ("y", "Encoder.angle"):
+        text = TEXT.replace("plant.y", f"plant.{name}").replace("tiny3.fmu", str(path))
+        found.append(run(parse_scenario(text.replace("tiny2.fmu", str(tiny[2])), "loop.toml", tmp_path)).recording)
+    assert list(found[0]) == list(found[1])
+    for column in found[0]:
+        np.testing.assert_array_equal(found[0][column], found[1][column])
 
 
 WRONG = {
