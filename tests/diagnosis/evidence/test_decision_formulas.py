@@ -10,7 +10,7 @@ import pytest
 
 from cosim.diagnosis.evidence import adequacy
 from cosim.diagnosis.evidence.adequacy import _cells, _hats, _lasting, _rms, _slow, _unexplained
-from cosim.diagnosis.evidence.marginal import Group, _size, marginal
+from cosim.diagnosis.evidence.marginal import Group, Marginal, _size, marginal
 from cosim.diagnosis.search.admissibility import _way_back
 from cosim.estimation.residuals import away_from_turns, removed_at_rest
 
@@ -140,35 +140,43 @@ def test_where_a_fiftieth_of_the_energy_goes_it_is_asked_where(
         assert away_from_turns(problem, left, without) == pytest.approx(1 / 3, rel=1e-9)
 
 
-def dense(grams: Array, free: Array, groups: list[Group], count: Array, effective: Array, floor: Array) -> Any:
+def dense(
+    grams: Array, free: Array, group: Group, size: float, count: Array, effective: Array, floor: Array
+) -> tuple[float, Array, Array]:
     """`marginal` without its rounds: noise and sizes as they begin, by inverses and determinants."""
     noise = np.maximum(grams[:, 0, 0] / count, floor)
     variance = np.square(free)
-    for group in groups:
-        variance[group.columns] = group.prior**2
+    variance[group.columns] = max(size, 1e-6 * group.prior) ** 2
     weight = effective / count / noise
     normal = np.tensordot(weight, grams[:, 1:, 1:], 1) + np.diag(1 / variance)
     target = weight @ grams[:, 1:, 0]
     beta = np.linalg.solve(normal, target)
     energy = weight @ grams[:, 0, 0] - target @ beta
-    penalty = len(groups) / 2
+    penalty = (size / group.prior) ** 2 / 2
     sizes = np.linalg.slogdet(normal)[1] + np.log(variance).sum()
     return -(effective @ np.log(noise) + energy + sizes) / 2 - penalty, noise, beta
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_a_marginal_likelihood_without_rounds_is_the_gaussian_integral(seed: int) -> None:
-    rng = np.random.default_rng(seed)
+@pytest.mark.parametrize("compiled", [True, False])
+@pytest.mark.parametrize("relative", [1.0, 0.01, 1e-4, 1e-9])
+def test_a_marginal_likelihood_without_rounds_is_the_gaussian_integral(
+    compiled: bool, relative: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """From sizes that are given too, down to a millionth of the prior, where a size counts as that."""
+    rng = np.random.default_rng(1)
     bands = [rng.normal(0, 1, (50, 5)) for _ in range(2)]
     grams = np.array([one.T @ one for one in bands])
     count, effective, floor = np.array([50.0, 50.0]), np.array([50.0, 11.0]), np.array([1e-9, 2.0])
-    free, groups = np.array([3.0, 0.5, 1.0, 1.0]), [Group(np.array([2, 3]), 0.7)]
-    found = marginal(grams, free.copy(), groups, count, effective, floor, rounds=0)
-    expected, noise, beta = dense(grams, free.copy(), groups, count, effective, floor)
+    free, group = np.array([3.0, 0.5, 1.0, 1.0]), Group(np.array([2, 3]), 0.7)
+    if not compiled:
+        monkeypatch.setattr("cosim.diagnosis.evidence.marginal.library", lambda: None)
+    expected, noise, beta = dense(grams, free.copy(), group, size := relative * 0.7, count, effective, floor)
+    start = None if relative == 1.0 else Marginal(0.0, noise, np.array([size]), beta)
+    found = marginal(grams, free.copy(), [group], count, effective, floor, start, rounds=0)
     assert found.log_likelihood == pytest.approx(expected, rel=1e-8)
     np.testing.assert_allclose(found.noise, noise)
-    np.testing.assert_allclose(found.beta, beta, rtol=1e-7)
-    np.testing.assert_allclose(found.sizes, [0.7])
+    np.testing.assert_allclose(found.beta, beta, rtol=1e-7, atol=1e-14)
+    np.testing.assert_allclose(found.sizes, [size])
 
 
 @pytest.mark.parametrize(("u", "var"), [([0.3, -0.2], [0.01, 0.04]), ([2.0], [0.0]), ([1e-6] * 5, [1e-9] * 5)])
