@@ -5,12 +5,15 @@ import zipfile
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from motor_fmu import motor
 
 import cosim
 from cosim.fmi.domain import KEY, Domain, domains_of, entries_of
+from cosim.master.proven import Proven
 from cosim.master.session import OutsideProvenRangeWarning
+from cosim.system.ports import PortRef
 from pyfmi_models.card import read_card
 from pyfmi_models.card_writer import card_text
 from pyfmi_models.export.related import identified, references
@@ -132,3 +135,15 @@ def test_what_is_no_range_is_no_domain():
     assert domains_of("all") == ()
     assert domains_of({"a": {"low": "x", "high": "1"}, "b": 3, "c": {"low": 2, "high": 1}, "d": {"low": 0}}) == ()
     assert json.dumps([one.name for one in domains_of({"e": {"low": "0", "high": "1"}})]) == '["e"]'
+
+
+@pytest.mark.parametrize(
+    ("value", "is_outside"),
+    [(-2.0, False), (6.0, False), (-2.0 - 4e-9, False), (6.0 + 4e-9, False), (-2.0 - 2e-8, True), (6.0 + 2e-8, True)],
+)
+def test_the_ends_of_a_proven_range_belong_to_it_and_rounding_does_too(value: float, is_outside: bool) -> None:
+    """A billionth of the range of 8 may be lost in arithmetic."""
+    watched = Proven(PortRef("a.w"), -2.0, 6.0, "rad/s")
+    watched.see(np.array([0.0, 0.5]), np.array([0.0, value]))
+    assert (watched.first, watched.value) == ((0.5, value) if is_outside else (float("inf"), 0.0))
+    assert (watched.least, watched.greatest) == (min(0.0, value), max(0.0, value))
