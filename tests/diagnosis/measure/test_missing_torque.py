@@ -8,7 +8,7 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.delivery.deliver import write_missing_torque
-from cosim.diagnosis.measure.breakdown import parts, samples
+from cosim.diagnosis.measure.breakdown import curve, parts, samples
 from cosim.diagnosis.measure.protocol import Structures, band_of, judge, traces
 from cosim.estimation.prepare import Band
 from pyfmi_models.friction import Coulomb
@@ -67,3 +67,16 @@ def test_errors_by_part_are_of_the_band_in_which_the_whole_was_judged() -> None:
     assert held.cutoff_hz == 8.0
     whole, *_ = parts(traces([run], [run], models, band_of(held)))
     assert whole.before == pytest.approx(held.before_rms, rel=1e-9)
+
+
+def test_a_curve_is_the_mean_over_equal_bins_from_the_first_to_the_last() -> None:
+    """Five samples are enough for a bin; one in thirty counts for the half width; what lies outside counts nowhere."""
+    edges = np.linspace(-1.0, 1.0, 5)
+    place = np.repeat([-1.0, -0.4, 0.2, 0.6], [60, 5, 4, 30])
+    x = np.concatenate([place, [-1.01, 1.0, 7.0]])
+    y = np.concatenate([place + np.tile([0.1, -0.1], 50)[: len(place)], [99.0, 99.0, 99.0]])
+    found = curve(x, y, edges)
+    np.testing.assert_allclose(found.x, [-0.75, -0.25, 0.25, 0.75])
+    np.testing.assert_allclose(found.mean, [-1.0, -0.38, np.nan, 0.6], atol=1e-12)
+    np.testing.assert_allclose(found.half[[0, 3]], [1.96 * 0.1 / np.sqrt(2), 1.96 * 0.1])
+    assert np.isnan(found.half[2])
