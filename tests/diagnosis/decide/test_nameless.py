@@ -99,6 +99,9 @@ def test_however_bad_its_shape_an_effects_own_table_speaks_for_its_name(
     assert leads[0] == leads[1] < 1e6
     others = [one for one in tried if one.name not in hypothesis_of(effect.effect).tables]
     assert _challenge(comparison, Nameless(proof), effect, -1e9, _Offered(others, [])).lead > 0.9e9
+    (own_alone,) = [one for one in tried if one.name in hypothesis_of(effect.effect).tables][:1]
+    none = _challenge(comparison, Nameless(proof), effect, -1e9, _Offered([own_alone], []))
+    assert (none.lead, none.term) == (-np.inf, own_alone), "nothing else is there to take the name"
 
 
 def test_friction_over_position_keeps_its_name(tmp_path: Path) -> None:
