@@ -79,11 +79,11 @@ PAGES = {
     "robustness/kills.md": BENCH.format("kills.py --trials 50 --seed 1920", "robustness"),
     **{
         f"robustness/{page}": BENCH.format(
-            f"mutants.py --seed {seed} --count 30 --seconds 12 --journal FILE --page {page}"
+            f"mutants.py --seed {seed} --count {count} --map MAP --journal FILE --page {page}"
             " --remarks results/robustness/mutants_remarks.toml",
             "robustness",
         )
-        for page, seed in (("mutants.md", 29001), ("mutants_2.md", 29002))
+        for page, seed, count in (("mutants.md", 30001, 60), ("mutants_2.md", 30002, 20))
     },
     "robustness/serve.md": BENCH.format("serve.py --drops 100 --rounds 3 --seed 17", "robustness"),
     "stiffness/README.md": "python -m cosim_studies.stiffness --out results/stiffness --force",

@@ -76,7 +76,8 @@ def test_a_unit_has_its_size(name: str) -> None:
 def test_a_base_unit_has_the_power_one_of_itself_alone(name: str) -> None:
     assert unit(name).dimension == tuple(int(place == BASE[name]) for place in range(5))
     assert unit(name).factor == 1
-    assert unit("rad").dimension == unit("deg").dimension == unit("1").dimension == (0,) * 5
+    assert {unit(one).dimension for one in ("rad", "deg", "mas", "1", "%")} == {(0,) * 5}
+    assert unit("degC").dimension == unit("degF").dimension == unit("K").dimension
 
 
 @pytest.mark.parametrize(
