@@ -49,8 +49,9 @@ def _rate(tried: Sequence[Tried]) -> str:
     return f"{found.value:.0%} ({found.low:.0%} to {found.high:.0%})"
 
 
-EQUIVALENT = "equivalent"
-"""How a remark begins of a survivor that changes nothing that can be seen: it is counted apart."""
+EQUIVALENT, SINCE = "equivalent", "a test was written after"
+"""How a remark begins of a survivor that changes nothing that can be seen, and of one that is noticed now: both are
+counted apart."""
 
 
 def page(tried: Sequence[Tried], sample: Sample, command: str, remarks: Mapping[str, str]) -> str:
@@ -67,6 +68,7 @@ def page(tried: Sequence[Tried], sample: Sample, command: str, remarks: Mapping[
     lines += [
         "What only a test notices that was written after the draw counts as survived; so the rate is a lower bound of",
         "what the whole suite notices. What is equivalent, with its reason below, is left out of the last column.",
+        _today(tried, remarks),
         "",
     ]
     for name, title in (("group", "room"), ("kind", "kind")):
@@ -77,6 +79,14 @@ def page(tried: Sequence[Tried], sample: Sample, command: str, remarks: Mapping[
         if not one.noticed:
             lines.append(f"| {one.module} | {one.line} | {one.kind} | `{one.change}` | {_remark(one, remarks)} |")
     return "\n".join(lines) + "\n"
+
+
+def _today(tried: Sequence[Tried], remarks: Mapping[str, str]) -> str:
+    """What is noticed with the tests that were written for survivors."""
+    said = [_remark(one, remarks) for one in tried if not one.noticed]
+    equivalent, since = (sum(one.startswith(word) for one in said) for word in (EQUIVALENT, SINCE))
+    seen, now = len(tried) - equivalent, len(tried) - len(said) + since
+    return f"With the {since} tests that were written since, {now} of {seen} are noticed ({now / max(seen, 1):.0%})."
 
 
 def _remark(one: Tried, remarks: Mapping[str, str]) -> str:
