@@ -45,6 +45,7 @@ LINEAR_UNITS = {
     "N.m.s2/rad2": "N.s2/m2",
     "1/rad2": "1/m2",
     "K/rad": "K/m",
+    "% per rad rubbed": "% per m rubbed",
 }
 Kind = TypeVar("Kind", bound=Effect)
 Seen = TypeVar("Seen", bound=MotionEffect)

@@ -364,7 +364,8 @@ def _findings(answer: Answer, signals: Sequence[Trace]) -> list[Finding]:
         open_ = [rival_finding(r, shares[r.effect.id], mount) for r in one.rivals if r.effect.id in members]
         rivals += [measured_as(row, found[-1], mount) for row in open_]
     named = {finding.effect for finding in found}
-    rivals = [finding for finding in rivals if finding.effect not in named]
+    likeliest = {finding.effect: finding for finding in sorted(rivals, key=lambda one: one.probability)}
+    rivals = [one for one in rivals if one.effect not in named and one is likeliest[one.effect]]
     known = named | {finding.effect for finding in rivals}
     unproven = [fit for one in answer.proof.unproven for fit in by_each_name(one.own, known)]
     lost = [replace(rival_finding(fit, 0.0, mount), answer="not_proven") for fit in unproven]

@@ -7,7 +7,10 @@ import casadi as ca
 
 from pyfmi_models.effects.base import FrictionEffect, Main, Motion
 from pyfmi_models.effects.shares import percent
-from pyfmi_models.model import Scalar, parameter
+from pyfmi_models.model import Recorded, Scalar, Variable, parameter
+
+MOST = 0.6
+"""Half the relative difference where one way has four times the friction of the other: (4 - 1) / (4 + 1)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,15 +39,20 @@ class FrictionAsymmetry(FrictionEffect):
         """`viscous (1 + b sign v)`."""
         return viscous * (1 + self.viscous_asymmetry * ca.sign(motion.v))
 
+    def fit_bounds(self, variable: Variable, recorded: Recorded) -> tuple[float, float]:
+        """One way at most four times the other, in a fit, which else takes it away for something; a card's is kept."""
+        return min(-MOST, variable.start), max(MOST, variable.start)
+
     def leading(self) -> Main:
-        """The larger of the two."""
-        viscous = abs(self.viscous_asymmetry) > abs(self.level_asymmetry)
+        """The larger of the two; not that of viscous friction where a fit left it at its end, where nothing is told."""
+        viscous = abs(self.level_asymmetry) < abs(self.viscous_asymmetry) < MOST
         return self.main._replace(parameter="viscous_asymmetry", unit="% viscous") if viscous else self.main
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
+        is_told = abs(self.viscous_asymmetry) < MOST or abs(self.viscous_asymmetry) < abs(self.level_asymmetry)
         sliding = _percent("sliding friction", self.level_asymmetry)
-        viscous = _percent("viscous friction", self.viscous_asymmetry)
+        viscous = _percent("viscous friction", self.viscous_asymmetry if is_told else 0.0)
         larger, smaller = sorted((sliding, viscous), key=lambda item: -item[0])
         return f"{larger[1]}." if smaller[0] < 0.1 * larger[0] else f"{larger[1]}, {smaller[1].lower()}."
 

@@ -1,6 +1,7 @@
 """Friction that drifts with temperature."""
 
 from dataclasses import dataclass
+from math import expm1
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -52,15 +53,37 @@ class ThermalViscosity(FrictionEffect):
         """`viscous exp(kv (T - 20))`."""
         return viscous * ca.exp(self.viscous_per_degC * self.warmth(motion))
 
+    def leading(self) -> Main:
+        """The larger of the two changes."""
+        sliding = abs(self.coulomb_per_degC) > abs(self.viscous_per_degC)
+        return self.main._replace(parameter="coulomb_per_degC", unit="%/K sliding") if sliding else self.main
+
+    def change(self, per_degree: float) -> float:
+        """The relative change that a text gives, of a coefficient: here that of one degree."""
+        return per_degree
+
+    def by(self, unit: str) -> str:
+        """What the change goes with, in words; `unit` is the torque or force unit."""
+        return "per degree"
+
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
         parts = {"Viscous friction": self.viscous_per_degC, "Sliding friction": self.coulomb_per_degC}
-        said = [f"{name} {_change(value)} per degree" for name, value in parts.items() if value]
+        said = [f"{name} {_changes(self.change(value))} {self.by(unit)}" for name, value in parts.items() if value]
         return " and ".join([*said[:1], *(text.lower() for text in said[1:])] or ["Friction keeps its size"]) + "."
 
 
 class _HeatedViscosity(ThermalViscosity):
-    """The same where use heats the bearing: its own temperature is that of its surroundings and a rise."""
+    """The same where use heats the bearing: its own temperature is that of its surroundings and a rise.
+
+    No thermometer has seen the rise: texts give what friction changes by, and over what time or way, not per degree.
+    """
+
+    def leading(self) -> Main:
+        """The larger of the two changes, as a text gives it."""
+        name, *_, is_size = super().leading()
+        number = float(getattr(self, name))
+        return Main(name, 100 * self.change(number) / number if number else 0.0, f"% {self.by('rad')}", is_size)
 
     def states(self) -> tuple[Variable, ...]:
         """One state: how much warmer than `temperature` the bearing is."""
@@ -89,6 +112,15 @@ class WarmingViscosity(_HeatedViscosity):
     warm_up_degC: Scalar = parameter("K", "Rise of temperature once warm", low=0, high=200, fitted=False)
     warm_up_s: Scalar = parameter("s", "Time constant of warming up", default=600.0, low=1e-3)
 
+    def change(self, per_degree: float) -> float:
+        """`exp(k warm_up_degC) - 1`: that of an axis that is warm."""
+        return expm1(per_degree * float(self.warm_up_degC))
+
+    def by(self, unit: str) -> str:
+        """Three time constants, in which 95 % of the rise are done."""
+        seconds = 3 * self.warm_up_s
+        return "in the first " + (f"{seconds:.2g} s" if seconds < 100 else f"{seconds / 60:.2g} min")
+
     def rate(self, motion: Motion) -> Any:
         """`(warm_up_degC - rise) / warm_up_s`."""
         return (self.warm_up_degC - motion.state[0]) / self.warm_up_s
@@ -109,10 +141,18 @@ class RubbedViscosity(_HeatedViscosity):
     )
     cooling_s: Scalar = parameter("s", "Time constant of cooling down", default=600.0, low=1e-3)
 
+    def change(self, per_degree: float) -> float:
+        """`k heat`: that of one radian or metre, while nothing has cooled."""
+        return per_degree * float(self.heat_degC_per_rad)
+
+    def by(self, unit: str) -> str:
+        """The way that is rubbed."""
+        return f"per {'m' if unit == 'N' else 'rad'} rubbed"
+
     def rate(self, motion: Motion) -> Any:
         """`heat |v| - rise / cooling_s`."""
         return self.heat_degC_per_rad * ca.fabs(motion.v) - motion.state[0] / self.cooling_s
 
 
-def _change(per_degree: float) -> str:
-    return f"{'grows' if per_degree > 0 else 'falls'} by {percent(abs(per_degree))}"
+def _changes(share: float) -> str:
+    return f"{'grows' if share > 0 else 'falls'} by {percent(abs(share))}"

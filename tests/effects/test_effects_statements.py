@@ -44,6 +44,8 @@ TURNING = {
     "RoughSpot": "Around 0.3 rad friction is 80 % higher moving forward and 30 % lower backward, over about 0.4 rad.",
     "StribeckEffect": "Below about 0.02 rad/s friction changes with speed, to 4 N·m near standstill.",
     "ThermalViscosity": "Viscous friction falls by 4 % per degree and sliding friction falls by 2 % per degree.",
+    "WarmingViscosity": "Viscous friction falls by 45 % in the first 90 s.",
+    "RubbedViscosity": "Viscous friction falls by 32 % per rad rubbed.",
     "TorqueDroop": "Of a command of 8 N·m the drive loses 20 %, of small ones less.",
     "WarmTorqueDroop": (
         "Of a command of 8 N·m the drive loses 20 %, of small ones less, and gives 0.2 % less per degree."
@@ -109,6 +111,11 @@ def test_the_sentence_of_an_axis_that_slides_differs_in_its_units_alone(effect: 
             "Sliding friction falls by 2 % per degree.",
         ),
         ("ThermalViscosity", {"viscous_per_degC": 0.0}, "Friction keeps its size."),
+        (
+            "WarmingViscosity",
+            {"viscous_per_degC": 0.01, "coulomb_per_degC": -0.02, "warm_up_degC": 10.0, "warm_up_s": 60.0},
+            "Viscous friction grows by 11 % in the first 3 min and sliding friction falls by 18 % in the first 3 min.",
+        ),
         (
             "ThermalViscosity",
             {"viscous_per_degC": 0.04},

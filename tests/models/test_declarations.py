@@ -178,6 +178,10 @@ def test_a_spring_is_fitted_with_its_resonance_above_its_antiresonance() -> None
         ("RoughSpot", {"forward": -0.3, "backward": 0.3}, "forward"),
         ("FrictionAsymmetry", {"level_asymmetry": -0.1, "viscous_asymmetry": 0.2}, "viscous_asymmetry"),
         ("FrictionAsymmetry", {"level_asymmetry": 0.2, "viscous_asymmetry": -0.2}, "level_asymmetry"),
+        ("FrictionAsymmetry", {"level_asymmetry": 0.2, "viscous_asymmetry": -0.6}, "level_asymmetry"),
+        ("ThermalViscosity", {"viscous_per_degC": 0.01, "coulomb_per_degC": -0.02}, "coulomb_per_degC"),
+        ("ThermalViscosity", {"viscous_per_degC": 0.02, "coulomb_per_degC": -0.02}, "viscous_per_degC"),
+        ("WarmingViscosity", {"viscous_per_degC": 0.01, "coulomb_per_degC": -0.02}, "coulomb_per_degC"),
         ("GearFriction", {"driving": 0.1, "driven": 0.2}, "driven"),
         ("GearFriction", {"driving": 0.2, "driven": 0.2}, "driving"),
     ],
@@ -187,6 +191,16 @@ def test_of_two_directions_the_larger_number_says_how_large_an_effect_is(
 ) -> None:
     effect = replace(example(next(form for form in FORMS if form.__name__ == name)), **changes)
     assert effect.leading().parameter == number
+
+
+def test_what_no_thermometer_has_seen_is_told_over_time_or_way() -> None:
+    """exp(-0.04 x 15) - 1 in three time constants of 30 s; 0.04 x 8 per radian."""
+    forms = {form.__name__: form for form in FORMS}
+    said = {}
+    for name in ("WarmingViscosity", "RubbedViscosity"):
+        main = example(forms[name]).leading()
+        said[main.unit] = -0.04 * main.factor
+    assert said == {"% in the first 90 s": pytest.approx(-45.12, abs=0.01), "% per rad rubbed": pytest.approx(-32.0)}
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from math import inf
+from math import inf, isclose
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,8 @@ from pyfmi_models.model import Recorded, Variable, parameters_of
 
 LEAST_GAIN = 0.01
 """A whole number of cycles is taken if the residual grows by less than this share, a free shape if it falls by more."""
+ROUNDING = 1e-9
+"""A fit comes to an end of a range up to rounding: -0.9499999999999998 is at -0.95."""
 ANY = Recorded(inf, inf)
 """Where no recording limits what a fit may find."""
 DEAD = 0.1
@@ -44,7 +46,8 @@ def ended_sizes(effect: Effect, sizes: Sequence[str], recorded: Recorded = ANY) 
 
 def _ends(effect: Effect, variable: Variable, recorded: Recorded) -> bool:
     low, high = effect.fit_bounds(variable, recorded)
-    return variable.start >= high or (low != 0 and variable.start <= low)
+    ended = [end for end in (low, high) if isclose(variable.start, end, rel_tol=ROUNDING)]
+    return variable.start > high or (low != 0 and variable.start < low) or any(end != 0 for end in ended)
 
 
 def refound(

@@ -6,13 +6,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.effects.tuning import ANY, ended_sizes
 from cosim.estimation.blocks import Blocks, covariance
-from cosim.estimation.fit import Fit
+from cosim.estimation.fit import Fit, recorded_by
 from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
 from cosim.support.statistics import Z95
 from pyfmi_models.effects import Effect
-from pyfmi_models.model import Variable, parameters_of
+from pyfmi_models.model import Recorded, Variable, parameters_of
 from pyfmi_models.mount import Mount
 
 
@@ -37,20 +38,25 @@ def numbers_of(effect: Effect, mount: Mount, errors: Mapping[str, float]) -> Num
     return Numbers(values, {name: errors[f"{prefix}.{name}"] for name in values if f"{prefix}.{name}" in errors})
 
 
-def is_told(effect: Effect, numbers: Numbers, mount: Mount) -> bool:
+def is_told(effect: Effect, numbers: Numbers, mount: Mount, recorded: Recorded = ANY) -> bool:
     """Whether the recordings tell the size of an effect: its 95 % range holds neither "none" nor all that it may be.
 
-    Of several sizes (a level and a viscosity, an offset and a drift) one is enough. At a bound nothing is told.
+    Of several sizes (a level and a viscosity, an offset and a drift) one is enough. At a bound, also at one of the fit,
+    nothing is told.
     """
     own, known = hypothesis_of(effect), {variable.name: variable for variable in parameters_of(effect)}
     sizes = [name for name in own.sizes or (effect.main.parameter,) if name in numbers.errors]
-    return not sizes or any(_excludes(numbers, name, own.none(mount), known[name]) for name in sizes)
+    ended = ended_sizes(effect, sizes, recorded)
+    return not sizes or any(
+        name not in ended and _excludes(numbers, name, own.none(mount), known[name]) for name in sizes
+    )
 
 
 def tells(problem: Problem, chosen: Fit, effect: Effect) -> bool:
     """Whether the training recordings tell a size of an effect of a fitted structure."""
     errors = standard_errors(chosen, Blocks.of(problem.prepared), problem.weight)
-    return is_told(effect, numbers_of(effect, chosen.mount, errors), chosen.mount)
+    numbers = numbers_of(effect, chosen.mount, errors)
+    return is_told(effect, numbers, chosen.mount, recorded_by(problem.prepared.pieces))
 
 
 def _excludes(numbers: Numbers, name: str, none: float, known: Variable) -> bool:
