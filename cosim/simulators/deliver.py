@@ -30,7 +30,7 @@ class Planned:
         """All that will be written."""
         return (*(path for _, path in self.files), self.table)
 
-    def write(self, force: bool = False) -> tuple[Held, ...]:
+    def write(self, force: bool) -> tuple[Held, ...]:
         """Write the files and the table; return what each simulator holds."""
         directory(self.table.parent)
         compared = along_recording(self.recording, self.mount) if self.recording else along_default(self.mount)

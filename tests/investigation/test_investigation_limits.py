@@ -111,3 +111,21 @@ def test_the_frequency_of_a_tone_is_its_own_and_of_two_the_higher_one(hertz: flo
     sizes = np.array([[1.0], [0.3]])
     v, a = (sizes * np.cos(w * t)).sum(0), (-sizes * w * np.sin(w * t)).sum(0)
     assert frequency_of(v, a, 1e-3) == pytest.approx(hertz, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("tones", "hertz"),
+    [
+        ({2.0: 1.0}, 2.0),
+        ({0.5: 1.0, 8.0: 0.3}, 8.0),  # a tenth of the energy of the acceleration
+        ({0.5: 1.0, 8.0: 0.05}, 0.5),  # a four-hundredth
+    ],
+)
+def test_a_motion_is_as_fast_as_the_tone_at_which_nearly_all_of_its_acceleration_ends(
+    tones: dict[float, float], hertz: float
+) -> None:
+    t = np.arange(0, 20, 2e-3)
+    a = sum(size * np.cos(2 * np.pi * one * t) for one, size in tones.items())
+    v = sum(size * np.sin(2 * np.pi * one * t) / (2 * np.pi * one) for one, size in tones.items())
+    assert frequency_of(v, a, 2e-3) == pytest.approx(hertz, abs=0.08)  # one that lasts 20 s blurs by .075 Hz
+    assert frequency_of(0 * t, 0 * t, 2e-3) == 0.0
