@@ -161,8 +161,10 @@ def test_a_diagnosis_of_data_frames_answers_in_python_on_a_terminal_and_in_a_not
     path = tmp_path / "axis.toml"
     path.write_text(CARD, "utf-8")
     train, heldout = [recorded(30, 4.0, seed) for seed in (1, 2)], recorded(30, 4.0, 3)
-    answer = cosim.diagnose(train, heldout, path)
+    told: list[tuple[str, ...]] = []
+    answer = cosim.diagnose(train, heldout, path, on_answer=lambda found: told.append(found.verdict))
     assert answer.missing == ("quadratic_drag",)
+    assert told == [answer.missing]
     assert [effect.id for effect in answer.card.effects] == ["quadratic_drag"]
     assert not answer.refitted.effects
     assert "quadratic drag" in str(answer).lower()

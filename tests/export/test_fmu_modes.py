@@ -8,13 +8,14 @@ from fuzz_rules import sealed
 from test_fmu_capabilities import both, everything, instance, library
 
 # call: in which modes of model exchange and of co-simulation it is allowed, as the standards' tables say
+READ = ("rates", "indicators", "nominals", "states read")
 MODES = {
     "instantiated": set(),
-    "initialization": {"get", "derivative"},
-    "event": {"get", "derivative", "time", "continuous"},
-    "continuous": {"get", "derivative", "time", "states", "completed", "event"},
+    "initialization": {"get", "derivative", *READ},
+    "event": {"get", "derivative", "time", "continuous", *READ},
+    "continuous": {"get", "derivative", "time", "states", "completed", "event", *READ},
     "step": {"get", "derivative", "step"},
-    "terminated": {"get", "derivative"},
+    "terminated": {"get", "derivative", *READ},
 }
 
 
@@ -41,8 +42,13 @@ def attempts(driver):
     torque, speed = (ctypes.byref(ctypes.c_uint(driver.references[name])) for name in ("torque", "speed"))
     lengths = (one,) if driver.fmi == 3 else ()
     flags = ctypes.byref(ctypes.c_int()), ctypes.byref(ctypes.c_int())
-    three = (ctypes.c_double * 3)()
+    three, of_three = (ctypes.c_double * 3)(), ctypes.c_size_t(3)
+    rates = "GetDerivatives" if driver.fmi == 2 else "GetContinuousStateDerivatives"
     return {
+        "rates": lambda: driver.call(rates, three, of_three),
+        "indicators": lambda: driver.call("GetEventIndicators", three, ctypes.c_size_t(0)),
+        "nominals": lambda: driver.call("GetNominalsOfContinuousStates", three, of_three),
+        "states read": lambda: driver.call("GetContinuousStates", three, of_three),
         "get": lambda: driver.get("torque"),
         "derivative": lambda: driver.call(
             "GetDirectionalDerivative", torque, one, speed, one, number, *lengths, number, *lengths
