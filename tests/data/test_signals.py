@@ -178,3 +178,20 @@ def test_a_constant_is_constant() -> None:
 def test_what_makes_no_signal_is_refused(wrong: dict[str, Any], rule: str) -> None:
     with pytest.raises(ValidationError, match=re.escape(rule)):
         TypeAdapter(Generator).validate_python(wrong)
+
+
+def test_the_phases_of_a_multisine_lie_all_around_and_its_seed_says_where() -> None:
+    """Forty tones of 1 to 40 Hz over one second: a Fourier sum gives each its amplitude and its phase."""
+    t, hertz = np.arange(1000) / 1000, np.arange(1.0, 41.0)
+
+    def tones(seed: int) -> np.ndarray:
+        one = Multisine(kind="multisine", frequencies=hertz.tolist(), amplitudes=0.5, seed=seed)
+        return np.fft.rfft(np.asarray(one.motion(t)[0]))[1:41] / 500
+
+    first, again, other = tones(1), tones(1), tones(2)
+    np.testing.assert_allclose(np.abs(first), 0.5, rtol=1e-9)
+    np.testing.assert_array_equal(first, again)
+    for found in (first, other):
+        turns = np.sort(np.mod(np.angle(found) / (2 * np.pi), 1))
+        assert np.diff([*turns, turns[0] + 1]).max() < 0.3, "no third of the circle is without"
+    assert np.abs(first - other).max() > 0.1
