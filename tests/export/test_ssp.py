@@ -9,6 +9,7 @@ import subprocess
 import sys
 import zipfile
 from dataclasses import replace
+from importlib.resources import files
 from math import pi
 from pathlib import Path
 
@@ -23,6 +24,7 @@ from cosim.cli import main
 from cosim.data.signals import Sine
 from cosim.master.simulate import run
 from cosim.models.system import system_of
+from cosim.support.units import unit
 from cosim.system.scenario import read_scenario
 from pyfmi_models.card import parse_card, read_card
 from pyfmi_models.errors import CardError, ExportError
@@ -57,6 +59,24 @@ def test_the_structure_and_the_parameter_sets_are_valid_ssp_1_0(ssp: Path) -> No
         for name in checked:
             validate_tree(etree.fromstring(archive.read(name)), schemas[Path(name).suffix])
     assert len(checked) == 4
+
+
+def test_units_are_defined_by_base_units_as_they_are_known_here(tmp_path: Path) -> None:
+    """Of a card with a time in milliseconds among SI: powers and factor are those that `--units` reads by the name."""
+    text = (files("pyfmi_models") / "cards" / "paper_mount.toml").read_text("utf-8")
+    card = parse_card(text + '\n[[effects]]\neffect = "delay"\ndelay_ms = 2.0\n', "late.toml")
+    found: dict[str, dict[str, str]] = {}
+    with zipfile.ZipFile(export_ssp(system_of(card), tmp_path / "a.ssp")) as archive:
+        for name in archive.namelist():
+            if name.endswith((".ssd", ".ssv")):
+                found |= {
+                    one.get("name"): dict(one[0].attrib) for one in etree.fromstring(archive.read(name)).iter("{*}Unit")
+                }
+    assert {"ms", "N.m", "rad/s2"} <= found.keys()
+    for name, base in found.items():
+        known = unit(name)
+        assert float(base.pop("factor", 1.0)) == known.factor
+        assert tuple(int(base.get(one, 0)) for one in ("m", "kg", "s", "A", "K")) == known.dimension
 
 
 def test_the_metadata_say_what_a_model_was_identified_from_and_how_well(tmp_path: Path) -> None:
