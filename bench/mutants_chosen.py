@@ -15,7 +15,7 @@ from functools import cache
 from pathlib import Path
 
 from mutants_blocks import HEAD, blocks, blocks_in_c, innermost
-from mutants_choice import HOME, LOADED, asked, functions, naming, told
+from mutants_choice import DECLARING, HOME, LOADED, asked, functions, naming, told
 
 PRODUCT = ("cosim", "pyfmi_models", "cosim_ethercat", "cosim_observatory", "cosim_serve", "cosim_studies")
 BATCHES = ((4.0, 5), (6.0, 7), (8.0, 9))
@@ -131,6 +131,8 @@ def chosen(known: Map, module: Path, source: str, line: int) -> Iterator[list[st
     declares = module.suffix == ".py" and not functions(source, line)
     unknown = [one for one in files if one not in known.files]
     before = [one for one in named if one.split("::")[0] in unknown] if known.files else named
+    if declares:  # what tests of ranges read is run by no block of its own
+        yield from ([one] for one in files[:1] if one in DECLARING.values() and one in known.files)
     if before and (declares or not known.files):
         yield before
     done: set[str] = set()

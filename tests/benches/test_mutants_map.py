@@ -117,3 +117,11 @@ def test_without_a_map_files_are_asked_that_are_near(tmp_path: Path) -> None:
     line = source[: source.index("def replay(")].count("\n") + 1
     found = [one for batch in mutants_chosen.chosen(Map(), path, source, line) for one in batch]
     assert "hardware/test_hardware_replay.py" in {one.split("::")[0] for one in found[:30]}
+
+
+def test_tests_of_what_is_declared_come_first_of_a_declaration() -> None:
+    path = HOME / "cosim/hardware/machine.py"
+    source = path.read_text("utf-8")
+    line = source[: source.index("    answer_spin_us: float")].count("\n") + 1
+    ranges = "hardware/test_machine_ranges.py"
+    assert next(mutants_chosen.chosen(Map(files={ranges}), path, source, line)) == [ranges]

@@ -10,6 +10,7 @@ from tiny_fmu import tiny
 
 from cosim.master.simulate import Options, run
 from cosim.support.errors import RecordingError, ScenarioError, SignalError
+from cosim.system.algorithm import Energy, Iterated
 from cosim.system.scenario import parse_scenario, read_scenario, shipped_scenarios
 from cosim.system.wire import Record, Wire
 
@@ -187,3 +188,11 @@ def test_a_replayed_recording_is_found_beside_the_scenario(tiny: dict[int, Path]
     (tmp_path / "night.csv").write_text("t,q\n0,1\n1,2\n")
     with pytest.raises(SignalError, match=r'night.csv has no column "load" to replay; it has: t, q.'):
         run(scenario)
+
+
+def test_what_a_scenario_does_not_say_of_its_algorithm_stays_as_it_is() -> None:
+    """Runs in use must not change with the next version: an iteration to rounding, of second order; a step's energy."""
+    iterated = Iterated(kind="iterated").model_dump()
+    assert iterated == {"kind": "iterated", "components": (), "tolerance": 1e-9, "max_iterations": 50, "theta": 0.5}
+    energy = Energy(kind="energy", bonds=(("a.torque", "b.speed"),)).model_dump()
+    assert (energy["tolerance"], energy["max_pieces"]) == (1e-5, 64)

@@ -7,6 +7,8 @@ import pytest
 from learned_cases import MOUNT, droop, learned, parts, wanders, warm_place
 from test_unknown import Array, Extra, iron
 
+from cosim.diagnosis.effects.candidates import Candidate
+from cosim.diagnosis.evidence.comparison import Screened
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.terms.candidate_terms import candidate_terms, resolved
 from cosim.diagnosis.terms.grams import columns_of, grams_of, with_terms
@@ -14,6 +16,7 @@ from cosim.diagnosis.terms.learn import _judged
 from cosim.diagnosis.terms.select import LEAST_EVIDENCE, paths
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.support.statistics import rms
+from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.effects.learned import LearnedFriction, LearnedViscous
 from pyfmi_models.effects.learned_drive import LearnedDrive, LearnedGain
 from pyfmi_models.effects.learned_memory import LearnedHysteresis
@@ -123,3 +126,21 @@ def test_a_coefficient_that_is_a_torque_is_as_large_as_the_friction_level_and_a_
         assert grams.unit[place : place + len(sizes)] == pytest.approx(sizes)
         place += len(sizes)
     assert place == len(grams.unit)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_candidate_that_can_only_add_is_none_where_it_would_take_away(sign: float) -> None:
+    """What is left is the column itself, or that upside down, which a spring cannot be."""
+    comparison, base, _ = parts(warm_place)
+    column = sign * base.residual[:, None]
+
+    def scored(positive: bool) -> Screened:
+        spring = Compliance(antiresonance_hz=3.0, resonance_hz=4.0)
+        return comparison.score(base, [Candidate("compliance", (spring,), (), lambda _: spring, positive)], [column])[0]
+
+    free, spring = scored(False), scored(True)
+    assert np.sign(free.coefficients[0]) == np.sign(spring.coefficients[0])
+    assert free.evidence > 100
+    assert (spring.evidence, spring.plain) == (
+        (free.evidence, free.plain) if free.coefficients[0] > 0 else (-np.inf, 0)
+    )
