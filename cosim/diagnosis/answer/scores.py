@@ -26,6 +26,8 @@ class EffectScores:
     """What the held-out recordings lose without it ..."""
     removes: float = 0.0
     """... and the share of their residual energy that it removes."""
+    ahead: float = 0.0
+    """By how much it is better than the best term of another kind in its place, which has no name."""
 
     def with_margins_of(self, share: float) -> "EffectScores":
         """The same with so much of each margin."""

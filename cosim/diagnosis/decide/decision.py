@@ -30,17 +30,19 @@ class Decision:
     doubtful: tuple[str, ...] = ()
     """Names that help, and may yet imitate what is unknown."""
 
-    def with_rest(self, follows: tuple[str, ...], doubtful: tuple[str, ...], policy: Policy) -> "Decision":
-        """The same where something is left without a name, that follows quantities; names may imitate it."""
+    def with_rest(self, follows: tuple[str, ...], doubtful: Mapping[str, float], policy: Policy) -> "Decision":
+        """The same where something is left without a name, that follows quantities; names may imitate it.
+
+        `doubtful`: what is left of the probability of each name that may.
+        """
         if self.is_unknown:
             return self
         told = {
-            name: {one: policy.true_beside_unknown * value for one, value in members.items()}
-            if name in doubtful
-            else members
+            name: {one: doubtful.get(name, 1.0) * value for one, value in members.items()}
             for name, members in self.probabilities.items()
         }
-        return Decision(self.sets, told, True, follows, doubtful)
+        imitations = tuple(name for name, left in doubtful.items() if left < policy.true_ahead)
+        return Decision(self.sets, told, True, follows, imitations)
 
 
 def decide(scores: Scores, policy: Policy) -> Decision:
@@ -72,7 +74,7 @@ def _of_rest(effects: Sequence[EffectScores], residual: ResidualScores, policy: 
     named = _named(effects, policy)
     # What shakes a machine is no part of what a name says, and no name imitates it.
     shaking = [rule.name for rule in shaking_rules(residual, policy) if rule.outcome]
-    return named.with_rest((SHAKING[shaking[0]],), (), policy) if shaking else named
+    return named.with_rest((SHAKING[shaking[0]],), {}, policy) if shaking else named
 
 
 def shaking_rules(residual: ResidualScores, policy: Policy) -> Iterator[Rule]:
@@ -93,10 +95,14 @@ def _named(effects: Sequence[EffectScores], policy: Policy) -> Decision:
     return Decision(sets, {one.effect: _probabilities(one, sets[one.effect]) for one in effects}, False, ())
 
 
-def beside_unknown(effects: Sequence[EffectScores], policy: Policy) -> tuple[str, ...]:
-    """Names that leave too much to be sure where that has no name: a part of one cause may look like them."""
-    removed = {one.effect: max(one.explains[one.effect], one.removes) for one in effects}
-    return tuple(name for name, share in removed.items() if share < policy.sure_beside_unknown)
+def beside_unknown(effects: Sequence[EffectScores], policy: Policy) -> dict[str, float]:
+    """What is left of the probability of names that leave too much to be sure where that has no name.
+
+    A part of one cause may look like them. What is only an imitation a term without a name does nearly as well.
+    """
+    weak = [one for one in effects if max(one.explains[one.effect], one.removes) < policy.sure_beside_unknown]
+    left = {True: policy.true_ahead, False: policy.true_beside_unknown}
+    return {one.effect: left[one.ahead >= policy.least_followed] for one in weak}
 
 
 def doubted(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> tuple[str, ...]:

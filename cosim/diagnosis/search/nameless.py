@@ -14,8 +14,8 @@ not its name. What then remains is asked again beside that term: names come in t
 a part.
 """
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from math import inf, log
 
 from cosim.diagnosis.answer.ledger import Rule
@@ -37,6 +37,8 @@ class Nameless:
 
     proof: Proof
     taken: tuple[tuple[AcceptedEffect, CandidateTerm], ...] = ()
+    ahead: Mapping[str, float] = field(default_factory=dict)
+    """Nats by which each name that stands is better than the best term in its place."""
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -88,7 +90,7 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
         rule = Rule(f"not explained better by {worst.term.name}", not leads, worst.lead, least, "nats")
         comparison.judge(name, chosen, [rule])
         if not leads:
-            break
+            return replace(found, ahead={one.effect.effect.id: -one.lead for one in challenges if one.lead > -inf})
         left = without(comparison, examined, found.proof, worst.effect, held)
         found = Nameless(left, (*found.taken, (worst.effect, worst.term)))
     return found

@@ -16,18 +16,26 @@ from cosim.diagnosis.terms.flexible import flexible_terms
 from cosim.estimation.fit import Fit
 
 
-def effect_scores(proof: Proof) -> list[EffectScores]:
+def effect_scores(found: Nameless) -> list[EffectScores]:
     """Scores of the effects that stand."""
-    said = {one.effect.id: (proof.predicted[one.effect.id], proof.removes[one.effect.id]) for one in proof.standing}
+    proof = found.proof
     return [
-        EffectScores(one.effect.id, one.own.evidence, margins(one), explains(one), *said[one.effect.id])
+        EffectScores(
+            one.effect.id,
+            one.own.evidence,
+            margins(one),
+            explains(one),
+            proof.predicted[one.effect.id],
+            proof.removes[one.effect.id],
+            found.ahead.get(one.effect.id, 0.0),
+        )
         for one in proof.standing
     ]
 
 
 def scores_of(comparison: Comparison, found: Nameless, held: Predictive) -> Scores:
     """Scores of what stands, and of what is left beside it."""
-    return Scores(effect_scores(found.proof), residual_scores(comparison, found, held))
+    return Scores(effect_scores(found), residual_scores(comparison, found, held))
 
 
 def residual_scores(comparison: Comparison, found: Nameless, held: Predictive) -> ResidualScores:

@@ -89,9 +89,24 @@ def test_nothing_is_unknown_where_nothing_is_left_and_what_is_left_says_what_it_
 
 def test_what_was_surely_learned_is_unknown_too_and_names_stay() -> None:
     named = decide(Scores([scores("cogging", 60.0)], QUIET), POLICY)
-    more = named.with_rest(("position",), (), POLICY)
+    more = named.with_rest(("position",), {}, POLICY)
     assert (more.is_unknown, more.depends_on, more.sets) == (True, ("position",), named.sets)
-    assert more.with_rest(("speed",), (), POLICY) == more
+    assert more.with_rest(("speed",), {}, POLICY) == more
+
+
+@pytest.mark.parametrize(
+    ("ahead", "removes", "left"),
+    [(9.9, 0.5, POLICY.true_beside_unknown), (10.0, 0.5, POLICY.true_ahead), (-50.0, 0.9, 1.0)],
+)
+def test_beside_something_unknown_a_name_is_an_imitation_unless_no_term_without_a_name_comes_near(
+    ahead: float, removes: float, left: float
+) -> None:
+    one = replace(scores("cogging", 60.0), removes=removes, ahead=ahead)
+    alone = decide(Scores([one], QUIET), POLICY)
+    beside = decide(Scores([one], ResidualScores(POLICY.large_residual + 0.01, 0.0)), POLICY)
+    assert beside.is_unknown
+    assert beside.probabilities["cogging"]["cogging"] == pytest.approx(left * alone.probabilities["cogging"]["cogging"])
+    assert beside.doubtful == (("cogging",) if left == POLICY.true_beside_unknown else ())
 
 
 def test_what_is_left_must_be_more_than_what_the_equations_of_strong_names_lack() -> None:
