@@ -51,6 +51,7 @@ PAGES = {
     "master/diagnosis_cost.md": BENCH.format("diagnosis_cost.py", "master"),
     "master/fmu_step.md": BENCH.format("fmu_step.py", "master"),
     "master/memory.md": BENCH.format("memory.py", "master"),
+    "master/step_parts.md": BENCH.format("step_parts.py", "master"),
     "master/parallel.md": BENCH.format("parallel_step.py --rounds 60", "master"),
     "master/sweep.md": BENCH.format("sweep.py --runs 250 --rounds 4", "master"),
     "master/two_axis.md": BENCH.format("two_axis.py", "master"),

@@ -19,7 +19,7 @@ from cosim.support.plain import JsonObject
 
 Table = Mapping[str, np.ndarray]
 GROUP = 32_768
-"""Rows of a row group in a streamed file: as many as the master hands over at once, which are then not copied."""
+"""Rows of a row group in a streamed file at least: what the master hands over at once is not copied."""
 ENCODING: JsonObject = {"use_dictionary": False, "compression": "none", "write_statistics": False}
 """Doubles of a simulation hardly compress; plain pages are written about as fast as the disk takes them."""
 

@@ -22,9 +22,12 @@ from cosim.system.wiring import Wiring
 Progress = Callable[[int, int], None]
 """Called between chunks with ticks done and ticks in all."""
 
-CHUNK = 32_768
-"""Ticks between two looks at progress and Ctrl-C at most; fewer where steps are slow."""
+CHUNK, VALUES, LAST = 131_072, 2**20, 32_768
+"""Ticks between two looks at progress, Ctrl-C and the process at most (half a millisecond each, a twentieth of quick
+steps where they come after LAST); numbers that a chunk may hold; ticks of the last one, which is written while nothing
+is simulated beside it any more."""
 CHUNK_SECONDS = 0.1
+"""What a chunk may take: fewer ticks where steps are slow."""
 
 
 @dataclass
@@ -111,7 +114,7 @@ class Execution:
 
     def _run_chunks(self) -> None:
         signals = Given(self.wiring, self.plan)
-        for chunk in chunks(self.ticks):
+        for chunk in chunks(self.ticks, len(self.plan.columns)):
             if self.ended:
                 return
             given = signals.at(chunk)
@@ -161,12 +164,12 @@ def _source(component: Component) -> str:
     return str(component.origin.get("file") or component.origin.get("function") or "no file")
 
 
-def chunks(ticks: int) -> Iterator[np.ndarray]:
-    """Yield all ticks in pieces that take about CHUNK_SECONDS each, as measured on the piece before."""
-    first, size = 0, 16
+def chunks(ticks: int, columns: int = 1) -> Iterator[np.ndarray]:
+    """Yield all ticks in pieces that take about CHUNK_SECONDS each, as measured on the piece before, or less."""
+    first, size, most = 0, 16, min(CHUNK, max(VALUES // max(columns, 1), 1))
     while first < ticks:
         begun = perf_counter()
         last = min(first + size, ticks)
         yield np.arange(first, last)
         fitting = size * CHUNK_SECONDS / max(perf_counter() - begun, 1e-9)
-        first, size = last, int(max(16, min(CHUNK, 8 * size, fitting)))
+        first, size = last, int(max(16, min(most, 8 * size, fitting, max(LAST, (ticks - last) // 2))))
