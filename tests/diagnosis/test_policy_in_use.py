@@ -15,9 +15,8 @@ from cosim.diagnosis.effects.candidates import columns_of
 from cosim.diagnosis.evidence.bands import Bands
 from cosim.diagnosis.evidence.comparison import NONE, Comparison
 from cosim.diagnosis.evidence.discrepancy import discrepancy
-from cosim.diagnosis.search.harmonics import with_harmonics
 from cosim.diagnosis.search.sizes import tells
-from cosim.diagnosis.search.stages import is_full
+from cosim.diagnosis.search.stages import is_full, with_harmonics
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Cogging

@@ -20,7 +20,6 @@ from cosim.diagnosis.decide.policy import Policy
 from cosim.diagnosis.evidence.bands import Bands, reading_torque
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.discrepancy import Discrepancy, Shapes, discrepancy
-from cosim.diagnosis.evidence.error import is_noise
 from cosim.diagnosis.evidence.marginal import Group, marginal
 from cosim.diagnosis.evidence.structure import Structure, structure_of
 from cosim.estimation.blocks import Blocks
@@ -30,8 +29,12 @@ from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
 from cosim.estimation.residuals import gets_memory, removed_at_rest, residuals
 from cosim.estimation.row_weights import weights
+from cosim.support.statistics import bootstrap_range
 from pyfmi_models.mount import Mount
 
+NOISY = 3.0
+"""Growth of the error from the band of the analysis to the protocol's from which that says nothing of the model."""
+BLOCK_SECONDS = 1.0
 AMPLIFIED = 2.0
 """Growth of the protocol's energy from which a model amplifies noise, which it may only if it halves the error that is
 no noise."""
@@ -217,3 +220,23 @@ def reading_noise(prepared: Prepared, mount: Mount) -> float:
 def _beyond(energy: float, noise: float) -> float:
     """What is left of an energy beside noise, which is only assumed to be white."""
     return max(float(energy) - noise, LEAST_BEYOND * float(energy))
+
+
+def is_noise(narrow: Sequence[float], wide: Sequence[float]) -> bool:
+    """Whether of any model's error energy most lies above the band of the analysis: noise of the reading, a late clock.
+
+    Args:
+        narrow: mean squares in the band of the analysis, one a model.
+        wide: the same in the protocol's band.
+    """
+    return any(after > NOISY**2 * before for before, after in zip(narrow, wide, strict=True))
+
+
+def interval_of(before: Array, after: Array, dt: float) -> tuple[float, float]:
+    """95 % range of the difference of RMS values, from a bootstrap of blocks of `BLOCK_SECONDS`."""
+    count = max(2, int(len(before) * dt / BLOCK_SECONDS))
+    squares = np.array([[np.mean(x**2) for x in np.array_split(one, count)] for one in (before, after)])
+    return bootstrap_range(
+        lambda drawn: np.asarray(np.sqrt(squares[0][drawn].mean(1)) - np.sqrt(squares[1][drawn].mean(1))),
+        count,
+    )

@@ -14,7 +14,7 @@ from scipy.special import ndtri
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.result import HeldOut, Trace
-from cosim.diagnosis.evidence.error import interval_of, is_noise
+from cosim.diagnosis.evidence.predictive import interval_of, is_noise
 from cosim.diagnosis.measure.flagged import Residual, Spans, flagged, noise_at
 from cosim.estimation.discrepancy_basis import discrepancy_basis
 from cosim.estimation.fit import free_parameters

@@ -11,17 +11,19 @@ from math import inf, log
 from cosim.diagnosis.answer.ledger import Rule, all_pass, at_least, until_refused
 from cosim.diagnosis.decide.policy import Policy
 from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.effects.candidates import columns_of
 from cosim.diagnosis.evidence.comparison import Comparison, Screened, aside_for
 from cosim.diagnosis.search.admissibility import in_time, name_rules
 from cosim.diagnosis.search.base_moved import owed_to_base
 from cosim.diagnosis.search.commanded import is_asked_for
-from cosim.diagnosis.search.harmonics import with_harmonics
 from cosim.diagnosis.search.instrumental_variable import is_told, misfits_of, settled
 from cosim.estimation.fit import Fit
 from cosim.estimation.residuals import away_from_turns, gets_memory, removed_at_rest
 from pyfmi_models.effects import Effect
 
 OnProgress = Callable[[str], None]
+MULTIPLES = (2, 3, 4, 5)
+"""Multiples of the cycles of a ripple that are asked for at once: slots and rollers are no sines."""
 MOST_WAVES = 8
 """Effects that one diagnosis may add, each harmonic of a ripple counted."""
 
@@ -57,7 +59,6 @@ class Stage:
 
     current: Fit
     tried: tuple[CandidateFit, ...]
-    screened: tuple[Screened, ...]
 
 
 Start = tuple[Effect, int]
@@ -98,11 +99,10 @@ IN_TURN = InTurn()
 
 def stage(comparison: Comparison, current: Fit, refits: InTurn = IN_TURN) -> Stage:
     """Screen all candidates beside a structure and refit the best forms."""
-    screened = comparison.screen(current)
-    fits = refits(comparison, current, starts(screened, comparison.policy))
+    fits = refits(comparison, current, starts(comparison.screen(current), comparison.policy))
     for one in fits:
         comparison.enter(one.effect.id, one.fit, one.plain_gain)
-    return Stage(current, tuple(sorted(fits, key=lambda one: -one.evidence)), tuple(screened))
+    return Stage(current, tuple(sorted(fits, key=lambda one: -one.evidence)))
 
 
 def starts(screened: Sequence[Screened], policy: Policy) -> list[Start]:
@@ -324,3 +324,18 @@ def is_full(best: CandidateFit, comparison: Comparison) -> bool:
     """Whether a structure with this effect has more than may be named."""
     added = best.fit.mount.effects[len(comparison.problem.mount.effects) :]
     return len({effect.id for effect in added}) > comparison.policy.most_effects or len(added) > MOST_WAVES
+
+
+def with_harmonics(comparison: Comparison, found: Fit, ripple: Effect) -> Fit:
+    """A fitted structure with those multiples of its ripple that have evidence, fitted together."""
+    own = hypothesis_of(ripple)
+    tried = [one for k in MULTIPLES if (one := own.multiple(ripple, k)) is not None]
+    if not tried:
+        return found
+    groups = columns_of(found.mount, tried, comparison.problem.prepared, found.values)
+    scored = comparison.score(found, tried, groups)
+    least = comparison.policy.least_wave
+    more = tuple(one.candidate.start(one.coefficients) for one in scored if one.evidence > least)
+    if not more:
+        return found
+    return comparison.problem.fit(replace(found.mount, effects=(*found.mount.effects, *more)), 30)

@@ -13,8 +13,7 @@ import numpy as np
 from cosim.diagnosis.answer.entries import BinsEntry, LearnedEntry, NotLearnedEntry
 from cosim.diagnosis.answer.scores import LearnedScores
 from cosim.diagnosis.evidence.comparison import Comparison
-from cosim.diagnosis.evidence.error import interval_of
-from cosim.diagnosis.evidence.predictive import Predictive
+from cosim.diagnosis.evidence.predictive import Predictive, interval_of
 from cosim.diagnosis.terms.candidate_terms import CandidateTerm, candidate_terms
 from cosim.diagnosis.terms.dictionary import OF_LAW
 from cosim.diagnosis.terms.formula import Formula, formula_of
