@@ -33,12 +33,15 @@ class Fitted(Protocol):
         ...
 
 
-def name_rules(problem: Problem, one: Fitted) -> Iterator[Rule]:
-    """Rules of whether an effect is what its name says, and can be identified from this motion."""
+def name_rules(problem: Problem, one: Fitted, is_held: bool = False) -> Iterator[Rule]:
+    """Rules of whether an effect is what its name says, and can be identified from this motion.
+
+    `is_held`: it explains surely what is held at rest, which no law without memory does, however little it bends.
+    """
     mount, effect, prepared = one.fit.mount, one.effect, problem.prepared
     own = hypothesis_of(effect)
     yield Rule("its numbers are those of such an effect", own.is_plausible(effect, mount))
-    yield Rule("the motion separates it from another friction law", own.shows(effect, mount, prepared))
+    yield Rule("the motion separates it from another friction law", is_held or own.shows(effect, mount, prepared))
     yield Rule("no number at its bound, and no other effect in disguise", not is_degenerate(problem, effect))
     needed, longest = hypothesis_of(effect).way_back(effect, mount), longest_way_back(prepared)
     yield at_least("way back of the motion", longest, needed, "m" if mount.motion == "linear" else "rad")

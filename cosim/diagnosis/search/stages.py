@@ -314,10 +314,15 @@ def admission(comparison: Comparison, one: CandidateFit) -> Iterator[Rule]:
         yield at_least("share that it removes away from reversals", one.away, policy.least_away)
     if one.at_rest < 1.0:
         yield at_least("share of the error at rest", one.at_rest, policy.halved)
-    yield from name_rules(problem, one)
+    yield from name_rules(problem, one, holds_at_rest(one, policy))
     yield Rule("the model explains the changes of the torque", in_time(problem, one))
     if own.must_stand_out:
         yield Rule("the set point demands it", is_asked_for(comparison, one.fit, one.effect))
+
+
+def holds_at_rest(one: CandidateFit, policy: Policy) -> bool:
+    """Whether an effect surely is what is held at rest: all but a tenth of the energy there, and not a small effect."""
+    return policy.sure_beside_unknown <= one.at_rest < 1.0 and one.evidence >= policy.small_evidence
 
 
 def is_full(best: CandidateFit, comparison: Comparison) -> bool:

@@ -14,6 +14,7 @@ from cosim.diagnosis.search.stages import (
     CandidateFit,
     best_of,
     contest,
+    holds_at_rest,
     is_hopeful,
     is_minor,
     is_small,
@@ -146,6 +147,20 @@ def test_a_spring_does_not_start_from_a_negative_mass() -> None:
     negative = [one for one in springs if one.coefficients[0] <= 0]
     assert negative
     assert all(one.evidence == -np.inf and one.plain == 0 for one in negative)
+
+
+@pytest.mark.parametrize(
+    ("at_rest", "evidence", "holds"),
+    [(0.9, 100.0, True), (0.89, 100.0, False), (0.9, 99.0, False), (1.0, 500.0, False)],
+)
+def test_what_surely_holds_an_axis_at_rest_need_not_bend_by_what_recordings_show(
+    at_rest: float, evidence: float, holds: bool
+) -> None:
+    """1.0 is that of an effect that gives the model no memory."""
+    _, base = compared(lambda q, v: 0 * q)
+    assert (
+        holds_at_rest(CandidateFit(Presliding(sigma0=1e9), base, evidence, 0.0, 0.5, at_rest=at_rest), POLICY) is holds
+    )
 
 
 def test_a_weak_presliding_is_minor_unless_it_removes_a_quarter_of_the_error() -> None:
