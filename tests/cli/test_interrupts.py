@@ -93,7 +93,7 @@ def test_a_signal_while_a_verb_is_loaded_is_an_interrupt_whatever_becomes_of_it(
         raise ImportError(f"initialization of {name} failed")
 
     before = {one: signal.getsignal(one) for one in (signal.SIGINT, signal.SIGTERM)}
-    monkeypatch.setattr("cosim.cli.import_module", loaded)
+    monkeypatch.setattr(sys.modules["cosim.cli.verbs"], "import_module", loaded)  # `cosim.cli.verbs` is the function
     try:
         signal.signal(signal.SIGINT, signal.default_int_handler)
         signal.signal(signal.SIGTERM, signal.SIG_DFL)

@@ -93,6 +93,8 @@ class Hypothesis(Generic[Form]):
     """Whether a refit gets from any member of the grid to the best one; then only one is refitted."""
     must_stand_out: ClassVar[bool] = False
     """Whether it must remove more energy than the noise of the reading holds, and be asked for by the set point."""
+    is_fine: ClassVar[bool] = False
+    """Whether it is a wave finer than the shapes of any term that may be learned: no such term can be its rival."""
     is_timing: ClassVar[bool] = False
     """Whether it is told by changes of the torque alone."""
     has_own_phase: ClassVar[bool] = False
@@ -249,6 +251,7 @@ class Cyclic(Hypothesis[Form]):
     """An effect with so many cycles a turn (a metre), each number of them a member of its kind."""
 
     member: ClassVar[str] = "cycles_per_rev"
+    is_fine: ClassVar[bool] = True
     shown: ClassVar[tuple[float, float]] = (LEAST_CYCLES, math.inf)
     """Cycles a turn from which and up to which one is concealed."""
 

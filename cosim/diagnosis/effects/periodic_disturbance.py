@@ -24,6 +24,7 @@ class Tone(Hypothesis[PeriodicDisturbance]):
 
     forms = (PeriodicDisturbance,)
     member: ClassVar[str] = "frequency_hz"
+    is_fine: ClassVar[bool] = True
     rank: ClassVar[float] = 12
     needs_position: ClassVar[bool] = False
     has_own_phase: ClassVar[bool] = True

@@ -38,7 +38,7 @@ class Nameless:
     proof: Proof
     taken: tuple[tuple[AcceptedEffect, CandidateTerm], ...] = ()
     ahead: Mapping[str, float] = field(default_factory=dict)
-    """Nats by which each name that stands is better than the best term in its place."""
+    """Nats by which each name that stands is better than the best term in its place, where a term can be its rival."""
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -90,7 +90,8 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
         rule = Rule(f"not explained better by {worst.term.name}", not leads, worst.lead, least, "nats")
         comparison.judge(name, chosen, [rule])
         if not leads:
-            return replace(found, ahead={one.effect.effect.id: -one.lead for one in challenges if one.lead > -inf})
+            told = [one for one in challenges if one.lead > -inf and not hypothesis_of(one.effect.effect).is_fine]
+            return replace(found, ahead={one.effect.effect.id: -one.lead for one in told})
         left = without(comparison, examined, found.proof, worst.effect, held)
         found = Nameless(left, (*found.taken, (worst.effect, worst.term)))
     return found

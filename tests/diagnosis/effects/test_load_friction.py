@@ -72,7 +72,7 @@ def test_without_a_load_in_the_card_it_is_not_testable_and_is_said_what_to_recor
 def test_what_is_above_such_a_bound_is_found_with_its_size_and_far_below_it_is_not(rise: float, seen: bool) -> None:
     comparison, base = compared(4.0, rise)
     one = refitted(comparison, base, LoadDependentFriction(coulomb_per_Nm=0.01), 2)
-    best = best_of(comparison, Stage(base, (one,), ()))
+    best = best_of(comparison, Stage(base, (one,)))
     assert (best is not None) is seen
     if seen:
         assert one.effect.coulomb_per_Nm == pytest.approx(rise, rel=0.15)  # type: ignore[attr-defined]
