@@ -1,6 +1,8 @@
 """What a file holds before anything is judged: columns by name, units and origin where they are stated."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -56,3 +58,9 @@ class Columns:
     clocks: dict[str, np.ndarray] = field(default_factory=dict)
     contradictions: dict[str, tuple[str, str]] = field(default_factory=dict)
     header: str = ""
+
+
+def doubles(chunks: Sequence[Any]) -> np.ndarray:
+    """Look at chunks of Arrow doubles without nulls; `to_numpy` would import pandas, a third of a second of a verb."""
+    parts = [np.frombuffer(one.buffers()[1], np.float64, len(one), 8 * one.offset) for one in chunks if len(one)]
+    return parts[0] if len(parts) == 1 else np.concatenate([np.empty(0), *parts])

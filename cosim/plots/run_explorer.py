@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cosim.data.columns import doubles
 from cosim.plots.digest import Digest, in_words
 from cosim.plots.explorer import Sheet, record, script_of_page
 from cosim.plots.quantities import scale_of
@@ -99,12 +100,11 @@ def _record(name: str, t: Array, signals: dict[str, Array], unit: str, share: fl
 
 
 def _column(file: "ParquetFile", name: str) -> Array:
-    """The values, from pyarrow's own memory: `to_numpy` would load pandas, and `cast` pyarrow's arithmetic."""
+    """The values; a `cast` that is not needed would load pyarrow's arithmetic."""
     import pyarrow as pa
 
     chunks, double = file.read(columns=[name])[name].chunks, pa.float64()
     parts = [chunk if chunk.type == double else chunk.cast(double, safe=False) for chunk in chunks]
     if any(part.null_count for part in parts):
         return np.concatenate([np.asarray(part.to_pylist(), float) for part in parts])
-    rows = [np.frombuffer(one.buffers()[1], np.float64)[one.offset : one.offset + len(one)] for one in parts]
-    return np.concatenate(rows) if rows else np.zeros(0)
+    return doubles(parts)

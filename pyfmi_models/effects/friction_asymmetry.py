@@ -44,15 +44,14 @@ class FrictionAsymmetry(FrictionEffect):
         return min(-MOST, variable.start), max(MOST, variable.start)
 
     def leading(self) -> Main:
-        """The larger of the two; not that of viscous friction where a fit left it at its end, where nothing is told."""
-        viscous = abs(self.level_asymmetry) < abs(self.viscous_asymmetry) < MOST
+        """The larger of the two."""
+        viscous = abs(self.viscous_asymmetry) > abs(self.level_asymmetry)
         return self.main._replace(parameter="viscous_asymmetry", unit="% viscous") if viscous else self.main
 
     def statement(self, unit: str = "N·m") -> str:
         """Say it to a mechanic."""
-        is_told = abs(self.viscous_asymmetry) < MOST or abs(self.viscous_asymmetry) < abs(self.level_asymmetry)
         sliding = _percent("sliding friction", self.level_asymmetry)
-        viscous = _percent("viscous friction", self.viscous_asymmetry if is_told else 0.0)
+        viscous = _percent("viscous friction", self.viscous_asymmetry)
         larger, smaller = sorted((sliding, viscous), key=lambda item: -item[0])
         return f"{larger[1]}." if smaller[0] < 0.1 * larger[0] else f"{larger[1]}, {smaller[1].lower()}."
 

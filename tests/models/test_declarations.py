@@ -178,7 +178,6 @@ def test_a_spring_is_fitted_with_its_resonance_above_its_antiresonance() -> None
         ("RoughSpot", {"forward": -0.3, "backward": 0.3}, "forward"),
         ("FrictionAsymmetry", {"level_asymmetry": -0.1, "viscous_asymmetry": 0.2}, "viscous_asymmetry"),
         ("FrictionAsymmetry", {"level_asymmetry": 0.2, "viscous_asymmetry": -0.2}, "level_asymmetry"),
-        ("FrictionAsymmetry", {"level_asymmetry": 0.2, "viscous_asymmetry": -0.6}, "level_asymmetry"),
         ("ThermalViscosity", {"viscous_per_degC": 0.01, "coulomb_per_degC": -0.02}, "coulomb_per_degC"),
         ("ThermalViscosity", {"viscous_per_degC": 0.02, "coulomb_per_degC": -0.02}, "viscous_per_degC"),
         ("WarmingViscosity", {"viscous_per_degC": 0.01, "coulomb_per_degC": -0.02}, "coulomb_per_degC"),

@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import csv
 
-from cosim.data.columns import Columns
+from cosim.data.columns import Columns, doubles
 from cosim.data.limits import check_cells, short
 from cosim.data.text.cells import lists_of
 from cosim.data.text.cleaning import without_comments
@@ -250,7 +250,7 @@ def as_array(column: Any) -> np.ndarray:
     """Return an Arrow column as float64, int64 where a double would lose digits, datetime64, or object for text."""
     kind = column.type
     if kind == pa.float64() and not column.null_count:
-        return _doubles(column)
+        return doubles(getattr(column, "chunks", [column]))
     if pa.types.is_timestamp(kind) or pa.types.is_date(kind):
         return np.asarray(column.cast(pa.timestamp("ns")).to_numpy(), dtype="datetime64[ns]")
     if pa.types.is_time(kind):
@@ -265,13 +265,6 @@ def as_array(column: Any) -> np.ndarray:
     if pa.types.is_nested(kind):
         return np.full(len(column), NESTED, dtype=object)
     return np.asarray(column.to_pylist(), dtype=object)
-
-
-def _doubles(column: Any) -> np.ndarray:
-    """Look at doubles; pyarrow's own `to_numpy` would import pandas, a third of a second of each verb that reads."""
-    chunks = [one for one in getattr(column, "chunks", [column]) if len(one)]
-    parts = [np.frombuffer(one.buffers()[1], np.float64, len(one), 8 * one.offset) for one in chunks]
-    return parts[0] if len(parts) == 1 else np.concatenate([np.empty(0), *parts])
 
 
 def _is_text(kind: Any) -> bool:

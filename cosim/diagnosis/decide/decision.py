@@ -17,6 +17,10 @@ SHAKING = {
 """Rules by which something shakes a machine, now and then or all the time; what the rest is then said to go with."""
 
 
+ALL: Mapping[str, float] = {}
+"""Every name keeps its probability."""
+
+
 @dataclass(frozen=True)
 class Decision:
     """The answer."""
@@ -30,19 +34,20 @@ class Decision:
     doubtful: tuple[str, ...] = ()
     """Names that help, and may yet imitate what is unknown."""
 
-    def with_rest(self, follows: tuple[str, ...], doubtful: Mapping[str, float], policy: Policy) -> "Decision":
-        """The same where something is left without a name, that follows quantities; names may imitate it.
+    def with_rest(
+        self, follows: tuple[str, ...], kept: Mapping[str, float] = ALL, doubtful: tuple[str, ...] = ()
+    ) -> "Decision":
+        """The same where something has no name, and follows quantities.
 
-        `doubtful`: what is left of the probability of each name that may.
+        `kept` is the share of its probability that a name keeps then; `doubtful` are names that may imitate the rest.
         """
         if self.is_unknown:
             return self
-        told = {
-            name: {one: doubtful.get(name, 1.0) * value for one, value in members.items()}
+        probabilities = {
+            name: {one: kept.get(name, 1.0) * value for one, value in members.items()}
             for name, members in self.probabilities.items()
         }
-        imitations = tuple(name for name, left in doubtful.items() if left < policy.true_ahead)
-        return Decision(self.sets, told, True, follows, imitations)
+        return Decision(self.sets, probabilities, True, follows, doubtful)
 
 
 def decide(scores: Scores, policy: Policy) -> Decision:
@@ -74,7 +79,7 @@ def _of_rest(effects: Sequence[EffectScores], residual: ResidualScores, policy: 
     named = _named(effects, policy)
     # What shakes a machine is no part of what a name says, and no name imitates it.
     shaking = [rule.name for rule in shaking_rules(residual, policy) if rule.outcome]
-    return named.with_rest((SHAKING[shaking[0]],), {}, policy) if shaking else named
+    return named.with_rest((SHAKING[shaking[0]],)) if shaking else named
 
 
 def shaking_rules(residual: ResidualScores, policy: Policy) -> Iterator[Rule]:
@@ -87,7 +92,10 @@ def shaking_rules(residual: ResidualScores, policy: Policy) -> Iterator[Rule]:
 def beside_rest(effects: Sequence[EffectScores], follows: tuple[str, ...], policy: Policy) -> Decision:
     """The answer where something without a name is left, that follows quantities: margins count for less there."""
     weighed = [one.with_margins_of(policy.margin_beside_unknown) for one in effects]
-    return _named(weighed, policy).with_rest(follows, beside_unknown(effects, policy), policy)
+    weak = leave_much(effects, policy)
+    doubtful = tuple(one.effect for one in weak if one.ahead < policy.least_followed)
+    shares = {one.effect: policy.true_beside_unknown if one.effect in doubtful else policy.true_ahead for one in weak}
+    return _named(weighed, policy).with_rest(follows, shares, doubtful)
 
 
 def _named(effects: Sequence[EffectScores], policy: Policy) -> Decision:
@@ -95,14 +103,12 @@ def _named(effects: Sequence[EffectScores], policy: Policy) -> Decision:
     return Decision(sets, {one.effect: _probabilities(one, sets[one.effect]) for one in effects}, False, ())
 
 
-def beside_unknown(effects: Sequence[EffectScores], policy: Policy) -> dict[str, float]:
-    """What is left of the probability of names that leave too much to be sure where that has no name.
+def leave_much(effects: Sequence[EffectScores], policy: Policy) -> list[EffectScores]:
+    """Names that leave too much to be sure where that has no name: a part of one cause may look like them.
 
-    A part of one cause may look like them. What is only an imitation a term without a name does nearly as well.
+    What is only an imitation a term without a name does nearly as well (`EffectScores.ahead`).
     """
-    weak = [one for one in effects if max(one.explains[one.effect], one.removes) < policy.sure_beside_unknown]
-    left = {True: policy.true_ahead, False: policy.true_beside_unknown}
-    return {one.effect: left[one.ahead >= policy.least_followed] for one in weak}
+    return [one for one in effects if max(one.explains[one.effect], one.removes) < policy.sure_beside_unknown]
 
 
 def doubted(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> tuple[str, ...]:

@@ -137,7 +137,8 @@ class Policy:
     sure_beside_unknown: float = 0.9
     """Share of the residual energy that a name must remove, in training or held out, to be sure where something unknown
     is left. Unit: 1. Beside it 15 names of 19 in the own generator were false, with .03 to .89; true ones had .19,
-    .95 and .997 there, .95 to .98 on two measured machines."""
+    .95 and .997 there, .95 to .98 on two measured machines. Of the energy at rest: the share from which a contact
+    surely holds the axis (`stages.holds_at_rest`)."""
     true_beside_unknown: float = 0.2
     """What is left of the probability of any other name there. Unit: 1. Of 38 such names in three decks of two
     generators 5 were true [.06, .27], where .62 would be printed (results/abroad/calibration_sets.md) ..."""

@@ -35,7 +35,7 @@ class Asymmetry(Hypothesis[FrictionAsymmetry]):
         neutral = FrictionAsymmetry(level_asymmetry=0.0, viscous_asymmetry=0.0)
 
         def start(c: Array) -> Effect:
-            a, b = (float(np.clip(x, -0.5, 0.5)) for x in c)
+            a, b = (float(np.clip(x, -0.5, 0.5)) for x in c)  # inside of what a fit may say
             return FrictionAsymmetry(level_asymmetry=a, viscous_asymmetry=b)
 
         yield Candidate("friction_asymmetry", (neutral,), linear, start)

@@ -46,8 +46,9 @@ def ended_sizes(effect: Effect, sizes: Sequence[str], recorded: Recorded = ANY) 
 
 def _ends(effect: Effect, variable: Variable, recorded: Recorded) -> bool:
     low, high = effect.fit_bounds(variable, recorded)
-    ended = [end for end in (low, high) if isclose(variable.start, end, rel_tol=ROUNDING)]
-    return variable.start > high or (low != 0 and variable.start < low) or any(end != 0 for end in ended)
+    value = variable.start
+    is_low = value <= low or isclose(value, low, rel_tol=ROUNDING)
+    return value >= high or isclose(value, high, rel_tol=ROUNDING) or (low != 0 and is_low)
 
 
 def refound(

@@ -90,8 +90,8 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
         rule = Rule(f"not explained better by {worst.term.name}", not leads, worst.lead, least, "nats")
         comparison.judge(name, chosen, [rule])
         if not leads:
-            told = [one for one in challenges if one.lead > -inf and not hypothesis_of(one.effect.effect).is_fine]
-            return replace(found, ahead={one.effect.effect.id: -one.lead for one in told})
+            met = [one for one in challenges if one.lead > -inf and not hypothesis_of(one.effect.effect).is_fine]
+            return replace(found, ahead={one.effect.effect.id: -one.lead for one in met})
         left = without(comparison, examined, found.proof, worst.effect, held)
         found = Nameless(left, (*found.taken, (worst.effect, worst.term)))
     return found

@@ -167,14 +167,13 @@ def _challenged(
     return found
 
 
-def refitted_from_here(comparison: Comparison, rest: Mount, beside: Fit, one: CandidateFit) -> CandidateFit:
+def refitted_from_here(comparison: Comparison, rest: Mount, without: Fit, one: CandidateFit) -> CandidateFit:
     """A rival, or its fit from the numbers that the others have in the structure that stands, where that is better.
 
-    Alone the others go where they stand in for what was taken out, and beside a rival a fit may not come back.
+    Alone the others go where they do for what was taken out, and with a rival a fit may not come back.
     """
-    problem, effects = comparison.problem, rest.effects
-    found = problem.fit(replace(rest, effects=(*effects, one.effect)), 36)
-    again = weighed(comparison, found, beside, one.many)
+    found = comparison.problem.fit(replace(rest, effects=(*rest.effects, one.effect)), 36)
+    again = weighed(comparison, found, without, one.many)
     return again if again.evidence > one.evidence else one
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from cosim.diagnosis.effects import hypothesis_of
-from cosim.diagnosis.effects.tuning import ANY, ended_sizes
+from cosim.diagnosis.effects.tuning import ended_sizes
 from cosim.estimation.blocks import Blocks, covariance
 from cosim.estimation.fit import Fit, recorded_by
 from cosim.estimation.prepare import Array
@@ -38,7 +38,7 @@ def numbers_of(effect: Effect, mount: Mount, errors: Mapping[str, float]) -> Num
     return Numbers(values, {name: errors[f"{prefix}.{name}"] for name in values if f"{prefix}.{name}" in errors})
 
 
-def is_told(effect: Effect, numbers: Numbers, mount: Mount, recorded: Recorded = ANY) -> bool:
+def is_told(effect: Effect, numbers: Numbers, mount: Mount, recorded: Recorded) -> bool:
     """Whether the recordings tell the size of an effect: its 95 % range holds neither "none" nor all that it may be.
 
     Of several sizes (a level and a viscosity, an offset and a drift) one is enough. At a bound, also at one of the fit,

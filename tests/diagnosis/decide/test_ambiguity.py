@@ -89,9 +89,9 @@ def test_nothing_is_unknown_where_nothing_is_left_and_what_is_left_says_what_it_
 
 def test_what_was_surely_learned_is_unknown_too_and_names_stay() -> None:
     named = decide(Scores([scores("cogging", 60.0)], QUIET), POLICY)
-    more = named.with_rest(("position",), {}, POLICY)
+    more = named.with_rest(("position",))
     assert (more.is_unknown, more.depends_on, more.sets) == (True, ("position",), named.sets)
-    assert more.with_rest(("speed",), {}, POLICY) == more
+    assert more.with_rest(("speed",)) == more
 
 
 @pytest.mark.parametrize(

@@ -230,7 +230,7 @@ def test_probabilities_are_calibrated_posterior_shares_times_what_is_explained(m
 
 def test_what_is_decided_stays_when_something_more_is_left() -> None:
     decided = Decision({}, {}, True, ("time",))
-    assert decided.with_rest(("position",), (), POLICY) is decided
+    assert decided.with_rest(("position",)) is decided
 
 
 def test_a_term_that_removes_next_to_nothing_in_training_and_held_out_is_no_unknown() -> None:

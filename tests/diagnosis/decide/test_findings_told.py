@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from cosim.diagnosis.effects import hypothesis_of
-from cosim.diagnosis.effects.tuning import at_bound
+from cosim.diagnosis.effects.tuning import ANY, at_bound
 from cosim.diagnosis.search.sizes import Numbers, is_told, numbers_of
 from pyfmi_models.effects import Cogging, Delay, Effect, FrictionAsymmetry, StribeckEffect, TorqueOffset
 from pyfmi_models.friction import Coulomb
@@ -17,7 +17,7 @@ BARE = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma
 
 def told(effect: Effect, **errors: float) -> bool:
     values = {variable.name: float(variable.start) for variable in parameters_of(effect)}
-    return is_told(effect, Numbers(values, errors), replace(BARE, effects=(effect,)))
+    return is_told(effect, Numbers(values, errors), replace(BARE, effects=(effect,)), ANY)
 
 
 def test_a_range_that_holds_nothing_at_all_tells_no_size() -> None:
@@ -38,6 +38,7 @@ def test_a_range_that_holds_all_that_it_may_be_tells_no_size() -> None:
 def test_at_a_bound_no_size_is_told() -> None:
     known = {variable.name: variable for variable in parameters_of(Delay(delay_ms=1.0))}["delay_ms"]
     assert at_bound(Delay(delay_ms=known.high))
+    assert at_bound(Delay(delay_ms=known.high * (1 - 1e-12))), "a fit ends there up to rounding"
     assert not at_bound(Delay(delay_ms=0.999 * known.high))
     assert not told(Delay(delay_ms=known.high), delay_ms=0.01 * known.high)
     assert told(Delay(delay_ms=0.999 * known.high), delay_ms=0.01 * known.high)
