@@ -15,6 +15,7 @@ from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.search.sizes import is_told, numbers_of, standard_errors
 from cosim.diagnosis.search.stages import CandidateFit, admission, margin, refitted
 from cosim.estimation.blocks import Blocks
+from cosim.estimation.fit import recorded_by
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import prepare
 from pyfmi_models.card import parse_card
@@ -59,7 +60,7 @@ def told(this: Tried, name: str) -> tuple[bool, dict[str, float]]:
     one, problem = this.fits[name], this.comparison.problem
     errors = standard_errors(one.fit, Blocks.of(problem.prepared), problem.weight)
     numbers = numbers_of(one.effect, one.fit.mount, errors)
-    return is_told(one.effect, numbers, one.fit.mount), numbers.errors
+    return is_told(one.effect, numbers, one.fit.mount, recorded_by(problem.prepared.pieces)), numbers.errors
 
 
 @pytest.mark.parametrize(("case", "name"), [(BENT, "presliding"), (DELAYED, "delay")])
