@@ -1,4 +1,7 @@
-"""What all tests share: where tools and benches are found, and Ctrl-C.
+"""What all tests share: where tools and benches are found, one thread for linear algebra, and Ctrl-C.
+
+Tests call functions where a user types a command: libraries are told here what `cosim` tells them, before they are
+loaded. Two workers on two cores whose small matrices have two threads each took three times the processor.
 
 Ctrl-C means the same however the tests were started: a shell's background jobs, and so their children, ignore it.
 """
@@ -7,6 +10,9 @@ import signal
 import sys
 from pathlib import Path
 
+from cosim.cli import set_libraries
+
+set_libraries()
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests" / "tools"))
 sys.path += [str(ROOT / "bench"), str(ROOT)]  # behind the installed package, which is the one that is tested

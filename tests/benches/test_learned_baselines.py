@@ -1,23 +1,12 @@
 """The benchmark of learned terms beside regressions: what it records, and what its page counts."""
 
-import numpy as np
-
-from bench.learned_baselines import METHODS, WIDE, bench_of, page
-from cosim_studies.proof.simulated_axis import RECORDINGS
+from bench.learned_baselines import METHODS, page
 
 
 def row(seed: int, inside: float, outside: float, learned: list[str]) -> dict[str, object]:
     left = {"inside": dict.fromkeys(METHODS, inside), "outside": dict.fromkeys(METHODS, outside)}
     left["outside"] |= {"gp": None}
     return {"seed": seed, "effect": "run_in", "size": 1.0, "verdict": ["unknown"], "learned": learned, **left}
-
-
-def test_the_fourth_recording_goes_beyond_all_that_training_holds() -> None:
-    bench = bench_of(7, "dead_band", 1.0)
-    for number in range(3):
-        first, wide = (np.ptp(bench.motions[name][number]) for name in (RECORDINGS[0], WIDE))
-        assert np.isclose(wide, 1.5 * first)
-    assert bench.drives[WIDE].level.size == bench.motions[WIDE].q.size
 
 
 def test_the_page_counts_what_is_left_and_what_is_made_worse() -> None:

@@ -51,15 +51,6 @@ def test_in_open_loop_an_error_of_the_model_adds_up_as_the_closed_form_says() ->
     assert expected > 50
 
 
-def test_only_the_first_20_positions_are_looked_at() -> None:
-    run = pushed(np.zeros(500))
-    found = official.open_loop(slide(), np.asarray(run["tau"]), TICK, np.asarray(run["q"])[: official.GIVEN])
-    other = np.asarray(run["q"]).copy()
-    other[official.GIVEN :] += 1.0
-    again = official.open_loop(slide(), np.asarray(run["tau"]), TICK, other[: official.GIVEN])
-    np.testing.assert_array_equal(found, again)
-
-
 def machine() -> measured.Machine:
     t = np.arange(1000) * 0.01
     table = pd.DataFrame({"t": t, "tau": np.sin(t), "q": np.cos(t)})

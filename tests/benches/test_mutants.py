@@ -3,8 +3,7 @@
 import ast
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from itertools import islice
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
 import mutants
 import mutations_c
-from mutants_choice import asked, told
+from mutants_choice import asked
 from mutants_page import Tried
 from mutations import KINDS, mutated, sites
 
@@ -94,12 +93,6 @@ def test_what_nobody_can_see_is_not_planted(source: str) -> None:
     assert kept == []
 
 
-def test_what_is_computed_for_a_picture_and_what_runs_here_is_planted() -> None:
-    source = "y = 1000.0 * q\naxes.plot(t, y)\nevent.set()\nif os.name == 'posix':\n    z = limited(n=3)"
-    changes = {site.change for site in sites(source)}
-    assert {"1000.0 * q -> Div", "event.set() -> left out", "3 -> 4"} <= changes
-
-
 def test_in_c_each_error_changes_one_token_and_nothing_that_is_only_said() -> None:
     found = [mutations_c.mutated(C, number) for number in range(len(mutations_c.sites(C)))]
     changes = {(site.kind, site.change.rpartition(": ")[2]) for site, _ in found}
@@ -146,17 +139,6 @@ def drawn(seed: int, count: int, groups: tuple[str, ...]) -> list[Tried]:
     return tried
 
 
-def test_what_does_not_compile_is_passed_and_a_run_goes_on_where_it_ended() -> None:
-    whole = drawn(1, 6, ("fmi", "loop"))
-    left = [(str(path.relative_to(mutants.HOME)), number) for _, path, number in islice(gone_on(whole[:4]), 4)]
-    assert left[0] == (whole[4].module, whole[4].site)
-    assert len(set(left)) == 4, "nothing is drawn twice"
-
-
-def gone_on(tried: list[Tried]) -> Iterator[tuple[str, Path, int]]:
-    return mutants.todo(1, 6, ("fmi", "loop"), tried)
-
-
 def test_every_room_of_the_product_has_its_errors() -> None:
     """But for what has no room of its own here: what is only shown, served, or runs on other machines."""
     there = {path for patterns in mutants.GROUPS.values() for one in patterns for path in mutants.HOME.glob(one)}
@@ -183,17 +165,6 @@ def test_the_tests_that_name_what_was_changed_or_are_near_come_first(module: str
     assert all(one.split("::")[0] in found for one in named)
     assert test in found[:4]
     assert len(set(found)) == len(found)
-
-
-def test_a_line_is_part_of_the_innermost_function_or_of_what_it_declares() -> None:
-    source = (
-        "LIMIT = 3\nclass A:\n    size: int = 4\n    def _grown(self):\n        def inner():\n            return 2\n"
-    )
-    source += "        return inner\n    def __len__(self):\n        return 1\n"
-    assert [told(source, line, False) for line in range(1, 10)] == [
-        *("LIMIT", "", "size", "grown", "inner", "inner", "grown", "", ""),
-    ]
-    assert [told(C, line, True) for line in (1, 5, 8, 11)] == ["", "clamp", "clamp", "clamp"]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks")

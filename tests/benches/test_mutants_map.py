@@ -1,14 +1,11 @@
 """A map of which tests run which blocks, and the tests that are asked of a line by it."""
 
 import ast
-from pathlib import Path
 
 import mutants_chosen
-import pytest
-from mutants_blocks import blocks, innermost, marked
+from mutants_blocks import blocks, marked
 from mutants_choice import HOME
-from mutants_chosen import Map, Ran, batches, candidates, ordered, reaching
-from mutants_map import packed, unpacked
+from mutants_chosen import Map, Ran, candidates, ordered, reaching
 
 SOURCE = '''"""A module."""
 from __future__ import annotations
@@ -32,15 +29,6 @@ class A:
 '''
 
 
-@pytest.mark.parametrize(
-    ("line", "function", "number"),
-    [(3, "", 0), (6, "", 0), (9, "A.grown", 0), (10, "A.grown", 1), (12, "A.grown", 5), (15, "A.grown.inner", 0)],
-)
-def test_a_line_belongs_to_the_innermost_block(line: int, function: str, number: int) -> None:
-    found = innermost(SOURCE, line)
-    assert (found and (found.function, found.number)) == ((function, number) if function else None)
-
-
 def test_a_block_leaves_its_mark_when_it_runs_and_only_then() -> None:
     text = marked(SOURCE, 10).replace("from mutants_seen import _seen_", "")
     there: dict[str, object] = {"_seen_": (seen := dict[int, int]())}
@@ -59,11 +47,6 @@ def test_every_module_of_the_product_can_be_marked() -> None:
         source = path.read_text("utf-8")
         count = ast.unparse(ast.parse(marked(source, 0))).count("_seen_[")
         assert count == len(blocks(source)), path
-
-
-@pytest.mark.parametrize("bits", [0, 1, 2**10_000 + 5])
-def test_a_set_of_blocks_is_read_as_it_was_written(bits: int) -> None:
-    assert unpacked(packed(bits)) == bits
 
 
 def known() -> Map:
@@ -85,19 +68,6 @@ def test_tests_that_run_a_block_are_asked_the_most_focused_first() -> None:
     assert known().seconds(["c.py::new"]) is None
 
 
-def test_of_a_parametrised_test_one_case_is_asked_before_the_next() -> None:
-    tests = [Ran(f"a.py::one[{k}]", 0.1, 1, 1) for k in range(3)] + [Ran("a.py::two", 0.1, 1, 5)]
-    assert [one.name[6:] for one in ordered(tests, "")] == ["one[0]", "two", "one[1]", "one[2]"]
-
-
-def test_a_batch_is_short_and_has_the_tests_of_a_file_together() -> None:
-    tests = [Ran(f"{file}.py::{k}", 0.1, 1, 1) for k in range(2) for file in "abcdefg"]
-    found = list(batches([*tests, Ran("h.py::long", 60.0, 1, 1)]))
-    assert [one for batch in found for one in batch[:2]][:2] == ["a.py::0", "b.py::0"]
-    assert sorted(one for batch in found for one in batch) == [*sorted(one.name for one in tests), "h.py::long"]
-    assert all(len({one.split("::")[0] for one in batch}) <= 9 for batch in found)
-
-
 def test_a_constant_is_looked_for_where_it_is_named_and_a_c_function_where_it_is_called() -> None:
     path = HOME / "cosim/diagnosis/trust/admission.py"
     source = path.read_text("utf-8")
@@ -109,14 +79,6 @@ def test_a_constant_is_looked_for_where_it_is_named_and_a_c_function_where_it_is
     for folder in ("cosim/nesting/c", "pyfmi_models/export/c", "cosim/hardware"):
         for one in (HOME / folder).glob("*.c"):
             assert reaching(one, "") or not mutants_chosen.HEAD.search(one.read_text("utf-8"))
-
-
-def test_without_a_map_files_are_asked_that_are_near(tmp_path: Path) -> None:
-    path = HOME / "cosim/hardware/replay.py"
-    source = path.read_text("utf-8")
-    line = source[: source.index("def replay(")].count("\n") + 1
-    found = [one for batch in mutants_chosen.chosen(Map(), path, source, line) for one in batch]
-    assert "hardware/test_hardware_replay.py" in {one.split("::")[0] for one in found[:30]}
 
 
 def test_tests_of_what_is_declared_come_first_of_a_declaration() -> None:
