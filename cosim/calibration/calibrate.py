@@ -142,8 +142,9 @@ def calibrate(
     start = np.array([one.start / one.scale for one in numbers])
     before = {one.name: one.start for one in numbers}
     notes = (*dict.fromkeys(note for match in matched for note in match.notes), *noted)
-    job = Job(subject, (*whole, *fitted), options.given)
-    all_, part = slice(0, len(whole)), slice(len(whole), None)
+    again = options.window is not None  # else what is fitted stands first in `whole`
+    job = Job(subject, (*whole, *fitted) if again else whole, options.given)
+    all_, part = slice(0, len(whole)), slice(len(whole), None) if again else slice(0, len(train))
     with Processes(job, options.workers, options.timeout, options.cluster, store) as processes:
         say("first simulation")
         old = processes.first(before, all_)
@@ -151,12 +152,14 @@ def calibrate(
         rows = Rows.of(fitted)
         _check_rows(rows, len(numbers))
         residuals = Residuals(processes, numbers, rows, 1 / rows.spread, part)
+        if not again:
+            residuals.know(start, old[: len(train)])
         found = fit(
             residuals, start, options.starts, options.seed, options.loss, say, options.derivatives == "directional"
         )
         values = residuals.point(found.x)
         notes += (*residuals.notes, *_on_roughness(residuals.rough))
-        (new,) = processes.at([values], all_)
+        new = _afterwards(processes, values, all_, None if again else residuals.outputs(found.x))
         evaluations, lost = processes.evaluations, tuple(processes.reasons)
     if new is None:
         text = f"{subject.source} cannot be simulated on all recordings with the numbers that were found"
@@ -166,6 +169,15 @@ def calibrate(
     traces = _traces(subject, whole, len(train), old, new)
     initial = {one.name: values.pop(one.name) for one in own}
     return Calibrated(subject, free, values, uncertainty, traces, found, evaluations, lost, (*notes, *remarks), initial)
+
+
+def _afterwards(processes: Processes, values: Point, all_: slice, fitted: Outputs | None) -> Outputs | None:
+    """Outputs with the numbers that were found; those of recordings that were fitted may be known."""
+    known = fitted or []
+    if len(known) == all_.stop:
+        return known
+    (rest,) = processes.at([values], slice(len(known), all_.stop))
+    return None if rest is None else [*known, *rest]
 
 
 def _check_set(subject: Subject, options: Options) -> None:

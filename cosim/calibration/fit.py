@@ -29,7 +29,7 @@ EVALUATIONS = 60
 """Evaluations of one start; derivatives come on top."""
 TOLERANCE = 1e-8
 ROUGH = 1e-4
-"""Tolerance of a first look, where weights are found after it and the fit goes on with them."""
+"""Tolerance of a first look: weights are found after it, and the fit goes on with them."""
 AGREE = 1e-3
 """Share by which the sums of two starts may differ to have found the same minimum."""
 ROUNDS = 3
@@ -91,12 +91,11 @@ def fit(
         residuals.notes = residuals.use_directional(residuals.inside(x))
     z = residuals.at(x)
     residuals.bad = BAD * max(float(np.sqrt(np.mean(z**2))), 1.0)
-    residuals.quick = len(spread) > 1
-    first = ROUGH if residuals.quick else TOLERANCE
+    residuals.quick = True
     found: list[tuple[float, Array]] = []
     for k, one in enumerate(_starts(residuals, x, starts, seed)):
         say(f"start {k + 1} of {starts}")
-        found.append(_minimum(residuals, one, loss, _outlier(z, loss), first))
+        found.append(_minimum(residuals, one, loss, _outlier(z, loss), ROUGH))
         if _agreeing(found) > 1:
             break
     best = min(found, key=lambda pair: pair[0])[1]
@@ -107,7 +106,7 @@ def fit(
     if residuals.stairs:
         say("searching among the steps of the model")
         best = _searched(residuals, best, loss, outlier, seed)
-    jacobian = residuals.jacobian(best)
+    jacobian = residuals.jacobian(best, final=True)
     return Fit(best, residuals.at(best), jacobian, loss, outlier, tuple(one for one, _ in found), agreeing)
 
 
@@ -120,7 +119,7 @@ def _weighted(residuals: Residuals, best: Array, loss: Loss, say: Callable[[str]
         weights = 1 / np.maximum(noise, EXACT * rows.spread)
         change = float(np.abs(weights / residuals.weights - 1).max())
         residuals.weights, outlier = weights, 1.0
-        if len(noise) == 1 or (k and change < SETTLED):
+        if k and change < SETTLED:
             break
         say(f"weights of outputs, round {k + 1}")
         residuals.bad = BAD * max(float(np.sqrt(np.mean(residuals.at(best) ** 2))), 1.0)

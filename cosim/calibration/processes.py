@@ -7,6 +7,7 @@ there is one, and is not simulated again.
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, as_completed
 from contextlib import ExitStack
+from dataclasses import replace
 from functools import partial
 from queue import SimpleQueue
 from time import perf_counter
@@ -14,7 +15,7 @@ from types import TracebackType
 from typing import Any, Self
 from uuid import uuid4
 
-from cosim.calibration.simulation import Answer, Job, Outputs, Point, outputs_at, prepare, slopes_at
+from cosim.calibration.simulation import Answer, Job, Outputs, Point, keeps_at, outputs_at, prepare, slopes_at
 from cosim.calibration.store import Store
 from cosim.support.cell import Cell, LostError, ending
 from cosim.support.errors import CosimError, InputError
@@ -86,9 +87,10 @@ class Processes:
             InputError: the model cannot be simulated with these numbers; says why.
         """
         self.evaluations += 1
-        begun = perf_counter()
+        begun, cell = perf_counter(), self._cells[0]
         try:
-            found = _outputs(self._cells[0], self._key, lambda: self.job, point, part, self._timeout)
+            found = _outputs(cell, self._key, lambda: self.job, point, part, self._timeout)
+            self.job = replace(self.job, keeps=cell.call(keeps_at, self._key, timeout=self._timeout))
         except LostError as loss:
             raise InputError(self._sentence(loss), culprit=str(self.job.subject.source)) from loss
         except CosimError as error:

@@ -76,6 +76,16 @@ class Rows:
         return np.concatenate([values[mask] for mask, values in pairs])
 
 
+@dataclass(frozen=True)
+class Slopes:
+    """Derivatives d z / d x at a point, with the weights that z had, and whether differences were central."""
+
+    point: bytes
+    weights: Array
+    columns: Array
+    central: bool
+
+
 @dataclass
 class Residuals:
     """Residuals z at points x = p / scale; keeps the steps that derivatives have found to be good."""
@@ -104,7 +114,8 @@ class Residuals:
         self.notes: tuple[str, ...] = ()
         self.own: tuple[int, ...] = ()
         """Numbers whose derivatives the FMU gives."""
-        self._known: dict[bytes, Array | None] = {}
+        self._known: dict[bytes, Outputs | None] = {}
+        self._slopes: Slopes | None = None
 
     def point(self, x: Array) -> Mapping[str, float]:
         """Values by name."""
@@ -117,18 +128,30 @@ class Residuals:
         high = np.array([one.high for one in self.free]) / self.scales
         return np.asarray(np.clip(x, low, high), np.float64)
 
-    def simulated(self, points: Sequence[Array]) -> list[Array | None]:
-        """Outputs at points, in rows."""
-        if len(self._known) > KEPT * (len(self.groups) + 1):
-            self._known.clear()
-        new = [x for x in dict.fromkeys(x.tobytes() for x in points) if x not in self._known]
-        found = self.processes.at([self.point(np.frombuffer(x)) for x in new], self.part)
-        self._known |= {x: None if one is None else self._rows(one) for x, one in zip(new, found, strict=True)}
-        return [self._known[x.tobytes()] for x in points]
+    def know(self, x: Array, outputs: Outputs) -> None:
+        """Take the outputs at a point as known."""
+        self._known[x.tobytes()] = outputs
 
-    def _rows(self, outputs: Outputs) -> Array | None:
-        values = self.rows.of_outputs(outputs)
-        return values if np.isfinite(values).all() else None
+    def outputs(self, x: Array) -> Outputs | None:
+        """Outputs at a point, by experiment."""
+        self.simulated([x])
+        return self._known[x.tobytes()]
+
+    def simulated(self, points: Sequence[Array]) -> list[Array | None]:
+        """Outputs at points, in rows; None where there are none, or one is no number."""
+        keys = list(dict.fromkeys(x.tobytes() for x in points))
+        new = [x for x in keys if x not in self._known]
+        found = self.processes.at([self.point(np.frombuffer(x)) for x in new], self.part) if new else []
+        self._known |= dict(zip(new, found, strict=True))
+        rows = {x: self._rows(self._known[x]) for x in keys}
+        for old in list(self._known)[: -KEPT * (len(self.groups) + 1)]:
+            if old not in rows:
+                del self._known[old]
+        return [rows[x.tobytes()] for x in points]
+
+    def _rows(self, outputs: Outputs | None) -> Array | None:
+        values = None if outputs is None else self.rows.of_outputs(outputs)
+        return values if values is not None and np.isfinite(values).all() else None
 
     def at(self, x: Array) -> Array:
         """Residuals at a point."""
@@ -144,9 +167,18 @@ class Residuals:
     def _residual(self, values: Array) -> Array:
         return self.weights[self.rows.output] * (values - self.rows.measured)
 
-    def jacobian(self, x: Array) -> Array:
-        """Derivatives d z / d x at a point, shape (rows, numbers)."""
-        columns, here = self._derivatives(x, self.steps)
+    def jacobian(self, x: Array, final: bool = False) -> Array:
+        """Derivatives d z / d x at a point, shape (rows, numbers); the `final` ones are of central differences.
+
+        Those of the same point are taken again, with other weights: the simulations would be the same.
+        """
+        kept, here = self._slopes, None
+        if kept is not None and kept.point == x.tobytes() and (kept.central or not final):
+            columns = kept.columns * (self.weights / kept.weights)[self.rows.output][:, None]
+            (here,) = self.simulated([x])
+        else:
+            columns, here = self._derivatives(x, self.steps)
+            self._slopes = None if self.quick else Slopes(x.tobytes(), self.weights, columns, True)
         if here is not None:
             self._learn(columns, self._residual(here), np.maximum(np.abs(x), 1.0))
         return columns
@@ -160,6 +192,8 @@ class Residuals:
         numbers for which no two steps agree; `stairs` says that the smallest steps see other slopes: a staircase around
         a smooth course.
         """
+        if self._is_smooth(x):
+            return
         steps = MOST * np.ones(len(self.free))
         wide, here = self._differences(x, steps)
         if here is None:
@@ -179,6 +213,20 @@ class Residuals:
         self.least = np.where(agree & (gap <= AGREE), np.minimum(floor, steps), steps)
         self.stairs = bool(np.any(agree & (gap > STAIRS)))
         self.rough = tuple(one.name for one, is_smooth in zip(self.free, agree, strict=True) if not is_smooth)
+
+    def _is_smooth(self, x: Array) -> bool:
+        """Whether slopes to one side agree over the greatest and the smallest steps; these are good then."""
+        quick, self.quick = self.quick, True
+        wide, here = self._differences(x, MOST * np.ones(len(self.free)))
+        floor = np.minimum(self._wanted(wide, 0.0, np.maximum(np.abs(x), 1.0)), FIRST)
+        fine = wide if here is None else self._derivatives(x, floor)[0]
+        self.quick = quick
+        shared = [k for k in range(len(x)) if k not in self.own]
+        if here is None or np.any(_apart(fine, wide)[shared] > AGREE):
+            return False
+        self.least, self.stairs, self.rough = floor, False, ()
+        self._slopes = Slopes(x.tobytes(), self.weights, fine, False)
+        return True
 
     def use_directional(self, x: Array) -> tuple[str, ...]:
         """Take the FMU's own derivatives where they agree with differences at a point; returns notes on where not."""
@@ -221,6 +269,8 @@ class Residuals:
         low = np.array([one.low for one in self.free]) / self.scales
         high = np.array([one.high for one in self.free]) / self.scales
         up, down = np.minimum(x + steps * size, high), np.maximum(x - steps * size, low)
+        if self.quick:
+            up = np.where(up - x < x - down, down, up)  # a bound leaves more room on the other side
         points = [_moved(x, group, values) for values in ((up,) if self.quick else (up, down)) for group in self.groups]
         here, *found = self.simulated([x, *points])
         found += [None] * (2 * len(self.groups) - len(points))

@@ -39,6 +39,8 @@ class Job:
     subject: Subject
     experiments: tuple[Experiment, ...]
     given: Point
+    keeps: bool | None = None
+    """Whether FMUs give the same bits when they stay open; None where each process finds out by a second run."""
 
     @property
     def scenario(self) -> Scenario:
@@ -66,7 +68,7 @@ class Bench:
     def __init__(self, job: Job) -> None:
         self.job = job
         self._stack, self._open = ExitStack(), dict[str, Component]()
-        self._keeps: bool | None = None
+        self.keeps = job.keeps
 
     def outputs(self, point: Point, part: slice) -> Outputs:
         """Outputs at the rows of each experiment of a part of them.
@@ -74,9 +76,9 @@ class Bench:
         Raises:
             CosimError: the model cannot be simulated there.
         """
-        if self._keeps is None:
+        if self.keeps is None:
             first, second = (self._all(point, part) for _ in range(2))
-            self._keeps = _same(first, second)
+            self.keeps = _same(first, second)
             return first
         return self._all(point, part)
 
@@ -113,7 +115,7 @@ class Bench:
 
     def _one(self, point: Point, experiment: Experiment) -> list[Array]:
         system = self.job.at(point, experiment).system()
-        if self._keeps is False:
+        if self.keeps is False:
             self.close()
         components: dict[str, Source] = {
             name: self._opened(name, source) if isinstance(source, Fmu) else source
@@ -143,6 +145,12 @@ def outputs_at(key: str, point: Point, part: slice) -> Outputs | None:
     """Outputs of a job that was prepared; None where it was not."""
     bench = _BENCHES.get(key)
     return bench.outputs(point, part) if bench else None
+
+
+def keeps_at(key: str) -> bool | None:
+    """Whether the FMUs of a job that was simulated here may stay open."""
+    bench = _BENCHES.get(key)
+    return bench.keeps if bench else None
 
 
 def slopes_at(key: str, job: Job, point: Point, part: slice, names: Sequence[str]) -> Outputs | None:

@@ -33,17 +33,15 @@ def description(prepared: Prepared, shown: Sequence[Shown], token: str, identifi
 
 
 def _head2(root: ET.Element, prepared: Prepared, identifier: str) -> None:
-    ET.SubElement(root, "CoSimulation", modelIdentifier=identifier, canHandleVariableCommunicationStepSize="true")
+    del prepared
+    flags = {"canHandleVariableCommunicationStepSize": "true", "providesDirectionalDerivative": "false"}
+    ET.SubElement(root, "CoSimulation", {"modelIdentifier": identifier, **flags})
 
 
 def _head3(root: ET.Element, prepared: Prepared, identifier: str) -> None:
-    ET.SubElement(
-        root,
-        "CoSimulation",
-        modelIdentifier=identifier,
-        canHandleVariableCommunicationStepSize="true",
-        fixedInternalStepSize=repr(prepared.plan.step),
-    )
+    flags = {"canHandleVariableCommunicationStepSize": "true", "providesDirectionalDerivatives": "false"}
+    flags |= {"providesAdjointDerivatives": "false", "fixedInternalStepSize": repr(prepared.plan.step)}
+    ET.SubElement(root, "CoSimulation", {"modelIdentifier": identifier, **flags})
 
 
 def _units(root: ET.Element, shown: Sequence[Shown]) -> None:

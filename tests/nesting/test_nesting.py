@@ -220,6 +220,22 @@ def test_another_importer_has_the_same_bits(tiny: Tiny, tmp_path: Path) -> None:
         np.testing.assert_array_equal(values[1:], theirs[name])
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_derivatives_are_not_promised_and_asking_for_them_is_an_error(fmi: int, tiny: Tiny, tmp_path: Path) -> None:
+    """Never zeros that look like derivatives: a calibration elsewhere would stop at its start."""
+    fmu = nested(oscillator(tiny[3], wires=[Wire("spring.y", "mass.b"), Wire("mass.y", "spring.a")]), tmp_path, fmi)
+    assert fmu.description.coSimulation.providesDirectionalDerivative is False
+    fmu.start()
+    asked = [fmu.places["mass.y"]], [fmu.places["mass.a"]], [1.0]
+    with pytest.raises(Exception, match="GetDirectionalDerivative failed with status 3"):
+        fmu.fmu.getDirectionalDerivative(*asked)
+    if fmi == 3:
+        assert fmu.description.coSimulation.providesAdjointDerivatives is False
+        with pytest.raises(Exception, match="GetAdjointDerivative failed with status 3"):
+            fmu.fmu.getAdjointDerivative(asked[1], asked[0], asked[2])
+    fmu.fmu.freeInstance()
+
+
 def refusal(system: System, folder: Path) -> str:
     with pytest.raises(WiringError) as refused:
         nested(system, folder, 3)

@@ -88,6 +88,9 @@ Status set_time(Instance *instance, double time) {
     return lacks(instance, "model exchange");
 }
 
+/* FMI 2.0 and 3.0, "Getting Partial Derivatives": these may be called only where the model description provides them, and it does
+   not: what an output of the whole does with an input is in the states of the components, which the functions cannot ask
+   for, and not all components give derivatives. */
 Status directional(Instance *instance, const uint32_t *unknowns, size_t unknown_count, const uint32_t *knowns,
                    size_t known_count, const double *seed, double *sensitivity) {
     (void)unknowns, (void)unknown_count, (void)knowns, (void)known_count, (void)seed, (void)sensitivity;
