@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from cosim.api.card import estimated_card
 from cosim.data.recording import Recording
 from pyfmi_models.card import Card
 
@@ -42,6 +41,8 @@ def _rows(one: Recording, rows: slice, part: str) -> Recording:
 
 def estimated(train: Sequence[Recording], motion: str, on_progress: Callable[[str], None]) -> tuple[Card, str]:
     """Estimate a card from the recordings that may be fitted, and say so."""
+    from cosim.api.card import estimated_card  # what most diagnoses are given
+
     on_progress("estimating a card from the recordings")
     found = estimated_card(train, motion, is_asked=False)
     names = ", ".join(f"{one.name.rpartition('.')[2]} {one.value:.4g} {one.unit}" for one in found.numbers)

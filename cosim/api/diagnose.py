@@ -13,17 +13,13 @@ from cosim.api.recordings import Source, Written, read_all
 from cosim.api.tables import findings_frame, missing_frame
 from cosim.api.why import frame
 from cosim.data.recording import Recording
-from cosim.delivery.closed_loop import Loops
-from cosim.delivery.correction_fmu import Correction, motion_of
 from cosim.delivery.deliver import DOCUMENT, FILES, QUICK, as_json, check_out, deliver, deliver_quickly, without_files
 from cosim.delivery.proposal import Proposal, write_proposals
 from cosim.diagnosis.answer.entries import Improved
 from cosim.diagnosis.answer.result import Diagnosis, Finding
-from cosim.diagnosis.black_box import BlackBox, as_base
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.diagnose import diagnose as find
 from cosim.diagnosis.search.side_by_side import side_by_side
-from cosim.fmi.alias import Alias
 from cosim.reading import check_kind
 from cosim.report.answer_figure import answer_figure
 from cosim.report.repairs import for_machine
@@ -174,7 +170,7 @@ def diagnose(
     given = _read(train, heldout, card, Written(columns, units, layout), motion, on_progress)
     given = replace(given, with_possible=with_possible)
     if fmu is not None:
-        given = _with_base(_black_box(fmu, variables or {}), given, on_progress)
+        given = _with_base(Path(fmu), variables or {}, given, on_progress)
     way = _delivered if folder and not quick else _diagnosed
     with _anew(folder if force else None):
         return way(given, folder, command, _Listeners(on_progress, on_answer))
@@ -187,10 +183,6 @@ def _checked(out: str | Path | None, quick: bool, force: bool) -> Path | None:
         check_out(folder, force, QUICK if quick else FILES)
         check_directory(folder)
     return folder
-
-
-def _black_box(fmu: str | Path, variables: Mapping[str, str]) -> BlackBox:
-    return BlackBox(Path(fmu), {name: Alias(own) for name, own in variables.items()})
 
 
 def _written(folder: Path) -> dict[Path, int]:
@@ -258,8 +250,13 @@ def _read(
     return _Given(fitted, held, believed, notes=tuple(notes))
 
 
-def _with_base(box: BlackBox, given: _Given, on_progress: Callable[[str], None]) -> _Given:
+def _with_base(fmu: Path, variables: Mapping[str, str], given: _Given, on_progress: Callable[[str], None]) -> _Given:
     """Put the card that is most like an FMU in its place."""
+    from cosim.delivery.correction_fmu import Correction, motion_of  # the master: a third of all that is imported
+    from cosim.diagnosis.black_box import BlackBox, as_base
+    from cosim.fmi.alias import Alias
+
+    box = BlackBox(fmu, {name: Alias(own) for name, own in variables.items()})
     base = as_base(box, given.train, given.heldout, given.card, on_progress)
     correction = Correction(box, base.card, *motion_of(given.train[0]))
     return replace(
@@ -285,6 +282,8 @@ def _diagnosed(given: _Given, out: Path | None, command: str, listeners: _Listen
 
 def _delivered(given: _Given, out: Path | None, command: str, listeners: _Listeners) -> DiagnosisResult:
     """Diagnose with the loops closed beside it, and write all files."""
+    from cosim.delivery.closed_loop import Loops  # the master: a third of all that is imported
+
     assert out is not None  # files need a folder
     train, heldout, card = given.train, given.heldout, given.card
     with Loops(card, heldout) as loops, side_by_side(listeners.on_progress) as refits:

@@ -11,7 +11,6 @@ it sets the widest band, and what is late by half of it is no delay.
 from dataclasses import replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from cosim.data.held import Array, Index, held_columns, new_rows
 from cosim.data.recording import GAP, Recording
@@ -96,6 +95,8 @@ def _between(t: Array, values: Array, grid: Array) -> Array:
     rows = _nearest(t, grid)
     if np.array_equal(t[rows], grid):
         return values[rows]
+    from scipy.interpolate import CubicSpline  # a tenth of a second that even recordings do not need
+
     return np.asarray(CubicSpline(t, values)(np.clip(grid, t[0], t[-1])))
 
 

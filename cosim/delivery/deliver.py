@@ -14,8 +14,6 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from cosim.data.recording import Recording
-from cosim.delivery.closed_loop import Loops
-from cosim.delivery.experiment import of_recording, with_experiment
 from cosim.diagnosis.answer.entries import CardSource, Improved, Provenance, Source
 from cosim.diagnosis.answer.result import Array, Diagnosis, Finding, HeldOut, Trace
 from cosim.diagnosis.diagnose import Outcome
@@ -25,13 +23,16 @@ from cosim.diagnosis.measure.findings import broadband_finding
 from cosim.diagnosis.measure.protocol import CUTOFF
 from cosim.estimation.neighbours import as_inputs
 from cosim.fmi.domain import KEY, Domain, entries_of
-from cosim.models.carried import related_of
 from cosim.support.files import check_free, directory, replacing, sha256
 from cosim.support.plain import JsonObject
 from cosim.support.version import __version__
 from pyfmi_models.card import Card
 from pyfmi_models.card_writer import card_text
-from pyfmi_models.export import export_fmu
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+    from cosim.delivery.closed_loop import Loops
 
 DOCUMENT, CARD = "diagnosis.json", "card.toml"
 MISSING, REPORT = "missing_torque.parquet", "report.html"
@@ -79,7 +80,7 @@ def deliver(
     card: Card,
     out: Path,
     command: str,
-    loops: Loops,
+    loops: "Loops",
     on_progress: Callable[[str], None] = lambda _: None,
     more: Callable[[Card, Path], Improved] = lambda *_: Improved(),
     base: str = "",
@@ -304,6 +305,10 @@ def _proven_range(found: Diagnosis) -> Improved:
 
 
 def _fmus(card: Card, found: Diagnosis, heldout: Recording, out: Path) -> Improved:
+    from cosim.delivery.experiment import of_recording, with_experiment  # the master: `--quick` runs nothing
+    from cosim.models.carried import related_of
+    from pyfmi_models.export import export_fmu
+
     span, unit = _proven_range(found)["speed"], "m/s" if found.motion == "linear" else "rad/s"
     model = card.plant().model()
     proven = f"{model.description}; proven on a held-out recording for speeds {span[0]:.3g} to {span[1]:.3g} {unit}"
@@ -322,9 +327,6 @@ def _domains(found: Diagnosis) -> tuple[Domain, Domain]:
     (slow, fast), (left, right) = _proven_range(found)["speed"], _proven_range(found)["position"]
     return Domain("speed", slow, fast, speed, "v"), Domain("position", left, right, position, "q")
 
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 ROWS = 2**19
 """Rows that are made and written at a time."""

@@ -18,7 +18,6 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import numpy.typing as npt
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.interpolate import CubicSpline
 
 from cosim.estimation.equations import Equations, equations_of
 from cosim.estimation.play import stepped_torque
@@ -285,6 +284,8 @@ class Inverse:
         clocks = self._parts(ClockEffect)
         if not clocks:
             return columns
+        from scipy.interpolate import CubicSpline  # a tenth of a second that machines of one clock do not need
+
         spline = CubicSpline(piece.t, columns, axis=0)
 
         def later(numbers: Array) -> Array:

@@ -1,7 +1,6 @@
 """The set point that was recorded, at every tick of the controller that followed it."""
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from cosim.data.held import held_columns, new_rows
 from cosim.data.recording import Recording
@@ -13,6 +12,8 @@ def set_point(recording: Recording, step: float) -> dict[str, Array]:
 
     Of one that repeats its readings, those that are new.
     """
+    from scipy.interpolate import make_interp_spline  # a tenth of a second that a fit does not need
+
     every = held_columns(recording.table).get("q_d")
     rows = new_rows(recording["q_d"], every) if every else np.arange(len(recording))
     spline = make_interp_spline(recording.t[rows], recording["q_d"][rows], k=5)

@@ -17,7 +17,6 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import minimize_scalar
 
 from cosim.diagnosis.effects.delay_and_lag import Drive, milliseconds, timed
 from cosim.estimation.discrepancy_basis import speed_shapes, stop_distances, stop_operators
@@ -130,6 +129,8 @@ def misfits_of(prepared: Prepared, fitted: Mount, drive: Effect) -> Misfits:
 
 def _least(parts: Sequence[Crossed], noise: Sequence[Array], form: type[Drive], fitted: float) -> float:
     """Chi-squared at the best time of a drive."""
+    from scipy.optimize import minimize_scalar  # a tenth of a second that most diagnoses do not need
+
     values = [_chi2(parts, noise, form, share * fitted) for share in GRID]
     best = int(np.argmin(values))
     ends = GRID[max(best - 1, 0)], GRID[min(best + 1, len(GRID) - 1)]

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.optimize import least_squares
 
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
@@ -152,6 +151,8 @@ class Search:
 
     def fitted(self, formula: Formula) -> tuple[float, Formula]:
         """The loss and the formula with the best inner numbers, from the best start of a grid."""
+        from scipy.optimize import least_squares  # a tenth of a second that most diagnoses do not need
+
         starts = list(_starts(formula, self.rows.quantities))
         losses = [float(np.sum(self.beyond(formula, one) ** 2)) for one in starts]
         best = int(np.argmin(losses))

@@ -14,10 +14,10 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import lsq_linear
 
 from cosim.data.recording import Recording
 from cosim.estimation.filters import gain, noise_of
+from cosim.estimation.least_squares import squares_left
 from cosim.estimation.prepare import Array, Piece, Prepared, prepare
 from cosim.support.statistics import rms
 
@@ -209,12 +209,8 @@ class Balance:
     def _sign(self, columns: Array, tau: Array) -> float:
         """Log of the squares that are left with the torque's sign turned, over those with the recorded one."""
         _, triangle = np.linalg.qr(np.column_stack([columns, tau]))
-        least = np.full(columns.shape[1], -np.inf)
-        least[[0, 2] if self.one_way and not self._turns else [0, 1, 2]] = 0.0
-        left = [
-            2 * lsq_linear(triangle[:, :-1], sign * triangle[:, -1], (least, np.inf), "bvls").cost + self.overlooked
-            for sign in (1, -1)
-        ]
+        positive = [0, 2] if self.one_way and not self._turns else [0, 1, 2]
+        left = squares_left(triangle[:, :-1], triangle[:, -1:] * [1, -1], positive) + self.overlooked
         return float(np.log(left[1] / left[0]))
 
     def _taken(self, own: Array, size: Array, count: int) -> Array:

@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.optimize import lsq_linear
 
 from cosim.diagnosis.answer.doubt_entry import Alternative, Sanity
 from cosim.diagnosis.trust.balance import Balance
+from cosim.estimation.filters import between
+from cosim.estimation.least_squares import squares_left
 from cosim.estimation.prepare import Array
 from cosim.estimation.row_weights import far_from_turns
 
@@ -139,10 +139,8 @@ def _misfit(balance: Balance) -> _Left:
     columns, torque = columns[inside], torque[inside]
     basis, triangle = np.linalg.qr(columns)
     seen, energy = basis.T @ torque, (torque**2).sum(0)
-    least = np.full(columns.shape[1], -np.inf)
-    least[[0, 1, 2]] = 0.0  # inertia, friction, viscosity
     unseen = energy - (seen**2).sum(0)
-    left = np.array([2 * lsq_linear(triangle, one, (least, np.inf), "bvls").cost for one in seen.T]) + unseen
+    left = squares_left(triangle, seen, (0, 1, 2)) + unseen  # inertia, friction, viscosity
     return _Left(left, float(np.mean(inside)), max(0.0, 1 - float((left / energy).min())))
 
 
@@ -154,8 +152,5 @@ def _likelihood(balance: Balance, left: _Left) -> Array:
 
 def _shifted(balance: Balance) -> Array:
     """The torque at each lag before the kept rows, (rows, lags); NaN beyond the ends of a piece."""
-    parts = []
-    for piece in balance.prepared.pieces:
-        spline = CubicSpline(piece.t, piece.tau, extrapolate=False)
-        parts.append(spline(piece.t[piece.kept][:, None] - LAGS))
-    return np.concatenate(parts)
+    pieces = balance.prepared.pieces
+    return np.concatenate([between(one.t, one.tau, one.t[one.kept][:, None] - LAGS) for one in pieces])
