@@ -104,21 +104,6 @@ def test_a_lead_that_is_not_the_observers_lag_learns_worse() -> None:
     assert rest[1][-PASS:].max() < 0.5 * min(rest[0][-PASS:].max(), rest[2][-PASS:].max())
 
 
-def test_the_learned_torque_stays_within_its_limit() -> None:
-    resist = passes(10)
-    found = close(controller(Learning(ticks=PASS, limit=0.5)), np.zeros((len(resist), 3)), resist)
-    assert np.abs(found["friction_estimate"]).max() == pytest.approx(0.5)
-
-
-@pytest.mark.parametrize("knots", [3, 7, 100])
-def test_the_hats_of_a_path_sum_to_one_and_close_the_circle(knots: int) -> None:
-    clock = ca.SX.sym("clock")
-    hats = ca.Function("hats", [clock], [ca.vertcat(*Learning(ticks=PASS, knots=knots)._hats(clock))])
-    values = hats.map(2 * PASS)(ca.DM(np.arange(-PASS, PASS)).T).full()
-    np.testing.assert_allclose(values.sum(axis=0), 1, atol=1e-12)
-    np.testing.assert_allclose(values[:, 0:PASS], values[:, PASS:], atol=1e-9)
-
-
 # On-line identification
 
 
@@ -139,15 +124,6 @@ def test_level_stiffness_and_bias_are_found_while_the_axis_moves(
     assert found["e"][late].std() < 0.25 * plain["e"][late].std()
 
 
-def test_at_rest_nothing_is_learned_and_nothing_forgotten() -> None:
-    """A stuck axis under a constant torque says nothing of sliding friction."""
-    reference = np.zeros((20_000, 3))
-    found = close(controller(Adaptation(law=LUGRE)), reference, np.full(20_000, 1.5))
-    for name, value in (("level", 1), ("stiffness", 1), ("bias", 0)):
-        assert np.all(found[f"adaptation.{name}"] == value)
-    assert np.all(found["adaptation.P00"] == found["adaptation.P00"][0])
-
-
 def test_steady_sliding_does_not_wind_up_what_it_cannot_tell() -> None:
     """At constant speed level and bias are one number, and stiffness none: no variance grows beyond its start."""
     t = H * np.arange(100_000)
@@ -157,14 +133,6 @@ def test_steady_sliding_does_not_wind_up_what_it_cannot_tell() -> None:
         variance = found[f"adaptation.{name}"]
         assert variance.max() <= 1.001 * variance[0]
         assert variance.min() > 0
-
-
-def test_estimates_stay_within_their_bounds() -> None:
-    reference = sine(20)
-    found = close(controller(Adaptation(law=LUGRE, widest=2.0)), reference, 10 * friction_of(LUGRE, reference[:, 1]))
-    assert found["adaptation.level"].max() == 2
-    assert np.abs(found["adaptation.bias"]).max() <= 3.322
-    assert 0.5 <= found["adaptation.stiffness"].min() <= found["adaptation.stiffness"].max() <= 2
 
 
 def test_the_fmu_of_a_controller_with_everything_gives_the_same_numbers(tmp_path: Path) -> None:

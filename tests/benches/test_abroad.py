@@ -104,16 +104,6 @@ def test_a_traceback_is_an_answer_that_is_wrong(tmp_path: Path) -> None:
     assert "inertia is missing" in abroad.kept(tmp_path / "answers" / "case_0000.json")["crashed"]
 
 
-def test_families_have_seeds_in_a_row_and_nulls_a_number_of_their_own() -> None:
-    deck = abroad.parts(["none", "delay", "pairs"], 10, 100, 7)
-    assert [(part.family, part.cases, part.seed) for part in deck] == [
-        ("none", 100, 7),
-        ("delay", 10, 8),
-        ("pairs", 10, 9),
-    ]
-    assert [part.family for part in abroad.parts(["none", "delay"], 10, 0, 7)] == ["delay"]
-
-
 def row(family: str, effects: list[str], verdict: list[str], level: str = "strong", **more: Any) -> dict[str, Any]:
     offered = [{"effect": name, "answer": "found", "probability": 0.9} for name in verdict if name != "unknown"]
     answer = {"verdict": verdict, "ambiguous_with": more.get("groups", []), "effects": offered, "wall_seconds": 2.0}

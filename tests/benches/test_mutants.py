@@ -12,7 +12,6 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "bench"))
 
 import mutants
 import mutations_c
-from mutants_choice import asked
 from mutants_page import Tried
 from mutations import KINDS, mutated, sites
 
@@ -145,26 +144,6 @@ def test_every_room_of_the_product_has_its_errors() -> None:
     rooms = {path.relative_to(mutants.HOME / "cosim").parts[0] for path in (mutants.HOME / "cosim").glob("*/*.py")}
     missing = {room for room in rooms if not any(mutants.HOME / "cosim" / room in one.parents for one in there)}
     assert missing == {"checks"}
-
-
-@pytest.mark.parametrize(
-    ("module", "name", "test"),
-    [
-        ("cosim/hardware/replay.py", "def replay(", "hardware/test_hardware_replay.py"),
-        ("pyfmi_models/adrc/controller.py", "def _tick(", "adrc/test_adrc_ticks.py"),
-        ("cosim/fmi/types.py", "INTEGERS = ", "fmi/test_edges_of_types.py"),
-        ("pyfmi_models/friction/maxwell_slip.py", "    sigma1: ", "models/test_parameter_ranges.py"),
-        ("cosim/hardware/heads.c", "EXPORT bool heads_combine", "hardware/test_heads.py"),
-        ("cosim/estimation/priors.py", "def _trust(", "estimation/test_priors.py"),
-    ],
-)
-def test_the_tests_that_name_what_was_changed_or_are_near_come_first(module: str, name: str, test: str) -> None:
-    source = (mutants.HOME / module).read_text("utf-8")
-    line = source[: source.index(name)].count("\n") + 1
-    named, found = asked(mutants.HOME / module, source, line)
-    assert all(one.split("::")[0] in found for one in named)
-    assert test in found[:4]
-    assert len(set(found)) == len(found)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks")

@@ -2,8 +2,6 @@
 
 import hashlib
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
@@ -193,9 +191,3 @@ def test_a_card_with_physics_that_the_inverse_model_lacks_is_refused() -> None:
     with pytest.raises(InputError) as caught:
         diagnose([recorded(2 * a, t, q)], [recorded(2 * a, t, q, "other")], card)
     assert "The card holds friction_wander, which a diagnosis cannot take into account yet" in str(caught.value)
-
-
-def test_diagnosis_is_not_imported_by_a_run() -> None:
-    heavy = "{'casadi', 'matplotlib', 'cosim.diagnosis', 'cosim.estimation'}"
-    code = f"import sys, cosim.cli, cosim.master.simulate; assert not {heavy} & set(sys.modules)"
-    subprocess.run([sys.executable, "-c", code], check=True)

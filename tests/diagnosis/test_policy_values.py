@@ -3,8 +3,6 @@
 What a limit does at its edges stands in test_decision_at_its_limits.py; here is where the limits themselves lie.
 """
 
-from dataclasses import replace
-
 import pytest
 
 from cosim.diagnosis.answer.scores import ResidualScores, TermScores
@@ -41,11 +39,6 @@ BETWEEN = {
 def test_a_constant_lies_between_what_was_measured(name: str) -> None:
     low, high = BETWEEN[name]
     assert low < getattr(POLICY, name) < high
-
-
-def test_forms_that_are_refitted_are_more_than_imitate_each_other() -> None:
-    """Delay, lag, presliding and backlash imitate each other, each in a form or two."""
-    assert POLICY.refitted >= 8
 
 
 def unknown(evidence: float, share: float, predicted: float = 0.0) -> bool:
@@ -112,24 +105,6 @@ def is_enough(evidence: float, gain: float, policy: Policy = POLICY) -> bool:
 )
 def test_what_the_first_effect_must_show_in_training(evidence: float, gain: float, expected: bool) -> None:
     assert is_enough(evidence, gain) is expected
-
-
-def test_the_constants_that_succeed_two_old_ones_cannot_be_nothing() -> None:
-    """Errors that were planted in them once went unseen.
-
-    LEAST_T, the t value of a gain over blocks, was succeeded by `least_evidence` and `evidence_if_large`; FORETOLD, the
-    share of a recording left out that an effect of little evidence must foretell, by `large_gain` in training and by
-    `clearly_predicted` and `halved` held out.
-    """
-    by_chance = Gain(0.5, 0.1, 0.1)
-    assert not is_validated(by_chance, 0.1, POLICY)
-    assert is_validated(by_chance, 0.1, replace(POLICY, clearly_predicted=0.02))
-    assert is_validated(by_chance, 0.1, replace(POLICY, halved=0.02))
-    assert not is_enough(5.0, 0.1)
-    assert is_enough(5.0, 0.1, replace(POLICY, least_evidence=0.0))
-    assert is_enough(5.0, 0.1, replace(POLICY, large_gain=0.02, evidence_if_large=0.0))
-    assert not is_enough(5.0, 0.3)
-    assert is_enough(5.0, 0.3, replace(POLICY, evidence_if_large=0.0))
 
 
 @pytest.mark.parametrize(

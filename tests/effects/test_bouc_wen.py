@@ -1,9 +1,8 @@
 """Hysteresis of Bouc and Wen: its loop, its energy, and an FMU with all effects of this kind beside numpy alone."""
 
-import casadi as ca
 import numpy as np
 import pytest
-from effect_examples import evaluate, mount
+from effect_examples import mount
 from export_models import Driver
 from scipy.integrate import solve_ivp
 from test_effects_of_cards import GEAR, SPOT, WEIGHT, drooped
@@ -35,30 +34,7 @@ def turned(effect: BoucWen, way: np.ndarray, z: float = 0.0) -> np.ndarray:
     return np.array(found)
 
 
-def by_rates(effect: BoucWen, way: np.ndarray, dt: float, z: float = 0.0) -> np.ndarray:
-    """The same from the effect's own rate over time, by the midpoint rule."""
-    rate = ca.Function("rate", [(s := ca.SX.sym("z")), (v := ca.SX.sym("v"))], [
-        effect.rate(mount().at(0.0, 0.0, v)._replace(state=ca.vertcat(s)))
-    ])  # fmt: skip
-    found = [z]
-    for step in np.diff(way):
-        half = z + dt / 2 * float(rate(z, step / dt))
-        z += dt * float(rate(half, step / dt))
-        found.append(z)
-    return np.array(found)
-
-
-WAY = 0.3 * np.concatenate([np.linspace(0, 1, 400), np.linspace(1, -0.5, 600)[1:], np.linspace(-0.5, 0.2, 300)[1:]])
 SHAPES = [{}, {"beta": 0.6, "gamma": -0.3, "n": 1.5}, {"A": 2.0, "beta": 0.4, "gamma": 0.1, "n": 4.0}]
-
-
-@pytest.mark.parametrize("numbers", SHAPES)
-def test_the_loop_is_that_of_its_equation_however_fast_the_motion_is(numbers: dict[str, float]) -> None:
-    effect = BoucWen(torque=0.8, stroke=0.05, **numbers)
-    expected = turned(effect, WAY)
-    for dt in (1e-4, 1.0):
-        np.testing.assert_allclose(by_rates(effect, WAY, dt), expected, atol=2e-3 * np.abs(expected).max())
-    assert np.abs(expected).max() <= (effect.A / (effect.beta + effect.gamma)) ** (1 / effect.n) + 1e-9
 
 
 @pytest.mark.parametrize("numbers", [*SHAPES, {"beta": 0.5, "gamma": -0.49}, {"beta": 2.0, "gamma": 2.0, "n": 3.0}])
@@ -83,16 +59,6 @@ def test_numbers_that_would_make_energy_are_refused_in_a_sentence() -> None:
         with pytest.raises(CardError, match=rf"\(bouc_wen\): gamma = {gamma:g} must be above -beta and at most beta"):
             parse_card(text + f"stroke = 0.05\nbeta = {beta}\ngamma = {gamma}\n", "c")
     assert parse_card(text + "stroke = 0.05\nbeta = 0.5\ngamma = 0.5\n", "c").effects
-
-
-@pytest.mark.parametrize("motion", ["rotary", "linear"])
-def test_hysteresis_resists_with_its_torque(motion: str) -> None:
-    model = mount(BoucWen(torque=0.8, stroke=0.05), motion=motion).model()
-    here, there = (evaluate(model, speed=0.1, **{"bouc_wen.z": z})["der(speed)"] for z in (0.5, 0.0))
-    assert (there - here) * 2.0 == pytest.approx(0.8 * 0.5, rel=1e-12)
-    units = {one.name: one.unit for one in model.parameters}
-    assert units["bouc_wen.stroke"] == ("rad" if motion == "rotary" else "m")
-    assert units["bouc_wen.torque"] == ("N.m" if motion == "rotary" else "N")
 
 
 def rates(t: float, x: np.ndarray, tau: float) -> list[float]:

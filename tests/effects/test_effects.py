@@ -1,7 +1,6 @@
 """Effects act where they say, resist, and are written with the ids and words of the contract."""
 
-from collections.abc import Callable
-from dataclasses import MISSING, fields, replace
+from dataclasses import MISSING, fields
 from typing import Any
 
 import casadi as ca
@@ -19,7 +18,6 @@ from pyfmi_models.effects import (
     DriveEffect,
     Effect,
     FrictionEffect,
-    GravityUnbalance,
     InertiaEffect,
     LoadEffect,
     Motion,
@@ -27,9 +25,7 @@ from pyfmi_models.effects import (
     StribeckEffect,
     TorqueOffset,
 )
-from pyfmi_models.effects.cable_wrap import CableWrap
 from pyfmi_models.friction import Coulomb
-from pyfmi_models.model import fields_of
 from pyfmi_models.mount import Axis, Mount
 
 CONTRACT = {
@@ -61,11 +57,6 @@ CONTRACT = {
 MULTIPLIED = ("friction_asymmetry", "stribeck", "position_friction", "thermal_viscosity")
 MULTIPLIERS = [one for one in EXAMPLES if one.id in MULTIPLIED and not one.states()]
 KINDS = (DriveEffect, FrictionEffect, LoadEffect, InertiaEffect, Coupling, SensorEffect, ClockEffect)
-DRIVES = pytest.mark.parametrize(
-    "drive", [ActuatorLag(time_constant_ms=4.0), Delay(delay_ms=4.0)], ids=lambda one: one.id
-)
-STATIC_LOADS = [Cogging(cycles_per_rev=24, amplitude=0.5, harmonics=(0.4,)), GravityUnbalance(mgl=1.5, phase=0.2)]
-STATIC_LOADS += [TorqueOffset(torque=0.7), CableWrap(stiffness=3.0, home=0.2, hardening=0.5)]
 
 
 def motion(q: float = 0.0, v: float = 0.1, turn: float = 1.0) -> Motion:
@@ -126,16 +117,6 @@ def test_an_effect_acts_in_one_place(effect: Effect) -> None:
 # Loads
 
 
-@pytest.mark.parametrize("effect", STATIC_LOADS, ids=lambda one: one.id)
-@pytest.mark.parametrize("q", [-1.0, 0.0, 0.4])
-def test_a_static_load_acts_at_standstill_as_in_motion(effect: LoadEffect, q: float) -> None:
-    load = float(effect.load(motion(q, 0.0)))
-    assert load != 0
-    assert acceleration(effect, q=q) == pytest.approx(-load / 2.0, rel=1e-12)
-    assert acceleration(effect, q=q, tau=load) == pytest.approx(0, abs=1e-12)
-    assert float(effect.load(motion(q, 5.0))) == float(effect.load(motion(q, -5.0))) == load
-
-
 def test_a_positive_offset_pushes_backward() -> None:
     assert acceleration(TorqueOffset(torque=0.7)) < 0
     assert "backward" in TorqueOffset(torque=0.7).statement()
@@ -178,16 +159,6 @@ def test_the_delays_states_have_the_moments_of_a_dead_time(order: int) -> None:
     assert term.item() == pytest.approx((-1.0) ** order / float(np.prod(np.arange(1, order + 1))), rel=1e-9)
 
 
-@DRIVES
-@pytest.mark.parametrize("scale", [0.1, 1.0, 10.0])
-def test_the_time_of_a_drive_effect_scales_its_frequencies(drive: DriveEffect, scale: float) -> None:
-    (name,) = fields_of(drive)
-    slower = replace(drive, **{name: scale * getattr(drive, name)})
-    omega = np.linspace(1, 300, 20)
-    np.testing.assert_allclose(slower.response(omega / scale), drive.response(omega), rtol=1e-12)
-    np.testing.assert_allclose(frequency_response(slower, omega / scale), frequency_response(drive, omega), rtol=1e-10)
-
-
 def test_the_plant_sends_the_command_through_its_drive_effects_in_series() -> None:
     drives = (Delay(delay_ms=4.0), ActuatorLag(time_constant_ms=3.0))
     model = Mount(name="m", axis=Axis(inertia=2.0), friction=Coulomb(Fc=0.0), effects=drives).model()
@@ -202,15 +173,3 @@ def test_the_plant_sends_the_command_through_its_drive_effects_in_series() -> No
         found = (C @ np.linalg.solve(1j * omega * np.eye(len(A)) - A, B) + D).item()
         alone = [frequency_response(drive, np.array([omega])).item() for drive in drives]
         assert found == pytest.approx(alone[0] * alone[1], rel=1e-9)
-
-
-@pytest.mark.parametrize(
-    ("kind", "call"),
-    [
-        (Effect, lambda effect: effect.statement()),
-        (LoadEffect, lambda effect: effect.load(motion())),
-    ],
-)
-def test_an_unfinished_effect_says_so(kind: type[Effect], call: Callable[[Any], Any]) -> None:
-    with pytest.raises(TypeError, match=f"{kind.__name__} has no"):
-        call(kind())

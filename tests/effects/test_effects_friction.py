@@ -49,9 +49,6 @@ def test_rubbing_heats_a_bearing_and_rest_cools_it() -> None:
     np.testing.assert_allclose(at_rest["thermal_viscosity.rise"], 10.0 * np.exp([0.0, -1.0, -3.0]), rtol=1e-6)
 
 
-# Rest
-
-
 # Load
 
 

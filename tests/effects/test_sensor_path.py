@@ -14,15 +14,6 @@ KNEE = TorqueSaturation(knee_torque=5.0, slope=0.4)
 DISC = EncoderEccentricity(cycles_per_rev=8, amplitude_rad=1e-3, phase=0.3, second=0.2)
 
 
-def applied(effect: TorqueSaturation, command: float) -> float:
-    return evaluate(mount(effect).model(), tau=command)["applied"]
-
-
-def test_without_a_slope_no_more_than_the_knee_arrives() -> None:
-    assert applied(TorqueSaturation(knee_torque=5.0), 1e4) == pytest.approx(5.0)
-    assert applied(TorqueSaturation(knee_torque=5.0), -1e4) == pytest.approx(-5.0)
-
-
 def test_the_torque_limit_acts_before_the_knee() -> None:
     model = mount(KNEE, axis=Axis(inertia=INERTIA, torque_limit=6.0)).model()
     assert evaluate(model, tau=100.0)["applied"] == pytest.approx(5.4, abs=1e-4)

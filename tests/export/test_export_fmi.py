@@ -39,16 +39,6 @@ def test_a_restored_run_repeats_its_bits(make, fmi):
     assert state.value is None
 
 
-@pytest.mark.parametrize("make", [models.lugre, models.controller])
-def test_a_serialized_state_continues_in_another_instance(make, fmi):
-    driver = instance(make, fmi)
-    content = driver.run(0, 100, 1e-3).serialize(driver.save())
-    once = everything(driver.run(0.1, 50, 1e-3))
-    other = models.Driver(make(), library(make), fmi)
-    assert other.restore(other.deserialize(content)) == "ok"
-    assert everything(other.run(0.1, 50, 1e-3)) == once
-
-
 def test_a_damaged_or_foreign_state_is_refused(fmi):
     driver = instance(models.lugre, fmi)
     content = driver.serialize(driver.save())

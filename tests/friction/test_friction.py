@@ -7,8 +7,6 @@ import casadi as ca
 import numpy as np
 import pytest
 from friction_laws import EXAMPLES, Array, numeric
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from pyfmi_models.card import parse_card, read_card
@@ -22,7 +20,6 @@ DAHL = Dahl(sigma0=9.23e4, Fc=2.322)
 SPEEDS = np.array([1e-7, 1e-4, 3e-3, 0.04, 0.7])
 BEND = 2.322 / 9.23e4
 """Level over stiffness [rad]: the scale of presliding."""
-speeds = st.floats(-1, 1).filter(lambda v: abs(v) > 1e-9)
 
 
 def pulled(law: Any, moves: Array, state: Array | None = None) -> tuple[Array, Array]:
@@ -33,16 +30,6 @@ def pulled(law: Any, moves: Array, state: Array | None = None) -> tuple[Array, A
 
 def moves(distance: float, count: int = 2000) -> Array:
     return np.full(count, distance / count)
-
-
-@given(v=speeds, share=st.floats(-1, 1))
-@settings(max_examples=50, deadline=None)
-def test_lugre_without_damping_and_peak_is_dahl_with_exponent_one(v: float, share: float) -> None:
-    """ERRATA 4: the reduction needs sigma1 = 0 and Fs = Fc; Dahl's equation carries the sign of the speed."""
-    plain = numeric(replace(LUGRE, sigma1=0.0, Fs=None, Vs=None))
-    dahl = numeric(Dahl(sigma0=9.23e4, Fc=2.322, sigma2=32.77))
-    for name in ("level", "torque", "rate", "advance"):
-        assert dahl(name, [2.322 * share], v) == pytest.approx(plain(name, [2.322 * share], v), rel=1e-12, abs=1e-10)
 
 
 @pytest.mark.parametrize("n", [0.5, 0.99, 1 - 1e-5, 1.0, 1 + 3e-5, 1.7, 2.0, 5.0])
@@ -213,14 +200,9 @@ def test_a_card_needs_only_stiffness_and_level_of_a_law_with_memory() -> None:
 
 
 SENTENCES = {
-    ("dahl", "Fc = 2"): "sigma0 is missing.",
     ("dahl", "sigma0 = 1e4"): "Fc is missing.",
     ("dahl", "sigma0 = 1e4\nFs = 2"): '"Fs" is not a key here; keys are: sigma0, Fc, n, sigma2.',
-    ("dahl", "sigma0 = -1e4\nFc = 2"): "sigma0 = -10000 is outside 1e-06 .. inf.",
     ("dahl", "sigma0 = 1e4\nFc = 2\nn = 0"): "n = 0 is outside 0.5 .. 5.",
-    ("dahl", "sigma0 = 1e4\nFc = {positive = 2, negative = -2}"): "Fc.negative = -2 is outside 1e-09 .. inf.",
-    ("dahl", "sigma0 = 1e4\nFc = [2, 3]"): "Fc = [2, 3] is not a number.",
-    ("maxwell_slip", "Fc = 2"): "sigma0 is missing.",
     ("maxwell_slip", "sigma0 = 1e4\nFc = 2\nFs = 3"): "Fs needs Vs, the speed over which friction falls.",
     ("maxwell_slip", "sigma0 = 1e4\nFc = 2\nspread = 0.5"): "spread = 0.5 is outside 1 .. 1e+06.",
     ("maxwell_slip", "sigma0 = 1e4\nFc = 2\nattraction = inf"): "attraction = inf is not a number.",

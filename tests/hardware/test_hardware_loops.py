@@ -13,7 +13,7 @@ from on_hardware import SIMULATED, scenario
 from over_udp import drive
 
 from cosim.data.recording import Recording
-from cosim.hardware import loops, move, udp, virtual
+from cosim.hardware import loops, move, udp
 from cosim.hardware.loops import Called, Threaded, bare_clock
 from cosim.hardware.machine import Machine
 from cosim.hardware.story import Story
@@ -142,11 +142,6 @@ def test_a_socket_waits_a_fifth_of_a_second_and_talks_to_one_place_only() -> Non
         assert one.gettimeout() == 0.2
         assert one.getpeername() == there.getsockname()
         one.close()
-
-
-def test_a_drive_waits_five_seconds_for_its_plant_and_is_looked_at_a_hundred_times_a_second() -> None:
-    assert (virtual.POLL, virtual.LONGEST, virtual.LEASE, virtual.AHEAD) == (0.01, 5.0, 1e9, 1000)
-    assert loops.POLL == 0.002
 
 
 STORY: dict[str, Any] = {

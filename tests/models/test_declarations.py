@@ -232,8 +232,3 @@ def test_set_points_and_pointing_declare_their_numbers() -> None:
     assert [told(one) for one in PointingError().model().outputs] == [
         *("cross_elevation [rad]", "elevation [rad]", "error [rad]")
     ]
-
-
-def test_a_variable_that_says_no_more_is_a_number_of_any_size_that_may_be_tuned() -> None:
-    plain = Variable(name="x", unit="1", description="")
-    assert (plain.start, plain.low, plain.high, plain.nominal, plain.tunable) == (0.0, -inf, inf, 1.0, True)

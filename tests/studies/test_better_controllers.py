@@ -115,17 +115,6 @@ def test_the_choice_is_the_longest_delay_margin_of_those_that_are_good_enough() 
     assert choice([invented(0.5, 50.0), invented(0.3, 46.0), invented(0.2, 40.0)]).ratio == 0.3
 
 
-def test_an_option_believes_the_friction_it_says() -> None:
-    where = condition(A)
-    believed = {knows: replace(REFERENCE, knows=knows).under(where).controller.believed for knows in KNOWLEDGE}
-    assert believed["plant"] == where.plant.friction
-    assert believed["nominal"] == where.controller.believed
-    assert len(set(map(str, believed.values()))) == 3
-
-
-KNOWLEDGE = ("nominal", "directional", "plant")
-
-
 @pytest.mark.parametrize("option", options(), ids=lambda one: one.key)
 def test_the_keys_of_an_option_make_it_in_a_card(option: Option) -> None:
     """Written as TOML into a card, the keys give the controller that was compared."""

@@ -14,7 +14,7 @@ import pytest
 
 from cosim.cli import main
 from cosim.support.errors import CosimError
-from cosim_studies.paper.checks import Check, checks
+from cosim_studies.paper.checks import checks
 from cosim_studies.paper.conditions import CASES, Condition, condition, conditions, definitions, scaled
 from cosim_studies.paper.experiment import Outcome, run
 from cosim_studies.paper.identification import Identification, identification, spread
@@ -134,20 +134,10 @@ def test_scaled_friction_keeps_its_directions() -> None:
     assert law == LuGre(sigma0=5e3, sigma1=9.0, Fc=Pair(4.0, 6.0), Fs=8.0, Vs=0.1)
 
 
-def test_the_papers_own_numbers_stand_in_its_order() -> None:
-    assert in_order(PAPER)
-    assert not in_order(PAPER | {"C2a": 1.0})
-
-
 def test_statistics_are_means_of_ratios() -> None:
     found = statistics([PAPER, {"C1": 1.0, "C2a": 0.5, "C2b": 0.5, "C3a": 0.1, "C3b": 0.8}])
     assert found["mean_ratio"]["C2a"] == pytest.approx((12.75 / 47.58 + 0.5) / 2)
     assert (found["order_share"], found["seeds"]) == (0.5, 2)
-
-
-@pytest.mark.parametrize("found", [0.9, 1.1])
-def test_a_check_says_when_a_number_is_outside(found: float) -> None:
-    assert not Check("x", found, 0.95, 1.05).met
 
 
 def test_many_jobs_go_to_many_processes_and_keep_their_order() -> None:

@@ -172,12 +172,6 @@ def test_what_was_learned_for_what_has_no_name_leaves_rivals_as_open_as_what_is_
     assert learned.sets["cable_wrap"] == ("gravity_unbalance",)
 
 
-def test_what_a_term_removes_about_turns_alone_is_nothing_unknown() -> None:
-    least = POLICY.least_away_unnamed
-    for away, expected in ((least, True), (least - LITTLE, False)):
-        assert is_left([], left(TermScores("position", 500.0, 0.0, 0.9, away)), ROUND) is expected
-
-
 def test_what_is_left_beside_a_sure_name_must_reach_its_share_of_that_evidence() -> None:
     sure = effect("delay", 80.0, 0.9)
     assert is_left([sure], left(TermScores("position", 40.0, 0.0, 0.5)), ROUND)

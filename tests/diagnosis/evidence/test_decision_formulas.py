@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from cosim.diagnosis.evidence import adequacy
-from cosim.diagnosis.evidence.adequacy import _cells, _hats, _lasting, _rms, _slow, _unexplained
+from cosim.diagnosis.evidence.adequacy import _hats, _lasting, _rms, _slow, _unexplained
 from cosim.diagnosis.evidence.marginal import Group, Marginal, _size, marginal
 from cosim.diagnosis.search.admissibility import _way_back
 from cosim.estimation.residuals import away_from_turns, removed_at_rest
@@ -33,16 +33,6 @@ def celled(given: Any) -> list[tuple[int, int, int]]:
     return [(number, math.floor(t / CELL), int(t / CELL % 1 >= 0.5)) for number, t in rows]
 
 
-@pytest.mark.parametrize("begin", [0.0, 0.1, 3.3])
-def test_a_cell_is_a_quarter_of_a_second_of_one_recording_in_two_halves(begin: float) -> None:
-    given = prepared(1.3, 0.6, begin=begin)
-    number, half = _cells(given)
-    expected = celled(given)
-    names = sorted({one[:2] for one in expected})
-    assert number.tolist() == [names.index(one[:2]) for one in expected]
-    assert half.tolist() == [one[2] for one in expected]
-
-
 @pytest.mark.parametrize("seed", range(4))
 def test_what_is_slow_and_what_lasts_are_means_over_cells_and_their_halves(seed: int) -> None:
     rng, given = np.random.default_rng(seed), prepared(2.1, 1.4)
@@ -63,23 +53,6 @@ def test_what_is_slow_and_what_lasts_are_means_over_cells_and_their_halves(seed:
     assert _slow(values, weight, given) == pytest.approx(math.sqrt(energy / total), rel=1e-12)
     assert _lasting(values, weight, given) == pytest.approx(math.sqrt(max(0.0, common / shared)), rel=1e-12)
     assert _rms(values, weight) == pytest.approx(math.sqrt(sum(weight * values**2) / sum(weight)), rel=1e-12)
-
-
-def test_rows_that_do_not_count_leave_nothing() -> None:
-    given, values = prepared(1.0), np.ones(RATE)
-    assert _rms(values, np.zeros(RATE)) == 0.0
-    assert _slow(values, np.zeros(RATE), given) == 0.0
-    assert _lasting(values, np.zeros(RATE), given) == 0.0
-    opposed = np.where(_cells(given)[1] == 0, 1.0, -1.0)
-    assert _lasting(opposed, np.ones(RATE), given) == 0.0, "halves against each other have nothing in common"
-
-
-def test_the_lightest_weight_still_counts() -> None:
-    """What all rows weigh makes no difference, however little that is."""
-    given, values = prepared(1.0), np.random.default_rng(1).normal(1, 1, RATE)
-    for size in (_slow, _lasting):
-        assert size(values, np.full(RATE, 1e-9), given) == pytest.approx(size(values, np.ones(RATE), given), rel=1e-9)
-    assert _rms(values, np.full(RATE, 1e-9)) == pytest.approx(_rms(values, np.ones(RATE)), rel=1e-9)
 
 
 def test_beside_columns_is_what_weighted_least_squares_leave() -> None:
