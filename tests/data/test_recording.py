@@ -226,29 +226,6 @@ def test_a_stream_that_finds_the_disk_full_says_so_and_leaves_nothing(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    ("text", "factor", "si"),
-    [
-        ("arcmin", np.pi / 10800, "rad"),
-        ("rev", 2 * np.pi, "rad"),
-        ("rpm", np.pi / 30, "rad/s"),
-        ("urad", 1e-6, "rad"),
-        ("mrad", 1e-3, "rad"),
-        ("arcsec/s", np.pi / 648000, "rad/s"),
-        ("deg/s^2", np.pi / 180, "rad/s2"),
-        ("um", 1e-6, "m"),
-        ("Ncm", 1e-2, "N.m"),
-        ("mN m", 1e-3, "N.m"),
-        ("kN", 1e3, "N"),
-        ("N.m/deg", 180 / np.pi, "N.m/rad"),
-        ("m.s-2", 1.0, "m.s-2"),
-    ],
-)
-def test_units_have_their_size(text: str, factor: float, si: str) -> None:
-    np.testing.assert_allclose(unit(text).factor, factor, rtol=1e-15)
-    assert unit(text).si == si
-
-
 def test_units_of_different_kinds_do_not_mix() -> None:
     assert conversion("N.m", "mN.m") == (1000.0, 0.0)
     assert conversion("", "V") == (1.0, 0.0)

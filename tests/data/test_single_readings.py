@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.data.resolution import resolution
 from cosim.data.single_readings import cleaned
 from cosim.diagnosis.measure.protocol import heldout_rms
 from cosim.diagnosis.trust.doubts import single_readings
@@ -127,13 +126,6 @@ def test_many_false_readings_are_not_single() -> None:
     q = np.where(rng.random(len(good)) < 0.05, -3.14, good["q"])
     run = replace(good, table=good.table | {"q": q})
     assert cleaned(run) is run
-
-
-@pytest.mark.parametrize("step", [3e-5, 3e-4, 3e-3])
-def test_the_step_of_an_encoder_is_seen_and_noise_has_none(step: float) -> None:
-    assert resolution(motion(step)["q"]) == pytest.approx(step, rel=1e-3)
-    assert resolution(motion(0.0, 1e-4)["q"]) == 0
-    assert resolution(motion(0.0, 0.0)["q"]) == 0
 
 
 def test_a_diagnosis_leaves_them_out_before_anything_is_fitted() -> None:

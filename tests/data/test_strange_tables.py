@@ -36,7 +36,6 @@ def wide(*columns: np.ndarray, names: Sequence[str] = ()) -> str:
 
 
 MITSUBISHI = "Axis1\nNumber of sampling data,4\nSampling time interval(ms),0.667\n"
-ODRIVE = "%motor characterization\n%timestep (500Hz),voltage,position,velocity\n%[#],[V],[turns],[turns/s]\n"
 TEK = [["Record Length", "2500", ""], ["Sample Interval", "4e-5", ""], ["Source", "CH1", ""]]
 BESIDE = [TEK[row] if row < len(TEK) else ["", "", ""] for row in range(ROWS)]
 
@@ -242,11 +241,3 @@ def test_a_column_that_was_given_is_not_proposed_again(tmp_path: Path) -> None:
     path.write_text(rows(*S, 7 * QL))
     with pytest.raises(RecordingError, match=r"for example --columns tau=#3\. First rows as read"):
         Recording.read(path, {"t": "#1", "q": "#2"})
-
-
-def test_a_file_without_names_and_without_a_torque_is_shown_as_a_table(tmp_path: Path) -> None:
-    path = tmp_path / "run.csv"
-    path.write_text(rows(LONG, QL))
-    shown = preview(path, {"columns": {"t": "#1", "q": "#2"}})
-    assert "has no column tau" in shown.refused
-    assert shown.recording.columns == ("t", "q")

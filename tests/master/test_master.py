@@ -19,7 +19,6 @@ import cosim.master.execution
 import cosim.master.loop
 from cosim.data.recording import Recording
 from cosim.fmi.fmu import FmuComponent
-from cosim.master.execution import chunks
 from cosim.master.result import RunResult
 from cosim.support.errors import FmuError, OutputError, StepError
 from cosim.system.wire import Record, Wire
@@ -212,13 +211,6 @@ def test_after_an_error_only_freeing_and_after_a_fatal_one_nothing_is_called(
     plant_calls, other_calls = (ctypes.c_char.in_dll(one, "calls") for one in both)
     assert ctypes.string_at(ctypes.addressof(plant_calls)).decode() == allowed
     assert ctypes.string_at(ctypes.addressof(other_calls)).decode() == ("" if status == 4 else "TF")
-
-
-def test_a_run_whose_steps_are_quick_is_taken_in_few_pieces_that_are_all_of_it() -> None:
-    pieces = list(chunks(1_000_000))
-    np.testing.assert_array_equal(np.concatenate(pieces), np.arange(1_000_000))
-    assert len(pieces[0]) == 16, "how long a step takes is not known yet"
-    assert len(pieces) < 300
 
 
 def test_a_recording_for_which_there_is_no_room_is_refused(tiny: Tiny, tmp_path: Path) -> None:

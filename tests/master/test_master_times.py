@@ -14,7 +14,6 @@ from tiny_fmu import tiny
 import cosim.master.execution
 from cosim.fmi.component import Port
 from cosim.master.execution import chunks
-from cosim.master.isolated import _end
 from cosim.master.loop import library
 from cosim.master.loop.shared import opened
 from cosim.master.pool import Pool
@@ -132,21 +131,6 @@ def test_a_wire_scales_shifts_and_rounds_in_its_own_unit_before_it_is_converted(
     value = gain * sent + offset
     rounded = quantum * np.floor(value / quantum + 0.5) if quantum else value
     np.testing.assert_allclose(run.recording["a"], np.radians(rounded), atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("code", "text"),
-    [
-        (0, "ended its process with exit code 0"),
-        (3, "ended its process with exit code 3"),
-        (-11, "crashed: SIGSEGV, segmentation fault,"),
-        (-9, "crashed: SIGKILL, killed, perhaps because memory ran out,"),
-        (-15, "crashed: SIGTERM,"),
-        (-99, "crashed with signal 99"),
-    ],
-)
-def test_how_a_component_ended_its_process_is_said_by_its_exit_code(code: int, text: str) -> None:
-    assert _end(code) == text
 
 
 @pytest.mark.parametrize(

@@ -55,6 +55,14 @@ def test_what_is_slow_and_what_lasts_are_means_over_cells_and_their_halves(seed:
     assert _rms(values, weight) == pytest.approx(math.sqrt(sum(weight * values**2) / sum(weight)), rel=1e-12)
 
 
+def test_the_lightest_weight_still_counts() -> None:
+    """What all rows weigh makes no difference, however little that is."""
+    given, values = prepared(1.0), np.random.default_rng(1).normal(1, 1, RATE)
+    for size in (_slow, _lasting):
+        assert size(values, np.full(RATE, 1e-9), given) == pytest.approx(size(values, np.ones(RATE), given), rel=1e-9)
+    assert _rms(values, np.full(RATE, 1e-9)) == pytest.approx(_rms(values, np.ones(RATE)), rel=1e-9)
+
+
 def test_beside_columns_is_what_weighted_least_squares_leave() -> None:
     rng = np.random.default_rng(3)
     residual, columns, weight = rng.normal(0, 1, 60), rng.normal(0, 1, (60, 3)), rng.choice([0.0, 1.0, 4.0], 60)

@@ -112,6 +112,11 @@ def test_beside_a_strong_effect_a_further_one_must_be_stronger_than_alone() -> N
     assert least(POLICY, 1e4, 0.9) == highest
 
 
+def test_alone_what_removes_much_needs_less_evidence_than_what_removes_little() -> None:
+    assert least(POLICY, 0.0, POLICY.large_gain - 0.01) == POLICY.least_evidence
+    assert least(POLICY, 0.0, POLICY.large_gain) == POLICY.evidence_if_large < POLICY.least_evidence
+
+
 def test_a_rival_is_fitted_from_where_the_others_stand_too_as_alone_they_may_have_gone_astray() -> None:
     comparison, _ = compared(lambda q, v: 1.5 * np.exp(-(((q - 0.1) / 0.04) ** 2) / 2) * np.sign(v) + q)
     problem = comparison.problem
