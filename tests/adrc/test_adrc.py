@@ -55,6 +55,16 @@ def kick(t: float) -> tuple[float, float, float]:
     return (0.0, 0.0, 1.0 if round(t / H) == 10 else 0.0)
 
 
+@pytest.mark.parametrize("limit", [LIMIT, 1e6])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_command_is_the_control_law_within_the_limit(limit: float, sign: int) -> None:
+    """Equation (7) with a fresh observer: zeta2 = zeta3 = 0."""
+    model = controller(torque_limit=limit)
+    values = [variable.start for variable in model.parameters]
+    _, outputs = model.equations(0, [0] * len(model.states), [sign * one for one in (0.01, 0.03, 0.2, 0.5)], values)
+    assert float(outputs[0]) == pytest.approx(sign * min(limit, J * (0.5 + 225 * 0.02 + 30 * 0.2)))
+
+
 def test_the_observer_is_fed_the_command_that_acted() -> None:
     """An impulse of tick 10 acts from tick 11: an observer fed with it at that moment is never surprised."""
     found = run(controller(), 200, reference=kick)

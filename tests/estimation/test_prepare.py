@@ -8,8 +8,6 @@ from wandering import recorded, wander
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.trust.admission import check_recordings
-from cosim.diagnosis.trust.judgement import judged
-from cosim.diagnosis.trust.likelihood import Reference
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.filters import derivative, lowpass, noise_of
 from cosim.estimation.inverse import Inverse
@@ -143,12 +141,6 @@ class TestPreparation:
         given = Recording("run", {"t": t, "tau": v, name: np.cumsum(v) / rate if name == "q" else v})
         with pytest.raises(RecordingError, match=rule) if rule else nullcontext():
             check_recordings([given], [given])
-
-    def test_a_constant_speed_says_nothing_about_units(self) -> None:
-        t = np.arange(5000) / 500
-        ripple = 1e-3 * np.sin(3 * t)
-        run = Recording("steady", {"t": t, "tau": 2.0 + ripple, "v": 0.4 + 10 * ripple})
-        assert judged([run], [], Reference(5.0, 2.0)) == ()
 
 
 def test_what_is_thinned_keeps_no_full_recording_alive() -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from alpaca_mount import ARCSEC, BEGUN, server, telescope, until
+from alpaca_mount import ARCSEC, server, telescope, until
 
 from cosim_observatory.pointing import HORIZON
 from cosim_observatory.sky import equatorial, horizontal, sidereal_time
@@ -154,23 +154,6 @@ def test_errors_are_those_of_the_standard(telescope: Any) -> None:
     with pytest.raises(exceptions.NotConnectedException):
         telescope.Altitude  # noqa: B018
     telescope.Connected = True
-
-
-def test_what_it_is_and_can_is_told(telescope: Any) -> None:
-    telescope.Connect()
-    assert not telescope.Connecting
-    assert telescope.InterfaceVersion == 4
-    assert telescope.Name == "mount-cosim simulated mount"
-    assert telescope.SiteLatitude == pytest.approx(49.0)
-    assert telescope.SiteLongitude == pytest.approx(9.0)
-    assert telescope.CanSlewAsync
-    assert not telescope.CanSlew
-    assert [int(rate) for rate in telescope.TrackingRates] == [0]
-    assert telescope.AlignmentMode.value == 0
-    assert telescope.EquatorialSystem.value == 1
-    assert telescope.UTCDate.replace(tzinfo=UTC) > BEGUN
-    state = {one["Name"]: one["Value"] for one in telescope.DeviceState}
-    assert {"Altitude", "Slewing", "UTCDate", "TimeStamp"} <= set(state)
 
 
 def test_directions_and_places_on_the_sky_are_each_others_inverse() -> None:
