@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 from pydantic import ValidationError
-from test_declarations import told
+from test_parameter_ranges import told
 
 from pyfmi_models.adrc import Adaptation, Gains, Learning
 from pyfmi_models.adrc.controller import INPUTS, MEMORY, OUTPUTS
