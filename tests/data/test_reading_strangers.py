@@ -60,12 +60,6 @@ def test_a_unit_that_is_not_known_costs_nothing_where_its_column_is_not_used(tmp
     np.testing.assert_allclose(read["lost motion"], Q, atol=1e-8)
 
 
-def test_a_unit_in_square_brackets_that_is_not_known_is_asked_for(tmp_path: Path) -> None:
-    path = written(tmp_path, "t,torque [stones],position [rad]", T, TAU, Q)
-    with pytest.raises(UndecidedError, match='"stones" of column "torque" is no unit known here; say which it is in'):
-        Recording.read(path)
-
-
 def test_a_number_in_brackets_is_no_unit(tmp_path: Path) -> None:
     path = written(tmp_path, "t,torque(0),position(0)", T, TAU, Q)
     np.testing.assert_allclose(Recording.read(path)["tau"], TAU, atol=1e-8)

@@ -10,7 +10,7 @@ from pyarrow import parquet
 from scipy.io import savemat
 
 from cosim.data.recording import Recording
-from cosim.support.errors import RecordingError, UndecidedError
+from cosim.support.errors import UndecidedError
 
 TA, TQ = np.arange(2000) / 1000, 3e-4 + np.arange(1000) / 500
 TAU, Q = np.cos(9 * TA), 0.1 * np.sin(9 * TQ)
@@ -117,9 +117,3 @@ def test_samples_of_one_time_that_differ_are_asked_for_in_a_channel_too(tmp_path
     with pytest.raises(UndecidedError, match=r"values differ at its sample 701 .* --layout repeated=first"):
         Recording.read(path)
     assert len(Recording.read(path, layout={"repeated": "last"})) == len(TQ) - 1  # its interval is half empty
-
-
-def test_channels_without_a_common_time_are_refused(tmp_path: Path) -> None:
-    path = npz(tmp_path / "run", {"t_tau": TA, "tau": TAU, "t_q": TQ + 10, "q": Q})
-    with pytest.raises(RecordingError, match="have no times in common"):
-        Recording.read(path)

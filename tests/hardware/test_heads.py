@@ -74,8 +74,9 @@ def test_the_mean_of_four_heads_is_free_of_eccentricity_and_one_head_is_not(tmp_
 FAILURES = {"silent": "silent_head", "frozen": "frozen_head", "astray": "stray_head"}
 
 
-@pytest.mark.parametrize("head", range(4))
-@pytest.mark.parametrize("why", FAILURES)
+@pytest.mark.parametrize(
+    ("why", "head"), [("silent", 0), ("frozen", 0), ("astray", 0), ("silent", 1), ("frozen", 2), ("astray", 3)]
+)
 def test_one_head_that_fails_is_named_and_left_out_without_a_step(tmp_path: Path, why: str, head: int) -> None:
     inject = Inject(kind=FAILURES[why], at=AT, size=1e-3, head=head)
     done, found = followed(tmp_path, encoder(4, inject))
