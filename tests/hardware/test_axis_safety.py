@@ -66,6 +66,13 @@ def test_the_torque_changes_by_the_slew_limit_a_cycle_at_most_either_way() -> No
     assert [record.torque, *torques(bench, 2)] == pytest.approx([7, 4, 1])
 
 
+def test_a_limit_tightened_below_the_torque_holds_at_once_however_slow_the_slew_is() -> None:
+    bench = commanding(10.0, {"slew": 3.0 / STEP})
+    torques(bench, 5)
+    assert bench.cycle(change=LIMITS.index("torque") + 1, value=2.0).torque == 2.0
+    assert torques(bench, 2) == [2.0, 2.0]
+
+
 def test_a_quick_stop_takes_the_torque_to_zero_along_its_own_slew_and_then_leaves() -> None:
     bench = commanding(10.0, stop_slew=3.0 / STEP)
     torques(bench, 2)

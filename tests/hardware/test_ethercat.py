@@ -76,17 +76,6 @@ def test_what_a_machine_file_does_not_say_of_the_bus_is_what_the_documentation_s
     assert {one.mapped & 0xFF00 for one in (*default.outputs, *default.inputs)} == {0}
 
 
-@pytest.mark.parametrize(
-    ("name", "low", "high"), [("object", 1, 0xFFFF), ("subindex", 0, 255)], ids=["object", "subindex"]
-)
-def test_an_entry_has_the_numbers_that_a_mapping_has_room_for(name: str, low: int, high: int) -> None:
-    rest = {"object": 0x6040, "bits": 16}
-    assert [getattr(Entry(**rest | {name: one}), name) for one in (low, high)] == [low, high]  # type: ignore[arg-type]
-    for beyond in (low - 1, high + 1):
-        with pytest.raises(ValueError, match=name):
-            Entry(**rest | {name: beyond})  # type: ignore[arg-type]
-
-
 def test_the_mapping_written_into_the_drive_is_that_of_the_machine_file(
     tmp_path: Path, bus: type[fake_soem.Master]
 ) -> None:

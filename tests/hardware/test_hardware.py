@@ -67,22 +67,6 @@ def test_after_a_fault_the_controller_starts_afresh_and_follows_again(tmp_path: 
     assert replay(recorded(tmp_path)).identical
 
 
-def test_torque_grows_from_zero_and_leaves_by_a_ramp(tmp_path: Path) -> None:
-    far = scenario(("smooth_start = 0.1", "smooth_start = 0.1\nphase = 0.2"))
-    with session(tmp_path, what=far) as one:
-        one.enable()
-        one.track(1000)
-        one.disable()
-    found = recorded(tmp_path)
-    first = int(np.flatnonzero(found["machine.notes"].astype(int) & 1)[0])
-    order = found["machine.order"]
-    ramp = 50.0 * np.arange(1, 201) / 200
-    assert np.all(np.abs(order[first : first + 200]) <= ramp * (1 + 1e-12))
-    stop = np.abs(order[found["machine.state"] == 5])
-    assert np.all(np.diff(stop) <= 0)
-    assert np.allclose(-np.diff(stop)[:-1], 0.5)
-
-
 def entered(folder: Path, position: float) -> np.ndarray:
     """Return the orders of a session that enters operation with the axis at rest at a position, and follows a ramp."""
     sine = 'kind = "sine"\nfrequency = 1.0\nmax_velocity = 2e-3\nsmooth_start = 0.1'
@@ -100,25 +84,6 @@ def test_entry_is_bumpless_wherever_the_axis_is(tmp_path: Path) -> None:
     assert np.abs(at_zero[:50]).max() < 0.5, "the observer begins at the measured position"
     assert np.abs(at_zero).max() > 0.1
     assert np.allclose(elsewhere, at_zero, atol=1e-6), "what rounding does"
-
-
-@pytest.mark.parametrize(("name", "value", "note"), [("torque", 1.0, 4), ("slew", 5.0, 8)])
-def test_torque_and_slew_keep_to_limits_tightened_on_the_way(
-    tmp_path: Path, name: str, value: float, note: int
-) -> None:
-    with session(tmp_path) as one:
-        one.enable()
-        one.track(500)
-        one.tighten(name, value)
-        tightened = one.status.tick
-        one.track(1500)
-    found = recorded(tmp_path)
-    order, operating = found["machine.order"], found["machine.state"] == 4
-    seen = operating & (found["machine.tick"] > tightened)
-    measured = np.abs(order) if name == "torque" else np.abs(np.diff(order, prepend=0.0)) / 1e-4
-    assert measured[seen].max() <= value * (1 + 1e-9)
-    assert (found["machine.notes"][seen].astype(int) & note).any(), "the limit was met"
-    assert replay(found).identical
 
 
 def test_a_limit_is_never_loosened_while_enabled(tmp_path: Path) -> None:

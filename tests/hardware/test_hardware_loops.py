@@ -10,15 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 from on_hardware import SIMULATED, scenario
-from over_udp import drive
 
 from cosim.data.recording import Recording
-from cosim.hardware import loops, move, udp
+from cosim.hardware import loops, move
 from cosim.hardware.loops import Called, Threaded, bare_clock
 from cosim.hardware.machine import Machine
 from cosim.hardware.story import Story
 from cosim.hardware.structures import CSession
-from cosim.hardware.udp import UdpDrive, reach
+from cosim.hardware.udp import reach
 from cosim.support.errors import HardwareError
 
 
@@ -123,16 +122,6 @@ def test_a_clock_sleeps_between_its_edges_and_is_not_early() -> None:
     assert edges + late >= 10
     assert monotonic() - began >= 0.02 * 9
     assert process_time() - awake < 0.05
-
-
-def test_a_loop_without_a_clock_waits_a_second_for_its_drive_and_asks_eight_times_whether_it_is_there() -> None:
-    with drive() as there:
-        machine = SIMULATED.model_copy(update={"adapter": there.url})
-        one = UdpDrive(machine, 1e-4, True)
-        assert (one.udp.patience, one.udp.spin) == (1_000_000_000, 0)
-        assert not one.python, "its loop is a process of its own"
-        one.close()
-    assert (udp.TRIES, udp.PATIENCE) == (8, 0.2)
 
 
 def test_a_socket_waits_a_fifth_of_a_second_and_talks_to_one_place_only() -> None:

@@ -10,7 +10,7 @@ from cosim.data.recording import Recording
 from cosim.hardware import look as looking
 from cosim.hardware.look import look
 from cosim.hardware.replay import LAST, _check_ticks, _exact
-from cosim.hardware.virtual import parse_injection, plant_of
+from cosim.hardware.virtual import plant_of
 from cosim.hardware.wired import _ends, refuse_what_has_no_machine
 from cosim.hardware.words import LIMITS
 from cosim.support.errors import HardwareError
@@ -109,20 +109,6 @@ def test_cycles_begin_with_the_session_and_follow_each_other_less_those_that_wer
         return
     with pytest.raises(HardwareError, match=rule):
         _check_ticks(NOTHING, *given)
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("lost", {"kind": "lost", "at": 0.0}),
-        ("lost:1.5", {"kind": "lost", "at": 1.5}),
-        ("late:1:2:3", {"kind": "late", "at": 1.0, "lasts": 2.0, "size": 3.0}),
-    ],
-)
-def test_an_injection_has_up_to_three_numbers(text: str, said: dict[str, object]) -> None:
-    assert parse_injection(text) == said
-    with pytest.raises(HardwareError, match=r"the form is KIND\[:AT\[:LASTS\[:SIZE\]\]\]"):
-        parse_injection("late:1:2:3:4")
 
 
 @pytest.mark.parametrize(
