@@ -98,9 +98,9 @@ def test_what_is_plugged_in_is_imported_by_itself_alone(plug_in: str) -> None:
             assert f'"{plug_in}' not in path.read_text("utf-8") or name == "cosim.master.loop.build_hook", name
 
 
-@pytest.mark.parametrize("name", FILES)
-def test_physics_and_what_is_heavy_stay_where_they_belong(name: str) -> None:
-    for other in imports(name):
+@pytest.mark.parametrize("folder", sorted({folder_of(name) for name in FILES}))
+def test_physics_and_what_is_heavy_stay_where_they_belong(folder: str) -> None:
+    for name, other in ((one, other) for one in FILES if folder_of(one) == folder for other in imports(one)):
         if belongs(name, "pyfmi_models"):
             assert not belongs(other, "cosim", "cosim_studies"), f"{name} imports {other}: physics knows no runner"
         elif belongs(other, "pyfmi_models"):
