@@ -135,9 +135,10 @@ def _lines(done: Calibrated) -> list[str]:
     """The summary for a terminal."""
     lines = [f"{done.subject.source.name}: {done.evaluations:,} simulations"]
     for row in number_rows(done):
-        error = f"± {row['error']}" if row["error"] != "not determined" else "(not determined)"
+        error = f"± {row['error']}" if row["error"] != "not determined" else "± unknown"
         bound = "; at its bound" if deliver.at_bound(done, row["name"]) else ""
-        lines.append(f"  {row['name']} = {row['value']} {error} {row['unit']} (was {row['start']}{bound})")
+        unit = f" {row['unit']}" if row["unit"] != "1" else ""
+        lines.append(f"  {row['name']} = {row['value']} {error}{unit} (was {row['start']}{bound})")
     lines += [one.statement for one in done.uncertainty.not_determined]
     lines += _pairs(done)
     for one in done.traces:
@@ -145,7 +146,8 @@ def _lines(done: Calibrated) -> list[str]:
         before, after = number(one.rms(one.before), 3), number(one.rms(one.after), 3)
         lines.append(f"  {one.recording}{kept}: {one.output} RMS error {before} -> {after} {one.unit}".rstrip())
     if done.lost:
-        lines.append(f"{len(done.lost)} points could not be simulated, the last one: {done.lost[-1]}")
+        points = "1 point" if len(done.lost) == 1 else f"{len(done.lost):,} points"
+        lines.append(f"{points} could not be simulated; the last time because: {done.lost[-1]}")
     return [*lines, *done.notes]
 
 

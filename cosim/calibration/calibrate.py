@@ -131,6 +131,7 @@ def calibrate(
     _check_kept_out(train, heldout)
     _check_set(subject, options)
     free = free_of(subject, options.free, options.given, options.bounds)
+    _check_columns(options.columns, (*train, *heldout))
     matched = [matching(subject, one, options.columns) for one in (*train, *heldout)]
     laid = [
         experiment_of(subject, one, match, options.step, options.interpolation)
@@ -169,6 +170,17 @@ def calibrate(
     traces = _traces(subject, whole, len(train), old, new)
     initial = {one.name: values.pop(one.name) for one in own}
     return Calibrated(subject, free, values, uncertainty, traces, found, evaluations, lost, (*notes, *remarks), initial)
+
+
+def _check_columns(columns: Mapping[str, str], recordings: Sequence[Recording]) -> None:
+    """Refuse the name of a column that no recording has; each may call its columns in its own way (InputError)."""
+    left_out = " ".join(note for one in recordings for note in one.notes)
+    for name, column in columns.items():
+        known = name == "t" or f'column "{column}" was left out' in left_out  # which has its own sentence
+        if not known and not any(column in one for one in recordings):
+            have = tuple(dict.fromkeys(each for one in recordings for each in one.columns if each != "t"))
+            text = f'--columns {name}={column}: no recording has a column "{column}"; they have: {", ".join(have)}.'
+            raise InputError(text, culprit=column, value=column, choices=have)
 
 
 def _afterwards(processes: Processes, values: Point, all_: slice, fitted: Outputs | None) -> Outputs | None:

@@ -21,6 +21,7 @@ EXAMPLES = {
     "identify": (
         "cosim identify steps.csv --card axis.toml",
         "cosim identify swing.csv --card axis.toml --free Fc --free inertia --out numbers",
+        "cosim identify --fmu theirs.fmu --free Motor.J Motor.Fc run1.csv run2.csv --heldout run3.csv",
     ),
     "card": ("cosim card monday.csv tuesday.csv --out axis.toml", "cosim card run.csv --motion linear --inertia 12"),
     "compare": ("cosim compare monday.csv tuesday.csv", "cosim compare run_1 measured.csv --out difference"),
@@ -30,13 +31,17 @@ EXAMPLES = {
     ),
     "show": ("cosim show recording.csv", "cosim show cogging"),
     "run": ("cosim run sidereal", "cosim run sidereal --set controller.kp=400 --stop 5 --out tuned"),
-    "export": ("cosim export paper_mount", "cosim export axis.toml --fmi 3 --ssp --out fmus"),
+    "export": (
+        "cosim export paper_mount",
+        "cosim export axis.toml --fmi 3 --ssp --out fmus",
+        "cosim export sidereal --as-fmu --out fmus",
+    ),
     "sweep": ("cosim sweep gains.toml", "cosim sweep gains.toml --workers 4 --out gains"),
     "check": ("cosim check plant.fmu", "cosim check plant.fmu --json"),
     "hardware": ("cosim hardware check machine.toml", "cosim hardware run --help"),
     "doctor": ("cosim doctor", "cosim doctor --json"),
 }
-"""Two command lines of each verb: the plainest, and one with what is asked for most."""
+"""Command lines of each verb: the plainest, one with what is asked for most, one of another use where there is one."""
 
 
 def group_of(verb: str, module: ModuleType) -> str:

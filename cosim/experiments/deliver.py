@@ -55,7 +55,8 @@ def lines_of(done: Checked) -> list[str]:
     lines = [f"{done.path.name}: {WORDS[done.passed]}" + (f" ({done.standard})" if done.standard else "")]
     for one in done.outcomes:
         word = WORDS[one.passed] if one.run else "not run"
-        count = f"{len(one.compared)} variables" if one.compared else one.reason.removeprefix("not run: ")
+        several = "s" * (len(one.compared) > 1)
+        count = f"{len(one.compared)} variable{several}" if one.compared else one.reason.removeprefix("not run: ")
         lines.append(f"  {word}  {one.experiment.name} ({one.experiment.purpose}): {count}")
         lines += [f"        {_sentence(row)}" for row in one.compared if not row.passed]
         lines += [f"        {note}" for note in one.notes]

@@ -201,7 +201,8 @@ def _until_ended(reference: Series, settings: Settings, done: int) -> tuple[Seri
     said = f"The FMU asked to end the simulation in the step to {ended:g} s"
     if reference.times[-1] > ended + ON_TICK * settings.step or not rows.any():
         raise FmuError(f"{said}, and its reference goes on to {reference.times[-1]:g} s.", culprit="reference")
-    left = f"; {int((~rows).sum())} rows there are not compared" if not rows.all() else ""
+    count = int((~rows).sum())
+    left = f"; {count:,} row{'s are' if count > 1 else ' is'} left out of the comparison" if count else ""
     numbers = {name: values[rows] for name, values in reference.numbers.items()}
     texts = {name: cells[: int(rows.sum())] for name, cells in reference.texts.items()}
     return Series(reference.times[rows], numbers, texts, reference.strange), f"{said}{left}."

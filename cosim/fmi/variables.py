@@ -42,12 +42,15 @@ def ports_of(description: Any, sizes: Mapping[str, int] | None = None) -> dict[s
 
 
 def variables_of(description: Any, sizes: Mapping[str, int] | None = None) -> Iterator[Port]:
-    """Yield the variables of a model description under each of their names, arrays whole; arguments of `ports_of`."""
-    own = _own_units(description)
+    """Yield the variables of a model description under each of their names, arrays whole; arguments of `ports_of`.
+
+    Some releases of FMPy list an alias of FMI 3 among the variables too, with its own description.
+    """
+    own, listed = _own_units(description), {one.name for one in description.modelVariables}
     for variable in description.modelVariables:
         shape = tuple(_size(one, sizes or {}) for one in variable.dimensions) if variable.dimensions else ()
         yield _port(variable, variable.name, own, shape)
-        for alias in variable.aliases or ():
+        for alias in (one for one in variable.aliases or () if one.name not in listed):
             yield _port(variable, alias.name, own, shape)
 
 

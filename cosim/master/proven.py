@@ -48,7 +48,7 @@ class Proven:
 
     def __str__(self) -> str:
         unit = self.unit and f" {self.unit}"
-        beyond = self.greatest if self.value > self.high else self.least
+        beyond = self.greatest if self.greatest - self.high > self.low - self.least else self.least
         said = f"{self.signal} leaves the range in which {self.signal.owner} is proven at {self.first:g} s"
         return f"{said}: {self.value:.4g}{unit}, proven {self.low:.4g} to {self.high:.4g}; at most it is {beyond:.4g}."
 

@@ -15,6 +15,8 @@ from pyfmi_models.effects.learned_base import LearnedEffect
 from pyfmi_models.export.related import Related
 
 BLOCKS = "▁▂▃▄▅▆▇█"
+WIDTH = 24
+"""Most blocks of a curve: its table then fits a terminal of 80 columns."""
 FILE = "maps.json"
 
 
@@ -60,7 +62,9 @@ def _rows(one: JsonObject) -> Iterator[dict[str, Json]]:
 
 
 def curve(values: list[float]) -> str:
-    """Draw values as blocks from the lowest to the highest."""
+    """Draw values as blocks from the lowest to the highest, evenly taken where there are more than `WIDTH`."""
+    if len(values) > WIDTH:
+        values = [values[round(k * (len(values) - 1) / (WIDTH - 1))] for k in range(WIDTH)]
     low, high = min(values), max(values)
     size = high - low or 1.0
     return "".join(BLOCKS[min(len(BLOCKS) - 1, int((value - low) / size * len(BLOCKS)))] for value in values)

@@ -66,8 +66,10 @@ def test_columns_are_matched_by_name_option_and_unit(fmus):
     done = found(turned, fmu=fmus[3], free=list(TRUTH), columns=given, units={"speed": "deg/s"}, starts=1)
     assert all(abs(done.numbers[name] - value) < 4 * done.standard_errors[name] for name, value in TRUTH.items())
     assert any("not used: other" in note for note in done.calibrated.notes)
-    with pytest.raises(cosim.InputError, match='has no column "nothing"'):
+    with pytest.raises(cosim.InputError, match='no recording has a column "nothing"; they have: current'):
         found(turned, fmu=fmus[3], free=["J"], columns={"w": "nothing"})
+    with pytest.raises(cosim.InputError, match='no recording has a column "seed"'):
+        found(table, fmu=fmus[3], free=["J"], columns={"w": "seed"})  # never that of the variable's own name instead
     with pytest.raises(cosim.InputError, match="none of its columns"):
         found(turned, fmu=fmus[3], free=["J"])
     with pytest.raises(cosim.InputError, match="does not fit w"):

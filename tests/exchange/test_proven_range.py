@@ -147,3 +147,10 @@ def test_the_ends_of_a_proven_range_belong_to_it_and_rounding_does_too(value: fl
     watched.see(np.array([0.0, 0.5]), np.array([0.0, value]))
     assert (watched.first, watched.value) == ((0.5, value) if is_outside else (float("inf"), 0.0))
     assert (watched.least, watched.greatest) == (min(0.0, value), max(0.0, value))
+
+
+@pytest.mark.parametrize(("values", "farthest"), [([-2.5, 0.0, 9.0], "9"), ([6.5, 0.0, -7.0], "-7"), ([6.5, 8.0], "8")])
+def test_the_value_farthest_outside_is_told_on_whichever_side_the_range_was_left_first(values, farthest) -> None:
+    watched = Proven(PortRef("a.w"), -2.0, 6.0, "rad/s")
+    watched.see(np.arange(float(len(values))), np.array(values))
+    assert f"at 0 s: {values[0]} rad/s, proven -2 to 6; at most it is {farthest}." in str(watched)

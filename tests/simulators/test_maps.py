@@ -10,7 +10,7 @@ from fmpy.validation import validate_fmu
 
 from cosim.api.export import export
 from cosim.api.show import show
-from cosim.models.maps import curve, maps_of
+from cosim.models.maps import WIDTH, curve, maps_of
 from pyfmi_models.card import read_card
 
 CARD = """[mount]
@@ -70,3 +70,10 @@ def test_an_fmu_carries_its_maps_and_stays_valid(card: Path, tmp_path: Path) -> 
 
 def test_a_flat_map_is_drawn_too() -> None:
     assert curve([2.0, 2.0]) == "▁▁"
+
+
+def test_a_long_map_is_drawn_from_end_to_end_in_one_line() -> None:
+    drawn = curve([float(k) for k in range(101)])
+    assert len(drawn) == WIDTH
+    assert (drawn[0], drawn[-1]) == ("▁", "█")
+    assert list(drawn) == sorted(drawn)
