@@ -128,10 +128,9 @@ def calibrate(
     if options.derivatives == "directional" and not subject.alone:
         text = f"--derivatives directional is of one FMU, and {subject.source} is a system; leave it out."
         raise InputError(text, culprit="--derivatives", value=options.derivatives)
-    _check_kept_out(train, heldout)
+    _check_recordings(train, heldout, options.columns)
     _check_set(subject, options)
     free = free_of(subject, options.free, options.given, options.bounds)
-    _check_columns(options.columns, (*train, *heldout))
     matched = [matching(subject, one, options.columns) for one in (*train, *heldout)]
     laid = [
         experiment_of(subject, one, match, options.step, options.interpolation)
@@ -232,6 +231,11 @@ def _check(options: Options) -> None:
     for name, number in (("--step", options.step), ("--window", options.window), ("--timeout", options.timeout)):
         if number is not None and not 0 < number < float("inf"):
             raise InputError(f"{name} {number:g}: it must be above 0.", culprit=name, value=number)
+
+
+def _check_recordings(train: Sequence[Recording], heldout: Sequence[Recording], columns: Mapping[str, str]) -> None:
+    _check_kept_out(train, heldout)
+    _check_columns(columns, (*train, *heldout))
 
 
 def _check_kept_out(train: Sequence[Recording], heldout: Sequence[Recording]) -> None:
