@@ -7,6 +7,7 @@ they keep an imprecise friction law from being taken for a missing effect; so do
 
 from dataclasses import replace
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -31,12 +32,19 @@ def stop_distances(prepared: Prepared) -> Array:
 
 def stop_operators(piece: Piece, distances: Array) -> Array:
     """Elastic up to a distance, then sliding: s <- clip(s + dq / distance, -1, 1); shape (rows, distances)."""
-    moves = np.diff(piece.q, prepend=piece.q[:1])[:, None] / distances
-    out, state = np.empty_like(moves), np.sign(piece.v[0]) * np.ones(len(distances))
-    for row, move in enumerate(moves):
-        state = np.minimum(np.maximum(state + move, -1.0), 1.0)
-        out[row] = state
+    out = np.empty((len(piece.q), len(distances)))
+    out[0] = np.sign(piece.v[0])
+    for first, last in pairwise([0, *_turns(piece.q), len(piece.q) - 1]):  # one way all rows are clipped at once
+        moved = (piece.q[first + 1 : last + 1, None] - piece.q[first]) / distances
+        out[first + 1 : last + 1] = np.clip(out[first] + moved, -1.0, 1.0)
     return out
+
+
+def _turns(q: Array) -> Index:
+    """Rows at which positions go on the other way."""
+    moves = np.sign(np.diff(q))
+    moving = np.flatnonzero(moves)
+    return np.asarray(moving[1:][np.diff(moves[moving]) != 0])
 
 
 def last_reversal(q: Array, least: float) -> tuple[Index, Array]:

@@ -10,7 +10,7 @@ import numpy as np
 from cosim.diagnosis.answer.result import Where
 from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach, Seen, with_numbers
 from cosim.diagnosis.effects.candidates import SHARE, Candidate, Span, columns_of, has, of_both_ways, span_of
-from cosim.diagnosis.effects.tuning import refound, restarted
+from cosim.diagnosis.effects.tuning import in_most_turns, refound, restarted
 from cosim.estimation.fit import Fit, with_values
 from cosim.estimation.play import far_torques, torques_of_grid
 from cosim.estimation.prepare import Array, Prepared
@@ -45,7 +45,7 @@ HALF, SHARED_GAPS = 0.5, np.geomspace(1e-4, 2e-3, 5)
 refitted without a play has long taken over what the far side does: from there no step leads to two halves. Of four
 plays that were missed this finds all; from .3 of the friction two."""
 FEW = 10
-"""Evaluations of each of several starts, of which the best go on: of three true plays they end within 4 nats of 36."""
+"""Evaluations of each of several starts, in the recording that turns most, of which the best go on in all of them."""
 ROUGH = 6
 """Evaluations of a fit without the play: what it leaves only tells where to begin."""
 GOES_ON = 5.0
@@ -102,7 +102,8 @@ class Play(Hypothesis[Backlash]):
     def tuned(self, problem: Problem, found: Fit, start: Backlash, evidence: Evidence) -> Fit:
         """Go on from gaps around the one that was found (whether a flank is met jumps with the gap), then from more."""
         others = [one for one in self._first(problem, found) if one.gap_rad != start.gap_rad]
-        ends = [found, _shared(problem, found, evidence), *(restarted(problem, found, one, FEW) for one in others)]
+        rough = in_most_turns(problem)
+        ends = [found, _shared(problem, found, evidence), *(restarted(rough, found, one, FEW) for one in others)]
         found = max(ends, key=evidence)
         if evidence(found) <= GOES_ON:
             return found
@@ -166,8 +167,9 @@ def _shared(problem: Problem, found: Fit, evidence: Evidence) -> Fit:
     behind = Backlash(
         gap_rad=1.0, load_share=SHARE, load_friction=HALF * law["Fc"], load_viscous=HALF * law["sigma2"], **bent
     )
+    rough = in_most_turns(problem)
     fits = [
-        problem.fit(replace(halved, effects=(*halved.effects[:-1], replace(behind, gap_rad=gap))), FEW)
+        rough.fit(replace(halved, effects=(*halved.effects[:-1], replace(behind, gap_rad=gap))), FEW)
         for gap in (SHARED_GAPS * reach).tolist()
     ]
     return problem.fit(max(fits, key=evidence).mount, 24)

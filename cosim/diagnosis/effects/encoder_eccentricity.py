@@ -50,14 +50,14 @@ class Eccentricity(Cyclic[EncoderEccentricity]):
         """Ask a disc of half the turns whether what was found is its error twice a turn.
 
         The torque of that error is four times as large as that of one once a turn, so a search begins with it, and no
-        step leads from there to half the turns. It must be ahead by the margin that a rival needs.
+        step leads from there to half the turns. It must be ahead by the margin that a rival needs. Once a turn is a
+        sixteenth of the energy: where twice a turn has less than any effect must have, both together have it no more.
         """
         found = super().tuned(problem, found, start, evidence)
-        if evidence(found) <= 0:
+        if evidence(found) < POLICY.further_evidence[0]:
             return found
         starts = halved(problem, found.mount.effects[-1])
-        halves = [in_cycles(problem, restarted(problem, found, one)) for one in starts]
-        best = max(halves, key=evidence)
+        best = in_cycles(problem, max((restarted(problem, found, one) for one in starts), key=evidence))
         return best if evidence(best) > evidence(found) + POLICY.set_margin else found
 
     def is_plausible(self, effect: EncoderEccentricity, mount: Mount) -> bool:

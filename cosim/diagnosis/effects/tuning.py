@@ -63,6 +63,16 @@ def restarted(problem: Problem, found: Fit, start: Effect, steps: int = 36) -> F
     return problem.fit(replace(found.mount, effects=(*found.mount.effects[:-1], start)), steps)
 
 
+def in_most_turns(problem: Problem) -> Problem:
+    """The same with the weight of one recording alone, the one that turns most: it tells several starts apart too."""
+    recordings, pieces = problem.prepared.recording_of, problem.prepared.pieces
+    turns = dict.fromkeys(np.unique(recordings[problem.weight > 0]).tolist(), 0)
+    for piece in (one for one in pieces if one.recording in turns):
+        turns[piece.recording] += int(np.count_nonzero(np.diff(np.sign(piece.v))))
+    most = max(turns, key=lambda one: turns[one])
+    return replace(problem, weight=np.where(recordings == most, problem.weight, 0.0))
+
+
 def in_cycles(problem: Problem, found: Fit) -> Fit:
     """Fit the cycles of a ripple; slots, teeth and rolling elements come in whole numbers: one that fits is taken.
 
