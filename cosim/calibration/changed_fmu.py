@@ -1,5 +1,6 @@
 """An FMU with other start values: the archive as it was, with a model description in which these are written.
 
+Experiments that the FMU carries go: their references are what it gave with the old numbers (`left_behind`).
 A binary may have start values of its own; `cosim` sets those that were changed, other tools may need the SSV.
 """
 
@@ -8,9 +9,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from cosim.calibration.left_behind import left_behind
 from cosim.calibration.subject import Subject
 from cosim.fmi.component import Port
 from cosim.fmi.description import DESCRIPTION, complaint_of
+from cosim.fmi.manifest import MANIFEST
 from cosim.fmi.own_starts import MEMBER, as_member, own_starts
 from cosim.support.archive import contents
 from cosim.support.files import replacing
@@ -25,11 +28,14 @@ def write_with_starts(subject: Subject, values: Mapping[str, float], path: Path,
     source = subject.source
     with zipfile.ZipFile(source) as archive, replacing(path, force) as partial:
         text = _changed(archive.read(DESCRIPTION), [(subject.ports[name], one) for name, one in values.items()])
+        gone, manifest = left_behind(archive)
         with zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as target:
             for member in contents(source, complaint_of(source)):
-                if member.filename == MEMBER:
+                if member.filename == MEMBER or member.filename in gone:
                     continue
                 target.writestr(member, text if member.filename == DESCRIPTION else archive.read(member))
+            if gone and manifest:
+                target.writestr(MANIFEST, manifest)
             target.writestr(MEMBER, as_member({**own_starts(source), **values}))
     return path
 
