@@ -3,7 +3,9 @@
 A number: low .. high, ~ the size that an FMU states as nominal, its unit, = what it is where a card says nothing;
 `fixed`: never fitted to a recording; `held`: an FMU keeps it from the start of a run to its end. Behind a form stand
 the number that tells how large it is and how it is treated. `promised.txt` has all of it; a change of it is a promise
-changed, and a line of the changelog. Written anew: python tests/models/test_parameter_ranges.py
+changed, and a line of the changelog. Written anew:
+
+    PYTHONPATH=tests/tools python tests/models/test_parameter_ranges.py
 """
 
 from collections.abc import Iterator

@@ -119,7 +119,7 @@ def test_effects_without_a_shape_do_what_they_say() -> None:
 @pytest.mark.parametrize("index", range(len(SHAPELESS)))
 def test_effects_without_a_shape_act_on_any_machine(index: int) -> None:
     name = list(SHAPELESS)[index]
-    case, null = (make_case(40 + index, effects, duration=12.0, machine=ANY) for effects in ([name], []))
+    case, null = (make_case(40 + index, effects, duration=6.0, machine=ANY) for effects in ([name], []))
     if case.truth["setup"]["machine"] == null.truth["setup"]["machine"]:
         assert np.ptp(case.heldout.tau - null.heldout.tau) > 0.02 * case.truth["friction_rms"]
     assert case.truth["verdict"] == ["unknown"]
