@@ -157,13 +157,9 @@ def test_slews_without_limits_worth_the_name_are_steps(limit: float) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("inertia = 30.0", "inertia = 5e-324", r"\[mount\] inertia = 5e-324 breaks the rule: input should be greater"),
-        ("inertia = 30.0", "inertia = 1e308", r"\[mount\] inertia = 1e\+308 breaks the rule: input should be less"),
         ("inertia = 30.0", f"inertia = {10**400}", r"inertia = 10+\.\.\. \(401 characters\) breaks the rule"),
         ("inertia = 30.0", f"inertia = {DIGITS}", r"not valid TOML: a number in it has too many digits"),
         ("inertia = 30.0", f"inertia = {NESTED}", r"not valid TOML: its brackets are nested too deeply"),
-        ("loop_hz = 10000", "loop_hz = 1e-308", r"\[controller\] loop_hz = 1e-308 breaks the rule"),
-        ("loop_hz = 10000", "loop_hz = 1e308", r"\[controller\] loop_hz = 1e\+308 breaks the rule"),
         ("[mount]", f'[mount]\nname = "{"x" * 5000}"', r"name = 'x+\.\.\. \(5,002 characters\) breaks the rule"),
     ],
 )
@@ -198,25 +194,12 @@ def test_a_sweep_with_such_a_number_is_refused(tmp_path: Path, line: str, senten
         read_sweep(path)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "sentence"),
-    [
-        ("watchdog_ms = 2.0", "watchdog_ms = 1e300", r"watchdog_ms = 1e\+300 breaks a rule"),
-        ("watchdog_ms = 2.0", "black_box_seconds = 1e300", r"black_box_seconds = 1e\+300 breaks a rule"),
-        ("watchdog_ms = 2.0", f"watchdog_ms = {DIGITS}", r"is not valid TOML: a number in it has too many digits"),
-        ("torque = 50.0", "torque = 1e308", r"limits\.torque = 1e\+308 breaks a rule"),
-        (
-            "[limits]",
-            "[reactions]\nlost_cycles = 99999999999\n[limits]",
-            r"reactions\.lost_cycles = 99999999999 breaks",
-        ),
-    ],
-)
-def test_a_machine_with_such_a_number_is_refused(old: str, new: str, sentence: str) -> None:
+def test_a_machine_with_a_number_of_too_many_digits_is_refused() -> None:
+    """All others at their limits: tests of machine files."""
     text = (files("cosim.hardware") / "machines" / "simulated.toml").read_text("utf-8")
-    assert old in text
-    with pytest.raises(HardwareError, match=sentence):
-        parse_machine(text.replace(old, new, 1), "m.toml")
+    assert "watchdog_ms = 2.0" in text
+    with pytest.raises(HardwareError, match=r"is not valid TOML: a number in it has too many digits"):
+        parse_machine(text.replace("watchdog_ms = 2.0", f"watchdog_ms = {DIGITS}", 1), "m.toml")
 
 
 @pytest.mark.parametrize("number", ["nan", "inf", "-inf"])
