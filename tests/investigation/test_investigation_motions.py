@@ -132,3 +132,8 @@ def test_the_other_end_comes_first_in_a_turned_motion() -> None:
     straight, turned = (room_of(LIMITS, 0.0, 12.0, 3, way) for way in (False, True))
     ways = [FAMILIES[0](room).sampled(np.arange(0.0, 12.0, 1e-2))[0] for room in (straight, turned)]
     assert np.allclose(ways[0], -ways[1])
+
+
+def test_without_a_forbidden_band_a_tone_has_the_frequency_that_is_wanted() -> None:
+    room = Room(0.0, 1.0, 2.0, 3.0, 4.0, 30.0, 1)
+    assert [room.outside(hertz) for hertz in (0.01, 0.9, 40.0)] == [0.01, 0.9, 40.0]
