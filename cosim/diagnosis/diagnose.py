@@ -286,7 +286,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
 def _shaken(answer: Answer) -> BroadbandEntry:
     """What shakes the machine all the time, if it is above its limit."""
     comparison, chosen = answer.comparison, answer.proof.chosen
-    if not answer.scores.rest.shaken > comparison.policy.large_broadband:
+    if not answer.scores.rest.shaken > comparison.policy.slight:
         return {}
     found, motion = shaken_everywhere(comparison, chosen, answer.held), comparison.problem.mount.motion
     return broadband_entry(found, answer.held.residual(chosen.mount), friction_level(comparison), motion)

@@ -10,9 +10,9 @@ from pyfmi_models.model import Recorded, Scalar, Variable, parameter
 
 SOFTNESS = 0.02
 """Width of the knee, as a share of the knee torque."""
-LEAST_KNEE = 0.2
+LEAST_KNEE = 0.1
 """A drive that saturates does so above this share of the command that is hardly ever exceeded (98 %). Past a knee the
-command outgrows the need: a drive that bends at 0.7 of what is needed, with a slope of 0.3, does so at 0.4 of it."""
+command outgrows the need: a drive that bends at 0.3 of what is needed, with a slope of 0.4, does so at 0.15 of it."""
 LEAST_SLOPE = 0.02
 """... and gives at least this share of what more is asked for, else no command gives what is needed."""
 

@@ -96,8 +96,8 @@ def beside_ripple(second_wave: float) -> tuple[Comparison, Any, float]:
     return comparison, found, comparison.score(found, second, columns)[0].evidence  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("second_wave", "between", "waves"), [(9.7e-4, (2.6, 5.0), 1), (1.05e-3, (5.0, 9.9), 2)])
-def test_a_further_wave_of_a_ripple_is_taken_from_five_nats_on(
+@pytest.mark.parametrize(("second_wave", "between", "waves"), [(1.05e-3, (5.0, 10.0), 1), (1.18e-3, (10.0, 20.0), 2)])
+def test_a_further_wave_of_a_ripple_is_taken_from_ten_nats_on(
     second_wave: float, between: tuple[float, float], waves: int
 ) -> None:
     comparison, found, evidence = beside_ripple(second_wave)

@@ -42,7 +42,7 @@ def test_what_is_no_score_is_said_in_one_sentence(stored: Any) -> None:
 def test_another_policy_may_decide_otherwise() -> None:
     stored = Scores.of_json(json.loads(json.dumps(CASES[1].as_json())))
     assert decide(stored, POLICY).sets == {"cogging": ("position_friction",)}
-    assert decide(stored, replace(POLICY, set_margin=1.0)).sets == {"cogging": ()}
+    assert decide(stored, replace(POLICY, fair=1.0)).sets == {"cogging": ()}
 
 
 def test_a_learned_term_alone_says_unknown_unless_a_friction_law_would_do() -> None:

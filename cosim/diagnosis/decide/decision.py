@@ -69,8 +69,8 @@ def _says_unknown(learned: LearnedScores, least: float, policy: Policy) -> bool:
 
     Another friction law over speed is no missing effect, nor is what laws lack about turns.
     """
-    elsewhere = learned.away >= policy.least_away_unnamed and not learned.is_of_law
-    return learned.is_sure and learned.removed >= policy.follows and learned.evidence >= least and elsewhere
+    elsewhere = learned.away >= policy.considerable and not learned.is_of_law
+    return learned.is_sure and learned.removed >= policy.considerable and learned.evidence >= least and elsewhere
 
 
 def _of_rest(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Decision:
@@ -84,16 +84,16 @@ def _of_rest(effects: Sequence[EffectScores], residual: ResidualScores, policy: 
 
 def shaking_rules(residual: ResidualScores, policy: Policy) -> Iterator[Rule]:
     """Rules of which one is enough to say that something shakes the machine."""
-    values = ((residual.in_bursts, policy.large_in_bursts), (residual.shaken, policy.large_broadband))
+    values = ((residual.in_bursts, policy.small), (residual.shaken, policy.slight))
     for name, (value, limit) in zip(SHAKING, values, strict=True):
         yield Rule(name, value > limit, value, limit)
 
 
 def beside_rest(effects: Sequence[EffectScores], follows: tuple[str, ...], policy: Policy) -> Decision:
     """The answer where something without a name is left, that follows quantities: margins count for less there."""
-    weighed = [one.with_margins_of(policy.margin_beside_unknown) for one in effects]
+    weighed = [one.with_margins_of(policy.fair / policy.clear) for one in effects]
     weak = leave_much(effects, policy)
-    doubtful = tuple(one.effect for one in weak if one.ahead < policy.least_followed)
+    doubtful = tuple(one.effect for one in weak if one.ahead < policy.clear)
     shares = {one.effect: policy.true_beside_unknown if one.effect in doubtful else policy.true_ahead for one in weak}
     return _named(weighed, policy).with_rest(follows, shares, doubtful)
 
@@ -108,16 +108,16 @@ def leave_much(effects: Sequence[EffectScores], policy: Policy) -> list[EffectSc
 
     What is only an imitation a term without a name does nearly as well (`EffectScores.ahead`).
     """
-    return [one for one in effects if max(one.explains[one.effect], one.removes) < policy.sure_beside_unknown]
+    return [one for one in effects if max(one.explains[one.effect], one.removes) < policy.nearly_all]
 
 
 def doubted(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
     """Names that may be no more than imitations: what is left beside them is not much less than what they explain."""
     left = max((one.evidence for one in residual.terms), default=0.0)
-    if left < policy.floor:
+    if left < policy.strong:
         return ()
-    weak = [one for one in effects if one.explains[one.effect] < policy.sure_beside_unknown]
-    return tuple(one.effect for one in weak if left > policy.imitation * one.evidence)
+    weak = [one for one in effects if one.explains[one.effect] < policy.nearly_all]
+    return tuple(one.effect for one in weak if left > policy.considerable * one.evidence)
 
 
 @dataclass(frozen=True)
@@ -142,18 +142,18 @@ class Gain:
         rest, which hardly count in it, the error may be halved instead, where nothing is raised.
         """
         removed = min(self.narrow, self.wide)
-        halved = max(removed, self.at_rest if removed >= 0 else 0.0) >= policy.halved
-        return halved and (self.nats > -policy.floor or removed >= policy.sure_beside_unknown)
+        halved = max(removed, self.at_rest if removed >= 0 else 0.0) >= policy.half
+        return halved and (self.nats > -policy.strong or removed >= policy.nearly_all)
 
     def predicts(self, policy: Policy) -> bool:
         """Whether the likelihood clearly says so, or says so of what is large, or the plain error is halved."""
-        large = min(self.narrow, self.wide) >= policy.large_gain or self.at_rest >= policy.halved
-        said = self.nats >= policy.clearly_predicted or (large and self.nats >= policy.least_predicted)
+        large = min(self.narrow, self.wide) >= policy.considerable or self.at_rest >= policy.half
+        said = self.nats >= policy.clear or (large and self.nats >= policy.fair)
         return said or self.halves(policy)
 
     def matters_alone(self, policy: Policy) -> bool:
         """Whether an effect that is small in training matters held out: it halves the error there, and predicts."""
-        return self.halves(policy) and self.nats >= policy.least_predicted
+        return self.halves(policy) and self.nats >= policy.fair
 
     def raises(self, policy: Policy) -> bool:
         """Whether the plain error is raised, in both bands or by much in one.
@@ -161,9 +161,9 @@ class Gain:
         What surely predicts and halves the error in the wider band may raise it in the narrower one: a bristle at rest
         creeps with each vibration that a filter leaves, the less of them the more a model keeps of a wrong torque.
         """
-        if self.wide >= policy.halved and self.nats >= policy.sure_predicted:
+        if self.wide >= policy.half and self.nats >= policy.strong:
             return False
-        return max(self.narrow, self.wide) < 0 or min(self.narrow, self.wide) < -policy.most_raised
+        return max(self.narrow, self.wide) < 0 or min(self.narrow, self.wide) < -policy.slight
 
 
 def held_out_rules(gain: Gain, share: float, policy: Policy) -> Iterator[Rule]:
@@ -172,13 +172,13 @@ def held_out_rules(gain: Gain, share: float, policy: Policy) -> Iterator[Rule]:
     It predicts (or halves the plain error), it does not raise the plain error there, and what it explains is no small
     change of what the base leaves: beside a strong effect, a weak one may be what the strong one's equation lacks.
     """
-    nats, limit = gain.nats, policy.clearly_predicted
+    nats, limit = gain.nats, policy.clear
     removed = f"removes {100 * gain.narrow:.0f} and {100 * gain.wide:.0f} % of the error energy in two bands"
     yield Rule("predicts held-out recordings", gain.predicts(policy), nats, limit, "nats", removed)
     lowest = min(gain.narrow, gain.wide)
-    yield Rule("does not raise the held-out error", not gain.raises(policy), lowest, -policy.most_raised)
-    matters = share >= policy.least_share or nats >= policy.sure_predicted
-    yield Rule("share of what the base leaves", matters, share, policy.least_share)
+    yield Rule("does not raise the held-out error", not gain.raises(policy), lowest, -policy.slight)
+    matters = share >= policy.negligible or nats >= policy.strong
+    yield Rule("share of what the base leaves", matters, share, policy.negligible)
 
 
 def is_validated(gain: Gain, share: float, policy: Policy) -> bool:
@@ -188,7 +188,7 @@ def is_validated(gain: Gain, share: float, policy: Policy) -> bool:
 
 def open_rivals(one: EffectScores, policy: Policy) -> tuple[str, ...]:
     """Rivals that are not beaten by the margin of a set, closest first."""
-    near = [name for name, margin in one.margins.items() if margin < policy.set_margin]
+    near = [name for name, margin in one.margins.items() if margin < policy.fair]
     return tuple(sorted(near, key=lambda name: one.margins[name]))
 
 
@@ -200,9 +200,9 @@ def is_left(effects: Sequence[EffectScores], residual: ResidualScores, policy: P
 def rest_rules(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Iterator[Rule]:
     """Rules of which one is enough to say that something without a name is left."""
     shares = (
-        ("slow error in training relative to friction", residual.share, policy.large_residual),
-        ("slow error held out relative to friction", residual.share_there, policy.large_residual_there),
-        ("the same beside friction-law error", residual.share_beside, policy.large_residual_beside),
+        ("slow error in training relative to friction", residual.share, policy.small),
+        ("slow error held out relative to friction", residual.share_there, policy.considerable),
+        ("the same beside friction-law error", residual.share_beside, policy.slight),
     )
     for name, value, limit in shares:
         yield Rule(name, value > limit, value, limit)
@@ -216,7 +216,7 @@ def rest_rules(effects: Sequence[EffectScores], residual: ResidualScores, policy
 
 def least_left(named: Sequence[EffectScores], policy: Policy) -> float:
     """Evidence [nats] below which what is left may be no more than what the equations of the names lack."""
-    return policy.imitation * max((one.evidence for one in named), default=0.0)
+    return policy.considerable * max((one.evidence for one in named), default=0.0)
 
 
 def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:
@@ -224,7 +224,7 @@ def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:
 
     What it removes about turns alone is what laws lack there, and what it hardly removes is about nothing that matters.
     """
-    if term.away < policy.least_away_unnamed or max(term.plain, term.share) < policy.least_plain_gain:
+    if term.away < policy.considerable or max(term.plain, term.share) < policy.negligible:
         return False
     return term.evidence >= max(least, _floor_of(term, policy))
 
@@ -241,15 +241,14 @@ def beyond_any_machine(residual: ResidualScores, policy: Policy) -> ResidualScor
 
 
 def _floor_of(term: TermScores, policy: Policy) -> float:
-    """Evidence that a term must have: the less, the more the held-out recordings agree."""
-    if term.share >= policy.follows:
-        return policy.least_followed
-    if term.share < -policy.contradicted or term.predicted < -policy.denied * term.evidence:
-        return policy.sure_floor
-    if term.share < policy.supported:
-        return policy.floor_alone
-    agreed = (term.share - policy.supported) / (policy.follows - policy.supported)
-    return policy.floor + agreed * (policy.least_followed - policy.floor)
+    """Evidence that a term must have: the less, the more the held-out recordings agree.
+
+    They contradict it where it adds to the error there, or where their likelihood denies more than training says.
+    """
+    if term.share >= policy.considerable:
+        return policy.clear
+    contradicted = term.share < 0 or term.predicted < -term.evidence
+    return policy.sure if contradicted else policy.strong
 
 
 def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
@@ -257,7 +256,7 @@ def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
     if residual.in_place:
         return residual.in_place
     best = max((one.share for one in residual.terms), default=0.0)
-    least = max(policy.follows, policy.halved * best)
+    least = max(policy.considerable, policy.half * best)
     ranked = sorted(residual.terms, key=lambda one: -one.share)
     return tuple(one.name for one in ranked if one.share > least) or (residual.over_time,)
 

@@ -88,7 +88,7 @@ class Hypothesis(Generic[Form]):
     tables: ClassVar[tuple[str, ...]] = ()
     """Terms that may be learned which are this effect in another form: where one is better, the name is still right."""
     is_common_misfit: ClassVar[bool] = False
-    """Whether laws of friction lack the like of it so often that it needs the evidence `policy.least_bent`."""
+    """Whether laws of friction lack the like of it so often that it needs the evidence `policy.strong`."""
     finds_its_way: ClassVar[bool] = False
     """Whether a refit gets from any member of the grid to the best one; then only one is refitted."""
     must_stand_out: ClassVar[bool] = False

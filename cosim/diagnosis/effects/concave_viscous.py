@@ -22,7 +22,7 @@ from pyfmi_models.mount import Mount
 
 LEAST_BEND = 0.033
 """What the torque must bend by in clear motion, RMS beside a level and a line, relative to the friction level. Unit: 1.
-Friction that is another law's leaves .032 of it at most (`policy.large_residual_beside`)."""
+Friction that is another law's leaves .032 of it at most (`policy.slight`)."""
 THINNING = (0.03, 0.1, 0.3)
 """Speeds from which on grease thins that are tried, relative to the top speed: two a decade of what bends in sight."""
 

@@ -49,7 +49,7 @@ class Settling(Hypothesis[DwellBreakaway]):
         """
         level = contact_level(problem.mount)
         bent = level / float(getattr(problem.mount.friction, "sigma0", inf))
-        settles = POLICY.wander_prior * level <= effect.torque_per_efold <= MOST_RISE * level
+        settles = POLICY.wander * level <= effect.torque_per_efold <= MOST_RISE * level
         return not settles or effect.memory_rad < bent
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:

@@ -54,11 +54,11 @@ class Eccentricity(Cyclic[EncoderEccentricity]):
         sixteenth of the energy: where twice a turn has less than any effect must have, both together have it no more.
         """
         found = super().tuned(problem, found, start, evidence)
-        if evidence(found) < POLICY.further_evidence[0]:
+        if evidence(found) < POLICY.clear:
             return found
         starts = halved(problem, found.mount.effects[-1])
         best = in_cycles(problem, max((restarted(problem, found, one) for one in starts), key=evidence))
-        return best if evidence(best) > evidence(found) + POLICY.set_margin else found
+        return best if evidence(best) > evidence(found) + POLICY.fair else found
 
     def is_plausible(self, effect: EncoderEccentricity, mount: Mount) -> bool:
         """The reading goes on where the axis does: it errs by less of the way than `MOST_SLOPE`."""

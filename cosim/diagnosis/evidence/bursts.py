@@ -3,7 +3,8 @@
     share = sum of max(l - ABOVE u, 0) / sum of e,    l = min(e, the larger neighbour's e),    u = median of e
     ln e = ln(variance of the rest) less a quadratic in ln(speed) and ln(acceleration), RMS of each
 
-in windows of a second of clear motion. Noise of any colour has the same e in each, and what a law lacks goes with the
+in windows of a second of clear motion, the variance less what a level of friction of its own would take in each:
+friction that changes is no shaking. Noise of any colour has the same e in each, and what a law lacks goes with the
 motion; a single window that stands out is a jolt, and counts nothing.
 """
 
@@ -23,6 +24,8 @@ LEAST_WINDOWS = 20
 """Windows that tell what is usual in which motion."""
 ABOVE = 3.0
 """Times the usual energy from which a window stands out; noise of 16 independent rows has 2.1 in one of a hundred."""
+LEAST_WAYS = 1e-3
+"""Variance of the direction below which a window goes one way, and its level is its mean. Unit: 1."""
 NONE = 1e-6
 """Mean square of a speed, relative to the largest, and of an acceleration, relative to reaching that within a window,
 below which it is none. Unit: 1."""
@@ -52,8 +55,11 @@ def _windows(piece: Piece, rest: Array, clear: Array, seconds: float) -> Array:
     t, v = piece.t[piece.kept], piece.v[piece.kept]
     if len(t) < LEAST_ROWS:
         return np.full((1, 3), np.nan)
-    means = window_means(t, clear, (rest, rest**2, v**2, np.gradient(v, t) ** 2), seconds)
-    return np.column_stack([means[:, 1] - means[:, 0] ** 2, means[:, 2:]])
+    way = np.sign(v)
+    columns = (rest, rest**2, way, way**2, way * rest, v**2, np.gradient(v, t) ** 2)
+    mean, square, ways, both, together, *motion = window_means(t, clear, columns, seconds).T
+    of_level = (together - ways * mean) ** 2 / np.maximum(both - ways**2, LEAST_WAYS)
+    return np.column_stack([square - mean**2 - of_level, *motion])
 
 
 def _beside_motion(logs: Array) -> Array:

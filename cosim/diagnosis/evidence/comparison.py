@@ -155,7 +155,7 @@ class Comparison:
         if missed:
             first = grams.shape[1] - 1
             grams = self._grown(grams, own, aside, self._kept(missed, lambda: self.bands.transform(missed.columns)))
-            groups = [*groups, *(Group(first + np.array(one), self.policy.form) for one in missed.groups)]
+            groups = [*groups, *(Group(first + np.array(one), self.policy.misfit) for one in missed.groups)]
         rows = self.bands.of_forms if few else self.bands.effective
         return marginal(grams, self._free(found, grams), groups, self.bands.count, rows, self.floor)
 
@@ -238,7 +238,7 @@ class Comparison:
         grams[:, :first, first:], grams[:, first:, :first] = cross, np.swapaxes(cross, 1, 2)
         grams[:, first:, first:] = self._nuisance_grams[:, kept][:, :, kept]
         fast, start = np.arange(len(found.free), first - 1), first - 1
-        placed = [Group(fast, self.policy.fast_prior)] if fast.size else []
+        placed = [Group(fast, self.policy.wander)] if fast.size else []
         for group in groups:
             placed.append(Group(np.arange(start, start + len(group.columns)), group.prior))
             start += len(group.columns)
@@ -289,7 +289,7 @@ class Comparison:
     def group(self, found: Fit, columns: Array) -> tuple[float, Array]:
         """Evidence of columns whose coefficients share an unknown size, and those coefficients, shrunk as that says.
 
-        Columns have unit RMS in training; the prior of the size is `policy.shape_prior` of the friction level.
+        Columns have unit RMS in training; the prior of the size is `policy.misfit` of the friction level.
         """
         own = self._own(found)
         grams, placed, free, now = self._ready(found, own, NONE)
@@ -298,7 +298,7 @@ class Comparison:
         scaled = columns * level
         grown = self._grown(grams, own, NONE, self.bands.transform(scaled))
         many = len(free)
-        added = Group(np.arange(many, many + columns.shape[1]), self.policy.shape_prior)
+        added = Group(np.arange(many, many + columns.shape[1]), self.policy.misfit)
         both = np.concatenate([free, np.ones(columns.shape[1])])
         after = marginal(grown, both, [*placed, added], bands.count, bands.effective, self.floor)
         return after.log_likelihood - now.log_likelihood, after.beta[many:] * level

@@ -48,7 +48,7 @@ def discrepancy(mount: Mount, prepared: Prepared, policy: Policy) -> Discrepancy
     if size <= 0:  # without friction there is nothing that laws could disagree on
         return Discrepancy(columns[:, :0], (), level)
     edges = np.cumsum([0, stops.shape[1], speeds.shape[1], wander.shape[1]])
-    priors = (policy.shape_prior, policy.shape_prior, policy.wander_prior)
+    priors = (policy.misfit, policy.misfit, policy.wander)
     names = ("stops", "speeds", "wander")
     groups = [
         Shapes(tuple(range(first, last)), prior, name)

@@ -1,6 +1,6 @@
 """What the equations of named effects may miss, beside which a further effect must earn its name.
 
-    y = ... + sum_j f_j (sum_k u_jk phi_k),    u_jk ~ N(0, s_j^2 / K),    s_j half-normal(`Policy.form`)
+    y = ... + sum_j f_j (sum_k u_jk phi_k),    u_jk ~ N(0, s_j^2 / K),    s_j half-normal(`Policy.misfit`)
 
 f_j is the torque of a named effect, phi_k the K lowest cosines over position, speed, time and recording, direction too
 for an effect of friction: a machine is 5 to 20 % off any equation, in its own slow way, and what is off repeats in

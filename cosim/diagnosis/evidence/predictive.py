@@ -82,7 +82,7 @@ class Predictive:
             bands,
             _moved(discrepancy(base.mount, prepared, comparison.policy), base, prepared, comparison.policy),
             floor,
-            comparison.policy.halved,
+            comparison.policy.half,
             protocol,
             comparison.problem,
             base.free,
@@ -198,7 +198,7 @@ def _moved(others: Discrepancy, base: Fit, prepared: Prepared, policy: Policy) -
     own = stacked(Inverse(base.mount, base.free), prepared.pieces, base.values)[1] * base.values
     own = own[:, np.abs(own).max(axis=0, initial=0.0) > 0]
     first = others.columns.shape[1]
-    moved = Shapes(tuple(range(first, first + own.shape[1])), policy.moved_prior, BASE)
+    moved = Shapes(tuple(range(first, first + own.shape[1])), policy.misfit, BASE)
     groups = (*others.groups, moved) if own.shape[1] else others.groups
     return replace(others, columns=np.column_stack([others.columns, own]), groups=groups)
 

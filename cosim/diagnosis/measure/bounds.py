@@ -166,7 +166,7 @@ def undecided(finding: Finding, standing: Sequence[AcceptedEffect], policy: Poli
         return finding
     for one in standing:
         for rival in one.rivals:
-            if rival.effect.id == finding.effect and rival.evidence >= policy.least_evidence:
+            if rival.effect.id == finding.effect and rival.evidence >= policy.clear:
                 removes = f"{100 * one.own.plain_gain:.0f} % of the error energy, this {100 * rival.plain_gain:.0f} %"
                 said = f"{one.effect.title} stands in its place: it removes {removes}"
                 told = replace(finding, answer="not_decided", rival=one.effect.id, evidence=said, gain=rival.plain_gain)

@@ -109,9 +109,9 @@ class Concealment:
     def is_found(self, hidden: Hidden, weights: Array) -> bool:
         """Whether the search would add the concealed effect: its rules of evidence and of size."""
         worth, policy = self.worth(hidden, weights), self._comparison.policy
-        enough = worth.evidence >= least(policy, self._largest, worth.plain) and worth.plain >= policy.least_plain_gain
-        large = worth.plain >= policy.small_gain or worth.evidence >= policy.small_evidence
-        rare = not hidden.is_common_misfit or worth.evidence >= policy.least_bent
+        enough = worth.evidence >= least(policy, self._largest) and worth.plain >= policy.negligible
+        large = worth.plain >= policy.small or worth.evidence >= policy.sure
+        rare = not hidden.is_common_misfit or worth.evidence >= policy.strong
         loud = not hidden.must_stand_out or worth.above_noise >= policy.least_above_noise
         return enough and large and rare and loud
 

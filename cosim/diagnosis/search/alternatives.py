@@ -31,7 +31,7 @@ def _ways(
     comparison: Comparison, examined: Examined, proof: Proof, refused: AcceptedEffect, held: Predictive
 ) -> Iterator[tuple[Examined, Proof]]:
     """Proofs in which a rival stands in the place of what was refused, and all that stood still does."""
-    told, least = margins(refused), comparison.policy.set_margin
+    told, least = margins(refused), comparison.policy.fair
     stood = {one.effect.id for one in proof.standing}
     for rival in refused.rivals:
         if told[rival.effect.id] < least and rival.effect.id not in stood and not is_renamed(rival.effect):

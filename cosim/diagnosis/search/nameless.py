@@ -78,7 +78,7 @@ class _Offered:
 
 def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Predictive) -> Nameless:
     """Take away the names that something without a name explains far better, the worst first."""
-    found, least = Nameless(proof), comparison.policy.least_followed
+    found, least = Nameless(proof), comparison.policy.clear
     offered = _Offered.by(comparison, held)
     while found.proof.standing:
         known = [*offered.law, *found.terms]
@@ -142,5 +142,5 @@ def _holds(comparison: Comparison, found: Nameless, one: _Challenge, held: Predi
         return False
     gain = held.log_likelihood(held.residual(whole)) - held.log_likelihood(held.residual(one.beside.mount))
     policy = comparison.policy
-    least = found.proof.predicted[one.effect.effect.id] - policy.least_followed
-    return gain >= max(policy.least_predicted, least)
+    least = found.proof.predicted[one.effect.effect.id] - policy.clear
+    return gain >= max(policy.fair, least)

@@ -106,13 +106,13 @@ def _validation(
     yield Rule("no number at its bound, and no other effect in disguise", within)
     if len(examined.effects) == 1 and is_small(one.own, policy):
         share = min(gain.narrow, gain.wide)
-        yield Rule("a small effect halves the held-out error", gain.matters_alone(policy), share, policy.halved)
+        yield Rule("a small effect halves the held-out error", gain.matters_alone(policy), share, policy.half)
     yield from held_out_rules(gain, _share(comparison.problem, examined.base, one), policy)
 
 
 def _is_sure(comparison: Comparison, chosen: Fit, one: AcceptedEffect, gain: Gain) -> bool:
     """Whether an effect surely predicts, or the recordings tell a size of it in the structure that stands."""
-    sure = at_least("evidence on held-out recordings", gain.nats, comparison.policy.sure_predicted, "nats")
+    sure = at_least("evidence on held-out recordings", gain.nats, comparison.policy.strong, "nats")
     if sure.outcome:
         return True
     told = Rule("its size differs from none", tells(comparison.problem, chosen, one.within(chosen.mount)))

@@ -113,7 +113,7 @@ def _round(
     effects = []
     for group in grouped(comparison, chosen):
         one = _challenged(comparison, chosen, group, known, refits)
-        if one.own.evidence < comparison.policy.keep_evidence and len(grouped(comparison, chosen)) > 1:
+        if one.own.evidence < comparison.policy.clear and len(grouped(comparison, chosen)) > 1:
             return [], one.without
         best = settled(one.misfits, one.own, one.rivals)
         if best is one.own:
@@ -129,7 +129,7 @@ def _takes(rival: CandidateFit, one: AcceptedEffect, policy: Policy) -> bool:
     """Whether a rival takes the place: it is better, or near and simpler; one that is near and less simple does not."""
     fewer = one.own.fit.count - rival.fit.count
     margin = one.margin(rival)
-    return margin < (policy.set_margin if fewer > 0 else -policy.set_margin if fewer < 0 else 0.0)
+    return margin < (policy.fair if fewer > 0 else -policy.fair if fewer < 0 else 0.0)
 
 
 def grouped(comparison: Comparison, chosen: Fit) -> list[tuple[Effect, ...]]:
@@ -209,23 +209,23 @@ def _enter(comparison: Comparison, found: AcceptedEffect) -> None:
     """Enter an effect that was challenged into the ledger: what it is worth beside the others, and each rival."""
     name, own, policy = found.effect.id, found.own, comparison.policy
     comparison.enter(name, own.fit, own.plain_gain)
-    kept = at_least("evidence beside the other effects", own.evidence, policy.keep_evidence, "nats")
+    kept = at_least("evidence beside the other effects", own.evidence, policy.clear, "nats")
     comparison.judge(name, own.fit, [kept, *(_ahead(found, rival, policy) for rival in found.rivals)])
     for rival in found.rivals:
         comparison.enter(rival.effect.id, rival.fit, rival.plain_gain)
         behind = found.contests[rival.effect.id]
         rule = Rule(
             f"less than the margin of a set behind {name}",
-            behind < policy.set_margin,
+            behind < policy.fair,
             behind,
-            policy.set_margin,
+            policy.fair,
             "nats",
         )
         comparison.judge(rival.effect.id, rival.fit, [rule])
 
 
 def _ahead(found: AcceptedEffect, rival: CandidateFit, policy: Policy) -> Rule:
-    return at_least(f"ahead of {rival.effect.id}", found.contests[rival.effect.id], policy.set_margin, "nats")
+    return at_least(f"ahead of {rival.effect.id}", found.contests[rival.effect.id], policy.fair, "nats")
 
 
 def _names(found: Fit) -> tuple[str, ...]:

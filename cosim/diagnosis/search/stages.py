@@ -126,7 +126,7 @@ def starts(screened: Sequence[Screened], policy: Policy) -> list[Start]:
 
 def is_hopeful(one: Screened, policy: Policy) -> bool:
     """Whether a linear step towards a candidate promises anything, by either statistic."""
-    return one.evidence > 0 or one.plain >= policy.least_plain_gain
+    return one.evidence > 0 or one.plain >= policy.negligible
 
 
 def _key(one: Screened) -> object:
@@ -195,12 +195,13 @@ def search(comparison: Comparison, base: Fit, refits: InTurn = IN_TURN) -> Searc
             return Search(base, tuple(stages))
 
 
-def least(policy: Policy, largest: float, gain: float) -> float:
-    """Evidence that one more effect of this plain gain must have beside others of which the largest has so much."""
-    if not largest:
-        return policy.evidence_if_large if gain >= policy.large_gain else policy.least_evidence
-    lowest, highest = policy.further_evidence
-    return min(highest, max(lowest, policy.further_share * largest))
+def least(policy: Policy, largest: float) -> float:
+    """Evidence that one more effect must have beside others of which the largest has so much: half of it, within steps.
+
+    An equation is never quite the machine's, and what it lacks looks like another effect. False ones beside true ones
+    had .33 to .37 of it, true ones .53 and more.
+    """
+    return min(policy.sure, max(policy.clear, policy.half * largest))
 
 
 def best_of(comparison: Comparison, now: Stage, largest: float = 0.0) -> CandidateFit | None:
@@ -225,9 +226,7 @@ def _choice(one: CandidateFit, best: CandidateFit | None, policy: Policy) -> Ite
     """Rules by which one of several that pass is taken first."""
     if one is not best and is_minor(one, policy):
         name = "more than what friction laws lack of any machine" if is_common(one, policy) else "not a small effect"
-        yield Rule(
-            name, False, one.evidence, policy.least_bent if is_common(one, policy) else policy.small_evidence, "nats"
-        )
+        yield Rule(name, False, one.evidence, policy.strong if is_common(one, policy) else policy.sure, "nats")
     elif best:
         yield Rule("most evidence at its step of the search", one is best, one.evidence, best.evidence, "nats")
 
@@ -235,7 +234,7 @@ def _choice(one: CandidateFit, best: CandidateFit | None, policy: Policy) -> Ite
 def _search_rules(comparison: Comparison, one: CandidateFit, largest: float) -> Iterator[Rule]:
     """Rules by which the search takes an effect, beside others of which the largest has so much evidence."""
     policy = comparison.policy
-    yield at_least("evidence", one.evidence, least(policy, largest, one.plain_gain), "nats")
+    yield at_least("evidence", one.evidence, least(policy, largest), "nats")
     yield from admission(comparison, one)
 
 
@@ -295,25 +294,25 @@ def is_minor(one: CandidateFit, policy: Policy) -> bool:
 
 def is_small(one: CandidateFit, policy: Policy) -> bool:
     """Whether an effect explains little, and not surely."""
-    return one.plain_gain < policy.small_gain and one.evidence < policy.small_evidence
+    return one.plain_gain < policy.small and one.evidence < policy.sure
 
 
 def is_common(one: CandidateFit, policy: Policy) -> bool:
     """Whether an effect is no more than what laws of friction lack of any machine: not sure, nor large."""
     common = hypothesis_of(one.effect).is_common_misfit
-    return common and one.evidence < policy.least_bent and one.plain_gain < policy.large_gain
+    return common and one.evidence < policy.strong and one.plain_gain < policy.considerable
 
 
 def admission(comparison: Comparison, one: CandidateFit) -> Iterator[Rule]:
     """Rules of whether an effect is large enough to matter, means what its name says, and shows in this motion."""
     policy, problem, own = comparison.policy, comparison.problem, hypothesis_of(one.effect)
-    yield at_least("share of the error energy", one.plain_gain, policy.least_plain_gain)
+    yield at_least("share of the error energy", one.plain_gain, policy.negligible)
     if own.must_stand_out:
         yield at_least("energy relative to the reading's noise", one.above_noise, policy.least_above_noise)
     if own.is_timing:
-        yield at_least("share that it removes away from reversals", one.away, policy.least_away)
+        yield at_least("share that it removes away from reversals", one.away, policy.small)
     if one.at_rest < 1.0:
-        yield at_least("share of the error at rest", one.at_rest, policy.halved)
+        yield at_least("share of the error at rest", one.at_rest, policy.half)
     yield from name_rules(problem, one, holds_at_rest(one, policy))
     yield Rule("the model explains the changes of the torque", in_time(problem, one))
     if own.must_stand_out:
@@ -322,7 +321,7 @@ def admission(comparison: Comparison, one: CandidateFit) -> Iterator[Rule]:
 
 def holds_at_rest(one: CandidateFit, policy: Policy) -> bool:
     """Whether an effect surely is what is held at rest: all but a tenth of the energy there, and not a small effect."""
-    return policy.sure_beside_unknown <= one.at_rest < 1.0 and one.evidence >= policy.small_evidence
+    return policy.nearly_all <= one.at_rest < 1.0 and one.evidence >= policy.sure
 
 
 def is_full(best: CandidateFit, comparison: Comparison) -> bool:
@@ -339,7 +338,7 @@ def with_harmonics(comparison: Comparison, found: Fit, ripple: Effect) -> Fit:
         return found
     groups = columns_of(found.mount, tried, comparison.problem.prepared, found.values)
     scored = comparison.score(found, tried, groups)
-    least = comparison.policy.least_wave
+    least = comparison.policy.clear
     more = tuple(one.candidate.start(one.coefficients) for one in scored if one.evidence > least)
     if not more:
         return found

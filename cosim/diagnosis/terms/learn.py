@@ -12,6 +12,7 @@ import numpy as np
 
 from cosim.diagnosis.answer.entries import BinsEntry, LearnedEntry, NotLearnedEntry
 from cosim.diagnosis.answer.scores import LearnedScores
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive, interval_of
 from cosim.diagnosis.terms.candidate_terms import CandidateTerm, candidate_terms
@@ -33,10 +34,6 @@ LEAST_GAIN = 0.01
 """Share of the held-out error that a term must remove: less is no better model, only a larger one. Unit: 1."""
 FEWER = 3
 """How often the waves of a term are halved before it is given up."""
-SURE = 10.0
-"""Nats that a term must have three times over (training, training recordings left out one by one, held-out ones) where
-nothing else says that something without a name is left. Of 43 nulls of a generator by others one has a term
-that helps the held-out recordings alone, none one that is sure."""
 MIDDLE = (0.025, 0.975)
 """Quantiles of a term's torque between which its size is told."""
 
@@ -72,7 +69,7 @@ class Learned:
     @property
     def is_sure(self) -> bool:
         """Whether training, what training left out and the held-out recordings each prove it for themselves."""
-        return self.helps and min(*self.evidence, *self.predicted, self.gain) >= SURE
+        return self.helps and min(*self.evidence, *self.predicted, self.gain) >= POLICY.clear
 
     def scores(self) -> LearnedScores:
         """What the decision looks at."""
@@ -189,7 +186,7 @@ def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], 
     gain = held.log_likelihood(held.residual(whole)) - held.log_likelihood(held.residual(found.mount))
     worse = any(rms(new) > rms(old) for old, new in pairs)
     interval = interval_of(left[0], left[1], held.protocol.pieces[0].dt)
-    proven = gain >= comparison.policy.least_predicted or 1 - (after / before) ** 2 >= comparison.policy.follows
+    proven = gain >= comparison.policy.fair or 1 - (after / before) ** 2 >= comparison.policy.considerable
     refused = worse or not proven or after > (1 - LEAST_GAIN) * before or interval[0] <= 0
     names = tuple(one.name for one in terms)
     return Learned(whole, effects, names, 0.0, before, after, interval, held.protocol.cutoff, not refused, gain=gain)

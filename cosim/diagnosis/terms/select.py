@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.terms.candidate_terms import CandidateTerm
 from cosim.diagnosis.terms.grams import Grams, grams_of, with_terms
@@ -15,16 +16,8 @@ from pyfmi_models.mount import Mount
 
 MOST = 3
 """Terms of one answer: more is a black box."""
-LEAST_EVIDENCE = 10.0
-"""Evidence that one more term must have in training. Unit: nats."""
-LEAST_PREDICTED = 3.0
-"""What recordings left out must gain by one more term. Unit: nats. As for a named effect (`policy.least_predicted`)."""
-SURE_EVIDENCE = 26.0
-"""Evidence from which a term is tried although no recording left out gains by it. Unit: nats; as `policy.floor`."""
 STARTS = 2
 """First terms that are followed, of each ranking: more looks at held-out recordings would let luck decide."""
-NEAR = 0.5
-"""Share of the best first term's nats that another one must have."""
 FOLDS = 8
 """Groups of recordings that are left out in turn, where there are more: fewer of them say less, more cost more. Five to
 ten are the usual (Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 7.10)."""
@@ -88,7 +81,7 @@ def _without_idle(grams: Grams, found: Path) -> Path:
     whole, _ = _scores(grams, found.order)
     for one in found.order[:-1]:
         rest = tuple(other for other in found.order if other != one)
-        if whole - _scores(grams, rest)[0] < LEAST_EVIDENCE:
+        if whole - _scores(grams, rest)[0] < POLICY.clear:
             return _along(grams, rest)
     return found
 
@@ -114,8 +107,8 @@ def _ranked(gains: Mapping[int, tuple[float, float]]) -> tuple[dict[int, float],
 
     No recording left out may gain, as each may hold what no other does: another place, temperature, way.
     """
-    proven = {k: there for k, (here, there) in gains.items() if here >= LEAST_EVIDENCE and there >= LEAST_PREDICTED}
-    return proven, {k: here for k, (here, _) in gains.items() if here >= SURE_EVIDENCE}
+    proven = {k: there for k, (here, there) in gains.items() if here >= POLICY.clear and there >= POLICY.fair}
+    return proven, {k: here for k, (here, _) in gains.items() if here >= POLICY.strong}
 
 
 def _near(gains: Mapping[int, tuple[float, float]]) -> list[int]:
@@ -123,7 +116,7 @@ def _near(gains: Mapping[int, tuple[float, float]]) -> list[int]:
     found: list[int] = []
     for ranked in _ranked(gains):
         order = sorted(ranked, key=lambda k: -ranked[k])
-        found += [k for k in order if ranked[k] >= NEAR * ranked[order[0]]][:STARTS]
+        found += [k for k in order if ranked[k] >= POLICY.half * ranked[order[0]]][:STARTS]
     return list(dict.fromkeys(found))
 
 

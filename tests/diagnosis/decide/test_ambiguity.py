@@ -49,7 +49,7 @@ def scores(effect: str, evidence: float, explains: float = 0.5, **margins: float
 
 
 def test_a_rival_that_is_beaten_by_the_margin_of_a_set_is_out_of_it_and_the_closest_comes_first() -> None:
-    near, beaten = POLICY.set_margin - 1, POLICY.set_margin + 1
+    near, beaten = POLICY.fair - 1, POLICY.fair + 1
     one = scores("torque_offset", 200.0, gravity_unbalance=near, cable_wrap=near - 1, cogging=beaten)
     assert open_rivals(one, POLICY) == ("cable_wrap", "gravity_unbalance")
 
@@ -78,11 +78,12 @@ def test_an_effect_of_little_evidence_is_less_probable_than_one_of_much() -> Non
 def test_nothing_is_unknown_where_nothing_is_left_and_what_is_left_says_what_it_follows() -> None:
     assert not decide(Scores([], QUIET), POLICY).is_unknown
     assert decide(Scores([], QUIET), POLICY).depends_on == ()
-    terms = [TermScores("position", POLICY.floor + 5, 3.0, 0.6), TermScores("temperature", POLICY.floor - 5, 3.0, 0.2)]
+    sizes = ("position", POLICY.strong + 5, 0.6), ("temperature", POLICY.strong - 5, 0.2)
+    terms = [TermScores(name, evidence, 3.0, share) for name, evidence, share in sizes]
     left = decide(Scores([], ResidualScores(0.0, 0.0, terms)), POLICY)
     assert left.is_unknown
     assert left.depends_on == ("position",)
-    large = decide(Scores([], ResidualScores(POLICY.large_residual + 0.01, 0.0, (), "time")), POLICY)
+    large = decide(Scores([], ResidualScores(POLICY.small + 0.01, 0.0, (), "time")), POLICY)
     assert large.is_unknown
     assert large.depends_on == ("time",)
 
@@ -103,7 +104,7 @@ def test_beside_something_unknown_a_name_is_an_imitation_unless_no_term_without_
 ) -> None:
     one = replace(scores("cogging", 60.0), removes=removes, ahead=ahead)
     alone = decide(Scores([one], QUIET), POLICY)
-    beside = decide(Scores([one], ResidualScores(POLICY.large_residual + 0.01, 0.0)), POLICY)
+    beside = decide(Scores([one], ResidualScores(POLICY.small + 0.01, 0.0)), POLICY)
     assert beside.is_unknown
     assert beside.probabilities["cogging"]["cogging"] == pytest.approx(left * alone.probabilities["cogging"]["cogging"])
     assert beside.doubtful == (("cogging",) if left == POLICY.true_beside_unknown else ())
@@ -111,7 +112,7 @@ def test_beside_something_unknown_a_name_is_an_imitation_unless_no_term_without_
 
 def test_what_is_left_must_be_more_than_what_the_equations_of_strong_names_lack() -> None:
     assert least_left([], POLICY) == 0.0
-    assert least_left([scores("cogging", 60.0), scores("cable_wrap", 200.0)], POLICY) == POLICY.imitation * 200.0
+    assert least_left([scores("cogging", 60.0), scores("cable_wrap", 200.0)], POLICY) == POLICY.considerable * 200.0
 
 
 def problem(speed: Array, **columns: Array) -> Problem:

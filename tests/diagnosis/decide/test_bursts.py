@@ -46,7 +46,7 @@ def test_noise_that_is_larger_for_some_seconds_comes_in_bursts() -> None:
     loud = noise(np.where((T > 10) & (T < 14), 10.0, 1.0))
     energy = 4 * 100.0  # of 476 in all, each window of it less three of the usual
     assert share(loud) == pytest.approx((energy - 4 * ABOVE) / (energy + 76), rel=0.05)
-    assert share(loud) > POLICY.large_in_bursts
+    assert share(loud) > POLICY.small
     assert share(np.where(T < 30, loud, noise(seed=3))) == pytest.approx(share(loud), rel=0.02)
 
 
@@ -62,7 +62,7 @@ def test_what_goes_with_the_motion_is_no_burst() -> None:
     fast = np.where(T % 12 < 6, 1.0, 5.0)
     found: Any = SimpleNamespace(residual=np.concatenate([noise(fast), noise(fast, seed=2)]))
     assert burst_share(comparing(fast), found) < 0.02
-    assert burst_share(comparing(np.ones(len(T))), found) > POLICY.large_in_bursts
+    assert burst_share(comparing(np.ones(len(T))), found) > POLICY.small
 
 
 def test_only_clear_motion_that_has_weight_counts() -> None:
@@ -85,8 +85,8 @@ def test_too_few_windows_tell_nothing() -> None:
 
 def test_bursts_are_unknown_and_take_nothing_from_a_name() -> None:
     one = EffectScores("cogging", 50.0, {"delay": 9.0}, {"cogging": 0.5, "delay": 0.1}, 20.0, 0.5)
-    quiet = ResidualScores(0.0, 0.0, in_bursts=POLICY.large_in_bursts)
-    loud = replace(quiet, in_bursts=1.001 * POLICY.large_in_bursts)
+    quiet = ResidualScores(0.0, 0.0, in_bursts=POLICY.small)
+    loud = replace(quiet, in_bursts=1.001 * POLICY.small)
     named, shaken = (decide(Scores([one], left), POLICY) for left in (quiet, loud))
     assert not named.is_unknown
     assert shaken.is_unknown

@@ -22,26 +22,16 @@ from cosim.diagnosis.decide.policy import POLICY
 
 ROUND = replace(
     POLICY,
-    sure_beside_unknown=0.875,
-    set_margin=3.0,
-    least_predicted=4.0,
-    clearly_predicted=8.0,
-    sure_predicted=32.0,
-    halved=0.5,
-    most_raised=0.25,
-    least_share=0.125,
-    floor=16.0,
-    floor_alone=32.0,
-    sure_floor=128.0,
-    supported=0.125,
-    contradicted=0.125,
-    denied=2.0,
-    least_followed=8.0,
-    follows=0.25,
-    imitation=0.5,
-    large_residual=0.125,
-    large_residual_there=0.25,
-    large_residual_beside=0.0625,
+    fair=4.0,
+    clear=8.0,
+    strong=16.0,
+    sure=128.0,
+    negligible=0.0625,
+    slight=0.125,
+    small=0.1875,
+    considerable=0.25,
+    half=0.5,
+    nearly_all=0.875,
     true_beside_unknown=0.375,
 )
 """Constants with which every product is exact, so that a limit can be met exactly."""
@@ -61,17 +51,17 @@ def unknown(evidence: float, share: float, predicted: float = 0.0) -> bool:
 
 
 def test_a_rival_at_the_margin_of_a_set_is_beaten() -> None:
-    assert open_rivals(effect("delay", 9.0, a=3.0 - LITTLE, b=3.0), ROUND) == ("a",)
+    assert open_rivals(effect("delay", 9.0, a=4.0 - LITTLE, b=4.0), ROUND) == ("a",)
 
 
 @pytest.mark.parametrize(
     ("gain", "share", "expected"),
     [
-        (Gain(8.0, 0.1, 0.1), 0.125, True),
-        (Gain(8.0 - LITTLE, 0.1, 0.1), 0.125, False),
-        (Gain(8.0, 0.1, 0.1), 0.125 - LITTLE, False),
-        (Gain(32.0, 0.1, 0.1), 0.0, True),
-        (Gain(32.0 - LITTLE, 0.1, 0.1), 0.0, False),
+        (Gain(8.0, 0.1, 0.1), 0.0625, True),
+        (Gain(8.0 - LITTLE, 0.1, 0.1), 0.0625, False),
+        (Gain(8.0, 0.1, 0.1), 0.0625 - LITTLE, False),
+        (Gain(16.0, 0.1, 0.1), 0.0, True),
+        (Gain(16.0 - LITTLE, 0.1, 0.1), 0.0, False),
         (Gain(-16.0 + LITTLE, 0.5, 0.5), 0.5, True),
         (Gain(-16.0, 0.5, 0.5), 0.5, False),
         (Gain(-999.0, 0.875, 0.875), 0.5, True),
@@ -86,15 +76,15 @@ def test_a_rival_at_the_margin_of_a_set_is_beaten() -> None:
         (Gain(9.0, 0.0, 0.0), 0.5, True),
         (Gain(9.0, 0.0, -LITTLE), 0.5, True),
         (Gain(9.0, -LITTLE, -LITTLE), 0.5, False),
-        (Gain(9.0, 0.3, -0.25), 0.5, True),
-        (Gain(9.0, 0.3, -0.25 - LITTLE), 0.5, False),
-        (Gain(9.0, -0.25 - LITTLE, 0.3), 0.5, False),
-        (Gain(32.0, -0.9, 0.5), 0.5, True),
-        (Gain(32.0 - LITTLE, -0.9, 0.5), 0.5, False),
-        (Gain(32.0, -0.9, 0.5 - LITTLE), 0.5, False),
-        (Gain(4.0, -0.25, 0.0, at_rest=0.5), 0.5, True),
-        (Gain(4.0, -0.25, 0.0, at_rest=0.5 - LITTLE), 0.5, False),
-        (Gain(4.0 - LITTLE, -0.25, 0.0, at_rest=0.5), 0.5, False),
+        (Gain(9.0, 0.3, -0.125), 0.5, True),
+        (Gain(9.0, 0.3, -0.125 - LITTLE), 0.5, False),
+        (Gain(9.0, -0.125 - LITTLE, 0.3), 0.5, False),
+        (Gain(16.0, -0.9, 0.5), 0.5, True),
+        (Gain(16.0 - LITTLE, -0.9, 0.5), 0.5, False),
+        (Gain(16.0, -0.9, 0.5 - LITTLE), 0.5, False),
+        (Gain(4.0, -0.125, 0.0, at_rest=0.5), 0.5, True),
+        (Gain(4.0, -0.125, 0.0, at_rest=0.5 - LITTLE), 0.5, False),
+        (Gain(4.0 - LITTLE, -0.125, 0.0, at_rest=0.5), 0.5, False),
         (Gain(-16.0 + LITTLE, 0.0, 0.0, at_rest=0.5), 0.5, True),
         (Gain(-16.0, 0.0, 0.0, at_rest=0.5), 0.5, False),
         (Gain(-16.0 + LITTLE, 0.0, -LITTLE, at_rest=0.5), 0.5, False),
@@ -111,8 +101,8 @@ def test_an_effect_stands_from_its_limits_on(gain: Gain, share: float, expected:
         (20.0, 0.5, 16.0 - LITTLE, False),
         (20.0, 0.875, 16.0, False),
         (20.0, 0.875 - LITTLE, 16.0, True),
-        (32.0, 0.5, 16.0, False),
-        (32.0 - LITTLE, 0.5, 16.0, True),
+        (64.0, 0.5, 16.0, False),
+        (64.0 - LITTLE, 0.5, 16.0, True),
     ],
 )
 def test_a_name_may_imitate_what_is_left_up_to_its_limits(
@@ -123,39 +113,37 @@ def test_a_name_may_imitate_what_is_left_up_to_its_limits(
 
 
 def test_a_residual_is_large_beyond_its_limit_in_training_or_held_out() -> None:
-    assert not is_left([], left(share=0.125, there=0.25), ROUND)
-    assert is_left([], left(share=0.125 + LITTLE), ROUND)
+    assert not is_left([], left(share=0.1875, there=0.25), ROUND)
+    assert is_left([], left(share=0.1875 + LITTLE), ROUND)
     assert is_left([], left(there=0.25 + LITTLE), ROUND)
-    assert not is_left([], ResidualScores(0.0, 0.0, share_beside=0.0625), ROUND)
-    assert is_left([], ResidualScores(0.0, 0.0, share_beside=0.0625 + LITTLE), ROUND)
+    assert not is_left([], ResidualScores(0.0, 0.0, share_beside=0.125), ROUND)
+    assert is_left([], ResidualScores(0.0, 0.0, share_beside=0.125 + LITTLE), ROUND)
 
 
-def test_the_evidence_that_is_asked_goes_with_what_held_out_recordings_say() -> None:
-    assert unknown(16.0, 0.125)
-    assert not unknown(16.0 - LITTLE, 0.125)
-    assert not unknown(16.0, 0.125 - LITTLE), "not supported: the higher floor"
-    assert unknown(32.0, 0.125 - LITTLE)
-    assert not unknown(32.0 - LITTLE, 0.0)
-    assert unknown(32.0, -0.125)
-    assert not unknown(32.0, -0.125 - LITTLE), "contradicted: the highest floor"
-    assert unknown(128.0, -0.5)
-    assert not unknown(128.0 - LITTLE, -0.5)
-    assert unknown(32.0, 0.0, -64.0)
-    assert not unknown(32.0, 0.0, -64.0 - LITTLE), "denied by the likelihood: the highest floor"
-    assert unknown(8.0, 0.25)
-    assert not unknown(8.0 - LITTLE, 0.25)
-    assert not unknown(8.0, 0.25 - LITTLE)
-    assert unknown(12.0, 0.1875), "half way between the shares, half way between the evidences"
-    assert not unknown(12.0 - LITTLE, 0.1875)
-    assert not unknown(12.0, 0.1875, -24.0 - LITTLE), "denied by the likelihood"
+@pytest.mark.parametrize(
+    ("share", "predicted", "least"),
+    [
+        (0.25, 0.0, 8.0),  # followed
+        (0.25, -999.0, 8.0),
+        (0.25 - LITTLE, 0.0, 16.0),
+        (0.0, -16.0, 16.0),
+        (0.0, -129.0, 128.0),  # the likelihood denies more than training says
+        (-LITTLE, 0.0, 128.0),  # the error grows
+    ],
+)
+def test_the_evidence_that_is_asked_goes_with_what_held_out_recordings_say(
+    share: float, predicted: float, least: float
+) -> None:
+    assert unknown(least, share, predicted)
+    assert not unknown(least - LITTLE, share, predicted)
 
 
 def test_beside_what_has_no_name_a_margin_counts_for_a_share() -> None:
     one = EffectScores(
-        "cable_wrap", 60.0, {"gravity_unbalance": 9.0, "delay": 13.0}, {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
+        "cable_wrap", 60.0, {"gravity_unbalance": 9.0, "delay": 17.0}, {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
     )
     alone, beside = (
-        decide(Scores([one], left(share=share)), replace(ROUND, margin_beside_unknown=0.25)) for share in (0.0, 1.0)
+        decide(Scores([one], left(share=share)), replace(ROUND, fair=4.0, clear=16.0)) for share in (0.0, 1.0)
     )
     assert (alone.is_unknown, alone.sets["cable_wrap"]) == (False, ())
     assert (beside.is_unknown, beside.sets["cable_wrap"]) == (True, ("gravity_unbalance",))
@@ -166,7 +154,7 @@ def test_beside_what_has_no_name_a_margin_counts_for_a_share() -> None:
 def test_what_was_learned_for_what_has_no_name_leaves_rivals_as_open_as_what_is_left() -> None:
     explained = {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
     one = EffectScores("cable_wrap", 60.0, {"gravity_unbalance": 9.0}, explained)
-    rules = replace(ROUND, margin_beside_unknown=0.25)
+    rules = replace(ROUND, fair=4.0, clear=16.0)
     learned, seen = beside_rest([one], ("time",), rules), decide(Scores([one], left(share=1.0)), rules)
     assert learned == seen
     assert learned.sets["cable_wrap"] == ("gravity_unbalance",)
@@ -174,8 +162,8 @@ def test_what_was_learned_for_what_has_no_name_leaves_rivals_as_open_as_what_is_
 
 def test_what_is_left_beside_a_sure_name_must_reach_its_share_of_that_evidence() -> None:
     sure = effect("delay", 80.0, 0.9)
-    assert is_left([sure], left(TermScores("position", 40.0, 0.0, 0.5)), ROUND)
-    assert not is_left([sure], left(TermScores("position", 40.0 - LITTLE, 0.0, 0.5)), ROUND)
+    assert is_left([sure], left(TermScores("position", 20.0, 0.0, 0.5)), ROUND)
+    assert not is_left([sure], left(TermScores("position", 20.0 - LITTLE, 0.0, 0.5)), ROUND)
 
 
 def test_a_doubtful_name_excuses_nothing_that_is_left() -> None:
@@ -198,7 +186,7 @@ def test_a_name_beside_something_unknown_is_less_likely_unless_it_removes_nearly
 
 
 def test_what_a_term_removes_about_turns_alone_is_what_laws_lack_there() -> None:
-    least = ROUND.least_away_unnamed
+    least = ROUND.considerable
     assert is_left([], left(TermScores("torque", 500.0, 50.0, 0.9, away=least)), ROUND)
     assert not is_left([], left(TermScores("torque", 500.0, 50.0, 0.9, away=least - LITTLE)), ROUND)
 
@@ -228,8 +216,8 @@ def test_what_is_decided_stays_when_something_more_is_left() -> None:
 
 
 def test_a_term_that_removes_next_to_nothing_in_training_and_held_out_is_no_unknown() -> None:
-    sure = TermScores("acceleration", 1000.0, 100.0, 0.0, plain=ROUND.least_plain_gain)
-    barely = replace(sure, plain=0.99 * ROUND.least_plain_gain)
-    there = replace(barely, share=ROUND.least_plain_gain)
+    sure = TermScores("acceleration", 1000.0, 100.0, 0.0, plain=ROUND.negligible)
+    barely = replace(sure, plain=0.99 * ROUND.negligible)
+    there = replace(barely, share=ROUND.negligible)
     said = [decide(Scores([], ResidualScores(0.0, 0.0, [one])), ROUND).is_unknown for one in (sure, barely, there)]
     assert said == [True, False, True]

@@ -58,7 +58,7 @@ def predicted(recording: Recording, effect: object) -> float:
 def test_a_small_offset_that_is_there_predicts_and_its_opposite_does_not(seed: int) -> None:
     offset, v = 0.2 * NOISE, np.sin(np.arange(SECONDS * RATE) / RATE)
     recording = held_out(white(seed) + offset, v)
-    assert predicted(recording, TorqueOffset(torque=offset)) > POLICY.least_predicted
+    assert predicted(recording, TorqueOffset(torque=offset)) > POLICY.fair
     assert predicted(recording, TorqueOffset(torque=-offset)) < 0
 
 
@@ -72,7 +72,7 @@ def test_what_acts_in_one_second_of_a_minute_predicts() -> None:
     t = np.arange(SECONDS * RATE) / RATE
     v = 1 + 2 * np.exp(-(((t - 30.5) / 0.15) ** 2)) + 0.1 * np.sin(t)
     recording = held_out(white(2) + 0.3 * v**2, v)
-    assert predicted(recording, QuadraticDrag(coefficient=0.3)) > POLICY.least_predicted
+    assert predicted(recording, QuadraticDrag(coefficient=0.3)) > POLICY.fair
 
 
 def test_what_training_leaves_open_of_an_effect_is_not_held_against_it() -> None:
@@ -84,8 +84,8 @@ def test_what_training_leaves_open_of_an_effect_is_not_held_against_it() -> None
     problem = Problem(axis(), prepared, np.ones(len(prepared.recording_of)), 1 / RATE)
     base, found = (problem.fit(axis(*effects), 15) for effects in ((), (FrictionAsymmetry(level_asymmetry=0.03),)))
     held = Predictive.of(Comparison.of(problem, base, POLICY), there, base, there)
-    assert held.predicted(found) > held.log_likelihood(held.residual(found.mount)) + POLICY.least_predicted
-    assert held.predicted(found) > held.predicted(base) + POLICY.least_predicted
+    assert held.predicted(found) > held.log_likelihood(held.residual(found.mount)) + POLICY.fair
+    assert held.predicted(found) > held.predicted(base) + POLICY.fair
     assert held.predicted(base) == held.log_likelihood(held.residual(base.mount))
 
 
@@ -95,7 +95,7 @@ def test_an_offset_is_told_beside_friction_and_load_of_another_day(factor: float
     offset, v = 0.2 * NOISE, np.sin(np.arange(SECONDS * RATE) / RATE)
     base = 5 * np.gradient(v, 1 / RATE) + 2 * np.sign(v) + v
     recording = held_out(white(5) + offset + (factor - 1) * base, v)
-    assert predicted(recording, TorqueOffset(torque=offset)) > 10 * POLICY.least_predicted
+    assert predicted(recording, TorqueOffset(torque=offset)) > 10 * POLICY.fair
     assert predicted(recording, TorqueOffset(torque=-offset)) < 0
 
 

@@ -58,7 +58,7 @@ def test_a_torque_constant_that_waves_is_no_friction_over_position(
 
 def test_a_name_is_not_taken_by_less_than_excludes_a_rival(rippling_motor: tuple[Diagnosis, tuple[Any, ...]]) -> None:
     _, (comparison, examined, proof, held) = rippling_motor
-    never = replace(comparison.policy, least_followed=1e4)
+    never = replace(comparison.policy, clear=1e4)
     left = nameless(replace(comparison, policy=never), examined, proof, held)
     assert left.taken == ()
     assert left.proof is proof

@@ -72,7 +72,7 @@ def test_of_what_is_nothing_the_true_evidence_and_gain_are_nothing() -> None:
     for effect in NOTHING:
         one = beside(effect)
         assert one.evidence <= 0.1, effect.id
-        assert one.plain_gain < POLICY.least_plain_gain, effect.id
+        assert one.plain_gain < POLICY.negligible, effect.id
 
 
 @pytest.mark.parametrize("effect", NOTHING, ids=lambda one: one.id)

@@ -69,11 +69,11 @@ def test_of_the_three_only_the_one_that_is_there_is_admissible_and_near(
 ) -> None:
     this = tried(*case)
     own = this.fits[name]
-    assert own.evidence > POLICY.least_evidence
+    assert own.evidence > POLICY.clear
     near = {
         rival
         for rival, one in this.fits.items()
-        if all_pass(admission(this.comparison, one)) and margin(this.comparison, own, one) < POLICY.set_margin
+        if all_pass(admission(this.comparison, one)) and margin(this.comparison, own, one) < POLICY.fair
     }
     assert near == {name}
 

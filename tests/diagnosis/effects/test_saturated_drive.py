@@ -59,7 +59,7 @@ def test_a_knee_that_one_recording_alone_reaches_is_tried_and_is_real(knee: floa
     comparison, base = saturated(knee, (0.5, 1.2))
     one = found(comparison, base)
     assert all_pass(admission(comparison, one))
-    assert one.evidence > POLICY.least_evidence
+    assert one.evidence > POLICY.clear
     assert isinstance(one.effect, TorqueSaturation)
     assert one.effect.knee_torque == pytest.approx(knee, rel=0.03)
     assert one.effect.slope == pytest.approx(SLOPE, rel=0.03)

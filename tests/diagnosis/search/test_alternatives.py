@@ -58,7 +58,7 @@ def test_what_stands_gives_way_to_nobody() -> None:
     assert proven({"b": 0.0, "bx": 4.0, "by": 80.0}, accepted("x", y=0.5))[2] == "x"
 
 
-@pytest.mark.parametrize(("behind", "expected"), [(RULES.set_margin - 0.01, "y"), (RULES.set_margin, "")])
+@pytest.mark.parametrize(("behind", "expected"), [(RULES.fair - 0.01, "y"), (RULES.fair, "")])
 def test_only_what_training_leaves_open_is_asked(behind: float, expected: str) -> None:
     assert proven({"b": 0.0, "bx": -2.0, "by": 8.0}, accepted("x", y=behind))[2] == expected
 

@@ -117,7 +117,7 @@ def test_what_is_late_about_turns_alone_is_not_named() -> None:
     comparison = Comparison.of(problem, base, POLICY)
     found = problem.fit(replace(base.mount, effects=(Delay(delay_ms=5.0),)), 15)
     one = weighed(comparison, found, base)
-    assert one.evidence > POLICY.least_evidence
-    assert one.away < POLICY.least_away
+    assert one.evidence > POLICY.clear
+    assert one.away < POLICY.small
     assert not all_pass(admission(comparison, one))
     assert all_pass(admission(comparison, replace(one, away=1.0)))

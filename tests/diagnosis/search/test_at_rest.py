@@ -54,7 +54,7 @@ def test_a_contact_that_bends_is_told_by_what_it_holds_at_rest() -> None:
     for bends in (True, False):
         whole, base = comparison(bends)
         found = refitted(whole, base, Presliding(sigma0=SIGMA0), 1)
-        assert (found.at_rest > POLICY.halved) is bends
+        assert (found.at_rest > POLICY.half) is bends
         assert all_pass(admission(whole, found)) is bends
 
 

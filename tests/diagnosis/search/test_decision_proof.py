@@ -11,15 +11,7 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.search.proof import Proof, prove
 from cosim.diagnosis.search.rivals import AcceptedEffect, Examined
 
-RULES = replace(
-    POLICY,
-    least_predicted=3.0,
-    clearly_predicted=3.0,
-    sure_predicted=30.0,
-    halved=0.5,
-    most_raised=0.1,
-    least_share=0.02,
-)
+RULES = replace(POLICY, fair=3.0, clear=3.0, slight=0.1)
 
 
 @dataclass(frozen=True)
@@ -193,7 +185,7 @@ def test_what_stands_alone_is_not_fitted_again() -> None:
 def test_what_is_small_in_training_and_alone_must_halve_the_held_out_error_and_predict(
     names: str, left: float, nats: float, expected: str
 ) -> None:
-    small, sure = 0.9 * RULES.small_gain, RULES.small_evidence
+    small, sure = 0.9 * RULES.small, RULES.sure
     likelihoods = {"b": 0.0, "bx": nats, "by": nats, "bxy": 2 * nats}
     tables = Tables(likelihoods, {"b": 1.0, "bx": left, "by": left, "bxy": 0.3})
     assert standing(proven(tables, names, small, sure - 1)) == expected
@@ -201,5 +193,5 @@ def test_what_is_small_in_training_and_alone_must_halve_the_held_out_error_and_p
 
 def test_what_is_small_and_sure_need_not() -> None:
     tables = Tables({"b": 0.0, "bx": 50.0}, {"b": 1.0, "bx": 0.8})
-    assert standing(proven(tables, "x", 0.9 * RULES.small_gain, RULES.small_evidence)) == "x"
-    assert standing(proven(tables, "x", RULES.small_gain, RULES.small_evidence - 1)) == "x"
+    assert standing(proven(tables, "x", 0.9 * RULES.small, RULES.sure)) == "x"
+    assert standing(proven(tables, "x", RULES.small, RULES.sure - 1)) == "x"

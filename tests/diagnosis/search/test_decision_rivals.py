@@ -10,7 +10,7 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.search import rivals
 from cosim.diagnosis.search.rivals import AcceptedEffect, Examined, examine, explains, grouped, margins
 
-RULES = replace(POLICY, set_margin=3.0, keep_evidence=8.0)
+RULES = replace(POLICY, fair=3.0, clear=8.0)
 
 
 @dataclass(frozen=True)
@@ -222,7 +222,7 @@ def test_what_has_evidence_only_beside_an_effect_that_was_swapped_in_is_added(pl
 
 
 def test_beside_an_effect_that_explains_little_nothing_is_added(play: Play) -> None:
-    least = RULES.small_evidence - 1
+    least = RULES.sure - 1
     beside = {"b": [], "bx": [replace(rival("p", 900.0, beside="bx"), adds=True)]}
-    found = play("x", {"x": least, "p": 900.0}, beside, gains={"x": RULES.small_gain / 2})
+    found = play("x", {"x": least, "p": 900.0}, beside, gains={"x": RULES.small / 2})
     assert chosen(found) == "bx"

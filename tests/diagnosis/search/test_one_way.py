@@ -78,4 +78,4 @@ def test_a_tone_is_not_found_in_the_noise_of_many_short_recordings_by_a_phase_in
     comparison = Comparison.of(problem, base, POLICY)
     one = refitted(comparison, base, PeriodicDisturbance(frequency_hz=3.0, amplitude=0.02), 1)
     assert one.plain_gain > 0.05
-    assert one.evidence < POLICY.least_evidence / 2
+    assert one.evidence < POLICY.clear / 2

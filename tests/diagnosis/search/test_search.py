@@ -86,7 +86,7 @@ def test_a_small_ripple_over_a_quiet_axis_is_seen_and_its_size_is_right(share: f
     best = best_of(comparison, stage(comparison, base))
     assert best is not None
     assert isinstance(best.effect, Cogging)
-    assert best.evidence > POLICY.least_evidence
+    assert best.evidence > POLICY.clear
     assert best.effect.amplitude == pytest.approx(amplitude, rel=0.1)
 
 
@@ -102,19 +102,12 @@ def test_what_is_slow_counts_beside_loud_fast_noise() -> None:
     best = best_of(comparison, stage(comparison, base))
     assert best is not None
     assert best.effect.id in ("gravity_unbalance", "cable_wrap")
-    assert best.evidence > POLICY.least_evidence
+    assert best.evidence > POLICY.clear
 
 
 def test_beside_a_strong_effect_a_further_one_must_be_stronger_than_alone() -> None:
-    lowest, highest = POLICY.further_evidence
-    assert least(POLICY, 1.0, 0.1) == lowest
-    assert lowest < least(POLICY, 100.0, 0.1) < highest
-    assert least(POLICY, 1e4, 0.9) == highest
-
-
-def test_alone_what_removes_much_needs_less_evidence_than_what_removes_little() -> None:
-    assert least(POLICY, 0.0, POLICY.large_gain - 0.01) == POLICY.least_evidence
-    assert least(POLICY, 0.0, POLICY.large_gain) == POLICY.evidence_if_large < POLICY.least_evidence
+    asked = [least(POLICY, largest) for largest in (0.0, 1.0, 100.0, 1e4)]
+    assert asked == [POLICY.clear, POLICY.clear, 50.0, POLICY.sure]
 
 
 def test_a_rival_is_fitted_from_where_the_others_stand_too_as_alone_they_may_have_gone_astray() -> None:
@@ -165,10 +158,10 @@ def test_what_surely_holds_an_axis_at_rest_need_not_bend_by_what_recordings_show
 
 def test_a_weak_presliding_is_minor_unless_it_removes_a_quarter_of_the_error() -> None:
     _, base = compared(lambda q, _: 0 * q)
-    bent = CandidateFit(Presliding(sigma0=1e4), base, POLICY.least_bent - 1, 0.0, POLICY.large_gain - 0.01)
+    bent = CandidateFit(Presliding(sigma0=1e4), base, POLICY.strong - 1, 0.0, POLICY.considerable - 0.01)
     assert is_minor(bent, POLICY)
-    assert not is_minor(replace(bent, evidence=POLICY.least_bent + 1), POLICY)
-    assert not is_minor(replace(bent, plain_gain=POLICY.large_gain), POLICY)
+    assert not is_minor(replace(bent, evidence=POLICY.strong + 1), POLICY)
+    assert not is_minor(replace(bent, plain_gain=POLICY.considerable), POLICY)
 
 
 def test_in_a_contest_of_names_the_bases_merit_counts_as_little_as_rows_do() -> None:
@@ -209,7 +202,7 @@ def test_what_the_base_gains_by_other_numbers_of_its_own_is_no_merit_of_an_effec
         axis = replace(comparison.problem.mount.axis, inertia=inertia)
         return replace(comparison, problem=replace(comparison.problem, mount=replace(base.mount, axis=axis)))
 
-    assert comparison.evidence(beside) - comparison.evidence(at(0.1)) > POLICY.least_evidence
+    assert comparison.evidence(beside) - comparison.evidence(at(0.1)) > POLICY.clear
     assert weighed(with_card(0.1), beside, at(0.1)).evidence < 1.0
     assert owed_to_base(with_card(2.5), beside, at(2.5), NONE) == (0.0, 0.0), "within what owners may be off"
     assert owed_to_base(comparison, beside, at(0.1), NONE) == (0.0, 0.0), "the base comes back to the card"

@@ -102,7 +102,7 @@ def test_a_weight_and_an_inertia_over_position_stand_in_one_set_on_one_sine_only
     comparison, base = compared(stroke)
     weight = refitted(comparison, base, GravityUnbalance(mgl=0.5, phase=0.1), 1)
     varying = refitted(comparison, base, InertiaVariation(relative_amplitude=0.1, cycles_per_rev=1.0, phase=3.0), 1)
-    assert weight.evidence > POLICY.evidence_if_large
-    assert weight.plain_gain > POLICY.large_gain
+    assert weight.evidence > POLICY.clear
+    assert weight.plain_gain > POLICY.considerable
     behind = float(margin(comparison, weight, varying))
-    assert behind < POLICY.set_margin if together else behind > POLICY.set_margin
+    assert behind < POLICY.fair if together else behind > POLICY.fair

@@ -46,7 +46,7 @@ def test_what_explains_slow_motion_is_worth_the_same_whatever_inertia_fast_motio
 
 
 def test_without_that_freedom_it_would_pay_for_the_fast_motion() -> None:
-    pinned = replace(POLICY, fast_prior=1e-6)
+    pinned = replace(POLICY, wander=1e-6)
     assert worth(0.03, 2.0, pinned) < worth(0.03, 2.0) - 100
 
 

@@ -7,13 +7,14 @@ import pytest
 from learned_cases import MOUNT, droop, learned, parts, wanders, warm_place
 from test_unknown import Array, Extra, iron
 
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.candidates import Candidate
 from cosim.diagnosis.evidence.comparison import Screened
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.terms.candidate_terms import candidate_terms, resolved
 from cosim.diagnosis.terms.grams import columns_of, grams_of, with_terms
 from cosim.diagnosis.terms.learn import _judged
-from cosim.diagnosis.terms.select import LEAST_EVIDENCE, paths
+from cosim.diagnosis.terms.select import paths
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.support.statistics import rms
 from pyfmi_models.effects.compliance import Compliance
@@ -107,7 +108,7 @@ def test_terms_need_evidence_each() -> None:
         def predicted(self, chosen, beta, which):
             return 100.0 * len(chosen)
 
-    assert LEAST_EVIDENCE > 5
+    assert POLICY.clear > 5
     assert paths(Scores(), range(4)) == []
 
 

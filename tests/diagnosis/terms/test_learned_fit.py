@@ -17,7 +17,7 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.measure.protocol import CUTOFF
-from cosim.diagnosis.terms.learn import SURE, Learned, learn
+from cosim.diagnosis.terms.learn import Learned, learn
 from cosim.diagnosis.terms.select import begun, paths
 from cosim.estimation.prepare import prepare
 from pyfmi_models.card import parse_card, read_card
@@ -107,7 +107,7 @@ def test_sure_is_what_three_kinds_of_recordings_prove_each_for_itself() -> None:
     found = learned(warm_place)
     assert found is not None
     assert found.is_sure
-    weak = SURE - 1
+    weak = POLICY.clear - 1
     for less in ({"evidence": (weak,)}, {"predicted": (weak,)}, {"gain": weak}, {"helps": False}):
         assert not replace(found, **less).is_sure
 
@@ -117,7 +117,7 @@ def test_what_is_sure_but_a_small_share_of_the_rest_or_of_a_name_does_not_say_un
     assert found is not None
     assert says_unknown(found)
     assert not says_unknown(replace(found, after=0.95 * found.before))
-    stronger = EffectScores("cogging", (min(found.evidence) + 1) / POLICY.imitation, {}, {"cogging": 1.0})
+    stronger = EffectScores("cogging", (min(found.evidence) + 1) / POLICY.considerable, {}, {"cogging": 1.0})
     assert not says_unknown(found, stronger)
     assert not says_unknown(replace(found, quantities=("speed",)))  # another friction law, no more
 

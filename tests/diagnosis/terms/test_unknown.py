@@ -111,7 +111,7 @@ def stuck(now: dict[str, Array]) -> Array:
     """Friction that has the old sign for .06 s after a turn, as where an axis sticks within a step of its encoder."""
     turned = last_reversal(now["q"], 1e-6)[0]
     after = now["t"] - now["t"][turned]
-    return np.where((after < 0.06) & (turned > 0), -2 * FC * np.sign(now["v"]), 0.0)
+    return np.where((after < 0.05) & (turned > 0), -2 * FC * np.sign(now["v"]), 0.0)
 
 
 @pytest.mark.parametrize(
@@ -126,7 +126,7 @@ def stuck(now: dict[str, Array]) -> Array:
 )
 def test_a_small_rest_and_noise_are_nothing_to_explain(extra: Extra) -> None:
     residual, decision = left(extra)
-    assert residual.share < POLICY.large_residual
+    assert residual.share < POLICY.small
     assert not decision.is_unknown
     assert decision.depends_on == ()
 
@@ -145,8 +145,8 @@ def test_what_no_law_can_have_left_may_be_smaller_than_what_one_has() -> None:
     (law, by_law), (push, by_push) = left(another_law), left(pushed)
     assert law.share_beside < 0.7 * law.share
     assert not by_law.is_unknown
-    assert max(push.share, push.share_there) < POLICY.large_residual
-    assert push.share_beside > POLICY.large_residual_beside
+    assert max(push.share, push.share_there) < POLICY.small
+    assert push.share_beside > POLICY.slight
     assert by_push.is_unknown
 
 
