@@ -70,6 +70,7 @@ PAGES = {
     "proof/bounds.md": BENCH.format("bounds.py --cases 12 --seed 1463892207", "proof"),
     "proof/left_out.md": BENCH.format("leave_one_out.py --cases 2 --seed 898481173", "proof"),
     "proof/null.md": BENCH.format("diagnosis.py null --cases 10 --seed 6000", "proof"),
+    "proof/ablation.md": "python bench/ablation.py --home 281127341 --rough 730915562 --cases 120 --out results/proof",
     "proof/sensitivity.md": BENCH.format("sensitivity.py --cases 6 --seed 158358624", "proof"),
     "robustness/attack.md": BENCH.format("attack.py --seed 1 --count 5200", "robustness"),
     "robustness/fuzz.md": BENCH.format(

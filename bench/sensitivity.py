@@ -48,11 +48,10 @@ FACTORS = (0.5, 2.0)
 OF_EVIDENCE = {
     "bands_hz",
     "coarsening",
+    "form_ways",
     "accuracy",
-    "fast_hz",
-    "fast_prior",
-    "shape_prior",
-    "wander_prior",
+    "misfit",
+    "wander",
     "wander_seconds",
     "phase_price",
 }

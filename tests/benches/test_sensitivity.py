@@ -21,7 +21,7 @@ def test_a_replay_is_a_diagnosis_by_another_policy(tmp_path: Path) -> None:
     assert replay.answer(POLICY) == ("cogging",)
     assert len(replay.problem.made) == made, "fits are made once"
     none = sensitivity.scaled("least_above_noise", 1e9)
-    assert replay.answer(sensitivity.scaled("least_plain_gain", 100.0), "least_plain_gain") != ("cogging",)
+    assert replay.answer(sensitivity.scaled("negligible", 100.0), "negligible") != ("cogging",)
     assert replay.answer(none, "least_above_noise") == ("cogging",), "a ripple need not stand out"
     assert replay.answer(sensitivity.scaled("coarsening", 1e-4), "coarsening") != ("cogging",)
 
@@ -30,8 +30,8 @@ def test_every_constant_is_scaled_and_whole_numbers_stay_whole() -> None:
     assert {*sensitivity.constants(), "version"} == {one.name for one in fields(Policy)}
     assert set(sensitivity.constants()) >= sensitivity.OF_EVIDENCE
     assert sensitivity.scaled("refitted", 0.5).refitted == 4
-    assert sensitivity.scaled("further_evidence", 2.0).further_evidence == (16.0, 150.0)
-    assert sensitivity.scaled("floor", 0.5).floor == pytest.approx(13.0)
+    assert sensitivity.scaled("bands_hz", 2.0).bands_hz == (4.0, 16.0, 64.0)
+    assert sensitivity.scaled("strong", 0.5).strong == pytest.approx(15.0)
 
 
 @pytest.mark.parametrize(

@@ -92,3 +92,13 @@ def test_bursts_are_unknown_and_take_nothing_from_a_name() -> None:
     assert shaken.is_unknown
     assert shaken.depends_on == (IN_BURSTS,)
     assert (shaken.sets, shaken.probabilities, shaken.doubtful) == (named.sets, named.probabilities, ())
+
+
+def test_a_friction_level_that_is_another_for_some_seconds_is_no_burst() -> None:
+    """It changes with the direction, several times in a window, and shakes nothing."""
+    way = np.where(np.sin(2 * np.pi * 3 * T) >= 0, 1.0, -1.0)
+    level = np.where((T > 10) & (T < 14), 8.0 * way, 0.0)
+    found: Any = SimpleNamespace(residual=np.concatenate([noise() + level, noise(seed=2)]))
+    assert burst_share(comparing(way), found) < 0.02
+    shaken: Any = SimpleNamespace(residual=np.concatenate([noise() + np.abs(level) * noise(seed=3), noise(seed=2)]))
+    assert burst_share(comparing(way), shaken) > POLICY.small
