@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from hashlib import sha256
 from math import isfinite
 from pathlib import Path
@@ -95,7 +96,9 @@ def calibrate(
         if store.found:
             on_progress(f"{store.found:,} simulations were done before")
         done = find(subject, train, kept, options, on_progress, store)
-        files = deliver.deliver(done, (*train, *kept), out, force)
+        from cosim.delivery.identified_fmu import carry  # what exports FMUs: without a folder nothing is written
+
+        files = deliver.deliver(done, (*train, *kept), out, force, partial(carry, done, options.timeout, on_progress))
     return CalibrateResult(done, files)
 
 

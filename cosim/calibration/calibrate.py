@@ -107,6 +107,10 @@ class Calibrated:
     notes: tuple[str, ...]
     initial: Mapping[str, float] = field(default_factory=dict)
     """Start values that were free, by name."""
+    shown: Experiment | None = None
+    """The first recording kept out, else the last one fitted, as it was simulated to judge the numbers."""
+    shown_with: Mapping[str, float] = field(default_factory=dict)
+    """What it is simulated with beside the numbers: other values that were given, and start values, by variable."""
 
 
 def calibrate(
@@ -124,10 +128,7 @@ def calibrate(
     Raises:
         InputError: a name, a column, a unit or an option does not fit; or the model cannot be simulated at its start.
     """
-    _check(options)
-    if options.derivatives == "directional" and not subject.alone:
-        text = f"--derivatives directional is of one FMU, and {subject.source} is a system; leave it out."
-        raise InputError(text, culprit="--derivatives", value=options.derivatives)
+    _check(options, subject)
     _check_recordings(train, heldout, options.columns)
     _check_set(subject, options)
     free = free_of(subject, options.free, options.given, options.bounds)
@@ -168,7 +169,15 @@ def calibrate(
     values = {**values, **{name: before[name] for one in uncertainty.not_determined if one.idle for name in one.parts}}
     traces = _traces(subject, whole, len(train), old, new)
     initial = {one.name: values.pop(one.name) for one in own}
-    return Calibrated(subject, free, values, uncertainty, traces, found, evaluations, lost, (*notes, *remarks), initial)
+    shown = whole[len(train)] if heldout else whole[-1]
+    last = (initial, shown, _other_values(shown, options.given, values, initial))
+    return Calibrated(subject, free, values, uncertainty, traces, found, evaluations, lost, (*notes, *remarks), *last)
+
+
+def _other_values(shown: Experiment, given: Point, values: Point, initial: Point) -> dict[str, float]:
+    """What an experiment is simulated with beside the numbers that were found."""
+    others = {name: value for name, value in given.items() if name not in values}
+    return {**others, **(shown.starts or {}), **{variable: initial[number] for variable, number in shown.own.items()}}
 
 
 def _check_columns(columns: Mapping[str, str], recordings: Sequence[Recording]) -> None:
@@ -218,7 +227,7 @@ def _experiments(
     return tuple(whole), fitted, own
 
 
-def _check(options: Options) -> None:
+def _check(options: Options, subject: Subject) -> None:
     for name, value, choices in (
         ("--loss", options.loss, LOSSES),
         ("--interpolation", options.interpolation, INTERPOLATIONS),
@@ -231,6 +240,9 @@ def _check(options: Options) -> None:
     for name, number in (("--step", options.step), ("--window", options.window), ("--timeout", options.timeout)):
         if number is not None and not 0 < number < float("inf"):
             raise InputError(f"{name} {number:g}: it must be above 0.", culprit=name, value=number)
+    if options.derivatives == "directional" and not subject.alone:
+        text = f"--derivatives directional is of one FMU, and {subject.source} is a system; leave it out."
+        raise InputError(text, culprit="--derivatives", value=options.derivatives)
 
 
 def _check_recordings(train: Sequence[Recording], heldout: Sequence[Recording], columns: Mapping[str, str]) -> None:

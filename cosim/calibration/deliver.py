@@ -1,7 +1,7 @@
 """Files of a calibration: identified.json, identified.ssv, report.html, the FMU with the numbers that were found."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite, sqrt
 from pathlib import Path
 
@@ -30,14 +30,21 @@ def check_out(out: Path, source: Path, alone: bool, force: bool) -> None:
         check_free(out / name, force)
 
 
-def deliver(done: Calibrated, recordings: Sequence[Recording], out: Path, force: bool) -> dict[str, Path]:
-    """Write all files into `out`, the JSON last; return them by kind."""
+def deliver(
+    done: Calibrated,
+    recordings: Sequence[Recording],
+    out: Path,
+    force: bool,
+    complete: Callable[[Path], None] = lambda path: None,
+) -> dict[str, Path]:
+    """Write all files into `out`, the JSON last; return them by kind. `complete` puts into the FMU what it carries."""
     directory(out)
     found = {"parameter_set": out / SET, "report": out / PAGE, "json": out / JSON}
     write_set(done, out / SET, force)
     if done.subject.alone:
         found["fmu"] = out / files_of(done.subject.source, True)[-1]
         write_with_starts(done.subject, done.values, found["fmu"], force)
+        complete(found["fmu"])
     write_page(done, out / PAGE, force)
     with replacing(out / JSON, force) as partial:
         content = as_json(done) | {

@@ -9,7 +9,7 @@ import csv
 import io
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
 
@@ -17,16 +17,19 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.data.recording import Recording
-from cosim.experiments.experiment_file import CSV, KINDS
+from cosim.experiments.experiment_file import CSV, KINDS, SET
 from cosim.experiments.run import Settings, system_of
 from cosim.experiments.series import TIME, Series
+from cosim.fmi.component import Port
 from cosim.fmi.description import describe
+from cosim.fmi.types import FLOATS
 from cosim.fmi.variables import ports_of
 from cosim.master.simulate import simulate
 from cosim.support.errors import CosimError
 from pyfmi_models.export.description import xml_text
 from pyfmi_models.export.platforms import host
 from pyfmi_models.export.related import Related
+from pyfmi_models.export.ssp import NAMESPACES
 from pyfmi_models.model import Model, Variable
 
 Array = npt.NDArray[np.float64]
@@ -48,6 +51,12 @@ class Stimulus:
     inputs: Mapping[str, Array]
     step: float
     measured: Mapping[str, Array] = field(default_factory=dict)
+    rows: Array = field(default_factory=lambda: np.zeros(0))
+    """Times of what was measured and of the reference, where they are not those of the inputs [s]."""
+    compared: tuple[str, ...] = ()
+    """Variables of the reference; () is each output."""
+    values: Mapping[str, float] = field(default_factory=dict)
+    """Parameters and start values of this experiment, by name."""
 
 
 def sines(model: Model) -> Stimulus:
@@ -93,14 +102,19 @@ def with_experiment(
         return path
 
 
-def experiment_files(path: Path, stimulus: Stimulus) -> tuple[Related, ...]:
-    """Simulate a stimulus with an FMU and return the files of the experiment."""
+def experiment_files(path: Path, stimulus: Stimulus, folder: str = "") -> tuple[Related, ...]:
+    """Simulate a stimulus with an FMU and return the files of the experiment, in a folder ("" or "name/")."""
     ports = ports_of(describe(path))
     ticks = round(float(stimulus.times[-1]) / stimulus.step)
     settings = Settings(0.0, stimulus.step, ticks)
     series = Series(stimulus.times, stimulus.inputs, {}, ())
-    columns = simulate(system_of(path, ports, settings, series, {}, None, "")).recording.table
-    rows = np.rint(stimulus.times / stimulus.step).astype(np.intp)
+    values = {name: _typed(ports[name], value) for name, value in stimulus.values.items()}
+    asked = Series(stimulus.times, {name: stimulus.times for name in stimulus.compared}, {}, ())
+    columns = simulate(
+        system_of(path, ports, settings, series, values, asked if stimulus.compared else None, "")
+    ).recording.table
+    measured_at = stimulus.rows if len(stimulus.rows) else stimulus.times
+    rows = np.minimum(np.rint(measured_at / stimulus.step).astype(np.intp), ticks)
     at: Array = stimulus.step * rows.astype(np.float64)
     reference = {name: values[rows] for name, values in columns.items() if name != "t" and np.isfinite(values).all()}
     found = [
@@ -108,10 +122,27 @@ def experiment_files(path: Path, stimulus: Stimulus) -> tuple[Related, ...]:
         Related(CSV, "stimulus.csv", "other", "Stimulus of the experiment", _csv(stimulus.times, stimulus.inputs)),
         Related(CSV, "reference.csv", "other", "What the FMU gave where it was made", _csv(at, reference)),
     ]
+    if values:
+        found.append(Related(SET, "values.ssv", "other", "Values of the experiment", _set(stimulus.name, values)))
     if stimulus.measured:
         said = f"What was measured in the recording {stimulus.name}"
-        found.append(Related(CSV, "measured.csv", "result", said, _csv(stimulus.times, stimulus.measured)))
-    return tuple(found)
+        found.append(Related(CSV, "measured.csv", "result", said, _csv(measured_at, stimulus.measured)))
+    return tuple(replace(one, source=f"{folder}{one.source}") for one in found)
+
+
+def _typed(port: Port, value: float) -> float | int | bool:
+    return float(value) if port.type in FLOATS else bool(value) if port.type == "Boolean" else int(value)
+
+
+def _set(name: str, values: Mapping[str, float | int | bool]) -> bytes:
+    """A parameter set of SSP, in the units of the variables."""
+    kinds = {float: "Real", int: "Integer", bool: "Boolean"}
+    root = ET.Element("ssv:ParameterSet", {"xmlns:ssv": NAMESPACES["ssv"], "version": "1.0", "name": name})
+    group = ET.SubElement(root, "ssv:Parameters")
+    for key, value in values.items():
+        parameter = ET.SubElement(group, "ssv:Parameter", name=key)
+        ET.SubElement(parameter, f"ssv:{kinds[type(value)]}", value=repr(value).lower())
+    return xml_text(root)
 
 
 def _size(variable: Variable) -> float:
@@ -124,6 +155,8 @@ def _file(stimulus: Stimulus, ticks: int) -> bytes:
     times = {"startTime": "0.0", "stopTime": repr(ticks * stimulus.step), "stepSize": repr(stimulus.step)}
     one = ET.SubElement(root, "Experiment", name=stimulus.name, description=stimulus.description)
     ET.SubElement(one, "TransientSimulation", times)
+    if stimulus.values:
+        ET.SubElement(one, "Parameters", source="values.ssv")
     ET.SubElement(one, "Stimuli", source="stimulus.csv")
     ET.SubElement(one, "References", source="reference.csv")
     return xml_text(root)

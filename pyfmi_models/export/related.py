@@ -41,12 +41,23 @@ PAGE = Related("text/html", "../../documentation/index.html", "document", "The m
 
 def references(related: Iterable[Related]) -> dict[str, bytes]:
     """Return what an archive gets: the manifest and the files that it does not have yet, by name in the archive."""
-    listed = (PAGE, *related)
-    root = ET.Element("fmiReferences", {"xmlns:fmi-ls": _SPACE, **{f"fmi-ls:{key}": one for key, one in _SAYS.items()}})
-    for one in listed:
-        ET.SubElement(root, "Related", type=one.kind, source=one.source, role=one.role, description=one.description)
-    files = {f"{FOLDER}/{one.source}": one.content for one in listed if one.content}
-    return {f"{FOLDER}/{MANIFEST}": xml_text(root), **files}
+    return listed((PAGE, *related), empty())
+
+
+def empty() -> ET.Element:
+    """A manifest that lists nothing."""
+    ET.register_namespace("fmi-ls", _SPACE)
+    return ET.Element("fmiReferences", {f"{{{_SPACE}}}{key}": one for key, one in _SAYS.items()})
+
+
+def listed(related: Iterable[Related], manifest: ET.Element) -> dict[str, bytes]:
+    """Return what an archive gets: its manifest with these files too, and those that have content, by name."""
+    files = tuple(related)
+    for one in files:
+        told = {"type": one.kind, "source": one.source, "role": one.role, "description": one.description}
+        ET.SubElement(manifest, "Related", told)
+    content = {f"{FOLDER}/{one.source}": one.content for one in files if one.content}
+    return {f"{FOLDER}/{MANIFEST}": xml_text(manifest), **content}
 
 
 def identified(name: str, origin: Mapping[str, object], numbers: bytes) -> tuple[Related, ...]:
