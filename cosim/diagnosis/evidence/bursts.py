@@ -1,7 +1,7 @@
 """What shakes an axis now and then: energy of what a structure leaves that lasts for seconds, far above the usual.
 
     share = sum of max(l - ABOVE u, 0) / sum of e,    l = min(e, the larger neighbour's e),    u = median of e
-    ln e = ln(variance of the rest) less a quadratic in ln(speed) and ln(acceleration), RMS of each
+    ln e = ln(variance of the rest) less a quadratic in ln(speed), ln(acceleration) and ln(jerk), RMS of each
 
 in windows of a second of clear motion, the variance less what a level of friction of its own would take in each:
 friction that changes is no shaking. Noise of any colour has the same e in each, and what a law lacks goes with the
@@ -9,6 +9,7 @@ motion; a single window that stands out is a jolt, and counts nothing.
 """
 
 from collections.abc import Sequence
+from itertools import combinations_with_replacement
 
 import numpy as np
 import numpy.typing as npt
@@ -38,35 +39,36 @@ def burst_share(comparison: Comparison, found: Fit) -> float:
     rest = found.residual / comparison.noise.at(prepared.stacked("v"))
     seconds = max(SECONDS, PERIODS / prepared.cutoff)
     for piece, rows in zip(prepared.pieces, comparison.bands.slices, strict=True):
-        parts += [_windows(piece, rest[rows], clear[rows], seconds), np.full((1, 3), np.nan)]
+        parts += [_windows(piece, rest[rows], clear[rows], seconds), np.full((1, 4), np.nan)]
     windows = np.concatenate(parts)
     known = np.isfinite(windows).all(1)
     if known.sum() < LEAST_WINDOWS:
         return 0.0
     energy = np.full(len(windows), np.nan)
-    least = NONE * float(windows[known, 1].max()) * np.array([0.0, 1.0, seconds**-2]) + 1e-300
+    least = NONE * float(windows[known, 1].max()) * np.array([0.0, 1.0, seconds**-2, seconds**-4]) + 1e-300
     energy[known] = _beside_motion(np.log(np.maximum(windows[known], least)))
     above = np.maximum(_lasting(energy)[known] - ABOVE * np.median(energy[known]), 0.0)
     return float(above.sum() / energy[known].sum())
 
 
 def _windows(piece: Piece, rest: Array, clear: Array, seconds: float) -> Array:
-    """Variance of the rest, mean squares of speed and acceleration: (windows, 3); not a number where hardly clear."""
+    """Variance of the rest, mean squares of speed, acceleration, jerk: (windows, 4); no number where hardly clear."""
     t, v = piece.t[piece.kept], piece.v[piece.kept]
     if len(t) < LEAST_ROWS:
-        return np.full((1, 3), np.nan)
+        return np.full((1, 4), np.nan)
     way = np.sign(v)
-    columns = (rest, rest**2, way, way**2, way * rest, v**2, np.gradient(v, t) ** 2)
+    a = np.gradient(v, t)
+    columns = (rest, rest**2, way, way**2, way * rest, v**2, a**2, np.gradient(a, t) ** 2)
     mean, square, ways, both, together, *motion = window_means(t, clear, columns, seconds).T
     of_level = (together - ways * mean) ** 2 / np.maximum(both - ways**2, LEAST_WAYS)
     return np.column_stack([square - mean**2 - of_level, *motion])
 
 
 def _beside_motion(logs: Array) -> Array:
-    """Energies relative to what a quadratic in the logarithms of speed and acceleration foretells."""
-    speed, acceleration = ((one - one.mean()) / (one.std() + 1e-300) for one in logs[:, 1:].T)
-    shapes = (speed, acceleration, speed**2, acceleration**2, speed * acceleration)
-    columns = np.column_stack([np.ones(len(logs)), *shapes])
+    """Energies relative to what a quadratic in the logarithms of speed, acceleration and jerk foretells."""
+    motion = [(one - one.mean()) / (one.std() + 1e-300) for one in logs[:, 1:].T]
+    shapes = [one * other for one, other in combinations_with_replacement(motion, 2)]
+    columns = np.column_stack([np.ones(len(logs)), *motion, *shapes])
     return np.asarray(np.exp(logs[:, 0] - columns @ np.linalg.lstsq(columns, logs[:, 0], rcond=None)[0]))
 
 
