@@ -147,9 +147,9 @@ def test_a_fitted_curve_lies_within_recorded_speeds_and_five_times_its_start(law
     assert bounds(law, "delta") == (0.1, 5.0)
 
 
-def test_a_fitted_saturation_is_above_a_fifth_of_the_torque_and_lets_something_through() -> None:
+def test_a_fitted_saturation_is_above_a_tenth_of_the_torque_and_lets_something_through() -> None:
     drive = TorqueSaturation(knee_torque=5.0, slope=0.3)
-    assert bounds(drive, "knee_torque") == (2.0, math.inf)
+    assert bounds(drive, "knee_torque") == (1.0, math.inf)
     assert bounds(drive, "slope") == (0.02, 1.0)
 
 
