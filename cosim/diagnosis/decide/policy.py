@@ -10,8 +10,8 @@ class Policy:
     """Constants of evidence, search and decision. Evidence is in nats (natural logarithms of odds).
 
     Rules do not have numbers of their own. Those of evidence ask for one of four steps, each about three times the one
-    before, those of size for one of six shares. Where true and false answers of 300 machines are apart they are so by
-    more than a step (results/proof/ablation.md), and a number between two of them would say more than is known.
+    before, those of size for one of six shares. Of 239 machines no more answers than by chance change where one of them
+    is a third less or a half more (results/proof/ablation.md): a number between two would say more than is known.
     """
 
     version: str = POLICY_VERSION

@@ -28,8 +28,8 @@ ABOVE = 3.0
 LEAST_WAYS = 1e-3
 """Variance of the direction below which a window goes one way, and its level is its mean. Unit: 1."""
 NONE = 1e-6
-"""Mean square of a speed, relative to the largest, and of an acceleration, relative to reaching that within a window,
-below which it is none. Unit: 1."""
+"""Mean square of a speed, relative to the largest, of an acceleration, relative to reaching that within a window, and
+of a jerk, relative to reaching that acceleration within one, below which it is none. Unit: 1."""
 
 
 def burst_share(comparison: Comparison, found: Fit) -> float:

@@ -28,9 +28,6 @@ from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount
 
 ROUNDS = 4
-FAR_BEHIND = 100.0
-"""Nats behind an effect from which a rival is not fitted again from the numbers that others have beside that effect.
-Another start gained 71 nats once and 2 at most else (65 fits of 30 cases), and the band of a set is 3."""
 
 
 @dataclass(frozen=True)
@@ -155,9 +152,10 @@ def _challenged(
     others = [one for one in beside.tried if one.effect.id != group[0].id]
     if len(rest) > len(problem.mount.effects):
         standing = replace(chosen.mount, effects=rest)
+        # Another start gained 71 nats once and 2 at most else (65 fits of 30 cases): no rival comes back from so far.
         others = [
             refitted_from_here(comparison, standing, beside.current, one)
-            if own.evidence - one.evidence < FAR_BEHIND
+            if own.evidence - one.evidence < comparison.policy.sure
             else one
             for one in others
         ]
