@@ -1,13 +1,10 @@
 """The scripts of the documentation do what they say."""
 
 import importlib.util
-import time
 from pathlib import Path
 from types import ModuleType
 
 SCRIPTS = Path(__file__).parents[2] / "docs" / "scripts"
-LONGEST = 30.0
-"""Seconds of processor that a script may take."""
 
 
 def script(name: str) -> ModuleType:
@@ -20,9 +17,7 @@ def script(name: str) -> ModuleType:
 
 
 def test_your_own_axis_is_diagnosed() -> None:
-    began = time.process_time()
     assert script("diagnose_your_axis").main() == ("cogging",)
-    assert time.process_time() - began <= LONGEST
 
 
 def test_your_fmu_runs_beside_the_controller_of_a_card() -> None:
@@ -30,7 +25,6 @@ def test_your_fmu_runs_beside_the_controller_of_a_card() -> None:
 
 
 def test_a_controller_is_designed_within_its_limits_and_proven_with_friction() -> None:
-    began = time.process_time()
     design = script("design_a_controller")
     chosen, before, after = design.main()
     phase, noise = design.limits(design.tuned(design.read_card("paper_mount"), chosen))
@@ -38,4 +32,3 @@ def test_a_controller_is_designed_within_its_limits_and_proven_with_friction() -
     assert noise <= design.MOST
     assert design.BANDWIDTHS[0] < chosen < design.BANDWIDTHS[-1]
     assert after <= before / 2
-    assert time.process_time() - began <= LONGEST

@@ -5,7 +5,6 @@ import json
 import re
 import subprocess
 import sys
-import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
@@ -16,7 +15,7 @@ import pytest
 
 from pyfmi_models.export import build_library
 from pyfmi_models.export.build import compile_shared
-from pyfmi_models.export.codegen import SHIM
+from pyfmi_models.export.codegen import SHIM, generate
 from pyfmi_models.export.platforms import PLATFORMS, host
 
 both = pytest.mark.parametrize("fmi", [2, 3])
@@ -145,13 +144,12 @@ def test_ten_million_ticks_do_not_drift(fmi, summed):
 
 
 @both
-def test_a_step_that_would_take_minutes_fails_in_seconds_and_names_the_culprit(fmi):
+def test_a_step_that_would_take_minutes_fails_after_so_many_of_the_solver_and_names_the_culprit(fmi):
     driver = instance(models.oscillator, fmi, tolerance=1e-13)
-    before, started = everything(driver), time.process_time()
+    before = everything(driver)
     assert driver.step(0, 1e7) == "error"
-    assert time.process_time() - started < 10  # about 1 s on a machine of its own
     message = driver.messages[-1][2]
-    assert "solver steps reach t = " in message
+    assert f"{generate(models.oscillator()).most_steps} solver steps reach t = " in message
     assert 'because of "position"' in message or 'because of "velocity"' in message
     assert everything(driver) == before
     assert driver.step(0, 0.1) == "ok"

@@ -137,10 +137,8 @@ def test_a_greeting_without_the_key_learns_only_that_it_is_another(keys: tuple[s
 def test_an_order_of_the_far_future_or_of_no_time_is_dropped(tick: int) -> None:
     with drive() as there, talking(there) as loop:
         loop.enable()
-        began = time.monotonic()
         loop.send(loop.order(5, 15, 1.0, tick))
         assert loop.silent()
-        assert time.monotonic() - began < 2
         assert there.drive.held == 0
         assert there.drive.tick == 3, "four orders for the ticks 1 to 4, of which the first is the tick at which it was"
         assert loop.obeyed(6, 15, 1.0, 6) == 1.0

@@ -51,16 +51,14 @@ def ideal(workshop: Workshop) -> dict[str, float]:
 
 def _interrupted() -> None:
     with everywhere(8) as spread:
-        spread(time.sleep, [60.0] * 8)
+        spread(time.sleep, [3600.0] * 8)  # longer than a test may take
         time.sleep(1.0)
         raise KeyboardInterrupt
 
 
 def test_an_interrupt_ends_what_waits_without_a_word(capfd: pytest.CaptureFixture[str]) -> None:
-    started = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
         _interrupted()
-    assert time.monotonic() - started < 30
     assert "Traceback" not in capfd.readouterr().err
 
 
