@@ -229,7 +229,7 @@ def check_one(*models: object) -> None:
     given = sum(one is not None for one in models)
     if given != 1:
         what = "none of them is given" if not given else f"{given} are given"
-        raise InputError(f"Identify needs one of card, fmu and system; {what}.", culprit="card")
+        raise InputError(f"One of --card, --fmu and --system says what is identified; {what}.", culprit="card")
 
 
 def _of_card(

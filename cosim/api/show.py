@@ -81,20 +81,37 @@ def show(
         InputError: the file is unsupported, or breaks its own rules.
     """
     if schedule:
+        _check_of_recordings(source, columns, units, layout, picture)
         return _of_schedule(source)
     if not isinstance(source, str | Path):
         from cosim.api.show_recordings import of_recording
 
         return Shown(*of_recording(source, picture, force))
     if (own := result(Path(source))) is not None:
+        _check_of_recordings(source, columns, units, layout, picture)
         return Shown(*own)
     if Path(source).suffix in NO_RECORDINGS or ssp_of(source)[0] is not None:
+        _check_of_recordings(source, columns, units, layout, picture)
         facts, tables = describe(str(source))
         return Shown(facts, tables, tuple(drawing(str(source))) if WIRES in tables else ())
     from cosim.api.show_recordings import of_file
 
     options = {"columns": columns or {}, "units": units or {}, "layout": layout or {}}
     return Shown(*of_file(Path(source), options, picture, force))
+
+
+def _check_of_recordings(
+    source: object,
+    columns: Mapping[str, str] | None,
+    units: Mapping[str, str] | None,
+    layout: Mapping[str, str] | None,
+    picture: str | Path | None,
+) -> None:
+    """Refuse options of recordings with what is none (InputError): they would do nothing."""
+    given = {"--columns": columns, "--units": units, "--layout": layout, "--out": picture}
+    for name, value in given.items():
+        if value:
+            raise InputError(f"{name} is for recordings alone; {source} is shown without it.", culprit=name)
 
 
 def _of_schedule(source: "str | Path | Recording") -> Shown:
@@ -167,7 +184,24 @@ def _fmu(path: Path) -> tuple[Facts, Tables]:
             }
             for port in ports
         ]
-    return facts, {"variables": variables}
+    drawn = _maps_in(path)
+    return facts, {"variables": variables} | ({"learned maps": drawn} if drawn else {})
+
+
+def _maps_in(path: Path) -> list[dict[str, Json]]:
+    """Return the learned terms that an FMU of ours carries as curves of text; nothing of what is no such file."""
+    from cosim.fmi.manifest import manifest_of
+
+    try:
+        manifest = manifest_of(path)
+    except FmuError:  # `brings along` says so
+        return []
+    named = [one.member for one in manifest.related if one.member.endswith("/maps.json")] if manifest else []
+    if not named:  # most FMUs: what draws maps knows the physics, which takes a second to load
+        return []
+    from cosim.models.maps import curves_in
+
+    return [row for member in named for row in curves_in(path, member)]
 
 
 def _carried(path: Path) -> dict[str, str]:
@@ -230,7 +264,7 @@ def _toml(file: str) -> tuple[Facts, Tables]:
     if file in effects() and not path.exists():
         return of_effect(file)
     if path.exists():
-        folders = "run, diagnosis, sweep, comparison or benchmark"
+        folders = "run, diagnosis, sweep, comparison, calibration, check or benchmark"
         kinds = f"a recording, FMU, SSP, scenario, card, sweep, or a folder of a {folders}"
         raise InputError(f"{file} is unsupported: cosim show takes {kinds}.", culprit=file)
     choices = (*shipped_scenarios(), *shipped_cards(), *effects())

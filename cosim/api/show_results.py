@@ -1,10 +1,11 @@
-"""What this project wrote itself, on one screen: folders of runs, diagnoses, sweeps, and their files."""
+"""What this project wrote itself, on one screen: folders of runs, diagnoses, sweeps and so on, and their files."""
 
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cosim.api.show_exchange import calibration, checked
 from cosim.support.errors import InputError
 from cosim.support.plain import Json, Parsed
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 Shown = tuple[dict[str, Json], dict[str, Sequence[Mapping[str, Json]]]]
 DIAGNOSIS, RUN, TABLE = "diagnosis.json", "run.json", "table.parquet"
 COMPARISON, PROOF = "compare.json", "proof.json"
+IDENTIFIED, CHECK = "identified.json", "check.json"
 FIRST = 20
 """Runs of a sweep that are listed, the best first."""
 
@@ -138,6 +140,14 @@ def _proof(path: Path) -> Shown:
     return facts, {"scores, with 95 % ranges": rows}
 
 
+def _calibration(path: Path) -> Shown:
+    return calibration(path, _document(path, *_KEYS[IDENTIFIED]))
+
+
+def _check(path: Path) -> Shown:
+    return checked(path, _document(path, *_KEYS[CHECK]))
+
+
 def _is_sweep(path: Path) -> bool:
     from pyarrow import parquet
 
@@ -189,7 +199,12 @@ def sweep_file(path: Path) -> Shown:
     return facts, {}
 
 
-_KEYS = {COMPARISON: ("recordings", "span", "rows", "differences"), PROOF: ("played", "cases", "scores", "command")}
+_KEYS = {
+    COMPARISON: ("recordings", "span", "rows", "differences"),
+    PROOF: ("played", "cases", "scores", "command"),
+    IDENTIFIED: ("source", "numbers", "outputs", "heldout"),
+    CHECK: ("fmu", "passed", "experiments", "findings"),
+}
 """What a file must hold to be ours, where its name alone does not say so."""
 _READERS: dict[str, Callable[[Path], Shown]] = {
     DIAGNOSIS: _diagnosis,
@@ -197,4 +212,6 @@ _READERS: dict[str, Callable[[Path], Shown]] = {
     TABLE: _sweep,
     COMPARISON: _comparison,
     PROOF: _proof,
+    IDENTIFIED: _calibration,
+    CHECK: _check,
 }

@@ -12,7 +12,7 @@ from math import isfinite
 
 import numpy as np
 
-from cosim.calibration.experiment import Array, Experiment, experiment_of, matching, record_of
+from cosim.calibration.experiment import Array, Experiment, Matching, experiment_of, matching, record_of
 from cosim.calibration.fit import LOSSES, Fit, Loss, fit
 from cosim.calibration.free import Free, free_of
 from cosim.calibration.initial import INITIALS, from_first_row, states_of, with_free_starts
@@ -132,7 +132,7 @@ def calibrate(
     _check_recordings(train, heldout, options.columns)
     _check_set(subject, options)
     free = free_of(subject, options.free, options.given, options.bounds)
-    matched = [matching(subject, one, options.columns) for one in (*train, *heldout)]
+    matched = _matched(subject, (*train, *heldout), options)
     laid = [
         experiment_of(subject, one, match, options.step, options.interpolation)
         for one, match in zip((*train, *heldout), matched, strict=True)
@@ -207,6 +207,17 @@ def _check_set(subject: Subject, options: Options) -> None:
             raise InputError(f"--set {name}={value:g}: it must be a finite number.", culprit=name, value=value)
         if name not in subject.known:
             raise unknown("--set", name, subject.source, subject.known, "what can be set")
+
+
+def _matched(subject: Subject, recordings: Sequence[Recording], options: Options) -> list[Matching]:
+    """Match columns; refuse another value of an input that a column feeds, where it would do nothing (InputError)."""
+    matched = [matching(subject, one, options.columns) for one in recordings]
+    for one, match in zip(recordings, matched, strict=True):
+        for name in options.given.keys() & match.inputs.keys():
+            column = match.inputs[name]
+            text = f'--set {name}: the column "{column}" of {one.name} feeds it, so another value would do nothing.'
+            raise InputError(text, culprit=name)
+    return matched
 
 
 def _experiments(

@@ -11,6 +11,9 @@ from cosim.plots.compare import Overlay, write_explorer
 from cosim.plots.quantities import number
 
 LINES = ("measured", "before", "after")
+CLOSE, MOST = 0.5, 12
+"""Correlation of two numbers from which on it is listed: the error of one is then a seventh larger than if the other
+were known, 1 / sqrt(1 - r^2); pairs listed at most."""
 
 
 def write_page(done: Calibrated, path: Path, force: bool) -> Path:
@@ -20,6 +23,7 @@ def write_page(done: Calibrated, path: Path, force: bool) -> Path:
         "lead": _lead(done),
         "notes": done.notes,
         "numbers": number_rows(done),
+        "correlations": correlation_rows(done),
         "undetermined": [one.statement for one in done.uncertainty.not_determined],
         "errors": [_error_row(one) for one in done.traces],
     }
@@ -41,6 +45,15 @@ def number_rows(done: Calibrated) -> list[dict[str, str]]:
             }
         )
     return rows
+
+
+def correlation_rows(done: Calibrated) -> list[dict[str, str]]:
+    """Pairs of numbers that are determined and whose errors hang together, the closest first: |r| >= `CLOSE`."""
+    names, found = [one.name for one in done.free], done.uncertainty
+    known = [k for k in range(len(names)) if isfinite(found.standard_errors[k])]
+    pairs = [(float(found.correlation[i][k]), names[k], names[i]) for i in known for k in known if k < i]
+    close = sorted((one for one in pairs if abs(one[0]) >= CLOSE), key=lambda one: -abs(one[0]))
+    return [{"one": one, "other": other, "value": f"{r:.3f}".replace("-", "−")} for r, one, other in close[:MOST]]
 
 
 def _text(value: float, error: float) -> str:
@@ -75,5 +88,5 @@ def _overlays(traces: Sequence[Trace]) -> dict[str, Overlay]:
         columns = {**(found[before].columns if before in found else {})}
         units = {**(found[before].units if before in found else {}), one.output: one.unit}
         columns[one.output] = np.stack([one.measured, one.before, one.after])
-        found[before] = Overlay(LINES, one.times, columns, units)
+        found[before] = Overlay(LINES, one.times, columns, units, as_stated=True)
     return found

@@ -24,7 +24,7 @@ def check(
     """Run the experiments in an FMU's archive (FMI-LS-REF) and compare each variable; exit 1 if one fails."""
     from cosim.api.check import check as carry_out
 
-    with stage(f"checking {fmu.name}") as progress:
+    with stage(f"checking {fmu.name or fmu}") as progress:
         done = carry_out(
             fmu, out, rtol=rtol, interface=interface, timeout=timeout, force=force, on_progress=progress.log
         )

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from cosim.cli.complete import anything
 from cosim.support.plain import Json
@@ -71,10 +72,10 @@ def _plain(title: str, rows: Sequence[Mapping[str, Json]]) -> str:
 
 
 def _table(title: str, rows: Iterable[Mapping[str, Json]]) -> Table:
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    table = Table(title=Text(title), title_justify="left", box=None, pad_edge=False)
     listed = list(rows)
     for name in listed[0] if listed else ():
-        table.add_column(name, overflow="fold", no_wrap=name == "over time")
+        table.add_column(Text(name), overflow="fold", no_wrap=name == "over time")
     for row in listed:
-        table.add_row(*(str(value) for value in row.values()))
+        table.add_row(*(Text(str(value)) for value in row.values()))  # [rad] is a unit there, and no markup
     return table

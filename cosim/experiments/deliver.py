@@ -103,7 +103,7 @@ def _overlay(one: Outcome) -> Overlay:
     names = [row.name for row in order if row.name in one.simulated][:MOST]
     rows = _apart(one.times)
     columns = {name: np.stack([one.reference[name][rows], one.simulated[name][rows]]) for name in names}
-    return Overlay(("reference", "simulated here"), one.times[rows], columns, {})
+    return Overlay(("reference", "simulated here"), one.times[rows], columns, one.units, as_stated=True)
 
 
 def _apart(times: np.ndarray) -> Sequence[int]:

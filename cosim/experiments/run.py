@@ -44,6 +44,8 @@ class Outcome:
     reference: Mapping[str, Array] = field(default_factory=dict)
     simulated: Mapping[str, Array] = field(default_factory=dict)
     run: bool = True
+    units: Mapping[str, str] = field(default_factory=dict)
+    """Of what was compared, as the FMU states them."""
 
 
 @dataclass(frozen=True)
@@ -187,7 +189,9 @@ def _judged(
         cells = [_text(recording.others[name][k]) for k in near]
         compared.append(compare_texts(name, reference.times, texts, cells))
     passed = all(one.passed for one in compared)
-    return Outcome(experiment, passed, "", tuple(compared), notes, reference.times, dict(reference.numbers), simulated)
+    units = {name: ports[name].unit for name in simulated}
+    numbers = (reference.times, dict(reference.numbers), simulated)
+    return Outcome(experiment, passed, "", tuple(compared), notes, *numbers, units=units)
 
 
 def _until_ended(reference: Series, settings: Settings, done: int) -> tuple[Series, str]:

@@ -37,6 +37,8 @@ def describe(path: Path) -> Any:
 
     if not path.exists():
         raise FmuError(f"{path} does not exist.", culprit=str(path))
+    if path.is_dir():
+        raise FmuError(f"{path} is no FMU: it is a folder.", culprit=str(path))
     if not zipfile.is_zipfile(path):
         raise FmuError(f"{path} is no FMU: it is not a zip archive.", culprit=str(path))
     complaint = complaint_of(path)

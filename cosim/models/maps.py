@@ -7,8 +7,11 @@ values at breakpoints.
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
+from cosim.fmi.description import complaint_of
+from cosim.support.archive import read
 from cosim.support.plain import Json, JsonObject
 from pyfmi_models.card import Card
 from pyfmi_models.effects.learned_base import LearnedEffect
@@ -17,7 +20,9 @@ from pyfmi_models.export.related import Related
 BLOCKS = "▁▂▃▄▅▆▇█"
 WIDTH = 24
 """Most blocks of a curve: its table then fits a terminal of 80 columns."""
-FILE = "maps.json"
+FILE, FORMAT = "maps.json", "mount-cosim maps 1"
+LARGEST = 2**24
+"""Bytes of a file with maps that is read."""
 
 
 def maps_of(card: Card) -> list[JsonObject]:
@@ -36,9 +41,18 @@ def related_maps(card: Card) -> tuple[Related, ...]:
     maps = maps_of(card)
     if not maps:
         return ()
-    content = json.dumps({"format": "mount-cosim maps 1", "maps": maps}, indent=1).encode()
+    content = json.dumps({"format": FORMAT, "maps": maps}, indent=1).encode()
     said = "Learned terms as maps: breakpoints, values, units"
     return (Related("application/json", FILE, "meta-data", said, content),)
+
+
+def curves_in(path: Path, member: str) -> list[dict[str, Json]]:
+    """The maps in a file of an FMU as `curves`; nothing where it is not as ours are, whatever its name."""
+    try:
+        document = json.loads(read(path, member, complaint_of(path), LARGEST))
+        return curves(document["maps"]) if document["format"] == FORMAT else []
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError):
+        return []
 
 
 def curves(maps: list[JsonObject]) -> list[dict[str, Json]]:

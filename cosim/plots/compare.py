@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.plots.digest import in_words
 from cosim.plots.explorer import INKS, Sheet, record, script_of_page
-from cosim.plots.quantities import number, scale_of
+from cosim.plots.quantities import Scale, number, scale_of
 from cosim.plots.style import AFTER, BEFORE, GREY, MEASURED, STYLE, Array
 from cosim.support.files import replacing
 from cosim.support.version import __version__
@@ -47,6 +47,13 @@ class Overlay:
     t: Array
     columns: Mapping[str, Array]
     units: Mapping[str, str]
+    as_stated: bool = False
+    """Drawn in the units that are stated, as of somebody else's FMU, and not in those of this project's pages."""
+
+    def scale(self, name: str, values: Array) -> Scale:
+        """How values of a column are drawn."""
+        unit = self.units.get(name, "")
+        return Scale(1.0, unit) if self.as_stated else scale_of(unit, float(np.nanmax(np.abs(values), initial=0)))
 
     def differences(self) -> list[Difference]:
         """Each further recording against the first, column by column."""
@@ -75,15 +82,15 @@ def figure_of(overlay: Overlay) -> Any:
         figure = Figure(figsize=(PANEL[0], 2 * PANEL[1] * count), layout="constrained")
         panels = figure.subplots(2 * count, 1, squeeze=False, sharex=True, height_ratios=[2, 1] * count)[:, 0]
         for (name, values), top, below in zip(overlay.columns.items(), panels[::2], panels[1::2], strict=True):
-            scale = scale_of(overlay.units.get(name, ""), float(np.nanmax(np.abs(values), initial=0)))
-            rest = scale_of(overlay.units.get(name, ""), float(np.nanmax(np.abs(values - values[0]), initial=0)))
+            scale, rest = overlay.scale(name, values), overlay.scale(name, values - values[0])
             for k, one in enumerate(values):
                 colour = COLOURS[k % len(COLOURS)]
-                top.plot(overlay.t, scale.factor * one, color=colour, lw=1.1, label=overlay.names[k])
+                dashes = (0, DASHES) if k else "-"
+                top.plot(overlay.t, scale.factor * one, color=colour, lw=1.1, ls=dashes, label=overlay.names[k])
                 if k:
                     below.plot(overlay.t, rest.factor * (one - values[0]), color=colour, lw=0.9)
             top.set_title(_titled(name, scale.unit), loc="left")
-            below.set_title(_titled("difference from the first", rest.unit), loc="left")
+            below.set_title(_titled(f"difference from {overlay.names[0]}", rest.unit), loc="left")
             top.grid(axis="y")
             below.grid(axis="y")
         panels[0].legend(loc="upper right", ncols=len(overlay.names), frameon=False)
@@ -200,8 +207,7 @@ def payload(overlays: Mapping[str, Overlay]) -> dict[str, Any]:
 
 def _record(overlay: Overlay, name: str, label: str, share: float) -> dict[str, Any]:
     values, keys = overlay.columns[name], [f"r{k}" for k in range(len(overlay.names))]
-    scale = scale_of(overlay.units.get(name, ""), float(np.nanmax(np.abs(values), initial=0)))
-    rest = scale_of(overlay.units.get(name, ""), float(np.nanmax(np.abs(values - values[0]), initial=0)))
+    scale, rest = overlay.scale(name, values), overlay.scale(name, values - values[0])
     signals = {key: scale.factor * one for key, one in zip(keys, values, strict=True)}
     signals |= {f"d{k}": rest.factor * (values[k] - values[0]) for k in range(1, len(keys))}
     made: dict[str, Any] = dict(record(label, overlay.t, signals, share))

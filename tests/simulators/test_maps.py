@@ -10,7 +10,7 @@ from fmpy.validation import validate_fmu
 
 from cosim.api.export import export
 from cosim.api.show import show
-from cosim.models.maps import WIDTH, curve, maps_of
+from cosim.models.maps import WIDTH, curve, curves_in, maps_of
 from pyfmi_models.card import read_card
 
 CARD = """[mount]
@@ -56,6 +56,18 @@ def test_a_card_is_shown_with_its_maps_as_curves(card: Path) -> None:
     assert rows[0]["values"] == "-0.2 to 0.2 N.m"
     assert len(rows) == 1 + 5, "the map of two quantities at five values of the second"
     assert "learned maps" not in show("emps").tables
+
+
+def test_an_fmu_is_shown_with_the_maps_that_it_carries(card: Path, tmp_path: Path) -> None:
+    (fmu, *_) = export(card, tmp_path, fmi=3).paths
+    assert show(fmu).tables["learned maps"] == show(card).tables["learned maps"]
+
+
+@pytest.mark.parametrize("content", ["[]", "{", '{"format": "mount-cosim maps 1"}', '{"format": "x", "maps": [1]}'])
+def test_a_file_that_only_has_the_name_of_our_maps_draws_nothing(content: str, tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "a.fmu", "w") as archive:
+        archive.writestr("extra/maps.json", content)
+    assert curves_in(tmp_path / "a.fmu", "extra/maps.json") == []
 
 
 def test_an_fmu_carries_its_maps_and_stays_valid(card: Path, tmp_path: Path) -> None:
