@@ -7,15 +7,18 @@ Plays the beginning of the home decks of these seeds (rough machines too), keeps
 rule of the decision off. `--also` adds other machines whose answers were kept in the same way.
 
 An answer is right if it says nothing of a null, `unknown` of what has no name, one name that is true or a set that
-holds it of one effect, true names alone of several. Of each change: answers lost and won, and the probability that
+holds it of one effect, true names alone of several; of a measured machine, which always lacks more than one knows, true
+names or `unknown`. Of each change: answers lost and won, and the probability that
 chance alone would be as unequal (McNemar, exact). Scores that were kept before are not played again. Nothing is fitted
-or proven again: rules of the search and of held-out proof stand in ledgers only.
+or proven again: of the rules of search and of held-out proof the page says, from the ledgers, how many effects each was
+the first to refuse, of those that were concealed and of those that were not.
 """
 
 import argparse
 import json
+import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
@@ -50,8 +53,9 @@ OFF: Mapping[str, Callable[[dict[str, Any]], None]] = {
     "another cause explains more than a name": lambda scores: scores["rest"].update(in_place=[]),
     "error follows a quantity": lambda scores: scores["rest"].update(terms=[]),
     "a learned term says unknown": lambda scores: scores.update(learned=None),
-    "what goes about turns alone": lambda scores: [one.update(away=1.0) for one in scores["rest"]["terms"]],
-    "held-out recordings contradict": lambda scores: [one.update(predicted=0.0) for one in scores["rest"]["terms"]],
+    "held-out recordings contradict": lambda scores: [
+        one.update(share=abs(one["share"])) for one in scores["rest"]["terms"]
+    ],
     "a little uneven over position": lambda scores: [one.update(uneven=None) for one in scores["rest"]["terms"]],
     "ahead of what has no name": lambda scores: [one.update(ahead=0.0) for one in scores["effects"]],
     "rivals": lambda scores: [one.update(margins={}) for one in scores["effects"]],
@@ -98,7 +102,18 @@ def _played(world: str, case: CaseSpec) -> Row:
         card, train, held = tool.given(folder)
         answer = as_json(diagnose(train, [held], card).diagnosis)
     head = {"world": world, "number": case.number, "kind": case.kind, "effects": list(case.effects)}
-    return head | {"scores": answer["scores"]}
+    return head | {"scores": answer["scores"], "refused": refused(answer["ledger"])}
+
+
+def refused(ledger: Iterable[Mapping[str, Any]]) -> dict[str, list[str]]:
+    """Rules by which a ledger refuses effects, and which; one that names a rival or a term is one for all of them."""
+    found: dict[str, set[str]] = {}
+    for row in ledger:
+        for rule in row["rules"]:
+            if not rule["outcome"] and row["effect"] != "unknown":
+                name = re.sub(r"(behind|ahead of|better by) .*", r"\1 another", rule["name"])
+                found.setdefault(name, set()).add(row["effect"])
+    return {name: sorted(effects) for name, effects in found.items()}
 
 
 def is_right(row: Row, policy: Policy, change: Callable[[dict[str, Any]], Any] = lambda _: None) -> bool:
@@ -109,6 +124,8 @@ def is_right(row: Row, policy: Policy, change: Callable[[dict[str, Any]], Any] =
     if row["kind"] in ("none", "outside"):
         return found.is_unknown if row["kind"] == "outside" else not (found.is_unknown or found.sets)
     said = [true & {name, *members} for name, members in found.sets.items()]
+    if row["kind"] == "measured":
+        return all(said) and (bool(said) or found.is_unknown)
     return bool(said) and all(said) and not found.is_unknown and (row["kind"] == "several" or len(said) == 1)
 
 
@@ -131,7 +148,19 @@ def page(rows: Sequence[Row], seeds: str) -> str:
             moved = min(factor * value, 0.99) if name in SHARES else factor * value
             lines.append(_line(f"`{name}` {value:g} → {moved:.3g}", rows, now, replace(POLICY, **{name: moved})))
     lines += [_line(f"without: {name}", rows, now, POLICY, off) for name, off in OFF.items()]
-    return "\n".join(lines) + "\n"
+    lines += ["", "| rule of search or proof | refuses of what is concealed | of what is not |", "|---|--:|--:|"]
+    return "\n".join([*lines, *_refusals(rows)]) + "\n"
+
+
+def _refusals(rows: Sequence[Row]) -> Iterator[str]:
+    count: dict[str, list[int]] = {}
+    for row in rows:
+        for rule, effects in row.get("refused", {}).items():
+            true = len(set(effects) & set(row["effects"]))
+            here = count.setdefault(rule, [0, 0])
+            here[0], here[1] = here[0] + true, here[1] + len(effects) - true
+    for rule, (true, false) in sorted(count.items(), key=lambda one: -one[1][1]):
+        yield f"| {rule} | {true} | {false} |"
 
 
 def _worlds(rows: Sequence[Row]) -> str:

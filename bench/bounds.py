@@ -30,7 +30,7 @@ from cosim.diagnosis.effects.candidates import columns_of, span_of
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.measure.bounds import SeenFrom, bounds
 from cosim.diagnosis.measure.concealment import Member, members
-from cosim.diagnosis.search.stages import admission, is_minor, least, refitted
+from cosim.diagnosis.search.stages import admission, is_small, least, refitted
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import prepare
@@ -96,7 +96,7 @@ def looked_for(comparison: Comparison, base: Fit, name: str) -> bool:
     best = {id(max(scored, key=lambda one: getattr(one, key))): key for key in ("evidence", "plain")}
     for one in (one for one in scored if id(one) in best):
         fit = refitted(comparison, base, one.candidate.start(one.coefficients), len(tried))
-        enough = fit.evidence >= least(POLICY, 0.0) and not is_minor(fit, POLICY)
+        enough = fit.evidence >= least(POLICY, 0.0) and not is_small(fit, POLICY)
         if enough and all_pass(admission(comparison, fit)):
             return True
     return False

@@ -6,7 +6,7 @@ import pytest
 from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores, TermScores
 from cosim.diagnosis.decide.policy import POLICY
 
-TERM = TermScores("position", 40.0, 5.0, 0.1)
+TERM = TermScores("position", 40.0, 0.1)
 
 
 def row(kind: str, effects: list[str], scores: Scores) -> ablation.Row:

@@ -15,8 +15,8 @@ from cosim.support.errors import InputError
 EFFECT = EffectScores("cogging", 80.0, {"position_friction": 2.0, "gravity_unbalance": 41.5}, {
     "cogging": 0.7, "position_friction": 0.6, "gravity_unbalance": 0.1,
 }, 12.0, 0.55)  # fmt: skip
-REST = ResidualScores(0.01, 0.02, [TermScores("position", 9.25, 3.5, 0.2)], "time", 0.01, (), 0.03)
-LEARNED = LearnedScores(("temperature",), 400.0, 0.8, 0.9, True, False)
+REST = ResidualScores(0.01, 0.02, [TermScores("position", 9.25, 0.2)], "time", 0.01, (), 0.03)
+LEARNED = LearnedScores(("temperature",), 400.0, 0.8, True, False)
 CASES = [
     Scores([], ResidualScores(0.0, 0.0)),
     Scores([EFFECT], REST),

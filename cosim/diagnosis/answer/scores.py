@@ -9,6 +9,8 @@ from cosim.support.plain import JsonObject
 
 FIELDS = ("effects", "rest", "learned")
 """What plain data of scores have."""
+RETIRED = ("away", "plain", "predicted")
+"""Scores of terms that decided up to policy 6, and that no stored answer needed."""
 
 
 @dataclass(frozen=True)
@@ -40,13 +42,8 @@ class TermScores:
 
     name: str
     evidence: float
-    predicted: float
     share: float
     """Share of the held-out residual energy that it predicts."""
-    away: float = 1.0
-    """Share of the training residual energy that it removes which it removes away from turns."""
-    plain: float = 1.0
-    """Share of the training residual energy that it removes."""
     uneven: float | None = None
     """Of the friction level over position: what it moves the level by, relative to it (RMS)."""
 
@@ -79,8 +76,6 @@ class LearnedScores:
     """The lower one of what training and what training left out say for it [nats]."""
     removed: float
     """Share of the held-out error energy that it removes."""
-    away: float
-    """Share of the training residual energy that it removes which it removes away from turns."""
     is_sure: bool
     """Whether training, what training left out and the held-out recordings each prove it for themselves."""
     is_of_law: bool
@@ -109,10 +104,14 @@ class Scores:
         """
         try:
             rest, learned = dict(entry["rest"]), entry["learned"]
-            rest["terms"] = [TermScores(**one) for one in rest["terms"]]
+            rest["terms"] = [TermScores(**_kept(one)) for one in rest["terms"]]
             rest["in_place"] = tuple(rest["in_place"])
-            known = LearnedScores(**{**learned, "quantities": tuple(learned["quantities"])}) if learned else None
+            known = LearnedScores(**{**_kept(learned), "quantities": tuple(learned["quantities"])}) if learned else None
             return cls([EffectScores(**one) for one in entry["effects"]], ResidualScores(**rest), known)
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             said = 'scores: not those of a diagnosis; take what stands under "scores" in its diagnosis.json'
             raise InputError(said, culprit="scores", value=entry, choices=FIELDS) from error
+
+
+def _kept(entry: Mapping[str, Any]) -> Mapping[str, Any]:
+    return {name: value for name, value in entry.items() if name not in RETIRED}

@@ -67,10 +67,10 @@ def decide(scores: Scores, policy: Policy) -> Decision:
 def _says_unknown(learned: LearnedScores, least: float, policy: Policy) -> bool:
     """Whether a learned term says alone that something has no name: sure, a large share of the rest, `least` nats.
 
-    Another friction law over speed is no missing effect, nor is what laws lack about turns.
+    Another friction law over speed is no missing effect.
     """
-    elsewhere = learned.away >= policy.considerable and not learned.is_of_law
-    return learned.is_sure and learned.removed >= policy.considerable and learned.evidence >= least and elsewhere
+    enough = learned.removed >= policy.considerable and learned.evidence >= least
+    return learned.is_sure and enough and not learned.is_of_law
 
 
 def _of_rest(effects: Sequence[EffectScores], residual: ResidualScores, policy: Policy) -> Decision:
@@ -166,24 +166,21 @@ class Gain:
         return max(self.narrow, self.wide) < 0 or min(self.narrow, self.wide) < -policy.slight
 
 
-def held_out_rules(gain: Gain, share: float, policy: Policy) -> Iterator[Rule]:
+def held_out_rules(gain: Gain, policy: Policy) -> Iterator[Rule]:
     """Rules by which an effect stands on the held-out recordings.
 
-    It predicts (or halves the plain error), it does not raise the plain error there, and what it explains is no small
-    change of what the base leaves: beside a strong effect, a weak one may be what the strong one's equation lacks.
+    It predicts (or halves the plain error), and does not raise the plain error there.
     """
     nats, limit = gain.nats, policy.clear
     removed = f"removes {100 * gain.narrow:.0f} and {100 * gain.wide:.0f} % of the error energy in two bands"
     yield Rule("predicts held-out recordings", gain.predicts(policy), nats, limit, "nats", removed)
     lowest = min(gain.narrow, gain.wide)
     yield Rule("does not raise the held-out error", not gain.raises(policy), lowest, -policy.slight)
-    matters = share >= policy.negligible or nats >= policy.strong
-    yield Rule("share of what the base leaves", matters, share, policy.negligible)
 
 
-def is_validated(gain: Gain, share: float, policy: Policy) -> bool:
+def is_validated(gain: Gain, policy: Policy) -> bool:
     """Whether an effect stands on the held-out recordings."""
-    return all_pass(held_out_rules(gain, share, policy))
+    return all_pass(held_out_rules(gain, policy))
 
 
 def open_rivals(one: EffectScores, policy: Policy) -> tuple[str, ...]:
@@ -210,23 +207,13 @@ def rest_rules(effects: Sequence[EffectScores], residual: ResidualScores, policy
     doubtful = doubted(effects, residual, policy)
     least = least_left([one for one in effects if one.effect not in doubtful], policy)
     for term in residual.terms:
-        outcome, limit = _is_no_misfit(term, least, policy), max(least, _floor_of(term, policy))
-        yield Rule(f"error follows {term.name}", outcome, term.evidence, limit, "nats")
+        limit = max(least, _floor_of(term, policy))
+        yield Rule(f"error follows {term.name}", term.evidence >= limit, term.evidence, limit, "nats")
 
 
 def least_left(named: Sequence[EffectScores], policy: Policy) -> float:
     """Evidence [nats] below which what is left may be no more than what the equations of the names lack."""
     return policy.considerable * max((one.evidence for one in named), default=0.0)
-
-
-def _is_no_misfit(term: TermScores, least: float, policy: Policy) -> bool:
-    """Whether what the residual follows is more than a friction law's misfit: sure, or held out as well as trained.
-
-    What it removes about turns alone is what laws lack there, and what it hardly removes is about nothing that matters.
-    """
-    if term.away < policy.considerable or max(term.plain, term.share) < policy.negligible:
-        return False
-    return term.evidence >= max(least, _floor_of(term, policy))
 
 
 def beyond_any_machine(residual: ResidualScores, policy: Policy) -> ResidualScores:
@@ -241,14 +228,10 @@ def beyond_any_machine(residual: ResidualScores, policy: Policy) -> ResidualScor
 
 
 def _floor_of(term: TermScores, policy: Policy) -> float:
-    """Evidence that a term must have: the less, the more the held-out recordings agree.
-
-    They contradict it where it adds to the error there, or where their likelihood denies more than training says.
-    """
+    """Evidence that a term must have: the less, the more it predicts of the held-out recordings."""
     if term.share >= policy.considerable:
         return policy.clear
-    contradicted = term.share < 0 or term.predicted < -term.evidence
-    return policy.sure if contradicted else policy.strong
+    return policy.strong if term.share >= 0 else policy.sure
 
 
 def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:

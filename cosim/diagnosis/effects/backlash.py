@@ -70,7 +70,6 @@ class Play(Hypothesis[Backlash]):
     forms = (Backlash,)
     tables = ("distance since reversal", "hysteresis over a long stroke")
     finds_its_way: ClassVar[bool] = True
-    is_common_misfit: ClassVar[bool] = True
     easiest: ClassVar[int] = 1
     rank: ClassVar[float] = 21
     view = "since reversal"

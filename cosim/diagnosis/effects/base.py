@@ -87,8 +87,6 @@ class Hypothesis(Generic[Form]):
     """Nuisance that is this effect in another form: beside it the effect would be explained away."""
     tables: ClassVar[tuple[str, ...]] = ()
     """Terms that may be learned which are this effect in another form: where one is better, the name is still right."""
-    is_common_misfit: ClassVar[bool] = False
-    """Whether laws of friction lack the like of it so often that it needs the evidence `policy.strong`."""
     finds_its_way: ClassVar[bool] = False
     """Whether a refit gets from any member of the grid to the best one; then only one is refitted."""
     must_stand_out: ClassVar[bool] = False
@@ -146,6 +144,10 @@ class Hypothesis(Generic[Form]):
     def is_plausible(self, effect: Form, mount: Mount) -> bool:
         """Whether a fitted effect, in the fitted mount that holds it, is what its name says."""
         return True
+
+    def must_fall(self, effect: Form) -> tuple[str, ...]:
+        """Parameters of which one must surely be below none: what the name says goes one way. Empty: no matter."""
+        return ()
 
     def shows(self, effect: Form, mount: Mount, prepared: Prepared) -> bool:
         """Whether the recorded motion shows what tells the fitted effect from another law of friction."""

@@ -45,7 +45,6 @@ class ThinningGrease(Hypothesis[ConcaveViscous]):
     rank: ClassVar[float] = 14.5
     needs_position: ClassVar[bool] = False
     imitated_by: ClassVar[str] = "speeds"
-    is_common_misfit: ClassVar[bool] = True
     view = "keep turning"
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:

@@ -31,7 +31,6 @@ class BendingContact(Hypothesis[Presliding]):
     easiest: ClassVar[int] = -1
     rank: ClassVar[float] = 8
     imitated_by: ClassVar[str] = "stops"
-    is_common_misfit: ClassVar[bool] = True
     finds_its_way: ClassVar[bool] = True
     view = "since reversal"
 

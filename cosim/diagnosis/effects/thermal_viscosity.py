@@ -42,6 +42,10 @@ class ThermalFriction(Hypothesis[ThermalViscosity]):
 
             yield Candidate("thermal_viscosity", (form,), ("viscous_per_degC", "coulomb_per_degC"), start)
 
+    def must_fall(self, effect: ThermalViscosity) -> tuple[str, ...]:
+        """Lubricants thin as they warm; where no thermometer saw it, a level that falls alone may be wearing in."""
+        return ("viscous_per_degC", "coulomb_per_degC") if type(effect) is ThermalViscosity else ("viscous_per_degC",)
+
 
 def _warming(seconds: float, span: Span) -> tuple[ThermalViscosity, ...]:
     """Warm-ups of this time constant, by time and by rubbing."""

@@ -75,7 +75,7 @@ def bounds(comparison: Comparison, chosen: Fit, named: Sequence[str], largest: f
 def _hidden(one: Member, place: Array, phase_price: float) -> Hidden:
     costs = price(one.many, one.phases, phase_price)
     own = hypothesis_of(one.instance)
-    return Hidden(one.effect, place, one.prior, costs, own.must_stand_out, own.is_common_misfit)
+    return Hidden(one.effect, place, one.prior, costs, own.must_stand_out)
 
 
 def tested(concealment: Concealment, members: Mapping[str, Sequence[tuple[Member, Hidden]]]) -> dict[str, SeenFrom]:

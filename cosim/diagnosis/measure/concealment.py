@@ -50,8 +50,6 @@ class Hidden:
     """Nats that the search for it costs."""
     must_stand_out: bool = False
     """Whether it must remove more energy than the noise of the reading holds."""
-    is_common_misfit: bool = False
-    """Whether laws of friction lack the like of it so often that it needs more evidence."""
 
 
 @dataclass(frozen=True)
@@ -111,9 +109,8 @@ class Concealment:
         worth, policy = self.worth(hidden, weights), self._comparison.policy
         enough = worth.evidence >= least(policy, self._largest) and worth.plain >= policy.negligible
         large = worth.plain >= policy.small or worth.evidence >= policy.sure
-        rare = not hidden.is_common_misfit or worth.evidence >= policy.strong
         loud = not hidden.must_stand_out or worth.above_noise >= policy.least_above_noise
-        return enough and large and rare and loud
+        return enough and large and loud
 
     def _plain_share(self, hidden: Hidden, weights: Array) -> float:
         place = 1 + hidden.columns

@@ -24,6 +24,7 @@ from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.search.proof import Proof, without
 from cosim.diagnosis.search.rivals import AcceptedEffect, Examined
+from cosim.diagnosis.search.sizes import goes_its_way
 from cosim.diagnosis.terms.candidate_terms import CandidateTerm, candidate_terms
 from cosim.diagnosis.terms.dictionary import OF_LAW
 from cosim.diagnosis.terms.grams import Grams, columns_of, grams_of
@@ -78,8 +79,8 @@ class _Offered:
 
 def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Predictive) -> Nameless:
     """Take away the names that something without a name explains far better, the worst first."""
-    found, least = Nameless(proof), comparison.policy.clear
-    offered = _Offered.by(comparison, held)
+    offered, least = _Offered.by(comparison, held), comparison.policy.clear
+    found = _without_misnamed(comparison, examined, Nameless(proof), held, offered)
     while found.proof.standing:
         known = [*offered.law, *found.terms]
         own = _worth(_grams(comparison, found.proof.chosen, known), range(len(known)))
@@ -94,6 +95,22 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
             return replace(found, ahead={one.effect.effect.id: -one.lead for one in met})
         left = without(comparison, examined, found.proof, worst.effect, held)
         found = Nameless(left, (*found.taken, (worst.effect, worst.term)))
+    return found
+
+
+def _without_misnamed(
+    comparison: Comparison, examined: Examined, found: Nameless, held: Predictive, offered: _Offered
+) -> Nameless:
+    """Take away names whose numbers do not surely go the way that the name says: something is there, and is not it."""
+    for one in found.proof.standing:
+        chosen = found.proof.chosen
+        goes = goes_its_way(comparison.problem, chosen, one.within(chosen.mount))
+        comparison.judge(one.effect.id, chosen, [Rule("it surely goes the way its name says", goes)])
+        if not goes and offered.free:
+            grams = _grams(comparison, _without(comparison, found.proof, one), offered.free)
+            term = offered.free[max(range(len(offered.free)), key=lambda k: _worth(grams, [k]))]
+            left = without(comparison, examined, found.proof, one, held)
+            return _without_misnamed(comparison, examined, Nameless(left, (*found.taken, (one, term))), held, offered)
     return found
 
 

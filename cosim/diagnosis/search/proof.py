@@ -107,7 +107,7 @@ def _validation(
     if len(examined.effects) == 1 and is_small(one.own, policy):
         share = min(gain.narrow, gain.wide)
         yield Rule("a small effect halves the held-out error", gain.matters_alone(policy), share, policy.half)
-    yield from held_out_rules(gain, _share(comparison.problem, examined.base, one), policy)
+    yield from held_out_rules(gain, policy)
 
 
 def _is_sure(comparison: Comparison, chosen: Fit, one: AcceptedEffect, gain: Gain) -> bool:
@@ -163,9 +163,3 @@ def _gain(
 
 def _gained(nats: float, without: Mount, mount: Mount, held: Predictive) -> Gain:
     return Gain(nats, *held.plain_gains(without, mount), held.at_rest(without, mount))
-
-
-def _share(problem: Problem, base: Fit, one: AcceptedEffect) -> float:
-    """Plain energy that an effect removes, relative to what the base leaves."""
-    energy = [float(((problem.weight * fit.residual) ** 2).sum()) for fit in (one.own.fit, one.without, base)]
-    return (energy[1] - energy[0]) / max(energy[2], 1e-300)

@@ -54,9 +54,20 @@ def is_told(effect: Effect, numbers: Numbers, mount: Mount, recorded: Recorded) 
 
 def tells(problem: Problem, chosen: Fit, effect: Effect) -> bool:
     """Whether the training recordings tell a size of an effect of a fitted structure."""
-    errors = standard_errors(chosen, Blocks.of(problem.prepared), problem.weight)
-    numbers = numbers_of(effect, chosen.mount, errors)
+    numbers = _in_training(problem, chosen, effect)
     return is_told(effect, numbers, chosen.mount, recorded_by(problem.prepared.pieces))
+
+
+def goes_its_way(problem: Problem, found: Fit, effect: Effect) -> bool:
+    """Whether an effect of a fitted structure goes the way its name says, by more than its 95 % range."""
+    names = hypothesis_of(effect).must_fall(effect)
+    numbers = _in_training(problem, found, effect) if names else None
+    return not numbers or any(numbers.values[name] < -Z95 * numbers.errors.get(name, np.inf) for name in names)
+
+
+def _in_training(problem: Problem, found: Fit, effect: Effect) -> Numbers:
+    """An effect's numbers with the errors that the training recordings leave."""
+    return numbers_of(effect, found.mount, standard_errors(found, Blocks.of(problem.prepared), problem.weight))
 
 
 def _excludes(numbers: Numbers, name: str, none: float, known: Variable) -> bool:

@@ -214,9 +214,9 @@ def best_of(comparison: Comparison, now: Stage, largest: float = 0.0) -> Candida
     for one in now.tried:
         comparison.judge(one.effect.id, one.fit, asked[id(one)])
     fit = [one for one in now.tried if all_pass(asked[id(one)])]
-    best = _demanded(comparison, [one for one in fit if not is_minor(one, policy)])
+    best = _demanded(comparison, [one for one in fit if not is_small(one, policy)])
     if best is None and not largest:
-        best = _demanded(comparison, [one for one in fit if not is_common(one, policy)])
+        best = _demanded(comparison, fit)
     for one in fit:
         comparison.judge(one.effect.id, one.fit, list(_choice(one, best, policy)))
     return best
@@ -224,9 +224,8 @@ def best_of(comparison: Comparison, now: Stage, largest: float = 0.0) -> Candida
 
 def _choice(one: CandidateFit, best: CandidateFit | None, policy: Policy) -> Iterator[Rule]:
     """Rules by which one of several that pass is taken first."""
-    if one is not best and is_minor(one, policy):
-        name = "more than what friction laws lack of any machine" if is_common(one, policy) else "not a small effect"
-        yield Rule(name, False, one.evidence, policy.strong if is_common(one, policy) else policy.sure, "nats")
+    if one is not best and is_small(one, policy):
+        yield Rule("not a small effect", False, one.evidence, policy.sure, "nats")
     elif best:
         yield Rule("most evidence at its step of the search", one is best, one.evidence, best.evidence, "nats")
 
@@ -287,20 +286,9 @@ def contest(comparison: Comparison, one: CandidateFit, other: CandidateFit) -> f
     return way * min(abs(rows), max(way * forms, 0.0))
 
 
-def is_minor(one: CandidateFit, policy: Policy) -> bool:
-    """Whether an effect explains little, and not surely, or what laws lack of any machine."""
-    return is_small(one, policy) or is_common(one, policy)
-
-
 def is_small(one: CandidateFit, policy: Policy) -> bool:
     """Whether an effect explains little, and not surely."""
     return one.plain_gain < policy.small and one.evidence < policy.sure
-
-
-def is_common(one: CandidateFit, policy: Policy) -> bool:
-    """Whether an effect is no more than what laws of friction lack of any machine: not sure, nor large."""
-    common = hypothesis_of(one.effect).is_common_misfit
-    return common and one.evidence < policy.strong and one.plain_gain < policy.considerable
 
 
 def admission(comparison: Comparison, one: CandidateFit) -> Iterator[Rule]:

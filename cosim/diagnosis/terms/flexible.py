@@ -9,7 +9,6 @@ from cosim.diagnosis.terms.dictionary import OF_LAW, Term, dictionary
 from cosim.estimation.fit import Fit
 from cosim.estimation.least_squares import projected
 from cosim.estimation.prepare import Array
-from cosim.estimation.residuals import away_from_turns
 from cosim.support.statistics import rms
 
 LEVEL = "friction level over position"
@@ -31,20 +30,14 @@ def flexible_terms(comparison: Comparison, found: Fit, held: Predictive) -> list
 def _scored(
     comparison: Comparison, found: Fit, name: str, term: Term, held: Predictive, residual: Array, slopes: Array
 ) -> TermScores:
-    problem = comparison.problem
-    columns = term.columns(problem.prepared)
+    columns = term.columns(comparison.problem.prepared)
     evidence, beta = comparison.group(found, columns)
     uneven = _uneven(comparison, columns @ beta) if name == LEVEL else None
-    pair = np.column_stack([found.residual, found.residual - columns @ beta])
-    without, with_it = projected(pair * problem.weight[:, None], found.slopes * problem.weight[:, None]).T
-    away = away_from_turns(problem, with_it, without)
-    plain = 1 - float(with_it @ with_it) / max(float(without @ without), 1e-300)
     after = residual - term.columns(held.prepared) @ beta
-    gain = held.log_likelihood(after) - held.log_likelihood(residual)
     # The base was bent to what is missing in training, so its own parameters are free beside what is predicted.
     left = projected(np.column_stack([residual, after]) * held.weight[:, None], slopes * held.weight[:, None])
     before, now = (left**2).sum(0)
-    return TermScores(name, evidence, gain, 1 - float(now) / max(float(before), 1e-300), away, plain, uneven)
+    return TermScores(name, evidence, 1 - float(now) / max(float(before), 1e-300), uneven)
 
 
 def _uneven(comparison: Comparison, torque: Array) -> float:

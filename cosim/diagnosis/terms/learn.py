@@ -23,9 +23,9 @@ from cosim.diagnosis.terms.partial import partial
 from cosim.diagnosis.terms.select import begun, fitted, paths
 from cosim.diagnosis.terms.spelled import Spelled
 from cosim.estimation.fit import Fit
-from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Array, Prepared
-from cosim.estimation.residuals import away_from_turns, residuals
+from cosim.estimation.residuals import residuals
 from cosim.support.statistics import rms
 from pyfmi_models.effects.learned_base import LearnedEffect
 from pyfmi_models.mount import Mount
@@ -59,8 +59,6 @@ class Learned:
     predicted: tuple[float, ...] = field(default=())
     gain: float = 0.0
     """What the held-out recordings gain by the terms. Unit: nats."""
-    away: float = 1.0
-    """Share of the energy that the terms remove in training which they remove away from turns."""
     data: tuple[BinsEntry, ...] = field(default=())
     """What the training recordings leave without each term, over what it goes over."""
     formulas: tuple[Formula | None, ...] = field(default=())
@@ -75,9 +73,7 @@ class Learned:
         """What the decision looks at."""
         removed = 1 - (self.after / self.before) ** 2
         of_law = set(self.quantities) <= set(OF_LAW)
-        return LearnedScores(
-            tuple(self.quantities), float(min(self.evidence)), float(removed), float(self.away), self.is_sure, of_law
-        )
+        return LearnedScores(tuple(self.quantities), float(min(self.evidence)), float(removed), self.is_sure, of_law)
 
     @property
     def unit(self) -> str:
@@ -170,9 +166,7 @@ def _measured(comparison: Comparison, found: Fit, learned: Learned, held: Predic
     rows = [partial(whole, one, problem.prepared, problem.weight) for one in learned.effects]
     formulas = (formula_of(whole, one, found, comparison, held) for one in learned.effects)
     data = tuple(one.data() for one in rows)
-    left = problem.prepared.stacked("tau") - stacked(Inverse(whole, ()), problem.prepared.pieces, np.zeros(0))[0]
-    away = away_from_turns(problem, problem.weight * left, problem.weight * found.residual)
-    return replace(learned, size=_size(comparison, learned), data=data, formulas=tuple(formulas), away=away)
+    return replace(learned, size=_size(comparison, learned), data=data, formulas=tuple(formulas))
 
 
 def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], held: Predictive) -> Learned | None:

@@ -79,7 +79,7 @@ def test_nothing_is_unknown_where_nothing_is_left_and_what_is_left_says_what_it_
     assert not decide(Scores([], QUIET), POLICY).is_unknown
     assert decide(Scores([], QUIET), POLICY).depends_on == ()
     sizes = ("position", POLICY.strong + 5, 0.6), ("temperature", POLICY.strong - 5, 0.2)
-    terms = [TermScores(name, evidence, 3.0, share) for name, evidence, share in sizes]
+    terms = [TermScores(name, evidence, share) for name, evidence, share in sizes]
     left = decide(Scores([], ResidualScores(0.0, 0.0, terms)), POLICY)
     assert left.is_unknown
     assert left.depends_on == ("position",)

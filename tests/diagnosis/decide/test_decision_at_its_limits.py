@@ -46,8 +46,8 @@ def left(*terms: TermScores, share: float = 0.0, there: float = 0.0) -> Residual
     return ResidualScores(share, there, terms)
 
 
-def unknown(evidence: float, share: float, predicted: float = 0.0) -> bool:
-    return is_left([], left(TermScores("position", evidence, predicted, share)), ROUND)
+def unknown(evidence: float, share: float) -> bool:
+    return is_left([], left(TermScores("position", evidence, share)), ROUND)
 
 
 def test_a_rival_at_the_margin_of_a_set_is_beaten() -> None:
@@ -55,43 +55,40 @@ def test_a_rival_at_the_margin_of_a_set_is_beaten() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gain", "share", "expected"),
+    ("gain", "expected"),
     [
-        (Gain(8.0, 0.1, 0.1), 0.0625, True),
-        (Gain(8.0 - LITTLE, 0.1, 0.1), 0.0625, False),
-        (Gain(8.0, 0.1, 0.1), 0.0625 - LITTLE, False),
-        (Gain(16.0, 0.1, 0.1), 0.0, True),
-        (Gain(16.0 - LITTLE, 0.1, 0.1), 0.0, False),
-        (Gain(-16.0 + LITTLE, 0.5, 0.5), 0.5, True),
-        (Gain(-16.0, 0.5, 0.5), 0.5, False),
-        (Gain(-999.0, 0.875, 0.875), 0.5, True),
-        (Gain(-999.0, 0.875 - LITTLE, 0.9), 0.5, False),
-        (Gain(-999.0, 0.9, 0.875 - LITTLE), 0.5, False),
-        (Gain(-LITTLE, 0.5 - LITTLE, 0.5), 0.5, False),
-        (Gain(-LITTLE, 0.5, 0.5 - LITTLE), 0.5, False),
-        (Gain(4.0, 0.25, 0.25), 0.5, True),
-        (Gain(4.0, 0.25, 0.25 - LITTLE), 0.5, False),
-        (Gain(4.0, 0.25 - LITTLE, 0.25), 0.5, False),
-        (Gain(4.0 - LITTLE, 0.25, 0.25), 0.5, False),
-        (Gain(9.0, 0.0, 0.0), 0.5, True),
-        (Gain(9.0, 0.0, -LITTLE), 0.5, True),
-        (Gain(9.0, -LITTLE, -LITTLE), 0.5, False),
-        (Gain(9.0, 0.3, -0.125), 0.5, True),
-        (Gain(9.0, 0.3, -0.125 - LITTLE), 0.5, False),
-        (Gain(9.0, -0.125 - LITTLE, 0.3), 0.5, False),
-        (Gain(16.0, -0.9, 0.5), 0.5, True),
-        (Gain(16.0 - LITTLE, -0.9, 0.5), 0.5, False),
-        (Gain(16.0, -0.9, 0.5 - LITTLE), 0.5, False),
-        (Gain(4.0, -0.125, 0.0, at_rest=0.5), 0.5, True),
-        (Gain(4.0, -0.125, 0.0, at_rest=0.5 - LITTLE), 0.5, False),
-        (Gain(4.0 - LITTLE, -0.125, 0.0, at_rest=0.5), 0.5, False),
-        (Gain(-16.0 + LITTLE, 0.0, 0.0, at_rest=0.5), 0.5, True),
-        (Gain(-16.0, 0.0, 0.0, at_rest=0.5), 0.5, False),
-        (Gain(-16.0 + LITTLE, 0.0, -LITTLE, at_rest=0.5), 0.5, False),
+        (Gain(8.0, 0.1, 0.1), True),
+        (Gain(8.0 - LITTLE, 0.1, 0.1), False),
+        (Gain(-16.0 + LITTLE, 0.5, 0.5), True),
+        (Gain(-16.0, 0.5, 0.5), False),
+        (Gain(-999.0, 0.875, 0.875), True),
+        (Gain(-999.0, 0.875 - LITTLE, 0.9), False),
+        (Gain(-999.0, 0.9, 0.875 - LITTLE), False),
+        (Gain(-LITTLE, 0.5 - LITTLE, 0.5), False),
+        (Gain(-LITTLE, 0.5, 0.5 - LITTLE), False),
+        (Gain(4.0, 0.25, 0.25), True),
+        (Gain(4.0, 0.25, 0.25 - LITTLE), False),
+        (Gain(4.0, 0.25 - LITTLE, 0.25), False),
+        (Gain(4.0 - LITTLE, 0.25, 0.25), False),
+        (Gain(9.0, 0.0, 0.0), True),
+        (Gain(9.0, 0.0, -LITTLE), True),
+        (Gain(9.0, -LITTLE, -LITTLE), False),
+        (Gain(9.0, 0.3, -0.125), True),
+        (Gain(9.0, 0.3, -0.125 - LITTLE), False),
+        (Gain(9.0, -0.125 - LITTLE, 0.3), False),
+        (Gain(16.0, -0.9, 0.5), True),
+        (Gain(16.0 - LITTLE, -0.9, 0.5), False),
+        (Gain(16.0, -0.9, 0.5 - LITTLE), False),
+        (Gain(4.0, -0.125, 0.0, at_rest=0.5), True),
+        (Gain(4.0, -0.125, 0.0, at_rest=0.5 - LITTLE), False),
+        (Gain(4.0 - LITTLE, -0.125, 0.0, at_rest=0.5), False),
+        (Gain(-16.0 + LITTLE, 0.0, 0.0, at_rest=0.5), True),
+        (Gain(-16.0, 0.0, 0.0, at_rest=0.5), False),
+        (Gain(-16.0 + LITTLE, 0.0, -LITTLE, at_rest=0.5), False),
     ],
 )
-def test_an_effect_stands_from_its_limits_on(gain: Gain, share: float, expected: bool) -> None:
-    assert is_validated(gain, share, ROUND) is expected
+def test_an_effect_stands_from_its_limits_on(gain: Gain, expected: bool) -> None:
+    assert is_validated(gain, ROUND) is expected
 
 
 @pytest.mark.parametrize(
@@ -108,7 +105,7 @@ def test_an_effect_stands_from_its_limits_on(gain: Gain, share: float, expected:
 def test_a_name_may_imitate_what_is_left_up_to_its_limits(
     evidence: float, explains: float, rest: float, expected: bool
 ) -> None:
-    found = doubted([effect("delay", evidence, explains)], left(TermScores("position", rest, 0.0, 0.0)), ROUND)
+    found = doubted([effect("delay", evidence, explains)], left(TermScores("position", rest, 0.0)), ROUND)
     assert found == (("delay",) if expected else ())
 
 
@@ -121,21 +118,17 @@ def test_a_residual_is_large_beyond_its_limit_in_training_or_held_out() -> None:
 
 
 @pytest.mark.parametrize(
-    ("share", "predicted", "least"),
+    ("share", "least"),
     [
-        (0.25, 0.0, 8.0),  # followed
-        (0.25, -999.0, 8.0),
-        (0.25 - LITTLE, 0.0, 16.0),
-        (0.0, -16.0, 16.0),
-        (0.0, -129.0, 128.0),  # the likelihood denies more than training says
-        (-LITTLE, 0.0, 128.0),  # the error grows
+        (0.25, 8.0),  # followed
+        (0.25 - LITTLE, 16.0),
+        (0.0, 16.0),
+        (-LITTLE, 128.0),  # the error grows
     ],
 )
-def test_the_evidence_that_is_asked_goes_with_what_held_out_recordings_say(
-    share: float, predicted: float, least: float
-) -> None:
-    assert unknown(least, share, predicted)
-    assert not unknown(least - LITTLE, share, predicted)
+def test_the_evidence_that_is_asked_goes_with_what_held_out_recordings_say(share: float, least: float) -> None:
+    assert unknown(least, share)
+    assert not unknown(least - LITTLE, share)
 
 
 def test_beside_what_has_no_name_a_margin_counts_for_a_share() -> None:
@@ -162,13 +155,13 @@ def test_what_was_learned_for_what_has_no_name_leaves_rivals_as_open_as_what_is_
 
 def test_what_is_left_beside_a_sure_name_must_reach_its_share_of_that_evidence() -> None:
     sure = effect("delay", 80.0, 0.9)
-    assert is_left([sure], left(TermScores("position", 20.0, 0.0, 0.5)), ROUND)
-    assert not is_left([sure], left(TermScores("position", 20.0 - LITTLE, 0.0, 0.5)), ROUND)
+    assert is_left([sure], left(TermScores("position", 20.0, 0.5)), ROUND)
+    assert not is_left([sure], left(TermScores("position", 20.0 - LITTLE, 0.5)), ROUND)
 
 
 def test_a_doubtful_name_excuses_nothing_that_is_left() -> None:
     weak = effect("delay", 20.0, 0.5)
-    residual = left(TermScores("position", 16.0, 0.0, 0.5))
+    residual = left(TermScores("position", 16.0, 0.5))
     found = decide(Scores([weak], residual), ROUND)
     assert (found.is_unknown, found.doubtful) == (True, ("delay",))
     assert decide(Scores([weak], left()), ROUND).doubtful == ()
@@ -185,17 +178,11 @@ def test_a_name_beside_something_unknown_is_less_likely_unless_it_removes_nearly
     assert found.probabilities["delay"]["delay"] == pytest.approx(0.375 * alone.probabilities["delay"]["delay"])
 
 
-def test_what_a_term_removes_about_turns_alone_is_what_laws_lack_there() -> None:
-    least = ROUND.considerable
-    assert is_left([], left(TermScores("torque", 500.0, 50.0, 0.9, away=least)), ROUND)
-    assert not is_left([], left(TermScores("torque", 500.0, 50.0, 0.9, away=least - LITTLE)), ROUND)
-
-
 def test_what_the_rest_follows_is_beyond_a_share_of_its_own_and_of_the_best() -> None:
-    terms = [TermScores(name, 50.0, 0.0, share) for name, share in (("t", 0.26), ("q", 0.8), ("v", 0.4), ("a", 0.41))]
+    terms = [TermScores(name, 50.0, share) for name, share in (("t", 0.26), ("q", 0.8), ("v", 0.4), ("a", 0.41))]
     assert followed(left(*terms), ROUND) == ("q", "a"), "beyond half of the best, the best first"
-    assert followed(left(TermScores("q", 50.0, 0.0, 0.25)), ROUND) == ("time",)
-    assert followed(left(TermScores("q", 50.0, 0.0, 0.25 + LITTLE)), ROUND) == ("q",)
+    assert followed(left(TermScores("q", 50.0, 0.25)), ROUND) == ("time",)
+    assert followed(left(TermScores("q", 50.0, 0.25 + LITTLE)), ROUND) == ("q",)
     assert followed(ResidualScores(0.0, 0.0, (), "friction level over time"), ROUND) == ("friction level over time",)
 
 
@@ -213,11 +200,3 @@ def test_probabilities_are_calibrated_posterior_shares_times_what_is_explained(m
 def test_what_is_decided_stays_when_something_more_is_left() -> None:
     decided = Decision({}, {}, True, ("time",))
     assert decided.with_rest(("position",)) is decided
-
-
-def test_a_term_that_removes_next_to_nothing_in_training_and_held_out_is_no_unknown() -> None:
-    sure = TermScores("acceleration", 1000.0, 100.0, 0.0, plain=ROUND.negligible)
-    barely = replace(sure, plain=0.99 * ROUND.negligible)
-    there = replace(barely, share=ROUND.negligible)
-    said = [decide(Scores([], ResidualScores(0.0, 0.0, [one])), ROUND).is_unknown for one in (sure, barely, there)]
-    assert said == [True, False, True]

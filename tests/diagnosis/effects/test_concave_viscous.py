@@ -71,6 +71,5 @@ def test_a_bend_next_to_rest_that_a_law_may_have_left_is_not_enough() -> None:
     prepared = prepare([recording(1, 1.0)], 30.0)
     bends, levels = ConcaveViscous(thinning_speed=0.1, exponent=0.5), ConcaveViscous(thinning_speed=0.01, exponent=0.05)
     grease = hypothesis_of(bends)
-    assert grease.is_common_misfit
     assert grease.shows(bends, mount, prepared)
     assert not grease.shows(levels, mount, prepared)

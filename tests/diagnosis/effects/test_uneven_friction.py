@@ -52,7 +52,7 @@ def test_a_spot_is_rough_from_there_on(rise: float, named: bool) -> None:
 
 @pytest.mark.parametrize(("uneven", "unknown"), [(0.02, False), (0.05, True)])
 def test_nor_is_it_something_unknown(uneven: float, unknown: bool) -> None:
-    term = TermScores("friction level over position", 200.0, 50.0, 0.5, uneven=uneven)
+    term = TermScores("friction level over position", 200.0, 0.5, uneven=uneven)
     assert decide(Scores([], ResidualScores(0.0, 0.0, [term])), POLICY).is_unknown == unknown
 
 
@@ -60,6 +60,6 @@ def test_nor_is_it_something_unknown(uneven: float, unknown: bool) -> None:
 def test_nor_does_it_make_a_name_doubtful(uneven: float, unknown: bool) -> None:
     """A name that explains little stands against 45 nats of another cause, unless as much as itself is left."""
     name = EffectScores("cogging", 200.0, {}, {"cogging": 0.5}, predicted=100.0)
-    level = TermScores("friction level over position", 200.0, -2000.0, -0.5, uneven=uneven)
-    rest = ResidualScores(0.0, 0.0, [level, TermScores("temperature", 45.0, 20.0, 0.1, plain=0.1)])
+    level = TermScores("friction level over position", 200.0, -0.5, uneven=uneven)
+    rest = ResidualScores(0.0, 0.0, [level, TermScores("temperature", 45.0, 0.1)])
     assert decide(Scores([name], rest), POLICY).is_unknown == unknown

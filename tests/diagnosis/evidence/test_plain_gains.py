@@ -63,7 +63,7 @@ def gains(this: Predictive, *effects: Effect) -> tuple[float, float]:
 
 def is_vetoed(narrow: float, wide: float) -> bool:
     """Whether an effect that surely matters and predicts falls by these."""
-    return not is_validated(Gain(2 * POLICY.clear, narrow, wide), 0.5, POLICY)
+    return not is_validated(Gain(2 * POLICY.clear, narrow, wide), POLICY)
 
 
 def test_what_is_there_removes_error_in_its_own_band_and_raises_none() -> None:

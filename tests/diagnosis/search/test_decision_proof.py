@@ -166,12 +166,6 @@ def test_of_two_ways_the_one_that_predicts_better_is_taken() -> None:
     assert standing(proven(tables, "xy")) == "y"
 
 
-@pytest.mark.parametrize(("nats", "expected"), [(10.0, ""), (30.0, "x")])
-def test_an_effect_that_removes_next_to_nothing_must_be_sure(nats: float, expected: str) -> None:
-    assert standing(proven(Tables({"b": 0.0, "bx": nats}), "x", removed=0.01)) == expected
-    assert standing(proven(Tables({"b": 0.0, "bx": nats}), "x", removed=0.03)) == "x"
-
-
 def test_what_stands_alone_is_not_fitted_again() -> None:
     tables = Tables({"b": 0.0, "bx": 10.0})
     assert standing(proven(tables, "x")) == "x"

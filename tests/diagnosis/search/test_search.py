@@ -16,7 +16,6 @@ from cosim.diagnosis.search.stages import (
     contest,
     holds_at_rest,
     is_hopeful,
-    is_minor,
     is_small,
     least,
     refitted,
@@ -154,14 +153,6 @@ def test_what_surely_holds_an_axis_at_rest_need_not_bend_by_what_recordings_show
     assert (
         holds_at_rest(CandidateFit(Presliding(sigma0=1e9), base, evidence, 0.0, 0.5, at_rest=at_rest), POLICY) is holds
     )
-
-
-def test_a_weak_presliding_is_minor_unless_it_removes_a_quarter_of_the_error() -> None:
-    _, base = compared(lambda q, _: 0 * q)
-    bent = CandidateFit(Presliding(sigma0=1e4), base, POLICY.strong - 1, 0.0, POLICY.considerable - 0.01)
-    assert is_minor(bent, POLICY)
-    assert not is_minor(replace(bent, evidence=POLICY.strong + 1), POLICY)
-    assert not is_minor(replace(bent, plain_gain=POLICY.considerable), POLICY)
 
 
 def test_in_a_contest_of_names_the_bases_merit_counts_as_little_as_rows_do() -> None:
