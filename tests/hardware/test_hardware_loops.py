@@ -116,14 +116,14 @@ def test_a_bare_clock_is_asked_in_nanoseconds_and_answers_in_microseconds(monkey
 
 
 def test_a_clock_sleeps_between_its_edges_and_is_not_early() -> None:
-    """Ten cycles of 20 ms, awake for the last 20 us of each: it must not spin, whatever else the computer does."""
+    """20 cycles of 10 ms, awake for the last 20 us of each: one that spins gives its processor up 4 times in all."""
     bare_clock(0.001, 0.0, 0.001)  # what is loaded once
-    began, before = monotonic(), resource.getrusage(resource.RUSAGE_THREAD)
-    edges, late, _ = bare_clock(0.02, 20.0, 0.2)
-    assert edges + late >= 10
-    assert monotonic() - began >= 0.02 * 9
-    slept = resource.getrusage(resource.RUSAGE_THREAD).ru_nvcsw - before.ru_nvcsw
-    assert slept > 0, "a clock that spins gives its processor up at no edge; one that is always late sleeps at some"
+    began, before = monotonic(), resource.getrusage(resource.RUSAGE_SELF)
+    edges, late, _ = bare_clock(0.01, 20.0, 0.2)
+    slept = resource.getrusage(resource.RUSAGE_SELF).ru_nvcsw - before.ru_nvcsw
+    assert edges + late >= 20
+    assert monotonic() - began >= 0.01 * 19
+    assert slept >= edges / 2
 
 
 def test_a_socket_waits_a_fifth_of_a_second_and_talks_to_one_place_only() -> None:
