@@ -42,8 +42,12 @@ FILES: dict[str, tuple[str, Maker]] = {
 """Name to suffix and maker."""
 FOREIGN = frozenset(name for name, (_, make) in FILES.items() if make.__name__.endswith("_elsewhere"))
 """Those that try to read another file."""
-LONG = frozenset(name for name, (_, make) in FILES.items() if make.__name__.startswith(("many_", "unwritten_small")))
-"""Those that take many seconds to make or to refuse."""
+LONG = frozenset(
+    name
+    for name, (_, make) in FILES.items()
+    if make.__name__.startswith(("many_", "unwritten_small", "zeros_as_text", "wide_messages", "zeros_in_archive"))
+)
+"""Those that take seconds to make or to refuse: all of the packed texts."""
 SECRET = bytes(range(33, 126)) * 4
 """What the file beside them holds, that none may read."""
 SECONDS, MEGABYTES, PATIENCE = 20.0, 1000.0, 90.0
