@@ -22,7 +22,7 @@ if __name__ == "__main__":
     truth = pathlib.Path(a.out + "_truth"); truth.mkdir()
     for k in range(a.n_per_family):
         effects = [] if a.families == "none" else [a.families]
-        case = make_case(a.seed + k, effects, duration=12.0, rate_hz=200)
+        case = make_case(a.seed + k, effects, duration=6.0, rate_hz=200)
         folder = pathlib.Path(a.out) / f"case_{k:04d}"; folder.mkdir(parents=True)
         for name, table in zip(("train_1", "train_2", "heldout"), (*case.train, case.heldout)):
             table.to_csv(folder / f"{name}.csv.gz", index=False)

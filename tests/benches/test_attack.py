@@ -21,7 +21,7 @@ SLOW = (
     "recording, binary", "crafted", "page, bytes",
 )  # fmt: skip
 """Kinds of which a mutation takes a second or more: the whole attack has them."""
-EACH = 3
+EACH = 1
 
 
 def alone(part: str, folder: Path) -> None:

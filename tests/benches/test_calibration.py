@@ -74,7 +74,7 @@ def test_a_world_is_judged_by_the_curve_of_the_other(tmp_path: Path) -> None:
     rng, files = np.random.default_rng(4), []
     for world, slope in (("honest", 1.0), ("boasting", 0.5)):
         rows = []
-        for printed in rng.uniform(0.5, 0.98, 1500):
+        for printed in rng.uniform(0.5, 0.98, 500):
             truth = ["cogging"] if rng.random() < calibrated(printed, 0.0, slope) else ["delay"]
             effect = {"effect": "cogging", "answer": "found", "probability": printed}
             rows.append({"effects": truth, "answer": {"effects": [effect]}})

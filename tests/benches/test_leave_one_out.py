@@ -19,14 +19,14 @@ from pyfmi_models.effects import ActuatorLag
 
 
 def recorded(effect: str, seed: int) -> list[Recording]:
-    made = make_case(seed, [effect], duration=25.0, rate_hz=500)
+    made = make_case(seed, [effect], duration=12.0, rate_hz=500)
     frames = [*made.train, made.heldout]
     return [Recording(f"run_{k}", {n: f[n].to_numpy(float) for n in f.columns}) for k, f in enumerate(frames)]
 
 
 def test_a_cogging_that_has_no_name_is_unknown() -> None:
     """With its name it is named: test_ledger.py."""
-    card = parse_card(to_toml(make_case(3, ["cogging"], duration=25.0, rate_hz=500).card), "card.toml")
+    card = parse_card(to_toml(make_case(3, ["cogging"], duration=12.0, rate_hz=500).card), "card.toml")
     *train, held = recorded("cogging", 3)
     with leave_one_out.left_out("cogging"):
         verdict = diagnose(train, [held], card).diagnosis.verdict

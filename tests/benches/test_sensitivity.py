@@ -13,7 +13,7 @@ from cosim_studies.proof.tool import given
 
 
 def test_a_replay_is_a_diagnosis_by_another_policy(tmp_path: Path) -> None:
-    write_given(make_case(3, ["cogging"], duration=30.0), tmp_path)
+    write_given(make_case(3, ["cogging"], duration=12.0), tmp_path)
     card, train, held = given(str(tmp_path))
     replay = sensitivity.Replay(train, held, card)
     assert replay.answer(POLICY) == diagnose(train, [held], card).diagnosis.verdict == ("cogging",)

@@ -25,7 +25,7 @@ sigma2 = 4.0
 
 def recording(seed: int, exponent: float) -> Recording:
     """A swing of two tones, friction of 2.5 N m and 12 N m s/rad that thins above 0.1 rad/s with this power."""
-    t = np.arange(0, 40, 0.01)
+    t = np.arange(0, 20, 0.01)
     q = 1.2 * np.sin(2 * np.pi * 0.15 * t) + 0.3 * np.sin(2 * np.pi * 0.43 * t + seed)
     v = np.gradient(q, t)
     viscous = 12 * v * (1 + (v / 0.1) ** 2) ** ((exponent - 1) / 2)

@@ -19,7 +19,7 @@ CARD = parse_card('[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1
 
 def recorded(uneven: float, seed: int) -> Recording:
     """An axis, 1.3 rad either way, whose friction rises and falls by so much eight times a turn."""
-    t = np.arange(4000) / 100
+    t = np.arange(2000) / 100
     slow, fast = 0.5 + 0.05 * seed, 1.3 + 0.1 * seed
     q = 1.2 * np.sin(slow * t + seed) + 0.1 * np.sin(fast * t + 1)
     v = 1.2 * slow * np.cos(slow * t + seed) + 0.1 * fast * np.cos(fast * t + 1)

@@ -19,7 +19,7 @@ CARD = parse_card(
 ORDER, RATE = 72, 1000.0
 
 
-def turning(seed: int, ripple: float = 4e-3, noise: float = 0.0, seconds: float = 12.0) -> Recording:
+def turning(seed: int, ripple: float = 4e-3, noise: float = 0.0, seconds: float = 6.0) -> Recording:
     """About a turn a second with a ripple of 72 a turn, the loop stiff, an encoder of 0.3 mrad noise."""
     draw, t = np.random.default_rng(seed), np.arange(int(seconds * RATE)) / RATE
     speed = 5 + 0.5 * np.sin(2 * np.pi * (0.2 + 0.05 * seed) * t)

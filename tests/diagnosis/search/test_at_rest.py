@@ -27,7 +27,7 @@ PLAIN = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=FC, sigma
 
 def recording(seed: int, bends: bool) -> Recording:
     """Moves and rests in turn; what is held at rest is a bent contact's torque, or none that motion tells."""
-    t = np.arange(12_000) / 200
+    t = np.arange(5_000) / 200
     goes = (np.sin(2 * np.pi * t / 6 + seed) > -0.3).astype(float)
     goes = np.convolve(goes, np.hanning(60) / np.hanning(60).sum(), "same")
     v = goes * (0.4 * np.sin(2 * np.pi * t / 2.3 + seed) + 0.2 * np.sin(2 * np.pi * t / 0.9))
