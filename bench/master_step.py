@@ -45,6 +45,12 @@ TITLES = {
     "interpreted": "cosim --interpreted, 6 signals to Parquet",
 }
 COMMAND = "python bench/master_step.py --out results/master"
+PEERS = (
+    "ecospy is linked with libtbb.so.12, which its wheel does not bring: `pip install '.[peers]' tbb` in an "
+    "environment of its own, and LD_LIBRARY_PATH=ENVIRONMENT/lib in front of the command."
+)
+ASKED = 1.2
+"""Of the C loop's time, with recording on."""
 
 
 def main() -> None:
@@ -62,6 +68,7 @@ def main() -> None:
 
 def measure(folder: Path, rounds: int) -> dict[str, Any]:
     """Return {"cosim": ratio, ...}: ours the worse, others' the better of FMI 2 and 3; and everything behind it."""
+    load = os.getloadavg()[0]
     per_version = {fmi: versus(pair(folder, fmi), fmi, rounds) for fmi in (2, 3)}
     ratios = {f"fmi{fmi}": {name: one["ratio"] for name, one in per_version[fmi].items()} for fmi in (2, 3)}
     names = [name for name in STEPS if name != "c"]
@@ -75,6 +82,7 @@ def measure(folder: Path, rounds: int) -> dict[str, Any]:
         "process": process(folder),
         "linearity": linearity(folder / "3"),
         "rounds": rounds,
+        "load": round(load, 1),
         "versions": versions(),
         "machine": f"Python {platform.python_version()}, {os.cpu_count()} cores, {platform.machine()}",
     }
@@ -173,7 +181,9 @@ def page(found: dict[str, Any]) -> str:
         "",
         f"    {COMMAND}",
         "",
-        ", ".join(f"{name} {text}" for name, text in found["versions"].items()) + f"; {found['machine']}, shared.",
+        ", ".join(f"{name} {text}" for name, text in found["versions"].items())
+        + f"; {found['machine']}, load {found['load']} before.",
+        PEERS,
         f"Plant and controller of the paper's mount, 0.1 ms; ratio to the C loop in the same round, median of "
         f"{found['rounds']} rounds (least to greatest). Start-up is not counted, closing the file is.",
         "",
@@ -215,8 +225,8 @@ def write(found: dict[str, Any], out: Path) -> None:
     for shift, key in ((-0.2, "fmi2"), (0.2, "fmi3")):
         bars = [(k + shift, found["detail"][key][name]["ratio"] or 0) for k, name in enumerate(STEPS)]
         axes.barh(*zip(*bars, strict=True), height=0.36, label=f"FMI {key[-1]}")
-    axes.axvline(1.5, color="k", lw=0.8, ls=":")
-    axes.set(xscale="log", xlabel="time of a step, ratio to the plain C loop (dotted: 1.5)")
+    axes.axvline(ASKED, color="k", lw=0.8, ls=":")
+    axes.set(xscale="log", xlabel=f"time of a step, ratio to the plain C loop (dotted: {ASKED})")
     axes.set_yticks(range(len(STEPS)), [TITLES[name] for name in STEPS])
     axes.invert_yaxis()
     axes.legend(frameon=False)

@@ -10,7 +10,7 @@
 
 #include <stdatomic.h>
 
-#include "loop.h"
+#include "part.h"
 
 enum { READ_OK, READ_STALE, READ_ERROR };
 enum { INPUTS = 8, MISSES = 64, HEADS = 4 };

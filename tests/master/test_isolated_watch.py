@@ -39,7 +39,7 @@ def loop(board: Board) -> Any:
 
 
 def stepping(loop: Any, part: int, tick: int) -> None:
-    """As the loop says whose functions it calls: see `enter` in part.c."""
+    """As the loop says whose functions it calls: see `enter` in part.h."""
     loop.status, loop.tick = -1 - part, tick
 
 

@@ -11,9 +11,7 @@
  * which need only roots).
  *
  * Outputs are read again after the inputs have their values of the same time, because outputs may follow inputs at once. */
-#include "loop.h"
-
-#include <math.h>
+#include "part.h"
 
 static double larger(double one, double other)
 {

@@ -97,17 +97,11 @@ typedef struct {
     /* while none has failed, `status` is -1 - the part whose functions are called: see enter */
 } Loop;
 
-/* part.c: status codes are those of FMI; `fail` notes who failed and returns 1. */
-double carry(const Loop *loop, const Wire *wire);
-int set_inputs(const Part *part);
-int get_outputs(const Part *part);
-int do_step(const Part *part, double time, double size, bool final);
+/* part.c: status codes are those of FMI; `fail` notes who failed and returns 1. part.h has what each tick needs. */
+double with_faults(const Loop *loop, const Wire *wire, double value);
 int save_state(const Part *part);
 int restore_state(const Part *part);
-int worse(int one, int other);
 int fail(Loop *loop, int64_t part, int status, int64_t since);
-const Part *enter(Loop *loop, int64_t part);
-int leave(const Part *part, int status);
 
 /* coupling.c: both take the components of a stage over one tick and return 0, or what `fail` returned. */
 int iterate(Loop *loop, Stage *stage);

@@ -1,6 +1,6 @@
 """The components of a plan and the wires between them, in Python: what a loop and a coupling both take.
 
-Does what part.c does, bit for bit; see there for the meaning of each function.
+Does what part.h and part.c do, bit for bit; see there for the meaning of each function.
 """
 
 from math import floor, isfinite

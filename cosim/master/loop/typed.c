@@ -5,8 +5,7 @@
  * the variables of other types and arrays, each with its values side by side. Nothing is rounded unless a wire asks for
  * it (`cast`): a value that its variable cannot hold is NOT_EXACT, and `culprit` and `wrong` tell which.
  * For a model-exchange FMU the inner functions are those of exchange.c, which must be called before others are set. */
-#include "foreign.h"
-#include "loop.h"
+#include "part.h"
 #include "pool.h"
 
 #include <math.h>
