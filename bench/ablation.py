@@ -1,6 +1,6 @@
 """What each number of the decision is worth: stored scores decided again with one step moved or one rule off.
 
-    python bench/ablation.py --home 281127341 --rough 730915562 --cases 120 --out results/proof
+    python bench/ablation.py --home 281127341 320128911 --rough 730915562 832011281 --out results/proof
 
 Plays the beginning of the home decks of these seeds (rough machines too), keeps the scores of each answer
 (`scores` of diagnosis.json), and decides them again: each step and share of `Policy` a third less and a half more, each
@@ -65,8 +65,8 @@ OFF: Mapping[str, Callable[[dict[str, Any]], None]] = {
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--home", type=int, default=281127341, help="seed")
-    parser.add_argument("--rough", type=int, default=730915562, help="seed of rough machines")
+    parser.add_argument("--home", type=int, nargs="+", default=(281127341, 320128911), help="seeds")
+    parser.add_argument("--rough", type=int, nargs="+", default=(730915562, 832011281), help="seeds of rough machines")
     parser.add_argument("--cases", type=int, default=120, help="of each")
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--scores", type=Path, default=Path("ablation.jsonl"), help="where answers are kept")
@@ -76,9 +76,10 @@ def main() -> None:
     known = {(row["world"], row["number"]) for row in _read(options.scores)}
     jobs = [
         (world, one)
-        for world, seed in (("home", options.home), ("rough", options.rough))
+        for kind, seeds in (("home", options.home), ("rough", options.rough))
+        for seed in seeds
         for one in cases_of(seed, options.cases)
-        if (world, one.number) not in known
+        if ((world := f"{kind} {seed}"), one.number) not in known
     ]
     with ProcessPoolExecutor(options.workers) as pool, options.scores.open("a") as file:
         for row in pool.map(_played, *zip(*jobs, strict=True)) if jobs else ():
@@ -86,9 +87,13 @@ def main() -> None:
             file.flush()
     options.out.mkdir(parents=True, exist_ok=True)
     rows = [row for path in (options.scores, *options.also) for row in _read(path) if row["scores"]]
-    text = page(rows, f"--home {options.home} --rough {options.rough}")
+    text = page(rows, f"--home {_listed(options.home)} --rough {_listed(options.rough)}")
     (options.out / "ablation.md").write_text(text, "utf-8")
     print(text)
+
+
+def _listed(seeds: Sequence[int]) -> str:
+    return " ".join(map(str, seeds))
 
 
 def _read(path: Path) -> Iterator[Row]:
@@ -98,7 +103,7 @@ def _read(path: Path) -> Iterator[Row]:
 
 def _played(world: str, case: CaseSpec) -> Row:
     with TemporaryDirectory() as folder:
-        make(case, SECONDS, folder, world == "rough")
+        make(case, SECONDS, folder, world.startswith("rough"))
         card, train, held = tool.given(folder)
         answer = as_json(diagnose(train, [held], card).diagnosis)
     head = {"world": world, "number": case.number, "kind": case.kind, "effects": list(case.effects)}
@@ -165,7 +170,7 @@ def _refusals(rows: Sequence[Row]) -> Iterator[str]:
 
 def _worlds(rows: Sequence[Row]) -> str:
     count = Counter(row["world"] for row in rows)
-    return " and ".join(f"{world} ({number})" for world, number in count.items())
+    return ", ".join(f"{world} ({number})" for world, number in count.items())
 
 
 def _line(

@@ -331,7 +331,10 @@ class Comparison:
 
 
 class _Offered(NamedTuple):
-    """The candidates beside a fit, and the columns of each."""
+    """The candidates beside a fit that have values there, and the columns of each.
+
+    Beside a number that ended at its bound (a spring of 10 kHz) a walk through a gap may have none.
+    """
 
     tried: Sequence[Candidate]
     columns: Sequence[Array]
@@ -339,7 +342,9 @@ class _Offered(NamedTuple):
     @classmethod
     def after(cls, problem: Problem, found: Fit, nuisances: Discrepancy, residual: Array) -> "_Offered":
         tried = candidates(found.mount, problem.prepared, residual, np.abs(nuisances.level))
-        return cls(tried, columns_of(found.mount, tried, problem.prepared, found.values))
+        columns = columns_of(found.mount, tried, problem.prepared, found.values)
+        kept = [k for k, one in enumerate(columns) if np.isfinite(one).all()]
+        return cls([tried[k] for k in kept], [columns[k] for k in kept])
 
 
 def _tangents_and_rest(problem: Problem, found: Fit, nuisances: Discrepancy) -> tuple[Array, Array]:

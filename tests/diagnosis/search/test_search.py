@@ -1,5 +1,6 @@
 """One effect beside a fitted base: what is tried of it, in which shape it is fitted, and what it is worth."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,8 @@ import pytest
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.effects.candidates import Candidate
+from cosim.diagnosis.evidence import comparison as evidence
 from cosim.diagnosis.evidence.comparison import NONE, Comparison
 from cosim.diagnosis.search.base_moved import owed_to_base
 from cosim.diagnosis.search.rivals import refitted_from_here
@@ -130,6 +133,21 @@ def test_a_step_that_promises_nothing_by_either_statistic_is_not_refitted() -> N
     assert hopeless
     assert Cogging in chosen
     assert not hopeless & set(chosen)
+
+
+def test_a_candidate_without_values_beside_a_structure_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A walk through a gap beside a spring of 10 kHz has none; a diagnosis ended with an error for it."""
+    comparison, base = compared(lambda q, _: 0.3 * np.sin(40 * q))
+    whole, columns_of = comparison.screen(base), evidence.columns_of
+    lacking = whole[0].candidate.effect
+
+    def without(mount: Mount, tried: Sequence[Candidate], *more: object) -> list[np.ndarray]:
+        columns = columns_of(mount, tried, *more)  # type: ignore[arg-type]
+        return [np.full_like(c, np.nan) if one.effect == lacking else c for one, c in zip(tried, columns, strict=True)]
+
+    monkeypatch.setattr(evidence, "columns_of", without)
+    rest = comparison.screen(base)
+    assert {one.candidate.effect for one in rest} == {one.candidate.effect for one in whole} - {lacking}
 
 
 def test_a_spring_does_not_start_from_a_negative_mass() -> None:
