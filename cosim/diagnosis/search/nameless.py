@@ -105,7 +105,7 @@ def _without_misnamed(
     for one in found.proof.standing:
         chosen = found.proof.chosen
         goes = goes_its_way(comparison.problem, chosen, one.within(chosen.mount))
-        comparison.judge(one.effect.id, chosen, [Rule("it surely goes the way its name says", goes)])
+        comparison.judge(one.effect.id, chosen, [Rule("its numbers surely have the sign of such an effect", goes)])
         if not goes and offered.free:
             grams = _grams(comparison, _without(comparison, found.proof, one), offered.free)
             term = offered.free[max(range(len(offered.free)), key=lambda k: _worth(grams, [k]))]
