@@ -37,5 +37,5 @@ def test_friction_is_thermal_without_a_thermometer_where_viscosity_surely_falls(
     found = diagnosed(level, viscosity)
     assert found.verdict == (said,)
     rows = [row for row in found.ledger if row.effect == "thermal_viscosity"]
-    ways = [rule.outcome for row in rows for rule in row.rules if rule.name == "its numbers surely have the sign of such an effect"]
+    ways = [rule.outcome for row in rows for rule in row.rules if "surely have the sign" in rule.name]
     assert ways == [said == "thermal_viscosity"]
