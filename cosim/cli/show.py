@@ -17,6 +17,9 @@ from cosim.support.terminal import put_json
 LONG = 500
 """Rows of a table that is drawn at most; a longer one is written plainly."""
 
+NARROW = 10
+"""Characters that a column of sentences needs to be read."""
+
 
 def show(
     file: Annotated[
@@ -52,7 +55,7 @@ def show(
         elif len(table) > LONG:
             sys.stdout.write(_plain(name, table) + "\n")
         else:
-            console.print(_table(name, table))
+            console.print(_table(name, table, console.width))
 
 
 def _options(path: Path, given: Mapping[str, list[str] | None]) -> dict[str, dict[str, str]]:
@@ -71,11 +74,22 @@ def _plain(title: str, rows: Sequence[Mapping[str, Json]]) -> str:
     return "\n".join([title, *(form.format(*cells).rstrip() for cells in zip(*columns, strict=True))])
 
 
-def _table(title: str, rows: Iterable[Mapping[str, Json]]) -> Table:
+def _table(title: str, rows: Iterable[Mapping[str, Json]], width: int) -> Table:
     table = Table(title=Text(title), title_justify="left", box=None, pad_edge=False)
     listed = list(rows)
-    for name in listed[0] if listed else ():
-        table.add_column(Text(name), overflow="fold", no_wrap=name == "over time")
-    for row in listed:
-        table.add_row(*(Text(str(value)) for value in row.values()))  # [rad] is a unit there, and no markup
+    columns = {name: [str(row[name]) for row in listed] for name in listed[0]} if listed else {}
+    whole = _names(columns, width)
+    for name in columns:
+        table.add_column(Text(name), overflow="fold", no_wrap=name == "over time" or name in whole)
+    for cells in zip(*columns.values(), strict=True):
+        table.add_row(*map(Text, cells))  # [rad] is a unit there, and no markup
     return table
+
+
+def _names(columns: Mapping[str, Sequence[str]], width: int) -> set[str]:
+    """Columns of single words, which are not broken where there is room for them and NARROW for each other column."""
+    single = {
+        name: max(map(len, (name, *cells))) for name, cells in columns.items() if not any(" " in cell for cell in cells)
+    }
+    others = NARROW * (len(columns) - len(single))
+    return set(single) if sum(single.values()) + others + 2 * len(columns) <= width else set()

@@ -95,3 +95,11 @@ def test_a_calibration_without_a_model_says_which_options_there_are(run, capsys)
         main(["identify", "--free", "J", str(run)])
     assert ended.value.code == 2
     assert "One of --card, --fmu and --system" in capsys.readouterr().err
+
+
+def test_names_of_a_schedule_are_not_broken_on_a_terminal_of_80_columns(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        main(["show", "sidereal", "--schedule"])
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.split()[:2] == ["controller.a_d", "reference.acceleration"] for line in lines)
