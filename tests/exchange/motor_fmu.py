@@ -7,14 +7,13 @@
 inertia 2 % larger, 7 a speed that ends at 2, 8 an angle by Euler's rule, 9 degrees, 10 an input one step late.
 """
 
-import subprocess
-import sys
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
 import fmpy
 import numpy as np
+from compiling import compiled
 from tiny_fmu import SOURCE as TINY
 from tiny_fmu import _stubs
 
@@ -82,12 +81,7 @@ def packed(
     directory: Path, stem: str, source: str, variables: Sequence[Row], version: int, name: str, *options: str
 ) -> Path:
     """Compile and pack an FMU written like the motor, whose value references are the places of its variables."""
-    library = directory / f"{stem}{fmpy.sharedLibraryExtension}"
-    if not library.exists():
-        text = directory / f"{stem}.c"
-        text.write_text(source + _stubs(version))
-        command = [sys.executable, "-m", "ziglang", "cc", "-shared", "-fPIC", "-O2", "-w", *options, "-o"]
-        subprocess.run([*command, str(library), str(text)], check=True)
+    library = compiled(stem, source + _stubs(version), *options)
     platform = fmpy.platform if version == 2 else fmpy.platform_tuple
     path = directory / f"{stem}.fmu"
     with zipfile.ZipFile(path, "w") as archive:

@@ -1,32 +1,18 @@
 """A model description in words that FMI does not know is refused in a sentence; what can be set is set."""
 
 import re
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from simulating import simulate
-from start_fmus import C, K, U, V, Y, library, packed
+from start_fmus import C, K, Make, U, V, Y, make
 
 from cosim.api.show import show
 from cosim.cli import main
 from cosim.support.errors import FmuError
 
+__all__ = ["make"]
 VERSIONS = pytest.mark.parametrize("version", [2, 3])
-Make = Callable[..., Path]
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The library of all small FMUs."""
-    return library(tmp_path_factory.mktemp("library"))
-
-
-@pytest.fixture
-def make(built: Path, tmp_path: Path) -> Make:
-    """Pack one of them."""
-    return lambda model, version=2, **more: packed(tmp_path, built, model, version, **more)
 
 
 @VERSIONS

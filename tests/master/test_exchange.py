@@ -1,7 +1,5 @@
 """Model-exchange FMUs step like any other: the built-in solver meets co-simulation, CVode, and the times of events."""
 
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -10,6 +8,7 @@ import export_models as models
 import fmpy
 import numpy as np
 import pytest
+from compiling import compiled
 from simulating import simulate
 from tiny_fmu import tiny
 
@@ -141,10 +140,7 @@ def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     folder = tmp_path_factory.mktemp("ball")
     wanted = [name for name in dir(FMU2Model) if name.startswith("fmi2") and f"{name}(" not in BALL]
-    source, library = folder / "ball.c", folder / f"ball{fmpy.sharedLibraryExtension}"
-    source.write_text(BALL + "".join(f"API int {name}(void) {{ return 3; }}\n" for name in wanted))
-    command = [sys.executable, "-m", "ziglang", "cc", "-shared", "-fPIC", "-O2", "-w", "-o", str(library), str(source)]
-    subprocess.run(command, check=True)
+    library = compiled("ball", BALL + "".join(f"API int {name}(void) {{ return 3; }}\n" for name in wanted))
     with zipfile.ZipFile(folder / "ball.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", DESCRIPTION)
         archive.write(library, f"binaries/{fmpy.platform}/{library.name}")

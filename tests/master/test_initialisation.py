@@ -1,14 +1,12 @@
 """Values at the start reach what they are wired to in initialisation mode; row 0 shows what FMUs have then."""
 
 import re
-from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from simulating import simulate
-from start_fmus import U, V, Y, library, packed
+from start_fmus import Make, U, V, Y, make
 
 from cosim.fmi.alias import Alias
 from cosim.fmi.function import FunctionComponent
@@ -18,24 +16,12 @@ from cosim.system.system import Fmu
 from cosim.system.wire import Wire
 
 BOTH = pytest.mark.parametrize("compiled", [True, False])
+__all__ = ["make"]
 VERSIONS = pytest.mark.parametrize("version", [2, 3])
-Make = Callable[..., Path]
 PYTHON = "It was asked for: the loop ran in Python."
 ANY = V("any", 4, "input", start="0")
 """An input that no output follows, through which a component waits for another."""
 GIVES = (Y, V("c", 3, "parameter", start="0"), ANY)
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The library of all small FMUs."""
-    return library(tmp_path_factory.mktemp("library"))
-
-
-@pytest.fixture
-def make(built: Path, tmp_path: Path) -> Make:
-    """Pack one of them."""
-    return lambda model, version=2, **more: packed(tmp_path, built, model, version, **more)
 
 
 def first(run: RunResult, name: str) -> float:

@@ -1,30 +1,17 @@
 """A run says what does not fit: an FMU's own steps, limits that cannot be, values without effect."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from simulating import simulate
-from start_fmus import C, K, U, V, Y, library, packed
+from start_fmus import C, K, Make, U, V, Y, make
 
 from cosim.api.show import show
 from cosim.fmi.function import FunctionComponent
 
+__all__ = ["make"]
 VERSIONS = pytest.mark.parametrize("version", [2, 3])
-Make = Callable[..., Path]
-
-
-@pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The library of all small FMUs."""
-    return library(tmp_path_factory.mktemp("library"))
-
-
-@pytest.fixture
-def make(built: Path, tmp_path: Path) -> Make:
-    """Pack one of them."""
-    return lambda model, version=2, **more: packed(tmp_path, built, model, version, **more)
 
 
 def notes(fmu: Path, step: float = 0.01, every: int = 1, **more: object) -> list[str]:

@@ -1,13 +1,12 @@
 """FMUs for scheduled execution: their partitions run when their clocks tick, in the order of time and priority."""
 
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
 import fmpy
 import numpy as np
 import pytest
+from compiling import compiled
 from fmpy.fmi3 import FMU3ScheduledExecution
 from simulating import simulate
 from tiny_fmu import tiny
@@ -72,10 +71,7 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("parts")
     wanted = [name for name in dir(FMU3ScheduledExecution) if name.startswith("fmi3")]
     stubs = [f"API int {name}(void) {{ return 3; }}" for name in wanted if name not in SOURCE]
-    source, library = folder / "parts.c", folder / f"parts{fmpy.sharedLibraryExtension}"
-    source.write_text("\n".join([SOURCE, *stubs]))
-    command = [sys.executable, "-m", "ziglang", "cc", "-shared", "-fPIC", "-w", "-o", str(library), str(source)]
-    subprocess.run(command, check=True)
+    library = compiled("parts", "\n".join([SOURCE, *stubs]))
     path = folder / "parts.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", DESCRIPTION)

@@ -4,13 +4,12 @@ Value references count anew for each type in FMI 2, and through all types in FMI
 step, and the enumeration's values are not 1, 2, 3.
 """
 
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
 import fmpy
 import pytest
+from compiling import compiled
 
 SOURCE = r"""
 #include <stdbool.h>
@@ -175,10 +174,7 @@ def mirror(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
     known = SOURCE + "".join(f"fmi3{access}{kind}(" for access in ("Set", "Get") for kind in KINDS)
     known += "".join(f"fmi2{access}{kind}(" for access in ("Set", "Get") for kind in ("Real", "Integer", "Boolean"))
     missing = [name for name in wanted if f"{name}(" not in known and f"({name})" not in known]
-    source, library = folder / "mirror.c", folder / f"mirror{fmpy.sharedLibraryExtension}"
-    source.write_text(SOURCE + "".join(f"UNUSED({name})\n" for name in missing))
-    command = [sys.executable, "-m", "ziglang", "cc", "-shared", "-fPIC", "-O2", "-w", "-o", str(library), str(source)]
-    subprocess.run(command, check=True)
+    library = compiled("mirror", SOURCE + "".join(f"UNUSED({name})\n" for name in missing))
     return {version: _packed(folder, library, version) for version in (2, 3)}
 
 

@@ -4,12 +4,11 @@ The output `third` is always 1/3 and the state's rate `rate` too, so that what a
 whether its arithmetic was left alone.
 """
 
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
 import fmpy
+from compiling import compiled
 
 DEEDS = (
     "nothing",
@@ -157,23 +156,14 @@ def rude_fmu(
 ) -> Path:
     """Write an FMU that does a deed in a stage by itself; with its parameters it can be told to do more."""
     path = folder / f"rude_{version}_{kind}_{deed}_{stage}.fmu"
-    library = _library(folder, version, deed if stage == "load" else "nothing")
+    loaded = deed if stage == "load" else "nothing"
+    library = compiled("rude", f"#define LOADED {loaded.upper()}\n{SOURCE}{_stubs(version)}", "-lm", "-lpthread")
     platform = fmpy.platform if version == 2 else fmpy.platform_tuple
     guid = f"{DEEDS.index(deed)}:{STAGES.index(stage)}"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", _description(version, guid, kind))
-        archive.write(library, f"binaries/{platform}/rude{fmpy.sharedLibraryExtension}")
+        archive.write(library, f"binaries/{platform}/{library.name}")
     return path
-
-
-def _library(folder: Path, version: int, loaded: str) -> Path:
-    library = folder / f"rude_{version}_{loaded}{fmpy.sharedLibraryExtension}"
-    if not library.exists():
-        source = library.with_suffix(".c")
-        source.write_text(f"#define LOADED {loaded.upper()}\n{SOURCE}{_stubs(version)}")
-        flags = ["-shared", "-fPIC", "-O1", "-w", "-lm", "-lpthread"]
-        subprocess.run([sys.executable, "-m", "ziglang", "cc", "-o", library, source, *flags], check=True)
-    return library
 
 
 def _stubs(version: int) -> str:

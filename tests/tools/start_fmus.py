@@ -15,14 +15,14 @@
 - `single`: y = k u + c in Float32 (FMI 3)
 """
 
-import subprocess
-import sys
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import fmpy
+import pytest
+from compiling import compiled
 
 SOURCE = r"""
 #include <stdbool.h>
@@ -195,23 +195,24 @@ VARIABLES: Mapping[str, Sequence[V]] = {
 OF_FMI2 = {"Float64": "Real", "Int32": "Integer"}
 
 
-def library(folder: Path) -> Path:
-    """Compile the library of all of them."""
-    path, source = folder / f"start{fmpy.sharedLibraryExtension}", folder / "start.c"
-    source.write_text(SOURCE + _stubs())
-    command = [sys.executable, "-m", "ziglang", "cc", "-shared", "-fPIC", "-O1", "-w", "-o", str(path), str(source)]
-    subprocess.run(command, check=True)
-    return path
+Make = Callable[..., Path]
 
 
-def packed(folder: Path, built: Path, model: str, version: int = 2, **description: str) -> Path:
+@pytest.fixture
+def make(tmp_path: Path) -> Make:
+    """Pack one of them."""
+    return lambda model, version=2, **more: packed(tmp_path, model, version, **more)
+
+
+def packed(folder: Path, model: str, version: int = 2, **description: str) -> Path:
     """Pack one of them; the rest says what its description shall say, see `described`."""
     platform = fmpy.platform if version == 2 else fmpy.platform_tuple
     number = len(list(folder.glob("*.fmu")))
     path = folder / f"{model}{number}.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", described(model, version, **description))
-        archive.write(built, f"binaries/{platform}/start{fmpy.sharedLibraryExtension}")
+        library = compiled("start", SOURCE + _stubs())
+        archive.write(library, f"binaries/{platform}/{library.name}")
     return path
 
 

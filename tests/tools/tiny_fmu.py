@@ -6,13 +6,12 @@ From fail_at on a step returns the number `status`; 11 crashes the process, 12 n
 17 asks to end the simulation, 18 returns early from its step (FMI 3).
 """
 
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 
 import fmpy
 import pytest
+from compiling import compiled
 
 SOURCE = r"""
 #include <math.h>
@@ -118,14 +117,11 @@ VARIABLES = [
 def build(directory: Path, version: int) -> Path:
     """Compile and pack the tiny FMU for one FMI version."""
     platform = fmpy.platform if version == 2 else fmpy.platform_tuple
-    library, source = directory / f"tiny{version}{fmpy.sharedLibraryExtension}", directory / f"tiny{version}.c"
-    source.write_text(SOURCE + _stubs(version))
-    command = [sys.executable, "-m", "ziglang", "cc", "-shared", "-fPIC", "-O2", "-w", "-o", str(library), str(source)]
-    subprocess.run(command, check=True)
+    library = compiled("tiny", SOURCE + _stubs(version))
     path = directory / f"tiny{version}.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", description(version))
-        archive.write(library, f"binaries/{platform}/tiny{fmpy.sharedLibraryExtension}")
+        archive.write(library, f"binaries/{platform}/{library.name}")
     return path
 
 
