@@ -13,6 +13,7 @@ from cosim.support.errors import InputError
 from cosim.support.files import check_free, replacing
 from cosim.support.html import text as html_text
 from cosim.support.plain import JsonObject
+from cosim.support.threads import in_one_thread
 from cosim.support.version import __version__
 from pyfmi_models.card import Card, MountSection
 from pyfmi_models.card_writer import card_text
@@ -79,6 +80,7 @@ class CardResult:
         return html_text(str(self))
 
 
+@in_one_thread
 def card(
     recordings: Source | Sequence[Source],
     out: str | Path | None = None,

@@ -30,6 +30,7 @@ from cosim.support.html import table as html_table
 from cosim.support.html import text as html_text
 from cosim.support.notebook import shows_progress
 from cosim.support.plain import JsonObject
+from cosim.support.threads import in_one_thread
 from pyfmi_models.card import Card, read_card
 
 if TYPE_CHECKING:
@@ -114,6 +115,7 @@ class DiagnosisResult:
 
 
 @shows_progress()
+@in_one_thread
 def diagnose(
     train: Source | Sequence[Source],
     heldout: Source | Sequence[Source] = (),

@@ -21,6 +21,7 @@ from cosim.support.files import replacing
 from cosim.support.html import text as html_text
 from cosim.support.notebook import shows_progress
 from cosim.support.plain import JsonObject
+from cosim.support.threads import in_one_thread
 from pyfmi_models.card import Card
 
 
@@ -52,6 +53,7 @@ class InvestigateResult:
 
 
 @shows_progress()
+@in_one_thread
 def investigate(
     scenario: str,
     card: str,

@@ -28,6 +28,7 @@ from cosim.support.interrupts import Terminated, end_well, is_interrupted, is_te
 from cosim.support.suffixes import RECORDINGS
 from cosim.support.system_errors import surroundings
 from cosim.support.terminal import abandon_stdout, finish_stdout, keep_stdout, put, say
+from cosim.support.threads import VARIABLES
 from cosim.support.version import __version__
 from pyfmi_models.errors import ModelError
 
@@ -79,8 +80,8 @@ def set_libraries() -> None:
     fortieth of a short run.
     """
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    for library in ("OPENBLAS", "OMP", "MKL"):
-        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    for name in VARIABLES:
+        os.environ.setdefault(name, "1")
 
 
 def check_given(arguments: Sequence[str]) -> None:

@@ -20,6 +20,7 @@ from typing import IO, Any
 from cosim.support.activity import SIZE, Board
 from cosim.support.errors import CosimError
 from cosim.support.scratch import Scratch
+from cosim.support.threads import VARIABLES
 
 GRACE = 2.0
 """Seconds that a process which gave no answer has to end by itself."""
@@ -47,11 +48,10 @@ class Cell:
     Args:
         quiet: keep what the process writes to stderr for the reason of a crash, in place of showing it.
         keep: file descriptors that the process inherits, for example that of a lock which shall outlive this process.
-        one_thread: let linear algebra have one thread: the cores are busy with other runs already.
     """
 
-    def __init__(self, quiet: bool = True, keep: tuple[int, ...] = (), one_thread: bool = True) -> None:
-        self._quiet, self._keep, self._one_thread = quiet, keep, one_thread
+    def __init__(self, quiet: bool = True, keep: tuple[int, ...] = ()) -> None:
+        self._quiet, self._keep = quiet, keep
         self._process: subprocess.Popen[bytes] | None = None
         self._said: IO[bytes] | None = None
         self._folder: Scratch | None = None
@@ -133,7 +133,7 @@ class Cell:
         self._said = tempfile.TemporaryFile("a+b") if self._quiet else None  # noqa: SIM115 it lives as long as the process
         home = str(Path(__file__).parents[2])
         paths = os.pathsep.join(filter(None, [home, os.environ.get("PYTHONPATH", "")]))
-        environment = os.environ | {"PYTHONPATH": paths} | ({"OMP_NUM_THREADS": "1"} if self._one_thread else {})
+        environment = dict.fromkeys(VARIABLES, "1") | os.environ | {"PYTHONPATH": paths}
         environment |= dict.fromkeys(("TMPDIR", "TEMP", "TMP"), folder)
         command = [sys.executable, "-m", "cosim.support.child", str(Path(folder) / BOARD), str(os.getpid())]
         # A session of its own: Ctrl-C at the terminal reaches the parent alone, which then ends this process.

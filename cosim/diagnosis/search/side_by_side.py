@@ -29,7 +29,8 @@ def side_by_side(on_progress: OnProgress) -> InTurn:
 class SideBySide(InTurn):
     """Refits here and in a process of its own, which is ended with the context.
 
-    That process has as many threads of linear algebra as this one: sums over more threads differ in their last digit.
+    It has as many threads of linear algebra as this one (`cosim.support.threads`): sums over more differ in their last
+    digit.
 
     Args:
         on_progress: told, in a few words, what is being refitted here.
@@ -37,7 +38,7 @@ class SideBySide(InTurn):
 
     def __init__(self, on_progress: OnProgress = lambda _: None) -> None:
         super().__init__(on_progress)
-        self._cell, self._is_lost = Cell(one_thread=False), False
+        self._cell, self._is_lost = Cell(), False
         self._thread = ThreadPoolExecutor(1, "refits")
         self._thread.submit(self._called, _prepare)  # what it needs is loaded while recordings are looked at
 
