@@ -3,7 +3,6 @@
 import ast
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -147,16 +146,10 @@ def test_every_room_of_the_product_has_its_errors() -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks")
-@pytest.mark.parametrize("part", ["noticed", "heads"])
-def test_an_error_is_noticed_where_a_test_looks_and_survives_where_none_does(part: str, tmp_path: Path) -> None:
+def test_an_error_is_noticed_where_a_test_looks_and_survives_where_none_does(tmp_path: Path) -> None:
     """In an interpreter of its own: tests are run in forks of it."""
-    done = subprocess.run([sys.executable, __file__, part, tmp_path], capture_output=True, text=True, timeout=600)
+    done = subprocess.run([sys.executable, __file__, tmp_path], capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
-
-
-def tree(folder: Path, home: Path | None = None) -> mutants.Tree:
-    mutants.HOME = home or mutants.HOME
-    return mutants.Tree(folder, 60.0)
 
 
 def noticed(folder: Path) -> None:
@@ -167,7 +160,8 @@ def noticed(folder: Path) -> None:
     for name, body in {"looks": "from held import held\n    assert held(9) == 3", "idle": "pass"}.items():
         (home / "tests" / f"test_{name}.py").write_text(f"def test_{name}():\n    {body}\n")
     (home / "tests" / "test_broken.py").write_text("def test_broken():\n    assert False\n")
-    this = tree(folder, home)
+    mutants.HOME = home
+    this = mutants.Tree(folder, 60.0)
     for number, site in enumerate(mutants.read(home / "held.py")[1]):
         for files in (["test_idle.py"], ["test_broken.py", "test_idle.py", "test_looks.py"])[number > 0 :]:
             mutants.chosen = lambda *_, files=files: iter([[one] for one in files])
@@ -178,21 +172,5 @@ def noticed(folder: Path) -> None:
     assert (this.place / "held.py").read_text() == (home / "held.py").read_text()
 
 
-def heads(folder: Path) -> None:
-    """A library that is built anew with the error, and anew without; a file that does not compile is none."""
-    this, path = tree(folder), mutants.HOME / "cosim/hardware/heads.c"
-    source, found = mutants.read(path)
-    line = source[: source.index("heads->shift + 2")].count("\n") + 1
-    number = next(k for k, one in enumerate(found) if one.line == line and one.change.endswith(": 2 -> 3"))
-    mutants.chosen = lambda *_: iter([["hardware/test_heads.py"]])
-    tried = this.attempt("hardware", path, number)
-    assert tried
-    assert tried.noticed
-    assert this._failed(["hardware/test_heads.py"], 60)[0] == "", "the library is the old one again"
-    assert not this._written("cosim/hardware/heads.c", "int nonsense(")
-
-
-PARTS: dict[str, Callable[[Path], None]] = {"noticed": noticed, "heads": heads}
-
 if __name__ == "__main__":
-    PARTS[sys.argv[1]](Path(sys.argv[2]))
+    noticed(Path(sys.argv[1]))

@@ -2,7 +2,7 @@
 
 from importlib.resources import files
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -107,22 +107,6 @@ def test_a_number_that_arithmetic_cannot_take_costs_a_sentence_and_no_warning(
     assert [one for one in said[1:-1] if not one.startswith("what was recorded until then is in ")] == []
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_a_signal_that_is_no_number_is_named_with_its_time(tiny: dict[int, Path], bad: float) -> None:
-    values = np.zeros(40)
-    values[33] = bad
-    sentence = rf'The signal "r\.value" is {bad} at tick 33 \(0\.033 s\); it must be a finite number\.'
-    with pytest.raises(SignalError, match=sentence):
-        simulate(
-            {"plant": tiny[3]},
-            [("r.value", "plant.a")],
-            record={"y": "plant.y"},
-            step=1e-3,
-            ticks=40,
-            signals={"r": Samples(values)},
-        )
-
-
 class Overflowing:
     """A signal of a caller's own whose numbers Python refuses."""
 
@@ -132,17 +116,20 @@ class Overflowing:
         return lambda ticks: np.full((1, len(ticks)), 10.0**400)
 
 
-def test_a_signal_whose_numbers_overflow_is_named(tiny: dict[int, Path]) -> None:
-    sentence = r'The signal "r" cannot be computed: its numbers lead beyond what arithmetic has\.'
+NOT_FINITE = r'The signal "r\.value" is {} at tick 33 \(0\.033 s\); it must be a finite number\.'
+
+
+@pytest.mark.parametrize(
+    ("signal", "sentence"),
+    [
+        *((Samples(np.where(np.arange(40) == 33, bad, 0.0)), NOT_FINITE.format(bad)) for bad in (np.nan, np.inf)),
+        (Overflowing(), r'The signal "r" cannot be computed: its numbers lead beyond what arithmetic has\.'),
+    ],
+)
+def test_a_signal_that_is_no_number_is_named_with_its_time(tiny: dict[int, Path], signal: Any, sentence: str) -> None:
+    wires, signals = [("r.value", "plant.a")], {"r": signal}
     with pytest.raises(SignalError, match=sentence):
-        simulate(
-            {"plant": tiny[3]},
-            [("r.value", "plant.a")],
-            record={"y": "plant.y"},
-            step=1e-3,
-            ticks=40,
-            signals={"r": Overflowing()},
-        )
+        simulate({"plant": tiny[3]}, wires, record={"y": "plant.y"}, step=1e-3, ticks=40, signals=signals)
 
 
 @pytest.mark.parametrize("limit", [1e150, 1e200, 1e308])
