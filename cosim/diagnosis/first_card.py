@@ -17,6 +17,7 @@ import numpy as np
 
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.band import in_band
 from cosim.diagnosis.search.sizes import standard_errors
 from cosim.diagnosis.trust.balance import Balance
@@ -26,19 +27,11 @@ from cosim.estimation.prepare import Array
 from cosim.estimation.problem import Problem
 from cosim.estimation.row_weights import weights
 from cosim.support.errors import InputError, RecordingError
-from cosim.support.statistics import Z95
+from cosim.support.statistics import SURELY, Z95
 from pyfmi_models.effects import Effect, GravityUnbalance, TorqueOffset
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
-CLEAR = 3.0
-"""Standard errors that a number must be away from nothing to be taken as determined; noise alone: 1 in 370."""
-MATTERS = 0.05
-"""Share of the error energy that a constant torque or a weight must remove: less is for a diagnosis to judge."""
-ALIKE = 0.9
-"""Correlation from which two numbers share what they explain: the error of each is 2.3 times what it is alone."""
-LITTLE = 0.5
-"""Share of the torque's energy below which the card is not yet a model of the axis, which is said."""
 LEAST_TRAVEL = 0.35
 """Travel [rad] from which a weight differs from a constant torque and a spring: its cosine changes by .06 in 20 deg."""
 EVALUATIONS, ROUNDS = 60, 2
@@ -166,7 +159,7 @@ def _is_clear(problem: Problem, without: Fit, tried: Fit) -> bool:
     name = f"{prefix}.{effect.main.parameter}"
     value, error = tried.parameters().get(name, 0.0), errors.get(name, np.inf)
     gained = 1 - (problem.error(tried) / max(problem.error(without), 1e-300)) ** 2
-    return abs(value) > CLEAR * error and gained > MATTERS and _is_apart(problem, tried, name)
+    return abs(value) > SURELY * error and gained > POLICY.slight and _is_apart(problem, tried, name)
 
 
 def _is_apart(problem: Problem, tried: Fit, name: str) -> bool:
@@ -179,7 +172,7 @@ def _is_apart(problem: Problem, tried: Fit, name: str) -> bool:
     sizes = {f"{prefix_of[id(effect)]}.{effect.main.parameter}" for effect in tried.mount.effects[:-1]}
     own = tried.free.index(name)
     others = [place for place, other in enumerate(tried.free) if other in sizes]
-    return all(abs(spread[own, place]) < ALIKE * error[own] * error[place] for place in others)
+    return all(abs(spread[own, place]) < POLICY.nearly_all * error[own] * error[place] for place in others)
 
 
 def _numbers(problem: Problem, found: Fit, inertia: float | None, linear: bool) -> list[Number]:
@@ -189,7 +182,7 @@ def _numbers(problem: Problem, found: Fit, inertia: float | None, linear: bool) 
     for name, value in found.parameters().items():
         variable, error = known[name], errors[name]
         inside = isfinite(error) and value > variable.low and value < variable.high
-        determined = inside and (abs(value) > CLEAR * error or name.endswith("phase"))
+        determined = inside and (abs(value) > SURELY * error or name.endswith("phase"))
         unit = _linear(variable.unit) if linear else variable.unit
         numbers.append(Number(name, value, error, unit, determined))
     return numbers
@@ -220,7 +213,7 @@ def _is_small(problem: Problem, tau: Array, numbers: Sequence[Number]) -> bool:
         return False
     inertia = _inertia_of(numbers)
     most = inertia.range[1] * float(np.linalg.norm(problem.weight * problem.prepared.stacked("a")))
-    return most < (1 - LITTLE) * float(np.linalg.norm(tau))
+    return most < (1 - POLICY.half) * float(np.linalg.norm(tau))
 
 
 def _within(inertia: Number) -> float:
@@ -248,7 +241,7 @@ def _notes(numbers: Sequence[Number], explained: float) -> list[str]:
     for name, words in (("friction.Fc", "Coulomb friction"), ("friction.sigma2", "viscous friction")):
         if not next(one for one in numbers if one.name == name).is_determined:
             notes.append(f"The recordings do not determine the {words}; the card has none.")
-    if explained < LITTLE:
+    if explained < POLICY.half:
         notes.append(
             f"The card explains {100 * explained:.0f} % of the torque's energy only: something else acts here."
         )

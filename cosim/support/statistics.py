@@ -9,6 +9,8 @@ Array = npt.NDArray[np.float64]
 Index = npt.NDArray[np.int64]
 Z95 = 1.96
 """Standard errors on either side of an estimate that hold 95 % of a normal distribution."""
+SURELY = 3.0
+"""Standard errors from which a number surely differs: noise alone comes to that once in 370."""
 
 
 def rms(values: npt.NDArray[np.floating]) -> float:

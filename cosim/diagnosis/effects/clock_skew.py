@@ -5,6 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.base import Hypothesis, Seen
 from cosim.diagnosis.effects.candidates import Candidate, Span, has
 from cosim.diagnosis.effects.delay_and_lag import NOTHING_ASKED, attributed
@@ -14,8 +15,8 @@ from pyfmi_models.effects import Effect
 from pyfmi_models.effects.clock_skew import ClockSkew
 from pyfmi_models.mount import Mount
 
-LEAST_DRIFT_MS, LEAST_DRIFT = 1.0, 0.3
-"""A clock that drifts by less than this, or than this share of its offset, over a recording is late like a delay."""
+LEAST_DRIFT_MS = 1.0
+"""A clock that drifts by less than this, or than a considerable share of its offset, is late like a delay."""
 
 
 class Clocks(Hypothesis[ClockSkew]):
@@ -54,7 +55,7 @@ class Clocks(Hypothesis[ClockSkew]):
     def late(self, problem: Problem, effect: ClockSkew) -> float | None:
         """Of a clock that drifts it is the middle of a recording that counts, if late by a sample at least."""
         offset, drift = float(effect.offset_ms), 1e-3 * float(effect.drift_ppm) * problem.seconds
-        steady = abs(drift) < max(LEAST_DRIFT_MS, LEAST_DRIFT * abs(offset))
+        steady = abs(drift) < max(LEAST_DRIFT_MS, POLICY.considerable * abs(offset))
         late = -1e-3 * (offset + drift / 2)
         return late if late > (0 if steady else problem.sample_time) else None
 

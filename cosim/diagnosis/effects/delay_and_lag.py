@@ -24,6 +24,7 @@ from cosim.diagnosis.effects.candidates import Candidate, Span, has
 from cosim.estimation.filters import derivative, lowpass
 from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.problem import Problem
+from cosim.support.statistics import SURELY
 from pyfmi_models.effects import ActuatorLag, Delay, DriveEffect, Effect
 from pyfmi_models.mount import Mount
 
@@ -105,8 +106,6 @@ SLOW = 1.0
 """Hz: a loop follows motion this slow as well as it ever will."""
 AGREES = 0.1
 """The two lags are one and the same if they differ by less than this share: a loop trails so by rare accident."""
-SURE = 3.0
-"""Standard errors of the lag that are allowed for."""
 
 
 class ReadingLag(NamedTuple):
@@ -124,9 +123,9 @@ def attributed(prepared: Prepared, seconds: float, sample_time: float) -> Litera
     if seconds < sample_time:
         return "drive"
     late = reading_lag(prepared)
-    if late is None or SURE * late.error > seconds / 4:
+    if late is None or SURELY * late.error > seconds / 4:
         return "either"
-    if abs(late.seconds - seconds) < AGREES * seconds + SURE * late.error:
+    if abs(late.seconds - seconds) < AGREES * seconds + SURELY * late.error:
         return "clock"
     return "drive" if late.seconds < seconds / 2 else "either"
 

@@ -6,6 +6,7 @@ from math import ceil, log, pi
 import numpy as np
 import numpy.typing as npt
 
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.candidates import Span
 from cosim.estimation.prepare import Array
 from cosim.estimation.tonal_disturbance import LEAST_WAVES
@@ -17,8 +18,8 @@ LEAST_ROWS = 50
 MOST = 20_000
 """Cycles that are tried at most, .35 of what a stroke tells apart: half a second of processor. With 3,000 the cycles of
 a motor that turned sixteen times ended at 64 a turn; its ripple of 72 was out of reach."""
-LEAST_TURNS, REPEATING = 8, 0.9
-"""Periods of a motion, and share of the energy of its speed in their harmonics, that show that it repeats itself."""
+LEAST_TURNS = 8
+"""Periods of a motion that show that it repeats itself, where harmonics hold nearly all of its speed's energy."""
 NEIGHBOURS = 10
 """Tones that a piece tells apart, on either side of one, whose mean power is the level there."""
 CAUSED = 3.0
@@ -91,7 +92,7 @@ def _repeated(t: Array, v: Array, hertz: Array) -> npt.NDArray[np.bool_]:
     power = _spectrum(t, v, fine)
     pitch = float(fine[np.argmax(power)])
     harmonic = [np.abs(f - pitch * np.maximum(np.round(f / pitch), 1)) < 2 * width for f in (fine, hertz)]
-    repeats = pitch > LEAST_TURNS * width and power[harmonic[0]].sum() > REPEATING * power.sum()
+    repeats = pitch > LEAST_TURNS * width and power[harmonic[0]].sum() > POLICY.nearly_all * power.sum()
     return np.asarray(harmonic[1] & repeats)
 
 

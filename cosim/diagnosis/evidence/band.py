@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.candidates import span_of
 from cosim.diagnosis.effects.periodogram import peaks
 from cosim.estimation.filters import lowpass
@@ -26,9 +27,6 @@ from pyfmi_models.mount import Mount
 
 NOISE_LIMIT = 0.1
 """Share of the torque that differentiated noise may reach in the wider band: it is seen, and is weighted. Unit: 1."""
-LEAST_PREDICTED = 0.3
-"""Share of the energy above the band, inertia taken off, that waves over position must predict. Unit: 1. Noise and
-other mechanics have 0.01 at most: nothing of them is predicted; of a motor's ripple of 72 a turn 0.84 and 0.97 are."""
 
 
 MOTION = (1.4, 2.0, 2.8, 4.0)
@@ -46,7 +44,7 @@ def in_band(train: Sequence[Recording], mount: Mount) -> Prepared:
     inertia = float(mount.axis.inertia)
     narrow, wide = choose_cutoff(train, inertia), choose_cutoff(train, inertia, NOISE_LIMIT)
     prepared = prepare(train, wide)
-    shown = wide > narrow and prepared.has_position and predicted(prepared, mount, narrow) > LEAST_PREDICTED
+    shown = wide > narrow and prepared.has_position and predicted(prepared, mount, narrow) > POLICY.considerable
     return with_motion_read(train, mount, prepared if shown else prepare(train, narrow))
 
 

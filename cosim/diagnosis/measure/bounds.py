@@ -16,7 +16,7 @@ from math import sqrt
 import numpy as np
 
 from cosim.diagnosis.answer.result import Bound, Finding
-from cosim.diagnosis.decide.policy import Policy
+from cosim.diagnosis.decide.policy import POLICY, Policy
 from cosim.diagnosis.effects import TRIED, candidates, hypothesis_of, named
 from cosim.diagnosis.effects.base import NOT_DETERMINED, UNSEEN, Seen
 from cosim.diagnosis.effects.candidates import span_of
@@ -29,8 +29,6 @@ from cosim.estimation.prepare import Array, Prepared
 from pyfmi_models.effects import CATALOGUE, Effect
 from pyfmi_models.mount import Mount
 
-LEAST_SHARE = 0.02
-"""Plain energy that the first size adds, relative to what is left: no effect that explains less is named."""
 STEP, STEPS = 1.5, 12
 """Factor between two sizes that are tried, and how many are: up to 86 times the first. The first is also one such step
 above the least that has a name, as what is read is smaller than what is concealed: the base takes a part of it. Of a
@@ -40,8 +38,6 @@ ALIKE = 3.0
 MARGIN = 1.25
 """A bound is this much larger than what was just found: another recording has other noise, and a refit gives a linear
 step's evidence only nearly. Where the number says where an effect sets in, the last member found is left out."""
-POWER = 0.9
-"""Share of the concealed effects that must be found at the bound."""
 
 
 @dataclass(frozen=True)
@@ -114,13 +110,17 @@ def _smallest(concealment: Concealment, members: Sequence[tuple[Member, Hidden]]
     while True:
         hits = [concealment.is_found(h, size * way) for m, h, _ in shared for way in m.directions]
         power = float(np.mean(hits))
-        if power >= POWER or size > STEP**2 * most:
+        if power >= POLICY.nearly_all or size > STEP**2 * most:
             break
         size *= STEP
     size *= MARGIN
     places = [member.place for member, _, _ in shared]
     first = shared[0][0]
-    return SeenFrom(first.none + size, (min(places), max(places)), power, first.instance) if power >= POWER else None
+    return (
+        SeenFrom(first.none + size, (min(places), max(places)), power, first.instance)
+        if power >= POLICY.nearly_all
+        else None
+    )
 
 
 def _raised(concealment: Concealment, member: Member, hidden: Hidden) -> float | None:
@@ -128,7 +128,7 @@ def _raised(concealment: Concealment, member: Member, hidden: Hidden) -> float |
     shares = [concealment.energy(hidden, way) for way in member.directions]
     if min(shares) <= 0:
         return None
-    size = max(sqrt(LEAST_SHARE / min(shares)), STEP * member.least)
+    size = max(sqrt(POLICY.negligible / min(shares)), STEP * member.least)
     for _ in range(STEPS):
         if size > member.most:
             return None

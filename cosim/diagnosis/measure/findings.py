@@ -14,6 +14,7 @@ import numpy as np
 from cosim.diagnosis.answer.entries import BroadbandEntry
 from cosim.diagnosis.answer.result import Finding, Trace
 from cosim.diagnosis.decide.calibration import calibrated
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import hypothesis_of, named
 from cosim.diagnosis.effects.candidates import at_own_level
 from cosim.diagnosis.evidence.broadband import Shaken
@@ -30,10 +31,6 @@ from pyfmi_models.mount import LINEAR_UNITS, Mount
 
 CYCLES = "cycles_per_rev"
 """How often a ripple comes round: in a turn, or on a linear axis in a metre."""
-
-EXCLUDED_NATS, EXCLUDED_SHARE = 10.0, 0.02
-"""Evidence (odds of 20 000 to 1) and share of the error energy by which a rival must be behind to be called ruled out:
-one that fits as well is only less likely, however the noise is counted."""
 
 
 def accepted(
@@ -92,7 +89,7 @@ def _behind(one: AcceptedEffect, members: Sequence[str], far: bool) -> Iterator[
         margin, lead = one.margin(rival), one.own.plain_gain - rival.plain_gain
         if rival.effect.id not in one.effect.rivals or rival.effect.id in members:
             continue
-        if (margin >= EXCLUDED_NATS and lead >= EXCLUDED_SHARE) == far:
+        if (margin >= POLICY.clear and lead >= POLICY.negligible) == far:
             both = f"{100 * rival.plain_gain:.1f} % of the error energy, this {100 * one.own.plain_gain:.1f} %"
             yield f"{rival.effect.title}: removes {both} ({margin:.0f} nats behind)"
 

@@ -17,19 +17,16 @@ import numpy as np
 from scipy.special import fdtrc
 
 from cosim.diagnosis.answer.entries import BiasEntry
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.search.commanded import BLOCK_SECONDS
 from cosim.diagnosis.search.instrumental_variable import on_set_point
 from cosim.estimation.blocks import Blocks, sandwich
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
+from cosim.support.statistics import SURELY
 
 SIGNIFICANT = 0.01
-MOVES = 0.05
-"""A parameter moves if instruments put it further off than this share, and than `CLEARLY` standard errors."""
-CLEARLY = 3.0
-TOLD = 0.5
-"""Share of a derivative's energy that the set point must explain, else it says nothing of the parameter."""
 RCOND = 1e-8
 """Directions weaker than this share of the strongest are not estimated."""
 
@@ -60,7 +57,7 @@ def loop_bias(prepared: Prepared, found: Fit, weight: Array) -> LoopBias | None:
     slopes, residual = found.slopes * weight[:, None], found.residual * weight
     explained = _projection(along * weight[:, None], slopes)
     energy = (slopes**2).sum(0)
-    told = (explained**2).sum(0) > TOLD * np.maximum(energy, 1e-300)
+    told = (explained**2).sum(0) > POLICY.half * np.maximum(energy, 1e-300)
     names = [name for name, ok in zip(found.free, told, strict=True) if ok]
     blocks = Blocks.of(prepared, BLOCK_SECONDS)
     if not names or len(blocks.rows) < 2 * len(names):
@@ -85,6 +82,6 @@ def _tested(slopes: Array, rest: Array, residual: Array, blocks: Blocks, names: 
     wald = float(extra @ np.linalg.pinv(own, rcond=RCOND) @ extra) / many
     errors = np.sqrt(np.maximum(np.diag(covariance)[:many], 1e-300))
     moves = beta[:many] / scale[:many] / np.where(values == 0, 1.0, np.abs(values))
-    far = (np.abs(moves) > MOVES) & (np.abs(beta[:many]) > CLEARLY * errors)
+    far = (np.abs(moves) > POLICY.slight) & (np.abs(beta[:many]) > SURELY * errors)
     moved = {name: float(move) for name, move, is_far in zip(names, moves, far, strict=True) if is_far}
     return LoopBias(float(fdtrc(many, count - 1, wald)), moved)

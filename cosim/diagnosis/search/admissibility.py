@@ -6,6 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from cosim.diagnosis.answer.ledger import Rule, at_least
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.effects.tuning import at_bound
 from cosim.estimation.fit import Fit, recorded_by
@@ -13,10 +14,6 @@ from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Effect
 from pyfmi_models.mount import Mount
-
-LEAST_CHANGES = 0.5
-"""Share of the torque's changes from row to row that a model with a delay or a lag must explain: in noise that the
-controller answers, time runs otherwise than in the machine."""
 
 
 class Fitted(Protocol):
@@ -79,7 +76,7 @@ def in_time(problem: Problem, one: Fitted) -> bool:
     """Whether an effect of timing, if it is one, is told by changes of the torque that the model explains.
 
     Only changes that some motion asks for: at constant speed nothing is asked, what changes is noise and ripple, and
-    the torque is what a loop answers.
+    the torque is what a loop answers, where time runs otherwise than in the machine. Half of them must be explained.
     """
     if not hypothesis_of(one.effect).is_timing:
         return True
@@ -88,4 +85,4 @@ def in_time(problem: Problem, one: Fitted) -> bool:
     owner = problem.prepared.recording_of
     rows = np.flatnonzero(counted[1:] & counted[:-1] & (owner[1:] == owner[:-1]))
     left, all_of_it = (np.diff(x)[rows] for x in (one.fit.residual, problem.prepared.stacked("tau")))
-    return float(left @ left) < (1 - LEAST_CHANGES) * float(all_of_it @ all_of_it)
+    return float(left @ left) < (1 - POLICY.half) * float(all_of_it @ all_of_it)

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.search.instrumental_variable import on_set_point
 from cosim.estimation.blocks import Blocks
@@ -22,14 +23,9 @@ from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.least_squares import projected
 from cosim.estimation.prepare import Array, Piece
+from cosim.support.statistics import SURELY
 from pyfmi_models.effects import Effect
 
-LEAST_SHARE = 0.5
-"""Share below which most of what was fitted is the loop's answer. Real springs of three generators have .92 to 1.03,
-two false ones .1 and .26."""
-STANDARD_ERRORS = 3.0
-"""The share must be so many standard errors above nothing, else the motion does not ask. Real springs have 10 and
-more, the false ones 2.4 and .9."""
 BLOCK_SECONDS = 2.0
 """Longer than the residual remembers, short enough for many."""
 
@@ -46,7 +42,7 @@ def is_asked_for(comparison: Comparison, found: Fit, effect: Effect) -> bool:
     known = np.column_stack([found.slopes[:, own], comparison.nuisances.columns]) * weight[:, None]
     x, z, r = projected(np.column_stack([along, asked, weight * found.residual]), known).T
     share, error = _share(x, z, r, Blocks.of(prepared, BLOCK_SECONDS))
-    return share >= LEAST_SHARE and share > STANDARD_ERRORS * error
+    return share >= POLICY.half and share > SURELY * error
 
 
 def _share(x: Array, z: Array, r: Array, blocks: Blocks) -> tuple[float, float]:

@@ -10,18 +10,17 @@ from typing import Final
 import numpy as np
 
 from cosim.diagnosis.answer.doubt_entry import Alternative, Sanity
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.search.base_moved import FAR
 from cosim.diagnosis.trust.balance import Balance, Estimate
 from cosim.estimation.prepare import Array
 from cosim.plots.quantities import raised
-from cosim.support.statistics import rms
+from cosim.support.statistics import SURELY, rms
 from pyfmi_models.effects import GravityUnbalance
 from pyfmi_models.model import Variable
 from pyfmi_models.mount import Mount
 
 BASE_FAR: Final = "base_far_from_card"
-FAR = 3.0
-"""A number of the base that leaves the card's by more than this factor says that card and recordings differ; what
-owners write is rarely more than a factor of two off."""
 FELT = 0.1
 """Share of the friction at the highest speed below which a change of a friction number is not felt, however large."""
 WORDS = {"axis.inertia": "inertia", "friction.Fc": "Coulomb friction", "friction.sigma2": "viscous friction"}
@@ -100,11 +99,6 @@ def _is_felt(name: str, before: Mapping[str, Variable], after: Mapping[str, Vari
 _TORQUES = ("friction.Fc", "friction.sigma2")
 
 
-OTHER = 0.5
-"""Share of the card's load from which a difference is another load: masses and lever arms are weighed and measured, to
-a tenth or so, not guessed as friction is."""
-
-
 def load_far_from_card(card: Mount, refitted: Mount, positions: Array) -> tuple[Sanity, ...]:
     """Say of a load off the axis that the refitted base turns it into another one.
 
@@ -123,7 +117,7 @@ def load_far_from_card(card: Mount, refitted: Mount, positions: Array) -> tuple[
             "counterweight, or another zero of the position.",
         )
         for one, other in both
-        if rms(_pull(other, positions) - _pull(one, positions)) > OTHER * rms(_pull(one, positions))
+        if rms(_pull(other, positions) - _pull(one, positions)) > POLICY.half * rms(_pull(one, positions))
     )
 
 
@@ -138,8 +132,6 @@ def _words(load: GravityUnbalance) -> str:
 
 INERTIA, FRICTION = log(1.6), log(3.0)
 """Factors by which inertia and friction of one machine may differ: it varies with position, and warms up."""
-SURELY = 3.0
-"""Standard errors by which they must differ beyond that."""
 OTHER_CAUSES = (
     Alternative(what="another payload, or another machine", likelihood=0.7),
     Alternative(what="another unit or gear ratio in one of the files", likelihood=0.3),

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cosim.diagnosis.answer.doubt_entry import Alternative, Sanity
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.trust.balance import Balance
 from cosim.estimation.filters import between
 from cosim.estimation.least_squares import squares_left
@@ -26,8 +27,6 @@ from cosim.estimation.row_weights import far_from_turns
 REACH, STEP = 0.060, 0.002
 """Lags that are tried [s]."""
 LAGS = np.arange(-REACH, REACH + STEP / 2, STEP)
-ALIKE = 3.0
-"""Lags less likely than the best by no more than so many nats are not excluded (95 % of normal errors: 1.9)."""
 LATE, CERTAINLY = 0.010, 0.008
 """A lag of so many seconds, certainly more than the latter, is more than delays and lags of most servo drives."""
 TOO_LATE, CERTAINLY_TOO_LATE = 0.018, 0.016
@@ -102,7 +101,7 @@ def clock_offset(balances: Sequence[Balance]) -> ClockOffset:
     """Find the lag of the position behind the torque that balances recordings best, with any friction."""
     lefts = [_misfit(one) for one in balances]
     likelihood = np.sum([_likelihood(one, left) for one, left in zip(balances, lefts, strict=True)], axis=0)
-    near = LAGS[likelihood >= likelihood.max() - ALIKE]
+    near = LAGS[likelihood >= likelihood.max() - POLICY.fair]
     best, none = int(likelihood.argmax()), len(LAGS) // 2
     removed = [float(1 - one.energy[best] / one.energy[none]) for one in lefts if one.share] or [0.0]
     return ClockOffset(float(LAGS[best]), float(near.min()), float(near.max()), max(removed), min(removed))

@@ -9,15 +9,13 @@ import numpy as np
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.doubt_entry import Alternative, Kind, Sanity
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.trust.explanations import Explanation, explanations
 from cosim.diagnosis.trust.likelihood import Evidence, Reference
 from cosim.support.errors import RecordingError
 
-SURE, REFUSED = 0.95, 0.9
-"""Probability from which an explanation is stated alone, and from which a wrong unit is refused: who states the unit
-that the recording has is not asked again."""
-DOUBTFUL = 0.5
-"""Probability that recording and card are right below which something is said."""
+SURE = 0.95
+"""Probability from which an explanation is stated alone."""
 ALONE = 0.2
 """The same for one recording, of which there may be many."""
 MOST_ALONE = 6
@@ -28,8 +26,6 @@ TOLD = 0.03
 """Alternatives less likely than this are not listed ..."""
 MOST_TOLD = 4
 """... and of the others so many at most."""
-MOSTLY = 0.5
-"""Share of the torque's energy below which it is said that inertia and friction explain no more of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +106,7 @@ def judged(train: Sequence[Recording], heldout: Sequence[Recording], reference: 
         others = [one for one in alone if one not in doubted and one.allows(doubted[0])]
         return tuple(stated(one) for one in _grouped([*doubted, *others], reference))
     together = Judgement.of([*train, *heldout], reference) if len(alone) > 1 else alone[0]
-    return (stated(together),) if together.right < DOUBTFUL else ()
+    return (stated(together),) if together.right < POLICY.half else ()
 
 
 def _groups(recordings: Sequence[Recording]) -> list[list[Recording]]:
@@ -137,7 +133,7 @@ def stated(judgement: Judgement) -> Sanity:
     told = [pair for pair in judgement.alternatives if pair[1].likelihood > TOLD][:MOST_TOLD]
     best, first = told[0]
     beyond = max(best.factor, 1 / best.factor) > IMPOSSIBLE
-    if first.likelihood > REFUSED and best.option and best.kind in ("position_scale", "time_unit") and beyond:
+    if first.likelihood > POLICY.nearly_all and best.option and best.kind in ("position_scale", "time_unit") and beyond:
         column = best.option.split()[1].split("=")[0]
         right = "" if column == "t" else f" If its unit is the right one, state that: --units {column}=..."
         text = f"{judgement.names}: {first.what} ({_fact(judgement)}). Use {best.option}.{right}"
@@ -146,7 +142,7 @@ def stated(judgement: Judgement) -> Sanity:
         finding=judgement.kind,
         statement=f"{judgement.names}: {_fact(judgement)}. {_causes(told)}",
         alternatives=tuple(one for _, one in told),
-        blocks_naming=judgement.slip > DOUBTFUL,
+        blocks_naming=judgement.slip > POLICY.half,
     )
 
 
@@ -171,4 +167,4 @@ def _fact(judgement: Judgement) -> str:
     if known.coulomb:
         said += f" and a friction of {found.coulomb.value:.3g} {force} (card: {known.coulomb:.3g})"
     said = f"{slope}, and {said}" if off != 1.0 else said
-    return said if found.explained > MOSTLY else f"{said}, and explain {found.explained:.0%} of it"
+    return said if found.explained > POLICY.half else f"{said}, and explain {found.explained:.0%} of it"

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.effects.candidates import span_of
 from cosim.diagnosis.effects.encoder_eccentricity import Eccentricity
 from cosim.diagnosis.effects.periodogram import peaks
-from cosim.diagnosis.evidence.band import LEAST_PREDICTED, NOISE_LIMIT, in_band, predicted
+from cosim.diagnosis.evidence.band import NOISE_LIMIT, in_band, predicted
 from cosim.estimation.prepare import choose_cutoff, prepare
 from pyfmi_models.card import parse_card
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
@@ -48,7 +49,7 @@ def test_noise_above_the_band_does_not_raise_it() -> None:
     train, mount = [turning(k, ripple=0.0, noise=4e-3) for k in (1, 2)], CARD.plant()
     narrow, wide = choose_cutoff(train, 5e-6), choose_cutoff(train, 5e-6, NOISE_LIMIT)
     assert wide > narrow
-    assert predicted(prepare(train, wide), mount, narrow) < LEAST_PREDICTED / 10
+    assert predicted(prepare(train, wide), mount, narrow) < POLICY.considerable / 10
     assert in_band(train, mount).cutoff == narrow
 
 
