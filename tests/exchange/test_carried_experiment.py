@@ -8,7 +8,7 @@ import pytest
 
 import cosim
 from cosim.data.recording import Recording
-from cosim.delivery.experiment import of_recording, with_experiment
+from cosim.delivery.experiment import of_recording, sines, with_experiment
 from cosim.fmi.domain import KEY, Domain, entries_of
 from pyfmi_models.card import read_card
 from pyfmi_models.export import export_fmu
@@ -62,3 +62,12 @@ def test_the_range_in_which_a_model_is_proven_is_shown(tmp_path):
     facts = cosim.show(path).facts
     assert facts["proven for"] == "speed -2.6 to 3.6 rad/s; position 0.1 to 0.5 rad"
     assert "meta-data" in facts["brings along"]
+
+
+def test_an_fmu_without_a_recording_is_asked_for_sines_of_two_seconds():
+    """Also where the model is sampled: ten of its steps lie between two rows."""
+    card = read_card("paper_mount")
+    for model, every in ((card.plant().model(), 0.01), (card.controller_model(), 10 / card.controller.loop_hz)):
+        times = sines(model).times
+        np.testing.assert_allclose(np.diff(times), every)
+        assert (times[0], times[-1]) == (0.0, pytest.approx(2.0))

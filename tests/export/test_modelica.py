@@ -16,6 +16,7 @@ from cosim.cli import main
 from pyfmi_models.card import read_card
 from pyfmi_models.derivation import derivation_of
 from pyfmi_models.errors import ExportError
+from pyfmi_models.export.expressions import Node, Writer
 from pyfmi_models.export.modelica import export_modelica, modelica_text, package_name
 from pyfmi_models.model import Model
 
@@ -91,6 +92,13 @@ def test_the_text_reads_like_the_book() -> None:
     assert 'parameter Real sigma1(unit = "N.m.s/rad", min = 0, nominal = 100) = 497 "Bristle damping";' in lines
     assert "LuGre friction(v = speed)" in text
     assert max(map(len, lines)) <= 120
+
+
+@pytest.mark.parametrize(("value", "text"), [(math.pi, "u/pi"), (2 * math.pi, "u/(2*pi)"), (math.pi / 2, "u/(pi/2)")])
+def test_a_quotient_by_a_multiple_of_pi_has_it_in_brackets(value: float, text: str) -> None:
+    number = Node(ca.OP_CONST, value=value)
+    u = Node(ca.OP_INPUT, place=(0, 0))
+    assert Writer({u: "u"}).text(Node(ca.OP_DIV, (u, number))) == text
 
 
 def test_a_modelica_compiler_finds_every_package_whole() -> None:

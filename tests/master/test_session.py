@@ -8,6 +8,7 @@ from small_loop import TEXT
 from tiny_fmu import tiny
 
 import cosim
+from cosim.fmi.fmu import FmuComponent
 from cosim.support.errors import StepError, WiringError
 
 __all__ = ["tiny"]
@@ -105,3 +106,15 @@ def test_a_component_that_asks_to_end_ends_the_session_without_an_error(scenario
         assert session.ended.startswith("plant asked to end the simulation at tick 10")
         with pytest.raises(StepError, match=r"asked to end the simulation .*: it cannot be stepped on"):
             session.step()
+
+
+def test_a_component_that_is_started_alone_starts_at_time_zero(
+    tiny: dict[int, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[float] = []
+    with FmuComponent(tiny[3], "one") as one:
+        monkeypatch.setattr(one, "enter_initialisation", lambda _, time: begun.append(time))
+        monkeypatch.setattr(one, "exit_initialisation", lambda: None)
+        one.start({})
+        one.start({}, 2.5)
+    assert begun == [0.0, 2.5]

@@ -83,6 +83,14 @@ def fed_by_a_signal(mirror: dict[int, Path], kind: str, values: Any, compiled: b
     return recording["y"]
 
 
+@pytest.mark.parametrize(
+    ("changes", "straight"),
+    [({}, True), ({"gain": 2.0}, False), ({"offset": 1.0}, False), ({"quantum": 1.0}, False), ({"noise": "n"}, False)],
+)
+def test_a_wire_that_changes_nothing_is_straight(changes: dict[str, Any], straight: bool) -> None:
+    assert Wire("one.y", "two.u", **changes).straight is straight
+
+
 @LOOPS
 def test_a_cast_takes_the_nearest_value_and_never_one_out_of_range(compiled: bool, mirror: dict[int, Path]) -> None:
     found = fed_by_a_signal(mirror, "Int8", [0.4, 0.6, -1.5, 127.4, 0.0], compiled, cast=True)
