@@ -85,7 +85,12 @@ PAGES = {
             " --remarks results/robustness/mutants_remarks.toml",
             "robustness",
         )
-        for page, seed, count in (("mutants.md", 30001, 59), ("mutants_2.md", 30002, 20), ("mutants_3.md", 30003, 20))
+        for page, seed, count in (
+            ("mutants.md", 30001, 59),
+            ("mutants_2.md", 30002, 20),
+            ("mutants_3.md", 30003, 20),
+            ("mutants_4.md", 32001, 51),
+        )
     },
     "robustness/serve.md": BENCH.format("serve.py --drops 100 --rounds 3 --seed 17", "robustness"),
     "stiffness/README.md": "python -m cosim_studies.stiffness --out results/stiffness --force",
