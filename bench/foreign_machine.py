@@ -1,6 +1,6 @@
 """A foreign plant FMU of a measured machine (EMPS) calibrated on its recordings, next to our own card's fit.
 
-python bench/foreign_machine.py --data DIR --out results/identify
+python bench/foreign_machine.py --data DIR --out results/identify    (DIR: that of EMPS, with estimation.parquet)
 
 The FMU is written from the equations of the benchmark (`emps_fmu`). `cosim identify --fmu` fits M, Fv and Fc to the
 speed on the estimation run, in windows of 0.5 s with free start values. Our own card is the base that `cosim diagnose`
