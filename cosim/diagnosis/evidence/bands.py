@@ -67,10 +67,17 @@ class Bands:
         parts = (np.asarray(one, float) for one in (weight / scale, effective, count, of_forms))
         return cls(tuple(slices), owner, np.concatenate(fast), *parts)
 
-    def transform(self, columns: Array) -> Array:
-        """Scale and transform columns (rows, n)."""
-        scaled = columns * self.gain[:, None]
-        return np.concatenate([dct(scaled[part], axis=0, norm="ortho") for part in self.slices])
+    def transform(self, columns: Array, start: int = 0) -> Array:
+        """Scale and transform columns (rows, n) of pieces, the first of which begins at row `start`.
+
+        One piece after the other: of long recordings columns are what takes the memory.
+        """
+        out = np.empty(columns.shape)
+        for part in self.slices:
+            if start <= part.start and part.stop <= start + len(columns):
+                own, gain = slice(part.start - start, part.stop - start), self.gain[part, None]
+                out[own] = dct(columns[own] * gain, axis=0, norm="ortho", overwrite_x=True)
+        return out
 
     def energy_by_block(self, transformed: Array, noise: Array, blocks: Blocks) -> Array:
         """Energy of one transformed column in each block of time, in nats: half its square over the noise, coarsened.

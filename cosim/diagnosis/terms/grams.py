@@ -10,9 +10,7 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from cosim.diagnosis.evidence.bands import Bands
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.marginal import Group, Marginal, marginal
 from cosim.diagnosis.terms.candidate_terms import CandidateTerm
@@ -24,7 +22,6 @@ from cosim.estimation.problem import Problem
 from cosim.support.statistics import rms
 from pyfmi_models.mount import Mount
 
-Index = npt.NDArray[np.int64]
 PASSES = 3
 """How often the noise of least squares is renewed."""
 SIZE = 0.5
@@ -138,14 +135,10 @@ def grams_of(comparison: Comparison, found: Fit, columns: Sequence[Array], added
     """Gram matrices of the training recordings, beside a structure."""
     level = rms(comparison.nuisances.level) or float(np.std(_torque(comparison.problem)))
     unit = [one.prior * (level if one.in_torque else 1.0) for one in added]
-    scaled = [column[:, size > 0] * size[size > 0] for column, size in zip(columns, unit, strict=True)]
-    widths = [found.slopes.shape[1], comparison.nuisances.columns.shape[1], *(one.shape[1] for one in scaled)]
+    widths = [found.slopes.shape[1], comparison.nuisances.columns.shape[1], *(int((one > 0).sum()) for one in unit)]
     edges = np.cumsum([0, *widths])
-    whole = np.column_stack([found.residual, found.slopes, comparison.nuisances.columns, *scaled])
-    rows = comparison.bands.transform(whole)
-    owner = comparison.problem.prepared.recording_of
-    parts, count = _by_recording(comparison.bands, rows, owner, comparison.problem.weight)
-    plain = _plain(whole * comparison.problem.weight[:, None], owner)
+    own = [found.residual[:, None], found.slopes, comparison.nuisances.columns]
+    parts, plain, count = _by_recording(comparison, [*own, *columns], [*(np.ones(one.shape[1]) for one in own), *unit])
     groups = tuple(Group(np.asarray(g.columns) + edges[1], g.prior) for g in comparison.nuisances.groups)
     return Grams(
         parts,
@@ -164,17 +157,25 @@ def _torque(problem: Problem) -> Array:
     return problem.prepared.stacked("tau")
 
 
-def _by_recording(bands: Bands, rows: Array, owner: Index, weight: Array) -> tuple[Array, Array]:
-    parts, count = [], []
-    for number in range(int(owner.max()) + 1):
-        own = owner == number
-        counted = float(np.mean(weight[own] > 0)) if own.any() else 0.0
-        places = [own & (bands.band == band) for band in range(len(bands.count))]
-        parts.append(np.array([rows[place].T @ rows[place] for place in places]))
-        count.append([counted * int(place.sum()) for place in places])
-    return np.array(parts), np.array(count)
+def _by_recording(
+    comparison: Comparison, columns: Sequence[Array], units: Sequence[Array]
+) -> tuple[Array, Array, Array]:
+    """Matrices of each recording and band, of its weighted rows as they are, and rows that count.
 
-
-def _plain(rows: Array, owner: Index) -> Array:
-    parts = [rows[owner == number] for number in range(int(owner.max()) + 1)]
-    return np.array([part.T @ part for part in parts])
+    A recording at a time: with all columns of all of them laid out at once, 600 s at 10 kHz took a third more memory.
+    """
+    bands, weight = comparison.bands, comparison.problem.weight
+    owner = comparison.problem.prepared.recording_of  # in order
+    parts, plain, count = [], [], []
+    for number in range(int(owner[-1]) + 1):
+        first, last = np.searchsorted(owner, [number, number + 1]).tolist()
+        pairs = zip(columns, units, strict=True)
+        whole = np.column_stack([one[first:last, size > 0] * size[size > 0] for one, size in pairs])
+        rows, band = bands.transform(whole, first), bands.band[first:last]
+        own = [rows[band == k] for k in range(len(bands.count))]
+        parts.append(np.array([one.T @ one for one in own]))
+        counted = float(np.mean(weight[first:last] > 0)) if last > first else 0.0
+        count.append([counted * len(one) for one in own])
+        whole *= weight[first:last, None]
+        plain.append(whole.T @ whole)
+    return np.array(parts), np.array(plain), np.array(count)
