@@ -22,7 +22,7 @@ def read(path: Path) -> Columns:
     with parquet.ParquetFile(path) as file:
         check_cells(path, file.metadata.num_rows, len(file.schema_arrow))
         texts = _check_declared(path, file.metadata)
-    with parquet.ParquetFile(path, read_dictionary=texts) as file:
+    with parquet.ParquetFile(path, read_dictionary=texts, pre_buffer=False) as file:  # it would hold the whole file
         table, metadata = file.read(), file.metadata.metadata or {}
     _check_texts(path, table)
     units = {field.name: (field.metadata or {}).get(UNIT_KEY, b"").decode("utf-8", "replace") for field in table.schema}

@@ -70,8 +70,9 @@ class Scores:
         transformed = bands.transform(np.column_stack([base.residual, own, *columns]))
         weight, prior = self._noise(comparison, base, transformed[:, : 1 + own.shape[1]])
         inside = bands.band >= 0
-        scaled = transformed[inside] * np.sqrt(weight[bands.band[inside]])[:, None]
-        target, known, tests = np.split(scaled, [1, 1 + own.shape[1]], axis=1)
+        transformed = transformed[inside]  # of long recordings no copy but this one has room
+        transformed *= np.sqrt(weight[bands.band[inside]])[:, None]
+        target, known, tests = np.split(transformed, [1, 1 + own.shape[1]], axis=1)
         self._normal = np.linalg.inv(known.T @ known + np.diag(1 / prior**2))
         self.residual = target[:, 0] - known @ (self._normal @ (known.T @ target[:, 0]))
         self.rows = len(self.residual)
