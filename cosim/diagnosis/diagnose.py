@@ -257,7 +257,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
     policy = answer.comparison.policy
     left = beyond_any_machine(answer.scores.rest, policy)
     rest = (*rest_rules(answer.scores.effects, left, policy), *shaking_rules(left, policy))
-    enter_answer(answer.comparison, answer.proof.chosen, found, rest, decision.is_unknown)
+    enter_answer(answer.comparison, answer.proof.chosen, found, answer.scores.improves, rest, decision.is_unknown)
     return Diagnosis(
         verdict=_verdict(found, decision),
         findings=tuple(found),
@@ -316,15 +316,21 @@ def _with_learned(
 def _delivered(answer: Answer, heldout: Sequence[Recording], with_possible: bool) -> tuple[Answer, Learned | None]:
     """The answer with what it delivers, and what is learned beside that; never worse held out than the base."""
     answer, tried = _learned(answer, heldout)
+    fit = _named(answer, with_possible)
+    models = Structures(answer.base.mount, answer.base.mount, fit.mount)
+    found = judge(heldout, models, answer.comparison.problem.prepared.band)
+    if found.after_rms > found.before_rms:
+        answer, fit = replace(answer, scores=replace(answer.scores, improves=False)), answer.base
+    whole = replace(answer, detected=detected(answer.comparison, answer.proof, answer.decision), delivered=fit)
+    return (whole, tried) if fit is answer.proof.chosen else (whole, _learned(whole, heldout)[1])
+
+
+def _named(answer: Answer, with_possible: bool) -> Fit:
+    """The base with what is detected, or with all that stands."""
     names = detected(answer.comparison, answer.proof, answer.decision)
     every = {one.effect.id for one in answer.proof.standing}
     fit = with_only(answer.comparison, answer.proof, every if with_possible else names | likelier(answer.decision))
-    fit = without_ended(answer.comparison, fit)
-    models = Structures(answer.base.mount, answer.base.mount, fit.mount)
-    found = judge(heldout, models, answer.comparison.problem.prepared.band)
-    fit = answer.base if found.after_rms > found.before_rms else fit
-    whole = replace(answer, detected=names, delivered=fit)
-    return (whole, tried) if fit is answer.proof.chosen else (whole, _learned(whole, heldout)[1])
+    return without_ended(answer.comparison, fit)
 
 
 def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Learned | None]:

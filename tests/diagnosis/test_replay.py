@@ -31,6 +31,15 @@ def test_stored_scores_are_decided_as_they_were(scores: Scores) -> None:
     assert decide(Scores.of_json(stored), POLICY) == decide(scores, POLICY)
 
 
+def test_scores_of_an_earlier_policy_are_decided_too() -> None:
+    """Up to policy 6 terms had three scores more, and nothing said whether the model improves."""
+    stored = json.loads(json.dumps(CASES[2].as_json()))
+    del stored["improves"]
+    stored["rest"]["terms"][0] |= {"away": 0.9, "plain": 0.4, "predicted": 12.0}
+    stored["learned"] |= {"away": 0.9}
+    assert decide(Scores.of_json(stored), POLICY) == decide(CASES[2], POLICY)
+
+
 @pytest.mark.parametrize(
     "stored", [None, [], {}, {"effects": [], "rest": {}}, {"effects": [1], "rest": {}, "learned": 0}]
 )

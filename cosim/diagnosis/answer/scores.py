@@ -90,6 +90,8 @@ class Scores:
     """Effects that stand on the held-out recordings."""
     rest: ResidualScores
     learned: LearnedScores | None = None
+    improves: bool = True
+    """Whether the model with the names is no worse on the held-out recordings than the refitted base."""
 
     def as_json(self) -> JsonObject:
         """Plain data: `scores` in diagnosis.json, each number with all its digits."""
@@ -107,7 +109,8 @@ class Scores:
             rest["terms"] = [TermScores(**_kept(one)) for one in rest["terms"]]
             rest["in_place"] = tuple(rest["in_place"])
             known = LearnedScores(**{**_kept(learned), "quantities": tuple(learned["quantities"])}) if learned else None
-            return cls([EffectScores(**one) for one in entry["effects"]], ResidualScores(**rest), known)
+            effects = [EffectScores(**one) for one in entry["effects"]]
+            return cls(effects, ResidualScores(**rest), known, entry.get("improves", True))
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             said = 'scores: not those of a diagnosis; take what stands under "scores" in its diagnosis.json'
             raise InputError(said, culprit="scores", value=entry, choices=FIELDS) from error

@@ -40,7 +40,12 @@ def _gain(base: Weighed, now: Weighed) -> Gain:
 
 
 def enter_answer(
-    comparison: Comparison, chosen: Fit, findings: Sequence[Finding], rest: Sequence[Rule], is_unknown: bool
+    comparison: Comparison,
+    chosen: Fit,
+    findings: Sequence[Finding],
+    improves: bool,
+    rest: Sequence[Rule],
+    is_unknown: bool,
 ) -> None:
     """Enter how each effect of the delivered structure is answered, and whether something unknown is left.
 
@@ -49,12 +54,13 @@ def enter_answer(
     for one in findings:
         if one.where is not None:
             comparison.enter(one.effect, chosen, one.gain)
-            comparison.judge(one.effect, chosen, list(_answer_rules(one)))
+            comparison.judge(one.effect, chosen, list(_answer_rules(one, improves)))
     learned = Rule(LEARNED, True) if is_unknown and not any(rule.outcome for rule in rest) else None
     comparison.enter(UNKNOWN, chosen, 0.0)
     comparison.judge(UNKNOWN, chosen, [*rest, *([learned] if learned else [])])
 
 
-def _answer_rules(one: Finding) -> Iterator[Rule]:
+def _answer_rules(one: Finding, improves: bool) -> Iterator[Rule]:
+    yield Rule("the model with the names is no worse on held-out recordings", improves)
     yield at_least("probability", one.probability, LIKELY)
     yield Rule("no rival left in its set, its size differs from none", one.answer == "found")

@@ -200,3 +200,11 @@ def test_probabilities_are_calibrated_posterior_shares_times_what_is_explained(m
 def test_what_is_decided_stays_when_something_more_is_left() -> None:
     decided = Decision({}, {}, True, ("time",))
     assert decided.with_rest(("position",)) is decided
+
+
+def test_names_that_make_the_model_worse_held_out_keep_half_of_their_probability() -> None:
+    scores = Scores([effect("delay", 80.0, 0.9, lag=1.0)], left())
+    better, worse = (decide(replace(scores, improves=way), ROUND) for way in (True, False))
+    assert worse.sets == better.sets == {"delay": ("lag",)}
+    kept = {name: ROUND.half * p for name, p in better.probabilities["delay"].items()}
+    assert worse.probabilities["delay"] == kept

@@ -1,13 +1,18 @@
-"""Grease that thins is asked for, with the evidence that a common misfit of friction laws needs."""
+"""Grease that thins is asked for, named, and only possible where it makes held-out recordings worse."""
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import cosim.diagnosis.diagnose as module
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.result import Diagnosis
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.effects import hypothesis_of
-from cosim.estimation.prepare import prepare
+from cosim.diagnosis.measure.protocol import HeldOut, Structures
+from cosim.estimation.prepare import Band, prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.card import Card, parse_card
 from pyfmi_models.effects.concave_viscous import ConcaveViscous
@@ -47,6 +52,22 @@ def test_grease_that_thins_is_named_with_its_speed_and_power_and_predicts_anothe
     assert grease.thinning_speed == pytest.approx(0.1, rel=0.3)
     assert grease.exponent == pytest.approx(0.2, abs=0.15)
     assert diagnosis.heldout.after_rms < 0.3 * diagnosis.heldout.before_rms
+
+
+def test_what_makes_the_held_out_error_larger_is_only_possible_and_not_delivered(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    judged = module.judge
+
+    def worse(recordings: Sequence[Recording], models: Structures, band: Band) -> HeldOut:
+        found = judged(recordings, models, band)
+        return replace(found, after_rms=1.01 * found.before_rms) if models.nominal is models.before else found
+
+    monkeypatch.setattr(module, "judge", worse)  # the one that asks whether what is named is delivered
+    diagnosis, card = diagnosed(0.2)
+    grease = next(one for one in diagnosis.findings if one.effect == "concave_viscous")
+    assert (diagnosis.verdict, card.effects, grease.answer) == (("concave_viscous",), (), "ambiguous")
+    assert grease.probability <= 0.5
 
 
 def test_grease_that_does_not_is_not_and_its_bound_says_from_which_speed_it_would_have_shown() -> None:
