@@ -15,7 +15,8 @@ from mutants_choice import HOME
 
 HEAVY = ("casadi", "fmpy", "pandas", "pyarrow.parquet", "scipy.signal", "scipy.optimize", "scipy.stats")
 """What is loaded here need not be loaded in each fork."""
-OURS = ("cosim", "cosim_ethercat", "cosim_observatory", "cosim_serve", "cosim_studies", "pyfmi_models")
+PLUG_INS = ("cosim_ethercat", "cosim_formulas", "cosim_observatory", "cosim_serve", "cosim_studies")
+OURS = ("cosim", *PLUG_INS, "pyfmi_models")
 """What a fork loads anew, from the tree; with it what lies beside this file."""
 
 

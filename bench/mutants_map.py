@@ -36,7 +36,8 @@ from mutants_forks import forked, preloaded  # noqa: E402
 
 from cosim.support.files import replacing  # noqa: E402
 
-PRODUCT = ("cosim", "pyfmi_models", "cosim_ethercat", "cosim_observatory", "cosim_serve", "cosim_studies")
+PLUG_INS = ("cosim_ethercat", "cosim_formulas", "cosim_observatory", "cosim_serve", "cosim_studies")
+PRODUCT = ("cosim", "pyfmi_models", *PLUG_INS)
 QUIET = ("-n0", "-q", "-p", "no:cacheprovider", "--no-header", "--tb=no", "--timeout=100")
 
 

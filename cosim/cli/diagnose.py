@@ -238,8 +238,9 @@ def _read(
 def _check_folders(out: Path, propose: Path | None, quick: bool, force: bool) -> None:
     """Refuse at once what could not be written at the end (raises OutputError)."""
     from cosim.delivery.deliver import FILES, QUICK, check_out
-    from cosim.delivery.proposal import check_folder
+    from cosim.delivery.proposal import check_folder, check_searched
 
     check_out(out, force, QUICK if quick else FILES)
     if propose:
+        check_searched()
         check_folder(propose, force)

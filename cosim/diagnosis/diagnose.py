@@ -47,8 +47,8 @@ from cosim.diagnosis.search.rivals import Examined, examine
 from cosim.diagnosis.search.scores import scores_of, shaken_everywhere
 from cosim.diagnosis.search.sizes import standard_errors
 from cosim.diagnosis.search.stages import InTurn, search
+from cosim.diagnosis.terms.closed_form import ClosedForm, searches
 from cosim.diagnosis.terms.learn import NOTHING_TRIED, Learned, learn
-from cosim.diagnosis.terms.spelled import Spelled
 from cosim.diagnosis.trust.admission import admit
 from cosim.diagnosis.trust.doubts import beyond_denial, doubts, of_base, of_delivered, single_readings, without_denied
 from cosim.diagnosis.trust.limits import end_stop, half_sample
@@ -78,7 +78,7 @@ class Outcome:
     refitted: Card
     named: Card
     experiment: Experiment | None = None
-    formulas: tuple[tuple[Spelled, str], ...] = ()
+    formulas: tuple[tuple[ClosedForm, str], ...] = ()
     """Formulas that are as good as what was learned, each with what is said of it: effects for a person to review."""
 
 
@@ -145,6 +145,7 @@ def diagnose(
         RecordingError: the recordings cannot belong to this card (units), or are too short.
     """
     started = time.perf_counter()
+    searches()  # one that cannot be loaded is told now, not at the end
     train, heldout, sanity = _admitted(train, heldout, card)
     on_progress("refitting the base")
     problem, base, late = _refitted(train, heldout, card)

@@ -2,6 +2,8 @@
 
     cosim.verbs        a module as those of `cosim.cli`: it has a function of the verb's name, or the typer `app`, its
                        `GROUP` in the help and `EXAMPLES`; "hardware.alpaca" is the verb `cosim hardware alpaca`
+    cosim.formulas     a function that looks for a closed form in the place of a learned table, see
+                       `cosim.diagnosis.terms.closed_form`
     cosim.transports   a `PythonAdapter`, made of machine and cycle [s]: the way to a drive at `adapter = "NAME:PLACE"`
                        of a machine file, whose section [NAME] is the pydantic model `section` of the class
 

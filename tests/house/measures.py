@@ -12,7 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-PACKAGES = ("cosim", "cosim_ethercat", "cosim_observatory", "cosim_serve", "cosim_studies", "pyfmi_models")
+PACKAGES = (
+    "cosim",
+    "cosim_ethercat",
+    "cosim_formulas",
+    "cosim_observatory",
+    "cosim_serve",
+    "cosim_studies",
+    "pyfmi_models",
+)
 Function = ast.FunctionDef | ast.AsyncFunctionDef
 
 

@@ -9,7 +9,15 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("cosim", "cosim_ethercat", "cosim_observatory", "cosim_serve", "cosim_studies", "pyfmi_models")
+PACKAGES = (
+    "cosim",
+    "cosim_ethercat",
+    "cosim_formulas",
+    "cosim_observatory",
+    "cosim_serve",
+    "cosim_studies",
+    "pyfmi_models",
+)
 SOURCES = sorted(path for folder in (*PACKAGES, "bench", "tests") for path in (ROOT / folder).rglob("*.py"))
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "results").glob("*.md")])
 MODULES = {".".join(one.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): one for one in SOURCES}
@@ -20,7 +28,7 @@ TO_WRITE = {"herschel_bulkley.py", "wind_load.py", "wind_load", "my_drive.py", "
 """Files that a reader is told to write, or that an export makes."""
 MOVED = {"cosim.stiffness"}
 """Names that the changelog says were moved."""
-GROUPS = {"cosim.effects", "cosim.laws", "cosim.hypotheses", "cosim.verbs", "cosim.transports"}
+GROUPS = {"cosim.effects", "cosim.laws", "cosim.hypotheses", "cosim.formulas", "cosim.verbs", "cosim.transports"}
 """Entry points by which other packages bring their own."""
 OTHERS = {"scope_files.c", "csv_output.py"}
 """Files of other projects that a page or docstring says are read."""

@@ -11,6 +11,7 @@ import pytest
 
 import cosim
 import cosim_ethercat
+import cosim_formulas
 import cosim_observatory
 import cosim_serve
 import cosim_studies
@@ -29,7 +30,8 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
 START = "python3 -m venv .venv && .venv/bin/pip install . && .venv/bin/cosim demo"
 TEST = ".venv/bin/pip install '.[test]' && .venv/bin/pytest"
 PACKAGES = {
-    one.__name__: one for one in (cosim, cosim_ethercat, cosim_observatory, cosim_serve, cosim_studies, pyfmi_models)
+    one.__name__: one
+    for one in (cosim, cosim_ethercat, cosim_formulas, cosim_observatory, cosim_serve, cosim_studies, pyfmi_models)
 }
 SOURCES = [path for name in PACKAGES for path in (ROOT / name).rglob("*")]
 CALLED = {"sklearn": "scikit-learn"}

@@ -4,7 +4,7 @@ import ast
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
-PLUG_INS = ("cosim_ethercat", "cosim_observatory", "cosim_serve", "cosim_studies")
+PLUG_INS = ("cosim_ethercat", "cosim_formulas", "cosim_observatory", "cosim_serve", "cosim_studies")
 """Packages that only entry points name."""
 PACKAGES = ("cosim", "pyfmi_models", *PLUG_INS)
 FILES = {

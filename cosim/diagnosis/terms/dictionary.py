@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from cosim.estimation.discrepancy_basis import last_reversal, since_reversal, stop_operators
+from cosim.estimation.discrepancy_basis import last_reversal, stop_operators
 from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.rowwise import recurrence
 from cosim.support.statistics import column_rms
@@ -223,8 +223,3 @@ def followed(name: str, piece: Piece) -> Array:
     middle = np.concatenate([[0.0], (piece.v[1:] + piece.v[:-1]) / 2])
     past = recurrence(np.full(len(middle), keep), (1 - keep) * middle[None])[0, 1:]
     return np.asarray((piece.v - past) / SEEN_WITHIN)
-
-
-def since(name: str, piece: Piece) -> Array:
-    """The time or the way since the last reversal, or since the start, at all rows of a piece."""
-    return np.abs(since_reversal(piece.t if name == "time since reversal" else piece.q, piece.v))

@@ -16,12 +16,11 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive, interval_of
 from cosim.diagnosis.terms.candidate_terms import CandidateTerm, candidate_terms
+from cosim.diagnosis.terms.closed_form import ClosedForm, closed_form
 from cosim.diagnosis.terms.dictionary import OF_LAW
-from cosim.diagnosis.terms.formula import Formula, formula_of
 from cosim.diagnosis.terms.grams import columns_of, grams_of
 from cosim.diagnosis.terms.partial import partial
 from cosim.diagnosis.terms.select import begun, fitted, paths
-from cosim.diagnosis.terms.spelled import Spelled
 from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Array, Prepared
@@ -61,13 +60,13 @@ class Learned:
     """What the held-out recordings gain by the terms. Unit: nats."""
     data: tuple[BinsEntry, ...] = field(default=())
     """What the training recordings leave without each term, over what it goes over."""
-    formulas: tuple[Formula | None, ...] = field(default=())
+    formulas: tuple[ClosedForm | None, ...] = field(default=())
     """Of each term, where one is as good as its table."""
 
     @property
     def is_sure(self) -> bool:
         """Whether training, what training left out and the held-out recordings each prove it for themselves."""
-        return self.helps and min(*self.evidence, *self.predicted, self.gain) >= POLICY.clear
+        return self.helps and bool(min(*self.evidence, *self.predicted, self.gain) >= POLICY.clear)
 
     def scores(self) -> LearnedScores:
         """What the decision looks at."""
@@ -108,7 +107,7 @@ class Learned:
             "quantities": list(self.quantities),
             "size": float(self.size),
             "table": [{**table, "data": one} for table, one in zip(tables, self.data, strict=True)],
-            "formula": [{"table": k, **one.as_json()} for k, one in self._spelled().items()],
+            "formula": [{"table": k, **one.as_json()} for k, one in enumerate(self.formulas) if one],
             "before": self.before,
             "after": self.after,
             "interval": list(self.interval),
@@ -119,14 +118,9 @@ class Learned:
             "statement": self.sentence(),
         }
 
-    def stated(self) -> tuple[tuple[Spelled, str], ...]:
-        """The formulas in words, each with what the diagnosis says of the learned term."""
-        return tuple((one, self.sentence()) for one in self._spelled().values())
-
-    def _spelled(self) -> dict[int, Spelled]:
-        """The formulas in words, by the number of the table each stands for."""
-        linear, pairs = self.mount.motion == "linear", enumerate(zip(self.effects, self.formulas, strict=True))
-        return {k: Spelled(effect, one, linear) for k, (effect, one) in pairs if one}
+    def stated(self) -> tuple[tuple[ClosedForm, str], ...]:
+        """The formulas, each with what the diagnosis says of the learned term."""
+        return tuple((one, self.sentence()) for one in self.formulas if one)
 
     def refused(self) -> NotLearnedEntry:
         """Return what `diagnosis.json` holds under `not_learned`."""
@@ -164,7 +158,7 @@ def _measured(comparison: Comparison, found: Fit, learned: Learned, held: Predic
     """Add the size of the terms, the data that they were learned from, and formulas that are as good."""
     problem, whole = comparison.problem, learned.mount
     rows = [partial(whole, one, problem.prepared, problem.weight) for one in learned.effects]
-    formulas = (formula_of(whole, one, found, comparison, held) for one in learned.effects)
+    formulas = (closed_form(whole, one, found, comparison, held) for one in learned.effects)
     data = tuple(one.data() for one in rows)
     return replace(learned, size=_size(comparison, learned), data=data, formulas=tuple(formulas))
 

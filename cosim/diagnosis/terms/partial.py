@@ -7,19 +7,17 @@ f is the term's value, a torque or a relative change of the friction level; of t
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import log
 from typing import Any
 
 import numpy as np
 
 from cosim.diagnosis.answer.entries import BinsEntry
-from cosim.diagnosis.terms.dictionary import followed, since
+from cosim.diagnosis.terms.dictionary import followed
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
 from cosim.support.statistics import Z95
 from pyfmi_models.effects import Effect
-from pyfmi_models.effects.learned import LearnedFriction
 from pyfmi_models.effects.learned_base import FOLLOWED, LearnedEffect
 from pyfmi_models.mount import Mount
 from pyfmi_models.waves import INPUT
@@ -28,8 +26,6 @@ BINS, COARSE = 24, (12, 5)
 """Bins over one quantity, and over two."""
 FEWEST = 8
 """Rows below which a bin says nothing."""
-DOUBLED = LearnedFriction(over="speed", seen=(-1.0, 1.0), level_change=(log(2.0),))
-"""Twice the friction level, whatever the speed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,15 +86,6 @@ def partial(mount: Mount, effect: LearnedEffect, prepared: Prepared, weight: Arr
     unit = added if one else np.ones_like(added)
     left, blocks = prepared.stacked("tau") - base, Blocks.of(prepared)
     return Partial(effect, over, by[0] if by else None, left, unit, weight, blocks)
-
-
-def faded(mount: Mount, effect: LearnedEffect, prepared: Prepared, weight: Array) -> Partial:
-    """Rows of a term that fades after a reversal, over the time or the way since then: f changes the friction level."""
-    bare = without(mount, effect)
-    base, doubled = needed(bare, prepared), replace(bare, effects=(*bare.effects, DOUBLED))
-    over = np.concatenate([since(effect.since(), piece)[piece.kept] for piece in prepared.pieces])
-    left, unit = prepared.stacked("tau") - base, needed(doubled, prepared) - base
-    return Partial(effect, over, None, left, unit, weight, Blocks.of(prepared))
 
 
 def without(mount: Mount, effect: Effect) -> Mount:

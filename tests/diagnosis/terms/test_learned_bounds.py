@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from learned_cases import MOUNT, droop, learned, parts, wanders, warm_place
-from test_unknown import Array, Extra, iron
+from learned_cases import MOUNT, Array, Extra, droop, learned, parts, wanders, warm_place
+from test_unknown import iron
 
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.candidates import Candidate

@@ -1,9 +1,8 @@
 """What no structure explains is called unknown if it is large beside friction, and said to follow what predicts it."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
+from learned_cases import FC, Array, Extra, night
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.scores import ResidualScores, Scores
@@ -19,24 +18,6 @@ from cosim.estimation.prepare import Prepared, prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
-
-Array = np.ndarray
-Extra = Callable[[dict[str, Array]], Array]
-FC = 2.0
-
-
-def night(seed: int) -> dict[str, Array]:
-    """A minute of a smooth motion that turns often, with a temperature that rises, faster or slower."""
-    rng, t = np.random.default_rng(seed), np.arange(6000) / 100
-    tones = [(0.3, rng.uniform(0.05, 0.1)), (0.2, rng.uniform(0.1, 0.2)), (0.05, rng.uniform(0.3, 0.5))]
-    table = {"t": t, "q": np.zeros_like(t), "v": np.zeros_like(t), "a": np.zeros_like(t)}
-    for size, hertz in tones:
-        w, phase = 2 * np.pi * hertz, rng.uniform(0, 2 * np.pi)
-        table["q"] += size * np.sin(w * t + phase)
-        table["v"] += size * w * np.cos(w * t + phase)
-        table["a"] -= size * w**2 * np.sin(w * t + phase)
-    warm = 10 * (1 - np.exp(-t / rng.uniform(10, 30))) + rng.uniform(10, 20)
-    return {**table, "temperature": warm, "run": np.full_like(t, float(seed))}
 
 
 def recorded(extra: Extra, *seeds: int) -> Prepared:

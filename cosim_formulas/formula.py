@@ -15,17 +15,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from cosim.diagnosis.evidence.comparison import Comparison
-from cosim.diagnosis.evidence.predictive import Predictive
-from cosim.diagnosis.terms.forms import FADE, FORMS, SECOND, Form
-from cosim.diagnosis.terms.partial import Partial, faded, partial, without
+from cosim.diagnosis.terms.partial import Partial
 from cosim.estimation.blocks import Blocks, sandwich
-from cosim.estimation.fit import Fit
-from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array
 from cosim.support.statistics import Z95, rms
-from pyfmi_models.effects.learned_base import LearnedEffect
-from pyfmi_models.mount import Mount
+from cosim_formulas.forms import FADE, FORMS, SECOND, Form
 
 ROWS = 1500
 """Rows of the search; the formula that is found is fitted to all."""
@@ -318,24 +312,3 @@ def first_as_good(formulas: Sequence[Formula], part: Partial, train: Rows, unsee
         if found and unseen.is_of_its_size(found[0]) and unseen.is_as_good(*found):
             return found[0]
     return None
-
-
-def formula_of(
-    learned: Mount, effect: LearnedEffect, found: Fit, comparison: Comparison, held: Predictive
-) -> Formula | None:
-    """The formula of a learned effect of a mount; None where none is as good, or it goes round a loop."""
-    problem = comparison.problem
-    rows = faded if effect.since() else partial
-    if effect.of_one() is None and not effect.since():
-        return None
-    part, there = (
-        rows(learned, effect, prepared, weight)
-        for prepared, weight in ((problem.prepared, problem.weight), (held.prepared, held.weight))
-    )
-    moving = found.free if effect.at_once else ()  # a line of the command is a scale of all numbers of the base at once
-    inverse = Inverse(without(learned, effect), moving)  # with the table in it a level's slope would be the table
-    slopes, own = (
-        stacked(inverse, prepared.pieces, inverse.present)[1] for prepared in (problem.prepared, held.prepared)
-    )
-    errors = (held.weight * held.residual(mount) for mount in (learned, found.mount))
-    return proposed(part, Rows.of(part, slopes), Unseen(Rows.of(there, own), there.blocks, *errors))

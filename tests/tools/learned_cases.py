@@ -1,9 +1,9 @@
 """Recordings of an axis with physics that has no name, and what is learned from them."""
 
+from collections.abc import Callable
 from functools import cache
 
 import numpy as np
-from test_unknown import FC, Array, Extra, night
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.decide.policy import POLICY
@@ -17,14 +17,42 @@ from cosim.estimation.problem import Problem
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
+Array = np.ndarray
+Extra = Callable[[dict[str, Array]], Array]
+FC = 2.0
 NOISE = 0.05
 MOUNT = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=FC, sigma2=1.0), effects=())
+
+
+def night(seed: int) -> dict[str, Array]:
+    """A minute of a smooth motion that turns often, with a temperature that rises, faster or slower."""
+    rng, t = np.random.default_rng(seed), np.arange(6000) / 100
+    tones = [(0.3, rng.uniform(0.05, 0.1)), (0.2, rng.uniform(0.1, 0.2)), (0.05, rng.uniform(0.3, 0.5))]
+    table = {"t": t, "q": np.zeros_like(t), "v": np.zeros_like(t), "a": np.zeros_like(t)}
+    for size, hertz in tones:
+        w, phase = 2 * np.pi * hertz, rng.uniform(0, 2 * np.pi)
+        table["q"] += size * np.sin(w * t + phase)
+        table["v"] += size * w * np.cos(w * t + phase)
+        table["a"] -= size * w**2 * np.sin(w * t + phase)
+    warm = 10 * (1 - np.exp(-t / rng.uniform(10, 30))) + rng.uniform(10, 20)
+    return {**table, "temperature": warm, "run": np.full_like(t, float(seed))}
 
 
 def warm_place(now: dict[str, Array]) -> Array:
     """Friction that rises at one place with the temperature: a product, none of the catalogue."""
     bump = np.exp(-((now["q"] / 0.15) ** 2))
     return 0.15 * (now["temperature"] - 20) * bump * np.sign(now["v"])
+
+
+def teeth(now: dict[str, Array]) -> Array:
+    """A torque constant that waves with position."""
+    needed = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"]
+    return 0.15 * needed * np.sin(25 * now["q"])
+
+
+def swerve(now: dict[str, Array]) -> Array:
+    """Drag by speed and acceleration at once."""
+    return 6.0 * np.abs(now["a"]) * now["v"]
 
 
 def droop(now: dict[str, Array]) -> Array:

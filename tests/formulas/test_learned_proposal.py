@@ -18,17 +18,18 @@ from test_learned_formula import POSITION, WARM, found
 
 import pyfmi_models
 from cosim.delivery.proposal import Proposal, write_proposals
-from cosim.diagnosis.terms.forms import FADE, FORMS
-from cosim.diagnosis.terms.formula import Formula, Shape
-from cosim.diagnosis.terms.spelled import Spelled
 from cosim.report.terminal import proposed
 from cosim.support.errors import OutputError
+from cosim_formulas.effect_file import EffectFile
+from cosim_formulas.forms import FADE, FORMS
+from cosim_formulas.formula import Formula, Shape
+from cosim_formulas.spelled import Spelled
 from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque, LearnedViscous
 from pyfmi_models.effects.learned_drive import LearnedDrive, LearnedGain
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal
 
 PACKAGE = Path(str(pyfmi_models.__file__)).parent
-TESTS = Path(__file__).parents[2]
+TESTS = Path(__file__).parents[1]
 NAMED = {form.name: form for form in FORMS}
 COLUMN = LearnedTorque(over="input.load", seen=(0.0, 10.0), torque=(0.0, 0.1))
 TURN = LearnedFriction(over="turn", level_change=(0.0, 0.1, 0.0))
@@ -84,7 +85,9 @@ def proposals() -> tuple[Proposal, ...]:
         (GAIN, simple(Shape(NAMED["line"]), inner=(), coefficients=(0.02,), top=25.0)),
         (KICK, simple(Shape(FADE), inner=(0.3,), coefficients=(0.7,), top=2.0)),
     ]
-    return tuple(Proposal(Spelled(effect, formula, False), "It was learned.") for effect, formula in formulas)
+    return tuple(
+        Proposal(EffectFile(Spelled(effect, formula, False)), "It was learned.") for effect, formula in formulas
+    )
 
 
 @pytest.fixture(scope="module")
@@ -112,16 +115,16 @@ def asked(one: Proposal) -> dict[str, list[float]]:
     edges |= {"acceleration": (-3.0, 3.0), "time since reversal": (0.0, 2.0)}
     return {
         name.removeprefix("input."): rng.uniform(*edges.get(name, (0.0, 10.0)), 25).tolist()
-        for name in one.spelled.names
+        for name in one.formula.spelled.names
     }
 
 
 def test_the_file_that_a_person_adds_gives_what_the_formula_gives(added: Path) -> None:
-    quantities = {one.id: (one.spelled.effect.kind, asked(one)) for one in proposals()}
+    quantities = {one.id: (one.formula.spelled.effect.kind, asked(one)) for one in proposals()}
     (added / "asked.json").write_text(json.dumps(quantities), "utf-8")
     told = json.loads(run(added, "-c", ASK))
     for one in proposals():
-        expected = one.spelled.formula.value([np.array(x) for x in asked(one).values()])
+        expected = one.formula.spelled.formula.value([np.array(x) for x in asked(one).values()])
         np.testing.assert_allclose(told[one.id], np.maximum(expected, -1.0), atol=1e-12)
 
 

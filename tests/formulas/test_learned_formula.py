@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from cosim.diagnosis.terms.forms import FORMS
-from cosim.diagnosis.terms.formula import Formula, Rows, Shape, Unseen, proposed
 from cosim.diagnosis.terms.partial import Partial
-from cosim.diagnosis.terms.spelled import Spelled
 from cosim.estimation.blocks import Blocks
+from cosim_formulas.forms import FORMS
+from cosim_formulas.formula import Formula, Rows, Shape, Unseen, proposed
+from cosim_formulas.spelled import Spelled
 from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal
 

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from cosim.diagnosis.answer.entries import FormulaEntry, NumberEntry
-from cosim.diagnosis.terms.formula import Formula, Shape, interval
+from cosim_formulas.formula import Formula, Shape, interval
 from pyfmi_models.effects.learned_base import SINCE, LearnedEffect
 from pyfmi_models.waves import INPUT, UNITS, spoken
 
