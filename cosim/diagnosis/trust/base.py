@@ -33,11 +33,7 @@ CAUSES = {
 
 
 def base_far_from_card(
-    card: Mount,
-    refitted: Mount,
-    bounds: Mapping[str, tuple[float, float]],
-    top_speed: float,
-    alternatives: Sequence[Alternative] = (),
+    card: Mount, refitted: Mount, bounds: Mapping[str, tuple[float, float]], top_speed: float
 ) -> tuple[Sanity, ...]:
     """Say which numbers of the refitted base leave the card by more than `FAR`, or sit at a bound of the fit.
 
@@ -46,7 +42,6 @@ def base_far_from_card(
         refitted: the same structure with fitted numbers.
         bounds: lowest and highest value of each parameter in the fit.
         top_speed: highest recorded speed [rad/s, m/s]: a viscous friction counts by what it makes there.
-        alternatives: what explains a wrong inertia, if that was asked already.
     """
     before, after = ({v.name: v for v in one.parameters()} for one in (card, refitted))
     said = []
@@ -54,10 +49,7 @@ def base_far_from_card(
         for full in (one for one in before if one == name or one.startswith(f"{name}.")):
             if full in after and _is_felt(full, before, after, top_speed):
                 said += _far(full, words, CAUSES[name], before[full], after[full].start, bounds.get(full))
-    causes = tuple(alternatives)
-    return tuple(
-        Sanity(finding=BASE_FAR, statement=text, alternatives=causes if "inertia" in text[:24] else ()) for text in said
-    )
+    return tuple(Sanity(finding=BASE_FAR, statement=text, alternatives=()) for text in said)
 
 
 def _far(
