@@ -22,6 +22,8 @@ WIRES = {"plant": ("tau", "q"), "controller": ("q", "tau")}
 """The input that is fed and the output that feeds the other one."""
 RECORD = {name: f"plant.{name}" for name in ("q", "v", "friction", "applied")}
 RECORD |= {"tau": "controller.tau", "measured": "controller.q"}
+RECORDED = {"plant": ("q", "v", "friction", "applied"), "controller": ("tau",)}
+"""What a C loop reads of each for these columns: the last one is the wire from q."""
 
 
 class Side(ctypes.Structure):
@@ -30,10 +32,23 @@ class Side(ctypes.Structure):
     _fields_ = (
         *((name, ctypes.c_void_p) for name in ("instance", "set", "get", "step")),
         *((name, ctypes.c_uint32) for name in ("input", "output")),
+        ("recorded", ctypes.c_uint32 * 4),
+        ("columns", ctypes.c_size_t),
     )
 
 
 def c(folder: Path, fmi: int, steps: int) -> float:
+    return _in_c(folder, fmi, steps, kept=False)
+
+
+def recording_c(folder: Path, fmi: int, steps: int) -> float:
+    """The same with the six signals and the time of each tick kept in memory."""
+    return _in_c(folder, fmi, steps, kept=True)
+
+
+def _in_c(folder: Path, fmi: int, steps: int, kept: bool) -> float:
+    import numpy as np
+
     from cosim.fmi.fmu import FmuComponent
     from pyfmi_models.export.build import FLAGS, compile_shared
     from pyfmi_models.export.platforms import PLATFORMS, host
@@ -47,11 +62,14 @@ def c(folder: Path, fmi: int, steps: int) -> float:
             component = stack.enter_context(FmuComponent(folder / f"{name}.fmu"))
             component.start(START[name])
             functions, references = component.functions, [component.ports[port].reference for port in ports]
-            sides.append(Side(functions.instance, functions.set, functions.get, functions.step, *references))
-        run = getattr(library, f"plain{fmi}")
-        run.argtypes = [ctypes.POINTER(Side), ctypes.POINTER(Side), ctypes.c_double, ctypes.c_int64]
+            recorded = [component.ports[port].reference for port in RECORDED[name]]
+            given = (functions.instance, functions.set, functions.get, functions.step, *references)
+            sides.append(Side(*given, (ctypes.c_uint32 * 4)(*recorded), len(recorded)))
+        run = getattr(library, f"{'recording' if kept else 'plain'}{fmi}")
         begun = perf_counter()
-        status = run(*sides, STEP, steps)
+        room = [np.empty((steps, len(RECORD) + 1))] if kept else []
+        rows = [one.ctypes.data_as(ctypes.c_void_p) for one in room]
+        status = run(*map(ctypes.byref, sides), ctypes.c_double(STEP), ctypes.c_int64(steps), *rows)
         seconds = perf_counter() - begun
     assert status <= 1, status
     return seconds
@@ -185,7 +203,7 @@ def libcosimpy(folder: Path, fmi: int, steps: int) -> float:
 
 
 RUNNERS: dict[str, Callable[[Path, int, int], float]] = {
-    one.__name__: one for one in (c, cosim, gauss_seidel, isolated, interpreted, fmpy, ecospy, libcosimpy)
+    one.__name__: one for one in (c, recording_c, cosim, gauss_seidel, isolated, interpreted, fmpy, ecospy, libcosimpy)
 }
 
 if __name__ == "__main__":

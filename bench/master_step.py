@@ -26,6 +26,7 @@ import cosim
 HERE = Path(__file__).parent
 STEPS = {
     "c": 150_000,
+    "recording_c": 150_000,
     "cosim": 150_000,
     "gauss_seidel": 150_000,
     "isolated": 150_000,
@@ -36,6 +37,7 @@ STEPS = {
 }
 TITLES = {
     "c": "plain C loop",
+    "recording_c": "C loop, 6 signals kept in memory",
     "cosim": "cosim, 6 signals to Parquet",
     "gauss_seidel": "cosim, Gauss-Seidel, 6 signals to Parquet",
     "isolated": "cosim --isolate, 6 signals to Parquet",
@@ -109,7 +111,8 @@ def versus(folder: Path, fmi: int, rounds: int) -> dict[str, Any]:
                     runs[name].append(step_time(name, folder, fmi, STEPS[name]))
                 except RuntimeError as error:
                     reasons[name] = str(error)
-    return {name: _summary(runs[name], runs["c"], reasons.get(name)) for name in STEPS}
+    found = {name: _summary(runs[name], runs["c"], reasons.get(name)) for name in STEPS}
+    return found | {"beside_recording": _summary(runs["cosim"], runs["recording_c"], None)}
 
 
 def _summary(times: list[float], yardstick: list[float], reason: str | None) -> dict[str, Any]:
@@ -192,7 +195,11 @@ def page(found: dict[str, Any]) -> str:
     ]
     cells = {name: [_cells(found["detail"][key][name]) for key in ("fmi2", "fmi3")] for name in STEPS}
     lines += [f"| {TITLES[name]} | {two} | {three} |" for name, (two, three) in cells.items()]
+    kept = " and ".join(_cells(found["detail"][key]["beside_recording"]).split("| ")[1] for key in ("fmi2", "fmi3"))
     lines += [
+        "",
+        f"Beside the C loop that keeps the same signals cosim takes {kept} (FMI 2 and 3; asked: {ASKED} at most). It "
+        "reads as much from the FMUs, writes no file, and looks at nothing.",
         "",
         "![ratios](master_step.svg)",
         "",

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from cosim.api.recordings import Source, read_all
+from cosim.api.recordings import Source, at_least_one, read_all
 from cosim.data.recording import Recording
 from cosim.diagnosis.first_card import FirstCard, Motion, Number, first_card
 from cosim.plots.quantities import number
@@ -113,7 +113,9 @@ def card(
     file = None if out is None else Path(out)
     if file is not None:
         check_free(file, force)
-    made = estimated_card(read_all(recordings, "recording", columns, units, layout), motion, inertia, on_progress)
+    made = estimated_card(
+        at_least_one(read_all(recordings, "recording", columns, units, layout)), motion, inertia, on_progress
+    )
     if file is not None:
         made.write(file, force)
     return made

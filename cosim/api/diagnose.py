@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cosim.api.defaults import estimated, split
 from cosim.api.progress import Staged, stages_of
-from cosim.api.recordings import Source, Written, read_all
+from cosim.api.recordings import Source, Written, at_least_one, read_all
 from cosim.api.tables import findings_frame, missing_frame
 from cosim.api.why import frame
 from cosim.data.recording import Recording
@@ -241,7 +241,7 @@ def _read(
     believed, notes = card if isinstance(card, Card) or card is None else read_card(card), []
     written = written.with_columns_of(believed.columns if believed else {})
     fitted, held = (read_all(some, kind, *written) for some, kind in ((train, "train"), (heldout, "heldout")))
-    check_split(fitted, held)
+    check_split(at_least_one(fitted), held)
     if not held:
         fitted, held, said = split(fitted)
         notes.append(said)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cosim.data.recording import REQUIRED, Recording
+from cosim.support.errors import InputError
 
 Source = Any
 """A path, a `Recording`, a pandas `DataFrame`, or a mapping of column to array."""
@@ -71,6 +72,14 @@ def read_all(
     return [
         read(one, columns=columns, units=units, name=f"{kind} {k}", layout=layout) for k, one in enumerate(several, 1)
     ]
+
+
+def at_least_one(recordings: list[Recording]) -> list[Recording]:
+    """Refuse a call without a recording (InputError)."""
+    if not recordings:
+        said = "No recording was given: give one at least, a path, a table or a Recording."
+        raise InputError(said, culprit="recordings", value=0)
+    return recordings
 
 
 def _table(source: Any) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 import inspect
 import subprocess
 import sys
+from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
 
@@ -195,3 +196,9 @@ def test_a_recording_is_shown_as_its_file_is(tmp_path: Path) -> None:
     assert cosim.show(recording).tables == cosim.show(path).tables
     assert "400 rows" in str(recording)
     assert "<table>" in recording._repr_html_()
+
+
+@pytest.mark.parametrize("call", [cosim.diagnose, cosim.card])
+def test_a_call_without_a_recording_is_refused_in_a_sentence(call: Callable[[list[Recording]], object]) -> None:
+    with pytest.raises(cosim.InputError, match="No recording was given: give one at least"):
+        call([])
