@@ -50,11 +50,11 @@ def faded(mount: Mount, effect: LearnedEffect, prepared: Prepared, weight: Array
     """Rows of a term that fades after a reversal, over the time or the way since then: f changes the friction level."""
     bare = without(mount, effect)
     base, doubled = needed(bare, prepared), replace(bare, effects=(*bare.effects, DOUBLED))
-    over = np.concatenate([_since(effect.since(), piece)[piece.kept] for piece in prepared.pieces])
+    over = np.concatenate([since(effect.since(), piece)[piece.kept] for piece in prepared.pieces])
     left, unit = prepared.stacked("tau") - base, needed(doubled, prepared) - base
     return Partial(effect, over, None, left, unit, weight, Blocks.of(prepared))
 
 
-def _since(name: str, piece: Piece) -> Array:
+def since(name: str, piece: Piece) -> Array:
     """The time or the way since the last reversal, or since the start, at all rows of a piece."""
     return np.abs(since_reversal(piece.t if name == "time since reversal" else piece.q, piece.v))

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cosim.diagnosis.terms.dictionary import followed, since
+from cosim.diagnosis.terms.dictionary import followed
+from cosim_formulas.find import since
 from pyfmi_models.effects.learned_base import SEEN_WITHIN
 
 DT = 1e-3
