@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp, sqrt
 
-from cosim.diagnosis.answer.ledger import Rule, all_pass
+from cosim.diagnosis.answer.ledger import Rule
 from cosim.diagnosis.answer.scores import EffectScores, LearnedScores, ResidualScores, Scores, TermScores
 from cosim.diagnosis.decide.calibration import calibrated
 from cosim.diagnosis.decide.policy import Policy
@@ -187,11 +187,6 @@ def held_out_rules(gain: Gain, policy: Policy) -> Iterator[Rule]:
     yield Rule("predicts held-out recordings", gain.predicts(policy), nats, limit, "nats", removed)
     lowest = min(gain.narrow, gain.wide)
     yield Rule("does not raise the held-out error", not gain.raises(policy), lowest, -policy.slight)
-
-
-def is_validated(gain: Gain, policy: Policy) -> bool:
-    """Whether an effect stands on the held-out recordings."""
-    return all_pass(held_out_rules(gain, policy))
 
 
 def open_rivals(one: EffectScores, policy: Policy) -> tuple[str, ...]:
