@@ -22,7 +22,7 @@ from pyfmi_models.export.platforms import PLATFORMS, host
 LOOP = Path(__file__).parents[1] / "master" / "loop"
 _INCLUDED = {"loop.inc": LOOP / "loop.c", "part.inc": LOOP / "part.c", "coupling.inc": LOOP / "coupling.c"}
 _INCLUDED |= {"instance.inc": SHIM / "instance.c"}
-_AS_THEY_ARE = [LOOP / "loop.h", LOOP / "foreign.h"]
+_AS_THEY_ARE = [LOOP / name for name in ("loop.h", "part.h", "foreign.h")]
 _AS_THEY_ARE += [SHIM / name for name in ("core.h", "model.h", "fmi2.c", "fmi3.c", "fmi3_unused.c")]
 FLAGS = ("-std=c11", "-O2", "-g0", "-ffp-contract=off", "-fvisibility=hidden", "-fPIC")
 """As of the loop of a run (build_hook.py): one rounding an operation."""

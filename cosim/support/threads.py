@@ -26,10 +26,8 @@ def in_one_thread(function: Callable[P, R]) -> Callable[P, R]:
     def limited(*given: P.args, **named: P.kwargs) -> R:
         if any(name in os.environ for name in VARIABLES):
             return function(*given, **named)
-        try:
-            from threadpoolctl import threadpool_limits  # here, so that a command does without it
-        except ModuleNotFoundError:  # a work tree that was not installed again: dearer, no other answer
-            return function(*given, **named)
+        from threadpoolctl import threadpool_limits  # here, so that a command does without it
+
         with threadpool_limits(1, "blas"):
             return function(*given, **named)
 

@@ -14,7 +14,7 @@
 #define TERMINATED LOOP_TERMINATED
 #define NOT_FINITE LOOP_NOT_FINITE
 #define STEP LOOP_STEP
-#include "loop.h"
+#include "part.h"
 #undef do_step
 #undef fail
 #undef TERMINATED
