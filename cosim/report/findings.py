@@ -20,7 +20,7 @@ from cosim.report.repairs import Check, repairs_of
 from cosim.report.sheet import Picture
 from cosim.report.tables import equation
 
-NOTHING_YET = "Nothing yet: it did not hold on the validation run."
+NOTHING_YET = "Nothing yet: not confirmed. “cosim why” names the rule."
 PROBABILITY = (
     "The probability is its share of the evidence among its rivals, calibrated on simulated telescope mounts and "
     "machines of six other classes; on machines unlike these it may come true less often."

@@ -40,7 +40,7 @@ def test_of_rivals_that_remove_as_much_it_is_said_what_decides() -> None:
 def test_nothing_is_to_be_done_about_what_did_not_prove_itself() -> None:
     weak = replace(FOUND[0], answer="not_proven", action="Check the bearing.")
     whole = replace(diagnosis("two"), findings=(weak, *FOUND[1:], *REST), verdict=("friction_asymmetry",))
-    assert "Nothing yet: it did not hold on the validation run." in render(whole)
+    assert "Nothing yet: not confirmed. “cosim why” names the rule." in render(whole)
     assert "Check the bearing" not in render(whole) + summary(whole)
 
 
