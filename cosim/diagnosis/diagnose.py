@@ -38,7 +38,7 @@ from cosim.diagnosis.measure.regression import black_box_rms
 from cosim.diagnosis.measure.withheld import without_names
 from cosim.diagnosis.search.alternatives import prove_sets
 from cosim.diagnosis.search.bookkeeping import enter_answer, finished
-from cosim.diagnosis.search.delivered import detected, likelier, standing, with_only, without_ended
+from cosim.diagnosis.search.delivered import detected, likelier, standing, structure_with
 from cosim.diagnosis.search.global_test import global_test
 from cosim.diagnosis.search.nameless import Nameless, nameless
 from cosim.diagnosis.search.proof import Proof
@@ -315,23 +315,24 @@ def _with_learned(
 
 
 def _delivered(answer: Answer, heldout: Sequence[Recording], with_possible: bool) -> tuple[Answer, Learned | None]:
-    """The answer with what it delivers, and what is learned beside that; never worse held out than the base."""
+    """The answer with what it delivers, and what is learned as well; never worse held out than the base."""
     answer, tried = _learned(answer, heldout)
-    fit = _named(answer, with_possible)
-    models = Structures(answer.base.mount, answer.base.mount, fit.mount)
-    found = judge(heldout, models, answer.comparison.problem.prepared.band)
-    if found.after_rms > found.before_rms:
+    names = detected(answer.comparison, answer.proof, answer.decision) | likelier(answer.decision)
+    fit = structure_with(answer.comparison, answer.proof, names)
+    if _is_worse(answer, fit, heldout):
         answer, fit = replace(answer, scores=replace(answer.scores, improves=False)), answer.base
+    if with_possible:
+        every = structure_with(answer.comparison, answer.proof, {one.effect.id for one in answer.proof.standing})
+        fit = fit if _is_worse(answer, every, heldout) else every
     whole = replace(answer, detected=detected(answer.comparison, answer.proof, answer.decision), delivered=fit)
     return (whole, tried) if fit is answer.proof.chosen else (whole, _learned(whole, heldout)[1])
 
 
-def _named(answer: Answer, with_possible: bool) -> Fit:
-    """The base with what is detected, or with all that stands."""
-    names = detected(answer.comparison, answer.proof, answer.decision)
-    every = {one.effect.id for one in answer.proof.standing}
-    fit = with_only(answer.comparison, answer.proof, every if with_possible else names | likelier(answer.decision))
-    return without_ended(answer.comparison, fit)
+def _is_worse(answer: Answer, fit: Fit, heldout: Sequence[Recording]) -> bool:
+    """Whether a structure leaves more of the held-out recordings than the refitted base."""
+    base, band = answer.base.mount, answer.comparison.problem.prepared.band
+    found = judge(heldout, Structures(base, base, fit.mount), band)
+    return found.after_rms > found.before_rms
 
 
 def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Learned | None]:
@@ -339,8 +340,7 @@ def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Lear
     tried, problem = learn(answer.comparison, answer.chosen, answer.held.as_delivered()), answer.comparison.problem
     if not tried:
         return answer, None
-    after = tried.mount if tried.helps else answer.chosen.mount
-    models = answer.models(after)
+    models = answer.models(tried.mount if tried.helps else answer.chosen.mount)
     told = tried.judged_in(judged_band(heldout, models, problem.prepared.band), answer.chosen.mount)
     answer = replace(answer, scores=replace(answer.scores, learned=told.scores()))
     return answer, told if answer.decision.is_unknown else None

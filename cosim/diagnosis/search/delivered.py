@@ -33,6 +33,11 @@ def likelier(decision: Decision) -> frozenset[str]:
     return frozenset(name for name, p in sums.items() if p >= LIKELY and name not in decision.doubtful)
 
 
+def structure_with(comparison: Comparison, proof: Proof, names: Collection[str]) -> Fit:
+    """The structure of some of the effects that stand, as a card may hold it."""
+    return without_ended(comparison, with_only(comparison, proof, names))
+
+
 def with_only(comparison: Comparison, proof: Proof, names: Collection[str]) -> Fit:
     """The structure that stands with just some of its effects, refitted where others go."""
     problem, chosen = comparison.problem, proof.chosen
