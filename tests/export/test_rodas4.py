@@ -1,14 +1,21 @@
 """The step of the co-simulation solver as expressions: its order, its damping, its answer to too long a step."""
 
-import re
+from ctypes import CDLL, CFUNCTYPE, POINTER, Structure, byref, c_double, c_int, c_void_p
 from pathlib import Path
 
 import casadi as ca
 import export_models as models
+import fmpy
 import numpy as np
 import pytest
 
-from pyfmi_models.export.rodas4 import ALPHA, GAMMA_TIME, A, C, step_functions
+from cosim.master import loop as own
+from pyfmi_models import export
+from pyfmi_models.export.build import compile_shared
+from pyfmi_models.export.platforms import PLATFORMS, host
+from pyfmi_models.export.rodas4 import step_functions
+
+LOOP = Path(own.__file__).parent
 
 
 def solver(sizes, formula):
@@ -83,9 +90,53 @@ def test_divisions_by_parameters_are_done_once_a_step():
     assert len(divisions) == 5 + 3  # one by the friction level in each later stage, one for each state's error
 
 
-def test_the_loop_integrates_foreign_models_with_the_same_numbers():
-    text = (Path(__file__).parents[2] / "cosim" / "master" / "loop" / "rodas4.c").read_text("utf-8")
-    tables = {name: body for name, body in re.findall(r"double (\w+)(?:\[\w+\])+ = \{(.*?)\};", text, re.S)}
-    found = {name: [float(one) for one in re.findall(r"-?\d+\.?\d*", body)] for name, body in tables.items()}
-    numbers = {"alpha": ALPHA, "gamma_time": GAMMA_TIME, "a": sum(A, (0,)), "c": sum(C, (0,))}
-    assert found == {name: [*row] for name, row in numbers.items()}
+RATES, JACOBIAN = (CFUNCTYPE(c_int, c_void_p, c_double, *count * [POINTER(c_double)]) for count in (2, 3))
+
+
+class Solver(Structure):
+    """That of cosim/master/loop/rodas4.h."""
+
+    _fields_ = (
+        *(("size", c_int), ("context", c_void_p), ("rates", RATES), ("jacobian", JACOBIAN)),
+        *(("nominals", c_void_p), ("tolerance", c_double), ("work", c_void_p), ("pivots", c_void_p)),
+    )
+
+
+@pytest.fixture(scope="module")
+def loop():
+    """What integrates foreign models, of which only rates and a Jacobian are known."""
+    headers = (LOOP / "rodas4.h", Path(export.__file__).parent / "c" / "detmath.h")
+    sources = {one.name: one.read_bytes() for one in (LOOP / "rodas4.c", *headers)}
+    flags, name = ("-shared", "-fPIC", "-O1", "-w"), f"rodas4{fmpy.sharedLibraryExtension}"
+    return CDLL(str(compile_shared(sources, name, PLATFORMS[host()].target, flags)))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_loop_steps_a_foreign_model_as_expressions_do(loop, seed):
+    """Rates A x + b sin t; in every second case 1 / (h gamma) - A has a zero in front, and rows are exchanged.
+
+    Expressions have them in other coordinates, where none is.
+    """
+    random, size, h = np.random.default_rng(seed), 5, 0.3
+    A, b, x = (random.normal(size=shape) for shape in ((size, size), size, size))
+    A[0, 0] = 1 / (0.25 * h) if seed % 2 else A[0, 0]
+    T = np.linalg.qr(random.normal(size=(size, size)))[0]
+
+    def rates(_, t, x, out):
+        np.ctypeslib.as_array(out, (size,))[:] = A @ np.ctypeslib.as_array(x, (size,)) + b * np.sin(t)
+        return 0
+
+    def jacobian(_, t, x, by_state, by_time):
+        np.ctypeslib.as_array(by_state, (size * size,))[:] = A.T.ravel()
+        np.ctypeslib.as_array(by_time, (size,))[:] = b * np.cos(t)
+        return 0
+
+    nominals, work, pivots = np.ones(size), np.zeros(size * size + 12 * size), np.zeros(size, np.intc)
+    numbers = (nominals.ctypes.data, 1e-6, work.ctypes.data, pivots.ctypes.data)
+    this, end, error = Solver(size, None, RATES(rates), JACOBIAN(jacobian), *numbers), np.zeros(size), np.zeros(size)
+    places = [c_void_p(one.ctypes.data) for one in (x, end, error)]
+    assert loop.rodas4_step(byref(this), c_double(0.4), c_double(h), *places) == 0
+    expressions = solver(
+        (size, 0, 0), lambda t, x, u, p: ca.vertsplit(ca.DM(T @ A @ T.T) @ x + ca.DM(T @ b) * ca.sin(t))
+    )
+    np.testing.assert_allclose(end, T.T @ expressions(0.4, T @ x, h=h)[0], rtol=1e-9)
