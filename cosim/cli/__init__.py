@@ -27,7 +27,7 @@ from cosim.support.errors import CosimError, InputError, PlugInError
 from cosim.support.interrupts import Terminated, end_well, is_interrupted, is_terminated
 from cosim.support.suffixes import RECORDINGS
 from cosim.support.system_errors import surroundings
-from cosim.support.terminal import abandon_stdout, finish_stdout, keep_stdout, put, say
+from cosim.support.terminal import abandon_stdout, finish_stdout, keep_stdout, put, say, say_once_begun
 from cosim.support.threads import VARIABLES
 from cosim.support.version import __version__
 from pyfmi_models.errors import ModelError
@@ -47,6 +47,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     debug = "--debug" in given
     try:
         end_well()
+        say_once_begun()
         keep_stdout()
         set_libraries()
         check_given(given)

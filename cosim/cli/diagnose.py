@@ -11,7 +11,7 @@ import typer
 from cosim.cli.complete import cards
 from cosim.cli.options import Cluster, Columns, Force, Layout, Out, Units, command_of, default_out, results
 from cosim.support.memory import keep_freed_memory
-from cosim.support.terminal import put, put_json, say, stage
+from cosim.support.terminal import put, put_json, say, say_once_begun, stage
 
 if TYPE_CHECKING:
     from cosim.api.diagnose import DiagnosisResult
@@ -156,7 +156,7 @@ def _begun(name: str) -> Path:
     last = max(made, key=lambda path: path.stat().st_mtime_ns, default=None)
     if last is None:
         return default_out(name)
-    say(f"results go to {last.parent}, where they were begun")
+    say_once_begun(f"results go to {last.parent}, where they were begun")
     return last.parent
 
 

@@ -10,7 +10,7 @@ from cosim.cli.drive import JsonOption, KeyOption, MachineOption, machine_of, vi
 from cosim.cli.firmware import firmware
 from cosim.cli.options import Force, Out, command_of, default_out
 from cosim.cli.verbs import attach
-from cosim.support.terminal import put, put_json, say
+from cosim.support.terminal import begun, put, put_json, say
 
 app = typer.Typer(no_args_is_help=True, help="The same controller on a machine.")
 app.command()(firmware)
@@ -51,6 +51,7 @@ def run(
         with Session(
             ready, given, box, fast=fast, force=force, origin={"command": command, "cards": cards_of(wanted)}
         ) as session:
+            begun()
             result = run_session(session)
     finally:
         if box.exists():

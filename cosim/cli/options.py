@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from cosim.support.command import command_of
-from cosim.support.terminal import say
+from cosim.support.terminal import say_once_begun
 
 __all__ = ["Cluster", "Columns", "Force", "Layout", "Out", "Units", "command_of", "default_out", "results"]
 RESULTS = "cosim_out"
@@ -32,9 +32,9 @@ def results() -> Path:
 
 
 def default_out(name: str) -> Path:
-    """Return a folder that is not there yet, for results of `name`, and say so: cosim_out/NAME-1, -2, ..."""
+    """Return a folder that is not there yet, for results of `name`, said once work begins: cosim_out/NAME-1, ..."""
     stem = "".join(c if c.isalnum() or c in "._-" else "_" for c in name).strip("._") or "results"
     free = (results() / f"{stem}-{k}" for k in count(1))
     found = next(path for path in free if not path.exists())
-    say(f"results go to {found}")
+    say_once_begun(f"results go to {found}")
     return found

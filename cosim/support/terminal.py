@@ -18,6 +18,8 @@ WRITABLE = "cosim-writable"
 """Name of the way in which text is written that an encoding has no letters for."""
 USUAL = 25
 """Steps told in words that a stage usually has: where the bar is full."""
+_ONCE_BEGUN: list[str] = []
+"""What is said once work has begun, and not where it is refused."""
 
 
 def messages() -> Console:
@@ -30,13 +32,28 @@ def say(text: str) -> None:
     messages().print(text, markup=False)
 
 
+def say_once_begun(*texts: str) -> None:
+    """Keep messages for stderr, in the place of those that are kept, until a stage goes on or there are results."""
+    _ONCE_BEGUN[:] = texts
+
+
+def begun() -> None:
+    """Say what is kept: the work was not refused."""
+    kept = tuple(_ONCE_BEGUN)
+    _ONCE_BEGUN.clear()
+    for text in kept:
+        say(text)
+
+
 def put(text: str) -> None:
     """Write data to stdout."""
+    begun()
     Console(highlight=False, soft_wrap=True, emoji=False).print(text, markup=False)
 
 
 def put_json(data: Any) -> None:
     """Write data to stdout as one JSON document."""
+    begun()
     sys.stdout.write(json.dumps(data, indent=2) + "\n")
 
 
@@ -106,10 +123,13 @@ class Stage:
 
     def __call__(self, done: int, of: int) -> None:
         """Show how much is done."""
+        begun()
         self._show(completed=done, total=of, counted=True)
 
     def tell(self, text: str) -> None:
         """Show what is being done, and that one thing more has been done."""
+        if self._told:  # something was done, and not refused
+            begun()
         self._told += 1
         self._show(description=text, completed=self._told, total=max(USUAL, self._told + 1))
 

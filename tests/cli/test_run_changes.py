@@ -74,6 +74,31 @@ def test_results_without_a_folder_get_one_of_their_own_which_is_said(
         assert said.out == f"cosim_out/loop-{number}/recording.parquet\n"
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("run", "loop.toml", "--set", "controller.kk=7"),
+        ("run", "bad.toml"),
+        ("identify", "run.csv", "--system", "bad.toml", "--free", "plant.k"),
+        ("identify", "run.csv", "--system", "loop.toml", "--free", "plant.wibble"),
+        ("diagnose", "run.csv", "run.csv", "--card", "bad.toml"),
+        ("export", "bad.toml"),
+        ("sweep", "bad.toml"),
+        ("compare", "run.csv", "run.csv"),
+        ("card", "run.csv"),
+        ("card", "short.csv"),
+    ],
+)
+def test_where_results_go_is_not_said_of_what_is_refused(
+    scenario: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...]
+) -> None:
+    Path("bad.toml").write_text("[mount]\n")
+    Path("run.csv").write_text("t,q\n0,1\n")
+    Path("short.csv").write_text("t,q,tau\n" + "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(20)))
+    assert call(*arguments) == 2
+    assert "results go to" not in capsys.readouterr().err
+
+
 def test_the_answer_begins_with_how_well_the_axis_followed(scenario: Path, tmp_path: Path) -> None:
     done = cosim.run(scenario, tmp_path / "out", page=False)
     (axis,) = done.statistics["tracking"]
