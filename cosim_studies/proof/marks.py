@@ -6,7 +6,7 @@ wherever an answer was due.
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
-from math import pi
+from math import inf, pi
 from typing import Any
 
 from cosim_studies.proof.ceiling import in_card_words
@@ -101,6 +101,12 @@ def removable(row: Row) -> float | None:
     if best is None or row["status"] != "ok":
         return None
     return float(1 - (best / row["answer"]["heldout"]["before_rms"]) ** 2)
+
+
+def is_findable(row: Row) -> bool:
+    """The true structure, refitted, predicts the held-out recording better than the base that it contains."""
+    best = row.get("ceiling", {})
+    return bool(best.get("heldout_rms", inf) < best.get("base_rms", inf))
 
 
 def has_gap(row: Row) -> bool:

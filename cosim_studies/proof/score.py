@@ -54,6 +54,10 @@ def _share(mark: Callable[[Row], bool], *kinds: str) -> Callable[[Rows], Estimat
     return lambda rows: share([mark(row) for row in kind(rows, *kinds)])
 
 
+def _share_of_findable(mark: Callable[[Row], bool]) -> Callable[[Rows], Estimate]:
+    return lambda rows: share([mark(row) for row in kind(rows, "one") if marks.is_findable(row)])
+
+
 def _precision(rows: Rows) -> Estimate:
     return ratio([(marks.hits(row), len(marks.names(row))) for row in kind(rows, "several")])
 
@@ -112,6 +116,8 @@ BARS = (
     Bar("false_alarms", "nothing concealed: something is said to be missing", _share(marks.alarm, "none"), most=0.02),
     Bar("right_first", "one effect: the first name is right", _share(marks.right_first, "one"), least=0.95),
     Bar("in_set", "one effect: the right name is in the answer set", _share(marks.in_set, "one"), least=0.95),
+    Bar("findable_first", "... of those that can be found: first", _share_of_findable(marks.right_first), least=0.85),
+    Bar("findable_in_set", "... of those that can be found: in the set", _share_of_findable(marks.in_set), least=0.92),
     Bar("set_size", "one effect: mean size of the set, where something is named", _set_size, most=1.6),
     Bar("wrong_single", "one effect: a single name, and wrong", _share(marks.wrong_single, "one"), most=0.05),
     Bar("exact", "one effect: the verdict is the truth and nothing else", _share(marks.exact, "one")),

@@ -80,6 +80,14 @@ def test_scores_of_hand_made_answers_are_what_one_counts() -> None:
     assert all(found[key]["low"] <= found[key]["value"] <= found[key]["high"] for key in expected)
 
 
+def test_an_effect_can_be_found_where_its_own_structure_predicts_better_than_the_base() -> None:
+    ceilings = ({"heldout_rms": 1.0, "base_rms": 2.0}, {"heldout_rms": 2.0, "base_rms": 2.0}, {"reason": "no fit"})
+    rows = [row("one", ["delay"], [name]) | {"ceiling": best} for name in ("delay", "lag") for best in ceilings]
+    found = scores([*rows, row("none", [], [])])
+    assert (found["findable_first"]["value"], found["findable_first"]["n"]) == (0.5, 2)
+    assert found["findable_in_set"]["value"] == 0.5
+
+
 def test_one_case_makes_nothing_sure() -> None:
     found = scores([row("one", ["cogging"], ["cogging"], after=1.0, best=1.0)])
     assert (found["gap_closed"]["met"], found["gap_closed"]["sure"]) == (True, False)
