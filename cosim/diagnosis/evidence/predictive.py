@@ -28,7 +28,7 @@ from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
 from cosim.estimation.residuals import gets_memory, removed_at_rest, residuals
-from cosim.estimation.row_weights import weights
+from cosim.estimation.row_weights import least_speed, weights
 from cosim.support.statistics import bootstrap_range
 from pyfmi_models.mount import Mount
 
@@ -173,6 +173,13 @@ class Predictive:
         pairs = (narrow, narrow if is_noise(narrow, wide) and not amplified else wide)
         first, second = (1 - after / max(before, 1e-300) for before, after in pairs)
         return (first, second) if self.prepared.cutoff <= self.protocol.cutoff else (second, first)
+
+    def in_motion(self, without: Mount, mount: Mount) -> float:
+        """Share of the plain residual energy in clear motion that a model removes, in the band of the analysis."""
+        v = self.prepared.stacked("v")
+        clear = np.abs(v) > least_speed(v)
+        before, after = (float(np.mean(self.residual(one)[clear] ** 2)) for one in (without, mount))
+        return 1 - after / max(before, 1e-300)
 
     def at_rest(self, without: Mount, mount: Mount) -> float:
         """Share of the plain residual energy that a model with memory removes where one without is silent, else 0."""

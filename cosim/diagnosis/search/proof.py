@@ -162,4 +162,5 @@ def _gain(
 
 
 def _gained(nats: float, without: Mount, mount: Mount, held: Predictive) -> Gain:
-    return Gain(nats, *held.plain_gains(without, mount), held.at_rest(without, mount))
+    shares = held.plain_gains(without, mount)
+    return Gain(nats, *shares, held.at_rest(without, mount), held.in_motion(without, mount))

@@ -169,3 +169,14 @@ def test_noise_counts_by_the_share_of_the_rows_that_are_weighed(monkeypatch: pyt
     narrow, wide = Predictive.plain_gains(this, before, after)
     assert narrow == pytest.approx(1 - (0.5 * 0.98**2 - 0.5 * 0.8) / (0.5 - 0.5 * 0.8))
     assert wide == pytest.approx(1 - (1.4 - 0.8) / (1.5 - 0.8))
+
+
+def test_what_a_model_removes_in_clear_motion_is_not_hidden_by_what_it_raises_at_rest() -> None:
+    t = np.arange(SECONDS * RATE) / RATE
+    v = np.where(t % 4 < 2, np.sin(np.pi * t) ** 2, 0.0)  # moves and rests in turn
+    clear = v > 0.02 * v.max()
+    left = {"base": np.ones(len(t)), "other": np.where(clear, 0.5, 3.0)}
+    prepared = SimpleNamespace(stacked=lambda _: v)
+    this: Any = SimpleNamespace(prepared=prepared, residual=lambda mount: left[mount])
+    assert Predictive.in_motion(this, "base", "other") == pytest.approx(0.75)  # type: ignore[arg-type]
+    assert np.mean(left["other"] ** 2) > 1

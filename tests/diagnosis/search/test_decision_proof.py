@@ -95,6 +95,10 @@ class Tables:
         """None of the effects remembers."""
         return 0.0
 
+    def in_motion(self, *both: Structure) -> float:
+        """As everywhere else."""
+        return self.plain_gains(*both)[0]
+
 
 def structure(names: str, left: float = 0.0) -> Fitted:
     return Fitted(Structure(tuple(Named(one) for one in names)), left)
