@@ -106,7 +106,10 @@ class Inverse:
 
     def momentary(self, piece: Piece, values: Array) -> Array:
         """Torque that the motion and the states need, and its derivatives: (rows, 1 + free), filtered once more."""
-        return piece.lowpass(self._momentary(piece, self._with(values)).T)
+        signals = self._momentary(piece, self._with(values))
+        acts = signals.any(axis=1)  # a spring, a drive, a clock act on a torque as a whole, later
+        signals[acts] = piece.lowpass(signals[acts].T).T
+        return signals.T
 
     def behind(self, piece: Piece, columns: Array, values: Array) -> Array:
         """The same after springs, drive and clocks, which act on a torque as a whole, and with what shakes the axis."""

@@ -1,13 +1,22 @@
 """What all fits of a diagnosis share."""
 
+from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from weakref import WeakValueDictionary
 
 import numpy as np
 
 from cosim.estimation.fit import Fit, fit
 from cosim.estimation.prepare import Array, Prepared
 from pyfmi_models.mount import Mount
+
+LESS = 45
+"""Evaluations of a structure from which an effect was taken: those that stay go far where they stood in for it."""
+
+AT_HAND = 4
+"""Of those so many stay in memory, 14 MB each where recordings are long."""
 
 
 @dataclass(frozen=True)
@@ -36,5 +45,29 @@ class Problem:
         return float(np.linalg.norm(self.weight * found.residual) / np.sqrt(np.count_nonzero(self.weight)))
 
     def fit(self, mount: Mount, evaluations: int, freed: Sequence[str] = ()) -> Fit:
-        """Fit a structure, its base held to the card; `freed` names endings of parameters, as in `fit`."""
-        return fit(mount, self.prepared.pieces, self.weight, self.mount, evaluations, freed=freed, held=self.held)
+        """Fit a structure, its base held to the card; `freed` names endings of parameters, as in `fit`.
+
+        The same fit from the same start is made once while anyone holds it.
+        """
+        key = mount, evaluations, tuple(freed)
+        found = self._fits.get(key)
+        if found is None:
+            found = fit(mount, self.prepared.pieces, self.weight, self.mount, evaluations, freed=freed, held=self.held)
+            self._fits[key] = found
+        return found
+
+    def without(self, found: Fit, name: str) -> Fit:
+        """A fitted structure without an effect that was added to the mount, by its id, refitted."""
+        own = len(self.mount.effects)
+        rest = tuple(one for k, one in enumerate(found.mount.effects) if k < own or one.id != name)
+        self._last.append(self.fit(replace(found.mount, effects=rest), LESS))
+        return self._last[-1]
+
+    @cached_property
+    def _fits(self) -> WeakValueDictionary[tuple[Mount, int, tuple[str, ...]], Fit]:
+        return WeakValueDictionary()
+
+    @cached_property
+    def _last(self) -> deque[Fit]:
+        """Structures from which an effect was taken: the search, the proof and what comes after ask for the same."""
+        return deque(maxlen=AT_HAND)

@@ -15,6 +15,7 @@ from cosim.diagnosis.search.rivals import AcceptedEffect
 from cosim.diagnosis.search.sizes import tells
 from cosim.diagnosis.search.stages import weighed
 from cosim.estimation.fit import Fit, recorded_by, with_values
+from cosim.estimation.problem import LESS
 
 
 def detected(comparison: Comparison, proof: Proof, decision: Decision) -> frozenset[str]:
@@ -45,7 +46,7 @@ def with_only(comparison: Comparison, proof: Proof, names: Collection[str]) -> F
     kept = tuple(one for k, one in enumerate(chosen.mount.effects) if k < own or one.id in names)
     if len(kept) == len(chosen.mount.effects):
         return chosen
-    return problem.fit(replace(chosen.mount, effects=kept), 45)
+    return problem.fit(replace(chosen.mount, effects=kept), LESS)
 
 
 def without_ended(comparison: Comparison, found: Fit) -> Fit:
@@ -74,9 +75,7 @@ def standing(comparison: Comparison, proof: Proof) -> Sequence[AcceptedEffect]:
 
 def _weighed(comparison: Comparison, proof: Proof, one: AcceptedEffect) -> AcceptedEffect:
     problem, chosen = comparison.problem, proof.chosen
-    many = len(problem.mount.effects)
-    own, added = chosen.mount.effects[:many], chosen.mount.effects[many:]
-    rest = tuple(effect for effect in added if effect.id != one.effect.id)
-    without = problem.fit(replace(chosen.mount, effects=(*own, *rest)), 45)
+    without = problem.without(chosen, one.effect.id)
+    added = chosen.mount.effects[len(problem.mount.effects) :]
     (first, *_) = (effect for effect in added if effect.id == one.effect.id)
     return replace(one, own=weighed(comparison, chosen, without, effect=first), without=without)

@@ -107,7 +107,7 @@ def _without_misnamed(
         goes = goes_its_way(comparison.problem, chosen, one.within(chosen.mount))
         comparison.judge(one.effect.id, chosen, [Rule("its numbers surely have the sign of such an effect", goes)])
         if not goes and offered.free:
-            grams = _grams(comparison, _without(comparison, found.proof, one), offered.free)
+            grams = _grams(comparison, comparison.problem.without(found.proof.chosen, one.effect.id), offered.free)
             term = offered.free[max(range(len(offered.free)), key=lambda k: _worth(grams, [k]))]
             left = without(comparison, examined, found.proof, one, held)
             return _without_misnamed(comparison, examined, Nameless(left, (*found.taken, (one, term))), held, offered)
@@ -118,7 +118,7 @@ def _challenge(
     comparison: Comparison, found: Nameless, one: AcceptedEffect, own: float, offered: _Offered
 ) -> _Challenge:
     """What leads an effect by most, beside the terms that took a name already; `own`: the worth of all that stands."""
-    beside = _without(comparison, found.proof, one)
+    beside = comparison.problem.without(found.proof.chosen, one.effect.id)
     tables = hypothesis_of(one.effect).tables
     law, free = offered.law, [term for term in offered.free if term.name not in found.quantities]
     alike = [term for term in free if term.name in tables]
@@ -131,14 +131,6 @@ def _challenge(
     kind = max([own, *(value - log(len(alike)) for value in worth[len(terms) :])])
     best = max(range(len(terms)), key=lambda k: worth[k])
     return _Challenge(one, terms[best], worth[best] - log(len(terms)) - kind, beside)
-
-
-def _without(comparison: Comparison, proof: Proof, out: AcceptedEffect) -> Fit:
-    """The structure that stands without one of its effects, refitted."""
-    own = len(comparison.problem.mount.effects)
-    effects = proof.chosen.mount.effects
-    rest = tuple(effect for k, effect in enumerate(effects) if k < own or effect.id != out.effect.id)
-    return comparison.problem.fit(replace(proof.chosen.mount, effects=rest), 30)
 
 
 def _grams(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm]) -> Grams:

@@ -12,7 +12,7 @@ from cosim.diagnosis.search.rivals import AcceptedEffect, Examined
 from cosim.diagnosis.search.sizes import tells
 from cosim.diagnosis.search.stages import is_small
 from cosim.estimation.fit import Fit
-from cosim.estimation.problem import Problem
+from cosim.estimation.problem import LESS, Problem
 from pyfmi_models.mount import Mount
 
 
@@ -145,7 +145,7 @@ def _with(problem: Problem, examined: Examined, some: Sequence[AcceptedEffect]) 
         return examined.base
     own = examined.chosen.mount.effects[: len(problem.mount.effects)]
     kept = tuple(effect for one in some for effect in one.effects)
-    return problem.fit(replace(examined.chosen.mount, effects=(*own, *kept)), 30)
+    return problem.fit(replace(examined.chosen.mount, effects=(*own, *kept)), LESS)
 
 
 def _gain(
@@ -154,9 +154,7 @@ def _gain(
     """What the held-out recordings lose without an effect."""
     without = one.without
     if len(standing) != 1 or len(without.mount.effects) != len(problem.mount.effects):
-        own = len(problem.mount.effects)
-        rest = [e for k, e in enumerate(chosen.mount.effects) if e.id != one.effect.id or k < own]
-        without = problem.fit(replace(chosen.mount, effects=tuple(rest)), 30)
+        without = problem.without(chosen, one.effect.id)
     after, before = (held.predicted(fit) for fit in (chosen, without))
     return _gained(after - before, without.mount, chosen.mount, held)
 

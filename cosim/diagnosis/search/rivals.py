@@ -147,7 +147,7 @@ def _challenged(
     problem = comparison.problem
     refits.on_progress(group[0].title)
     rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
-    beside = _stage_after(comparison, problem.fit(replace(chosen.mount, effects=rest), 45), known, refits)
+    beside = _stage_after(comparison, problem.without(chosen, group[0].id), known, refits)
     own = weighed(comparison, chosen, beside.current, effect=group[0])
     others = [one for one in beside.tried if one.effect.id != group[0].id]
     if len(rest) > len(problem.mount.effects):

@@ -32,10 +32,17 @@ INLINE void pass(double *rows, long long count, long long step, const double *se
     }
 }
 
-INLINE void both_ways(double *rows, long long count, const double *sections, const double *settled, long many,
-                      int wide) {
+INLINE void to_and_fro(double *rows, long long count, const double *sections, const double *settled, long many,
+                       int wide) {
     pass(rows, count, 1, sections, settled, many, wide);
     pass(rows + wide * (count - 1), count, -1, sections, settled, many, wide);
+}
+
+/* One pass of a filter has two sections: where a compiler knows their number, states stay in registers. */
+INLINE void both_ways(double *rows, long long count, const double *sections, const double *settled, long many,
+                      int wide) {
+    if (many == 2) to_and_fro(rows, count, sections, settled, 2, wide);
+    else to_and_fro(rows, count, sections, settled, many, wide);
 }
 
 static void both_ways_one(double *rows, long long count, const double *sections, const double *settled, long many) {
@@ -64,18 +71,20 @@ EXPORT int filter_run(double *signals, long long many, long long rows, long long
     double *lanes = malloc((size_t)(whole * wide) * sizeof *lanes);
     if (!lanes) return 1;
     for (long long first = 0; first < many; first += wide) {
-        for (int j = 0; j < wide; j++) { /* lanes without a signal repeat the last one */
-            const double *x = signals + rows * (first + j < many ? first + j : many - 1);
-            double *lane = lanes + j;
-            for (long long k = 0; k < edge; k++) {
-                lane[wide * k] = 2 * x[0] - x[edge - k];
-                lane[wide * (edge + rows + k)] = 2 * x[rows - 1] - x[rows - 2 - k];
+        double *x[LANES];
+        for (int j = 0; j < wide; j++) /* lanes without a signal repeat the last one */
+            x[j] = signals + rows * (first + j < many ? first + j : many - 1);
+        for (long long k = 0; k < edge; k++) /* row by row: eight signals are read along, one is not written across */
+            for (int j = 0; j < wide; j++) {
+                lanes[wide * k + j] = 2 * x[j][0] - x[j][edge - k];
+                lanes[wide * (edge + rows + k) + j] = 2 * x[j][rows - 1] - x[j][rows - 2 - k];
             }
-            for (long long k = 0; k < rows; k++) lane[wide * (edge + k)] = x[k];
-        }
+        for (long long k = 0; k < rows; k++)
+            for (int j = 0; j < wide; j++) lanes[wide * (edge + k) + j] = x[j][k];
         (wide == 1 ? both_ways_one : is_wide() ? both_ways_wide : both_ways_plain)(lanes, whole, sections, settled, (long)count);
-        for (int j = 0; j < wide && first + j < many; j++)
-            for (long long k = 0; k < rows; k++) signals[rows * (first + j) + k] = lanes[wide * (edge + k) + j];
+        int own = (int)(first + wide < many ? wide : many - first);
+        for (long long k = 0; k < rows; k++)
+            for (int j = 0; j < own; j++) x[j][k] = lanes[wide * (edge + k) + j];
     }
     free(lanes);
     return 0;
