@@ -1,5 +1,6 @@
 """An adapter in Python is a drive like any other, and what it raises is a fault."""
 
+import ctypes
 import sys
 from pathlib import Path
 from typing import Any
@@ -9,8 +10,10 @@ import pytest
 from on_hardware import SCENARIO, SIMULATED, assert_safe, invoke, recorded, scenario
 
 from cosim.hardware.machine import changed, read_machine
+from cosim.hardware.python_adapter import Order, PythonAdapter, PythonTransport, Reading
 from cosim.hardware.replay import replay
 from cosim.hardware.session import Session, run_session
+from cosim.hardware.structures import CFeedback, COrder
 from cosim.support.errors import CosimError
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
@@ -125,3 +128,53 @@ def test_in_real_time_the_loop_of_an_adapter_in_python_is_a_thread(tmp_path: Pat
     found = invoke("check", str(tmp_path / "s.toml"), "--machine", str(tmp_path / "m.toml"), "--seconds", "0.05")
     assert found.exit_code == 0, found.output
     assert "drive.py:Wall" in found.output
+
+
+class Scripted(PythonAdapter):
+    """An adapter that gives what a test wants, or fails."""
+
+    def __init__(self, reading: Reading | None = None, fails: str = "") -> None:
+        super().__init__(1e-3)
+        self.reading, self.fails, self.orders, self.closed = reading, fails, [], False
+
+    def write(self, order: Order) -> None:
+        if "write" in self.fails:
+            raise ValueError("no wire")
+        self.orders.append(order)
+
+    def read(self) -> Reading | None:
+        if "read" in self.fails:
+            raise OSError("no answer")
+        return self.reading
+
+    def status(self) -> int:
+        if "status" in self.fails:
+            raise KeyError("state")
+        return super().status()
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def test_what_an_adapter_says_goes_into_the_sample_modulo_2_to_the_32() -> None:
+    transport, feedback = PythonTransport(Scripted(Reading(-1, 2**32 + 5, 0x27, 1.5))), CFeedback()
+    assert transport._read(None, ctypes.pointer(feedback)) == 0
+    assert (feedback.counts, feedback.encoder, feedback.statusword, feedback.torque) == (2**32 - 1, 5, 0x27, 1.5)
+    order = COrder(tick=4, controlword=15, torque=-2.5)
+    assert transport._write(None, ctypes.pointer(order)) == 0
+    assert transport.one.orders == [Order(4, 15, -2.5)]  # type: ignore[attr-defined]
+    assert transport._status(None) == 0
+    assert transport.statistics() == {}
+    assert transport.python
+    transport.close()
+    assert transport.one.closed  # type: ignore[attr-defined]
+
+
+def test_an_adapter_that_fails_is_said_by_what_it_raised_first() -> None:
+    transport = PythonTransport(Scripted(None))
+    assert transport._read(None, ctypes.pointer(CFeedback())) == 1, "nothing new"
+    transport = PythonTransport(Scripted(None, "read write status"))
+    assert transport._read(None, ctypes.pointer(CFeedback())) == 2
+    assert transport._write(None, ctypes.pointer(COrder())) == 1
+    assert transport._status(None) == 1
+    assert transport.statistics() == {"adapter_error": "OSError: no answer"}

@@ -4,6 +4,7 @@ Every import counts: at the top of a file, inside a function, under TYPE_CHECKIN
 """
 
 import re
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -52,8 +53,9 @@ C_COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 C_FUNCTION = re.compile(r"^(?!static)(?:[A-Za-z_][\w *]*[ *])(\w+)\([^;{}]*\)\n\{", re.MULTILINE)
 
 
-def ours(name: str) -> set[str]:
-    return {other for other in imports(name) if other in FILES} - {name}
+@cache
+def ours(name: str) -> frozenset[str]:
+    return frozenset({other for other in imports(name) if other in FILES} - {name})
 
 
 def belongs(name: str, *rooms: str) -> bool:

@@ -5,6 +5,7 @@ Nobody runs Python on Windows here, so this is read from the text: what is impor
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 
 import pytest
 from imports import FILES
@@ -89,6 +90,7 @@ def bare(node: ast.AST, place: str = "") -> Iterator[tuple[str, str]]:
                     break  # what follows in this block is reached on one kind of system only
 
 
+@cache
 def found() -> dict[tuple[str, str], set[str]]:
     """What is reached unasked in the product, by module and outermost place."""
     every: dict[tuple[str, str], set[str]] = {}

@@ -1,6 +1,7 @@
 """What the modules of the packages import, read from their text."""
 
 import ast
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -14,7 +15,8 @@ FILES = {
 }
 
 
-def imports(name: str, inside: bool = True) -> set[str]:
+@cache
+def imports(name: str, inside: bool = True) -> frozenset[str]:
     """List what a module imports, as far as modules of ours go; `inside` counts imports within functions too."""
     tree = ast.parse(FILES[name].read_text("utf-8"))
     found: set[str] = set()
@@ -24,4 +26,4 @@ def imports(name: str, inside: bool = True) -> set[str]:
         elif isinstance(node, ast.ImportFrom) and node.module:
             whole = {f"{node.module}.{alias.name}" for alias in node.names}
             found |= {one if one in FILES else node.module for one in whole}
-    return found
+    return frozenset(found)
