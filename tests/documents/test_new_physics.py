@@ -70,7 +70,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("copy")
     for package in (pyfmi_models, cosim):
         source = Path(str(package.__file__)).parent
-        shutil.copytree(source, folder / source.name, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(source, folder / source.name)  # with what is compiled: each command would do it again
     for block in own_files():
         name = block.partition("\n")[0].removeprefix("# ")
         assert not (folder / name).exists()
