@@ -57,6 +57,7 @@ REMARKS = frozenset(
         "half_sample",
         "end_stop",
         "little_motion",
+        "own_torque",
         "no_set_point",
         "not_determined",
         "single_readings",
@@ -196,7 +197,12 @@ def proven_range(diagnosis: Diagnosis, scales: Scales) -> str:
 
 
 def sized(finding: Finding) -> tuple[str, str]:
-    """Return size and its 95 % range as they are printed: angles and lengths in a unit that needs no zeros."""
+    """Return size and its 95 % range as they are printed: angles and lengths in a unit that needs no zeros.
+
+    What held-out recordings do not confirm has none: the size that training alone would give it may be any.
+    """
+    if finding.answer == "not_proven":
+        return "", ""
     size = re.fullmatch(r"([-−\d.e+]+) (rad|m)", finding.size)
     if not size:
         return spelled(minus(finding.size)), spelled(minus(_thousands(finding.size_range)))

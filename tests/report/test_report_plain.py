@@ -111,3 +111,10 @@ def test_many_remarks_are_folded_on_the_terminal_and_alarms_are_not(tmp_path: Pa
     told = summary(whole, out=tmp_path)
     assert told.count("Remark") == 3
     assert "4 more remarks in report.html" in told
+
+
+def test_what_did_not_prove_itself_has_no_size() -> None:
+    weak = replace(FOUND[0], answer="not_proven", size="663 N·m", size_range="1 to 1,325")
+    whole = replace(diagnosis("two"), findings=(weak, *FOUND[1:], *REST), verdict=("friction_asymmetry",))
+    assert "663" not in summary(whole)
+    assert "not confirmed" in summary(whole)

@@ -24,6 +24,7 @@ Kind = Literal[
     "end_stop",
     "no_set_point",
     "little_motion",
+    "own_torque",
 ]
 
 

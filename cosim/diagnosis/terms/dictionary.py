@@ -11,6 +11,7 @@ from functools import partial
 
 import numpy as np
 
+from cosim.diagnosis.terms.own_torque import own_torque
 from cosim.estimation.discrepancy_basis import last_reversal, stop_operators
 from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.rowwise import recurrence
@@ -164,9 +165,21 @@ def _nothing(_: Piece) -> list[Array]:
 
 def user_columns(prepared: Prepared) -> dict[str, Column]:
     """Columns that are neither torque nor motion under another name, centred, of unit size."""
+    useful = _useful(prepared)
+    torque = own_torque(prepared, useful)
+    return {name: _centred(prepared, name) for name in useful if name not in torque}
+
+
+def torque_again(prepared: Prepared) -> tuple[str, ...]:
+    """Names of columns that are no causes because they are this axis' torque, asked for or read elsewhere."""
+    return own_torque(prepared, _useful(prepared))
+
+
+def _useful(prepared: Prepared) -> dict[str, Array]:
+    """Columns that vary and are no plain copy, low-passed, at the kept rows."""
     common = set.intersection(*(set(piece.extras) for piece in prepared.pieces)) - {"q_d", "v"}
-    useful = (name for name in sorted(common) if _varies(prepared, name) and not _repeats(prepared, name))
-    return {name: _centred(prepared, name) for name in useful}
+    made_of = {name: _at_rows(prepared, name) for name in sorted(common) if _varies(prepared, name)}
+    return {name: column for name, column in made_of.items() if not _repeats(prepared, column)}
 
 
 def _varies(prepared: Prepared, name: str) -> bool:
@@ -175,9 +188,12 @@ def _varies(prepared: Prepared, name: str) -> bool:
     return bool(np.ptp(whole) > ROUNDING * np.abs(whole).max())
 
 
-def _repeats(prepared: Prepared, name: str) -> bool:
+def _at_rows(prepared: Prepared, name: str) -> Array:
+    return np.concatenate([piece.lowpass(piece.extras[name])[piece.kept] for piece in prepared.pieces])
+
+
+def _repeats(prepared: Prepared, column: Array) -> bool:
     """Whether a column is the torque, or the motion, under another name or in another unit: then it is no cause."""
-    column = np.concatenate([piece.lowpass(piece.extras[name])[piece.kept] for piece in prepared.pieces])
     known = np.column_stack([*(prepared.stacked(one) for one in ("tau", "q", "v", "a")), np.ones(len(column))])
     own = column - column.mean()
     left = own - known @ np.linalg.lstsq(known, own, rcond=1e-9)[0]

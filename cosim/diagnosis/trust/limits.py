@@ -11,6 +11,7 @@ import numpy as np
 from cosim.data.recording import Recording
 from cosim.data.resolution import SEEN_STEPS, resolution
 from cosim.diagnosis.answer.doubt_entry import Sanity
+from cosim.diagnosis.terms.dictionary import torque_again
 from cosim.estimation.end_stops import Push
 from cosim.estimation.prepare import Prepared
 from cosim.estimation.row_weights import far_from_turns
@@ -102,3 +103,16 @@ def little_motion(prepared: Prepared) -> tuple[Sanity, ...]:
         "longer strokes at speeds that last."
     )
     return (Sanity(finding="little_motion", statement=text),)
+
+
+def own_torque(prepared: Prepared) -> tuple[Sanity, ...]:
+    """Say which columns are the axis' own torque, asked for or read elsewhere, and so are tried as no cause."""
+    names = torque_again(prepared)
+    if not names:
+        return ()
+    tells, it = ("each tells", "them") if names[1:] else ("it tells", "it")
+    text = (
+        f"Beside {', '.join(names)} the axis hardly needs friction or inertia of its own: {tells} its torque, as a "
+        f"command or another reading, and is no cause. Nothing was learned over {it}."
+    )
+    return (Sanity(finding="own_torque", statement=text),)

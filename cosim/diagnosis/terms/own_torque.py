@@ -1,0 +1,64 @@
+"""Columns that are the axis' own torque, asked for or read elsewhere: a set point of the torque, a motor current.
+
+A set point of the speed is one, too, where drag is all that an axis needs: no cause either.
+
+A cause acts beside the axis' own inertia, friction and load, which it still needs. Beside its own torque it needs none
+of them: tau = k c + B b with B the motion (inertia, friction of either sign, drag, waves over the position), and what
+B explains beside c is small against what it explains alone. Torque then follows torque, which foretells nothing.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.estimation.prepare import Array, Prepared
+from cosim.support.statistics import column_rms
+
+CREEP = 0.02
+"""Share of the fastest speed below which the sign of friction is not told. Unit: 1."""
+WAVES = 3
+"""Waves of a load over the range of positions: a weight on half a turn, or a spring, is one and a half of them."""
+
+
+def own_torque(prepared: Prepared, columns: Mapping[str, Array]) -> tuple[str, ...]:
+    """Return the names of the columns that are the torque of this axis again, though not in every sample.
+
+    Args:
+        prepared: recordings of training.
+        columns: values of each column at the kept rows, (rows,), low-passed as the torque is.
+
+    Returns:
+        Names in the order given. None where motion explains hardly anything of the torque: then nothing tells them.
+    """
+    tau, motion = prepared.stacked("tau"), _motion(prepared)
+    level = np.ones((len(tau), 1))
+    alone, moved = _energy_left(level, tau), _energy_left(np.column_stack([level, motion]), tau)
+    if alone - moved <= POLICY.small * alone:
+        return ()
+
+    def is_torque(column: Array) -> bool:
+        beside = np.column_stack([level, column])
+        needed = _energy_left(beside, tau) - _energy_left(np.column_stack([beside, motion]), tau)
+        return needed < POLICY.small * (alone - moved)
+
+    return tuple(name for name, column in columns.items() if is_torque(column))
+
+
+def _motion(prepared: Prepared) -> Array:
+    """What an axis' own motion may ask of its torque, (rows, n)."""
+    v = prepared.stacked("v")
+    sign = np.tanh(v / (CREEP * np.abs(v).max() + 1e-300))
+    shapes = [prepared.stacked("a"), sign, v]
+    if prepared.has_position:
+        low, high = prepared.ranges["q"]
+        place = (prepared.stacked("q") - low) / (high - low)
+        shapes += [np.cos(np.pi * k * place) for k in range(1, WAVES + 1)]
+    return np.column_stack(shapes)
+
+
+def _energy_left(columns: Array, tau: Array) -> float:
+    """Energy of the torque that least squares leave."""
+    scaled = columns / (column_rms(columns) + 1e-300)
+    rest = tau - scaled @ np.linalg.lstsq(scaled, tau, rcond=1e-9)[0]
+    return float(rest @ rest)
