@@ -72,6 +72,9 @@ PAGES = {
     "proof/null.md": BENCH.format("diagnosis.py null --cases 10 --seed 6000", "proof"),
     "proof/ablation.md": "python bench/ablation.py --home 281127341 --rough 730915562 --cases 120 --out results/proof",
     "proof/sensitivity.md": BENCH.format("sensitivity.py --cases 6 --seed 158358624", "proof"),
+    "proof/class_first.md": "cosim prove --rough --cases 150 --seed 881102323 --seconds 60 --out rough"
+    " && cosim prove --cases 100 --seed 344864908 --seconds 60 --out home"
+    " && python -m bench.class_first rough home --out results/proof",
     "robustness/attack.md": BENCH.format("attack.py --seed 1 --count 5200", "robustness"),
     "robustness/fuzz.md": BENCH.format(
         "fuzz.py --watch plain --watch sanitizers --examples 500 --seed 7", "robustness"
