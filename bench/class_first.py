@@ -113,31 +113,20 @@ def rows_of(folder: Path, workers: int) -> Iterable[dict[str, str]]:
 
 def page(rows: Sequence[dict[str, Any]], command: str) -> str:
     """The table, and what the comparison of the two orders says."""
-    lines = [
-        "# Class first, name second: measured",
-        "",
-        f"    {command}",
-        "",
-        str(__doc__).split("\n\n", 2)[2].strip(),
-        "",
-    ]
-    lines += [
-        "| true class | machines | name: right, other, silent | term: right, other, silent |",
-        "|---|---|---|---|",
-    ]
+    how = str(__doc__).split("\n\n", 2)[2].strip()
+    lines = ["# Class first, name second: measured", "", f"    {command}", "", how, ""]
+    lines += ["| true class | machines | right by name | right by term | class of the term |", "|---|---|---|---|---|"]
     for kind in (*CLASSES, OTHER, NONE):
         own = [row for row in rows if row["true"] == kind]
-        cells = (" ".join(str(n) for n in counted(own, way)) for way in ("named", "term"))
-        lines.append(f"| {kind} | {len(own)} | {' | '.join(cells)} |")
+        by_name, by_term = (sum(row[way] == kind for row in own) for way in ("named", "term"))
+        told = ", ".join(f"{one} {many}" for one, many in Counter(row["term"] for row in own).most_common())
+        lines.append(f"| {kind} | {len(own)} | {by_name} | {by_term} | {told} |")
     own = [row for row in rows if row["true"] in CLASSES]
     right = Counter((row["named"] == row["true"], row["term"] == row["true"]) for row in own)
     names, terms = right[True, False], right[False, True]
     p = binomtest(names, names + terms).pvalue if names + terms else 1.0
-    lines += [
-        "",
-        f"Of {len(own)} machines whose effect has a class, {names} have the right class by the name alone and",
-    ]
-    lines += [f"{terms} by the term alone (McNemar, p = {p:.2g})."]
+    told = f"{names} have the right class by the name alone and {terms} by the term alone (McNemar, p = {p:.2g})."
+    lines += ["", f"Of {len(own)} machines whose effect has a class,", told]
     return "\n".join(lines) + "\n"
 
 
