@@ -15,6 +15,8 @@ Row = Mapping[str, Any]
 Spans = Sequence[Sequence[float]]
 
 NO_NAMES = ("none", "unknown")
+SHAKEN = ("ground", "vibration", "wind")
+"""What is concealed where `broadband_disturbance`, a word for something without a name, is true."""
 LEAST_REMOVABLE = 0.05
 """Share of the held-out RMS that the true structure must remove, else there is no gap to close."""
 
@@ -83,7 +85,13 @@ def probabilities(row: Row) -> Iterator[tuple[float, bool]]:
     """Each printed probability of an effect that was offered, and whether it was there."""
     for finding in row["answer"]["effects"] if row["status"] == "ok" else ():
         if finding["answer"] in ("found", "ambiguous"):
-            yield float(finding["probability"]), finding["effect"] in concealed(row)
+            yield float(finding["probability"]), finding["effect"] in told_rightly(row)
+
+
+def told_rightly(row: Row) -> tuple[str, ...]:
+    """Names that should be given, and the word for what shakes the machine where that is concealed."""
+    shaken = any(entry["effect"] in SHAKEN for entry in row["truth"]["effects"])
+    return (*concealed(row), "broadband_disturbance") if shaken else concealed(row)
 
 
 def gap_closed(row: Row) -> float | None:

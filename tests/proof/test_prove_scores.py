@@ -106,6 +106,8 @@ def test_a_tool_that_crashed_is_wrong_and_raises_no_alarm() -> None:
 def test_calibration_error_is_the_distance_from_the_diagonal() -> None:
     rows = [row("one", ["delay"], [name]) for name in ("delay", "delay", "delay", "cogging")]
     assert scores(rows)["calibration_error"]["value"] == pytest.approx(0.9 - 0.75)
+    shaken = [row("outside", [name], ["broadband_disturbance"]) for name in ("wind", "wind", "wind", "rubbing")]
+    assert scores(shaken)["calibration_error"]["value"] == pytest.approx(0.9 - 0.75)  # rubbing is no random disturbance
     (only,) = score.bins([(0.9, True), (0.94, True), (0.92, False)])
     assert (only["printed"], only["true"], only["n"]) == (pytest.approx(0.92), pytest.approx(2 / 3), 3)
 
