@@ -72,9 +72,11 @@ def _standing(
     """Of some effects those that stand, their structure, and what each gains, or gained before it was taken out.
 
     One that does not stand may be spoilt by another: the one that falls lowest is taken out, or the one that helps
-    least, whichever leaves the better prediction in the end.
+    least, whichever leaves the better prediction in the end; but a way with one that halves the held-out error goes
+    before one that leaves it. The likelihood counts fast rows by the hundred: one that explains a few of them may be
+    ahead there, and leave the error as it was.
     """
-    problem = comparison.problem
+    problem, policy = comparison.problem, comparison.policy
     gains = {one.effect.id: _gain(problem, chosen, one, some, held) for one in some}
     nats = {one.effect.id: gains[one.effect.id].nats for one in some}
     falling = [one for one in some if not _is_validated(comparison, examined, chosen, one, gains[one.effect.id])]
@@ -85,7 +87,12 @@ def _standing(
     for name in sorted(out):
         rest = [one for one in some if one.effect.id != name]
         ways.append(_standing(comparison, examined, _with(problem, examined, rest), rest, held))
-    best, kept, known = max(ways, key=lambda way: held.predicted(way[0]))
+
+    def worth(way: tuple[Fit, list[AcceptedEffect], dict[str, Gain]]) -> tuple[bool, float]:
+        fit, those, known = way
+        return any(known[one.effect.id].matters_alone(policy) for one in those), held.predicted(fit)
+
+    best, kept, known = max(ways, key=worth)
     return best, kept, gains | known
 
 

@@ -83,6 +83,12 @@ class Tables:
         self.fitted.append(mount.names)
         return Fitted(mount)
 
+    def without(self, found: Fitted, name: str) -> Fitted:
+        """The base keeps its own effect."""
+        own = len(self.mount.effects)
+        kept = tuple(one for place, one in enumerate(found.mount.effects) if one.id != name or place < own)
+        return self.fit(Structure(kept), 30)
+
     def predicted(self, found: Fitted) -> float:
         return self.nats[found.mount.names]
 
@@ -168,6 +174,13 @@ def test_of_two_ways_the_one_that_predicts_better_is_taken() -> None:
     assert standing(proof) == "x"
     tables = Tables({"b": 0.0, "bx": 52.5, "by": 54.0, "bxy": 55.0})
     assert standing(proven(tables, "xy")) == "y"
+
+
+def test_of_two_ways_one_that_halves_the_error_goes_before_one_that_leaves_it() -> None:
+    """Fast rows by the hundred are predicted a little better by the first, which takes nothing of the error away."""
+    nats = {"b": 0.0, "bx": 134.0, "by": 37.0, "bxy": 219.0}
+    assert standing(proven(Tables(nats, {"b": 1.0, "bx": 0.99, "by": 0.4, "bxy": 0.45}), "xy")) == "y"
+    assert standing(proven(Tables(nats, {"b": 1.0, "bx": 0.99, "by": 0.7, "bxy": 0.78}), "xy")) == "x"
 
 
 def test_what_stands_alone_is_not_fitted_again() -> None:
