@@ -154,11 +154,17 @@ def unnamed(path: Path, found: Columns, lacking: Sequence[str], free: Sequence[s
     return UndecidedError(text, decided_by=deciding, culprit=str(path), value=len(names), choices=names)
 
 
-def counting(path: Path, name: str, step: float) -> UndecidedError:
-    """Ask what a column counts that is not named as a time and grows by whole numbers: samples, or a unit of time."""
-    asked = f'{path}: "{short(name)}" steps by {step:.6g}; say what one is, for example --units t=ms, or for samples'
+def counting(path: Path, name: str, step: float, fitting: Sequence[str]) -> UndecidedError:
+    """Ask what a column counts that is not named as a time and grows by whole numbers: samples, or a unit of time.
+
+    The example is the first unit that makes the step one of a servo.
+    """
+    unit = (*fitting, "ms")[0]
+    asked = (
+        f'{path}: "{short(name)}" steps by {step:.6g}; say what one is, for example --units t={unit}, or for samples'
+    )
     text = f'{asked} that are 0.5 ms apart --units "t=0.5 ms".'
-    return UndecidedError(text, decided_by={"units": {"t": "ms"}}, culprit=str(path), value=step)
+    return UndecidedError(text, decided_by={"units": {"t": unit}}, culprit=str(path), value=step)
 
 
 def rates(path: Path, name: str, step: float, fitting: Sequence[str], said: str) -> UndecidedError:

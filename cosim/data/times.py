@@ -121,8 +121,8 @@ def check_slow(path: Path, column: np.ndarray, name: str, stated: str) -> None:
     step = float(np.median(steps)) if len(steps) else 0.0
     if step >= 1 and not _is_since_1970(values):
         if not is_named(name, "time"):
-            raise questions.counting(path, name, step)
-        fitting = [unit for unit, size in SECONDS.items() if SLOWEST <= 1 / (step * size) <= FASTEST]
+            raise questions.counting(path, name, step, _fitting(step))
+        fitting = _fitting(step)
         said = " or ".join(f"{1 / (step * SECONDS[unit]):.4g} Hz in {unit}" for unit in ("s", *fitting))
         raise questions.rates(path, name, step, [*fitting, "s"], said)
 
@@ -135,6 +135,11 @@ def _of_date(column: np.ndarray) -> str:
     """Return the unit in which a column counts since 1970, or an empty text if it does not."""
     first = float(column[0])
     return next((unit for unit, size in SECONDS.items() if YEARS[0] <= first * size <= YEARS[1] and unit != "s"), "")
+
+
+def _fitting(step: float) -> list[str]:
+    """Return the units in which such a step is that of a servo."""
+    return [unit for unit, size in SECONDS.items() if SLOWEST <= 1 / (step * size) <= FASTEST]
 
 
 def _of_sampling(path: Path, column: np.ndarray, name: str) -> str:
@@ -150,9 +155,9 @@ def _of_sampling(path: Path, column: np.ndarray, name: str) -> str:
         said = f"{1 / step:.4g} Hz in s and {1 / (step * SECONDS['ms']):.4g} Hz in ms"
         raise questions.rates(path, name, step, ("ms", "s"), said)
     if not is_named(name, "time") and not is_unit(name):
-        raise questions.counting(path, name, step)
+        raise questions.counting(path, name, step, _fitting(step))
     span = float(np.nanmax(values) - np.nanmin(values))
-    fitting = [unit for unit, size in SECONDS.items() if SLOWEST <= 1 / (step * size) <= FASTEST]
+    fitting = _fitting(step)
     lasting = [unit for unit in fitting if span * SECONDS[unit] >= SHORTEST] or fitting
     if len(lasting) == 1:
         return lasting[0]

@@ -115,6 +115,13 @@ def test_a_time_that_counts_is_asked_for_in_a_table_that_is_no_axis_too(
     assert seen.options["units"] == {"t": "ms"}
 
 
+def test_a_counter_is_asked_for_in_the_unit_in_which_a_servo_counts(tmp_path: Path) -> None:
+    """A tick of 5005 is 200 Hz in us; in ms, which was the example before, it is 0.2 Hz."""
+    seen = preview(written(tmp_path / "run.csv", "#a,b,c", 5005 * np.arange(400), TAU, Q), {"columns": {"t": "#1"}})
+    assert any("for example --units t=us" in text for text in seen.undecided)
+    assert seen.options["units"]["t"] == "us"
+
+
 def test_a_frequency_is_no_unit_of_a_time(tmp_path: Path) -> None:
     path = written(tmp_path / "run.csv", "timestep (8Hz),torque (Nm),position (rad)", 10 * np.arange(400), TAU, Q)
     with pytest.raises(UndecidedError, match='"8 Hz" of column "timestep" is no unit of time; say which'):
