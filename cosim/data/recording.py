@@ -5,7 +5,7 @@ Names: `t` [s], `tau` [N.m, or N on a linear axis], `q` [rad or m] or a measured
 """
 
 from collections.abc import Hashable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -96,7 +96,8 @@ class Recording:
         found, own = read_run(path, columns or {}, units or {}, layout)
         columns, units = options_within(path, columns or {}, units or {})
         found = rows_of_one(path, found, columns, units, layout, required)
-        return cls.judged(path, named(path), found, own, columns, units, required)
+        one = cls.judged(path, named(path), found, own, columns, units, required)
+        return replace(one, origin=one.origin | {"period": layout["period"]}) if "period" in layout else one
 
     @classmethod
     def of(

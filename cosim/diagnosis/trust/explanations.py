@@ -85,7 +85,7 @@ TIMES = {"ms": (1e3, 0.01), "us": (1e6, 0.006), "ns": (1e9, 0.002)}
 
 
 def explanations(
-    linear: bool, reading: str, stated: Collection[str] = (), speed_off: float = 1.0
+    linear: bool, reading: str, stated: Collection[str] = (), speed_off: float = 1.0, is_counted: bool = False
 ) -> Iterator[Explanation]:
     """All explanations for an axis.
 
@@ -94,6 +94,7 @@ def explanations(
         reading: "q", or "v" where a speed was measured.
         stated: columns whose unit was stated; theirs is not doubted.
         speed_off: how many times the slope of the position a measured speed is, 1 where they agree.
+        is_counted: whether rows were given their times by a period that a user stated.
     """
     yield RIGHT
     yield from CARDS
@@ -106,7 +107,7 @@ def explanations(
         yield Explanation(
             kind="time_unit", what=what, prior=prior, time=factor, factor=factor, option=f"--units t={unit}"
         )
-    yield from _halves(reading) if speed_off == 1.0 else _contradiction(speed_off, linear)
+    yield from _halves(reading) if speed_off == 1.0 else _contradiction(speed_off, linear, is_counted)
 
 
 def _halves(reading: str) -> Iterator[Explanation]:
@@ -117,16 +118,22 @@ def _halves(reading: str) -> Iterator[Explanation]:
         )
 
 
-def _contradiction(k: float, linear: bool) -> Iterator[Explanation]:
+def _contradiction(k: float, linear: bool, is_counted: bool) -> Iterator[Explanation]:
     """Speed, position and time of which one must be wrong, as a speed is k times the slope of the position.
 
     A speed is wrong more often (an estimate of a drive, another shaft); a time or a position is in published records.
+    Where rows were given their times by a period, speed and time change places: both readings are the machine's, and
+    the period is what somebody said of it.
     """
+    rare, often = 0.007, 0.02
+    of_time, of_speed = (often, rare) if is_counted else (rare, often)
     length = "m" if linear else "rad"
-    slip = Explanation(kind="time_unit", what=f'time is stretched by {k:.3g} (--units "t={1 / k:.4g} s")', prior=0.007)
+    slip = Explanation(
+        kind="time_unit", what=f'time is stretched by {k:.3g} (--units "t={1 / k:.4g} s")', prior=of_time
+    )
     speed = f'"v" is {k:.3g} times the speed, and position and time are right'
     place = f'"q" is {1 / k:.3g} times the position (--units "q={k:.4g} {length}")'
-    yield replace(slip, kind="speed_scale", what=speed, prior=0.02, speed=k, factor=k, is_slip=False)
+    yield replace(slip, kind="speed_scale", what=speed, prior=of_speed, speed=k, factor=k, is_slip=False)
     yield replace(slip, time=k, factor=k)
     yield replace(slip, kind="position_scale", what=place, prior=0.005, position=1 / k, factor=1 / k)
 

@@ -43,7 +43,8 @@ class Judgement:
         evidence = Evidence(list(recordings), reference)
         reading = "q" if all("q" in one for one in recordings) else "v"
         stated = [name for name in (reading, "tau") if all(name in one.units for one in recordings)]
-        table = tuple(explanations(reference.linear, reading, stated, evidence.speed_off))
+        counted = all("period" in one.origin for one in recordings)
+        table = tuple(explanations(reference.linear, reading, stated, evidence.speed_off, counted))
         prior = np.array([log(one.prior) for one in table])
         score = prior + np.array([evidence.of(one) for one in table])
         if not np.isfinite(score).any():  # too short to say anything
@@ -138,11 +139,13 @@ def stated(judgement: Judgement) -> Sanity:
         right = "" if column == "t" else f" If its unit is the right one, state that: --units {column}=..."
         text = f"{judgement.names}: {first.what} ({_fact(judgement)}). Use {best.option}.{right}"
         raise RecordingError(text, culprit=column, value=best.factor)
+    evidence = judgement.evidence
+    same_fault = evidence.speed_off != 1.0 and evidence.reference.is_of_recordings  # other sizes, and no other names
     return Sanity(
         finding=judgement.kind,
         statement=f"{judgement.names}: {_fact(judgement)}. {_causes(told)}",
         alternatives=tuple(one for _, one in told),
-        blocks_naming=judgement.slip > POLICY.half,
+        blocks_naming=judgement.slip > POLICY.half and not same_fault,
     )
 
 

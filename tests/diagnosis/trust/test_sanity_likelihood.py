@@ -90,6 +90,16 @@ def test_where_speed_position_and_time_contradict_the_card_says_which_is_wrong(
     assert option in said.alternatives[0].what
 
 
+def test_a_period_that_somebody_stated_is_doubted_before_the_speed_of_the_machine() -> None:
+    """Nothing else tells them: the card was estimated from the same recording."""
+    read, unknown = beside_speed(t=2.0), Reference(4.0, 4.0, is_of_recordings=True)
+    counted = replace(read, origin={"period": "20ms"})
+    (by_file,), (by_hand,) = (judged([one], [], unknown) for one in (read, counted))
+    assert [one.what.split()[0] for one in by_file.alternatives][:2] == ['"v"', "time"]
+    assert [one.what.split()[0] for one in by_hand.alternatives][:2] == ["time", '"v"']
+    assert not by_hand.blocks_naming, "what acts is the same, whatever its size"
+
+
 def test_where_no_card_knows_all_three_are_named() -> None:
     """A card that was estimated from the same recording has the same fault."""
     (said,) = judged([beside_speed(t=2.0)], [], Reference(4.0, 4.0, is_of_recordings=True))
