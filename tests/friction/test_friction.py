@@ -32,14 +32,6 @@ def moves(distance: float, count: int = 2000) -> Array:
     return np.full(count, distance / count)
 
 
-@pytest.mark.parametrize("n", [0.5, 0.99, 1 - 1e-5, 1.0, 1 + 3e-5, 1.7, 2.0, 5.0])
-def test_the_first_loading_of_dahl_is_its_closed_form(n: float) -> None:
-    x = np.array([0.1, 0.5, 1.9, 3.0, 10.0])
-    left = np.exp(-x) if n == 1 else np.maximum(1 + (n - 1) * x, 0) ** (-1 / (n - 1))
-    found = [numeric(replace(DAHL, n=n))("advance", [0.0], 1.0, one * BEND)[0] / 2.322 for one in x]
-    np.testing.assert_allclose(found, 1 - left, rtol=1e-7)
-
-
 @pytest.mark.parametrize("law", [LUGRE, replace(DAHL, n=0.5), replace(DAHL, n=1.7), MAXWELL], ids=lambda law: law.key)
 @pytest.mark.parametrize("v", [-0.7, -1e-3, 1e-5, 0.05])
 def test_advance_is_what_a_tight_solver_finds_at_constant_speed(law: Any, v: float) -> None:
@@ -55,33 +47,6 @@ def test_dahls_inner_loops_drift_and_those_of_maxwell_slip_close() -> None:
         torque, state = pulled(law, moves(0.8 * BEND))
         again, _ = pulled(law, np.concatenate([moves(-0.5 * BEND), moves(0.5 * BEND)]), state)
         assert low <= abs(again[-1] - torque[-1]) / law.Fc <= high
-
-
-def first_loading(law: MaxwellSlip, distance: float) -> float:
-    """Torque after the first pull over a distance, slowly: every element a spring up to its level."""
-    k = ca.DM(law.stiffness()).full().ravel()
-    return float(np.minimum(k * distance, law.Fs / law.elements).sum())
-
-
-SHARP = replace(MAXWELL, attraction=1000.0)
-
-
-def test_maxwell_slip_is_springs_that_slip_one_after_the_other() -> None:
-    stiffness = ca.DM(MAXWELL.stiffness()).full().ravel()
-    assert len(stiffness) == len(MAXWELL.states()) == MaxwellSlip.elements
-    assert stiffness.sum() == pytest.approx(MAXWELL.sigma0, rel=1e-14)
-    assert stiffness[0] / stiffness[-1] == pytest.approx(18.0, rel=1e-12)
-    steps = moves(4 * BEND) * 1e-3  # moved slowly: the level is that at rest
-    found = numeric(SHARP).along(steps, 1e3).sum(axis=0)
-    expected = [first_loading(SHARP, x) for x in np.cumsum(steps) * 1e3]
-    np.testing.assert_allclose(found, expected, atol=2e-3 * SHARP.Fs)
-
-
-def test_with_its_default_spread_maxwell_slip_loads_like_dahl() -> None:
-    plain = replace(SHARP, Fs=None, Vs=None)
-    x = np.cumsum(moves(8 * BEND))
-    torque, _ = pulled(plain, moves(8 * BEND))
-    assert np.abs(torque / 2.322 - (1 - np.exp(-x / BEND))).max() < 0.062
 
 
 @pytest.mark.parametrize("reached", [0.2, 0.8, 2.0, 6.0])
@@ -115,16 +80,6 @@ def test_another_number_of_elements_is_a_subclass_with_the_same_limits(elements:
     assert len(law.states()) == elements
     assert numeric(law)("advance", np.zeros(elements), 1e-10, 1.0).sum() == pytest.approx(9.23e-6, rel=1e-9)
     assert pulled(law, moves(100 * BEND))[0][-1] == pytest.approx(2.322, rel=1e-9)
-
-
-def test_after_a_fall_of_the_level_the_elements_follow_it_over_a_distance() -> None:
-    """Pulled slowly to break-away, then fast: no element unloads faster than its spring, so the softest is the last."""
-    this, last = numeric(MAXWELL), 1.0 / 8 / float(MAXWELL.stiffness()[-1])
-    state = this("advance", this.start(), 1e-6, 1e3)
-    assert state.sum() == pytest.approx(3.322, rel=1e-3)
-    half, whole = (this("advance", state, 0.7, share * last / 0.7).sum() for share in (0.5, 1.1))
-    assert 2.322 + 1.0 / 16 < half < 3.0
-    assert whole == pytest.approx(2.322, rel=1e-3)
 
 
 def test_an_element_that_slips_forgets_what_it_was() -> None:

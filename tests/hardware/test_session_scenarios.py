@@ -9,7 +9,7 @@ import pytest
 from cosim.data.recording import Recording
 from cosim.hardware import look as looking
 from cosim.hardware.look import look
-from cosim.hardware.replay import LAST, _check_ticks, _exact
+from cosim.hardware.replay import _check_ticks
 from cosim.hardware.virtual import plant_of
 from cosim.hardware.wired import _ends, refuse_what_has_no_machine
 from cosim.hardware.words import LIMITS
@@ -69,19 +69,6 @@ def test_the_encoder_is_the_wire_with_a_quantum_and_the_torque_goes_the_other_wa
 def test_wires_that_no_machine_has_are_refused(wires: list[Wire], rule: str) -> None:
     with pytest.raises(HardwareError, match=rule):
         _ends(scenario(wires=wires))
-
-
-@pytest.mark.parametrize("kind", [np.uint32, np.int64, np.uint64, np.float64])
-def test_a_field_holds_whole_numbers_within_its_bounds_and_what_a_double_counts(kind: type) -> None:
-    given = np.array([0.0, 7.0, 0.5, -1.0, 2.0**32 - 1, 2.0**32, 2.0**53, 2.0**53 + 2, np.nan, np.inf, -(2.0**63)])
-    found = _exact(given, np.dtype(kind))
-    if kind is np.float64:
-        np.testing.assert_array_equal(found, given)
-        return
-    limits = np.iinfo(kind)
-    holds = [np.isfinite(x) and x == int(x) and limits.min <= int(x) <= min(limits.max, LAST) for x in given]
-    assert found.tolist() == [int(x) if held else 0 for x, held in zip(given, holds, strict=True)]
-    assert LAST == 2**53
 
 
 NOTHING = Recording("box", {"t": np.zeros(0)})
