@@ -18,24 +18,20 @@ from cosim.diagnosis.evidence.band import in_band
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.measure.bounds import not_found, undecided
-from cosim.diagnosis.measure.breakdown import parts
 from cosim.diagnosis.measure.experiment import Experiment, best, in_words
 from cosim.diagnosis.measure.findings import accepted, broadband_entry, measured_as, rival_finding, taken_finding
 from cosim.diagnosis.measure.law_selection import proposed_law
-from cosim.diagnosis.measure.locate import regions
 from cosim.diagnosis.measure.loop_bias import loop_bias
 from cosim.diagnosis.measure.protocol import (
     CUTOFF,
     Structures,
     band_of,
     heldout_rms,
-    judge,
     judged_band,
     of_the_best,
-    traces,
 )
 from cosim.diagnosis.measure.regression import black_box_rms
-from cosim.diagnosis.measure.withheld import without_names
+from cosim.diagnosis.measure.withheld import measured, remarks, without_names
 from cosim.diagnosis.search.alternatives import prove_sets
 from cosim.diagnosis.search.bookkeeping import enter_answer, finished
 from cosim.diagnosis.search.delivered import detected, likelier, standing, structure_with
@@ -58,9 +54,11 @@ from cosim.estimation.end_stops import pushes, without
 from cosim.estimation.fit import Fit
 from cosim.estimation.half_sample import are_even, moved, torque_late
 from cosim.estimation.not_determined import not_determined
-from cosim.estimation.prepare import prepare, quality
+from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
+from cosim.estimation.residuals import inside
 from cosim.estimation.row_weights import weights
+from cosim.support.statistics import rms
 from pyfmi_models.card import Card
 from pyfmi_models.effects import GravityUnbalance
 from pyfmi_models.mount import Mount
@@ -249,36 +247,28 @@ def _answer(comparison: Comparison, examined: Examined, heldout: Sequence[Record
 def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Recording], card: Card) -> Diagnosis:
     """What stands, measured on all recordings and put into words."""
     problem, decision = answer.comparison.problem, answer.decision
-    prepared, linear = problem.prepared, problem.mount.motion == "linear"
-    models = answer.models()
-    held = judge(heldout, models, prepared.band)
-    signals = traces(train, heldout, models, band_of(held))
-    found = _findings(answer, signals)
-    bias = loop_bias(prepared, answer.chosen, problem.weight)
+    seen = measured(problem, answer.models(), train, heldout)
+    found = _findings(answer, seen["traces"])
+    bias = loop_bias(problem.prepared, answer.chosen, problem.weight)
     policy = answer.comparison.policy
     left = beyond_any_machine(answer.scores.rest, policy)
     rest = (*rest_rules(answer.scores.effects, left, policy), *shaking_rules(left, policy))
     enter_answer(answer.comparison, answer.proof.chosen, found, answer.scores.improves, rest, decision.is_unknown)
+    seen["heldout"] = replace(seen["heldout"], black_box_rms=black_box_rms(seen["traces"]))
     return Diagnosis(
+        **seen,
         verdict=_verdict(found, decision),
         findings=tuple(found),
-        heldout=replace(held, black_box_rms=black_box_rms(signals)),
-        traces=signals,
-        parts=parts(signals),
-        regions=regions(signals, False, linear),
-        regions_after=regions(signals, True, linear),
         mount=card.mount.name,
-        motion=problem.mount.motion,
         delivered=tuple(
             dict.fromkeys(effect.id for effect in answer.chosen.mount.effects[len(problem.mount.effects) :])
         ),
         ambiguous_with=tuple((name, *members) for name, members in decision.sets.items() if members),
         depends_on=decision.depends_on,
         broadband=_shaken(answer),
-        data_quality=(*card.remarks(), *(n for one in (*train, *heldout) for n in quality(one, prepared.cutoff))),
+        data_quality=(*card.remarks(), *remarks(problem, train, heldout)),
         friction_law=proposed_law(problem, answer.chosen),
         loop_bias=bias.as_json() if bias else {},
-        base_parameters=models.base_parameters(),
         ledger=finished(answer.comparison, answer.held, answer.proof.chosen),
         scores=answer.scores,
     )
@@ -300,18 +290,9 @@ def _with_learned(
     if not (tried and tried.helps):
         refused = tried.refused() if tried else NOTHING_TRIED
         return replace(named, not_learned=refused) if answer.decision.is_unknown else named
-    problem, models = answer.comparison.problem, answer.models(tried.mount)
-    held = judge(heldout, models, problem.prepared.band)
-    signals = traces(train, heldout, models, band_of(held))
-    return replace(
-        named,
-        learned=tried.as_json(),
-        heldout=replace(held, black_box_rms=named.heldout.black_box_rms),
-        traces=signals,
-        parts=parts(signals),
-        regions_after=regions(signals, True, problem.mount.motion == "linear"),
-        base_parameters=models.base_parameters(),
-    )
+    seen = measured(answer.comparison.problem, answer.models(tried.mount), train, heldout)
+    seen["heldout"] = replace(seen["heldout"], black_box_rms=named.heldout.black_box_rms)
+    return replace(named, **(seen | {"learned": tried.as_json(), "regions": named.regions}))
 
 
 def _delivered(answer: Answer, heldout: Sequence[Recording], with_possible: bool) -> tuple[Answer, Learned | None]:
@@ -331,8 +312,8 @@ def _delivered(answer: Answer, heldout: Sequence[Recording], with_possible: bool
 def _is_worse(answer: Answer, fit: Fit, heldout: Sequence[Recording]) -> bool:
     """Whether a structure leaves more of the held-out recordings than the refitted base."""
     base, band = answer.base.mount, answer.comparison.problem.prepared.band
-    found = judge(heldout, Structures(base, base, fit.mount), band)
-    return found.after_rms > found.before_rms
+    judged = judged_band(heldout, Structures(base, base, fit.mount), band)
+    return rms(inside(judged, fit.mount)) > rms(inside(judged, base))
 
 
 def _learned(answer: Answer, heldout: Sequence[Recording]) -> tuple[Answer, Learned | None]:

@@ -56,3 +56,13 @@ def residuals(prepared: Prepared, mount: Mount) -> list[Array]:
     """Measured minus model torque at all rows of each piece."""
     inverse = Inverse(mount, ())
     return [piece.tau - inverse.torque(piece, np.zeros(0))[0] for piece in prepared.pieces]
+
+
+def kept(prepared: Prepared, mount: Mount) -> Array:
+    """The same at the kept rows of all pieces."""
+    return np.concatenate([one[p.kept] for one, p in zip(residuals(prepared, mount), prepared.pieces, strict=True)])
+
+
+def inside(prepared: Prepared, mount: Mount) -> Array:
+    """The same at all rows away from the edges of pieces."""
+    return np.concatenate([one[p.inside] for one, p in zip(residuals(prepared, mount), prepared.pieces, strict=True)])

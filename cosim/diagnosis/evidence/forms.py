@@ -17,9 +17,8 @@ import numpy as np
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array, Prepared
-from cosim.estimation.residuals import residuals
+from cosim.estimation.residuals import kept
 from pyfmi_models.effects import Effect
-from pyfmi_models.mount import Mount
 
 WAVES = 2
 """Cosines over each quantity: one that bends it, one that bends it twice; finer ones are effects of their own."""
@@ -49,23 +48,15 @@ def forms(found: Fit, own: int, prepared: Prepared) -> Forms | None:
     if not groups:
         return None
     columns, placed, first = [], [], 0
-    with_all = np.concatenate(
-        [one[piece.kept] for one, piece in zip(residuals(prepared, mount), prepared.pieces, strict=True)]
-    )
+    with_all = kept(prepared, mount)
     for group in groups.values():
         rest = tuple(one for one in mount.effects if not any(one is other for other in group))
-        torque = _residual(prepared, replace(mount, effects=rest)) - with_all
+        torque = kept(prepared, replace(mount, effects=rest)) - with_all
         shapes = np.column_stack([*_shapes(group[0], prepared)])
         columns.append(torque[:, None] * shapes / sqrt(shapes.shape[1]))
         placed.append(tuple(range(first, first + shapes.shape[1])))
         first += shapes.shape[1]
     return Forms(np.column_stack(columns), tuple(placed), tuple(groups))
-
-
-def _residual(prepared: Prepared, mount: Mount) -> Array:
-    """What a mount leaves at the kept rows."""
-    pieces = zip(residuals(prepared, mount), prepared.pieces, strict=True)
-    return np.concatenate([one[piece.kept] for one, piece in pieces])
 
 
 def _shapes(effect: Effect, prepared: Prepared) -> Iterator[Array]:

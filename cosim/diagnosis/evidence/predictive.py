@@ -27,7 +27,7 @@ from cosim.estimation.fit import Fit
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Prepared
 from cosim.estimation.problem import Problem
-from cosim.estimation.residuals import gets_memory, removed_at_rest, residuals
+from cosim.estimation.residuals import gets_memory, inside, kept, removed_at_rest
 from cosim.estimation.row_weights import least_speed, weights
 from cosim.support.statistics import bootstrap_range
 from pyfmi_models.mount import Mount
@@ -96,8 +96,7 @@ class Predictive:
 
     def residual(self, mount: Mount) -> Array:
         """Measured minus model torque at the kept rows."""
-        left = zip(residuals(self.prepared, mount), self.prepared.pieces, strict=True)
-        return np.concatenate([one[piece.kept] for one, piece in left])
+        return kept(self.prepared, mount)
 
     def slopes(self, found: Fit | Structure) -> Array:
         """Derivatives of the needed torque by the fitted numbers of a structure, at the kept rows."""
@@ -128,15 +127,14 @@ class Predictive:
         own = self.nuisances.columns[:, base.columns] * base.prior if base else np.empty((len(self.weight), 0))
         return np.column_stack([self.left_open(structure_of(self.training, found), range(len(found.free))), own])
 
-    def log_likelihood(self, residual: Array, open_: Array | None = None) -> float:
-        """Log-likelihood of a residual at the kept rows, nuisances integrated out.
+    def likelihood_of(self, mount: Mount) -> float:
+        """Log-likelihood of a model as it is, nuisances integrated out."""
+        residual = self.residual(mount)
+        return self._weighed(residual, np.empty((len(residual), 0))).log_likelihood
 
-        `open_` are columns (rows, n) of which a standard normal amount may be in it.
-        """
-        return self._weighed(residual, open_).log_likelihood
-
-    def _weighed(self, residual: Array, open_: Array | None) -> "Weighed":
-        columns = residual[:, None] if open_ is None else np.column_stack([residual, open_])
+    def _weighed(self, residual: Array, open_: Array) -> "Weighed":
+        """`open_` are columns (rows, n) of which a standard normal amount may be in the residual at the kept rows."""
+        columns = np.column_stack([residual, open_])
         target = self.bands.transform(columns)
         cross = self.bands.crossed(target, self._nuisances)
         grams = np.concatenate(
@@ -168,7 +166,10 @@ class Predictive:
             _beyond(float(np.mean((self.weight * self.residual(one)) ** 2)), share * reading_noise(self.prepared, one))
             for one in (without, mount)
         ]
-        wide = [_beyond(self._protocol_energy(one), reading_noise(self.protocol, one)) for one in (without, mount)]
+        wide = [
+            _beyond(float(np.mean(inside(self.protocol, one) ** 2)), reading_noise(self.protocol, one))
+            for one in (without, mount)
+        ]
         amplified = wide[1] > AMPLIFIED * wide[0] and narrow[1] > (1 - self.halved) * narrow[0]
         pairs = (narrow, narrow if is_noise(narrow, wide) and not amplified else wide)
         first, second = (1 - after / max(before, 1e-300) for before, after in pairs)
@@ -186,10 +187,6 @@ class Predictive:
         if not gets_memory(mount, without) or self.weight.all():
             return 0.0
         return removed_at_rest(self.weight, self.residual(mount), self.residual(without))
-
-    def _protocol_energy(self, mount: Mount) -> float:
-        left = zip(residuals(self.protocol, mount), self.protocol.pieces, strict=True)
-        return float(np.mean(np.concatenate([one[piece.inside] for one, piece in left]) ** 2))
 
     @cached_property
     def _nuisances(self) -> Array:

@@ -15,6 +15,8 @@ from cosim.diagnosis.answer.result import Part, Trace
 from cosim.support.statistics import Array, Index, bootstrap_range, rms
 
 Mask = npt.NDArray[np.bool_]
+MOST_BARS = 120
+"""Bars of a picture over time, at most."""
 
 
 @dataclass(frozen=True)
@@ -88,12 +90,12 @@ def slow(v: Array) -> float:
     return 0.02 * float(np.quantile(np.abs(v), 0.995)) if v.size else 0.0
 
 
-def speed_classes(v: Array, classes: int = 3) -> Array:
-    """Return edges of speed classes with equally many moving samples, from the least speed that counts as motion."""
+def speed_classes(v: Array) -> Array:
+    """Return edges of three speed classes with equally many moving samples, from the least that is motion."""
     moving = np.abs(v)[np.abs(v) > slow(v)]
     if moving.size < 100:
         return np.empty(0)
-    return np.unique(np.quantile(moving, np.linspace(0, 1, classes + 1)))
+    return np.unique(np.quantile(moving, [0, 1 / 3, 2 / 3, 1]))
 
 
 def parts(traces: Sequence[Trace]) -> tuple[Part, ...]:
@@ -114,10 +116,10 @@ def _masks(v: Array) -> Iterator[tuple[str, Mask, tuple[float, float] | None]]:
     yield "backward", v < -slow(v), None
 
 
-def bars(trace: Trace, most: int = 120) -> tuple[Array, Array, Array]:
+def bars(trace: Trace) -> tuple[Array, Array, Array]:
     """Return (edges, RMS before, RMS after) per second, or per 2, 5, 10, ... s of long recordings."""
     length = float(trace.t[-1] - trace.t[0])
-    width = next((w for w in (1, 2, 5, 10, 20, 60, 120, 300, 600) if length / w <= most), length / most)
+    width = next((w for w in (1, 2, 5, 10, 20, 60, 120, 300, 600) if length / w <= MOST_BARS), length / MOST_BARS)
     edges = trace.t[0] + width * np.arange(int(np.ceil(length / width)) + 1)
     count, _ = np.histogram(trace.t, edges)
     power = [_summed(trace.t, residual, edges) for residual in (trace.missing, trace.tau - trace.after)]

@@ -21,7 +21,7 @@ from cosim.estimation.fit import free_parameters
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.least_squares import projected
 from cosim.estimation.prepare import Array, Band, Piece, Prepared, prepare
-from cosim.estimation.residuals import residuals
+from cosim.estimation.residuals import inside, kept, residuals
 from cosim.estimation.row_weights import least_speed
 from cosim.support.statistics import Z95, rms
 from pyfmi_models.mount import Mount
@@ -50,20 +50,16 @@ def judge(recordings: Sequence[Recording], models: Structures, band: Band) -> He
 
     Where the protocol's band is mostly noise, the `band` of the analysis is what is judged.
     """
-    prepared = judged_band(recordings, models, band)
-    inside = np.concatenate([piece.inside for piece in prepared.pieces])
-    left = {
-        name: np.concatenate(residuals(prepared, mount))[inside]
-        for name, mount in (("nominal", models.nominal), ("before", models.before), ("after", models.after))
-    }
+    prepared, own = _judged(recordings, models, band)
+    nominal, before, after = (inside(prepared, one) for one in (models.nominal, models.before, models.after))
     return HeldOut(
         name=", ".join(recording.name for recording in recordings),
-        nominal_rms=rms(left["nominal"]),
-        before_rms=rms(left["before"]),
-        after_rms=rms(left["after"]),
+        nominal_rms=rms(nominal),
+        before_rms=rms(before),
+        after_rms=rms(after),
         floor_rms=_floor(prepared, models.after),
-        confidence_interval=interval_of(left["before"], left["after"], prepared.pieces[0].dt),
-        sliding=_sliding(recordings, models, band),
+        confidence_interval=interval_of(before, after, prepared.pieces[0].dt),
+        sliding=_sliding(own, models),
         cutoff_hz=prepared.cutoff,
         motion_hz=max(prepared.band),
     )
@@ -71,12 +67,15 @@ def judge(recordings: Sequence[Recording], models: Structures, band: Band) -> He
 
 def judged_band(recordings: Sequence[Recording], models: Structures, band: Band) -> Prepared:
     """Recordings in the band in which `judge` compares models on them."""
-    own, protocol = (
-        [heldout_rms(recordings, one, edges) ** 2 for one in (models.before, models.after)]
-        for edges in (band, Band(CUTOFF))
-    )
+    return _judged(recordings, models, band)[0]
+
+
+def _judged(recordings: Sequence[Recording], models: Structures, band: Band) -> tuple[Prepared, Prepared]:
+    """Recordings in the band that is judged, and in that of the analysis."""
+    both = prepare(recordings, band), prepare(recordings, CUTOFF)
+    own, protocol = ([rms(inside(one, mount)) ** 2 for mount in (models.before, models.after)] for one in both)
     is_above = band.cutoff > CUTOFF and own[0] > 2 * protocol[0]
-    return prepare(recordings, band if is_above or is_noise(own, protocol) else CUTOFF)
+    return both[0] if is_above or is_noise(own, protocol) else both[1], both[0]
 
 
 def band_of(held: HeldOut) -> Band:
@@ -86,19 +85,16 @@ def band_of(held: HeldOut) -> Band:
 
 def heldout_rms(recordings: Sequence[Recording], mount: Mount, band: float | Band = CUTOFF) -> float:
     """RMS of the torque residual of one model by the protocol, in its band or another [Hz]."""
-    prepared = prepare(recordings, band)
-    inside = np.concatenate([piece.inside for piece in prepared.pieces])
-    return rms(np.concatenate(residuals(prepared, mount))[inside])
+    return rms(inside(prepare(recordings, band), mount))
 
 
-def _sliding(recordings: Sequence[Recording], models: Structures, band: Band) -> dict[str, float]:
-    prepared = prepare(recordings, band)
-    v, inside = (np.concatenate([getattr(piece, name) for piece in prepared.pieces]) for name in ("v", "inside"))
-    least = least_speed(v[inside])
-    moving = inside & (np.abs(v) > least)
+def _sliding(prepared: Prepared, models: Structures) -> dict[str, float]:
+    v = np.concatenate([piece.v[piece.inside] for piece in prepared.pieces])
+    least = least_speed(v)
+    moving = np.abs(v) > least
     return {
-        "before_rms": rms(np.concatenate(residuals(prepared, models.before))[moving]),
-        "after_rms": rms(np.concatenate(residuals(prepared, models.after))[moving]),
+        "before_rms": rms(inside(prepared, models.before)[moving]),
+        "after_rms": rms(inside(prepared, models.after)[moving]),
         "cutoff_hz": prepared.cutoff,
         "motion_hz": max(prepared.band),
         "least_speed": least,
@@ -107,10 +103,8 @@ def _sliding(recordings: Sequence[Recording], models: Structures, band: Band) ->
 
 def _floor(prepared: Prepared, mount: Mount) -> float:
     """RMS that a general friction model and slow drifts, fitted to this very recording, would leave: noise, roughly."""
-    kept = [piece.kept for piece in prepared.pieces]
-    left = [one[rows] for one, rows in zip(residuals(prepared, mount), kept, strict=True)]
     drift = np.concatenate([_drifts(piece)[piece.kept] for piece in prepared.pieces])
-    return rms(projected(np.concatenate(left), np.column_stack([*discrepancy_basis(prepared), drift])))
+    return rms(projected(kept(prepared, mount), np.column_stack([*discrepancy_basis(prepared), drift])))
 
 
 def _drifts(piece: Piece) -> Array:

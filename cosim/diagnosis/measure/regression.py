@@ -19,6 +19,8 @@ CENTRES, MOST_ROWS = 800, 20_000
 """Rows that a kernel is placed at, and rows that it is fitted to."""
 ROUNDING = 1e-12
 """Spread of a feature, relative to its size, below which it is constant but for rounding. Unit: 1."""
+RIDGE = 1e-2
+"""Added to the diagonal, relative to the mean of the normal matrix. Unit: 1."""
 CHUNK = 256
 """Rows lifted at once: they stay in the cache."""
 
@@ -35,10 +37,10 @@ def stacked(traces: Sequence[Trace]) -> tuple[Array, Array]:
     return rows, np.concatenate([trace.missing for trace in traces])[::EVERY]
 
 
-def kernel(rows: Array, target: Array, ridge: float = 1e-2) -> Model:
+def kernel(rows: Array, target: Array) -> Model:
     """Kernel ridge regression on evenly spaced centres; widths are the spread of each feature.
 
-    k(x, c) = exp(-|x - c|^2 / 2) of features scaled to unit spread; ridge relative to the mean of the normal matrix.
+    k(x, c) = exp(-|x - c|^2 / 2) of features scaled to unit spread.
     """
     middle, spread = rows.mean(0), rows.std(0)
     spread = np.where(spread > ROUNDING * np.abs(rows).max(0), spread, 1.0)  # one way only, in training
@@ -58,7 +60,7 @@ def kernel(rows: Array, target: Array, ridge: float = 1e-2) -> Model:
         columns = lifted(part)
         normal += columns.T @ columns
         right += columns.T @ own
-    weights = np.linalg.solve(normal + ridge * np.trace(normal) / len(normal) * np.eye(len(normal)), right)
+    weights = np.linalg.solve(normal + RIDGE * np.trace(normal) / len(normal) * np.eye(len(normal)), right)
     return lambda others: np.concatenate([lifted(part) @ weights for part in _chunks(others)])
 
 

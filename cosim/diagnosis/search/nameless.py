@@ -149,7 +149,7 @@ def _holds(comparison: Comparison, found: Nameless, one: _Challenge, held: Predi
     whole, effects = allowed(comparison, one.beside, tuple(terms.values()))
     if not effects:
         return False
-    gain = held.log_likelihood(held.residual(whole)) - held.log_likelihood(held.residual(one.beside.mount))
+    gain = held.likelihood_of(whole) - held.likelihood_of(one.beside.mount)
     policy = comparison.policy
     least = found.proof.predicted[one.effect.effect.id] - policy.clear
     return gain >= max(policy.fair, least)

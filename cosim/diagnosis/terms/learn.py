@@ -171,7 +171,7 @@ def _judged(comparison: Comparison, found: Fit, terms: Sequence[CandidateTerm], 
     pairs = list(zip(_held_out(held.protocol, found.mount), _held_out(held.protocol, whole), strict=True))
     left = [np.concatenate(parts) for parts in zip(*pairs, strict=True)]
     before, after = map(rms, left)
-    gain = held.log_likelihood(held.residual(whole)) - held.log_likelihood(held.residual(found.mount))
+    gain = held.likelihood_of(whole) - held.likelihood_of(found.mount)
     worse = any(rms(new) > rms(old) for old, new in pairs)
     interval = interval_of(left[0], left[1], held.protocol.pieces[0].dt)
     proven = gain >= comparison.policy.fair or 1 - (after / before) ** 2 >= comparison.policy.considerable

@@ -28,6 +28,8 @@ ENOUGH = 1e-7
 """A fit ends when a step lowers the sum of squares by less than this share: less than a standard error moves it."""
 ROUGH = 1e-3
 """The same for a first look: basins differ by per cents."""
+MOST = 60
+"""Evaluations that a fit may take."""
 KEPT = 4
 """Evaluations that are kept: a search that ends with some that were no better ends at one before them."""
 WIDEST = 1e3
@@ -92,12 +94,9 @@ class Estimate:
         return (*lost, *pairs)
 
 
-def estimate(
-    names: Sequence[str], start: Array, model: Model, limits: Array | None = None, evaluations: int = 60
-) -> Estimate:
+def estimate(names: Sequence[str], start: Array, model: Model, limits: Array | None = None) -> Estimate:
     """Fit from one start; see the module. `limits` (free, 2) are the lowest and highest values that make sense."""
-    rough = explore(names, start, model, limits, evaluations, ENOUGH)
-    return settle(rough, model, limits, evaluations)
+    return settle(explore(names, start, model, limits, MOST, ENOUGH), model, limits)
 
 
 def explore(
@@ -112,11 +111,11 @@ def explore(
     return Estimate(tuple(names), start, np.exp(found), covariance, _rms(outputs.residual), search.evaluations)
 
 
-def settle(rough: Estimate, model: Model, limits: Array | None = None, evaluations: int = 60) -> Estimate:
+def settle(rough: Estimate, model: Model, limits: Array | None = None) -> Estimate:
     """Go on from an estimate with its own residuals as weights, until nothing changes any more."""
     scale = np.maximum(rough.rms, 1e-300)
     settled = _Search(model, scale)
-    found = _minimum(settled, np.log(rough.values), limits, evaluations, ENOUGH)
+    found = _minimum(settled, np.log(rough.values), limits, MOST, ENOUGH)
     outputs = settled.outputs(found)
     counted = rough.evaluations + settled.evaluations
     rms = _rms(outputs.residual)

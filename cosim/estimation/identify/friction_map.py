@@ -197,8 +197,8 @@ def _pairs(law: FrictionLaw, names: Sequence[str]) -> list[tuple[str, float]]:
     return list(zip(names, _numbers(law, names).tolist(), strict=True))
 
 
-def _stribeck_starts(samples: Samples, names: Sequence[str], count: int = 3) -> list[Array]:
-    """The best (Vs, delta) of a grid, the linear parameters fitted for each."""
+def _stribeck_starts(samples: Samples, names: Sequence[str]) -> list[Array]:
+    """The three best (Vs, delta) of a grid, the linear parameters fitted for each."""
     v, friction = samples.v, samples.friction
     found = []
     for speed in np.geomspace(v.min() / 3, v.max(), 20):
@@ -212,4 +212,4 @@ def _stribeck_starts(samples: Samples, names: Sequence[str], count: int = 3) -> 
     typical = float(np.median(np.abs(friction)))
     plain = [typical, typical, float(np.median(v)), 2.0, 0.1 * typical / float(v.max())]
     order = [NAMES.index(name) for name in names]
-    return [np.array(numbers)[order] for numbers in (best or [plain])[:count]]
+    return [np.array(numbers)[order] for numbers in (best or [plain])[:3]]

@@ -50,7 +50,7 @@ def predicted(recording: Recording, effect: object) -> float:
     held = Predictive.of(
         Comparison.of(problem, base, POLICY), prepare([recording], 30.0), base, prepare([recording], 30.0)
     )
-    with_it, without = (held.log_likelihood(held.residual(mount)) for mount in (axis(effect), axis()))
+    with_it, without = (held.likelihood_of(mount) for mount in (axis(effect), axis()))
     return with_it - without
 
 
@@ -84,9 +84,9 @@ def test_what_training_leaves_open_of_an_effect_is_not_held_against_it() -> None
     problem = Problem(axis(), prepared, np.ones(len(prepared.recording_of)), 1 / RATE)
     base, found = (problem.fit(axis(*effects), 15) for effects in ((), (FrictionAsymmetry(level_asymmetry=0.03),)))
     held = Predictive.of(Comparison.of(problem, base, POLICY), there, base, there)
-    assert held.predicted(found) > held.log_likelihood(held.residual(found.mount)) + POLICY.fair
+    assert held.predicted(found) > held.likelihood_of(found.mount) + POLICY.fair
     assert held.predicted(found) > held.predicted(base) + POLICY.fair
-    assert held.predicted(base) == held.log_likelihood(held.residual(base.mount))
+    assert held.predicted(base) == held.likelihood_of(base.mount)
 
 
 @pytest.mark.parametrize("factor", [0.8, 1.2])
