@@ -31,7 +31,7 @@ from cosim.diagnosis.measure.protocol import (
     of_the_best,
 )
 from cosim.diagnosis.measure.regression import black_box_rms
-from cosim.diagnosis.measure.withheld import measured, remarks, without_names
+from cosim.diagnosis.measure.withheld import measured, without_names
 from cosim.diagnosis.search.alternatives import prove_sets
 from cosim.diagnosis.search.bookkeeping import enter_answer, finished
 from cosim.diagnosis.search.delivered import detected, likelier, standing, structure_with
@@ -248,17 +248,17 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
     """What stands, measured on all recordings and put into words."""
     problem, decision = answer.comparison.problem, answer.decision
     seen = measured(problem, answer.models(), train, heldout)
-    found = _findings(answer, seen["traces"])
+    found = _findings(answer, seen.traces)
     bias = loop_bias(problem.prepared, answer.chosen, problem.weight)
     policy = answer.comparison.policy
     left = beyond_any_machine(answer.scores.rest, policy)
     rest = (*rest_rules(answer.scores.effects, left, policy), *shaking_rules(left, policy))
     enter_answer(answer.comparison, answer.proof.chosen, found, answer.scores.improves, rest, decision.is_unknown)
-    seen["heldout"] = replace(seen["heldout"], black_box_rms=black_box_rms(seen["traces"]))
-    return Diagnosis(
-        **seen,
+    return replace(
+        seen,
         verdict=_verdict(found, decision),
         findings=tuple(found),
+        heldout=replace(seen.heldout, black_box_rms=black_box_rms(seen.traces)),
         mount=card.mount.name,
         delivered=tuple(
             dict.fromkeys(effect.id for effect in answer.chosen.mount.effects[len(problem.mount.effects) :])
@@ -266,7 +266,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         ambiguous_with=tuple((name, *members) for name, members in decision.sets.items() if members),
         depends_on=decision.depends_on,
         broadband=_shaken(answer),
-        data_quality=(*card.remarks(), *remarks(problem, train, heldout)),
+        data_quality=(*card.remarks(), *seen.data_quality),
         friction_law=proposed_law(problem, answer.chosen),
         loop_bias=bias.as_json() if bias else {},
         ledger=finished(answer.comparison, answer.held, answer.proof.chosen),
@@ -291,8 +291,15 @@ def _with_learned(
         refused = tried.refused() if tried else NOTHING_TRIED
         return replace(named, not_learned=refused) if answer.decision.is_unknown else named
     seen = measured(answer.comparison.problem, answer.models(tried.mount), train, heldout)
-    seen["heldout"] = replace(seen["heldout"], black_box_rms=named.heldout.black_box_rms)
-    return replace(named, **(seen | {"learned": tried.as_json(), "regions": named.regions}))
+    return replace(
+        named,
+        learned=tried.as_json(),
+        heldout=replace(seen.heldout, black_box_rms=named.heldout.black_box_rms),
+        traces=seen.traces,
+        parts=seen.parts,
+        regions_after=seen.regions_after,
+        base_parameters=seen.base_parameters,
+    )
 
 
 def _delivered(answer: Answer, heldout: Sequence[Recording], with_possible: bool) -> tuple[Answer, Learned | None]:

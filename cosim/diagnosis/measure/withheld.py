@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import replace
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.doubt_entry import Sanity, not_determined_doubts
@@ -37,12 +37,9 @@ def without_names(
     """
     base, limits = limited(problem, base)
     unknown = not_determined(problem, limits)
-    return Diagnosis(
-        **measured(problem, Structures(problem.mount, base, base), train, heldout),
-        verdict=("unknown",),
+    return replace(
+        measured(problem, Structures(problem.mount, base, base), train, heldout),
         findings=tuple(_untestable(name) for name in TRIED),
-        mount=problem.mount.name,
-        data_quality=remarks(problem, train, heldout),
         sanity=(*sanity, *not_determined_doubts(unknown)),
         not_determined=unknown,
         seconds=time.perf_counter() - started,
@@ -51,25 +48,24 @@ def without_names(
 
 def measured(
     problem: Problem, models: Structures, train: Sequence[Recording], heldout: Sequence[Recording]
-) -> dict[str, Any]:
-    """What is measured of three models, whatever is named, by the fields of a diagnosis."""
+) -> Diagnosis:
+    """What is measured of three models, whatever is named: a diagnosis without names."""
     linear = problem.mount.motion == "linear"
     held = judge(heldout, models, problem.prepared.band)
     signals = traces(train, heldout, models, band_of(held))
-    return {
-        "heldout": held,
-        "traces": signals,
-        "parts": parts(signals),
-        "regions": regions(signals, False, linear),
-        "regions_after": regions(signals, True, linear),
-        "motion": problem.mount.motion,
-        "base_parameters": models.base_parameters(),
-    }
-
-
-def remarks(problem: Problem, train: Sequence[Recording], heldout: Sequence[Recording]) -> tuple[str, ...]:
-    """What is odd about the recordings."""
-    return tuple(note for one in (*train, *heldout) for note in quality(one, problem.prepared.cutoff))
+    return Diagnosis(
+        verdict=("unknown",),
+        findings=(),
+        heldout=held,
+        traces=signals,
+        parts=parts(signals),
+        regions=regions(signals, False, linear),
+        regions_after=regions(signals, True, linear),
+        mount=problem.mount.name,
+        motion=problem.mount.motion,
+        data_quality=tuple(note for one in (*train, *heldout) for note in quality(one, problem.prepared.cutoff)),
+        base_parameters=models.base_parameters(),
+    )
 
 
 def _untestable(name: str) -> Finding:
