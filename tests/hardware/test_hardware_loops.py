@@ -14,7 +14,7 @@ from on_hardware import SIMULATED, scenario
 
 from cosim.data.recording import Recording
 from cosim.hardware import loops, move
-from cosim.hardware.loops import Called, Threaded, bare_clock
+from cosim.hardware.loops import Threaded, bare_clock
 from cosim.hardware.machine import Machine
 from cosim.hardware.story import Story
 from cosim.hardware.structures import CSession
@@ -71,17 +71,6 @@ def library_of(calls: list[Any], **also: Any) -> Any:
     names = ("hardware_run", "hardware_release", "hardware_bare")
     made = {name: lambda *given, name=name: calls.append((name, *given[1:])) for name in names}
     return lambda: SimpleNamespace(**(made | also))
-
-
-def test_a_loop_that_is_called_runs_what_it_is_told_and_ends_without_torque(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls: list[Any] = []
-    monkeypatch.setattr(loops, "library", library_of(calls))
-    one = Called("session", "sample")  # type: ignore[arg-type]
-    assert one.alive
-    one.start()
-    one.go(7)
-    one.stop()
-    assert calls == [("hardware_run", "sample", 7), ("hardware_release",)]
 
 
 def test_a_loop_in_a_thread_runs_until_it_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None:
