@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any
 from unittest.mock import patch
 
+from cosim.estimation import problem
 from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import Piece
-from cosim.estimation.problem import Problem
 
 
 @dataclass
@@ -27,16 +27,16 @@ class Counts:
 @contextmanager
 def counted() -> Iterator[Counts]:
     """Count in this process, until the context ends."""
-    counts, fit, torque = Counts(), Problem.fit, Inverse.torque
+    counts, fit, torque = Counts(), problem.fit, Inverse.torque
 
-    def counting_fit(self: Problem, *args: Any, **more: Any) -> Any:
+    def counting_fit(*args: Any, **more: Any) -> Any:
         counts.fits += 1
-        return fit(self, *args, **more)
+        return fit(*args, **more)
 
     def counting_torque(self: Inverse, piece: Piece, values: Any) -> Any:
         counts.evaluations += 1
         counts.row_columns += len(piece.t) * (1 + len(self.by))
         return torque(self, piece, values)
 
-    with patch.object(Problem, "fit", counting_fit), patch.object(Inverse, "torque", counting_torque):
+    with patch.object(problem, "fit", counting_fit), patch.object(Inverse, "torque", counting_torque):
         yield counts
