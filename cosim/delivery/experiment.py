@@ -9,7 +9,7 @@ import csv
 import io
 import xml.etree.ElementTree as ET
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import pi
 from pathlib import Path
 
@@ -102,8 +102,8 @@ def with_experiment(
         return path
 
 
-def experiment_files(path: Path, stimulus: Stimulus) -> tuple[Related, ...]:
-    """Simulate a stimulus with an FMU and return the files of the experiment."""
+def experiment_files(path: Path, stimulus: Stimulus, folder: str = "") -> tuple[Related, ...]:
+    """Simulate a stimulus with an FMU and return the files of the experiment, in a folder ("" or "name/")."""
     ports = ports_of(describe(path))
     ticks = round(float(stimulus.times[-1]) / stimulus.step)
     settings = Settings(0.0, stimulus.step, ticks)
@@ -127,7 +127,7 @@ def experiment_files(path: Path, stimulus: Stimulus) -> tuple[Related, ...]:
     if stimulus.measured:
         said = f"What was measured in the recording {stimulus.name}"
         found.append(Related(CSV, "measured.csv", "result", said, _csv(measured_at, stimulus.measured)))
-    return tuple(found)
+    return tuple(replace(one, source=f"{folder}{one.source}") for one in found)
 
 
 def _typed(port: Port, value: float) -> float | int | bool:

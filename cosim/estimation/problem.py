@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from weakref import WeakValueDictionary
 
@@ -62,6 +62,10 @@ class Problem:
         rest = tuple(one for k, one in enumerate(found.mount.effects) if k < own or one.id != name)
         self._last.append(self.fit(replace(found.mount, effects=rest), LESS))
         return self._last[-1]
+
+    def __getstate__(self) -> dict[str, object]:
+        """What another process needs: no fits that are held here."""
+        return {one.name: getattr(self, one.name) for one in fields(self)}
 
     @cached_property
     def _fits(self) -> WeakValueDictionary[tuple[Mount, int, tuple[str, ...]], Fit]:

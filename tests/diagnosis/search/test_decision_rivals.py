@@ -79,6 +79,11 @@ class Tables:
     def fit(self, mount: Structure, iterations: int) -> Fitted:
         return Fitted(mount)
 
+    def without(self, found: Fitted, name: str) -> Fitted:
+        """The base keeps its own effect."""
+        own = len(self.mount.effects)
+        return Fitted(Structure(tuple(one for k, one in enumerate(found.mount.effects) if k < own or one.id != name)))
+
 
 def fitted(names: str, count: int = 0) -> Fitted:
     return Fitted(Structure(tuple(Named(one) for one in names)), count)

@@ -88,7 +88,7 @@ def test_what_removes_much_of_an_error_is_delivered_though_the_rest_is_no_likeli
     terms = [
         one for one in candidate_terms(MOUNT, comparison.problem.prepared) if one.name == "position and temperature"
     ]
-    monkeypatch.setattr(Predictive, "log_likelihood", lambda *_: 0.0)
+    monkeypatch.setattr(Predictive, "likelihood_of", lambda *_: 0.0)
     found = _judged(comparison, base, terms, held)
     assert found is not None
     assert found.gain == 0.0
