@@ -2,6 +2,8 @@
 
 import ast
 import re
+import shutil
+import subprocess
 import sys
 import tomllib
 from importlib.metadata import PackageNotFoundError, packages_distributions, version
@@ -37,6 +39,8 @@ SOURCES = [path for name in PACKAGES for path in (ROOT / name).rglob("*")]
 CALLED = {"sklearn": "scikit-learn"}
 """Optional packages that are installed by another name than they are imported by."""
 BUILT = {".so", ".dylib", ".dll", ".pyc"}
+FOLDERS = {".ci", "bench", "docs", "fmus", "results", "tests"}
+"""What the project has at its top beside the packages."""
 
 
 def fenced(language: str) -> list[str]:
@@ -49,6 +53,17 @@ def test_readme_states_the_two_commands_and_ci_runs_the_second() -> None:
     assert TEST in README
     assert TEST in (ROOT / ".ci" / "run").read_text("utf-8")
     assert (ROOT / ".ci" / "run").stat().st_mode & 0o100
+
+
+def test_what_a_run_leaves_is_no_part_of_the_project() -> None:
+    """Answers about measured machines name folders of the computer they were made on, and stay there."""
+    if not (ROOT / ".git").exists() or not (git := shutil.which("git")):
+        pytest.skip("no checkout by git")
+    listed = subprocess.run(
+        [git, "-c", "safe.directory=*", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split("\n")
+    strange = {one.split("/")[0] for one in listed if "/" in one} - FOLDERS - set(PACKAGES)
+    assert not strange, f"folders that are committed, and not the project's: {', '.join(sorted(strange))}"
 
 
 def test_every_verb_that_readme_types_exists() -> None:
