@@ -20,6 +20,8 @@ FEW = 8
 """Cases below which a bootstrap that never varies says nothing."""
 BINS = 10
 """Bins of equal width for the calibration of probabilities."""
+DRAWS = 500
+"""Draws of outcomes by which the calibration error of right probabilities is known to a twentieth of its spread."""
 BASELINES = ("cosim", *NAMES)
 Rows = Sequence[Row]
 
@@ -66,6 +68,10 @@ def _recall(rows: Rows) -> Estimate:
     return ratio([(marks.hits(row), len(marks.concealed(row))) for row in kind(rows, "several")])
 
 
+def _recall_of_findable(rows: Rows) -> Estimate:
+    return _recall([row for row in rows if marks.is_findable(row)])
+
+
 def _set_size(rows: Rows) -> Estimate:
     return mean([float(len(marks.answer_set(row))) for row in kind(rows, "one") if marks.names(row)])
 
@@ -91,6 +97,20 @@ def calibration_error(rows: Rows) -> Estimate:
     """Expected calibration error with an interval from a bootstrap over cases."""
     each = [pairs for row in rows if (pairs := list(marks.probabilities(row)))]
     return bootstrap(each, lambda chosen: calibration_error_of(list(chain.from_iterable(chosen))))
+
+
+def calibration_error_by_chance(rows: Rows) -> Estimate:
+    """Calibration error that the same printed probabilities would show if each were exactly right.
+
+    Its mean and the middle 95 % of draws: bins of few cases miss the diagonal by chance alone, so an error within this
+    interval is no evidence of a wrong probability. Reference: Broecker and Smith, Weather and Forecasting 22 (2007) 651.
+    """
+    printed = np.array([p for row in rows for p, _ in marks.probabilities(row)])
+    if not len(printed):
+        return NOTHING
+    draws = np.random.default_rng(0).random((DRAWS, len(printed))) < printed
+    errors = [calibration_error_of(list(zip(printed.tolist(), draw.tolist(), strict=True))) for draw in draws]
+    return Estimate(float(np.mean(errors)), *map(float, np.quantile(errors, (0.025, 0.975))), len(printed))
 
 
 def bins(pairs: Sequence[tuple[float, bool]]) -> list[Parsed]:
@@ -123,9 +143,11 @@ BARS = (
     Bar("exact", "one effect: the verdict is the truth and nothing else", _share(marks.exact, "one")),
     Bar("precision", "two or three effects: names that are true", _precision, least=0.9),
     Bar("recall", "two or three effects: true ones that are named", _recall, least=0.8),
+    Bar("findable_recall", "... of those that can be found: named", _recall_of_findable, least=0.6),
     Bar("unknown", "outside the list: unknown", _share(marks.exact, "outside"), least=0.91),
     Bar("named_outside", "outside the list: a name is attached", _share(lambda r: bool(marks.names(r)), "outside")),
     Bar("calibration_error", "expected calibration error of printed probabilities", calibration_error, most=0.05),
+    Bar("calibration_by_chance", "... that right ones would show by chance", calibration_error_by_chance),
     Bar("gap_closed", "median share of the removable held-out RMS that was removed", _gap, least=0.9),
     Bar("no_gap", "one or more effects: no gap to close", _share(lambda r: not marks.has_gap(r), "one", "several")),
     Bar("localisation", "median IoU of local effects, 0 where no place was given", _places, least=0.7),

@@ -1,5 +1,6 @@
 """Scores of a proof are what one counts by hand, with the intervals of the textbook."""
 
+from math import pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -86,6 +87,9 @@ def test_an_effect_can_be_found_where_its_own_structure_predicts_better_than_the
     found = scores([*rows, row("none", [], [])])
     assert (found["findable_first"]["value"], found["findable_first"]["n"]) == (0.5, 2)
     assert found["findable_in_set"]["value"] == 0.5
+    several = [row("several", ["delay", "lag"], ["delay"]) | {"ceiling": best} for best in ceilings[:2]]
+    several.append(row("several", ["delay", "lag"], ["lag", "delay"]) | {"ceiling": ceilings[0]})
+    assert scores(several)["findable_recall"]["value"] == 3 / 4
 
 
 def test_one_case_makes_nothing_sure() -> None:
@@ -108,6 +112,9 @@ def test_calibration_error_is_the_distance_from_the_diagonal() -> None:
     assert scores(rows)["calibration_error"]["value"] == pytest.approx(0.9 - 0.75)
     shaken = [row("outside", [name], ["broadband_disturbance"]) for name in ("wind", "wind", "wind", "rubbing")]
     assert scores(shaken)["calibration_error"]["value"] == pytest.approx(0.9 - 0.75)  # rubbing is no random disturbance
+    chance = scores(rows * 250)["calibration_by_chance"]  # p = .9 a thousand times: half a percent by chance
+    assert chance["value"] == pytest.approx(sqrt(2 / pi * 0.9 * 0.1 / 1000), rel=0.15)
+    assert chance["low"] < chance["value"] < chance["high"] < 0.03
     (only,) = score.bins([(0.9, True), (0.94, True), (0.92, False)])
     assert (only["printed"], only["true"], only["n"]) == (pytest.approx(0.92), pytest.approx(2 / 3), 3)
 
