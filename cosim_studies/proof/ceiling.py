@@ -55,6 +55,8 @@ def in_card_words(entry: Mapping[str, Any]) -> Parsed:
 def ceiling(folder: str, entries: Sequence[Mapping[str, Any]], truth: Mapping[str, Any] | None = None) -> Parsed:
     """{"heldout_rms": x, "base_rms": y}, or {"reason": why there is no x}, for the effects of a truth.
 
+    Of several effects also {"without": {effect: held-out RMS of the same structure without that effect}}.
+
     `truth` holds the true numbers of the machine, one more place to start from.
     """
     if foreign := [entry["effect"] for entry in entries if not entry["listed"]]:
@@ -62,9 +64,16 @@ def ceiling(folder: str, entries: Sequence[Mapping[str, Any]], truth: Mapping[st
     card, train, held = given(folder)
     mount = card.plant()
     prepared = in_band(train, mount)
-    effects = [_rubbing(true_effect(entry), mount) for entry in entries]
     starts = [mount, *([_as_made(mount, truth)] if truth else [])]
-    return judged([held], *_refitted(starts, effects, prepared))
+
+    def refitted(those: Sequence[Mapping[str, Any]]) -> tuple[Found, Found]:
+        return _refitted(starts, [_rubbing(true_effect(entry), mount) for entry in those], prepared)
+
+    found = judged([held], *refitted(entries))
+    if "reason" in found or len(entries) < 2:
+        return found
+    without = {one["effect"]: refitted([entry for entry in entries if entry is not one])[1].mount for one in entries}
+    return found | {"without": {name: heldout_rms([held], mount) for name, mount in without.items()}}
 
 
 def judged(held: Sequence[Recording], base: Found, best: Found) -> Parsed:

@@ -117,6 +117,12 @@ def is_findable(row: Row) -> bool:
     return bool(best.get("heldout_rms", inf) < best.get("base_rms", inf))
 
 
+def findable(row: Row) -> tuple[str, ...]:
+    """Of several effects those without which the true structure, refitted, predicts the held-out recording worse."""
+    best = row.get("ceiling", {})
+    return tuple(name for name, left in best.get("without", {}).items() if best["heldout_rms"] < left)
+
+
 def has_gap(row: Row) -> bool:
     """There is something to gain, as far as a refit of the true structure can tell."""
     return gap_closed(row) is not None

@@ -38,6 +38,14 @@ def test_the_true_structure_refitted_leaves_less_than_the_base(tmp_path: Path) -
     assert len(given(str(tmp_path))[1]) == 2
 
 
+def test_of_two_effects_the_one_that_matters_is_missed_where_it_is_left_out(tmp_path: Path) -> None:
+    case = make_case(8, ["torque_offset", "stribeck"], duration=12.0)
+    write_given(case, tmp_path)
+    best = ceiling(str(tmp_path), case.truth["effects"])
+    assert set(best["without"]) == {"torque_offset", "stribeck"}
+    assert best["heldout_rms"] < 0.8 * best["without"]["torque_offset"]
+
+
 def test_a_ceiling_that_is_worse_than_the_base_it_contains_is_rejected(tmp_path: Path) -> None:
     """In training or held out: it is then no excuse for a miss, and the case is counted as one without a gap."""
     case = make_case(8, ["torque_offset"], duration=12.0)

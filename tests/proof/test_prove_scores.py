@@ -87,9 +87,13 @@ def test_an_effect_can_be_found_where_its_own_structure_predicts_better_than_the
     found = scores([*rows, row("none", [], [])])
     assert (found["findable_first"]["value"], found["findable_first"]["n"]) == (0.5, 2)
     assert found["findable_in_set"]["value"] == 0.5
-    several = [row("several", ["delay", "lag"], ["delay"]) | {"ceiling": best} for best in ceilings[:2]]
-    several.append(row("several", ["delay", "lag"], ["lag", "delay"]) | {"ceiling": ceilings[0]})
-    assert scores(several)["findable_recall"]["value"] == 3 / 4
+
+
+def test_of_several_effects_those_count_without_which_the_true_structure_predicts_worse() -> None:
+    best = {"heldout_rms": 1.0, "base_rms": 2.0, "without": {"delay": 1.5, "lag": 0.9}}
+    several = [row("several", ["delay", "lag"], [name]) | {"ceiling": best} for name in ("delay", "lag", "cogging")]
+    found = scores([*several, row("several", ["delay", "lag"], []) | {"ceiling": {"reason": "no fit"}}])
+    assert (found["recall"]["value"], found["findable_recall"]["value"]) == (2 / 8, 1 / 3)
 
 
 def test_one_case_makes_nothing_sure() -> None:
