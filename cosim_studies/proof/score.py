@@ -111,7 +111,8 @@ def calibration_error_by_chance(rows: Rows) -> Estimate:
         return NOTHING
     draws = np.random.default_rng(0).random((DRAWS, len(printed))) < printed
     errors = [calibration_error_of(list(zip(printed.tolist(), draw.tolist(), strict=True))) for draw in draws]
-    return Estimate(float(np.mean(errors)), *map(float, np.quantile(errors, (0.025, 0.975))), len(printed))
+    low, high = (float(edge) for edge in np.quantile(errors, (0.025, 0.975)))
+    return Estimate(float(np.mean(errors)), low, high, len(printed))
 
 
 def bins(pairs: Sequence[tuple[float, bool]]) -> list[Parsed]:
