@@ -2,10 +2,12 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
+from browsing import browser, check_by_axe
 
 import cosim
 from cosim.cli import main
@@ -99,3 +101,13 @@ def test_what_cannot_be_compared_is_one_sentence(
 ) -> None:
     with pytest.raises(error, match=sentence):
         cosim.compare(table(100.0), *others)
+
+
+# The page of a comparison: by axe, on a phone, in the dark.
+
+__all__ = ["browser"]
+
+
+def test_axe_finds_nothing_in_the_page_of_a_comparison(browser: Any, tmp_path: Path) -> None:
+    cosim.compare(table(500.0), table(200.0, 15.0, 2.0, extra=0.25), out=tmp_path / "out")
+    check_by_axe(browser, (tmp_path / "out" / "compare.html").read_text("utf-8"), tmp_path)

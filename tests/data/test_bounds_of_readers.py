@@ -1,10 +1,14 @@
 """Each bound of a reader: what just fits is read, one more is refused, before it takes memory."""
 
+import gzip
 import json
+import subprocess
+import sys
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 
+import attack_files
 import h5py
 import numpy as np
 import pyarrow as pa
@@ -16,8 +20,10 @@ from cosim.data import limits
 from cosim.data.binary import hdf5, matlab, numpy_files, packages
 from cosim.data.binary import parquet as parquet_files
 from cosim.data.limits import Allowance, allowed_by, check_cells, check_columns, check_text, check_unpacked, within
+from cosim.data.recording import Recording
 from cosim.data.text import json_records
 from cosim.data.text.reader import read_text
+from cosim.reading import options_of
 from cosim.support.errors import RecordingError
 
 ROWS, COLUMNS = 120, 3
@@ -194,3 +200,75 @@ def test_groups_of_hdf5_lie_a_hundred_deep_and_no_deeper(depth: int, fits: bool,
     else:
         with pytest.raises(RecordingError, match="more than 100 groups"):
             hdf5.read(tmp_path / "run.h5")
+
+
+# What reading a file may cost is one rule for all readers, and `--layout limit=...` raises it.
+
+MANY = 400
+TIMES = np.arange(MANY) * 1e-3
+AXIS = {"t": TIMES, "tau": np.cos(9 * TIMES), "q": np.sin(9 * TIMES)}
+
+
+def test_too_many_numbers_are_refused_and_the_named_factor_lets_them_in(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(limits, "UNPACKED", 1000 * limits.NUMBER)
+    path = tmp_path / "run.parquet"
+    parquet.write_table(pa.table(AXIS), path)
+    with pytest.raises(RecordingError, match=r"at most 1,000 numbers are read.* --layout limit=2\."):
+        Recording.read(path)
+    assert len(Recording.read(path, layout={"limit": "2"})) == MANY
+
+
+def test_the_limit_grows_with_the_size_of_the_file(monkeypatch: pytest.MonkeyPatch) -> None:
+    small, large, huge = (limits.Allowance.of(size) for size in (1000, 3 * limits.ORDINARY, 10**12))
+    assert small.unpacked == limits.UNPACKED
+    assert large.unpacked == 3 * limits.UNPACKED
+    assert huge.unpacked == limits.MOST
+    assert large.seconds == 3 * small.seconds == 3 * limits.SECONDS
+
+
+def test_time_is_limited_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(limits, "SECONDS", 0.0)
+    (tmp_path / "run.csv.gz").write_bytes(gzip.compress(b"t,tau,q\n" + b"0.001,1,2\n" * 1000))
+    with pytest.raises(RecordingError, match=r"took more than 0 s of a processor .* --layout limit=3\."):
+        Recording.read(tmp_path / "run.csv.gz")
+
+
+@pytest.mark.parametrize("said", ["0", "-1", "1.5", "many", "1001", "9" * 50])
+def test_a_limit_that_is_none_is_refused(tmp_path: Path, said: str) -> None:
+    parquet.write_table(pa.table(AXIS), tmp_path / "run.parquet")
+    with pytest.raises(RecordingError, match=r"--layout limit=.*: it is the factor .* from 1 to 1,000\."):
+        Recording.read(tmp_path / "run.parquet", layout={"limit": said})
+
+
+def test_a_limit_leaves_an_importer_its_file(tmp_path: Path) -> None:
+    """Options on how a text is written switch the importers off; a limit says nothing of that."""
+    rows = "".join(f"pos {x:+.6f} tau {y:+.6f}\n" for x, y in zip(AXIS["q"], AXIS["tau"] + 2, strict=True))
+    (tmp_path / "run.log").write_text(f"Sampling period is 1000000 ns\n\n{rows}")
+    options = options_of(tmp_path / "run.log", None, None, ["limit=2"])
+    read = Recording.read(tmp_path / "run.log", {"q": "pos"}, layout=options["layout"])
+    assert read.sample_time == pytest.approx(1e-3)
+
+
+# A file that was made to cost memory or time is read or refused within 20 s of a processor and 1 GB.
+
+KINDS = sorted({name.partition(":")[0] for name in attack_files.FILES.keys() - attack_files.LONG})
+
+
+@pytest.fixture(scope="module")
+def costs() -> dict[str, attack_files.Cost]:
+    """What a file of each kind costs, none that takes long; `python bench/attack_files.py` shows all."""
+    if sys.platform != "linux":
+        pytest.skip("forks")
+    command = [sys.executable, str(attack_files.__file__), "--read", "--json", "--sample", "1"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=500)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout[done.stdout.index("[") :])  # a library may print before
+    return {one["name"].partition(":")[0]: attack_files.Cost(**one) for one in told}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_crafted_file_is_read_or_refused_at_a_bounded_cost(kind: str, costs: dict[str, attack_files.Cost]) -> None:
+    assert costs[kind].is_fine, costs[kind]
+    assert costs[kind].name not in attack_files.FOREIGN or costs[kind].code != 0

@@ -1,11 +1,13 @@
 """Files of machines that were not seen when the reader was written: read rightly, or asked; nothing taken silently."""
 
 import re
+from math import pi
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from cosim.data.preview import preview
 from cosim.data.recording import Recording
 from cosim.data.text.names import spelled, split_unit
 from cosim.data.text.table import grouped
@@ -212,3 +214,39 @@ def test_a_channel_in_volts_is_no_torque_until_its_scale_is_given(tmp_path: Path
         read_recordings([path], columns, [], ["q=rad"], "rotary")
     scaled = Recording.read(path, columns, {"tau": "2 N.m", "q": "rad"})
     np.testing.assert_allclose(scaled["tau"], 2 * TAU, atol=1e-8)
+
+
+# A file that holds a torque or a position alone is no axis, and is shown as what it holds.
+
+
+@pytest.mark.parametrize(
+    ("header", "role", "scale"),
+    [("time (ms),position_value (degree)", "q", pi / 180), ("time (ms),torque_nm", "tau", 1.0)],
+)
+def test_what_is_there_is_served(tmp_path: Path, header: str, role: str, scale: float) -> None:
+    values = np.arange(400) * 1.5 % 360
+    rows = "\n".join(f"{k},{value:.3f}" for k, value in enumerate(values))
+    path = tmp_path / "half.csv"
+    path.write_text(f"{header}\n{rows}\n")
+    shown = preview(path)
+    other = {"q": "no column tau", "tau": "no column q or v"}[role]
+    assert other in shown.refused
+    counted = np.arange(400) * 1.5 if role == "q" else values  # a position in degrees begins again at 360
+    assert shown.recording.table[role] == pytest.approx(counted * scale)
+
+
+# The log of Machinekit's halscope: another spelling of its unit, and channels that record nothing.
+
+TIMES = np.arange(200) * 1e-3
+
+
+def test_names_are_read_and_channels_without_a_pin_are_none(tmp_path: Path) -> None:
+    rows = (
+        f"joint.0.pos-fb {np.sin(9 * t):+.14f} (null) +0.0 pid.0.output {np.cos(7 * t):+.14f} (null) +0.0 "
+        for t in TIMES
+    )
+    (tmp_path / "halscope.log").write_text("Sampling period is 1000000 nSec \n\n" + "\n".join(rows) + "\n")
+    seen = Recording.read(tmp_path / "halscope.log", {"tau": "pid.0.output", "q": "joint.0.pos-fb"})
+    np.testing.assert_allclose(seen["q"], np.sin(9 * TIMES), atol=1e-13)
+    np.testing.assert_allclose(seen.t, TIMES)
+    assert set(seen) == {"t", "tau", "q"}

@@ -4,10 +4,12 @@ import importlib.util
 import re
 import sys
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import pytest
 from effect_examples import FORMS
+from plain_words import unplain
 
 from cosim.diagnosis.effects import TRIED
 from pyfmi_models.effects import CATALOGUE
@@ -96,3 +98,85 @@ def test_links_out_of_the_folder_are_said_as_paths(site: Any) -> None:
     text = ["of [the report](../report.md), in [results](../../results/a.md)"]
     site.inside_the_site(None, "_generated/effects", text)
     assert text == ["of [the report](../report.md), in results (`results/a.md` in the source)"]
+
+
+# The gallery of machines: at least six measured ones, each with picture, verdict, what is known and a licence.
+
+PAGE = (DOCS / "machines.md").read_text("utf-8")
+SECTIONS = dict(re.findall(r"^\((\w+)\)=\n(.*?)(?=^\(\w+\)=|\Z)", PAGE, re.DOTALL | re.MULTILINE))
+LARGEST = 60_000
+"""Bytes of a picture."""
+
+
+def test_six_machines_are_measured_and_their_licence_is_stated() -> None:
+    measured = {name: text for name, text in SECTIONS.items() if "*Measured.*" in text}
+    assert len(measured) >= 6
+    for name, text in measured.items():
+        assert re.search(r"\b(MIT|BSD 3-Clause|Apache 2\.0)\b", text), name
+    assert all("*Generated from published numbers.*" in text for name, text in SECTIONS.items() if name not in measured)
+
+
+@pytest.mark.parametrize("name", SECTIONS)
+def test_a_machine_has_a_verdict_errors_a_picture_and_a_small_one_that_leads_to_it(name: str) -> None:
+    text, picture = SECTIONS[name], DOCS / "machines" / f"{name}.png"
+    assert picture.stat().st_size < LARGEST
+    assert f"](machines/{name}.png)" in text
+    assert f"machines/{name}.png)" in PAGE.split("(brushless_motor)=")[0]
+    assert f"](#{name})" in PAGE
+    assert re.search(r"^\*\*.+\*\*$", text, re.MULTILINE)
+    for word in ("*Validation error:*", "*Known of it:*"):
+        assert word in text
+    assert not unplain(text)
+
+
+def test_no_picture_is_of_a_machine_that_the_page_lacks_and_no_recording_lies_beside_them() -> None:
+    assert {path.name for path in (DOCS / "machines").iterdir()} == {f"{name}.png" for name in SECTIONS}
+
+
+# docs/promises.md names tests that there are.
+
+TESTS = Path(__file__).parents[1]
+PROMISES = TESTS.parent / "docs" / "promises.md"
+
+
+def test_every_promise_names_tests_that_there_are() -> None:
+    rows = [one for one in PROMISES.read_text("utf-8").splitlines() if one.startswith("| ") and "| tests |" not in one]
+    assert rows
+    for row in rows:
+        promise, tests = row.strip("| ").split(" | ")
+        named = re.findall(r"`(test_\w+\.py)::(test_\w+)`", tests)
+        assert named or "`.ci/" in tests, promise
+        for file, name in named:
+            assert f"\ndef {name}(" in next(TESTS.rglob(file)).read_text("utf-8"), (file, name)
+
+
+# The scripts of the documentation do what they say.
+
+SCRIPTS = Path(__file__).parents[2] / "docs" / "scripts"
+
+
+def script(name: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(name, SCRIPTS / f"{name}.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_your_own_axis_is_diagnosed() -> None:
+    assert script("diagnose_your_axis").main() == ("cogging",)
+
+
+def test_your_fmu_runs_beside_the_controller_of_a_card() -> None:
+    assert script("cosimulate_your_fmu").main() <= 0.01  # arcsec; the encoder of the card has counts of 0.0003
+
+
+def test_a_controller_is_designed_within_its_limits_and_proven_with_friction() -> None:
+    design = script("design_a_controller")
+    chosen, before, after = design.main()
+    phase, noise = design.limits(design.tuned(design.read_card("paper_mount"), chosen))
+    assert phase >= design.LEAST
+    assert noise <= design.MOST
+    assert design.BANDWIDTHS[0] < chosen < design.BANDWIDTHS[-1]
+    assert after <= before / 2

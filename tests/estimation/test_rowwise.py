@@ -3,7 +3,13 @@
 import casadi as ca
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
+from scipy.optimize import lsq_linear
 
+from cosim.estimation.filters import between, derivative, derivative_at
+from cosim.estimation.least_squares import squares_left
 from cosim.estimation.rowwise import CHUNK, STRIDE, Rowwise, Stepwise, Tape
 
 X, P = ca.SX.sym("x", 3), ca.SX.sym("p", 2)
@@ -48,3 +54,42 @@ def test_a_state_is_carried_step_by_step(rows: int) -> None:
     walk = Stepwise(state, column, factor, following)
     for _ in range(2):  # each walk starts from zero
         np.testing.assert_allclose(walk(columns, np.array([0.5])), by_hand, rtol=1e-14, atol=1e-14)
+
+
+# Derivatives at some rows alone are those of all rows there, to the bit.
+
+WALK = np.cumsum(np.random.default_rng(0).normal(size=300))
+
+
+@pytest.mark.parametrize("each", [1, 7, 60])
+def test_a_derivative_at_some_rows_has_the_bits_of_that_of_all_rows(each: int) -> None:
+    rows = np.arange(0, len(WALK), each)
+    assert np.array_equal(derivative_at(WALK, 0.1, rows), derivative(WALK, 0.1)[rows])
+    assert np.array_equal(derivative_at(WALK, 0.1, rows, 2), derivative(derivative(WALK, 0.1), 0.1)[rows])
+
+
+# Two small things that a library does too, and that cost a diagnosis more to load there than to do here.
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(4, 40))
+def test_a_signal_is_read_between_its_rows_as_by_the_library(seed: int, rows: int) -> None:
+    draw = np.random.default_rng(seed)
+    t = np.cumsum(draw.uniform(0.5, 1.5, rows))
+    values, at = draw.normal(size=rows), draw.uniform(t[0] - 0.5, t[-1] + 0.5, (7, 3))
+    expected = CubicSpline(t, values, extrapolate=False)(at)
+    np.testing.assert_allclose(between(t, values, at), expected, atol=1e-9 * np.abs(values).max())
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(3, 6))
+def test_what_least_squares_leaves_with_signs_is_the_librarys(seed: int, count: int) -> None:
+    draw = np.random.default_rng(seed)
+    columns, targets = draw.normal(size=(9, count)), draw.normal(size=(9, 4))
+    least = np.where(np.arange(count) < 3, 0.0, -np.inf)
+    left = [2 * lsq_linear(columns, one, (least, np.inf), "bvls").cost for one in targets.T]
+    np.testing.assert_allclose(squares_left(columns, targets, (0, 1, 2)), left, rtol=1e-9)
+
+
+def test_a_column_that_is_twice_another_does_not_hide_the_best_signs() -> None:
+    columns = np.array([[1.0, 2.0], [0.0, 0.0], [1.0, 2.0]])
+    assert np.isclose(squares_left(columns, np.array([[1.0], [2.0], [1.0]]), (0, 1))[0], 4.0)
+    assert np.isclose(squares_left(columns, np.array([[-1.0], [2.0], [-1.0]]), (0, 1))[0], 6.0)

@@ -2,19 +2,32 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.stages import margin, stage
 from cosim.estimation import fit as fitting
-from cosim.estimation.fit import fit, free_parameters
+from cosim.estimation import problem as problems
+from cosim.estimation.fit import Fit, fit, free_parameters
 from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.least_squares import ENOUGH, least_squares
 from cosim.estimation.prepare import Piece, Prepared, prepare
-from pyfmi_models.effects import Cogging, Delay, Effect
+from cosim.estimation.priors import trust
+from cosim.estimation.problem import AT_HAND, Problem
+from cosim.estimation.row_weights import weights
+from cosim_studies.proof.generator import make_case, write_case
+from cosim_studies.proof.tool import given
+from pyfmi_models.effects import Cogging, Delay, Effect, TorqueOffset
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
-from pyfmi_models.friction import LuGre
+from pyfmi_models.friction import Coulomb, FrictionLaw, LuGre, Stribeck
 from pyfmi_models.mount import Axis, Mount
 
 LAW = LuGre(Fc=2.0, Fs=2.4, Vs=0.05, sigma0=5e3, sigma1=20.0, sigma2=1.5)
@@ -92,3 +105,171 @@ def test_a_prior_that_is_a_share_of_the_misfit_has_exact_derivatives() -> None:
     assert rows(values, values)[0] == pytest.approx(np.linalg.norm(rest) * np.log(1.5) / (20 * np.log(2)))
     assert rows(values, values)[1] == 0
     assert not pull.slopes(values, np.zeros(30), slopes).any()
+
+
+# The least squares behind every fit: where it ends, how often it looks, bounds.
+
+EVERYWHERE = (np.full(2, -np.inf), np.full(2, np.inf))
+T = np.linspace(0, 3, 40)
+
+
+def decay(x: np.ndarray) -> np.ndarray:
+    """Residuals of x0 exp(-x1 t) against 2 exp(-t) with an error that no x removes."""
+    return np.asarray(x[0] * np.exp(-x[1] * T) - 2 * np.exp(-T) + 0.1 * np.sin(20 * T))
+
+
+def slopes(x: np.ndarray) -> np.ndarray:
+    return np.column_stack([np.exp(-x[1] * T), -x[0] * T * np.exp(-x[1] * T)])
+
+
+class Counted:
+    """Residuals that are counted."""
+
+    def __init__(self) -> None:
+        self.looked: list[np.ndarray] = []
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        self.looked.append(x)
+        return decay(x)
+
+
+def test_it_finds_the_minimum() -> None:
+    found = least_squares(decay, slopes, np.array([0.5, 0.2]), EVERYWHERE, 50)
+    assert found == pytest.approx([2, 1], abs=0.03)
+    assert slopes(found).T @ decay(found) == pytest.approx([0, 0], abs=1e-2)
+
+
+def test_a_start_at_the_minimum_is_looked_at_once() -> None:
+    best = least_squares(decay, slopes, np.array([0.5, 0.2]), EVERYWHERE, 50, 1e-12)
+    counted = Counted()
+    assert np.array_equal(least_squares(counted, slopes, best, EVERYWHERE, 50), best)
+    assert len(counted.looked) == 1
+
+
+def test_a_step_is_done_while_it_promises_enough() -> None:
+    best = least_squares(decay, slopes, np.array([0.5, 0.2]), EVERYWHERE, 50, 1e-12)
+    lowest, aside = float(decay(best) @ decay(best)), np.array([0.02, 0.0])
+    worth = 1 - lowest / float(decay(best + aside) @ decay(best + aside))
+    assert worth > ENOUGH
+    found = least_squares(decay, slopes, best + aside, EVERYWHERE, 50)
+    assert float(decay(found) @ decay(found)) == pytest.approx(lowest, rel=ENOUGH)
+
+
+def test_a_step_that_a_bound_bends_uphill_is_no_end() -> None:
+    bounds = (np.array([-np.inf, 0.0]), np.array([np.inf, 0.5]))
+    found = least_squares(decay, slopes, np.array([0.1, 0.4]), bounds, 60)
+    assert found[1] == pytest.approx(0.5)
+    assert slopes(found)[:, 0] @ decay(found) == pytest.approx(0, abs=2e-2)
+
+
+# A structure from which an effect was taken is fitted once, whoever asks for it.
+
+
+@pytest.fixture
+def problem(tmp_path: Path) -> Problem:
+    write_case(make_case(5000, (), duration=15.0), tmp_path)
+    card, train, _ = given(str(tmp_path))
+    prepared = prepare(train, 20.0)
+    return Problem(card.plant(), prepared, weights(card.friction, prepared), train[0].sample_time)
+
+
+def test_what_is_left_without_an_effect_is_fitted_once(problem: Problem, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[int] = []
+    fit = problems.fit
+    monkeypatch.setattr(problems, "fit", lambda *args, **more: made.append(1) or fit(*args, **more))
+    whole = problem.fit(replace(problem.mount, effects=(*problem.mount.effects, TorqueOffset(torque=0.01))), 20)
+    first = problem.without(whole, "torque_offset")
+    assert problem.without(whole, "torque_offset") is first
+    assert len(made) == 2
+    assert first.mount.effects == problem.mount.effects
+
+
+def test_another_weight_or_number_of_evaluations_is_another_fit(problem: Problem) -> None:
+    found = problem.fit(problem.mount, 20)
+    assert problem.fit(problem.mount, 20) is found
+    assert problem.fit(problem.mount, 21) is not found
+    half = replace(problem, weight=problem.weight * (problem.prepared.recording_of == 0))
+    assert half.fit(problem.mount, 20) is not found
+
+
+def test_fits_that_nobody_holds_take_no_memory(problem: Problem) -> None:
+    kept: list[Fit] = [problem.fit(problem.mount, many) for many in range(1, 4)]
+    assert len(problem._fits) == len(kept)
+    kept.clear()
+    for many in range(AT_HAND + 2):
+        offset = TorqueOffset(torque=0.01 * (1 + many))
+        found = problem.fit(replace(problem.mount, effects=(*problem.mount.effects, offset)), 1)
+        problem.without(found, "torque_offset")
+        del found
+    assert len(problem._fits) <= AT_HAND
+    assert np.isfinite(problem._last[0].residual).all()
+
+
+# Priors of evidence: a number that is a place costs the same wherever the encoder has its zero.
+
+AXIS = Mount(name="axis", axis=Axis(inertia=0.6), friction=Coulomb(Fc=1.1, sigma2=0.3))
+
+
+def swinging(zero: float) -> Recording:
+    """Half a minute of 3.4 degrees to either side, a load of 3 N m below the axis; the encoder's zero is elsewhere."""
+    t = np.arange(6_000) / 200
+    q, v, a = (0.06 * w * np.sin(1.3 * t + k * np.pi / 2) for k, w in ((0, 1), (1, 1.3), (2, 1.69)))
+    noise = 0.03 * np.random.default_rng(5).standard_normal(len(t))
+    return Recording(
+        "run", {"t": t, "tau": 0.6 * a + 1.1 * np.sign(v) + 0.3 * v + 3 * np.sin(q) + noise, "q": q + zero}
+    )
+
+
+def compared(zero: float) -> tuple[dict[str, float], float]:
+    """Evidence of a cable and of a load off the axis, and how far the one is before the other."""
+    prepared = prepare([swinging(zero)], 10.0)
+    problem = Problem(AXIS, prepared, np.ones(len(prepared.recording_of)), 0.005)
+    comparison = Comparison.of(problem, problem.fit(AXIS, 15), POLICY)
+    best = {one.effect.id: one for one in reversed(stage(comparison, problem.fit(AXIS, 15)).tried)}
+    cable, load = best["cable_wrap"], best["gravity_unbalance"]
+    return {name: one.evidence for name, one in best.items()}, margin(comparison, cable, load)
+
+
+@pytest.mark.parametrize("zero", [0.0, 0.3, -2.0])
+def test_two_effects_that_are_one_here_are_not_told_apart_by_their_priors(zero: float) -> None:
+    evidence, ahead = compared(zero)
+    assert min(evidence["cable_wrap"], evidence["gravity_unbalance"]) > 100
+    assert abs(ahead) < 3.5
+
+
+def test_what_a_cable_is_worth_has_nothing_to_do_with_the_encoders_zero() -> None:
+    worth = [compared(zero)[0]["cable_wrap"] for zero in (0.0, 0.7)]
+    assert worth[0] == pytest.approx(worth[1], abs=0.1)
+
+
+def test_a_place_may_lie_anywhere_in_the_motion() -> None:
+    class Found:
+        mount, free, values = AXIS, ("cable_wrap.home", "cable_wrap.stiffness", "spot.q_center"), (1e-9, 2.0, 0.0)
+
+    assert trust(Found(), 0.4).tolist() == [0.4, 2.0, 0.4]  # type: ignore[arg-type]
+
+
+def trusted(law: FrictionLaw, **values: float) -> list[float]:
+    mount = Mount(name="axis", axis=Axis(inertia=0.6), friction=law)
+    found: Any = SimpleNamespace(mount=mount, free=tuple(values), values=tuple(values.values()))
+    return [float(one) for one in trust(found, 0.4)]
+
+
+def test_a_level_may_be_as_far_off_as_it_is_large_and_a_shape_of_the_law_by_a_tenth() -> None:
+    """Where the torque is linear in a number its tangent holds anywhere; that of a shape, only near the fit."""
+    law = Stribeck(Fc=1.1, Fs=1.5, Vs=0.02, delta=2.0, sigma2=0.3)
+    found = trusted(law, **{"friction.Fc": -1.1, "friction.Fs": 1.5, "friction.Vs": 0.02, "friction.sigma2": 0.3})
+    assert found == pytest.approx([1.1, 0.15, 0.002, 0.3])
+
+
+def test_a_number_of_one_direction_is_a_level_and_one_of_an_effect_is_trusted_by_its_size() -> None:
+    law = Stribeck(Fc=1.1, Fs=1.5, Vs=0.02, delta=2.0, sigma2=0.3)
+    found = trusted(
+        law, **{"friction.Vs.negative": 0.02, "cogging.amplitude": -0.4, "drag.Vs": 0.5, "axis.inertia": 2.0}
+    )
+    assert found == pytest.approx([0.02, 0.4, 0.5, 2.0])
+
+
+def test_a_phase_may_be_off_by_a_radian_and_a_number_that_is_nothing_by_next_to_nothing() -> None:
+    found = trusted(Coulomb(Fc=1.1), **{"cogging.phase": 3.0, "cogging.amplitude": 0.0})
+    assert found == [1.0, 1e-12]

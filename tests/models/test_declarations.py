@@ -5,12 +5,15 @@ from typing import Any
 
 import pytest
 from effect_examples import example
+from pydantic import ValidationError
 from test_parameter_ranges import told
 
-from pyfmi_models.adrc import Adaptation
+from pyfmi_models.adrc import Adaptation, Gains, Learning
+from pyfmi_models.adrc.controller import INPUTS, MEMORY, OUTPUTS
+from pyfmi_models.controller_section import AdaptationSection, ControllerSection, LearningSection
 from pyfmi_models.effects import FORMS
 from pyfmi_models.friction import LuGre
-from pyfmi_models.model import Pair
+from pyfmi_models.model import Pair, parameters_of
 from pyfmi_models.pointing import PointingError
 from pyfmi_models.setpoint import Sine
 
@@ -76,3 +79,96 @@ def test_set_points_and_pointing_declare_their_numbers() -> None:
     assert [told(one) for one in PointingError().model().outputs] == [
         *("cross_elevation [rad]", "elevation [rad]", "error [rad]")
     ]
+
+
+# What a controller declares: its numbers as its FMUs have them, the limits of a card, what a card leaves out.
+
+GAINS = """
+inertia [kg.m2] = 1 1e-09..inf
+kp [1/s2] = 2 0..inf ~100
+kd [1/s] = 3 0..inf ~10
+observer_bandwidth [rad/s] = 4 0.001..inf ~100
+torque_limit [N.m] = 1e+06 0..inf
+"""
+ADAPTATION = """
+adaptation.memory [s] = 20 0.1..inf ~10
+adaptation.slowest [rad/s] = 2e-05 0..inf ~1e-05
+adaptation.widest [1] = 3 1..inf
+adaptation.noise [N.m] = 0.5 1e-06..inf
+"""
+LEARNING = """
+learning.gain [1] = 0.5 0..1
+learning.lead [s] = 0.0136 0..1
+learning.limit [N.m] = 1e+06 0..inf
+"""
+
+
+def lines(text: str) -> list[str]:
+    return text.strip().splitlines()
+
+
+def test_a_controller_declares_its_numbers_as_its_fmus_do() -> None:
+    law = LuGre(sigma0=1e4, Fc=2.0, Fs=4.0, Vs=0.1)
+    assert list(map(told, parameters_of(Gains(inertia=1, kp=2, kd=3, observer_bandwidth=4)))) == lines(GAINS)
+    assert list(map(told, Adaptation(law=law).parameters()))[-4:] == lines(ADAPTATION)
+    assert list(map(told, Learning(ticks=100).parameters())) == lines(LEARNING)
+    assert Learning(ticks=100).knots == 100
+    assert [one.name for one in (*INPUTS, *OUTPUTS)] == [
+        *("q", "q_d", "v_d", "a_d"),
+        *("tau", "friction_estimate", "zeta1", "zeta2", "zeta3"),
+    ]
+    assert {one.start for one in (*INPUTS, *MEMORY, *OUTPUTS)} == {0.0}
+
+
+CARD: dict[type, dict[str, tuple[Any, ...]]] = {
+    ControllerSection: {
+        "kp": (1e-300, 1e12, 0.0, 1.001e12),
+        "kd": (1e-300, 1e12, 0.0, 1.001e12),
+        "loop_hz": (1e-3, 1e9, 0.999e-3, 1.001e9),
+        "record_hz": (1e-3, 1e9, 0.999e-3, 1.001e9),
+        "observer_bandwidth": (1e-300, 1e9, 0.0, 1.001e9),
+        "observer_order": (3, 4, 2, 5),
+    },
+    LearningSection: {
+        "period": (1e-300, 1e9, 0.0, -1.0),
+        "knots": (3, 1000, 2, 1001),
+        "gain": (1e-300, 1.0, 0.0, 1.001),
+    },
+    AdaptationSection: {
+        "memory": (0.1, 1e9, 0.099, -1.0),
+        "slowest": (0.0, 1e9, -1e-300, -1.0),
+        "widest": (1.0, 1e9, 0.999, -1.0),
+        "doubt": (1e-300, 1e9, 0.0, -1.0),
+        "noise": (1e-300, 1e9, 0.0, -1.0),
+    },
+}
+"""Sections of a card, by key: lowest and highest number that it takes, and two that it refuses."""
+NEEDED: dict[type, dict[str, Any]] = {
+    ControllerSection: {"kp": 1.0, "kd": 1.0},
+    LearningSection: {"period": 1.0},
+    AdaptationSection: {},
+}
+
+
+@pytest.mark.parametrize(("section", "key"), [(section, key) for section, keys in CARD.items() for key in keys])
+def test_a_card_of_a_controller_takes_numbers_up_to_their_limits(section: Any, key: str) -> None:
+    low, high, under, over = CARD[section][key]
+    for value in (low, high):
+        assert getattr(section(**(NEEDED[section] | {key: value})), key) == value
+    for value in (under, over):
+        with pytest.raises(ValidationError):
+            section(**(NEEDED[section] | {key: value}))
+
+
+def test_what_a_card_does_not_say_of_its_controller_is_what_the_documentation_says() -> None:
+    said = ControllerSection(kp=1.0, kd=1.0)
+    assert (said.loop_hz, said.record_hz, said.observer_bandwidth, said.observer_order) == (10_000, 1_000, 220, 3)
+    assert (said.velocity, said.compensation, said.period) == ("observer", "C1", 1e-4)
+    assert LearningSection(period=1.0).model_dump() == {"period": 1.0, "knots": 100, "gain": 0.5}
+    assert AdaptationSection().model_dump() == {
+        "memory": 20.0,
+        "slowest": 2e-5,
+        "widest": 3.0,
+        "doubt": 0.3,
+        "noise": 0.5,
+    }

@@ -1,15 +1,26 @@
 """Progress in a notebook: one line that is written over and gone at the end; nothing elsewhere."""
 
+import importlib
+import inspect
 import sys
 from inspect import Parameter, signature
+from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
+import matplotlib
+import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from report_example import diagnosis
 
 import cosim
+from cosim.api.diagnose import DiagnosisResult
+from cosim.api.tables import missing_frame
+from cosim.data.recording import Recording
 from cosim.support.notebook import shows_progress
 from cosim_serve import example
+from pyfmi_models.card import read_card
 
 
 @pytest.fixture
@@ -74,3 +85,110 @@ def test_a_diagnosis_in_a_notebook_shows_its_stages(line: list[str], tmp_path: A
 @pytest.mark.parametrize("verb", ["diagnose", "investigate", "sweep"])
 def test_the_signature_stays_what_it_is(verb: str) -> None:
     assert signature(getattr(cosim, verb)).parameters["on_progress"].kind is Parameter.KEYWORD_ONLY
+
+
+# Results in a notebook: one line each, tables, figures; and Python calls that offer what the command line does.
+
+CARD = """
+[mount]
+name = "axis"
+inertia = 3.0
+[friction]
+model = "coulomb"
+Fc = 2.0
+sigma2 = 1.0
+"""
+
+
+@pytest.fixture
+def recording() -> Recording:
+    t = np.arange(3000) * 0.005
+    q = 0.4 * np.sin(2 * t) + 0.1 * np.sin(5 * t)
+    v, a = 0.8 * np.cos(2 * t) + 0.5 * np.cos(5 * t), -1.6 * np.sin(2 * t) - 2.5 * np.sin(5 * t)
+    tau = 3.0 * a + 2.4 * np.sign(v) + 1.2 * v
+    return Recording.of({"t": t, "tau": tau, "q": q, "q_d": q + 1e-3, "heat": t}, "swing")
+
+
+@pytest.fixture
+def answer(tmp_path: Path) -> DiagnosisResult:
+    (tmp_path / "card.toml").write_text(CARD, "utf-8")
+    card = read_card(tmp_path / "card.toml")
+    return DiagnosisResult(diagnosis("two"), card, card)
+
+
+def is_one_line(thing: object) -> bool:
+    return "\n" not in repr(thing) and len(repr(thing)) < 200
+
+
+def test_a_recording_is_one_line_and_a_figure_with_its_set_point_beside_the_position(recording: Recording) -> None:
+    assert is_one_line(recording)
+    before = matplotlib.rcParams["font.size"]
+    drawn = recording.plot()
+    assert isinstance(drawn, Figure)
+    assert [axes.get_title(loc="left") for axes in drawn.axes] == ["tau", "q", "heat"]
+    assert [len(axes.lines) for axes in drawn.axes] == [1, 2, 1]
+    assert drawn.axes[-1].get_xlabel() == "time [s]"
+    assert all(axes.get_ylabel() for axes in drawn.axes)
+    assert [axes.get_title(loc="left") for axes in recording.plot("heat").axes] == ["heat"]
+    assert matplotlib.rcParams["font.size"] == before  # a reader's own settings stay
+    with pytest.raises(cosim.CosimError, match='no column "qq"; columns are: t, tau, q'):
+        recording.plot("qq")
+
+
+def test_a_diagnosis_is_one_line_tables_and_a_figure(answer: DiagnosisResult, tmp_path: Path) -> None:
+    assert is_one_line(answer)
+    found = answer.frame()
+    assert found.iloc[0]["effect"] == "cogging"
+    assert len(found) == len(answer.findings)
+    missing = answer.missing_torque
+    assert list(missing) == ["recording", "heldout", "t", "q", "v", "missing", "band", "after"]
+    held = missing[missing["heldout"]]
+    assert 0 < np.std(held["after"]) < np.std(held["missing"])
+    drawn = answer.plot()
+    assert [axes.get_xlabel() for axes in drawn.axes] == ["validation RMS error [N·m]", "time [s]"]
+    bars = [bar.get_width() for bar in drawn.axes[0].patches]
+    held_out = answer.diagnosis.heldout
+    assert bars == pytest.approx([held_out.after_rms, held_out.before_rms, held_out.nominal_rms])
+    drawn.savefig(tmp_path / "answer.png")
+    assert missing_frame(()).empty
+
+
+def test_an_identification_is_one_line_a_table_and_a_figure(recording: Recording, tmp_path: Path) -> None:
+    (tmp_path / "card.toml").write_text(CARD, "utf-8")
+    found = cosim.identify(recording, tmp_path / "card.toml")
+    assert is_one_line(found)
+    table = found.frame().set_index("parameter")
+    assert table.loc["friction.Fc", "value"] == pytest.approx(2.4, rel=0.1)
+    assert table.loc["friction.Fc", "given"] == 2.0
+    drawn = found.plot()
+    assert {axes.get_ylabel() for axes in drawn.axes} == {"friction [N m]"}
+
+
+def test_a_run_is_one_line_and_a_figure() -> None:
+    done = cosim.run("sidereal", stop=0.05)
+    assert is_one_line(done)
+    assert "time [s]" in {axes.get_xlabel() for axes in done.plot().axes}
+
+
+SAME = {
+    "run": {"sets": "set", "interpreted": "compiled"},
+    "compare": {"recordings": "recordings"},
+    "investigate": {"drive": "machine", "key": "machine", "move": "machine"},
+    "show": {"file": "source", "out": "picture"},
+}
+"""Options of the command line that have another word in Python."""
+FOLDER = dict.fromkeys(("workers", "cluster"), "cosim.diagnose_folder")
+METHODS = {"as_json": "as_json", "check": "missing", "propose": "propose", **FOLDER}
+"""Options that are a method or a property of the result, or an argument of the call for several machines."""
+PYTHON_ONLY = {"on_progress", "on_build", "on_answer", "on_step", "command", "fast"}
+"""Arguments that make no sense on a command line: who is told, and what files name as their maker."""
+VERBS = ("run", "diagnose", "export", "show", "sweep", "investigate", "card", "compare")
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_command_line_and_python_offer_the_same(verb: str) -> None:
+    command: Any = getattr(importlib.import_module(f"cosim.cli.{verb}"), verb)
+    options = {SAME.get(verb, {}).get(name, name) for name in inspect.signature(command).parameters}
+    arguments = set(inspect.signature(getattr(cosim, verb)).parameters)
+    assert options - (set(METHODS) - arguments) <= arguments, "on the command line only"
+    assert arguments - PYTHON_ONLY <= options, "in Python only"

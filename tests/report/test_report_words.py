@@ -1,21 +1,26 @@
 """Numbers, units and sentences of the report, and the summary on a terminal."""
 
 import io
+import re
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from report_example import FOUND, REST, diagnosis
 from test_report import KINDS, page
 
-from cosim.plots.quantities import minus, number, raised
+from cosim.diagnosis.answer.result import Diagnosis
+from cosim.plots.quantities import FAMILIES, Scale, minus, number, raised
 from cosim.report import tables
 from cosim.report.figures_proof import relative
 from cosim.report.findings import block
 from cosim.report.lead import improvement
+from cosim.report.page import unexplained
 from cosim.report.quantities import Scales
 from cosim.report.tables import limits
 from cosim.report.terminal import summary
 from cosim.report.words import blocks
+from cosim.support.units import unit
 
 
 def test_where_nothing_is_missing_no_effect_is_left_out_of_the_first_screen_and_no_gain_is_claimed() -> None:
@@ -116,3 +121,55 @@ def test_where_rests_are_most_of_the_error_that_of_clear_motion_is_told() -> Non
     assert "0.050 in clear motion" in " ".join(summary(resting).split())
     near = replace(whole, heldout=replace(held, sliding={"before_rms": 0.4, "after_rms": 0.4}))
     assert "in clear motion" not in " ".join(summary(near).split())
+
+
+# Where training never was: what is left there is said to lie there, what is left everywhere is not.
+
+
+def limited(limit: float, trained: float) -> Diagnosis:
+    """Something unknown that acts on the held-out run alone, where its torque passes a limit."""
+    whole = diagnosis("none")
+    *fitted, held = whole.traces
+    large = held.tau > limit
+    held = replace(held, after=held.after - 3.0 * large)
+    fitted = [replace(one, tau=np.minimum(one.tau, trained)) for one in fitted]
+    after = float(np.sqrt(np.mean((held.tau - held.after) ** 2)))
+    return replace(whole, verdict=("unknown",), traces=(*fitted, held), heldout=replace(whole.heldout, after_rms=after))
+
+
+def test_a_rest_where_training_never_was_is_said_to_lie_there() -> None:
+    top = float(np.quantile(diagnosis("none").traces[-1].tau, 0.97))
+    said = limited(top, top)
+    page = " ".join(unexplained(said, Scales.of(said)))
+    assert re.search(
+        r"9\d % of the error energy on validation runs lies at torques outside .* \(3 % of the time\)", page
+    )
+    assert "which the fit never had (3 % of the time): what acts there" in " ".join(summary(said).split())
+
+
+def test_a_rest_where_training_was_too_is_said_to_lie_nowhere() -> None:
+    top = float(np.quantile(diagnosis("none").traces[-1].tau, 0.97))
+    for known in (limited(top, np.inf), limited(-np.inf, top)):
+        assert "the fit never had" not in " ".join(unexplained(known, Scales.of(known))) + summary(known)
+
+
+# Units of what people read: each shown number is the SI value in the unit that stands behind it.
+
+SIGNS = {"°": "deg", "′": "arcmin", "″": "arcsec", "·": "."}
+SHOWN = [(si, scale) for si, family in FAMILIES.items() for scale in family]
+
+
+@pytest.mark.parametrize(("si", "scale"), SHOWN, ids=[f"{si} as {scale.unit}" for si, scale in SHOWN])
+def test_a_scale_is_the_size_of_its_unit(si: str, scale: Scale) -> None:
+    name = scale.unit
+    for sign, word in SIGNS.items():
+        name = name.replace(sign, word)
+    assert unit(name).dimension == unit(si).dimension
+    assert scale.factor * unit(name).factor == pytest.approx(1.0, rel=1e-12)
+
+
+def test_the_scales_of_a_unit_begin_with_the_largest_and_each_is_smaller() -> None:
+    for family in FAMILIES.values():
+        factors = [scale.factor for scale in family]
+        assert factors == sorted(factors)
+        assert len(set(factors)) == 3

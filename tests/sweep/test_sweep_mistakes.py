@@ -9,6 +9,7 @@ from sweeps import SCENARIO, K, R, folder, run, written
 from tiny_fmu import tiny
 
 from cosim.support.errors import FmuError, SweepError, WiringError
+from cosim.sweeps.cluster import ADDRESS, _client
 from cosim.sweeps.file import read_sweep
 
 __all__ = ["folder", "tiny"]
@@ -140,3 +141,20 @@ def test_a_sweep_or_its_scenario_that_is_not_there(folder: Path) -> None:
     with pytest.raises(SweepError, match=r"none.toml: no such sweep; a sweep is a .toml file."):
         read_sweep(folder / "none.toml")
     assert call("sweep", written(folder, ("loop.toml", "none.toml")), "--out", folder / "out") == 2
+
+
+# What is no address of a scheduler is one sentence, before anybody is asked.
+
+
+@pytest.mark.parametrize("address", ["foo", "tcp://host", "tcp://", "host:", "a b:1", "127.0.0.1"])
+def test_what_is_no_address_of_a_scheduler_is_refused_before_anybody_is_asked(address: str) -> None:
+    with pytest.raises(SweepError, match="is no address of a Dask scheduler; write it as tcp://host:8786") as refused:
+        _client(address)
+    assert refused.value.culprit == address
+
+
+@pytest.mark.parametrize(
+    "address", ["tcp://host:8786", "tls://10.0.0.1:1", "host:8786", "tcp://[::1]:8786", "inproc://1/2/3"]
+)
+def test_addresses_are_known(address: str) -> None:
+    assert ADDRESS.fullmatch(address)

@@ -11,17 +11,20 @@ from cosim.data.recording import Recording
 from cosim.diagnosis.answer.ledger import all_pass
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
+from cosim.diagnosis.effects import candidates
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.search.sizes import is_told, numbers_of, standard_errors
 from cosim.diagnosis.search.stages import CandidateFit, admission, margin, refitted
 from cosim.estimation.blocks import Blocks
 from cosim.estimation.fit import recorded_by
 from cosim.estimation.inverse import Inverse
-from cosim.estimation.prepare import prepare
+from cosim.estimation.prepare import Prepared, prepare
 from pyfmi_models.card import parse_card
-from pyfmi_models.effects import Delay, Effect
+from pyfmi_models.effects import Delay, Effect, FrictionAsymmetry, TorqueOffset
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.presliding import Presliding
+from pyfmi_models.friction import Coulomb, FrictionLaw, LuGre
+from pyfmi_models.mount import Axis, Mount
 
 CARD = parse_card('[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\nsigma2 = 1.0\n', "card.toml")
 CONTACT, LATE = Presliding(sigma0=1000.0), Delay(delay_ms=5.0)
@@ -98,3 +101,32 @@ def test_the_range_of_the_one_that_is_there_holds_its_size_and_that_of_an_imitat
     assert not told(bent, "delay")[0], "its 95 % range holds no delay at all"
     assert told(bent, "delay")[1]["delay_ms"] > 20 * told(late, "delay")[1]["delay_ms"]
     assert told(late, "delay")[0]
+
+
+# A constant torque and friction of two directions: two numbers of an axis that moves, not three.
+
+COULOMB = Coulomb(Fc=2.0, sigma2=1.0)
+LUGRE = LuGre(sigma0=1e5, sigma1=300.0, sigma2=1.0, Fc=2.0, Fs=2.5, Vs=0.01)
+OFFSET, ASYMMETRY = TorqueOffset(torque=0.3), FrictionAsymmetry(level_asymmetry=0.1, viscous_asymmetry=0.0)
+
+
+@pytest.fixture(scope="module")
+def prepared() -> Prepared:
+    t = np.arange(4_000) / 200
+    v = 0.2 * np.cos(0.9 * t)
+    return prepare([Recording("run", {"t": t, "tau": 2 * np.sign(v) + v, "q": np.cumsum(v) / 200})], 10.0)
+
+
+def offered(prepared: Prepared, law: FrictionLaw, *effects: Effect) -> set[str]:
+    mount = Mount(name="axis", axis=Axis(inertia=5.0), friction=law, effects=effects)
+    rows = len(prepared.recording_of)
+    return {one.effect for one in candidates(mount, prepared, np.ones(rows), np.ones(rows))}
+
+
+@pytest.mark.parametrize(("law", "both"), [(COULOMB, False), (LUGRE, True)])
+def test_one_is_offered_beside_the_other_only_where_rest_tells_them_apart(
+    prepared: Prepared, law: FrictionLaw, both: bool
+) -> None:
+    assert {"torque_offset", "friction_asymmetry"} <= offered(prepared, law)
+    assert ("friction_asymmetry" in offered(prepared, law, OFFSET)) is both
+    assert ("torque_offset" in offered(prepared, law, ASYMMETRY)) is both

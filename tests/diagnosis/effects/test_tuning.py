@@ -1,20 +1,34 @@
 """What a start knows only roughly of an effect is found by further fits."""
 
 from dataclasses import replace
+from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from cosim.data.recording import Recording
+from cosim.diagnosis.answer.ledger import all_pass
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.diagnose import _problem
 from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.effects.encoder_eccentricity import halved
 from cosim.diagnosis.effects.tuning import in_cycles
-from cosim.estimation.fit import fit, with_values
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.search.stages import CandidateFit, admission, refitted, starts
+from cosim.estimation.fit import Fit, fit, with_values
+from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
+from pyfmi_models.card import parse_card
+from pyfmi_models.effects.backlash import Backlash
+from pyfmi_models.effects.base import Motion
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
 from pyfmi_models.effects.inertia_variation import InertiaVariation
 from pyfmi_models.effects.quadratic_drag import QuadraticDrag
 from pyfmi_models.effects.thermal_viscosity import ThermalViscosity
+from pyfmi_models.effects.torque_saturation import TorqueSaturation
 from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
@@ -83,3 +97,173 @@ def test_a_disc_is_found_at_its_own_turns_though_its_error_twice_a_turn_is_large
     assert found.cycles_per_rev == turns
     assert found.second == pytest.approx(second, abs=0.05)
     assert found.amplitude_rad == pytest.approx(2e-3 if second else 1.2e-3, rel=0.1)
+
+
+# A disc of half the turns whose error twice a turn is that of the disc that was found.
+
+
+def problem(middle: float, motion: str) -> Any:
+    """What the search knows: where the axis was, and whether it turns."""
+    prepared = SimpleNamespace(ranges={"q": (middle - 0.5, middle + 0.5)})
+    return SimpleNamespace(mount=SimpleNamespace(motion=motion), prepared=prepared)
+
+
+def twice_a_turn(disc: EncoderEccentricity, angle: np.ndarray) -> np.ndarray:
+    """The second harmonic of a disc's error, as its docstring has it, at an angle in rad (a place in m times 2 pi)."""
+    return np.asarray(disc.second * disc.amplitude_rad * np.sin(2 * (disc.cycles_per_rev * angle + disc.phase)))
+
+
+@pytest.mark.parametrize("motion", ["rotary", "linear"])
+@pytest.mark.parametrize("phase", [0.0, 0.8, -2.5])
+@pytest.mark.parametrize("cycles", [12.0, 13.0])
+def test_the_error_twice_a_turn_of_half_the_turns_is_the_error_that_was_found(
+    motion: str, phase: float, cycles: float
+) -> None:
+    """In the middle of what was visited, and everywhere where the turns can be halved."""
+    disc = EncoderEccentricity(cycles_per_rev=cycles, amplitude_rad=3e-4, phase=phase)
+    middle = 0.7
+    found = halved(problem(middle, motion), disc)
+    angle = (2 * np.pi if motion == "linear" else 1.0) * np.linspace(middle - 0.3, middle + 0.3, 61)
+    error = disc.amplitude_rad * np.sin(cycles * angle + phase)
+    whole = motion == "linear" or cycles % 2 == 0
+    assert len(found) == 2
+    for one in found:
+        got = twice_a_turn(one, angle)
+        np.testing.assert_allclose(got if whole else got[30], error if whole else error[30], rtol=0, atol=1e-12)
+
+
+def test_the_two_starts_differ_in_the_sign_of_the_error_once_a_turn() -> None:
+    disc = EncoderEccentricity(cycles_per_rev=12.0, amplitude_rad=3e-4, phase=0.8)
+    one, other = (first_harmonic(each) for each in halved(problem(0.0, "rotary"), disc))
+    np.testing.assert_allclose(one, -other, rtol=0, atol=1e-12)
+    assert np.abs(one).max() == pytest.approx(1.5e-4, rel=1e-2)
+
+
+def first_harmonic(disc: EncoderEccentricity) -> np.ndarray:
+    angle = np.linspace(-1, 1, 201)
+    motion = SimpleNamespace(angle=angle)
+    read = [float(disc.reading(0.0, _at(motion, k))) for k in range(len(angle))]
+    return np.array(read) - twice_a_turn(disc, angle)
+
+
+def _at(motion: Any, k: int) -> Motion:
+    found: Any = SimpleNamespace(angle=float(motion.angle[k]))
+    return found  # type: ignore[no-any-return]
+
+
+def test_an_axis_that_turns_has_whole_turns_and_at_least_one() -> None:
+    for cycles, turns in ((1.0, 1.0), (5.0, 2.0), (7.0, 4.0), (12.0, 6.0)):
+        disc = EncoderEccentricity(cycles_per_rev=cycles, amplitude_rad=3e-4)
+        assert {one.cycles_per_rev for one in halved(problem(0.0, "rotary"), disc)} == {turns}
+        assert {one.cycles_per_rev for one in halved(problem(0.0, "linear"), disc)} == {cycles / 2}
+
+
+# A play with a stiff contact is found from afar: the grid that looks for it gets finer as its averages get shorter.
+
+CARD = parse_card('[mount]\ninertia = 2.0\n[friction]\nmodel = "coulomb"\nFc = 1.0\nsigma2 = 1.0\n', "card.toml")
+WIDE = Backlash(gap_rad=5e-3, load_share=0.4, load_friction=0.4)
+NARROW = Backlash(gap_rad=1e-3, load_share=0.4, load_friction=0.2)
+PLAYS = pytest.mark.parametrize("play", [WIDE, NARROW])
+
+
+def recorded(play: Backlash, seed: int) -> Recording:
+    """Two slow tones, and what the axis needs for them with a play behind it, 100 Hz of band."""
+    t, rng = np.arange(15000) / 1000, np.random.default_rng(seed)
+    q = 0.3 * np.sin(1.5 * (t + seed)) + 0.03 * np.sin(5 * (t + seed))
+    (piece,) = prepare([Recording("still", {"t": t, "tau": t, "q": q})], 450.0).pieces
+    tau = Inverse(replace(CARD.plant(), effects=(play,)), ()).torque(piece, np.zeros(0))[0]
+    return Recording(f"run_{seed}", {"t": piece.t, "q": piece.q, "tau": tau + 0.02 * rng.standard_normal(len(tau))})
+
+
+@cache
+def compared(play: Backlash) -> tuple[Comparison, Fit]:
+    problem = _problem([recorded(play, seed) for seed in (1, 2)], CARD)
+    base = problem.fit(problem.mount, 40)
+    return Comparison.of(problem, base, POLICY), base
+
+
+def likeliest(play: Backlash) -> Backlash:
+    comparison, base = compared(play)
+    looked = [one for one in comparison.screen(base) if one.candidate.effect == "backlash"]
+    best = max(looked, key=lambda one: one.evidence)
+    start = best.candidate.start(best.coefficients)
+    assert isinstance(start, Backlash)
+    return start
+
+
+@PLAYS
+def test_the_likeliest_candidate_has_the_gap_and_what_stops_the_far_side(play: Backlash) -> None:
+    start = likeliest(play)
+    assert start.gap_rad == pytest.approx(play.gap_rad, rel=0.05)
+    assert start.load_friction / start.load_share == pytest.approx(play.load_friction / play.load_share, rel=0.1)
+
+
+@PLAYS
+def test_from_there_a_fit_ends_at_the_truth(play: Backlash) -> None:
+    comparison, base = compared(play)
+    found = refitted(comparison, base, likeliest(play), 1)
+    assert isinstance(found.effect, Backlash)
+    assert found.effect.gap_rad == pytest.approx(play.gap_rad, rel=0.01)
+    assert found.effect.load_share == pytest.approx(play.load_share, rel=0.05)
+    assert found.evidence > 1000
+    assert all_pass(admission(comparison, found))
+
+
+# A drive that saturates is found where it acts: in few rows of one recording, at a knee far below the command.
+
+Array = np.ndarray
+SLOPE = 0.4
+
+
+def motion(size: float, phase: float) -> tuple[Array, Array, Array, Array]:
+    """Time, position, speed and acceleration of 20 s at 500 Hz."""
+    t = np.arange(10_000) / 500
+    tones = [(0.5, 0.11, phase), (0.1, 0.37, 1.0 + phase), (0.02, 0.9, 2.0)]
+    waves = [(size * a, 2 * np.pi * f, 2 * np.pi * f * t + p) for a, f, p in tones]
+    q = sum(a * np.sin(x) for a, _, x in waves)
+    v = sum(a * w * np.cos(x) for a, w, x in waves)
+    return t, q, v, sum(-a * w**2 * np.sin(x) for a, w, x in waves)
+
+
+def saturated(knee: float, sizes: tuple[float, float]) -> tuple[Comparison, Fit]:
+    """Two motions of different size by a drive that gives `SLOPE` of what is asked for past a knee (N m)."""
+    recordings, rng = [], np.random.default_rng(1)
+    for phase, size in enumerate(sizes):
+        t, q, v, a = motion(size, 2.0 * phase)
+        need = 5 * a + 2 * np.sign(v) + v
+        past = np.maximum(np.abs(need) - knee, 0)
+        command = np.sign(need) * (np.abs(need) + past * (1 / SLOPE - 1))
+        noise = 0.005 * rng.standard_normal(len(t))
+        recordings.append(Recording(f"run_{phase}", {"t": t, "tau": command + noise, "q": q}))
+    mount = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0))
+    prepared = prepare(recordings, 20.0)
+    weight = (np.abs(prepared.stacked("v")) > 0.02).astype(float)
+    problem = Problem(mount, prepared, weight, 0.002)
+    base = problem.fit(mount, 25)
+    return Comparison.of(problem, base, POLICY), base
+
+
+def found(comparison: Comparison, base: Fit) -> CandidateFit:
+    """The refitted structure with the saturation that screening proposes."""
+    worth = starts(comparison.screen(base), POLICY)
+    fits = [refitted(comparison, base, one, many) for one, many in worth if isinstance(one, TorqueSaturation)]
+    return max(fits, key=lambda one: one.evidence)
+
+
+@pytest.mark.parametrize("knee", [5.6, 7.0])
+def test_a_knee_that_one_recording_alone_reaches_is_tried_and_is_real(knee: float) -> None:
+    comparison, base = saturated(knee, (0.5, 1.2))
+    one = found(comparison, base)
+    assert all_pass(admission(comparison, one))
+    assert one.evidence > POLICY.clear
+    assert isinstance(one.effect, TorqueSaturation)
+    assert one.effect.knee_torque == pytest.approx(knee, rel=0.03)
+    assert one.effect.slope == pytest.approx(SLOPE, rel=0.03)
+
+
+def test_a_knee_is_found_far_below_the_command_that_it_swells() -> None:
+    comparison, base = saturated(3.5, (1.0, 1.0))
+    one = found(comparison, base)
+    assert 0.4 * np.quantile(np.abs(comparison.problem.prepared.stacked("tau")), 0.98) > 3.5
+    assert isinstance(one.effect, TorqueSaturation)
+    assert one.effect.knee_torque == pytest.approx(3.5, rel=0.03)

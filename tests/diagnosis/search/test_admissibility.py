@@ -1,16 +1,34 @@
 """When a fitted effect is none: on motions of which every number is known."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 from motions import Array, Motion
+from scipy.signal import lfilter
 
+from cosim.data.recording import Recording
 from cosim.diagnosis.answer.ledger import all_pass
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.search import admissibility
 from cosim.diagnosis.search.admissibility import in_time, is_degenerate, name_rules, needs_turns
+from cosim.diagnosis.search.commanded import is_asked_for
+from cosim.diagnosis.search.stages import admission, refitted, weighed
+from cosim.estimation.fit import Fit
+from cosim.estimation.prepare import prepare
+from cosim.estimation.problem import Problem
+from cosim.estimation.residuals import away_from_turns, gets_memory, removed_at_rest
+from cosim.estimation.row_weights import weights
+from pyfmi_models.effects import Delay, TorqueOffset
+from pyfmi_models.effects.compliance import LoadSideCompliance
+from pyfmi_models.effects.dwell_breakaway import DwellBreakaway
+from pyfmi_models.effects.presliding import Presliding
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
 
 
 class Hypothesis:
@@ -136,3 +154,183 @@ def replace_at(values: Array, place: int, value: float) -> Array:
     changed = values.copy()
     changed[place] = value
     return changed
+
+
+# A spring must be asked for by the set point, and what is late must be late away from turns too.
+
+J, DT, SECONDS = 2.0, 2e-3, 60.0
+MOUNT = Mount(name="axis", axis=Axis(inertia=J), friction=Coulomb(Fc=0.5, sigma2=0.5), effects=())
+SPRING = LoadSideCompliance(resonance_hz=12.0, encoder_share=0.5)
+
+
+def motion(noise: float, asked: float, seed: int) -> tuple[Any, Any, Any]:
+    """Time, set point and position of an axis that a slow loop holds: torque noise moves it, the loop answers."""
+    rng, t = np.random.default_rng(seed), np.arange(0, SECONDS, DT)
+    q_d = 0.5 * np.sin(2 * np.pi * 0.2 * t) + asked * np.sin(2 * np.pi * 5 * t) / (2 * np.pi * 5) ** 2
+    w, e = 2 * np.pi * 4, rng.standard_normal(len(t)) * noise
+    # e'' + 1.4 w e' + w^2 e = noise, by semi-implicit Euler
+    moved = lfilter([DT**2], [1, -2 + 1.4 * w * DT + (w * DT) ** 2, 1 - 1.4 * w * DT], e)
+    return t, q_d, q_d + moved
+
+
+def recordings(noise: float, asked: float, spring: bool) -> list[Recording]:
+    """Two recordings: the torque of the loop, without the noise that moved the axis, or of a machine with a spring."""
+    out = []
+    for seed in (1, 2):
+        t, q_d, q = motion(noise, asked, seed)
+        v, a = np.gradient(q, DT), np.gradient(np.gradient(q, DT), DT)
+        desired = np.gradient(np.gradient(q_d, DT), DT)
+        w = 2 * np.pi * 4
+        answer = desired - 1.4 * w * np.gradient(q - q_d, DT) - w**2 * (q - q_d)
+        tau = J * (a if spring else answer) + 0.5 * v + 0.5 * np.sign(v)
+        if spring:
+            tau = tau + J * np.gradient(np.gradient(a, DT), DT) / (2 * np.pi * 12.0) ** 2
+        out.append(Recording(f"run_{seed}", {"t": t, "q": q, "q_d": q_d, "tau": tau}))
+    return out
+
+
+def asked_for(noise: float, asked: float, spring: bool, *, with_set_point: bool = True) -> bool:
+    made = recordings(noise, asked, spring)
+    if not with_set_point:
+        made = [Recording(one.name, {n: one.table[n] for n in ("t", "q", "tau")}) for one in made]
+    prepared = prepare(made, 8.0)
+    problem = Problem(MOUNT, prepared, np.ones(len(prepared.recording_of)), DT)
+    base = problem.fit(MOUNT, 25)
+    found = problem.fit(replace(base.mount, effects=(SPRING,)), 15)
+    return is_asked_for(Comparison.of(problem, base, POLICY), found, found.mount.effects[-1])
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.5])
+def test_a_spring_that_the_set_point_moves_is_asked_for(noise: float) -> None:
+    assert asked_for(noise, 2.0, True)
+
+
+def test_a_loop_that_answers_noise_is_no_spring() -> None:
+    assert not asked_for(5.0, 0.0, False)
+
+
+def test_without_a_set_point_nobody_can_be_asked() -> None:
+    assert asked_for(5.0, 0.0, False, with_set_point=False)
+
+
+def swung(left: Any) -> tuple[Problem, Any, Any]:
+    """Rows of a motion that turns every 5 s, what is left of them with an effect (`left` of the time), and without."""
+    t = np.arange(0, SECONDS, DT)
+    recording = Recording("run", {"t": t, "q": np.sin(2 * np.pi * 0.1 * t), "tau": np.zeros_like(t)})
+    prepared = prepare([recording], 8.0)
+    when = prepared.stacked("t")
+    problem = Problem(MOUNT, prepared, np.ones(len(when)), DT)
+    return problem, left(when), np.ones(len(when))
+
+
+def turning(t: Any) -> Any:
+    """0 for 60 ms after each turn, 1 elsewhere: all that is removed is removed there."""
+    return np.where((t - 2.5) % 5.0 < 0.06, 0.0, 1.0)
+
+
+def test_where_something_removes_energy() -> None:
+    problem, left, without = swung(turning)
+    assert away_from_turns(problem, left, without) == 1.0  # a hundredth of the energy says nothing
+    loud = np.where(turning(problem.prepared.stacked("t")) == 0.0, 5.0, 1.0)
+    assert away_from_turns(problem, left, loud) == pytest.approx(0.0, abs=1e-12)
+    assert away_from_turns(problem, 0 * left, without) == pytest.approx(0.94, abs=0.03)
+
+
+def test_what_is_late_about_turns_alone_is_not_named() -> None:
+    """An axis that sticks within a step of its encoder is read late as it turns: the friction is 20 ms ahead, alone."""
+    made = []
+    for seed in (1, 2):
+        t = np.arange(0, SECONDS, DT)
+        v = np.cos(2 * np.pi * 0.3 * t + seed) + 0.3 * np.cos(2 * np.pi * 0.11 * t)
+        ahead = np.sign(np.interp(t + 0.02, t, v))
+        a = np.gradient(v, DT)
+        noise = 0.02 * np.random.default_rng(seed).standard_normal(len(t))
+        tau = 0.01 * a + 0.5 * v + 2 * ahead + noise
+        made.append(Recording(f"run_{seed}", {"t": t, "q": np.cumsum(v) * DT, "tau": tau}))
+    mount = replace(MOUNT, axis=Axis(inertia=0.01), friction=Coulomb(Fc=2.0, sigma2=0.5))
+    prepared = prepare(made, 8.0)
+    problem = Problem(mount, prepared, np.ones(len(prepared.recording_of)), DT)
+    base = problem.fit(problem.mount, 25)
+    comparison = Comparison.of(problem, base, POLICY)
+    found = problem.fit(replace(base.mount, effects=(Delay(delay_ms=5.0),)), 15)
+    one = weighed(comparison, found, base)
+    assert one.evidence > POLICY.clear
+    assert one.away < POLICY.small
+    assert not all_pass(admission(comparison, one))
+    assert all_pass(admission(comparison, replace(one, away=1.0)))
+
+
+# A contact that bends says what is held at rest and must be right; one that settles rises by less than itself.
+
+FC, SIGMA0 = 2.0, 400.0
+PLAIN = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=FC, sigma2=1.0), effects=())
+
+
+def recording(seed: int, bends: bool) -> Recording:
+    """Moves and rests in turn; what is held at rest is a bent contact's torque, or none that motion tells."""
+    t = np.arange(5_000) / 200
+    goes = (np.sin(2 * np.pi * t / 6 + seed) > -0.3).astype(float)
+    goes = np.convolve(goes, np.hanning(60) / np.hanning(60).sum(), "same")
+    v = goes * (0.4 * np.sin(2 * np.pi * t / 2.3 + seed) + 0.2 * np.sin(2 * np.pi * t / 0.9))
+    q, z, held = np.cumsum(v) / 200, 0.0, np.zeros_like(t)
+    for k, speed in enumerate(v):
+        z = float(np.clip(z + SIGMA0 * speed / 200, -FC, FC))
+        held[k] = z
+    rng = np.random.default_rng(seed)
+    if not bends:
+        rest = np.abs(v) < 0.01
+        held = np.where(rest, FC * np.sin(40 * t), np.sign(v) * FC)
+    tau = 5 * np.gradient(v, t) + held + v + 0.02 * rng.standard_normal(len(t))
+    return Recording(f"run_{seed}", {"t": t, "tau": tau, "q": q})
+
+
+def comparison(bends: bool) -> tuple[Comparison, Fit]:
+    prepared = prepare([recording(1, bends), recording(2, bends)], 30.0)
+    problem = Problem(PLAIN, prepared, weights(PLAIN.friction, prepared), 1 / 200)
+    base = problem.fit(PLAIN, 15)
+    return Comparison.of(problem, base, POLICY), base
+
+
+def test_a_contact_that_bends_is_told_by_what_it_holds_at_rest() -> None:
+    for bends in (True, False):
+        whole, base = comparison(bends)
+        found = refitted(whole, base, Presliding(sigma0=SIGMA0), 1)
+        assert (found.at_rest > POLICY.half) is bends
+        assert all_pass(admission(whole, found)) is bends
+
+
+def test_held_out_too() -> None:
+    whole, base = comparison(True)
+    there = prepare([recording(3, True)], 30.0)
+    held = Predictive.of(whole, there, base, there)
+    bent = Mount(name="axis", axis=PLAIN.axis, friction=PLAIN.friction, effects=(Presliding(sigma0=SIGMA0),))
+    pushed = Mount(name="axis", axis=PLAIN.axis, friction=PLAIN.friction, effects=(TorqueOffset(torque=0.1),))
+    assert held.at_rest(PLAIN, bent) > 0.9
+    assert held.at_rest(PLAIN, pushed) == held.at_rest(bent, bent) == 0.0
+
+
+def test_where_an_axis_hardly_rests_nothing_is_asked() -> None:
+    weight, left, without = np.ones(50), np.ones(50), np.ones(50)
+    weight[:9] = 0
+    assert removed_at_rest(weight, 3 * left, without) == 1
+    weight[9] = 0
+    assert removed_at_rest(weight, 3 * left, without) == pytest.approx(-8)
+    assert removed_at_rest(weight, 0.5 * left, without) == pytest.approx(0.75)
+
+
+def test_memory_is_got_from_a_contact_and_from_nothing_else() -> None:
+    bent = Mount(name="axis", axis=PLAIN.axis, friction=PLAIN.friction, effects=(Presliding(sigma0=SIGMA0),))
+    assert gets_memory(bent, PLAIN)
+    assert not gets_memory(bent, bent)
+    assert not gets_memory(PLAIN, bent)
+
+
+@pytest.mark.parametrize(
+    ("rise", "settles"),
+    [(0.01, False), (0.015, False), (0.03, True), (0.1, True), (1.01, True), (1.9, True), (2.1, False)],
+)
+def test_a_contact_settles_by_less_than_twice_its_level_and_more_than_that_wanders(rise: float, settles: bool) -> None:
+    prepared = prepare([recording(1, True)], 30.0)
+    problem = Problem(PLAIN, prepared, weights(PLAIN.friction, prepared), 1 / 200)
+    effect = DwellBreakaway(torque_per_efold=rise * FC, memory_rad=0.01)
+    assert is_degenerate(problem, effect) is not settles

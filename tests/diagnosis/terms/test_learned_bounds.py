@@ -1,24 +1,32 @@
 """What a learned term may be: its columns, its signs, its waves, its energy, the evidence it needs."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
-from learned_cases import MOUNT, Array, Extra, droop, learned, parts, wanders, warm_place
+from learned_cases import FC, MOUNT, Array, Extra, droop, learned, night, parts, wanders, warm_place
 from test_unknown import iron
 
+from cosim.data.recording import Recording
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects.candidates import Candidate
 from cosim.diagnosis.evidence.comparison import Screened
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.terms.candidate_terms import candidate_terms, resolved
+from cosim.diagnosis.terms.dictionary import followed, torque_again, user_columns
 from cosim.diagnosis.terms.grams import columns_of, grams_of, with_terms
 from cosim.diagnosis.terms.learn import _judged
 from cosim.diagnosis.terms.select import paths
+from cosim.diagnosis.trust.limits import own_torque
 from cosim.estimation.inverse import Inverse, stacked
+from cosim.estimation.prepare import Prepared, prepare
 from cosim.support.statistics import rms
+from cosim_formulas.find import since
 from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.effects.learned import LearnedFriction, LearnedViscous
+from pyfmi_models.effects.learned_base import SEEN_WITHIN
 from pyfmi_models.effects.learned_drive import LearnedDrive, LearnedGain
 from pyfmi_models.effects.learned_memory import LearnedHysteresis
 
@@ -145,3 +153,82 @@ def test_a_candidate_that_can_only_add_is_none_where_it_would_take_away(sign: fl
     assert (spring.evidence, spring.plain) == (
         (free.evidence, free.plain) if free.coefficients[0] > 0 else (-np.inf, 0)
     )
+
+
+# What a learned term may follow along a motion: acceleration, way, and what has passed since the speed turned.
+
+DT = 1e-3
+T = DT * np.arange(8001)
+
+
+def moving(q: np.ndarray, v: np.ndarray) -> Any:
+    return SimpleNamespace(t=T, dt=DT, q=q, v=v)
+
+
+def test_the_acceleration_is_that_of_the_motion_behind_a_short_lag() -> None:
+    """Of a speed that grows evenly it is exact once the lag is over; of a sine it is that of a first order."""
+    assert followed("acceleration", moving(T**2, 2 * T))[-1] == pytest.approx(2.0, rel=1e-3)  # half a row early
+    w = 3.0
+    found = followed("acceleration", moving(-np.cos(w * T) / w, np.sin(w * T)))
+    gain, late = 1 / np.hypot(1, w * SEEN_WITHIN), np.arctan(w * SEEN_WITHIN)
+    np.testing.assert_allclose(found[2000:], w * gain * np.cos(w * T[2000:] - late), atol=0.005)
+
+
+def test_the_way_grows_whichever_way_the_axis_moves() -> None:
+    found = followed("way", moving(0.5 * np.sin(T), 0.5 * np.cos(T)))
+    assert found[0] == 0
+    assert np.all(np.diff(found) >= 0)
+    quarter = np.searchsorted(T, np.pi / 2)
+    assert found[quarter] == pytest.approx(0.5, abs=1e-4)
+    assert found[np.searchsorted(T, 3 * np.pi / 2)] == pytest.approx(1.5, abs=1e-4)
+
+
+def test_time_and_way_count_from_the_last_reversal_or_the_start() -> None:
+    piece = moving(0.5 * np.sin(T), 0.5 * np.cos(T))
+    turned = np.searchsorted(T, np.pi / 2)
+    time, way = since("time since reversal", piece), since("way since reversal", piece)
+    for k in (500, 1500):
+        assert (time[k], way[k]) == (pytest.approx(T[k]), pytest.approx(0.5 * np.sin(T[k])))
+    assert time[turned] == pytest.approx(0.0, abs=1.5 * DT)
+    for k in (turned + 400, turned + 2500):
+        assert time[k] == pytest.approx(T[k] - np.pi / 2, abs=1.5 * DT)
+        assert way[k] == pytest.approx(0.5 * (1 - np.sin(T[k])), abs=1e-5)
+
+
+# A column that is the axis' own torque, commanded or read elsewhere, is no cause; that of a cause stays one.
+
+
+def recorded(seed: int = 1, pull: float = 0.0, coupling: float = 0.0) -> Prepared:
+    """An axis whose torque was commanded, too, by a drive that follows badly; a neighbour, and a pull that was read."""
+    now = night(seed)
+    rng = np.random.default_rng(seed)
+    t = now["t"]
+    neighbour, force = 3.0 * np.sin(1.3 * t), np.sin(0.7 * t)
+    own = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"]
+    tau = own + pull * force + coupling * neighbour
+    slow = np.convolve(rng.standard_normal(len(t)), np.ones(50) / 50**0.5, "same")
+    command = 1.3 * tau + 0.3 * float(np.std(tau)) * slow
+    columns = {"command": command, "neighbour": neighbour, "force": force}
+    return prepare([Recording("one", {"t": t, "q": now["q"], "tau": tau} | columns)], 10.0)
+
+
+def test_a_command_that_the_torque_follows_badly_is_no_cause() -> None:
+    prepared = recorded()
+    column = np.concatenate([piece.extras["command"][piece.kept] for piece in prepared.pieces])
+    assert np.corrcoef(column, prepared.stacked("tau"))[0, 1] ** 2 < 0.98, "a plain copy would be told without the rule"
+    assert torque_again(prepared) == ("command",)
+    assert set(user_columns(prepared)) == {"neighbour", "force"}
+    assert "command" in own_torque(prepared)[0].statement
+
+
+def test_a_cause_stays_one_even_where_it_is_most_of_the_torque() -> None:
+    for case in (recorded(pull=5.0), recorded(coupling=2.0)):
+        assert torque_again(case) == ("command",)
+        assert {"neighbour", "force"} <= set(user_columns(case))
+
+
+def test_nothing_is_told_of_an_axis_whose_motion_asks_for_no_torque() -> None:
+    now = night(2)
+    tau = np.random.default_rng(2).standard_normal(len(now["t"]))
+    columns = {"t": now["t"], "q": now["q"], "tau": tau, "half": tau + np.sin(now["t"])}
+    assert torque_again(prepare([Recording("still", columns)], 10.0)) == ()
