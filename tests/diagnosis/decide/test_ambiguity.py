@@ -1,4 +1,4 @@
-"""What cannot be excluded stays in the set; what an effect that is really another is called."""
+"""What an effect that is really another is called."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,8 +8,6 @@ import numpy.typing as npt
 import pytest
 
 from cosim.data.recording import Recording
-from cosim.diagnosis.answer.scores import EffectScores, ResidualScores, Scores, TermScores
-from cosim.diagnosis.decide.decision import decide, least_left, open_rivals
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.evidence.comparison import Comparison
@@ -22,8 +20,6 @@ from cosim.estimation.problem import Problem
 from pyfmi_models.effects import (
     ActuatorLag,
     Delay,
-    FrictionAsymmetry,
-    GravityUnbalance,
     StribeckEffect,
     TorqueOffset,
 )
@@ -34,85 +30,8 @@ from pyfmi_models.friction import Coulomb
 from pyfmi_models.mount import Axis, Mount
 
 Array = npt.NDArray[np.float64]
-OFFSET, UNBALANCE = TorqueOffset(torque=1.0), GravityUnbalance(mgl=1.0, phase=1.5)
-CABLE = CableWrap(stiffness=0.1, home=-0.5)
-ASYMMETRY = FrictionAsymmetry(level_asymmetry=0.3)
 MOUNT = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=1.0))
 NONE: Array = np.zeros(0)
-
-
-QUIET = ResidualScores(0.0, 0.0)
-
-
-def scores(effect: str, evidence: float, explains: float = 0.5, **margins: float) -> EffectScores:
-    return EffectScores(effect, evidence, margins, dict.fromkeys((effect, *margins), explains))
-
-
-def test_a_rival_that_is_beaten_by_the_margin_of_a_set_is_out_of_it_and_the_closest_comes_first() -> None:
-    near, beaten = POLICY.fair - 1, POLICY.fair + 1
-    one = scores("torque_offset", 200.0, gravity_unbalance=near, cable_wrap=near - 1, cogging=beaten)
-    assert open_rivals(one, POLICY) == ("cable_wrap", "gravity_unbalance")
-
-
-def test_the_nearer_a_rival_the_less_probable_is_the_effect_and_all_add_up_to_one_at_most() -> None:
-    told = [
-        decide(Scores([scores("torque_offset", 200.0, gravity_unbalance=margin)], QUIET), POLICY).probabilities
-        for margin in (0.1, 1.0, 2.9)
-    ]
-    told = [one["torque_offset"] for one in told]
-    own = [one["torque_offset"] for one in told]
-    assert own == sorted(own)
-    assert own[0] < own[-1]
-    assert all(sum(one.values()) <= 1 + 1e-12 for one in told)
-    assert all(set(one) == {"torque_offset", "gravity_unbalance"} for one in told)
-
-
-def test_an_effect_of_little_evidence_is_less_probable_than_one_of_much() -> None:
-    few, many = (
-        decide(Scores([scores("cogging", evidence)], QUIET), POLICY).probabilities["cogging"]["cogging"]
-        for evidence in (1.0, 100.0)
-    )
-    assert few < many
-
-
-def test_nothing_is_unknown_where_nothing_is_left_and_what_is_left_says_what_it_follows() -> None:
-    assert not decide(Scores([], QUIET), POLICY).is_unknown
-    assert decide(Scores([], QUIET), POLICY).depends_on == ()
-    sizes = ("position", POLICY.strong + 5, 0.6), ("temperature", POLICY.strong - 5, 0.2)
-    terms = [TermScores(name, evidence, share) for name, evidence, share in sizes]
-    left = decide(Scores([], ResidualScores(0.0, 0.0, terms)), POLICY)
-    assert left.is_unknown
-    assert left.depends_on == ("position",)
-    large = decide(Scores([], ResidualScores(POLICY.small + 0.01, 0.0, (), "time")), POLICY)
-    assert large.is_unknown
-    assert large.depends_on == ("time",)
-
-
-def test_what_was_surely_learned_is_unknown_too_and_names_stay() -> None:
-    named = decide(Scores([scores("cogging", 60.0)], QUIET), POLICY)
-    more = named.with_rest(("position",))
-    assert (more.is_unknown, more.depends_on, more.sets) == (True, ("position",), named.sets)
-    assert more.with_rest(("speed",)) == more
-
-
-@pytest.mark.parametrize(
-    ("ahead", "removes", "left"),
-    [(9.9, 0.5, POLICY.true_beside_unknown), (10.0, 0.5, POLICY.true_ahead), (-50.0, 0.9, 1.0)],
-)
-def test_beside_something_unknown_a_name_is_an_imitation_unless_no_term_without_a_name_comes_near(
-    ahead: float, removes: float, left: float
-) -> None:
-    one = replace(scores("cogging", 60.0), removes=removes, ahead=ahead)
-    alone = decide(Scores([one], QUIET), POLICY)
-    beside = decide(Scores([one], ResidualScores(POLICY.small + 0.01, 0.0)), POLICY)
-    assert beside.is_unknown
-    assert beside.probabilities["cogging"]["cogging"] == pytest.approx(left * alone.probabilities["cogging"]["cogging"])
-    assert beside.doubtful == (("cogging",) if left == POLICY.true_beside_unknown else ())
-
-
-def test_what_is_left_must_be_more_than_what_the_equations_of_strong_names_lack() -> None:
-    assert least_left([], POLICY) == 0.0
-    assert least_left([scores("cogging", 60.0), scores("cable_wrap", 200.0)], POLICY) == POLICY.considerable * 200.0
 
 
 def problem(speed: Array, **columns: Array) -> Problem:
@@ -209,7 +128,7 @@ def test_of_an_asymmetry_that_looks_like_the_offset_found_it_is_said_that_it_doe
     one = {"t": t, "q": q, "tau": np.sign(v) + 0.2 + 5 * np.gradient(v, t)}
     prepared = prepare([Recording("r", one)], 10.0)
     this = Problem(MOUNT, prepared, np.ones(len(prepared.recording_of)), 1e-2)
-    found = this.fit(replace(MOUNT, effects=(OFFSET,)), 5)
+    found = this.fit(replace(MOUNT, effects=(TorqueOffset(torque=1.0),)), 5)
     comparison = Comparison.of(this, this.fit(MOUNT, 5), POLICY)
     absent = {finding.effect: finding for finding in not_found(comparison, found, ["torque_offset"], 0.0)}
     assert absent["friction_asymmetry"].answer == "not_testable"

@@ -51,8 +51,8 @@ def unknown(evidence: float, share: float) -> bool:
     return is_left([], left(TermScores("position", evidence, share)), ROUND)
 
 
-def test_a_rival_at_the_margin_of_a_set_is_beaten() -> None:
-    assert open_rivals(effect("delay", 9.0, a=4.0 - LITTLE, b=4.0), ROUND) == ("a",)
+def test_a_rival_at_the_margin_of_a_set_is_beaten_and_the_closest_comes_first() -> None:
+    assert open_rivals(effect("delay", 9.0, a=4.0 - LITTLE, b=4.0, c=3.0), ROUND) == ("c", "a")
 
 
 @pytest.mark.parametrize(
@@ -179,6 +179,19 @@ def test_a_name_beside_something_unknown_is_less_likely_unless_it_removes_nearly
     assert found.probabilities["delay"]["delay"] == pytest.approx(0.375 * alone.probabilities["delay"]["delay"])
 
 
+@pytest.mark.parametrize(
+    ("ahead", "removes", "kept"),
+    [(8.0 - LITTLE, 0.5, ROUND.true_beside_unknown), (8.0, 0.5, ROUND.true_ahead), (-50.0, 0.9, 1.0)],
+)
+def test_a_name_that_no_term_without_a_name_comes_near_is_less_of_an_imitation(
+    ahead: float, removes: float, kept: float
+) -> None:
+    one = replace(effect("cogging", 60.0), removes=removes, ahead=ahead)
+    alone, beside = (decide(Scores([one], left(share=share)), ROUND) for share in (0.0, 1.0))
+    assert beside.probabilities["cogging"]["cogging"] == pytest.approx(kept * alone.probabilities["cogging"]["cogging"])
+    assert beside.doubtful == (("cogging",) if kept == ROUND.true_beside_unknown else ())
+
+
 def test_what_the_rest_follows_is_beyond_a_share_of_its_own_and_of_the_best() -> None:
     terms = [TermScores(name, 50.0, share) for name, share in (("t", 0.26), ("q", 0.8), ("v", 0.4), ("a", 0.41))]
     assert followed(left(*terms), ROUND) == ("q", "a"), "beyond half of the best, the best first"
@@ -201,6 +214,8 @@ def test_probabilities_are_calibrated_posterior_shares_times_what_is_explained(m
 def test_what_is_decided_stays_when_something_more_is_left() -> None:
     decided = Decision({}, {}, True, ("time",))
     assert decided.with_rest(("position",)) is decided
+    nothing = decide(Scores([], left()), ROUND)
+    assert (nothing.is_unknown, nothing.depends_on) == (False, ())
 
 
 def test_names_that_make_the_model_worse_held_out_keep_half_of_their_probability() -> None:
