@@ -4,7 +4,7 @@
 
 Each maker writes one small file from a seed; `FILES` has them by name. Every file of up to 50 MB must end in an answer
 or a sentence within 20 s and 1 GB; those of `FOREIGN` try to read other files and must be refused.
-tests/data/test_crafted_files.py reads a sample of them.
+tests/data/test_bounds_of_readers.py reads a sample of them.
 """
 
 import argparse

@@ -265,4 +265,4 @@ def test_every_form_with_an_equation_of_its_own_is_asked_here() -> None:
         "FrictionWander",
         "Presliding",
     }
-    assert set(FORM) == asked | others, "Presliding: in test_effects_friction.py"
+    assert set(FORM) == asked | others, "Presliding: in test_effects_masses.py"
