@@ -58,6 +58,7 @@ REMARKS = frozenset(
         "end_stop",
         "little_motion",
         "own_torque",
+        "own_set_point",
         "no_set_point",
         "not_determined",
         "single_readings",

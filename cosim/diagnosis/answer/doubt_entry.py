@@ -25,6 +25,7 @@ Kind = Literal[
     "no_set_point",
     "little_motion",
     "own_torque",
+    "own_set_point",
 ]
 
 

@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from cosim.diagnosis.terms.own_torque import own_torque
+from cosim.diagnosis.terms.own_torque import own_set_point, own_torque
 from cosim.estimation.discrepancy_basis import last_reversal, stop_operators
 from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.rowwise import recurrence
@@ -164,15 +164,22 @@ def _nothing(_: Piece) -> list[Array]:
 
 
 def user_columns(prepared: Prepared) -> dict[str, Column]:
-    """Columns that are neither torque nor motion under another name, centred, of unit size."""
+    """Columns that are neither torque nor motion under another name, measured or asked for, centred, of unit size."""
     useful = _useful(prepared)
-    torque = own_torque(prepared, useful)
-    return {name: _centred(prepared, name) for name in useful if name not in torque}
+    again = {*own_torque(prepared, useful), *own_set_point(prepared, useful)}
+    return {name: _centred(prepared, name) for name in useful if name not in again}
 
 
 def torque_again(prepared: Prepared) -> tuple[str, ...]:
     """Names of columns that are no causes because they are this axis' torque, asked for or read elsewhere."""
     return own_torque(prepared, _useful(prepared))
+
+
+def set_point_again(prepared: Prepared) -> tuple[str, ...]:
+    """Names of columns that are no causes because they are this axis' set point."""
+    useful = _useful(prepared)
+    torque = own_torque(prepared, useful)
+    return own_set_point(prepared, {name: one for name, one in useful.items() if name not in torque})
 
 
 def _useful(prepared: Prepared) -> dict[str, Array]:

@@ -1,16 +1,22 @@
-"""Columns that are the axis' own torque, asked for or read elsewhere: a set point of the torque, a motor current.
+"""Columns of the axis' own loop, which are no causes: its torque, asked for or read elsewhere, and its set point.
 
-A set point of the speed is one, too, where drag is all that an axis needs: no cause either.
+A set point of the speed is a torque, too, where drag is all that an axis needs.
 
 A cause acts beside the axis' own inertia, friction and load, which it still needs. Beside its own torque it needs none
 of them: tau = k c + B b with B the motion (inertia, friction of either sign, drag, waves over the position), and what
 B explains beside c is small against what it explains alone. Torque then follows torque, which foretells nothing.
+
+A set point is what the axis follows: its motion (q, v, a) tells most of it. Such a column may still be a cause, as a
+neighbour that moves along; but in a loop tau = k (c - q) - d v, so with the set point, the position and the speed, B
+is needed half as much as with these two alone, and beside a cause as much as before. What is named for a set point
+needs no such proof.
 """
 
 from collections.abc import Mapping
 
 import numpy as np
 
+from cosim.data.roles import is_named
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.estimation.prepare import Array, Prepared
 from cosim.support.statistics import column_rms
@@ -43,6 +49,29 @@ def own_torque(prepared: Prepared, columns: Mapping[str, Array]) -> tuple[str, .
         return needed < POLICY.small * (alone - moved)
 
     return tuple(name for name, column in columns.items() if is_torque(column))
+
+
+def own_set_point(prepared: Prepared, columns: Mapping[str, Array]) -> tuple[str, ...]:
+    """Return the names of the columns that are the set point of this axis under another name; arguments as above."""
+    tau, motion = prepared.stacked("tau"), _motion(prepared)
+    state = np.column_stack([np.ones_like(tau), *(prepared.stacked(name) for name in "qv")])
+    moved = np.column_stack([state, prepared.stacked("a")])
+
+    def needed(beside: Array) -> float:
+        return _energy_left(beside, tau) - _energy_left(np.column_stack([beside, motion]), tau)
+
+    def is_followed(column: Array) -> bool:
+        return _energy_left(moved, column) <= POLICY.half * _energy_left(state[:, :1], column)
+
+    def closes_loop(column: Array) -> bool:
+        return needed(np.column_stack([state, column])) <= POLICY.half * needed(state)
+
+    return tuple(name for name, one in columns.items() if is_followed(one) and (_asks(name) or closes_loop(one)))
+
+
+def _asks(name: str) -> bool:
+    """Whether a column is named for a motion that is asked for."""
+    return is_named(name, "asked") and is_named(name, "position", "speed")
 
 
 def _motion(prepared: Prepared) -> Array:

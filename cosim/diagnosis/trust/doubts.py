@@ -16,7 +16,7 @@ from cosim.diagnosis.trust.base import BASE_FAR, base_far_from_card, load_far_fr
 from cosim.diagnosis.trust.clocks import LATE, clocks
 from cosim.diagnosis.trust.judgement import judged
 from cosim.diagnosis.trust.likelihood import Reference
-from cosim.diagnosis.trust.limits import encoder_step, little_motion, no_set_point, own_torque
+from cosim.diagnosis.trust.limits import encoder_step, little_motion, no_set_point, own_set_point, own_torque
 from cosim.estimation.fit import Fit, edges_of
 from cosim.estimation.problem import Problem
 from pyfmi_models.card import Card
@@ -79,6 +79,7 @@ def of_base(
         *encoder_step([*train, *heldout], problem.mount, problem.prepared.cutoff),
         *little_motion(problem.prepared),
         *own_torque(problem.prepared),
+        *own_set_point(problem.prepared),
         *no_set_point([*train, *heldout]),
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 from cosim.data.recording import Recording
 from cosim.data.resolution import SEEN_STEPS, resolution
 from cosim.diagnosis.answer.doubt_entry import Sanity
-from cosim.diagnosis.terms.dictionary import torque_again
+from cosim.diagnosis.terms.dictionary import set_point_again, torque_again
 from cosim.estimation.end_stops import Push
 from cosim.estimation.prepare import Prepared
 from cosim.estimation.row_weights import far_from_turns
@@ -116,3 +116,15 @@ def own_torque(prepared: Prepared) -> tuple[Sanity, ...]:
         f"command or another reading, and is no cause. Nothing was learned over {it}."
     )
     return (Sanity(finding="own_torque", statement=text),)
+
+
+def own_set_point(prepared: Prepared) -> tuple[Sanity, ...]:
+    """Say which columns are the axis' own set point under another name, and so are tried as no cause."""
+    names = set_point_again(prepared)
+    if not names:
+        return ()
+    is_what, it = ("set points", "them") if names[1:] else ("a set point", "it")
+    text = f"The axis follows {', '.join(names)}: {is_what}, no cause. Nothing was learned over {it}."
+    if not any("q_d" in piece.extras for piece in prepared.pieces):
+        text += f" A set point of the position is of use where it is named: --columns q_d={names[0]}."
+    return (Sanity(finding="own_set_point", statement=text),)

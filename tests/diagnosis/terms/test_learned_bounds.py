@@ -15,11 +15,11 @@ from cosim.diagnosis.effects.candidates import Candidate
 from cosim.diagnosis.evidence.comparison import Screened
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.terms.candidate_terms import candidate_terms, resolved
-from cosim.diagnosis.terms.dictionary import followed, torque_again, user_columns
+from cosim.diagnosis.terms.dictionary import followed, set_point_again, torque_again, user_columns
 from cosim.diagnosis.terms.grams import columns_of, grams_of, with_terms
 from cosim.diagnosis.terms.learn import _judged
 from cosim.diagnosis.terms.select import paths
-from cosim.diagnosis.trust.limits import own_torque
+from cosim.diagnosis.trust.limits import own_set_point, own_torque
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Prepared, prepare
 from cosim.support.statistics import rms
@@ -232,3 +232,40 @@ def test_nothing_is_told_of_an_axis_whose_motion_asks_for_no_torque() -> None:
     tau = np.random.default_rng(2).standard_normal(len(now["t"]))
     columns = {"t": now["t"], "q": now["q"], "tau": tau, "half": tau + np.sin(now["t"])}
     assert torque_again(prepare([Recording("still", columns)], 10.0)) == ()
+
+
+def looped(name: str = "asked", gain: float = 25.0, along: float = 0.0) -> Prepared:
+    """An axis that follows a set point softly, logged a step early; a neighbour that moves along; pushes from outside.
+
+    The torque is read with noise, so that the set point is no plain function of it and of the motion.
+    """
+    now, rng = night(3), np.random.default_rng(3)
+    t, dt = now["t"], float(now["t"][1] - now["t"][0])
+    pushes = 4.0 * np.sign(np.sin(2.1 * t + 2 * np.sin(0.9 * t)))
+    tau = 5.0 * now["a"] + FC * np.sign(now["v"]) + now["v"] + pushes
+    asked = now["q"] + (tau + 3.0 * now["v"]) / gain
+    late = round(0.06 / dt)
+    neighbour = along * now["q"] / now["q"].std() + np.sin(1.3 * t)
+    read = tau + 0.2 * tau.std() * rng.standard_normal(len(t)) + 2.0 * neighbour
+    columns = {name: np.roll(asked, -late), "neighbour": neighbour}
+    return prepare([Recording("one", {"t": t, "q": now["q"], "tau": read} | columns)], 10.0)
+
+
+def test_a_set_point_under_another_name_is_told_and_no_cause() -> None:
+    for name in ("joint_pos_target_0", "column_17"):
+        prepared = looped(name)
+        assert set_point_again(prepared) == (name,)
+        assert set(user_columns(prepared)) == {"neighbour"}
+        assert f"q_d={name}" in own_set_point(prepared)[0].statement
+
+
+def test_a_neighbour_that_moves_along_stays_a_cause() -> None:
+    for along in (0.0, 2.0):
+        assert "neighbour" in user_columns(looped(along=along))
+
+
+def test_the_set_point_of_another_axis_is_none_of_this_one() -> None:
+    prepared = recorded()
+    other = Recording("one", {"t": prepared.pieces[0].t, **{n: getattr(prepared.pieces[0], n) for n in ("q", "tau")}})
+    asked = {"joint_pos_target_1": np.sin(1.3 * other.t)}
+    assert set_point_again(prepare([Recording("one", {**other.table, **asked})], 10.0)) == ()
