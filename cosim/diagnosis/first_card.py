@@ -5,7 +5,8 @@ The torque balance of the recordings gives the start (`trust/balance.py`), inver
     tau = J a + Fc sign(v) + sigma2 v [+ offset] [+ mgl sin(q + phase)]
 
 A constant torque and a weight are taken where their size is clear of its error and they explain a share of the error
-that matters; a diagnosis with the card looks for everything else.
+that matters; a diagnosis with the card looks for everything else. An inertia that the axis' own motion does not show is
+taken from the balance with its neighbours' (`beside_neighbours.py`).
 """
 
 from collections.abc import Callable, Sequence
@@ -15,8 +16,10 @@ from typing import Literal
 
 import numpy as np
 
+from cosim.data.neighbours import Neighbour
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
+from cosim.diagnosis.beside_neighbours import inertia_beside_neighbours
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.band import in_band
 from cosim.diagnosis.search.sizes import standard_errors
@@ -94,20 +97,46 @@ def first_card(
     linear = motion == "linear"
     recordings = [as_analysed(one) for one in recordings]
     on_progress("reading the torque balance")
-    problem, found = _base(recordings, motion, inertia)
+    problem, best = _with_loads(*_base(recordings, motion, inertia), inertia, on_progress)
+    numbers = tuple(_numbers(problem, best, inertia, linear))
+    beside = "" if _inertia_of(numbers).is_determined else _named(problem.prepared.neighbours)
+    if beside:
+        value, error = inertia_beside_neighbours(problem.prepared, not linear)
+        beside = beside if value > SURELY * error else ""
+    if beside:
+        on_progress(f"reading the inertia beside the motion of {beside}")
+        problem, best = _with_loads(*_base(recordings, motion, value), value, on_progress)
+        given, *others = _numbers(problem, best, value, linear)
+        numbers = (replace(given, error=error), *others)
+    tau = problem.weight * problem.prepared.stacked("tau")
+    if is_asked or not _is_small(problem, tau, numbers):
+        _check_inertia(numbers, linear)
+    left = problem.weight * best.residual
+    explained = 1 - float(left @ left) / max(float(tau @ tau), 1e-300)
+    notes = (*_beside(numbers, beside), *_notes(numbers, explained))
+    return FirstCard(_held(best.mount, numbers), numbers, explained, notes)
+
+
+def _with_loads(problem: Problem, found: Fit, inertia: float | None, on_progress: OnProgress) -> tuple[Problem, Fit]:
+    """Add a constant torque and a weight to a base where they are clear."""
     best = found
     for effect in _extras(problem, found):
         on_progress(f"trying {effect.title.lower()}")
         tried = _fitted(problem, replace(best.mount, effects=(*best.mount.effects, effect)), inertia)
         if _is_clear(problem, best, tried):
             best = tried
-    numbers = tuple(_numbers(problem, best, inertia, linear))
-    tau = problem.weight * problem.prepared.stacked("tau")
-    if is_asked or not _is_small(problem, tau, numbers):
-        _check_inertia(numbers, linear)
-    left = problem.weight * best.residual
-    explained = 1 - float(left @ left) / max(float(tau @ tau), 1e-300)
-    return FirstCard(_held(best.mount, numbers), numbers, explained, tuple(_notes(numbers, explained)))
+    return problem, best
+
+
+def _named(several: Sequence[Neighbour]) -> str:
+    return ", ".join(one.name for one in several)
+
+
+def _beside(numbers: Sequence[Number], neighbours: str) -> tuple[str, ...]:
+    """Say beside which neighbours the inertia was estimated."""
+    one = _inertia_of(numbers)
+    said = f"{one.value:.3g} {one.unit} (95 %: {one.range[0]:.3g} to {one.range[1]:.3g})"
+    return (f"The inertia shows only beside the motion of {neighbours}: {said}.",) if neighbours else ()
 
 
 def _base(recordings: Sequence[Recording], motion: Motion, inertia: float | None) -> tuple[Problem, Fit]:
@@ -227,7 +256,8 @@ def _check_inertia(numbers: Sequence[Number], linear: bool) -> None:
         what = "mass" if linear else "inertia"
         raise InputError(
             f"These recordings do not determine the {what}: the axis hardly accelerates, or friction hides it. "
-            f"Give it to a card (cosim card RUN --inertia VALUE, in {one.unit}), or record faster swings.",
+            f"Give it to a card (cosim card RUN --inertia VALUE, in {one.unit}), or record faster swings; where other "
+            "axes move with it, alone, or with their motion as columns (q2, q3, ...).",
             culprit="inertia",
         )
 

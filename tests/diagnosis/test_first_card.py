@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from two_links import OWN, elbow
 
 import cosim
 from cosim.api.defaults import split
@@ -169,3 +170,14 @@ def test_a_recording_that_is_given_twice_is_refused_and_an_estimated_card_is_cal
     with pytest.raises(InputError, match="recording 2 and recording 1 are the same recording; give each once"):
         cosim.card([once, once.copy()], motion="rotary")
     assert cosim.card(once, motion="rotary").card.path == "the estimated card"
+
+
+def test_an_inertia_that_a_neighbour_hides_is_estimated_beside_its_motion() -> None:
+    """An elbow whose weight turns with both joints: alone the balance tells nothing, and says what would."""
+    hidden = [elbow(1, columns=False), elbow(2, columns=False)]
+    with pytest.raises(InputError, match=r"other axes move with it, alone, or with their motion as columns \(q2"):
+        cosim.card(hidden, motion="rotary")
+    beside = cosim.card([elbow(1), elbow(2)], motion="rotary")
+    assert beside.card.mount.inertia == pytest.approx(OWN, rel=0.05)
+    assert any("only beside the motion of q1" in note for note in beside.notes)
+    assert 0 < beside.numbers[0].error < 0.05 * OWN

@@ -9,7 +9,7 @@ B explains beside c is small against what it explains alone. Torque then follows
 A set point is what the axis follows: its motion (q, v, a) tells most of it. Such a column may still be a cause, as a
 neighbour that moves along; but in a loop tau = k (c - q) - d v, so with the set point, the position and the speed, B
 is needed half as much as with these two alone, and beside a cause as much as before. What is named for a set point
-needs no such proof.
+needs no such proof, and what is named for the motion of a neighbour is none.
 """
 
 from collections.abc import Mapping
@@ -66,7 +66,12 @@ def own_set_point(prepared: Prepared, columns: Mapping[str, Array]) -> tuple[str
     def closes_loop(column: Array) -> bool:
         return needed(np.column_stack([state, column])) <= POLICY.half * needed(state)
 
-    return tuple(name for name, one in columns.items() if is_followed(one) and (_asks(name) or closes_loop(one)))
+    theirs = {name for one in prepared.neighbours_recorded for name in (one.position, one.speed, one.acceleration)}
+    return tuple(
+        name
+        for name, one in columns.items()
+        if name not in theirs and is_followed(one) and (_asks(name) or closes_loop(one))
+    )
 
 
 def _asks(name: str) -> bool:

@@ -123,8 +123,9 @@ def own_set_point(prepared: Prepared) -> tuple[Sanity, ...]:
     names = set_point_again(prepared)
     if not names:
         return ()
-    is_what, it = ("set points", "them") if names[1:] else ("a set point", "it")
-    text = f"The axis follows {', '.join(names)}: {is_what}, no cause. Nothing was learned over {it}."
+    it = "them" if names[1:] else "it"
+    text = f"The axis follows {', '.join(names)}, as its set point or another reading of it: no cause. "
+    text += f"Nothing was learned over {it}."
     if not any("q_d" in piece.extras for piece in prepared.pieces):
-        text += f" A set point of the position is of use where it is named: --columns q_d={names[0]}."
+        text += f" A set point of the position is of use where it is stated: --columns q_d={names[0]}."
     return (Sanity(finding="own_set_point", statement=text),)
