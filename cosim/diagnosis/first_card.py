@@ -113,7 +113,7 @@ def first_card(
         _check_inertia(numbers, linear)
     left = problem.weight * best.residual
     explained = 1 - float(left @ left) / max(float(tau @ tau), 1e-300)
-    notes = (*_beside(numbers, beside), *_notes(numbers, explained))
+    notes = (*_neighbour_note(numbers, beside), *_notes(numbers, explained))
     return FirstCard(_held(best.mount, numbers), numbers, explained, notes)
 
 
@@ -132,7 +132,7 @@ def _named(several: Sequence[Neighbour]) -> str:
     return ", ".join(one.name for one in several)
 
 
-def _beside(numbers: Sequence[Number], neighbours: str) -> tuple[str, ...]:
+def _neighbour_note(numbers: Sequence[Number], neighbours: str) -> tuple[str, ...]:
     """Say beside which neighbours the inertia was estimated."""
     one = _inertia_of(numbers)
     said = f"{one.value:.3g} {one.unit} (95 %: {one.range[0]:.3g} to {one.range[1]:.3g})"
