@@ -15,6 +15,7 @@ import numpy as np
 from cosim.data.held import Array, Index, held_columns, new_rows
 from cosim.data.recording import GAP, Recording
 from cosim.data.single_readings import cleaned
+from cosim.data.start_up import settled
 
 SMOOTH = ("q", "v", "q_d")
 """Columns that are read between rows by a cubic spline; others are those of the nearest row."""
@@ -25,8 +26,8 @@ LEAST_READINGS = 8
 
 
 def as_analysed(recording: Recording) -> Recording:
-    """Return the recording as analyses take it: in rows that are new, and without single false readings."""
-    return cleaned(at_own_rate(recording))
+    """Return the recording as analyses take it: in new rows, without a loop that settles and single false readings."""
+    return cleaned(settled(at_own_rate(recording)))
 
 
 def at_own_rate(recording: Recording) -> Recording:
