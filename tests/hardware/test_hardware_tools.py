@@ -1,12 +1,10 @@
-"""The commands, the test move, the supervisor and the benchmark over UDP."""
+"""The commands, the test move and the supervisor over UDP."""
 
 import json
 import sys
 from contextlib import ExitStack
 from pathlib import Path
 
-import hardware_faults
-import hardware_page
 import numpy as np
 import pytest
 from on_hardware import SCENARIO, SIMULATED, invoke, recorded, scenario
@@ -98,18 +96,6 @@ def test_records_that_the_ring_has_overwritten_are_missing_not_wrong(tmp_path: P
     assert records["sequence"][-1] == 1234
     assert np.all(np.diff(records["sequence"].astype(int)) == 1)
     assert 400 < len(records) <= 500
-
-
-def test_a_fault_that_the_benchmark_injects_becomes_a_row_of_its_page() -> None:
-    trials = [
-        hardware_faults.injected("lost", {}, "frame_lost", 0.1),
-        hardware_faults.injected("lost", {}, "estop", 0.1),
-    ]
-    seen, missed = (hardware_faults.row("lost", "frame_lost", [one]) for one in trials)
-    assert (seen["detected"], seen["cycles"], seen["states"], seen["torque_after"]) == (1.0, [3, 3], ["fault"], 0.0)
-    assert missed["detected"] == 0.0
-    page = "\n".join(hardware_page.fault_lines({"rows": [seen], "detected": 1.0}))
-    assert "| lost | `frame_lost` | 100% of 1 | 3 | fault | 0 |" in page
 
 
 def test_a_bare_clock_counts_its_edges() -> None:
