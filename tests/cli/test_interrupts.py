@@ -44,6 +44,7 @@ def test_a_signal_that_comes_before_a_verb_begins_is_told_by_the_exit_code(
         (OSError(errno.ENOSPC, "No space left on device"), signal.SIGTERM, 2),
     ],
 )
+@pytest.mark.usefixtures("capsys")  # not the descriptor of pytest's own file: a verb that fails lets go of its stdout
 def test_what_a_c_extension_makes_of_a_signal_is_an_interrupt(
     error: Exception, number: int | None, code: int | None
 ) -> None:

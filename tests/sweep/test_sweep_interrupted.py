@@ -43,43 +43,56 @@ def test_a_killed_sweep_goes_on_where_it_was(folder: Path) -> None:
     pd.testing.assert_frame_equal(table.drop(columns="seconds"), same.drop(columns="seconds"))
 
 
-@pytest.mark.parametrize(
-    "spoilt",
-    [
-        b"no row at all",
-        b"[1, 2]",
-        b'{"run": 1}',
-        b'{"run": "1"}',
-        b"[" * 100_000,
-        b"\xff\x00",
-        lambda line: line.replace(b'"status": "ok"', b'"status": 3'),
-        lambda line: line.replace(b'"run": 2', b'"run": 9'),
-        lambda line: line.replace(b'"run": 2', b'"run": true'),
-        lambda line: line.replace(b'"plant.k"', b'"plant.j"'),
-        lambda line: line.replace(b'"seconds": ', b'"seconds": "long", "was": '),
-    ],
+SPOILT: tuple[bytes | Callable[[bytes], bytes], ...] = (
+    b"no row at all",
+    b"[1, 2]",
+    b'{"run": 1}',
+    b'{"run": "1"}',
+    b"[" * 100_000,
+    b"\xff\x00",
+    lambda line: line.replace(b'"status": "ok"', b'"status": 3'),
+    lambda line: line.replace(b'"run": 2', b'"run": 9'),
+    lambda line: line.replace(b'"run": 2', b'"run": true'),
+    lambda line: line.replace(b'"plant.k"', b'"plant.j"'),
+    lambda line: line.replace(b'"seconds": ', b'"seconds": "long", "was": '),
 )
+
+
+@pytest.fixture
+def unrehearsed(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """From now on no process is started before the folder is looked at: what is asked is refused there."""
+
+    def now() -> None:
+        monkeypatch.setattr("cosim.sweeps.conduct.warm", lambda _: None)
+        monkeypatch.setattr("cosim.sweeps.conduct._units", lambda _: {"seconds": "s"})
+
+    return now
+
+
 def test_a_journal_that_another_hand_changed_is_a_sentence_and_stays_as_it_is(
-    folder: Path, spoilt: bytes | Callable[[bytes], bytes]
+    folder: Path, unrehearsed: Callable[[], None]
 ) -> None:
     path, journal = written(folder), folder / "out" / "runs.jsonl"
     run(path)
+    unrehearsed()
     lines = sorted(journal.read_bytes().splitlines(), key=lambda line: json.loads(line)["run"])
-    line = spoilt if isinstance(spoilt, bytes) else spoilt(lines[2])
-    assert line != lines[2]
-    journal.write_bytes(b"\n".join([*lines[:2], line, *lines[3:], b""]))
-    before = journal.read_bytes()
-    with pytest.raises(OutputError, match=r"runs.jsonl: line 3 is no row of a sweep; mend or remove that line"):
-        run(path)
-    assert journal.read_bytes() == before
+    for spoilt in SPOILT:
+        line = spoilt if isinstance(spoilt, bytes) else spoilt(lines[2])
+        assert line != lines[2]
+        journal.write_bytes(b"\n".join([*lines[:2], line, *lines[3:], b""]))
+        before = journal.read_bytes()
+        with pytest.raises(OutputError, match=r"runs.jsonl: line 3 is no row of a sweep; mend or remove that line"):
+            run(path)
+        assert journal.read_bytes() == before, line[:80]
     journal.write_bytes(b"\n".join([*lines[:2], *lines[3:], b""]))
     again, _ = run(path)
     assert (again.done, again.found) == (1, 8)
 
 
-def test_an_identity_that_is_no_json_is_a_sentence(folder: Path) -> None:
+def test_an_identity_that_is_no_json_is_a_sentence(folder: Path, unrehearsed: Callable[[], None]) -> None:
     path, identity = written(folder), folder / "out" / "sweep.json"
     run(path)
+    unrehearsed()
     for spoilt in (b"", b"{", b"[]", b"\xff", b"[" * 100_000):
         identity.write_bytes(spoilt)
         with pytest.raises(OutputError, match=r"sweep.json is damaged: it is no JSON; give another --out, or --force"):
