@@ -27,16 +27,16 @@ class Counts:
 @contextmanager
 def counted() -> Iterator[Counts]:
     """Count in this process, until the context ends."""
-    counts, fit, torque = Counts(), problem.fit, Inverse.torque
+    counts, fit, columns = Counts(), problem.fit, Inverse.columns
 
     def counting_fit(*args: Any, **more: Any) -> Any:
         counts.fits += 1
         return fit(*args, **more)
 
-    def counting_torque(self: Inverse, piece: Piece, values: Any) -> Any:
+    def counting_columns(self: Inverse, piece: Piece, values: Any) -> Any:
         counts.evaluations += 1
         counts.row_columns += len(piece.t) * (1 + len(self.by))
-        return torque(self, piece, values)
+        return columns(self, piece, values)
 
-    with patch.object(problem, "fit", counting_fit), patch.object(Inverse, "torque", counting_torque):
+    with patch.object(problem, "fit", counting_fit), patch.object(Inverse, "columns", counting_columns):
         yield counts

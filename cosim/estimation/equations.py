@@ -97,7 +97,7 @@ class Equations:
 
     @cached_property
     def torque(self) -> Rowwise:
-        """Torque and its derivatives by states and free parameters, from the columns and the states."""
+        """Torque and its derivatives by free parameters, from the columns, the states and all their `Slopes`."""
         return self._rowwise("torque", self._torque)
 
     def _rowwise(self, name: str, make: Callable[[], Tape]) -> Rowwise:
@@ -113,8 +113,26 @@ class Equations:
         torque = near * s["a"] + ca.jacobian(near, motion.q) * motion.v**2 / 2
         torque += this.law.contact(own["friction"], motion.v, level) + this.viscous(motion, own)
         torque = self._true(_command(this, torque + this.loads(motion, own), motion))
-        rows = ca.vertcat(torque, ca.jacobian(torque, s["state"]).T, ca.jacobian(torque, s["free"]).T)
-        return Tape.of(ca.vertcat(self._column, s["state"]), s["p"], rows)
+        by_state, by_free = ca.jacobian(torque, s["state"]), ca.jacobian(torque, s["free"])
+        slopes = ca.SX.sym("slopes", sum(map(len, self._live)))
+        through, first = ca.SX(self.count, len(self._free)), 0
+        for k, live in enumerate(self._live):
+            if live:
+                through[k, live] = slopes[first : first + len(live)]
+            first += len(live)
+        rows = ca.vertcat(torque, (by_free + by_state @ through).T)
+        return Tape.of(ca.vertcat(self._column, s["state"], slopes), s["p"], rows)
+
+    @cached_property
+    def _live(self) -> list[list[int]]:
+        """Free parameters that change each state at all."""
+        if not self._affine:
+            return [list(range(len(self._free)))] * self.count
+        live = list[list[int]]()
+        for k, one in enumerate(self._affine):
+            own = ([j - k] if j >= k else live[j] for j in one.by)
+            live.append(sorted(set().union(*own)))
+        return live
 
     @cached_property
     def _following(self) -> Any:
@@ -157,9 +175,13 @@ class Equations:
         for k, one in enumerate(self._affine):
             out = one.rows([*steps, *states[:, :-1]], full)
             states[k] = recurrence(out[0], out[1:2])[0]
-            kept, added = out[2:].reshape(2, len(one.by), len(steps[0]))
-            change = kept * states[k, :-1] + added
-            slopes.append(_carried(out[0], {j - k: row for j, row in zip(one.by, change, strict=True)}, slopes))
+            change, added = out[2:].reshape(2, len(one.by), len(steps[0]))
+            change *= states[k, :-1]
+            change += added
+            if all(j >= k for j in one.by):
+                slopes.append(Slopes(self._live[k], recurrence(out[0], change)))
+            else:
+                slopes.append(_carried(out[0], {j - k: row for j, row in zip(one.by, change, strict=True)}, slopes))
         return states, slopes
 
     @cached_property

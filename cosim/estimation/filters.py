@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.estimation.kernels import done, library
+from cosim.support.splines import CubicSpline
 
 Array = npt.NDArray[np.float64]
 EDGE = 15
@@ -18,14 +19,22 @@ axis at constant speed was taken to start and stop at the ends of each piece."""
 
 def lowpass(columns: Array, dt: float, cutoff: float, passes: int = 1) -> Array:
     """Fourth-order Butterworth, forward and backward: no phase, -6 dB at the cutoff [Hz]; along the first axis."""
-    if cutoff >= 0.45 / dt:
-        return columns
-    return _both_ways(columns, *_butterworth(cutoff * dt, passes), max(EDGE, ceil(FADED / (cutoff * dt))))
+    signals = np.array(columns.T, order="C", ndmin=2)
+    lowpass_in_place(signals, dt, cutoff, passes)
+    return np.asarray(signals.T.reshape(columns.shape) if columns.ndim < 2 else signals.T)
+
+
+def lowpass_in_place(signals: Array, dt: float, cutoff: float, passes: int = 1) -> None:
+    """The same along the last axis of (signals, rows), which are overwritten."""
+    if cutoff < 0.45 / dt:
+        _both_ways(signals, *_butterworth(cutoff * dt, passes), max(EDGE, ceil(FADED / (cutoff * dt))))
 
 
 def highpass(column: Array, dt: float, cutoff: float) -> Array:
-    """The same for what is faster than the cutoff [Hz]."""
-    return _both_ways(column, *_butterworth(cutoff * dt, 1, high=True), EDGE)
+    """The same of one column (rows,) for what is faster than the cutoff [Hz]."""
+    signals = np.array(column, ndmin=2)
+    _both_ways(signals, *_butterworth(cutoff * dt, 1, high=True), EDGE)
+    return np.asarray(signals[0])
 
 
 def noise_of(values: Array, dt: float) -> float:
@@ -34,22 +43,20 @@ def noise_of(values: Array, dt: float) -> float:
     return float(np.sqrt(np.mean(high[20:-20] ** 2) / 0.4))
 
 
-def _both_ways(columns: Array, sections: Array, settled: Array, edge: int) -> Array:
-    edge, kernels = min(edge, len(columns) - 1), library()
+def _both_ways(signals: Array, sections: Array, settled: Array, edge: int) -> None:
+    (many, rows), kernels = signals.shape, library()
+    edge = min(edge, rows - 1)
     if kernels is not None:
-        signals = np.array(columns.T, order="C", ndmin=2)
-        many, rows = signals.shape
         places = signals.ctypes.data, many, rows, edge, sections.ctypes.data, settled.ctypes.data, len(sections)
         done(kernels.filter_run(*places))
-        return signals.T.reshape(columns.shape) if columns.ndim < 2 else signals.T
+        return
     from scipy.signal import sosfilt  # it takes longer to import than to filter a recording
 
-    before, after = 2 * columns[:1] - columns[edge:0:-1], 2 * columns[-1:] - columns[-2::-1][:edge]
-    settled = settled.reshape(*settled.shape, *[1] * (columns.ndim - 1))
-    passed = np.concatenate([before, columns, after])
+    before, after = 2 * signals[:, :1] - signals[:, edge:0:-1], 2 * signals[:, -1:] - signals[:, -2::-1][:, :edge]
+    passed = np.concatenate([before, signals, after], axis=1)
     for _ in ("forward", "backward"):
-        passed = sosfilt(sections, passed, axis=0, zi=settled * passed[:1])[0][::-1]
-    return np.asarray(passed[edge : len(passed) - edge])
+        passed = sosfilt(sections, passed, zi=settled[:, None] * passed[:, :1])[0][:, ::-1]
+    signals[:] = passed[:, edge : edge + rows]
 
 
 @lru_cache(maxsize=1024)  # each piece has a time step of its own, and all of them are filtered in turn
@@ -107,10 +114,6 @@ def derivative_at(x: Array, dt: float, rows: npt.NDArray[np.int64], order: int =
 
 
 def between(t: Array, values: Array, at: Array) -> Array:
-    """A signal of rows at times t (rows,), read between them at times of any shape; NaN beyond its ends.
-
-    By a cubic spline, which is loaded here: it brings an optimiser along (.1 s).
-    """
-    from scipy.interpolate import CubicSpline
-
-    return np.asarray(CubicSpline(t, values, extrapolate=False)(at))
+    """A signal of rows at times t (rows,), read between them at times of any shape; NaN beyond its ends."""
+    found = CubicSpline(t, values)(at.ravel()).reshape(at.shape)
+    return np.where((at < t[0]) | (at > t[-1]), np.nan, found)

@@ -125,13 +125,14 @@ def fit(
         rest = weight_used * (tau_used - model.torque(values))
         return np.concatenate([rest, np.linalg.norm(rest) * pull(values)[0]])
 
-    def jacobian(u: Array) -> Array:
-        values = own.matrix @ u
-        torque, slopes = model.whole(values)
-        rest, slopes = weight_used * (tau_used - torque), -weight_used[:, None] * slopes
-        return np.concatenate([slopes, pull.slopes(values, rest, slopes)]) @ own.matrix
+    def equations(u: Array, left: Array) -> tuple[Array, Array]:
+        values, rest, pulled = own.matrix @ u, left[: len(tau_used)], left[len(tau_used) :]
+        columns = -weight_used * model.whole(values)[1].T
+        prior = pull.slopes(values, rest, columns.T)
+        normal, slope = columns @ columns.T + prior.T @ prior, columns @ rest + prior.T @ pulled
+        return own.matrix.T @ normal @ own.matrix, own.matrix.T @ slope
 
-    found = least_squares(residuals, jacobian, own.of(start), (own.low, own.high), evaluations)
+    found = least_squares(residuals, equations, own.of(start), (own.low, own.high), evaluations)
     values = _in_a_turn(free, np.clip(own.matrix @ found, *edges))
     seen = model.whole(own.matrix @ found)
     torque, slopes = _joined(used, seen, unused, lambda rest: stacked(inverse, [pieces[k] for k in rest], values))
@@ -193,11 +194,12 @@ def _joined(
     used: _Part, known: tuple[Array, Array], unused: _Part, look: Callable[[list[int]], tuple[Array, Array]]
 ) -> tuple[Array, Array]:
     """Torque and slopes at all rows: known where there was weight, looked at only now elsewhere."""
+    if not unused.pieces:
+        return known
     count = len(used.rows) + len(unused.rows)
-    torque, slopes = np.empty(count), np.empty((count, known[1].shape[1]))
-    torque[used.rows], slopes[used.rows] = known
-    if unused.pieces:
-        torque[unused.rows], slopes[unused.rows] = look(unused.pieces)
+    torque, slopes = np.empty(count), np.empty((known[1].shape[1], count)).T
+    for part, (own, derivatives) in ((used, known), (unused, look(unused.pieces))):
+        torque[part.rows], slopes[part.rows] = own, derivatives
     return torque, slopes
 
 

@@ -24,11 +24,14 @@ from cosim.estimation.play import stepped_torque
 from cosim.estimation.prepare import Array, Piece
 from cosim.estimation.row_weights import described_rows
 from cosim.estimation.tonal_disturbance import Tone, in_phase, phases_of
+from cosim.support.splines import CubicSpline
 from pyfmi_models.effects import ClockEffect, DriveEffect, Effect
 from pyfmi_models.effects.base import TonalEffect, Transmission
 from pyfmi_models.model import Variable, with_symbols
 from pyfmi_models.mount import Mount
 
+SPARSE = 64
+"""Every so many rows are looked at first where it is asked whether a signal is zero throughout."""
 BUMP = 1e-6
 """Relative change of a parameter by which a frequency response is differentiated."""
 
@@ -101,14 +104,23 @@ class Inverse:
 
     def torque(self, piece: Piece, values: Array) -> tuple[Array, Array]:
         """Return needed torque (rows,) and its derivatives (rows, free) at all rows of a piece, filtered once more."""
-        columns = self.behind(piece, self.momentary(piece, values), values)
+        columns = self.columns(piece, values)
         return columns[:, 0], columns[:, 1:]
+
+    def columns(self, piece: Piece, values: Array) -> Array:
+        """Both, (rows, 1 + free)."""
+        return self.behind(piece, self.momentary(piece, values), values)
 
     def momentary(self, piece: Piece, values: Array) -> Array:
         """Torque that the motion and the states need, and its derivatives: (rows, 1 + free), filtered once more."""
         signals = self._momentary(piece, self._with(values))
-        acts = signals.any(axis=1)  # a spring, a drive, a clock act on a torque as a whole, later
-        signals[acts] = piece.lowpass(signals[acts].T).T
+        # A spring, a drive, a clock act on a torque as a whole, later.
+        acts = np.asarray(signals[:, ::SPARSE].any(axis=1))
+        acts[~acts] = signals[~acts].any(axis=1)
+        if acts.all():
+            piece.lowpass_in_place(signals)
+        else:
+            signals[acts] = piece.lowpass(signals[acts].T).T
         return signals.T
 
     def behind(self, piece: Piece, columns: Array, values: Array) -> Array:
@@ -147,25 +159,39 @@ class Inverse:
     def _momentary(self, piece: Piece, full: Array) -> Array:
         """Torque that the motion of each moment and the states need, and its derivatives: (1 + free, rows)."""
         rows, steps = self._equations.given(piece)
-        count = self._equations.count
-        state, slopes = self._equations.states(steps, full) if count else (np.zeros((0, len(piece.t))), [])
-        out = self._equations.torque([*rows, *state], full)
-        torque, by_state, by_free = out[0].copy(), out[1 : 1 + count], out[1 + count :]
-        for row, slope in zip(by_state, slopes, strict=True):
-            by_free[slope.live] += row * slope.values
-        out[count] = torque  # one signal after the other in memory is how they are filtered
-        return out[count:]
+        state, slopes = self._equations.states(steps, full) if self._equations.count else ((), ())
+        return self._equations.torque([*rows, *state, *(one for by in slopes for one in by.values)], full)
 
     @cached_property
     def _components(self) -> dict[str, Any]:
         return self.mount.components()
 
     def _parts(self, kind: type[Effect]) -> list[str]:
-        return [name for name, part in self._components.items() if isinstance(part, kind)]
+        """Prefixes of the effects that act in one place: asked in each evaluation, answered once."""
+        if kind not in self._places_of:
+            self._places_of[kind] = [name for name, part in self._components.items() if isinstance(part, kind)]
+        return self._places_of[kind]
+
+    @cached_property
+    def _places_of(self) -> dict[type[Effect], list[str]]:
+        return {}
+
+    @cached_property
+    def _trailing(self) -> list[str]:
+        return [name for name, _ in self.mount.trailing()]
 
     def _set(self, prefix: str, full: Array) -> Any:
-        values = dict(zip(self.names, full, strict=True))
-        return with_symbols(self._components[prefix], values, 0.0, prefix)
+        if prefix not in self._numbered:
+            dotted = prefix + "."
+            own = {n: k for k, n in enumerate(self.names) if n.startswith(dotted)}
+            self._numbered[prefix] = list(own.values()), list(own)
+        places, names = self._numbered[prefix]
+        return with_symbols(self._components[prefix], dict(zip(names, full[places], strict=True)), 0.0, prefix)
+
+    @cached_property
+    def _numbered(self) -> dict[str, tuple[list[int], list[str]]]:
+        """Where the numbers of a part are among all, and their names."""
+        return {}
 
     def _bumped(self, full: Array, name: str) -> tuple[Array, float]:
         """All parameters with one of them changed a little, and by how much."""
@@ -181,7 +207,7 @@ class Inverse:
         Where several stand in a row, each is taken to follow the axis itself: what one of them does to the motion that
         the next one sees is left out.
         """
-        couplings, motors = [name for name, _ in self.mount.trailing()], self._parts(Transmission)
+        couplings, motors = self._trailing, self._parts(Transmission)
         if not couplings:
             return columns
         v, a = self._equations.motion(piece, full)
@@ -211,7 +237,7 @@ class Inverse:
     def _far(self, full: Array) -> Iterator[tuple[float, Any]]:
         """Couplings, the nearest first, each with the inertia behind it."""
         far = self._behind_motors(full)
-        for prefix, _ in self.mount.trailing():
+        for prefix in self._trailing:
             coupling = self._set(prefix, full)
             far = far * coupling.share()
             yield far, coupling
@@ -287,20 +313,18 @@ class Inverse:
         clocks = self._parts(ClockEffect)
         if not clocks:
             return columns
-        from scipy.interpolate import CubicSpline  # a tenth of a second that machines of one clock do not need
-
-        spline = CubicSpline(piece.t, columns, axis=0)
+        spline = CubicSpline(piece.t, columns)
 
         def later(numbers: Array) -> Array:
             parts = [self._set(name, numbers) for name in clocks]
             return np.asarray(sum(part.ahead(self.mount.at(piece.t, piece.q, piece.v)) for part in parts))
 
         at = np.clip(piece.t - later(full), piece.t[0], piece.t[-1])
-        out, slope = spline(at), spline(at, 1)[:, 0]
+        out, slope = spline.with_slope(at)
         for column, name in enumerate(self.by):
             if name.split(".")[0] in clocks:
                 other, change = self._bumped(full, name)
-                out[:, 1 + column] -= slope * (later(other) - later(full)) / change
+                out[:, 1 + column] -= slope[:, 0] * (later(other) - later(full)) / change
         return np.asarray(out)
 
     def _with_tones(self, piece: Piece, columns: Array, full: Array) -> Array:
@@ -337,9 +361,7 @@ def _each(added: Callable[[Array], Array]) -> Callable[[Sequence[Array]], Array]
 
 
 def stacked(inverse: Inverse, pieces: Sequence[Piece], values: Array) -> tuple[Array, Array]:
-    """Return torque and derivatives at the kept rows of all pieces."""
-    parts = [(piece, *inverse.torque(piece, values)) for piece in pieces]
-    return (
-        np.concatenate([torque[piece.kept] for piece, torque, _ in parts]),
-        np.concatenate([slopes[piece.kept] for piece, _, slopes in parts]),
-    )
+    """Return torque and derivatives at the kept rows of all pieces; each derivative lies in one stretch of memory."""
+    whole = [np.take(inverse.columns(piece, values).T, piece.kept, axis=1) for piece in pieces]
+    columns = np.concatenate(whole, axis=1) if len(whole) > 1 else whole[0]
+    return columns[0], columns[1:].T

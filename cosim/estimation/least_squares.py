@@ -1,6 +1,7 @@
 """Least squares inside bounds, for few parameters and many rows."""
 
 from collections.abc import Callable, Sequence
+from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,7 @@ ENOUGH = 1e-5
 
 def least_squares(
     residuals: Callable[[Array], Array],
-    jacobian: Callable[[Array], Array],
+    equations: Callable[[Array, Array], tuple[Array, Array]],
     start: Array,
     bounds: tuple[Array, Array],
     evaluations: int,
@@ -28,14 +29,15 @@ def least_squares(
     It ends after `evaluations`, or when a step lowers the sum by less than the share `enough` of it, or by the linear
     model would: of a diagnosis's evaluations a tenth served such steps.
 
-    Few parameters and many rows make the normal equations 10 times cheaper than a decomposition of the Jacobian.
+    `equations` gives of x and the residuals there the normal matrix J^T J and the slope J^T r, J being the Jacobian:
+    few parameters and many rows make them 10 times cheaper than a decomposition of it.
     Reference: Marquardt, J. SIAM 11 (1963) 431; scaling by the diagonal of the normal matrix; the damping follows the
     ratio of what a step gains to what it promised (Nielsen, IMM-REP-1999-05, Technical University of Denmark).
     """
     x, damping, slower = start, 1e-3, SLOWER
     r = residuals(x)
     cost = float(r @ r)
-    normal, slope = _normal(jacobian(x), r)
+    normal, slope = equations(x, r)
     for _ in range(evaluations - 1):
         free = ~((x <= bounds[0]) & (slope > 0) | (x >= bounds[1]) & (slope < 0))
         step = _damped(normal, slope, damping, free)
@@ -53,14 +55,20 @@ def least_squares(
         ratio = (cost - lower) / promised if promised > 0 else 1.0
         damping, slower = damping * max(1 / QUICKER, 1 - (2 * ratio - 1) ** 3), SLOWER
         gained, x, cost = 1 - lower / cost, trial, lower
-        normal, slope = _normal(jacobian(x), r)
+        normal, slope = equations(x, r)
         if gained < enough:
             break
     return x
 
 
-def _normal(jacobian: Array, residual: Array) -> tuple[Array, Array]:
-    return np.asarray(jacobian.T @ jacobian), np.asarray(jacobian.T @ residual)
+def of_jacobian(jacobian: Callable[[Array], Array]) -> Callable[[Array, Array], tuple[Array, Array]]:
+    """The equations of residuals whose Jacobian (rows, parameters) is given."""
+
+    def equations(x: Array, residual: Array) -> tuple[Array, Array]:
+        columns = jacobian(x)
+        return np.asarray(columns.T @ columns), np.asarray(columns.T @ residual)
+
+    return equations
 
 
 def _promised(normal: Array, slope: Array, step: Array) -> float:
@@ -87,11 +95,15 @@ def projected(target: Array, columns: Array) -> Array:
 def squares_left(columns: Array, targets: Array, positive: Sequence[int]) -> Array:
     """Sum of squares that least squares leaves of each target, (targets,), some coefficients not being below zero.
 
-    What has any sign is taken out first, of those that have not and of the targets: what remains is Lawson and Hanson's
-    problem. `columns` are (rows, n), `targets` (rows, targets).
+    What has any sign is taken out first, of those that have not and of the targets. The least is that of some of what
+    remains, the others being zero: with few of them all choices are looked at. `columns` are (rows, n), `targets`
+    (rows, targets).
     """
-    from scipy.optimize import nnls  # .07 s to load, which the import of this file does not take
-
     free, held = np.delete(columns, positive, axis=1), columns[:, positive]
     held, targets = (one - free @ np.linalg.lstsq(free, one, rcond=None)[0] for one in (held, targets))
-    return np.array([nnls(held, target)[1] ** 2 for target in targets.T])
+    left = (targets**2).sum(0)
+    for some in (list(few) for many in range(1, len(positive) + 1) for few in combinations(range(len(positive)), many)):
+        found = np.linalg.lstsq(held[:, some], targets, rcond=None)[0]
+        rest = ((targets - held[:, some] @ found) ** 2).sum(0)
+        left = np.where((found >= 0).all(0), np.minimum(left, rest), left)
+    return np.asarray(left)

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from cosim.data.neighbours import KINDS, Neighbour, neighbours
 from cosim.data.recording import GAP, Gap, Recording
 from cosim.data.resolution import resolution
-from cosim.estimation.filters import EDGE, derivative_at, gain, lowpass, noise_of, passes_of
+from cosim.estimation.filters import EDGE, derivative_at, gain, lowpass, lowpass_in_place, noise_of, passes_of
 from cosim.estimation.neighbours import is_alone, key, motions, moving
 from cosim.support.errors import RecordingError
 from cosim.support.statistics import rms
@@ -92,6 +92,10 @@ class Piece:
     def lowpass(self, columns: Array) -> Array:
         """Second pass of the filter, along the first axis."""
         return lowpass(columns, self.dt, self.cutoff, passes_of(self.cutoff, self.motion))
+
+    def lowpass_in_place(self, signals: Array) -> None:
+        """The same of signals (signals, rows) that may be overwritten."""
+        lowpass_in_place(signals, self.dt, self.cutoff, passes_of(self.cutoff, self.motion))
 
     @cached_property
     def _given(self) -> dict[tuple[tuple[str, float], ...], tuple[Array, tuple[Array, ...]]]:

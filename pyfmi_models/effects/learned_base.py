@@ -13,7 +13,7 @@ Waves that are level at both ends are the basis of smoothing splines: Solin and 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, make_dataclass, replace
 from typing import Any, ClassVar, Self
 
 import casadi as ca
@@ -82,6 +82,24 @@ class LearnedEffect(Effect):
     def for_reader(self, unit: str) -> LearnedTable:
         """The term as a table of plain numbers: quantity, values, their unit; `unit` is that of a torque."""
         raise TypeError(f"{type(self).__name__} has no table")
+
+
+_FREE: dict[tuple[type[LearnedEffect], int], Any] = {}
+
+
+def with_free_coefficients(form: type[LearnedEffect], count: int) -> Any:
+    """The form with `count` coefficients as parameters, zero to begin with: the same class each time."""
+    if (form, count) not in _FREE:
+        _FREE[form, count] = _free(form, count)
+    return _FREE[form, count]
+
+
+def _free(form: type[LearnedEffect], count: int) -> Any:
+    names = [f"c{k}" for k in range(count)]
+    free = [(name, Any, parameter("1", "A coefficient of a candidate term", default=0.0)) for name in names]
+    own = {"coefficients": lambda self: tuple(getattr(self, name) for name in names), "__module__": form.__module__}
+    options: dict[str, Any] = {"bases": (form,), "frozen": True, "kw_only": True, "namespace": own}
+    return make_dataclass(f"Free{form.__name__}{count}", free, **options)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,7 +6,7 @@ a coefficient of wave k has a prior of 1/k beside the size of its term, that of 
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, make_dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import product
 from math import pi
 from typing import Any
@@ -16,10 +16,9 @@ import numpy as np
 from cosim.diagnosis.terms.dictionary import followed, user_columns
 from cosim.estimation.prepare import Array, Prepared
 from pyfmi_models.effects.learned import LearnedFriction, LearnedTorque, LearnedViscous
-from pyfmi_models.effects.learned_base import LearnedEffect
+from pyfmi_models.effects.learned_base import LearnedEffect, with_free_coefficients
 from pyfmi_models.effects.learned_drive import LearnedDrive, LearnedGain
 from pyfmi_models.effects.learned_memory import LearnedAfterReversal, LearnedHysteresis
-from pyfmi_models.model import parameter
 from pyfmi_models.mount import Mount
 from pyfmi_models.waves import INPUT
 
@@ -86,23 +85,8 @@ class CandidateTerm:
         return made
 
 
-_FORMS: dict[tuple[type[LearnedEffect], int], Any] = {}
-"""Forms with free coefficients; equations are kept by class, so each is made once."""
-
-
-def _form(form: type[LearnedEffect], count: int) -> Any:
-    """The form with `count` coefficients as parameters."""
-    if (form, count) not in _FORMS:
-        names = [f"c{k}" for k in range(count)]
-        free = [(name, Any, parameter("1", "A coefficient of a candidate term", default=0.0)) for name in names]
-        own = {"coefficients": lambda self: tuple(getattr(self, name) for name in names)}
-        options: dict[str, Any] = {"bases": (form,), "frozen": True, "kw_only": True, "namespace": own}
-        _FORMS[form, count] = make_dataclass(f"Free{form.__name__}{count}", free, **options)
-    return _FORMS[form, count]
-
-
 def _term(name: str, form: type[LearnedEffect], prior: Sequence[float], **shape: Any) -> CandidateTerm:
-    return CandidateTerm(name, _form(form, len(prior))(**shape), np.asarray(prior, float))
+    return CandidateTerm(name, with_free_coefficients(form, len(prior))(**shape), np.asarray(prior, float))
 
 
 def candidate_terms(mount: Mount, prepared: Prepared) -> list[CandidateTerm]:

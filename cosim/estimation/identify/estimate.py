@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from cosim.estimation.least_squares import least_squares
+from cosim.estimation.least_squares import least_squares, of_jacobian
 from cosim.plots.quantities import number
 from cosim.support.errors import InputError
 from cosim.support.statistics import column_rms
@@ -201,7 +201,7 @@ def _minimum(search: _Search, logs: Array, limits: Array | None, evaluations: in
     wide = np.log(WIDEST)
     bounds = np.maximum(logs - wide, low), np.minimum(logs + wide, high)
     inside = np.clip(logs, bounds[0] + 1e-9, bounds[1] - 1e-9)
-    return least_squares(search.residual, search.jacobian, inside, bounds, evaluations, enough)
+    return least_squares(search.residual, of_jacobian(search.jacobian), inside, bounds, evaluations, enough)
 
 
 def _rms(residual: Array) -> Array:
