@@ -63,6 +63,18 @@ def test_an_operation_in_c_is_that_of_numpy(operation: int, interpreted: Callabl
     np.testing.assert_allclose(found, wanted, rtol=1e-13, atol=1e-300)
 
 
+@pytest.mark.parametrize(("exponent", "product"), [(2.0, np.square), (1.0, np.positive), (1.7, lambda x: x**1.7)])
+def test_a_power_that_all_rows_share_is_a_product_where_it_is_whole(
+    exponent: float, product: Callable[[np.ndarray], np.ndarray], interpreted: Callable[[], None]
+) -> None:
+    p, columns = ca.SX.sym("p"), np.abs(np.random.default_rng(6).normal(0, 3, (2, 400)))
+    function = Rowwise(Tape.of(X, p, X[0] ** p))
+    found = function(columns, np.array([exponent]))[0]
+    np.testing.assert_allclose(found, product(columns[0]), rtol=0 if exponent != 1.7 else 1e-13)
+    interpreted()
+    np.testing.assert_allclose(function(columns, np.array([exponent]))[0], found, rtol=1e-13)
+
+
 def test_a_row_has_the_same_bits_wherever_it_stands() -> None:
     curve = Rowwise(Tape.of(X, ca.SX.sym("p"), ca.tanh(X[0]) * ca.exp(-((X[1] / 3) ** 2)) + ca.sin(X[0]) ** 1.3))
     columns = np.random.default_rng(3).normal(0, 2, (2, 777))

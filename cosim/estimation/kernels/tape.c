@@ -43,7 +43,13 @@ INLINE void operate(int code, const double *a, int a_moves, const double *b,
         UNARY(LOG, row_log(x))
         UNARY(LOG1P, row_log1p(x))
         UNARY(EXPM1, expm1(x))
-        BINARY(POW, row_pow(x, y))
+        case POW: /* a Stribeck curve has the exponents 2 and 1: a product costs a tenth of a power, and is exact */
+            if (!b_moves && *b == 2) EACH { double x = a[k]; out[k] = x * x; }
+            else if (!b_moves && *b == 1) EACH { double x = a[k]; out[k] = x; }
+            else if (!b_moves) { double y = *b; EACH { double x = a[k]; out[k] = row_pow(x, y); } }
+            else if (!a_moves) { double x = *a; EACH { double y = b[k]; out[k] = row_pow(x, y); } }
+            else EACH { double x = a[k], y = b[k]; out[k] = row_pow(x, y); }
+            return;
         UNARY(SQRT, sqrt(x))
         UNARY(SQ, x * x)
         UNARY(TWICE, 2 * x)
