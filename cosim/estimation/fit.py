@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.estimation.inverse import Inverse, stacked
-from cosim.estimation.least_squares import least_squares
+from cosim.estimation.least_squares import ENOUGH, least_squares
 from cosim.estimation.prepare import Array, Piece
 from cosim.estimation.tonal_disturbance import phases_of
 from cosim.support.statistics import rms
@@ -91,6 +91,7 @@ def fit(
     fixed: Sequence[str] = (),
     freed: Sequence[str] = (),
     held: Sequence[str] = (),
+    enough: float = ENOUGH,
 ) -> Fit:
     """Fit all free parameters of a mount, starting from its numbers.
 
@@ -103,6 +104,7 @@ def fit(
         fixed: endings of the names of parameters that stay.
         freed: endings of the names of parameters that are fitted although their parts declare that they stay.
         held: names of parameters that keep their start although they are unknown: they count as free.
+        enough: share of the sum of squares below which a step ends the fit.
 
     Returns:
         The fit; residual = measured - model torque, N m.
@@ -132,7 +134,7 @@ def fit(
         normal, slope = columns @ columns.T + prior.T @ prior, columns @ rest + prior.T @ pulled
         return own.matrix.T @ normal @ own.matrix, own.matrix.T @ slope
 
-    found = least_squares(residuals, equations, own.of(start), (own.low, own.high), evaluations)
+    found = least_squares(residuals, equations, own.of(start), (own.low, own.high), evaluations, enough)
     values = _in_a_turn(free, np.clip(own.matrix @ found, *edges))
     seen = model.whole(own.matrix @ found)
     torque, slopes = _joined(used, seen, unused, lambda rest: stacked(inverse, [pieces[k] for k in rest], values))

@@ -15,6 +15,7 @@ from cosim.diagnosis.search.stages import (
     Search,
     Stage,
     admission,
+    at_its_end,
     best_of,
     contest,
     is_full,
@@ -101,7 +102,9 @@ def _grown(comparison: Comparison, effects: Sequence[AcceptedEffect], beside: St
     if any(is_small(one.own, comparison.policy) for one in effects):
         return None
     best = best_of(comparison, beside, max((one.own.evidence for one in effects), default=0.0))
-    return None if best is None or is_full(best, comparison) else best.fit
+    if best is None or is_full(best, comparison):
+        return None
+    return at_its_end(comparison, best, beside.current).fit
 
 
 def _round(
@@ -117,7 +120,7 @@ def _round(
             free = [r for r in one.rivals if excludes(one.misfits, one.effect, r.effect) is None]
             best = next((rival for rival in free if _takes(rival, one, comparison.policy)), best)
         if best is not one.own:
-            return [], best.fit
+            return [], at_its_end(comparison, best, one.without).fit
         effects.append(one)
     return effects, None
 
@@ -164,6 +167,8 @@ def _challenged(
     for rival in rivals:
         if rival.effect.id not in best or rival.evidence > best[rival.effect.id].evidence:
             best[rival.effect.id] = rival
+    near = [name for name, rival in best.items() if contest(comparison, own, rival) < comparison.policy.clear]
+    best |= {name: at_its_end(comparison, best[name], beside.current) for name in near}
     misfits = misfits_of(problem.prepared, chosen.mount, group[0])
     margins = {rival.effect.id: margin(comparison, own, rival) for rival in best.values()}
     ranked = sorted(best.values(), key=lambda rival: margins[rival.effect.id])

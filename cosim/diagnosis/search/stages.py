@@ -51,6 +51,8 @@ class CandidateFit:
     """Share of the energy at rest that a contact that bends removes."""
     many: int = 1
     """How many members of its form were tried."""
+    is_rough: bool = False
+    """Whether its fit ended where it is clear which of many is best (`Problem.roughly`)."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +102,9 @@ IN_TURN = InTurn()
 def stage(comparison: Comparison, current: Fit, refits: InTurn = IN_TURN) -> Stage:
     """Screen all candidates beside a structure and refit the best forms."""
     fits = refits(comparison, current, starts(comparison.screen(current), comparison.policy))
+    top = max((one.evidence for one in fits), default=0.0)
+    near = max(comparison.policy.fair, top - comparison.policy.clear)
+    fits = [at_its_end(comparison, one, current) if one.evidence > near else one for one in fits]
     for one in fits:
         comparison.enter(one.effect.id, one.fit, one.plain_gain)
     return Stage(current, tuple(sorted(fits, key=lambda one: -one.evidence)))
@@ -135,8 +140,8 @@ def _key(one: Screened) -> object:
 
 
 def refitted(comparison: Comparison, current: Fit, effect: Effect, many: int) -> CandidateFit:
-    """Add an effect to a fitted structure, refit everything, weigh it."""
-    problem = comparison.problem
+    """Add an effect to a fitted structure, refit everything, as one of many, weigh it."""
+    problem = comparison.problem.roughly
     grown = replace(current.mount, effects=(*current.mount.effects, effect))
     found, aside = problem.fit(grown, 36), aside_for(effect.id)
     before = comparison.evidence(current, aside, beside=current)
@@ -145,7 +150,14 @@ def refitted(comparison: Comparison, current: Fit, effect: Effect, many: int) ->
         return comparison.evidence(fit, aside, beside=current) - before
 
     found = hypothesis_of(effect).tuned(problem, found, effect, gain)
-    return weighed(comparison, found, current, many)
+    return replace(weighed(comparison, found, current, many), is_rough=True)
+
+
+def at_its_end(comparison: Comparison, one: CandidateFit, current: Fit) -> CandidateFit:
+    """A candidate beside a structure whose fit has come to its end."""
+    if not one.is_rough:
+        return one
+    return weighed(comparison, comparison.problem.fit(one.fit.mount, 36), current, one.many)
 
 
 def weighed(
@@ -189,6 +201,7 @@ def search(comparison: Comparison, base: Fit, refits: InTurn = IN_TURN) -> Searc
         best = best_of(comparison, now, largest)
         if best is None or is_full(best, comparison):
             return Search(base, tuple(stages))
+        best = at_its_end(comparison, best, now.current)
         largest = max(largest, best.evidence)
         stages.append(stage(comparison, with_harmonics(comparison, best.fit, best.effect), refits))
         if is_small(best, comparison.policy):
