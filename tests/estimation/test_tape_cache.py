@@ -31,7 +31,7 @@ def evaluated(mount: Mount = MOUNT) -> list[np.ndarray]:
     columns = [np.linspace(0, 1, 50) + k for k in range(9)]
     numbers = np.array([variable.start for variable in mount.parameters()])
     return [
-        equations.torque(columns[:5], numbers),
+        equations.torque(columns[:6], numbers),
         *(one.rows([*columns, columns[0]], numbers) for one in equations._affine),
     ]
 
