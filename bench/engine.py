@@ -4,7 +4,8 @@ python -m bench.engine --before OLD --out results/master      (10 to 30 minutes,
 
 OLD is a checkout of the commit that is compared with (2ad1e55), its libraries built by `python
 cosim/master/loop/build_hook.py`; without it nothing is compared. Processor time is user and system time of a process
-from its start to its end, linear algebra in one thread. `--skip 10k` leaves out cases whose name holds the word.
+from its start to its end, linear algebra in one thread, byte code kept as in an installation. `--skip 10k` leaves out
+cases whose name holds the word.
 """
 
 import argparse
@@ -33,6 +34,10 @@ SHARED = ROOT.parent / "shared"
 SEED = 5001
 COMPARED = ("demo", "home_one_9_delay", "emps", "home_several_0_cable_wrap_compliance", "home_none_3_none")
 """Cases of the net that are diagnosed by both: the demo, a delay, EMPS, a table with a compliance, a null."""
+LENGTHS = (60.0, 120.0, 240.0)
+"""Seconds of each of three recordings at 1 kHz, over which processor time shall grow with the rows."""
+WALKED = {"types": "<= 40", "files": "<= 90", "returns": "<= 150"}
+"""What a recording meets on its way through a diagnosis, as `tests/house/walk.py` counts, and what was asked."""
 FIRST_FIT = """
 import runpy, sys, time
 from cosim.estimation.problem import Problem
@@ -69,7 +74,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path)
     given = parser.parse_args()
     rows = []
-    for row in chain(sizes(), costs(given.skip), compared(given.before, given.skip)):
+    for row in chain(sizes(), walked(), costs(given.skip), lengths(given.skip), compared(given.before, given.skip)):
         rows.append(row)
         print(*row, sep=" | ", flush=True)
     if given.out:
@@ -114,6 +119,36 @@ def _is_number(node: ast.expr) -> bool:
     return bool(leaves) and all(isinstance(one, ast.Constant) and isinstance(one.value, int | float) for one in leaves)
 
 
+def walked() -> Iterator[Row]:
+    """What a recording with two effects meets on its way through `diagnose --quick`."""
+    case = next(one for one in home() if one.name == "home_several_0_cable_wrap_compliance")
+    with tempfile.TemporaryDirectory() as work:
+        case.write(Path(work))
+        words = ["tests/house/walk.py", "diagnose", *case.arguments(Path(work)), "--out", f"{work}/out"]
+        counted = used(ROOT, words).words.replace(",", "").split()
+    for what, asked in WALKED.items():
+        yield Row(f"a recording on its way, --quick: {what}", asked, counted[counted.index(what) + 1])
+
+
+def lengths(skip: list[str]) -> Iterator[Row]:
+    """Processor time over the length of the recordings."""
+    if any(word in "lengths" for word in skip):
+        return
+    spent = []
+    for seconds in LENGTHS:
+        with tempfile.TemporaryDirectory() as work:
+            with ProcessPoolExecutor(1, get_context("spawn")) as apart:
+                apart.submit(write, Case(seconds, 1000, 1.0, True), SEED, Path(work)).result()
+            words = NetCase("lengths", "cost", lambda _: None).arguments(Path(work))
+            spent.append(used(ROOT, ["-m", "cosim", "diagnose", *words, "--out", f"{work}/out"]).seconds)
+    power = float(np.polyfit(np.log(LENGTHS), np.log(spent), 1)[0])
+    said = ", ".join(f"{one:.1f}" for one in spent)
+    spans = ", ".join(f"{one:g}" for one in LENGTHS)
+    yield Row(
+        f"3 x {spans} s at 1 kHz, --quick: seconds, and their power of the length", "<= 1", f"{said}: {power:.2f}"
+    )
+
+
 def costs(skip: list[str]) -> Iterator[Row]:
     """Processor time and memory of fixed cases."""
     yield Row("import of cosim [s]", "unchanged", f"{used(ROOT, ['-c', 'import cosim']).seconds:.2f}")
@@ -154,6 +189,7 @@ def used(root: Path, words: list[str]) -> Used:
     """What Python uses for some words with the packages of a checkout."""
     threads = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS")}
     environment = os.environ | threads | {"PYTHONPATH": str(root.resolve())}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     with tempfile.TemporaryFile("w+") as errors:
         command, quiet = [sys.executable, *words], subprocess.DEVNULL
         process = subprocess.Popen(
