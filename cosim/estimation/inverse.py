@@ -30,8 +30,6 @@ from pyfmi_models.effects.base import TonalEffect, Transmission
 from pyfmi_models.model import Variable, with_symbols
 from pyfmi_models.mount import Mount
 
-SPARSE = 64
-"""Every so many rows are looked at first where it is asked whether a signal is zero throughout."""
 BUMP = 1e-6
 """Relative change of a parameter by which a frequency response is differentiated."""
 
@@ -115,8 +113,7 @@ class Inverse:
         """Torque that the motion and the states need, and its derivatives: (rows, 1 + free), filtered once more."""
         signals = self._momentary(piece, self._with(values))
         # A spring, a drive, a clock act on a torque as a whole, later.
-        acts = np.asarray(signals[:, ::SPARSE].any(axis=1))
-        acts[~acts] = signals[~acts].any(axis=1)
+        acts = signals.any(axis=1)
         if acts.all():
             piece.lowpass_in_place(signals)
         else:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from cosim.estimation.fit import Fit, with_values
+from cosim.estimation.least_squares import ENOUGH
 from cosim.estimation.priors import is_linear
 from cosim.estimation.problem import Problem
 from pyfmi_models.effects import Effect
@@ -91,8 +92,8 @@ def in_cycles(problem: Problem, found: Fit) -> Fit:
 
 
 def freed(problem: Problem, found: Fit, name: str) -> Fit:
-    """Fit again with a number that a fit leaves as it is otherwise."""
-    return problem.fit(found.mount, 30, (name,))
+    """Fit again with a number that a fit leaves as it is otherwise: it stays from there on, so this goes to the end."""
+    return replace(problem, enough=ENOUGH).fit(found.mount, 30, (name,))
 
 
 def at_bound(effect: Effect, sizes: Sequence[str] = (), recorded: Recorded = ANY, may_end: Sequence[str] = ()) -> bool:

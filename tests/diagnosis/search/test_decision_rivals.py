@@ -45,6 +45,7 @@ class Candidate:
     evidence: float
     plain_gain: float = 0.5
     adds: bool = False
+    is_rough: bool = False
 
 
 @dataclass(frozen=True)
