@@ -26,8 +26,10 @@ class Ripple(Rippled[Cogging]):
             yield self.wave(cycles)
 
     def is_degenerate(self, problem: Problem, effect: Cogging) -> bool:
-        """Once a turn it is an unbalance."""
-        return problem.mount.motion == "rotary" and bool(effect.cycles_per_rev < LEAST_CYCLES)
+        """Once a turn it is an unbalance; on a carriage half a wave over all of its way is a slope, less a constant."""
+        if problem.mount.motion == "rotary":
+            return bool(effect.cycles_per_rev < LEAST_CYCLES)
+        return bool(2 * effect.cycles_per_rev * problem.prepared.reach < 1)
 
     def wave(self, cycles: float) -> Candidate:
         """Torque with so many cycles."""
