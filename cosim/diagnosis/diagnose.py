@@ -46,6 +46,7 @@ from cosim.diagnosis.search.stages import InTurn, search
 from cosim.diagnosis.terms.closed_form import ClosedForm, searches
 from cosim.diagnosis.terms.learn import NOTHING_TRIED, Learned, learn
 from cosim.diagnosis.trust.admission import admit
+from cosim.diagnosis.trust.changes import changes
 from cosim.diagnosis.trust.doubts import beyond_denial, doubts, of_base, of_delivered, single_readings, without_denied
 from cosim.diagnosis.trust.limits import end_stop, half_sample
 from cosim.estimation.blocks import Blocks
@@ -169,9 +170,10 @@ def diagnose(
     on_model_ready("after", delivered.plant())
     experiment = _experiment(answer)
     described = _with_learned(_described(answer, train, heldout, card), answer, tried, train, heldout)
+    changed = changes((problem.prepared, answer.held.prepared), answer.chosen.mount)
     diagnosis = replace(
         _with_search(described, answer, examined, heldout),
-        sanity=(*of_delivered(sanity, card, problem, mounts[0]), *not_determined_doubts(unknown)),
+        sanity=(*changed, *of_delivered(sanity, card, problem, mounts[0]), *not_determined_doubts(unknown)),
         not_determined=unknown,
         next_experiment=in_words(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,

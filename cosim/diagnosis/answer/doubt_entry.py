@@ -22,6 +22,7 @@ Kind = Literal[
     "encoder_step",
     "half_sample",
     "end_stop",
+    "change_at_a_time",
     "no_set_point",
     "little_motion",
     "own_torque",
