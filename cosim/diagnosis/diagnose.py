@@ -170,10 +170,9 @@ def diagnose(
     on_model_ready("after", delivered.plant())
     experiment = _experiment(answer)
     described = _with_learned(_described(answer, train, heldout, card), answer, tried, train, heldout)
-    changed = changes((problem.prepared, answer.held.prepared), answer.chosen.mount)
     diagnosis = replace(
         _with_search(described, answer, examined, heldout),
-        sanity=(*changed, *of_delivered(sanity, card, problem, mounts[0]), *not_determined_doubts(unknown)),
+        sanity=(*described.sanity, *of_delivered(sanity, card, problem, mounts[0]), *not_determined_doubts(unknown)),
         not_determined=unknown,
         next_experiment=in_words(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,
@@ -261,6 +260,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         verdict=_verdict(found, decision),
         findings=tuple(found),
         heldout=replace(seen.heldout, black_box_rms=black_box_rms(seen.traces)),
+        sanity=changes((problem.prepared, answer.held.prepared), answer.chosen.mount),
         mount=card.mount.name,
         delivered=tuple(
             dict.fromkeys(effect.id for effect in answer.chosen.mount.effects[len(problem.mount.effects) :])

@@ -99,21 +99,17 @@ def first_card(
     on_progress("reading the torque balance")
     problem, best = _with_loads(*_base(recordings, motion, inertia), inertia, on_progress)
     numbers = tuple(_numbers(problem, best, inertia, linear))
-    beside = "" if _inertia_of(numbers).is_determined else _named(problem.prepared.neighbours)
+    beside = _beside_neighbours(problem, _inertia_of(numbers), linear)
     if beside:
-        value, error = inertia_beside_neighbours(problem.prepared, not linear)
-        beside = beside if value > SURELY * error else ""
-    if beside:
-        on_progress(f"reading the inertia beside the motion of {beside}")
-        problem, best = _with_loads(*_base(recordings, motion, value), value, on_progress)
-        given, *others = _numbers(problem, best, value, linear)
-        numbers = (replace(given, error=error), *others)
+        on_progress("reading the inertia beside the motion of the neighbours")
+        problem, best = _with_loads(*_base(recordings, motion, _within(beside)), _within(beside), on_progress)
+        numbers = (beside, *_numbers(problem, best, beside.value, linear)[1:])
     tau = problem.weight * problem.prepared.stacked("tau")
     if is_asked or not _is_small(problem, tau, numbers):
         _check_inertia(numbers, linear)
     left = problem.weight * best.residual
     explained = 1 - float(left @ left) / max(float(tau @ tau), 1e-300)
-    notes = (*_neighbour_note(numbers, beside), *_notes(numbers, explained))
+    notes = (*_neighbour_note(beside, problem.prepared.neighbours), *_notes(numbers, explained))
     return FirstCard(_held(best.mount, numbers), numbers, explained, notes)
 
 
@@ -128,15 +124,22 @@ def _with_loads(problem: Problem, found: Fit, inertia: float | None, on_progress
     return problem, best
 
 
-def _named(several: Sequence[Neighbour]) -> str:
-    return ", ".join(one.name for one in several)
+def _beside_neighbours(problem: Problem, alone: Number, linear: bool) -> Number | None:
+    """The inertia beside the neighbours' motion, where the axis' own does not show it and theirs narrows it."""
+    if alone.is_determined:
+        return None
+    value, error = inertia_beside_neighbours(problem.prepared, not linear)
+    found = replace(alone, value=value, error=error, is_determined=value > SURELY * error)
+    return found if error < alone.error and _within(found) > 0 else None
 
 
-def _neighbour_note(numbers: Sequence[Number], neighbours: str) -> tuple[str, ...]:
+def _neighbour_note(inertia: Number | None, neighbours: Sequence[Neighbour]) -> tuple[str, ...]:
     """Say beside which neighbours the inertia was estimated."""
-    one = _inertia_of(numbers)
-    said = f"{one.value:.3g} {one.unit} (95 %: {one.range[0]:.3g} to {one.range[1]:.3g})"
-    return (f"The inertia shows only beside the motion of {neighbours}: {said}.",) if neighbours else ()
+    if not (inertia and inertia.is_determined):
+        return ()
+    low, high = inertia.range
+    said = f"{inertia.value:.3g} {inertia.unit} (95 %: {low:.3g} to {high:.3g})"
+    return (f"The inertia shows only beside the motion of {', '.join(one.name for one in neighbours)}: {said}.",)
 
 
 def _base(recordings: Sequence[Recording], motion: Motion, inertia: float | None) -> tuple[Problem, Fit]:

@@ -145,15 +145,15 @@ class _Rest:
 
     def gain(self, shape: Array) -> float:
         """Energy that a shape (rows, n) takes of the rest."""
-        along = _basis(self._beside(shape)).T @ self.left
+        along = _basis(self._cleared(shape)).T @ self.left
         return float(along @ along)
 
     def size(self, shape: Array) -> float:
         """How large it is: with its sign, or the amplitude of a sine and a cosine."""
-        found = np.linalg.lstsq(self._beside(shape), self.left, rcond=1e-9)[0]
+        found = np.linalg.lstsq(self._cleared(shape), self.left, rcond=1e-9)[0]
         return float(found[0]) if len(found) == 1 else float(np.hypot(*found))
 
-    def _beside(self, shape: Array) -> Array:
+    def _cleared(self, shape: Array) -> Array:
         return np.asarray(shape - self.basis @ (self.basis.T @ shape))
 
 
