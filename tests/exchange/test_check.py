@@ -53,6 +53,24 @@ def made(folder) -> dict[str, dict]:
     return {"stimulus": {"time": T, "i": CURRENT}, "reference": {"time": T, "w": table["w"], "phi": table["phi"]}}
 
 
+class InThisProcess:
+    """A cell that answers here: what an experiment says does not depend on where it runs."""
+
+    def call(self, function, *arguments, timeout):
+        return function(*arguments)
+
+    def close(self):
+        """Nothing was started."""
+
+
+@pytest.fixture
+def here(monkeypatch) -> None:
+    monkeypatch.setattr("cosim.experiments.check.Cell", InThisProcess)
+
+
+HERE = pytest.mark.usefixtures("here")
+
+
 def verb(*arguments: object) -> int:
     with pytest.raises(SystemExit) as ended:
         main([str(one) for one in arguments])
@@ -71,6 +89,7 @@ def test_an_fmu_that_runs_as_meant_passes(folder, made, version, capsys):
     assert verb("check", fmu, "--out", folder / version) == 2
 
 
+@HERE
 @pytest.mark.parametrize("planted", CAUSES)
 def test_a_planted_error_is_found_and_said(folder, made, planted, capsys):
     fmu = with_files(motor(folder, 3, planted), folder / f"planted{planted}.fmu", bundle(**made))
@@ -80,6 +99,7 @@ def test_a_planted_error_is_found_and_said(folder, made, planted, capsys):
     assert "FAIL  chirp" in said
 
 
+@HERE
 def test_an_event_that_is_missed_is_said_with_its_time(folder, made):
     reference = dict(made["reference"])
     reference["w"] = np.where(T >= 1.2, -reference["w"], reference["w"])
@@ -89,6 +109,7 @@ def test_an_event_that_is_missed_is_said_with_its_time(folder, made):
     assert "right up to 1.19 s and wrong from 1.2 s on" in str(done)
 
 
+@HERE
 def test_the_later_draft_with_its_kind_of_analysis_is_read_and_other_kinds_are_not_run(folder, made):
     inside = '<TransientSimulation startTime="0" stopTime="2" stepSize="0.01"/>'
     fmu = with_files(motor(folder, 3), folder / "later.fmu", bundle(**made, inside=inside, times=""))
@@ -103,6 +124,7 @@ def test_the_later_draft_with_its_kind_of_analysis_is_read_and_other_kinds_are_n
     assert "b.oth is of type application/x-of-others, and read here are:" in foreign
 
 
+@HERE
 def test_a_parameter_set_of_an_experiment_is_applied(folder, made):
     files = bundle(**made, inside='<Parameters source="p.ssv"/>')
     fmu = with_files(motor(folder, 3), folder / "set.fmu", files | {"p.ssv": SET.format("J", 0.05)})
@@ -119,6 +141,7 @@ def test_a_version_that_is_not_known_is_refused_by_name(folder, made, capsys):
     assert 'FMI-LS-REF "2.0.0"; known here are: 1.0.0-alpha.1, 1.0.0-beta.1' in capsys.readouterr().err
 
 
+@HERE
 def test_a_reference_outside_the_experiment_and_files_that_are_not_there_are_sentences(folder, made):
     times = 'startTime="0" stopTime="1" stepSize="0.01"'
     fmu = with_files(motor(folder, 3), folder / "long.fmu", bundle(**made, times=times))
@@ -134,6 +157,7 @@ def test_a_reference_outside_the_experiment_and_files_that_are_not_there_are_sen
     assert not cosim.check(fmu).passed
 
 
+@HERE
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
@@ -149,6 +173,7 @@ def test_a_table_that_cannot_be_meant_fails_with_a_sentence(folder, made, name, 
     assert words in str(done)
 
 
+@HERE
 def test_references_in_hdf5_are_refused_with_what_to_do(folder, made):
     files = bundle(**made)
     files["a.exp"] = experiments().replace("<References", '<References type="application/x-hdf"')

@@ -121,39 +121,47 @@ def probed(*scenarios: Path) -> list[dict[str, Any]]:
     return found
 
 
-@pytest.mark.parametrize(
-    ("version", "stage"),
-    [
-        *((2, stage) for stage in ("load", "instantiate", "setup", "initialise", "step", "terminate", "free")),
-        (3, "step"),
-    ],
+STAGES_ASKED = (
+    *((2, one) for one in ("load", "instantiate", "setup", "initialise", "step", "terminate", "free")),
+    (3, "step"),
 )
-def test_what_an_fmu_changes_in_the_process_is_put_back_and_named(folder: Path, version: int, stage: str) -> None:
-    deeds = [name for name in NAMES if stage != "load" or name in ("upward", "flush")]
-    scenarios = []
-    for deed in deeds:
-        fmu = rude_fmu(folder, version, deed, stage)
-        scenarios.append(scenario_of(folder / f"{deed}_{stage}_{version}.toml", ONE.format(fmu=fmu, more="")))
-    for deed, answer in zip(deeds, probed(*scenarios), strict=True):
-        assert answer["changed"] == []
-        assert answer["notes"] == [
-            f"a (rude_{version}_CoSimulation_{deed}_{stage}.fmu) changed {NAMES[deed]}; restored."
-        ]
 
 
-def test_a_handler_that_a_runtime_may_need_stays_until_its_fmu_is_closed(folder: Path) -> None:
+@pytest.fixture(scope="module")
+def answers(folder: Path, tiny: dict[int, Path]) -> dict[str, dict[str, Any]]:
+    """What is left in a process by a run of each FMU, all one after the other in the same."""
+    asked = {}
+    for version, stage in STAGES_ASKED:
+        for deed in (name for name in NAMES if stage != "load" or name in ("upward", "flush")):
+            fmu = rude_fmu(folder, version, deed, stage)
+            asked[fmu.name] = scenario_of(fmu.with_suffix(".toml"), ONE.format(fmu=fmu, more=""))
     fmu = rude_fmu(folder, 2, "handle", "initialise")
-    (answer,) = probed(scenario_of(folder / "handle.toml", ONE.format(fmu=fmu, more="")))
-    assert answer["changed"] == []
-    assert answer["notes"] == [f"a ({fmu.name}) handles SIGUSR1 itself until it is closed; then restored."]
+    asked[fmu.name] = scenario_of(fmu.with_suffix(".toml"), ONE.format(fmu=fmu, more=""))
+    two = TWO.format(fmu=rude_fmu(folder, 2, "umask", "step"), tiny=tiny[2], output="third", more="")
+    asked["two"] = scenario_of(folder / "several.toml", two)
+    return dict(zip(asked, probed(*asked.values()), strict=True))
 
 
-def test_where_one_of_several_changed_something_in_the_loop_all_are_named(folder: Path, tiny: dict[int, Path]) -> None:
-    fmu = rude_fmu(folder, 2, "umask", "step")
-    (answer,) = probed(scenario_of(folder / "several.toml", TWO.format(fmu=fmu, tiny=tiny[2], output="third", more="")))
-    assert answer["changed"] == []
+@pytest.mark.parametrize(("version", "stage"), STAGES_ASKED)
+def test_what_an_fmu_changes_in_the_process_is_put_back_and_named(
+    answers: dict[str, dict[str, Any]], version: int, stage: str
+) -> None:
+    for deed in (name for name in NAMES if stage != "load" or name in ("upward", "flush")):
+        name = f"rude_{version}_CoSimulation_{deed}_{stage}.fmu"
+        assert answers[name]["changed"] == [], name
+        assert answers[name]["notes"] == [f"a ({name}) changed {NAMES[deed]}; restored."]
+
+
+def test_a_handler_that_a_runtime_may_need_stays_until_its_fmu_is_closed(answers: dict[str, dict[str, Any]]) -> None:
+    name = "rude_2_CoSimulation_handle_initialise.fmu"
+    assert answers[name]["changed"] == []
+    assert answers[name]["notes"] == [f"a ({name}) handles SIGUSR1 itself until it is closed; then restored."]
+
+
+def test_where_one_of_several_changed_something_in_the_loop_all_are_named(answers: dict[str, dict[str, Any]]) -> None:
+    assert answers["two"]["changed"] == []
     said = "One of the components (other, rude) that were started and stepped changed the umask; restored."
-    assert answer["notes"] == [said]
+    assert answers["two"]["notes"] == [said]
 
 
 CALLS = [
