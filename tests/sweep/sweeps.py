@@ -62,11 +62,6 @@ def written(folder: Path, *changes: tuple[str, str]) -> Path:
     return path
 
 
-def appended(path: Path, text: str) -> Path:
-    path.write_text(path.read_text() + text)
-    return path
-
-
 def run(path: Path, **settings: Any) -> tuple[Summary, pd.DataFrame]:
     sweep = read_sweep(path)
     done = conduct(sweep, scenario_of(path), path.parent / "out", **({"workers": 1} | settings))
