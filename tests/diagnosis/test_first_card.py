@@ -12,6 +12,8 @@ from two_links import OWN, elbow
 import cosim
 from cosim.api.defaults import split
 from cosim.cli import main
+from cosim.data.recording import Recording
+from cosim.diagnosis.first_card import first_card
 from cosim.support.errors import InputError
 from pyfmi_models.card import read_card
 from pyfmi_models.effects import TorqueOffset
@@ -181,3 +183,20 @@ def test_an_inertia_that_a_neighbour_hides_is_estimated_beside_its_motion() -> N
     assert beside.card.mount.inertia == pytest.approx(OWN, rel=0.05)
     assert any("only beside the motion of q1" in note for note in beside.notes)
     assert 0 < beside.numbers[0].error < 0.05 * OWN
+
+
+def test_an_inertia_that_even_its_neighbour_hardly_shows_is_taken_from_its_limit() -> None:
+    """A wrist whose torque is read behind the gear: a weight that turns with two joints, and next to no inertia."""
+    runs = []
+    for seed in (1, 2):
+        one, dice = elbow(seed), np.random.default_rng(seed)
+        q, own = one["q1"] + one["q"], np.gradient(one["q"], one.t)
+        tau = 3.0 * np.sin(q) + 0.3 * np.tanh(own / 1e-2) + dice.normal(0, 0.1, len(q))
+        runs.append(Recording.of({**one.table, "tau": tau}, one.name))
+    found = first_card(runs, "rotary", is_asked=False)
+    assert not found.number("axis.inertia").is_determined
+    assert 0 < found.mount.axis.inertia < 0.02
+    assert any("hardly show the inertia" in note for note in found.notes)
+    alone = [Recording.of({name: one[name] for name in ("t", "tau", "q")}, one.name) for one in runs]
+    most = first_card(alone, "rotary", is_asked=False).number("axis.inertia").range[1]
+    assert found.number("axis.inertia").range[1] < 0.1 * most
