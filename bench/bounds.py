@@ -96,7 +96,7 @@ def looked_for(comparison: Comparison, base: Fit, name: str) -> bool:
     best = {id(max(scored, key=lambda one: getattr(one, key))): key for key in ("evidence", "plain")}
     for one in (one for one in scored if id(one) in best):
         fit = refitted(comparison, base, one.candidate.start(one.coefficients), len(tried))
-        enough = fit.evidence >= least(POLICY, 0.0) and not is_small(fit, POLICY)
+        enough = fit.evidence >= least(POLICY, 0.0, fit.plain_gain) and not is_small(fit, POLICY)
         if enough and all_pass(admission(comparison, fit)):
             return True
     return False

@@ -107,7 +107,7 @@ class Concealment:
     def is_found(self, hidden: Hidden, weights: Array) -> bool:
         """Whether the search would add the concealed effect: its rules of evidence and of size."""
         worth, policy = self.worth(hidden, weights), self._comparison.policy
-        enough = worth.evidence >= least(policy, self._largest) and worth.plain >= policy.negligible
+        enough = worth.evidence >= least(policy, self._largest, worth.plain) and worth.plain >= policy.negligible
         large = worth.plain >= policy.small or worth.evidence >= policy.sure
         loud = not hidden.must_stand_out or worth.above_noise >= policy.least_above_noise
         return enough and large and loud

@@ -1,13 +1,14 @@
-"""What training leaves open, held-out recordings may choose: a name that they refuse gives way to a rival of its set.
+"""A name that held-out recordings refuse gives way to a near one that training found in its place.
 
 A constant torque, friction of two directions and a load are one thing on a short stroke: training has them within a nat
-of each other and names the simplest. Where that one does not predict, another of the set may: it was found in training
-as well as the first, so nothing is named that only held-out recordings know.
+of each other and names the simplest; play is three nats ahead of a contact that bends. Where the first does not
+predict, another may. It has evidence of its own in training, so nothing is named that only held-out recordings know.
 """
 
 from collections.abc import Iterator
 from dataclasses import replace
 
+from cosim.diagnosis.decide.policy import Policy
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.search.instrumental_variable import misfits_of
@@ -18,7 +19,7 @@ from cosim.diagnosis.search.stages import CandidateFit, contest
 
 
 def prove_sets(comparison: Comparison, examined: Examined, held: Predictive) -> tuple[Examined, Proof]:
-    """Keep the effects that predict; of a set whose first does not, the member that predicts best.
+    """Keep the effects that predict; in the place of one that does not, the rival that predicts best.
 
     One effect gives way: what was fitted in another's place was fitted beside the names that training gave.
     """
@@ -31,14 +32,19 @@ def _ways(
     comparison: Comparison, examined: Examined, proof: Proof, refused: AcceptedEffect, held: Predictive
 ) -> Iterator[tuple[Examined, Proof]]:
     """Proofs in which a rival stands in the place of what was refused, and all that stood still does."""
-    told, least = margins(refused), comparison.policy.fair
     stood = {one.effect.id for one in proof.standing}
-    for rival in refused.rivals:
-        if told[rival.effect.id] < least and rival.effect.id not in stood and not is_renamed(rival.effect):
-            swapped = _in_place(comparison, examined, refused, rival)
-            again = prove(comparison, swapped, held)
-            if stood | {rival.effect.id} <= {one.effect.id for one in again.standing}:
-                yield swapped, replace(again, unproven=(refused, *again.unproven))
+    for rival in _near(examined, refused, comparison.policy):
+        swapped = _in_place(comparison, examined, refused, rival)
+        again = prove(comparison, swapped, held)
+        if stood | {rival.effect.id} <= {one.effect.id for one in again.standing}:
+            yield swapped, replace(again, unproven=(refused, *again.unproven))
+
+
+def _near(examined: Examined, refused: AcceptedEffect, policy: Policy) -> list[CandidateFit]:
+    """Rivals with evidence of their own that are not clearly behind, as names are weighed beside something unknown."""
+    listed, told = {one.effect.id for one in examined.effects}, margins(refused)
+    others = [one for one in refused.rivals if one.effect.id not in listed and not is_renamed(one.effect)]
+    return [one for one in others if told[one.effect.id] < policy.clear <= one.evidence]
 
 
 def _in_place(comparison: Comparison, examined: Examined, out: AcceptedEffect, rival: CandidateFit) -> Examined:

@@ -126,8 +126,14 @@ def _round(
 
 
 def _takes(rival: CandidateFit, one: AcceptedEffect, policy: Policy) -> bool:
-    """Whether a rival takes the place: it is better, or near and simpler; one that is near and less simple does not."""
+    """Whether a rival takes the place: it is better, or as good and simpler; one as good and less simple does not.
+
+    As good is what is within `fair`, and what no contest of names decides (`contest` is 0: of 400 rows one of them is
+    ahead, of a few ways of being wrong the other): more numbers fit what the equation misses, too.
+    """
     fewer = one.own.fit.count - rival.fit.count
+    if fewer and one.contests[rival.effect.id] == 0.0:
+        return fewer > 0
     margin = one.margin(rival)
     return margin < (policy.fair if fewer > 0 else -policy.fair if fewer < 0 else 0.0)
 

@@ -208,12 +208,15 @@ def search(comparison: Comparison, base: Fit, refits: InTurn = IN_TURN) -> Searc
             return Search(base, tuple(stages))
 
 
-def least(policy: Policy, largest: float) -> float:
+def least(policy: Policy, largest: float, share: float) -> float:
     """Evidence that one more effect must have beside others of which the largest has so much: half of it, within steps.
 
     An equation is never quite the machine's, and what it lacks looks like another effect. False ones beside true ones
-    had .33 to .37 of it, true ones .53 and more.
+    had .33 to .37 of it, true ones .53 and more. What removes half of the error energy that the others leave needs no
+    more than alone: what is slow has few independent rows, and so little evidence beside what is fast.
     """
+    if share >= policy.half:
+        return policy.clear
     return min(policy.sure, max(policy.clear, policy.half * largest))
 
 
@@ -246,7 +249,7 @@ def _choice(one: CandidateFit, best: CandidateFit | None, policy: Policy) -> Ite
 def _search_rules(comparison: Comparison, one: CandidateFit, largest: float) -> Iterator[Rule]:
     """Rules by which the search takes an effect, beside others of which the largest has so much evidence."""
     policy = comparison.policy
-    yield at_least("evidence", one.evidence, least(policy, largest), "nats")
+    yield at_least("evidence", one.evidence, least(policy, largest, one.plain_gain), "nats")
     yield from admission(comparison, one)
 
 

@@ -240,7 +240,7 @@ def chosen(nats: Mapping[str, float], *effects: AcceptedEffect) -> tuple[Examine
     return found, proof, "".join(one.effect.id for one in proof.standing)
 
 
-def test_a_member_of_the_set_stands_where_the_first_does_not_predict() -> None:
+def test_a_rival_stands_where_the_first_does_not_predict() -> None:
     found, proof, names = chosen({"b": 0.0, "bx": -2.0, "by": 8.0}, accepted("x", y=0.5))
     assert names == "y"
     assert proof.predicted["y"] == 8.0
@@ -252,9 +252,19 @@ def test_what_stands_gives_way_to_nobody() -> None:
     assert chosen({"b": 0.0, "bx": 4.0, "by": 80.0}, accepted("x", y=0.5))[2] == "x"
 
 
-@pytest.mark.parametrize(("behind", "expected"), [(RULES.fair - 0.01, "y"), (RULES.fair, "")])
-def test_only_what_training_leaves_open_is_asked(behind: float, expected: str) -> None:
-    assert chosen({"b": 0.0, "bx": -2.0, "by": 8.0}, accepted("x", y=behind))[2] == expected
+@pytest.mark.parametrize(("behind", "own", "expected"), [(-0.01, 0.0, "y"), (0.0, 0.0, ""), (-0.01, -0.01, "")])
+def test_only_what_training_has_near_it_with_evidence_of_its_own_is_asked(
+    behind: float, own: float, expected: str
+) -> None:
+    refused = accepted("x", y=RULES.clear + behind)
+    (rival,) = refused.rivals
+    refused = replace(refused, rivals=(replace(rival, evidence=RULES.clear + own),))
+    assert chosen({"b": 0.0, "bx": -2.0, "by": 8.0}, refused)[2] == expected
+
+
+def test_an_effect_that_is_in_the_list_takes_no_other_place() -> None:
+    nats = {"b": 0.0, "bx": -2.0, "bv": -1.0, "bxv": -3.0, "bvv": 40.0}
+    assert chosen(nats, accepted("x", "v", v=1.0), accepted("v"))[2] == ""
 
 
 def test_of_several_members_the_one_that_predicts_best_and_its_own_rivals() -> None:

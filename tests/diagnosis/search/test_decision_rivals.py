@@ -104,6 +104,7 @@ def play(monkeypatch: pytest.MonkeyPatch) -> Play:
         misfits: dict[str, float] | None = None,
         counts: dict[str, int] | None = None,
         gains: dict[str, float] | None = None,
+        undecided: tuple[str, ...] = (),
     ) -> Examined:
         def stage(comparison: Any, current: Fitted, told: Any) -> Tried:
             return Tried(current, tuple((tried or {}).get("".join(sorted(current.names)), [])))
@@ -115,7 +116,13 @@ def play(monkeypatch: pytest.MonkeyPatch) -> Play:
         monkeypatch.setattr(rivals, "stage", stage)
         monkeypatch.setattr(rivals, "weighed", weighed)
         monkeypatch.setattr(rivals, "margin", lambda _, own, other: own.evidence - other.evidence)
-        monkeypatch.setattr(rivals, "contest", lambda _, own, other: own.evidence - other.evidence)
+        monkeypatch.setattr(
+            rivals,
+            "contest",
+            lambda _, own, other: (
+                0.0 if own.effect.id + other.effect.id in undecided else own.evidence - other.evidence
+            ),
+        )
         monkeypatch.setattr(rivals, "_is_admissible", lambda _, one: not one.effect.id.isupper())
         monkeypatch.setattr(rivals, "misfits_of", lambda *_: misfits or {})
         monkeypatch.setattr(rivals, "best_of", lambda _, beside, __: next(filter(adds, beside.tried), None))
@@ -170,6 +177,17 @@ def test_a_rival_takes_the_place_where_it_is_better_or_near_and_simpler(
 ) -> None:
     tried = {"b": [rival("r", other, counts[1]), rival("x", own, counts[0])]}
     found = play("x", {"x": own, "r": other}, tried, counts={"x": counts[0], "r": counts[1]})
+    assert chosen(found) == expected
+
+
+@pytest.mark.parametrize(("counts", "expected"), [((5, 1), "br"), ((1, 5), "bx"), ((2, 2), "bx")])
+def test_where_no_contest_of_names_decides_the_simpler_stands_however_far_the_other_is_ahead(
+    counts: tuple[int, int], expected: str, play: Play
+) -> None:
+    """More numbers fit what an equation misses, too: friction that goes with the load was one over position."""
+    ahead = {"x": 90.0, "r": 20.0} if counts[0] >= counts[1] else {"x": 20.0, "r": 90.0}
+    tried = {"b": [rival(name, ahead[name], count) for name, count in zip("xr", counts, strict=True)]}
+    found = play("x", ahead, tried, counts=dict(zip("xr", counts, strict=True)), undecided=("xr", "rx"))
     assert chosen(found) == expected
 
 

@@ -108,8 +108,9 @@ def test_what_is_slow_counts_beside_loud_fast_noise() -> None:
 
 
 def test_beside_a_strong_effect_a_further_one_must_be_stronger_than_alone() -> None:
-    asked = [least(POLICY, largest) for largest in (0.0, 1.0, 100.0, 1e4)]
+    asked = [least(POLICY, largest, POLICY.half - 0.01) for largest in (0.0, 1.0, 100.0, 1e4)]
     assert asked == [POLICY.clear, POLICY.clear, 50.0, POLICY.sure]
+    assert least(POLICY, 1e4, POLICY.half) == POLICY.clear, "but where it removes half of what they leave"
 
 
 def test_a_rival_is_fitted_from_where_the_others_stand_too_as_alone_they_may_have_gone_astray() -> None:
