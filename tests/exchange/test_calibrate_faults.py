@@ -42,8 +42,9 @@ def test_a_point_at_which_the_fmu_crashes_or_gives_nan_costs_that_point(fmus):
     ],
 )
 def test_an_fmu_that_cannot_be_simulated_at_its_start_is_a_sentence(fmus, name, value, words):
+    patience = 2.0 if name == "hang_below" else 60.0  # what answers may be slow on a busy computer
     with pytest.raises(cosim.InputError, match=words):
-        found(recorded(fmus[3], TRUTH), fmu=fmus[3], free=["J"], timeout=2.0, set={name: value})
+        found(recorded(fmus[3], TRUTH), fmu=fmus[3], free=["J"], timeout=patience, set={name: value})
 
 
 @pytest.mark.parametrize(
