@@ -7,8 +7,8 @@ Of one recording's kept rows, r what the model leaves of the torque:
 C are shapes that a model may have wrong all the time: a constant, a weight, waves of the position, each alone and as a
 level of friction, friction over speed, inertia. k is one of them alone. The change is told where k from t1 on takes
 half of the energy that C leaves, and more than the same k with smooth waves of time does: what changes slowly is wear,
-or warmth. Of six generated machines onto which a payload comes four are told so, each at its time (two compared: within .1 s); of 67
-others, a half of them rough, none.
+or warmth. Of six generated machines onto which a payload comes four are told so (two times were compared: within .1 s);
+of 67 others, a half of them rough, none.
 """
 
 from collections.abc import Iterator, Sequence
