@@ -148,6 +148,9 @@ class Rowwise:
     def __call__(self, columns: Sequence[Array] | Array, parameters: Array) -> Array:
         """Evaluate: inputs of shape (rows,) each and (parameters,) -> (outputs, rows)."""
         numbers, rows = self._tape.numbers.copy(), len(columns[0])
+        if len(columns) != self._tape.inputs or any(len(one) != rows for one in columns):
+            lengths = ", ".join(str(len(one)) for one in columns)
+            raise ValueError(f"a tape of {self._tape.inputs} columns was given columns of {lengths} rows")
         places, which = self._tape.parameters
         numbers[places] = np.asarray(parameters, float)[which]
         out, kernels = np.empty((self._tape.outputs, rows)), library()

@@ -43,6 +43,14 @@ def test_rows_are_what_casadi_says(name: str, rows: int) -> None:
         np.testing.assert_allclose(found, wanted.T, rtol=1e-12, atol=1e-12)
 
 
+@pytest.mark.parametrize("lengths", [(5,), (5, 5, 5), (5, 4)])
+def test_columns_that_a_tape_does_not_have_are_refused(lengths: tuple[int, ...]) -> None:
+    """In C what lies behind them would be read."""
+    x = ca.SX.sym("x", 2)
+    with pytest.raises(ValueError, match="a tape of 2 columns was given columns of 5"):
+        Rowwise(Tape.of(x, P, x[0] + x[1]))([np.zeros(length) for length in lengths], np.ones(P.numel()))
+
+
 @pytest.mark.parametrize("rows", [0, 1, STRIDE - 1, STRIDE, STRIDE + 1, 3 * STRIDE + 5])
 def test_a_state_is_carried_step_by_step(rows: int) -> None:
     state, column, factor = ca.SX.sym("state", 2), ca.SX.sym("column", 2), ca.SX.sym("factor")
