@@ -66,11 +66,11 @@ def pictures(folder: Path) -> Iterator[str]:
 
 
 def shortened(path: Path) -> None:
-    """Leave long lists out of a large JSON file and name them."""
+    """Leave long lists out of a large JSON file and name them; scores stay, of which SCORES.md is made."""
     if path.stat().st_size <= JSON_FILE:
         return
     document: dict[str, Any] = json.loads(path.read_text("utf-8"))
-    long = [name for name, part in document.items() if len(json.dumps(part)) > JSON_PART]
+    long = [name for name, part in document.items() if name != "scores" and len(json.dumps(part)) > JSON_PART]
     kept = {name: part for name, part in document.items() if name not in long}
     path.write_text(json.dumps(kept | {"left_out": long}, indent=1) + "\n", "utf-8")
 
