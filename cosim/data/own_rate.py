@@ -16,7 +16,6 @@ from cosim.data.held import Array, Index, held_columns, new_rows
 from cosim.data.recording import GAP, Recording
 from cosim.data.single_readings import cleaned
 from cosim.data.start_up import settled
-from cosim.support.splines import CubicSpline
 
 SMOOTH = ("q", "v", "q_d")
 """Columns that are read between rows by a cubic spline; others are those of the nearest row."""
@@ -97,7 +96,9 @@ def _between(t: Array, values: Array, grid: Array) -> Array:
     rows = _nearest(t, grid)
     if np.array_equal(t[rows], grid):
         return values[rows]
-    return CubicSpline(t, values)(np.clip(grid, t[0], t[-1]))
+    from scipy.interpolate import CubicSpline  # a tenth of a second that even recordings do not need
+
+    return np.asarray(CubicSpline(t, values)(np.clip(grid, t[0], t[-1])))
 
 
 def _nearest(t: Array, grid: Array) -> Index:

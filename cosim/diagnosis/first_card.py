@@ -6,7 +6,7 @@ The torque balance of the recordings gives the start (`trust/balance.py`), inver
 
 A constant torque and a weight are taken where their size is clear of its error and they explain a share of the error
 that matters; a diagnosis with the card looks for everything else. An inertia that the axis' own motion does not show is
-taken from the balance with its neighbours' (`beside_neighbours.py`).
+taken from the balance with its neighbours' (`neighbour_inertia.py`).
 """
 
 from collections.abc import Callable, Sequence
@@ -19,9 +19,9 @@ import numpy as np
 from cosim.data.neighbours import Neighbour
 from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
-from cosim.diagnosis.beside_neighbours import inertia_beside_neighbours
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.evidence.band import in_band
+from cosim.diagnosis.neighbour_inertia import inertia_with_neighbours
 from cosim.diagnosis.search.sizes import standard_errors
 from cosim.diagnosis.trust.balance import Balance
 from cosim.estimation.blocks import Blocks, covariance
@@ -99,7 +99,7 @@ def first_card(
     on_progress("reading the torque balance")
     problem, best = _with_loads(*_base(recordings, motion, inertia), inertia, on_progress)
     numbers = tuple(_numbers(problem, best, inertia, linear))
-    beside = _beside_neighbours(problem, _inertia_of(numbers), linear)
+    beside = _with_neighbours(problem, _inertia_of(numbers), linear)
     if beside:
         on_progress("reading the inertia beside the motion of the neighbours")
         problem, best = _with_loads(*_base(recordings, motion, _within(beside)), _within(beside), on_progress)
@@ -124,11 +124,11 @@ def _with_loads(problem: Problem, found: Fit, inertia: float | None, on_progress
     return problem, best
 
 
-def _beside_neighbours(problem: Problem, alone: Number, linear: bool) -> Number | None:
+def _with_neighbours(problem: Problem, alone: Number, linear: bool) -> Number | None:
     """The inertia beside the neighbours' motion, where the axis' own does not show it and theirs narrows it."""
     if alone.is_determined:
         return None
-    value, error = inertia_beside_neighbours(problem.prepared, not linear)
+    value, error = inertia_with_neighbours(problem.prepared, not linear)
     found = replace(alone, value=value, error=error, is_determined=value > SURELY * error)
     return found if error < alone.error and _within(found) > 0 else None
 

@@ -7,7 +7,6 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.estimation.kernels import done, library
-from cosim.support.splines import CubicSpline
 
 Array = npt.NDArray[np.float64]
 EDGE = 15
@@ -114,6 +113,10 @@ def derivative_at(x: Array, dt: float, rows: npt.NDArray[np.int64], order: int =
 
 
 def between(t: Array, values: Array, at: Array) -> Array:
-    """A signal of rows at times t (rows,), read between them at times of any shape; NaN beyond its ends."""
-    found = CubicSpline(t, values)(at.ravel()).reshape(at.shape)
-    return np.where((at < t[0]) | (at > t[-1]), np.nan, found)
+    """A signal of rows at times t (rows,), read between them at times of any shape; NaN beyond its ends.
+
+    By a cubic spline, which is loaded here: it brings an optimiser along (.1 s).
+    """
+    from scipy.interpolate import CubicSpline
+
+    return np.asarray(CubicSpline(t, values, extrapolate=False)(at))

@@ -24,7 +24,6 @@ from cosim.estimation.play import stepped_torque
 from cosim.estimation.prepare import Array, Piece
 from cosim.estimation.row_weights import described_rows
 from cosim.estimation.tonal_disturbance import Tone, in_phase, phases_of
-from cosim.support.splines import CubicSpline
 from pyfmi_models.effects import ClockEffect, DriveEffect, Effect
 from pyfmi_models.effects.base import TonalEffect, Transmission
 from pyfmi_models.model import Variable, with_symbols
@@ -310,18 +309,20 @@ class Inverse:
         clocks = self._parts(ClockEffect)
         if not clocks:
             return columns
-        spline = CubicSpline(piece.t, columns)
+        from scipy.interpolate import CubicSpline  # a tenth of a second that machines of one clock do not need
+
+        spline = CubicSpline(piece.t, columns, axis=0)
 
         def later(numbers: Array) -> Array:
             parts = [self._set(name, numbers) for name in clocks]
             return np.asarray(sum(part.ahead(self.mount.at(piece.t, piece.q, piece.v)) for part in parts))
 
         at = np.clip(piece.t - later(full), piece.t[0], piece.t[-1])
-        out, slope = spline.with_slope(at)
+        out, slope = spline(at), spline(at, 1)[:, 0]
         for column, name in enumerate(self.by):
             if name.split(".")[0] in clocks:
                 other, change = self._bumped(full, name)
-                out[:, 1 + column] -= slope[:, 0] * (later(other) - later(full)) / change
+                out[:, 1 + column] -= slope * (later(other) - later(full)) / change
         return np.asarray(out)
 
     def _with_tones(self, piece: Piece, columns: Array, full: Array) -> Array:

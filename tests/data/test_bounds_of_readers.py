@@ -260,7 +260,7 @@ KINDS = sorted({name.partition(":")[0] for name in attack_files.FILES.keys() - a
 def costs() -> dict[str, attack_files.Cost]:
     """What a file of each kind costs, none that takes long; `python bench/attack_files.py` shows all."""
     if sys.platform != "linux":
-        pytest.skip("forks")
+        pytest.skip("the bench forks and limits the memory of what it forks, which Linux alone allows as it does")
     command = [sys.executable, str(attack_files.__file__), "--read", "--json", "--sample", "1"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=500)
     assert done.returncode == 0, done.stderr

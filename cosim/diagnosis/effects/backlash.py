@@ -219,20 +219,13 @@ def _around(values: Array, middle: float) -> Array:
 
 def _alike(columns: Array, span: Span, window: float = 0.0) -> Array:
     """Share of the residual that each column explains beyond what inertia and friction may, averaged over a window."""
+    from scipy.ndimage import uniform_filter1d  # a tenth of a second that nothing before the search needs
+
     rows = max(1, round(window / float(np.median(np.diff(span.t)))))
-    columns, base, residual = (_smooth(one, rows) for one in (columns, _plain(span), span.residual))
+    columns, base, residual = (uniform_filter1d(one, rows, axis=0) for one in (columns, _plain(span), span.residual))
     even = np.linalg.qr(base)[0]
     own = columns - even @ (even.T @ columns)
     return np.asarray((own.T @ residual) ** 2 / np.maximum((own**2).sum(0), 1e-300))
-
-
-def _smooth(columns: Array, rows: int) -> Array:
-    """Mean over so many rows around each, mirrored at both ends."""
-    if rows < 2:
-        return columns
-    width = [(rows // 2 + 1, rows - 1 - rows // 2), *[(0, 0)] * (columns.ndim - 1)]
-    total = np.cumsum(np.pad(columns, width, mode="symmetric"), axis=0)
-    return np.asarray((total[rows:] - total[:-rows]) / rows)
 
 
 def _plain(span: Span) -> Array:

@@ -42,9 +42,9 @@ def _ways(
 
 def _near(examined: Examined, refused: AcceptedEffect, policy: Policy) -> list[CandidateFit]:
     """Rivals with evidence of their own that are not clearly behind, as names are weighed beside something unknown."""
-    listed, told = {one.effect.id for one in examined.effects}, margins(refused)
+    listed, behind = {one.effect.id for one in examined.effects}, margins(refused)
     others = [one for one in refused.rivals if one.effect.id not in listed and not is_renamed(one.effect)]
-    return [one for one in others if told[one.effect.id] < policy.clear <= one.evidence]
+    return [one for one in others if behind[one.effect.id] < policy.clear <= one.evidence]
 
 
 def _in_place(comparison: Comparison, examined: Examined, out: AcceptedEffect, rival: CandidateFit) -> Examined:

@@ -8,6 +8,7 @@ they are followed along the motion, as the plant's own states do (`learned_base.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -163,23 +164,26 @@ def _nothing(_: Piece) -> list[Array]:
     return []
 
 
-def user_columns(prepared: Prepared) -> dict[str, Column]:
-    """Columns that are neither torque nor motion under another name, measured or asked for, centred, of unit size."""
-    useful = _useful(prepared)
-    again = {*own_torque(prepared, useful), *own_set_point(prepared, useful)}
-    return {name: _centred(prepared, name) for name in useful if name not in again}
+class FurtherColumns(NamedTuple):
+    """Names of further columns: possible causes, this axis' torque again, its set point again."""
+
+    causes: tuple[str, ...]
+    torque: tuple[str, ...]
+    set_point: tuple[str, ...]
 
 
-def torque_again(prepared: Prepared) -> tuple[str, ...]:
-    """Names of columns that are no causes because they are this axis' torque, asked for or read elsewhere."""
-    return own_torque(prepared, _useful(prepared))
-
-
-def set_point_again(prepared: Prepared) -> tuple[str, ...]:
-    """Names of columns that are no causes because they are this axis' set point."""
+def further_columns(prepared: Prepared) -> FurtherColumns:
+    """Part the columns that vary and are no plain copy of the motion."""
     useful = _useful(prepared)
     torque = own_torque(prepared, useful)
-    return own_set_point(prepared, {name: one for name, one in useful.items() if name not in torque})
+    rest = {name: column for name, column in useful.items() if name not in torque}
+    set_point = own_set_point(prepared, rest)
+    return FurtherColumns(tuple(name for name in rest if name not in set_point), torque, set_point)
+
+
+def user_columns(prepared: Prepared) -> dict[str, Column]:
+    """Possible causes, centred, of unit size."""
+    return {name: _centred(prepared, name) for name in further_columns(prepared).causes}
 
 
 def _useful(prepared: Prepared) -> dict[str, Array]:

@@ -60,11 +60,13 @@ def own_set_point(prepared: Prepared, columns: Mapping[str, Array]) -> tuple[str
     def needed(beside: Array) -> float:
         return _energy_left(beside, tau) - _energy_left(np.column_stack([beside, motion]), tau)
 
+    alone = needed(state)
+
     def is_followed(column: Array) -> bool:
         return _energy_left(moved, column) <= POLICY.half * _energy_left(state[:, :1], column)
 
     def closes_loop(column: Array) -> bool:
-        return needed(np.column_stack([state, column])) <= POLICY.half * needed(state)
+        return needed(np.column_stack([state, column])) <= POLICY.half * alone
 
     theirs = {name for one in prepared.neighbours_recorded for name in (one.position, one.speed, one.acceleration)}
     return tuple(

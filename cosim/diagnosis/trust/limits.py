@@ -11,7 +11,7 @@ import numpy as np
 from cosim.data.recording import Recording
 from cosim.data.resolution import SEEN_STEPS, resolution
 from cosim.diagnosis.answer.doubt_entry import Sanity
-from cosim.diagnosis.terms.dictionary import set_point_again, torque_again
+from cosim.diagnosis.terms.dictionary import further_columns
 from cosim.estimation.end_stops import Push
 from cosim.estimation.prepare import Prepared
 from cosim.estimation.row_weights import far_from_turns
@@ -107,7 +107,7 @@ def little_motion(prepared: Prepared) -> tuple[Sanity, ...]:
 
 def own_torque(prepared: Prepared) -> tuple[Sanity, ...]:
     """Say which columns are the axis' own torque, asked for or read elsewhere, and so are tried as no cause."""
-    names = torque_again(prepared)
+    names = further_columns(prepared).torque
     if not names:
         return ()
     tells, it = ("each tells", "them") if names[1:] else ("it tells", "it")
@@ -120,7 +120,7 @@ def own_torque(prepared: Prepared) -> tuple[Sanity, ...]:
 
 def own_set_point(prepared: Prepared) -> tuple[Sanity, ...]:
     """Say which columns are the axis' own set point under another name, and so are tried as no cause."""
-    names = set_point_again(prepared)
+    names = further_columns(prepared).set_point
     if not names:
         return ()
     it = "them" if names[1:] else "it"

@@ -15,7 +15,7 @@ from cosim.diagnosis.effects.candidates import Candidate
 from cosim.diagnosis.evidence.comparison import Screened
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.terms.candidate_terms import candidate_terms, resolved
-from cosim.diagnosis.terms.dictionary import followed, set_point_again, torque_again, user_columns
+from cosim.diagnosis.terms.dictionary import followed, further_columns, user_columns
 from cosim.diagnosis.terms.grams import columns_of, grams_of, with_terms
 from cosim.diagnosis.terms.learn import _judged
 from cosim.diagnosis.terms.select import paths
@@ -216,14 +216,14 @@ def test_a_command_that_the_torque_follows_badly_is_no_cause() -> None:
     prepared = recorded()
     column = np.concatenate([piece.extras["command"][piece.kept] for piece in prepared.pieces])
     assert np.corrcoef(column, prepared.stacked("tau"))[0, 1] ** 2 < 0.98, "a plain copy would be told without the rule"
-    assert torque_again(prepared) == ("command",)
+    assert further_columns(prepared).torque == ("command",)
     assert set(user_columns(prepared)) == {"neighbour", "force"}
     assert "command" in own_torque(prepared)[0].statement
 
 
 def test_a_cause_stays_one_even_where_it_is_most_of_the_torque() -> None:
     for case in (recorded(pull=5.0), recorded(coupling=2.0)):
-        assert torque_again(case) == ("command",)
+        assert further_columns(case).torque == ("command",)
         assert {"neighbour", "force"} <= set(user_columns(case))
 
 
@@ -231,7 +231,7 @@ def test_nothing_is_told_of_an_axis_whose_motion_asks_for_no_torque() -> None:
     now = night(2)
     tau = np.random.default_rng(2).standard_normal(len(now["t"]))
     columns = {"t": now["t"], "q": now["q"], "tau": tau, "half": tau + np.sin(now["t"])}
-    assert torque_again(prepare([Recording("still", columns)], 10.0)) == ()
+    assert further_columns(prepare([Recording("still", columns)], 10.0)).torque == ()
 
 
 def looped(name: str = "asked", gain: float = 25.0, along: float = 0.0) -> Prepared:
@@ -254,7 +254,7 @@ def looped(name: str = "asked", gain: float = 25.0, along: float = 0.0) -> Prepa
 def test_a_set_point_under_another_name_is_told_and_no_cause() -> None:
     for name in ("joint_pos_target_0", "column_17"):
         prepared = looped(name)
-        assert set_point_again(prepared) == (name,)
+        assert further_columns(prepared).set_point == (name,)
         assert set(user_columns(prepared)) == {"neighbour"}
         assert f"q_d={name}" in own_set_point(prepared)[0].statement
 
@@ -268,4 +268,4 @@ def test_the_set_point_of_another_axis_is_none_of_this_one() -> None:
     prepared = recorded()
     other = Recording("one", {"t": prepared.pieces[0].t, **{n: getattr(prepared.pieces[0], n) for n in ("q", "tau")}})
     asked = {"joint_pos_target_1": np.sin(1.3 * other.t)}
-    assert set_point_again(prepare([Recording("one", {**other.table, **asked})], 10.0)) == ()
+    assert further_columns(prepare([Recording("one", {**other.table, **asked})], 10.0)).set_point == ()

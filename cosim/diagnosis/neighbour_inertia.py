@@ -23,7 +23,7 @@ LEAST_ROWS = 3
 """Rows for each number that is estimated, at least. Unit: 1. Of fewer the error of the inertia is not known."""
 
 
-def inertia_beside_neighbours(prepared: Prepared, turns: bool) -> tuple[float, float]:
+def inertia_with_neighbours(prepared: Prepared, turns: bool) -> tuple[float, float]:
     """Estimate the inertia beside the motion of the neighbours.
 
     Args:
