@@ -18,7 +18,7 @@ from cosim.data.assign import assign
 from cosim.data.checks import chosen
 from cosim.data.columns import Columns
 from cosim.data.joining import LEAST, on_one_time
-from cosim.data.limits import listed
+from cosim.data.limits import LARGEST, listed
 from cosim.data.order import order_of
 from cosim.data.questions import EMPTY, PERIOD
 from cosim.data.times import read_clock
@@ -99,14 +99,14 @@ def without_empty(
         units: what the user says of units.
         required: columns that are needed.
         layout: what the user says of rows: `nan=gap` leaves those between others out too in which a column that is
-            needed has no value; with a `period` time is none of the file's values.
+            needed has no value, or one beyond any axis; with a `period` time is none of the file's values.
 
     Raises:
         RecordingError: as `assign`.
     """
-    if not any(_is_empty(column).any() for column in found.values.values() if column.dtype != object):
+    empty = {name: _is_empty(column, EMPTY in layout) for name, column in found.values.items()}
+    if not any(rows.any() for name, rows in empty.items() if found.values[name].dtype != object):
         return found
-    empty = {name: _is_empty(column) for name, column in found.values.items()}
     served = assign(path, found, columns, units, required)
     made = served.sources.get("t") if PERIOD in layout else None
     others = [rows for name, rows in empty.items() if name != made]
@@ -145,8 +145,10 @@ def _begins_again(t: np.ndarray, found: Columns, name: str, there: Mapping[str, 
     return bool((np.diff(order_of(t[rows], {name: found.values[name][rows]}).t) < 0).any())
 
 
-def _is_empty(column: np.ndarray) -> np.ndarray:
-    """Which rows of a column hold nothing."""
+def _is_empty(column: np.ndarray, or_garbled: bool) -> np.ndarray:
+    """Which rows of a column hold nothing, or what no axis has."""
+    if column.dtype.kind == "f" and or_garbled:
+        return ~(np.abs(column) <= LARGEST)
     if column.dtype.kind in "fmM":
         return np.array(column != column, bool)
     return np.array([one is None for one in column], bool) if column.dtype == object else np.zeros(len(column), bool)

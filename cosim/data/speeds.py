@@ -224,7 +224,7 @@ def _is_torque_again(served: Assigned, name: str) -> bool:
     column, tau = served.values[name], served.values.get("tau")
     if tau is None or not (is_named(name, "torque", "current") and _is_numeric(column) and _is_numeric(tau)):
         return False
-    good = np.isfinite(column) & np.isfinite(tau)
+    good = (np.abs(column) < LARGEST) & (np.abs(tau) < LARGEST)
     if good.sum() < LEAST or np.ptp(column[good]) == 0 or np.ptp(tau[good]) == 0:
         return False
     return float(np.corrcoef(column[good], tau[good])[0, 1] ** 2) > REPEATS

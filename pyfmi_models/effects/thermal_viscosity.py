@@ -14,6 +14,8 @@ REFERENCE = 20.0
 """Temperature [degC] at which the card's friction holds."""
 LEAST_WARMING = 2.0
 """Seconds in which a bearing warms or cools at the fastest."""
+MOST_WARMING = 1e5
+"""Seconds in which one warms or cools at the slowest, about a day: what is slower is not seen to end."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,8 +97,9 @@ class _HeatedViscosity(ThermalViscosity):
 
     def fit_bounds(self, variable: Variable, recorded: Recorded) -> tuple[float, float]:
         """Faster than `LEAST_WARMING`, a warm-up is a friction that depends on speed; a card's own time is kept."""
-        warms = variable.name in ("warm_up_s", "cooling_s")
-        return (min(LEAST_WARMING, variable.start) if warms else variable.low), variable.high
+        if variable.name not in ("warm_up_s", "cooling_s"):
+            return variable.low, variable.high
+        return min(LEAST_WARMING, variable.start), max(MOST_WARMING, variable.start)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -47,9 +47,11 @@ def bounded(megabytes: float) -> Iterator[None]:
     assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - peak) / 1024 < megabytes
 
 
+GARBLED = {name: np.where(np.arange(ROWS) == 2, 1e184, TABLE[of]) for name, of in (("q", "q"), ("current", "tau"))}
 ALTERNATING = np.concatenate([[0.0], np.cumsum(np.resize([1e-9, 1e-9, 0.01], ROWS - 1))])
 NUMBERS = {
     "1e308": ({"tau": 1e308 * np.sign(TABLE["tau"])}, 'column "tau" holds 1e+308 at row 1, which is beyond any axis.'),
+    "a garbled row": (GARBLED, 'column "q" holds 1e+184 at row 3, which is beyond any axis.'),
     "5e9 s between samples": ({"t [s]": 5e9 * np.arange(ROWS), "t": None}, "is sampled every 5e+09 s; an axis is"),
     "a time of no known unit": ({"t": 5e9 * np.arange(ROWS)}, "Say which with --units t=ms."),
     "1e-9 s and 0.01 s in turns": ({"t": ALTERNATING}, "half of its time steps are 1e-09 s or less and others 0.01 s:"),

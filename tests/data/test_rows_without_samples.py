@@ -51,9 +51,11 @@ def test_rows_are_left_out_of_evenly_spaced_ones_in_their_places(tmp_path: Path)
     np.testing.assert_allclose(seen.t, np.delete(T, 100))
 
 
-def test_a_value_that_is_missing_between_others_is_asked_for_by_its_row(tmp_path: Path) -> None:
-    path = written(tmp_path / "run.csv", "t,tau,q", T, without(TAU, 0), without(Q, 100))
-    with pytest.raises(UndecidedError, match=r'"tau" holds nan at row 1,.* --layout nan=gap leaves such rows out'):
+@pytest.mark.parametrize("value", [np.nan, 1e184])
+def test_a_value_that_is_missing_between_others_is_asked_for_by_its_row(tmp_path: Path, value: float) -> None:
+    tau, q = (np.where(np.arange(len(T)) == row, value, one) for row, one in ((0, TAU), (100, Q)))
+    path = written(tmp_path / "run.csv", "t,tau,q", T, tau, q)
+    with pytest.raises(UndecidedError, match=r'"tau" holds .* at row 1,.* --layout nan=gap leaves such rows out'):
         Recording.read(path)
     seen = Recording.read(path, layout={"nan": "gap"})
     np.testing.assert_allclose(seen.t, np.delete(T, [0, 100]))
