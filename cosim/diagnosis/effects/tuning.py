@@ -91,6 +91,18 @@ def in_cycles(problem: Problem, found: Fit) -> Fit:
     return found
 
 
+def in_whole_cycles(problem: Problem, found: Fit, waves: int) -> Fit:
+    """A ripple and its multiples, the last effects of a fit, with a whole number of cycles, where that fits as well."""
+    ripple: list[Any] = [*found.mount.effects[-waves:]]
+    cycles = ripple[0].cycles_per_rev
+    whole = max(1.0, float(round(cycles)))
+    if problem.mount.motion == "linear" or cycles == whole:
+        return found
+    moved = [replace(one, cycles_per_rev=one.cycles_per_rev / cycles * whole) for one in ripple]
+    settled = problem.fit(replace(found.mount, effects=(*found.mount.effects[:-waves], *moved)), 24)
+    return settled if problem.error(settled) < problem.error(found) * (1 + LEAST_GAIN) else found
+
+
 def freed(problem: Problem, found: Fit, name: str) -> Fit:
     """Fit again with a number that a fit leaves as it is otherwise: it stays from there on, so this goes to the end."""
     return replace(problem, enough=ENOUGH).fit(found.mount, 30, (name,))

@@ -3,7 +3,7 @@
     y = ... + sum_j f_j (sum_k u_jk phi_k),    u_jk ~ N(0, s_j^2 / K),    s_j half-normal(`Policy.misfit`)
 
 f_j is the torque of a named effect, phi_k the K lowest cosines over position, speed, time and recording, direction too
-for an effect of friction: a machine is 5 to 20 % off any equation, in its own slow way, and what is off repeats in
+for what resists motion: a machine is 5 to 20 % off any equation, in its own slow way, and what is off repeats in
 every stroke and on every day, so that neither rows nor held-out recordings tell it from another effect. Forms of the
 others only, never of the effect that is weighed: that one stands by its word.
 """
@@ -14,6 +14,7 @@ from math import pi, sqrt
 
 import numpy as np
 
+from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.estimation.fit import Fit
 from cosim.estimation.prepare import Array, Prepared
@@ -52,25 +53,31 @@ def forms(found: Fit, own: int, prepared: Prepared) -> Forms | None:
     for group in groups.values():
         rest = tuple(one for one in mount.effects if not any(one is other for other in group))
         torque = kept(prepared, replace(mount, effects=rest)) - with_all
-        shapes = np.column_stack([*_shapes(group[0], prepared)])
+        shapes = np.column_stack([*_shapes(group[0], torque, prepared)])
         columns.append(torque[:, None] * shapes / sqrt(shapes.shape[1]))
         placed.append(tuple(range(first, first + shapes.shape[1])))
         first += shapes.shape[1]
     return Forms(np.column_stack(columns), tuple(placed), tuple(groups))
 
 
-def _shapes(effect: Effect, prepared: Prepared) -> Iterator[Array]:
-    """The cosines of an effect, each of unit RMS or so at the kept rows."""
+def _shapes(effect: Effect, torque: Array, prepared: Prepared) -> Iterator[Array]:
+    """The cosines of an effect of so much torque, each of unit RMS or so at the kept rows."""
+    v = prepared.stacked("v")
     if prepared.has_position:
         yield from _cosines(prepared.stacked("q"))
     if not _is_load(effect):
-        yield from _cosines(np.abs(prepared.stacked("v")))
+        yield from _cosines(np.abs(v))
     owner = prepared.recording_of
     yield from _cosines(np.concatenate([_along(piece.t[piece.kept]) for piece in prepared.pieces]))
     for number in range(1, int(owner.max()) + 1):
         yield sqrt(2) * (owner == number)
-    if effect.place == "Friction":
-        yield np.sign(prepared.stacked("v"))
+    if effect.place == "Friction" or _resists(torque * v):
+        yield np.sign(v)
+
+
+def _resists(power: Array) -> bool:
+    """Whether an effect takes power throughout, as drag does, but for what a filter smears of a turn."""
+    return float(-power[power < 0].sum()) <= POLICY.negligible * float(np.abs(power).sum())
 
 
 def _is_load(effect: Effect) -> bool:

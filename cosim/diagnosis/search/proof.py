@@ -141,7 +141,7 @@ def _longest(
 def _between(fits: Sequence[Fit], likelihoods: Sequence[float], count: int, held: Predictive) -> Gain:
     """What one effect more gains."""
     without, grown = fits[count], fits[count + 1]
-    return _gained(likelihoods[count + 1] - likelihoods[count], without.mount, grown.mount, held)
+    return gained(likelihoods[count + 1] - likelihoods[count], without.mount, grown.mount, held)
 
 
 def _with(problem: Problem, examined: Examined, some: Sequence[AcceptedEffect]) -> Fit:
@@ -163,9 +163,10 @@ def _gain(
     if len(standing) != 1 or len(without.mount.effects) != len(problem.mount.effects):
         without = problem.without(chosen, one.effect.id)
     after, before = (held.predicted(fit) for fit in (chosen, without))
-    return _gained(after - before, without.mount, chosen.mount, held)
+    return gained(after - before, without.mount, chosen.mount, held)
 
 
-def _gained(nats: float, without: Mount, mount: Mount, held: Predictive) -> Gain:
+def gained(nats: float, without: Mount, mount: Mount, held: Predictive) -> Gain:
+    """What the held-out recordings gain by a model in place of another, which is so many nats better there."""
     shares = held.plain_gains(without, mount)
     return Gain(nats, *shares, held.at_rest(without, mount), held.in_motion(without, mount))

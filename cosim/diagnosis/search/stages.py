@@ -12,6 +12,7 @@ from cosim.diagnosis.answer.ledger import Rule, all_pass, at_least, until_refuse
 from cosim.diagnosis.decide.policy import Policy
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.effects.candidates import columns_of
+from cosim.diagnosis.effects.tuning import in_whole_cycles
 from cosim.diagnosis.evidence.comparison import Comparison, Screened, aside_for
 from cosim.diagnosis.search.admissibility import in_time, name_rules
 from cosim.diagnosis.search.base_moved import owed_to_base
@@ -335,7 +336,10 @@ def is_full(best: CandidateFit, comparison: Comparison) -> bool:
 
 
 def with_harmonics(comparison: Comparison, found: Fit, ripple: Effect) -> Fit:
-    """A fitted structure with those multiples of its ripple that have evidence, fitted together."""
+    """A fitted structure with those multiples of its ripple that have evidence, fitted together.
+
+    What the ripple alone had of its multiples may have drawn its cycles aside, so a whole number is asked again.
+    """
     own = hypothesis_of(ripple)
     tried = [one for k in MULTIPLES if (one := own.multiple(ripple, k)) is not None]
     if not tried:
@@ -346,4 +350,5 @@ def with_harmonics(comparison: Comparison, found: Fit, ripple: Effect) -> Fit:
     more = tuple(one.candidate.start(one.coefficients) for one in scored if one.evidence > least)
     if not more:
         return found
-    return comparison.problem.fit(replace(found.mount, effects=(*found.mount.effects, *more)), 30)
+    together = comparison.problem.fit(replace(found.mount, effects=(*found.mount.effects, *more)), 30)
+    return in_whole_cycles(comparison.problem, together, 1 + len(more))

@@ -14,8 +14,9 @@ from cosim.diagnosis.answer.scores import ResidualScores, Scores
 from cosim.diagnosis.decide.decision import decide, followed
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.effects import HYPOTHESES, hypothesis_of
-from cosim.diagnosis.search.nameless import Nameless, _challenge, _Offered, nameless
+from cosim.diagnosis.search.nameless import Nameless, _Challenge, _challenge, _holds, _Offered, nameless
 from cosim.diagnosis.terms.candidate_terms import candidate_terms
+from cosim.diagnosis.terms.learn import allowed
 from cosim.estimation.prepare import prepare
 from cosim_studies.proof.generator import ANY, make_case, write_given
 from cosim_studies.proof.tool import given
@@ -70,6 +71,29 @@ def test_a_name_is_not_taken_where_held_out_recordings_contradict(
     _, (comparison, examined, proof, held) = rippling_motor
     sure = replace(proof, predicted={name: 1e6 for name in proof.predicted})
     assert nameless(comparison, examined, sure, held).taken == ()
+
+
+def test_a_term_that_raises_the_held_out_error_takes_no_name_however_many_nats_it_leads_by(
+    rippling_motor: tuple[Diagnosis, tuple[Any, ...]],
+) -> None:
+    comparison, _, proof, held = rippling_motor[1]
+    (effect,) = proof.standing
+    beside = comparison.problem.without(proof.chosen, effect.effect.id)
+    silent = Nameless(replace(proof, predicted={effect.effect.id: -1e6}))  # nats say nothing for the name
+    tried = {one.name: one for one in candidate_terms(comparison.problem.mount, comparison.problem.prepared)}
+
+    def takes(name: str) -> tuple[bool, float]:
+        term = tried[name]
+        whole, _ = allowed(comparison, beside, (term,))
+        removed = held.plain_gains(proof.chosen.mount, whole)
+        return _holds(comparison, silent, _Challenge(effect, term, 1e3, beside), held), min(removed)
+
+    able, removed = takes("torque and position")
+    assert able
+    assert removed > 0
+    able, removed = takes("speed and position")
+    assert not able
+    assert removed < -POLICY.slight
 
 
 def test_what_took_a_name_stands_beside_every_rival_of_the_next(

@@ -14,7 +14,7 @@ from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.diagnose import _problem
 from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.effects.encoder_eccentricity import halved
-from cosim.diagnosis.effects.tuning import in_cycles
+from cosim.diagnosis.effects.tuning import in_cycles, in_whole_cycles
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.search.stages import CandidateFit, admission, refitted, starts
 from cosim.estimation.fit import Fit, fit, with_values
@@ -22,6 +22,7 @@ from cosim.estimation.inverse import Inverse
 from cosim.estimation.prepare import prepare
 from cosim.estimation.problem import Problem
 from pyfmi_models.card import parse_card
+from pyfmi_models.effects import Cogging
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.base import Motion
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
@@ -62,6 +63,32 @@ def test_a_metre_knows_no_whole_numbers_of_waves() -> None:
     found = in_cycles(problem, grown).mount.effects[-1]
     assert isinstance(found, InertiaVariation)
     assert found.cycles_per_rev != 1.0
+
+
+@pytest.mark.parametrize(
+    ("true", "motion", "found_at"), [(6.0, "rotary", 6.0), (6.4, "rotary", 6.4), (6.08, "linear", 6.08 / (2 * np.pi))]
+)
+def test_waves_of_a_ripple_have_whole_cycles_together_which_one_alone_had_not(
+    true: float, motion: Any, found_at: float
+) -> None:
+    """On part of a turn a wave that stands in for its double has other cycles."""
+    t = np.arange(4000) / 200
+    tones = [(0.35, 0.9, 1.0), (0.05, 3.1, 2.0)]
+    q = 0.1 + sum((a * np.sin(w * t + p) for a, w, p in tones), np.zeros_like(t))
+    v = sum(a * w * np.cos(w * t + p) for a, w, p in tones)
+    acceleration = sum(-a * w**2 * np.sin(w * t + p) for a, w, p in tones)
+    ripple = 1.0 * np.cos(true * q - 2.8) + 0.4 * np.cos(2 * true * q + 2.4)
+    noise = 0.05 * np.random.default_rng(3).standard_normal(len(t))
+    tau = 5 * acceleration + 2 * np.sign(v) + 3 * v + ripple + noise
+    prepared = prepare([Recording("r", {"t": t, "tau": tau, "q": q})], 20.0)
+    turn = 2 * np.pi if motion == "linear" else 1.0
+    card = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=3.0), motion=motion)
+    problem = Problem(card, prepared, (np.abs(prepared.stacked("v")) > 0.02).astype(float), 0.005)
+    drawn = max(true, 6.08) / turn
+    waves = [Cogging(cycles_per_rev=k * drawn, amplitude=0.4, phase=p) for k, p in ((1, -2.5), (2, 2.0))]
+    found = in_whole_cycles(problem, problem.fit(replace(card, effects=tuple(waves)), 24), 2)
+    cycles = [wave.cycles_per_rev for wave in found.mount.effects if isinstance(wave, Cogging)]
+    assert cycles == [found_at, 2 * found_at]
 
 
 def test_grease_is_found_to_thin_where_a_drag_had_taken_its_place() -> None:

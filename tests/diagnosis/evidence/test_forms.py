@@ -1,0 +1,63 @@
+"""What a machine is off the equation of a named effect is no evidence of another one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cosim.data.recording import Recording
+from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.forms import forms
+from cosim.diagnosis.search.stages import weighed
+from cosim.estimation.prepare import prepare
+from cosim.estimation.problem import Problem
+from cosim.estimation.residuals import kept
+from pyfmi_models.effects import Effect, FrictionAsymmetry, GravityUnbalance
+from pyfmi_models.effects.quadratic_drag import QuadraticDrag
+from pyfmi_models.friction import Coulomb
+from pyfmi_models.mount import Axis, Mount
+
+MOUNT = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma2=1.0))
+DRAG, EVEN = QuadraticDrag(coefficient=6.0), FrictionAsymmetry(level_asymmetry=0.0, viscous_asymmetry=0.0)
+
+
+def problem_of(drag_one_way: float = 0.0, level_one_way: float = 0.0) -> Problem:
+    """An axis in oil; its drag, or its friction level, is larger by this share forward and smaller backward."""
+    t = np.arange(8000) / 200
+    tones = [(0.5, 0.9, 1.0), (0.1, 3.1, 2.0), (0.02, 7.0, 0.5)]
+    q = sum((size * np.sin(w * t + phase) for size, w, phase in tones), np.zeros_like(t))
+    v = sum(size * w * np.cos(w * t + phase) for size, w, phase in tones)
+    a = sum(-size * w**2 * np.sin(w * t + phase) for size, w, phase in tones)
+    way = np.sign(v)
+    tau = 5 * a + 2 * way * (1 + level_one_way * way) + v + 6 * v * np.abs(v) * (1 + drag_one_way * way)
+    read = {"t": t, "q": q, "tau": tau + 0.01 * np.random.default_rng(1).standard_normal(len(t))}
+    prepared = prepare([Recording("run", read)], 20.0)
+    return Problem(MOUNT, prepared, (np.abs(prepared.stacked("v")) > 0.02).astype(float), 0.005)
+
+
+def asymmetry_beside(drag: Effect, problem: Problem) -> float:
+    """Nats of a friction asymmetry beside a drag."""
+    comparison = Comparison.of(problem, problem.fit(MOUNT, 30), POLICY)
+    alone, both = (problem.fit(replace(MOUNT, effects=some), 30) for some in ((drag,), (drag, EVEN)))
+    return weighed(comparison, both, alone).evidence
+
+
+def test_a_drag_that_is_stronger_one_way_is_no_friction_asymmetry() -> None:
+    assert asymmetry_beside(DRAG, problem_of(drag_one_way=0.12)) < POLICY.clear
+
+
+def test_a_friction_asymmetry_beside_a_drag_is_found() -> None:
+    assert asymmetry_beside(DRAG, problem_of(level_one_way=0.1)) > POLICY.strong
+
+
+@pytest.mark.parametrize(("effect", "resists"), [(DRAG, True), (GravityUnbalance(mgl=1.0, phase=0.4), False)])
+def test_what_resists_motion_may_do_so_more_one_way(effect: Effect, resists: bool) -> None:
+    problem = problem_of()
+    mount = replace(MOUNT, effects=(effect,))
+    found = forms(problem.fit(mount, 0), 0, problem.prepared)
+    assert found is not None
+    torque = kept(problem.prepared, MOUNT) - kept(problem.prepared, mount)
+    one_way = torque * np.sign(problem.prepared.stacked("v"))
+    alike = [abs(float(np.corrcoef(column, one_way)[0, 1])) for column in found.columns.T]
+    assert (max(alike) == pytest.approx(1.0, abs=1e-6)) is resists
