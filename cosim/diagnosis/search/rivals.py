@@ -5,6 +5,8 @@ from dataclasses import dataclass, field, replace
 
 from cosim.diagnosis.answer.ledger import Rule, all_pass, at_least, until_refused
 from cosim.diagnosis.decide.policy import Policy
+from cosim.diagnosis.effects import hypothesis_of
+from cosim.diagnosis.effects.base import Cyclic
 from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.search.instrumental_variable import Misfits, excludes, misfits_of, settled
 from cosim.diagnosis.search.renaming import renamed
@@ -129,13 +131,22 @@ def _takes(rival: CandidateFit, one: AcceptedEffect, policy: Policy) -> bool:
     """Whether a rival takes the place: it is better, or as good and simpler; one as good and less simple does not.
 
     As good is what is within `fair`, and what no contest of names decides (`contest` is 0: of 400 rows one of them is
-    ahead, of a few ways of being wrong the other): more numbers fit what the equation misses, too.
+    ahead, of a few ways of being wrong the other): more numbers fit what the equation misses, too. A wave over position
+    with any number of cycles stands in for whatever goes with position, so in a set with one it gives way to a name of
+    one shape.
     """
+    waves = _is_wave(one.effect) - _is_wave(rival.effect)
+    if waves:
+        return one.contests[rival.effect.id] < waves * policy.fair
     fewer = one.own.fit.count - rival.fit.count
     if fewer and one.contests[rival.effect.id] == 0.0:
         return fewer > 0
     margin = one.margin(rival)
     return margin < (policy.fair if fewer > 0 else -policy.fair if fewer < 0 else 0.0)
+
+
+def _is_wave(effect: Effect) -> bool:
+    return isinstance(hypothesis_of(effect), Cyclic)
 
 
 def grouped(comparison: Comparison, chosen: Fit) -> list[tuple[Effect, ...]]:

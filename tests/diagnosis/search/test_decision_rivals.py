@@ -9,6 +9,10 @@ import pytest
 from cosim.diagnosis.decide.policy import POLICY
 from cosim.diagnosis.search import rivals
 from cosim.diagnosis.search.rivals import AcceptedEffect, Examined, examine, explains, grouped, margins
+from pyfmi_models.effects import Cogging
+from pyfmi_models.effects.cable_wrap import CableWrap
+from pyfmi_models.effects.load_dependent_friction import LoadDependentFriction
+from pyfmi_models.effects.position_friction import PeriodicFriction
 
 RULES = replace(POLICY, fair=3.0, clear=8.0)
 
@@ -127,6 +131,7 @@ def play(monkeypatch: pytest.MonkeyPatch) -> Play:
         monkeypatch.setattr(rivals, "misfits_of", lambda *_: misfits or {})
         monkeypatch.setattr(rivals, "best_of", lambda _, beside, __: next(filter(adds, beside.tried), None))
         monkeypatch.setattr(rivals, "is_full", lambda *_: False)
+        monkeypatch.setattr(rivals, "_is_wave", lambda effect: effect.id == "w")
         return examine(Tables(), Found(fitted("b"), fitted("b" + names)))  # type: ignore[arg-type]
 
     return examined
@@ -189,6 +194,26 @@ def test_where_no_contest_of_names_decides_the_simpler_stands_however_far_the_ot
     tried = {"b": [rival(name, ahead[name], count) for name, count in zip("xr", counts, strict=True)]}
     found = play("x", ahead, tried, counts=dict(zip("xr", counts, strict=True)), undecided=("xr", "rx"))
     assert chosen(found) == expected
+
+
+@pytest.mark.parametrize(
+    ("first", "other", "behind", "expected"),
+    [("w", "r", 2.9, "br"), ("w", "r", 3.0, "bw"), ("r", "w", -2.9, "br"), ("r", "w", -3.1, "bw")],
+)
+def test_a_wave_gives_way_to_what_has_one_shape_unless_it_beats_it_as_a_name(
+    first: str, other: str, behind: float, expected: str, play: Play
+) -> None:
+    """Whatever goes with position a wave with some number of cycles follows, too; here with fewer numbers."""
+    worth = {first: 20.0, other: 20.0 - behind}
+    counts = {"w": 1, "r": 9}
+    tried = {"b": [rival(name, worth[name], counts[name]) for name in worth]}
+    assert chosen(play(first, worth, tried, counts=counts)) == expected
+
+
+def test_waves_over_position_have_any_number_of_cycles() -> None:
+    waves = (Cogging(cycles_per_rev=7.0, amplitude=1.0), PeriodicFriction(cycles_per_rev=3.0, relative_amplitude=0.1))
+    assert all(map(rivals._is_wave, waves))
+    assert not any(map(rivals._is_wave, (LoadDependentFriction(coulomb_per_Nm=0.1), CableWrap(stiffness=1.0))))
 
 
 def test_a_rival_that_cannot_be_takes_no_place(play: Play) -> None:
