@@ -148,7 +148,7 @@ def _begins_again(t: np.ndarray, found: Columns, name: str, there: Mapping[str, 
 def _is_empty(column: np.ndarray, or_garbled: bool) -> np.ndarray:
     """Which rows of a column hold nothing, or what no axis has."""
     if column.dtype.kind == "f" and or_garbled:
-        return ~(np.abs(column) <= LARGEST)
+        return np.asarray(~(np.abs(column) <= LARGEST), bool)
     if column.dtype.kind in "fmM":
         return np.array(column != column, bool)
     return np.array([one is None for one in column], bool) if column.dtype == object else np.zeros(len(column), bool)
