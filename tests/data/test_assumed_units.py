@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tables import written
 
 from cosim.data.preview import preview
 from cosim.data.recording import Recording
@@ -13,12 +14,6 @@ T = np.arange(300) * 4e-3
 Q = 9 * np.sin(3 * T)
 TAU = np.cos(5 * T)
 RUN = "no unit is stated for "
-
-
-def written(path: Path, header: str, *columns: np.ndarray, separator: str = ",") -> Path:
-    lines = [separator.join(f"{value:.9g}" for value in row) for row in zip(*columns, strict=True)]
-    path.write_text("\n".join(([header] if header else []) + lines) + "\n")
-    return path
 
 
 def test_columns_without_a_unit_are_said_to_be_taken_in_si_units(tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tables import written
 
 from cosim.data.recording import Recording
 from cosim.support.errors import RecordingError, UndecidedError
@@ -13,14 +14,6 @@ Q = 0.8 * np.sin(2 * T) + 0.2 * np.sin(5.1 * T)
 A = -3.2 * np.sin(2 * T) - 5.202 * np.sin(5.1 * T)
 TAU = 0.5 * A + 0.3 * np.cos(2 * T)
 DEG = 180 / np.pi
-
-
-def written(path: Path, header: str, *columns: object, sep: str = ",", comma: bool = False) -> Path:
-    rows = zip(*columns, strict=True)
-    lines = [sep.join(x if isinstance(x, str) else f"{x:.9g}" for x in row) for row in rows]
-    text = "\n".join([header, *lines]) + "\n"
-    path.write_text(text.replace(".", ",") if comma else text)
-    return path
 
 
 def cells(column: np.ndarray, unit: str) -> list[str]:
@@ -37,7 +30,10 @@ def test_cells_that_hold_their_unit_are_numbers_in_it(
     time = cells(1e3 * T if units[0] else T, units[0])
     columns = (time, cells(TAU, units[1]), cells(DEG * Q, units[2]))
     header = sep.join(["time", "torque", "angle"])
-    seen = Recording.read(written(tmp_path / "run.csv", header, *columns, sep=sep, comma=comma))
+    path = written(tmp_path / "run.csv", header, *columns, sep=sep)
+    if comma:
+        path.write_text(path.read_text("utf-8").replace(".", ","), "utf-8")
+    seen = Recording.read(path)
     np.testing.assert_allclose(seen.t, T, atol=1e-8)
     np.testing.assert_allclose(seen["q"], Q, atol=1e-7)
     np.testing.assert_allclose(seen["tau"], TAU, atol=1e-6)

@@ -62,11 +62,6 @@ def test_texts_that_stand_once_in_the_file_stand_once_in_memory(tmp_path: Path) 
     assert [len(one or "") for one in kept[:2]] == [400_000, 0]
 
 
-def test_lists_of_other_lengths_are_left_out_and_the_rest_is_read(tmp_path: Path) -> None:
-    parquet.write_table(pa.table(AXIS | {"l": [[1.0], [1.0, 2.0]] * 200}), tmp_path / "run.parquet")
-    np.testing.assert_array_equal(Recording.read(tmp_path / "run.parquet")["q"], AXIS["q"])
-
-
 def test_packed_variables_count_by_what_they_unpack_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     cells = np.empty(50, dtype=object)
     cells[:] = [np.zeros(1000) for _ in cells]

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from tables import written
 
 from cosim.api.diagnose import check_split
 from cosim.api.show import show
@@ -182,13 +183,6 @@ def tau(t: np.ndarray) -> np.ndarray:
 
 def q(t: np.ndarray) -> np.ndarray:
     return 0.1 * np.sin(9 * t)
-
-
-def written(path: Path, header: str, *columns: object) -> Path:
-    rows = zip(*columns, strict=True)
-    lines = [",".join(x if isinstance(x, str) else f"{x:.9g}" for x in row) for row in rows]
-    path.write_text("\n".join(([header] if header else []) + lines) + "\n")
-    return path
 
 
 def agrees(seen: Recording) -> None:

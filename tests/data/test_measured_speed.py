@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tables import written
 
 from cosim.data.recording import Recording
 from cosim.support.errors import UndecidedError
@@ -16,9 +17,7 @@ NOISE = np.random.default_rng(1).normal(0, 0.02, len(T))
 
 
 def read(folder: Path, header: str, *columns: np.ndarray, units: dict[str, str] | None = None) -> Recording:
-    path = folder / "run.csv"
-    np.savetxt(path, np.column_stack(columns), fmt="%.9g", delimiter=",", header=header, comments="")
-    return Recording.read(path, units=units)
+    return Recording.read(written(folder / "run.csv", header, *columns), units=units)
 
 
 @pytest.mark.parametrize(

@@ -65,13 +65,15 @@ def test_a_counter_of_whole_steps_is_continued(
 @settings(max_examples=80, deadline=None)
 @given(
     seed=SEEDS,
-    unit=st.sampled_from([*TURN]),
+    scale=st.sampled_from([*TURN.items(), ("", 2 * pi), ("", 360.0)]),
     turns=st.floats(1.1, 12),
     low=st.sampled_from([0.0, -0.5, -0.25]),
     digits=st.booleans(),
 )
-def test_a_turn_in_any_unit_is_continued(seed: int, unit: str, turns: float, low: float, digits: bool) -> None:
-    turn = TURN[unit]
+def test_a_turn_in_any_unit_is_continued(
+    seed: int, scale: tuple[str, float], turns: float, low: float, digits: bool
+) -> None:
+    unit, turn = scale
     q = motion(seed, turns * turn)
     wrapped = np.mod(q - low * turn, turn) + low * turn
     joined, notes = read(np.round(wrapped / turn, 5) * turn if digits else wrapped, unit)
@@ -201,32 +203,6 @@ TIMES = np.arange(4000) / 500
 Q = 3.0 * np.sin(0.9 * TIMES) + 2.5 * TIMES
 """Three turns and a half, forth and back."""
 TAU = np.rint(400 * np.sin(1.3 * TIMES))
-
-
-@pytest.mark.parametrize(
-    ("unit", "turn"), [("", 2 * np.pi), ("", 360.0), ("rad", 2 * np.pi), ("deg", 360.0), ("turn", 1)]
-)
-@pytest.mark.parametrize("low", [0.0, -0.5])
-def test_the_turns_of_a_position_are_counted(unit: str, turn: float, low: float) -> None:
-    """An encoder of one turn counts from 0 to it, or from half a turn on either side."""
-    q = Q * turn / (2 * np.pi)
-    read = np.mod(q - low * turn, turn) + low * turn
-    table, (note,) = continued("run", {"t": TIMES, "q": read}, {"q": unit} if unit else {})
-    np.testing.assert_allclose(table["q"] - table["q"][0], q - q[0], atol=1e-9 * turn)
-    assert note.startswith('run: "q" begins again at ')
-
-
-def test_a_set_point_stays_on_the_turn_of_the_position() -> None:
-    q = np.mod(Q, 2 * np.pi)
-    ahead = np.mod(Q + 0.05, 2 * np.pi)
-    table, notes = continued("run", {"q": q, "q_d": ahead}, {})
-    assert len(notes) == 1
-    np.testing.assert_allclose(table["q_d"] - table["q"], 0.05, atol=1e-9)
-
-
-def test_a_set_point_that_goes_on_is_brought_to_the_turn_of_the_position() -> None:
-    table, _ = continued("run", {"q": np.mod(Q + 1.0, 2 * np.pi), "q_d": Q + 4 * np.pi + 1.05}, {})
-    np.testing.assert_allclose(table["q_d"] - table["q"], 0.05, atol=1e-9)
 
 
 def test_a_set_point_that_steps_by_a_turn_is_no_register() -> None:

@@ -131,6 +131,7 @@ def test_messages_stay_short_however_long_names_are(tmp_path: Path) -> None:
 SENTENCES: dict[str, tuple[str, Callable[[], bytes], str]] = {
     "nothing": ("run.csv", bytes, "is empty"),
     "one blank line": ("run.csv", lambda: b"\n", "holds no samples"),
+    "names alone": ("run.csv", lambda: b"t,tau,q\n", "holds no samples"),
     "noise": ("run.csv", lambda: random.Random(1).randbytes(4000), "is no text"),
     "a picture": ("run.csv", lambda: b"\x89PNG\r\n\x1a\n" + random.Random(2).randbytes(4000), "is no text"),
     "zero bytes at the end": ("run.csv", lambda: csv_text(TABLE).encode() + bytes(512), "holds a zero byte at byte"),
@@ -168,7 +169,7 @@ def test_what_is_no_recording_is_one_sentence(tmp_path: Path, what: str, capsys:
     assert said.count("\n") == 1
 
 
-@pytest.mark.parametrize("name", ["x" * 300 + ".csv", "a\0b.csv"])
+@pytest.mark.parametrize("name", ["x" * 300 + ".csv", "a\0b.csv", "none.csv"])
 def test_a_name_that_no_file_can_have_is_one_sentence(tmp_path: Path, name: str) -> None:
     with pytest.raises(RecordingError, match=r"cannot be opened|does not exist"):
         Recording.read(tmp_path / name)

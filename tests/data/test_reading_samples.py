@@ -135,7 +135,8 @@ def hdf5(path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     with h5py.File(path, "w") as file:
         for name, column in {"t": made.T, "tau": made.TAU, "q": made.Q / made.DEG}.items():
-            file[f"log/{name}"] = column
+            file[f"log/{name}"] = column.reshape(-1, 1)
+        file["mass"] = 95.1
         file["log/q"].attrs["units"] = "deg"
 
 

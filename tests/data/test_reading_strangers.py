@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tables import written
 
 from cosim.data.preview import preview
 from cosim.data.recording import Recording
@@ -22,17 +23,8 @@ TAU = 1.5 * np.cos(3 * T)
 DEG = np.degrees(1)
 
 
-def written(folder: Path, header: str, *columns: object, separator: str = ",", name: str = "run.csv") -> Path:
-    """Write columns, of numbers or of text, below a header."""
-    cells = [[one if isinstance(one, str) else f"{one:.10g}" for one in column] for column in columns]  # type: ignore[attr-defined]
-    lines = [separator.join(row) for row in zip(*cells, strict=True)]
-    path = folder / name
-    path.write_text("\n".join([header, *lines]) + "\n", encoding="utf-8")
-    return path
-
-
 def test_a_unit_in_brackets_that_is_not_known_is_asked_for_and_never_taken_for_ours(tmp_path: Path) -> None:
-    path = written(tmp_path, "Time (s),Torque (stone-ell),Position (deg)", T, TAU, Q * DEG)
+    path = written(tmp_path / "run.csv", "Time (s),Torque (stone-ell),Position (deg)", T, TAU, Q * DEG)
     sentence = '"stone-ell" of column "Torque (stone-ell)" is no unit known here; say which it is in, for example '
     with pytest.raises(UndecidedError, match=re.escape(f"{sentence}--units tau=mN.m.")):
         Recording.read(path)
@@ -43,27 +35,27 @@ def test_a_unit_in_brackets_that_is_not_known_is_asked_for_and_never_taken_for_o
     ("name", "stated"), [("torque [%]", "%"), ("torque_permille", "0.1 %"), ("torque (‰)", "0.1 %")]
 )
 def test_a_share_of_the_rated_torque_is_asked_for(tmp_path: Path, name: str, stated: str) -> None:
-    path = written(tmp_path, f"t,{name},position", T, TAU, Q)
+    path = written(tmp_path / "run.csv", f"t,{name},position", T, TAU, Q)
     with pytest.raises(UndecidedError, match=f'is in {stated} of a torque .* for example --units "tau=0.04 N.m"'):
         Recording.read(path)
     np.testing.assert_allclose(Recording.read(path, units={"tau": "0.04 N.m"})["tau"], 0.04 * TAU, atol=1e-8)
 
 
 def test_an_angle_is_no_torque(tmp_path: Path) -> None:
-    path = written(tmp_path, "t,tau,q", T, TAU, Q)
+    path = written(tmp_path / "run.csv", "t,tau,q", T, TAU, Q)
     with pytest.raises(InputError, match=r"it is a torque or force, in N\.m or a unit that becomes it"):
         read_recordings([path], {}, [], ["tau=deg"], "rotary")
 
 
 def test_a_unit_that_is_not_known_costs_nothing_where_its_column_is_not_used(tmp_path: Path) -> None:
-    path = written(tmp_path, "t,torque [Nm],position [rad],lost motion [reference unit]", T, TAU, Q, Q)
+    path = written(tmp_path / "run.csv", "t,torque [Nm],position [rad],lost motion [reference unit]", T, TAU, Q, Q)
     read = Recording.read(path)
     assert read.units.get("lost motion", "") == ""
     np.testing.assert_allclose(read["lost motion"], Q, atol=1e-8)
 
 
 def test_a_number_in_brackets_is_no_unit(tmp_path: Path) -> None:
-    path = written(tmp_path, "t,torque(0),position(0)", T, TAU, Q)
+    path = written(tmp_path / "run.csv", "t,torque(0),position(0)", T, TAU, Q)
     np.testing.assert_allclose(Recording.read(path)["tau"], TAU, atol=1e-8)
 
 
@@ -111,21 +103,21 @@ def test_units_stand_alone_or_behind_a_stroke(header: str, name: str, text: str)
 
 def test_the_last_part_of_a_path_tells_what_it_is(tmp_path: Path) -> None:
     names = "time,axis.vel_mapper.pos,axis.pos_loop.torque_ref"
-    read = Recording.read(written(tmp_path, names, T, Q, TAU))
+    read = Recording.read(written(tmp_path / "run.csv", names, T, Q, TAU))
     assert "v" not in read
     np.testing.assert_allclose([read["q"], read["tau"]], [Q, TAU], atol=1e-8)
 
 
 def test_relative_positions_of_an_odrive_are_in_turns(tmp_path: Path) -> None:
     names = "time,axis0.pos_vel_mapper.pos_rel,axis0.controller.effective_torque_setpoint,axis0.controller.input_pos"
-    read = Recording.read(written(tmp_path, names, T, Q, TAU, Q))
+    read = Recording.read(written(tmp_path / "run.csv", names, T, Q, TAU, Q))
     np.testing.assert_allclose(read["q"], 2 * np.pi * Q, atol=1e-8)
     np.testing.assert_allclose(read["q_d"], 2 * np.pi * Q, atol=1e-8)
 
 
 def test_days_of_a_spreadsheet_are_no_seconds(tmp_path: Path) -> None:
     days = [f"{45352.5 + t / 86400:.11f}" for t in T]
-    path = written(tmp_path, "time,torque,position", days, TAU, Q)
+    path = written(tmp_path / "run.csv", "time,torque,position", days, TAU, Q)
     with pytest.raises(UndecidedError, match=r"200 Hz in days\. Say which with --units t=day, or --units t=s\."):
         Recording.read(path)
     assert Recording.read(path, units={"t": "day"}).sample_time == pytest.approx(5e-3, rel=1e-3)
@@ -134,13 +126,13 @@ def test_days_of_a_spreadsheet_are_no_seconds(tmp_path: Path) -> None:
 @pytest.mark.parametrize("sign", [";", ":"])
 def test_milliseconds_behind_a_time_are_counted(tmp_path: Path, sign: str) -> None:
     clock = [f"12:00:{int(t):02d}{sign}{round(1e3 * t) % 1000}" for t in T]
-    read = Recording.read(written(tmp_path, "Time,torque,position", clock, TAU, Q))
+    read = Recording.read(written(tmp_path / "run.csv", "Time,torque,position", clock, TAU, Q))
     np.testing.assert_allclose(read.t, T, atol=1e-9)
 
 
 def test_names_that_stand_again_are_left_out_and_a_new_time_is_another_recording(tmp_path: Path) -> None:
     header, half = "time_s,torque_Nm,pos_rad", ROWS // 2
-    path = written(tmp_path, header, T, TAU, Q)
+    path = written(tmp_path / "run.csv", header, T, TAU, Q)
     lines = path.read_text().splitlines()
     path.write_text("\n".join([*lines[: half + 1], header, *lines[half + 1 :]]))
     read = Recording.read(path)
@@ -154,24 +146,24 @@ def test_names_that_stand_again_are_left_out_and_a_new_time_is_another_recording
 
 def test_thousands_may_be_parted_where_that_is_certain(tmp_path: Path) -> None:
     large = [f'"{1e6 * x:,.1f}"' for x in TAU]
-    read = Recording.read(written(tmp_path, "t,torque [uN.m],q", T, large, Q))
+    read = Recording.read(written(tmp_path / "run.csv", "t,torque [uN.m],q", T, large, Q))
     np.testing.assert_allclose(read["tau"], TAU, atol=1e-7)
     german = [text.strip('"').translate(str.maketrans(",.", ".,")) for text in large]
     columns = [[f"{x:.9f}".replace(".", ",") for x in column] for column in (T, Q)]
-    path = written(tmp_path, "t;torque [uN.m];q", columns[0], german, columns[1], separator=";")
+    path = written(tmp_path / "run.csv", "t;torque [uN.m];q", columns[0], german, columns[1], sep=";")
     np.testing.assert_allclose(Recording.read(path)["tau"], TAU, atol=1e-7)
 
 
 def test_quoted_decimal_commas_between_commas_are_read_and_a_single_group_is_no_thousand(tmp_path: Path) -> None:
     columns = [[f'"{x:.6f}"'.replace(".", ",") for x in column] for column in (T, TAU, Q)]
-    read = Recording.read(written(tmp_path, "t,torque,q", *columns))
+    read = Recording.read(written(tmp_path / "run.csv", "t,torque,q", *columns))
     np.testing.assert_allclose([read["tau"], read["q"]], [TAU, Q], atol=1e-6)
     assert grouped(np.array(["1,931", "2,125"], dtype=object), ".").dtype == object
 
 
 def test_a_time_of_too_few_digits_names_the_period(tmp_path: Path) -> None:
     seconds = [f"2024-03-01 12:00:{int(10 * t):02d}" for t in T]
-    path = written(tmp_path, "timestamp,torque,position", seconds, TAU, Q)
+    path = written(tmp_path / "run.csv", "timestamp,torque,position", seconds, TAU, Q)
     with pytest.raises(UndecidedError, match="if the rows are evenly spaced, say --layout period=50ms"):
         Recording.read(path)
     assert Recording.read(path, layout={"period": "50ms"}).sample_time == pytest.approx(0.05)
@@ -180,10 +172,10 @@ def test_a_time_of_too_few_digits_names_the_period(tmp_path: Path) -> None:
 @pytest.mark.parametrize("word", ["---", "#NV", "-nan(ind)", "n.a."])
 def test_words_for_no_value_are_told_and_cost_no_other_column(tmp_path: Path, word: str) -> None:
     holes = [word if row % 90 == 5 else f"{x:.6f}" for row, x in enumerate(TAU)]
-    read = Recording.read(written(tmp_path, "t,tau,q,load", T, TAU, Q, holes))
+    read = Recording.read(written(tmp_path / "run.csv", "t,tau,q,load", T, TAU, Q, holes))
     assert "load" not in read
     with pytest.raises(RecordingError, match=r"holds nan at row 6, which is not a finite number \(5 such rows\)"):
-        Recording.read(written(tmp_path, "t,tau,q", T, holes, Q))
+        Recording.read(written(tmp_path / "run.csv", "t,tau,q", T, holes, Q))
 
 
 def test_a_file_without_names_offers_no_empty_column(tmp_path: Path) -> None:
@@ -194,21 +186,21 @@ def test_a_file_without_names_offers_no_empty_column(tmp_path: Path) -> None:
 
 
 def test_a_comment_column_of_labview_may_be_missing_below_its_name(tmp_path: Path) -> None:
-    path = written(tmp_path, "X_Value\tTorque\tAngle\tComment", T, TAU, Q, separator="\t", name="run.lvm")
+    path = written(tmp_path / "run.lvm", "X_Value\tTorque\tAngle\tComment", T, TAU, Q, sep="\t")
     np.testing.assert_allclose(Recording.read(path)["tau"], TAU, atol=1e-8)
 
 
 @pytest.mark.parametrize("word", ["Y_Unit_Label", "Vertical Units", "unit", "Einheit"])
 def test_units_that_a_preamble_gives_column_by_column_are_those_of_the_columns(tmp_path: Path, word: str) -> None:
     header = f"Written by a tool\nDate;2024/03/01\n{word};mN.m;deg\nEnd of header\nt;torque;angle"
-    read = Recording.read(written(tmp_path, header, T, TAU, Q, separator=";"))
+    read = Recording.read(written(tmp_path / "run.csv", header, T, TAU, Q, sep=";"))
     np.testing.assert_allclose(read["tau"], 1e-3 * TAU, atol=1e-9)
     np.testing.assert_allclose(read["q"], Q / DEG, atol=1e-8)
 
 
 def test_a_channel_in_volts_is_no_torque_until_its_scale_is_given(tmp_path: Path) -> None:
     header = "Model,scope\nVertical Units,V,V\nTIME,CH1,CH2"
-    path = written(tmp_path, header, T, TAU, Q)
+    path = written(tmp_path / "run.csv", header, T, TAU, Q)
     columns = {"tau": "CH1", "q": "CH2"}
     with pytest.raises(InputError, match="becomes V; "):
         read_recordings([path], columns, [], ["q=rad"], "rotary")

@@ -1,7 +1,6 @@
 """A recording is read as it is, judged in one sentence, and never repaired."""
 
 import errno
-import gzip
 import os
 import re
 from pathlib import Path
@@ -69,20 +68,6 @@ def test_a_measured_speed_may_take_the_place_of_the_encoder(tmp_path: Path) -> N
     table = columns()
     table["v"] = table.pop("q")
     assert "v" in Recording.read(csv_file(tmp_path / "run.csv", table))
-
-
-def test_semicolons_comments_and_brackets_are_read(tmp_path: Path) -> None:
-    rows = "\n".join(f"{k / 1000};{np.sin(k)};{np.cos(k)}" for k in range(ROWS))
-    (tmp_path / "run.csv").write_text(f"# logger 7\nt;tau [mNm];q [deg]\n{rows}\n")
-    recording = Recording.read(tmp_path / "run.csv")
-    np.testing.assert_allclose(recording["q"][0], np.pi / 180)
-
-
-def test_mat_files_are_read(tmp_path: Path) -> None:
-    from scipy.io import savemat
-
-    savemat(tmp_path / "run.mat", columns() | {"M": 95.1})
-    np.testing.assert_array_equal(Recording.read(tmp_path / "run.mat")["q"], columns()["q"])
 
 
 def test_gaps_and_jitter_are_reported_and_left_as_they_are(tmp_path: Path) -> None:
@@ -157,29 +142,6 @@ def test_names_that_are_not_there_are_met_with_those_that_are(
         Recording.read(path, columns_given, units)
 
 
-def test_files_that_cannot_be_read_are_named(tmp_path: Path) -> None:
-    empty, odd, torn, header = (tmp_path / name for name in ("a.csv", "b.xlsx", "c.parquet", "d.csv"))
-    empty.touch()
-    odd.write_text("x")
-    torn.write_text("PAR1 torn")
-    header.write_text("t,tau,q\n")
-    (tmp_path / "e.csv.gz").write_bytes(gzip.compress(b"t,q\n1,2\n")[:-9])
-    (tmp_path / "folder").mkdir()
-    sentences = {
-        tmp_path / "none.csv": "does not exist",
-        tmp_path / "folder": "is not a file",
-        empty: "is empty",
-        odd: "is a spreadsheet; save its table as CSV",
-        torn: "cannot be read as .parquet",
-        header: "holds no samples",
-        tmp_path / "e.csv.gz": "cannot be read as .csv.gz",
-    }
-    for path, sentence in sentences.items():
-        with pytest.raises(RecordingError, match=re.escape(sentence)) as caught:
-            Recording.read(path)
-        assert str(path) in str(caught.value)
-
-
 def test_nothing_is_overwritten_or_left_half_written(tmp_path: Path) -> None:
     recording = Recording("run", columns())
     path = recording.write(tmp_path / "run.csv")
@@ -233,24 +195,3 @@ def test_units_of_different_kinds_do_not_mix() -> None:
         conversion("N.m", "rad")
     with pytest.raises(InputError, match='"furlong" is no unit known here; known are: 1, %,'):
         unit("furlong")
-
-
-def test_hdf5_is_read_whatever_its_groups(tmp_path: Path) -> None:
-    h5py = pytest.importorskip("h5py")
-    with h5py.File(tmp_path / "run.h5", "w") as file:
-        file["mass"] = 95.1
-        for name, column in columns().items():
-            file[f"log/{name}"] = column.reshape(-1, 1)
-    np.testing.assert_array_equal(Recording.read(tmp_path / "run.h5")["q"], columns()["q"])
-
-
-@pytest.mark.filterwarnings("default")
-def test_mdf4_is_read_with_its_units(tmp_path: Path) -> None:
-    asammdf = pytest.importorskip("asammdf")
-    table, units = columns(), {"tau": "N.m", "q": "deg"}
-    with asammdf.MDF(version="4.10") as file:
-        file.append([asammdf.Signal(table[name], table["t"], name=name, unit=unit) for name, unit in units.items()])
-        file.save(tmp_path / "run.mf4")
-    recording = Recording.read(tmp_path / "run.mf4")
-    np.testing.assert_allclose(recording["q"], table["q"] * np.pi / 180)
-    assert recording.units == {"t": "s", "tau": "N.m", "q": "rad"}

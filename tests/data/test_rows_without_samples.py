@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tables import written
 
 from cosim.data.preview import preview
 from cosim.data.recording import Recording
@@ -11,13 +12,6 @@ from cosim.support.errors import ManyRecordingsError, RecordingError, UndecidedE
 
 T = np.arange(400) / 200
 TAU, Q = np.cos(5 * T), 0.3 * np.sin(3 * T)
-
-
-def written(path: Path, header: str, *columns: object, empty: str = "nan") -> Path:
-    rows = zip(*columns, strict=True)
-    lines = [",".join(empty if x != x else x if isinstance(x, str) else f"{x:.9g}" for x in row) for row in rows]
-    path.write_text("\n".join(([header] if header else []) + lines) + "\n")
-    return path
 
 
 def without(column: np.ndarray, *rows: int) -> np.ndarray:
