@@ -4,9 +4,12 @@ import gzip
 import re
 import tracemalloc
 from pathlib import Path
+from random import Random
 
 import attack_files
 import attack_files_bags
+import attack_files_hdf5 as crafted
+import h5py
 import numpy as np
 import pyarrow as pa
 import pytest
@@ -94,3 +97,99 @@ def test_lines_of_one_number_are_counted_before_they_become_objects(tmp_path: Pa
         assert tracemalloc.get_traced_memory()[1] < 4 * 52e6
     finally:
         tracemalloc.stop()
+
+
+# A recording in HDF5, which MAT 7.3 is, is read from its own file alone, and costs what it holds.
+
+FOREIGN = [make for make in crafted.MAKERS if make.__name__.endswith("_elsewhere")]
+
+
+def as_mat(path: Path) -> Path:
+    """Put the head of a MAT 7.3 file in front of an HDF5 file."""
+    head = b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM"
+    made = path.with_suffix(".mat")
+    made.write_bytes(head.ljust(512, b"\x00") + path.read_bytes())
+    return made
+
+
+@pytest.mark.parametrize("suffix", [".h5", ".mat"])
+@pytest.mark.parametrize("make", FOREIGN, ids=lambda make: make.__name__)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_what_leads_to_another_file_is_refused(tmp_path: Path, make: crafted.Maker, suffix: str, seed: int) -> None:
+    (tmp_path / "secret.bin").write_bytes(bytes(range(33, 126)) * 40)
+    make(Random(seed), tmp_path / "run.h5")
+    path = as_mat(tmp_path / "run.h5") if suffix == ".mat" else tmp_path / "run.h5"
+    with pytest.raises(RecordingError, match=r"a recording is read from its own file alone\. Copy it into one"):
+        Recording.read(path)
+
+
+def test_a_link_within_the_file_is_no_harm(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        run = file.create_group("run")
+        run["t"], run["tau"], run["q"] = T, np.cos(T), np.sin(T)
+        file["latest"] = h5py.SoftLink("/run")
+        run["above"] = file
+    assert np.array_equal(Recording.read(tmp_path / "run.h5").table["q"], np.sin(T))
+
+
+@pytest.mark.parametrize(
+    ("make", "sentence"),
+    [
+        (crafted.large_chunk, r'a chunk of "q" unpacks to .* [MG]B or more'),
+        (crafted.chunk_bomb, r'"q" has a chunk that unpacks to more than the 3,200 bytes of a chunk'),
+        (crafted.chunk_bomb_lzf, r'"q" has a chunk that unpacks to more than the 3,200 bytes of a chunk'),
+        (crafted.packed_twice, r'"q" is packed twice'),
+        (crafted.deep_groups, r'more than 100 groups within each other, beginning at "g/g/'),
+        (crafted.virtual_of_itself, r'"q" is put together from other datasets'),
+    ],
+    ids=lambda one: getattr(one, "__name__", ""),
+)
+def test_what_costs_more_than_it_holds_is_refused(tmp_path: Path, make: crafted.Maker, sentence: str) -> None:
+    make(Random(3), tmp_path / "run.h5")
+    with pytest.raises(RecordingError, match=sentence):
+        Recording.read(tmp_path / "run.h5")
+
+
+def test_numbers_that_were_never_written_are_counted_before_memory_is_taken(tmp_path: Path) -> None:
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        for name in ("t", "tau", "q"):
+            file.create_dataset(name, (80_000_000,), "f8", chunks=(1 << 20,), compression="gzip")
+    with pytest.raises(RecordingError, match=r"holds 240,000,000 numbers; .* --layout limit=10\."):
+        Recording.read(tmp_path / "run.h5")
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"compression": "gzip", "shuffle": True, "fletcher32": True},
+        {"compression": "lzf"},
+        {"scaleoffset": 6},
+        {"chunks": (7,), "maxshape": (None,)},
+        {"chunks": (150,), "compression": "gzip"},
+    ],
+    ids=str,
+)
+def test_chunks_that_are_what_they_say_are_read(tmp_path: Path, options: dict[str, object]) -> None:
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        for name, values in {"t": T, "tau": np.cos(T), "q": np.sin(T)}.items():
+            file.create_dataset(name, data=values, **options)
+    read = Recording.read(tmp_path / "run.h5")
+    assert np.allclose(read.table["q"], np.sin(T), atol=1e-5)
+
+
+def test_large_chunks_are_unpacked_for_trial_and_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from cosim.data.binary import hdf5, hdf5_chunks
+
+    monkeypatch.setattr(hdf5_chunks, "HARMLESS", 1000)
+    monkeypatch.setattr(hdf5_chunks, "CELLS", 64)
+    for options in ({"compression": "gzip", "fletcher32": True}, {"compression": "gzip"}, {"compression": "lzf"}):
+        with h5py.File(tmp_path / "run.h5", "w") as file:
+            for name, values in {"t": T, "tau": np.cos(T), "q": np.sin(T)}.items():
+                file.create_dataset(name, data=values, chunks=(100,), **options)
+        assert np.array_equal(hdf5.read(tmp_path / "run.h5").values["q"], np.sin(T))
+
+
+def test_a_unit_that_is_no_text_states_none(tmp_path: Path) -> None:
+    crafted.large_attribute(Random(1), tmp_path / "run.h5")
+    assert set(Recording.read(tmp_path / "run.h5").units) == {"t"}

@@ -8,6 +8,7 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from wandering import swing
 
 from cosim.data.held import held_columns, notes, rows_held
 from cosim.data.own_rate import _mean, at_own_rate
@@ -26,16 +27,7 @@ def axis(seed: int, seconds: float = 30.0, rate: float = 1000.0) -> Recording:
     """An axis with Coulomb and viscous friction on a multisine, as the card says; torque 0.02 N m of noise."""
     random = np.random.default_rng(seed)
     t, phases = np.arange(int(seconds * rate)) / rate, random.uniform(0, 6, len(LINES))
-    q, v, a = (
-        sum(
-            (
-                size * (2 * np.pi * f) ** k * np.sin(2 * np.pi * f * t + p + k * np.pi / 2)
-                for (f, size), p in zip(LINES, phases, strict=True)
-            ),
-            0 * t,
-        )
-        for k in range(3)
-    )
+    q, v, a = swing(t, [(size, f, p) for (f, size), p in zip(LINES, phases, strict=True)])
     tau = 30 * a + 2.5 * np.tanh(v / 1e-3) + 30 * v + random.normal(0, 0.02, len(t))
     return Recording(f"run{seed}", {"t": t, "tau": tau, "q": q + random.normal(0, 1e-7, len(t)), "q_d": q})
 
@@ -163,9 +155,7 @@ def wave(period: float, t: Array = T) -> Array:
 
 
 def multisine(t: Array = T, phase: float = 0.0) -> Array:
-    return sum(
-        (a * np.sin(2 * np.pi * f * t + phase * f) for a, f in ((0.3, 0.11), (0.12, 0.27), (0.036, 0.63))), 0 * t
-    )
+    return swing(t, [(size, f, phase * f) for f, size in LINES])[0]
 
 
 def strokes() -> Array:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from wandering import swing
 
 from cosim.data.recording import Recording
 from cosim.data.single_readings import cleaned
@@ -22,11 +23,7 @@ MOUNT = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigm
 def motion(step: float = 0.0, noise: float = 1e-6, rate: float = RATE) -> Recording:
     """A multisine of 20 s that friction and inertia answer; `step` [rad] of the encoder, `noise` [rad] rms."""
     t = np.arange(int(20 * rate)) / rate
-    tones = [(0.2, 0.11, 0.0), (0.1, 0.37, 1.0), (0.03, 0.9, 2.0)]
-    q, v, a = (
-        sum(size * (2 * np.pi * f) ** k * np.sin(2 * np.pi * f * t + p + k * np.pi / 2) for size, f, p in tones)
-        for k in range(3)
-    )
+    q, v, a = swing(t, [(0.2, 0.11, 0.0), (0.1, 0.37, 1.0), (0.03, 0.9, 2.0)])
     q = q + noise * np.random.default_rng(1).standard_normal(len(t))
     return Recording(
         "run", {"t": t, "tau": 5 * a + 2 * np.tanh(v / 1e-3) + v, "q": np.round(q / step) * step if step else q}

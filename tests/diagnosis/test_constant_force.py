@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from wandering import swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import Outcome, diagnose
@@ -37,10 +38,7 @@ def recorded(seed: int, force: float = FORCE) -> Recording:
     """12 s of a carriage that swings, with the noise of its drive and of its scale."""
     dice, t = np.random.default_rng(seed), np.arange(0, 12, 1 / 250)
     waves = [(0.09, 0.23), (0.035, 0.61), (0.012, 1.7)]
-    tones = [(a, 2 * np.pi * f, dice.uniform(0, 2 * np.pi)) for a, f in waves]
-    q = sum(a * np.sin(w * t + p) for a, w, p in tones)
-    v = sum(a * w * np.cos(w * t + p) for a, w, p in tones)
-    acceleration = sum(-a * w**2 * np.sin(w * t + p) for a, w, p in tones)
+    q, v, acceleration = swing(t, [(a, f, dice.uniform(0, 2 * np.pi)) for a, f in waves])
     tau = 20 * acceleration + 15 * np.tanh(v / 1e-4) + 30 * v + force + dice.normal(0, 0.3, len(t))
     return Recording.of({"t": t, "tau": tau, "q": q + dice.normal(0, 1e-7, len(t))}, f"run {seed}")
 

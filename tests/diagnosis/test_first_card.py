@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from two_links import OWN, elbow
+from wandering import swing
 
 import cosim
 from cosim.api.defaults import split
@@ -32,10 +33,7 @@ def table(
     t = np.arange(round(seconds * RATE)) / RATE
     waves = [(0.9, 0.13), (0.35, 0.41), (0.12, 0.97)]
     phases = dice.uniform(0, 2 * np.pi, len(waves))
-    parts = [(reach * a, 2 * np.pi * f, p) for (a, f), p in zip(waves, phases, strict=True)]
-    q = sum(a * np.sin(w * t + p) for a, w, p in parts)
-    v = sum(a * w * np.cos(w * t + p) for a, w, p in parts)
-    acceleration = sum(-a * w**2 * np.sin(w * t + p) for a, w, p in parts)
+    q, v, acceleration = swing(t, [(reach * a, f, p) for (a, f), p in zip(waves, phases, strict=True)])
     tau = TRUE["axis.inertia"] * acceleration + TRUE["friction.Fc"] * np.tanh(v / 1e-3) + TRUE["friction.sigma2"] * v
     tau += offset + weight * np.sin(q + 0.4)
     noises = (dice.normal(0, size, len(t)) for size in (NOISE, READING))

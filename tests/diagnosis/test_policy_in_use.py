@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from wandering import swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.decide.policy import POLICY
@@ -31,10 +32,7 @@ RIPPLE = Cogging(amplitude=0.3, cycles_per_rev=20.0)
 def recorded(seconds: float, second_wave: float = 0.0, noise: float = 0.002, seed: int = 1) -> Recording:
     """An axis with a ripple that has a second wave of some size."""
     t = np.arange(int(500 * seconds)) / 500
-    tones = [(0.5, 0.7, 1.0 + seed), (0.1, 2.3, 2.0), (0.02, 5.7, 0.5)]
-    q = sum((size * np.sin(w * t + phase) for size, w, phase in tones), np.zeros_like(t))
-    v = sum(size * w * np.cos(w * t + phase) for size, w, phase in tones)
-    a = sum(-size * w**2 * np.sin(w * t + phase) for size, w, phase in tones)
+    q, v, a = swing(t, [(0.5, 0.7, 1.0 + seed), (0.1, 2.3, 2.0), (0.02, 5.7, 0.5)], per=1)
     extra = 0.3 * np.cos(20 * q) + second_wave * np.cos(40 * q)
     tau = 5 * a + 2 * np.sign(v) + v + extra + noise * np.random.default_rng(seed).standard_normal(len(t))
     return Recording(f"run_{seed}", {"t": t, "q": q, "tau": tau})

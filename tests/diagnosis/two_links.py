@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from wandering import swing
 
 from cosim.data.recording import Recording
 
@@ -32,14 +33,9 @@ class Joint(NamedTuple):
 def tones(t: Array, seed: int, size: float) -> Joint:
     """Swings at four frequencies that are another in each joint and recording."""
     dice = np.random.default_rng(seed)
-    waves = [
-        (size / k, 2 * np.pi * f * dice.uniform(0.85, 1.15), p)
-        for k, f, p in zip((1, 2, 4, 8), (0.15, 0.4, 0.9, 1.9), dice.uniform(0, 2 * np.pi, 4), strict=True)
-    ]
-    q = sum(a * np.sin(w * t + p) for a, w, p in waves)
-    v = sum(a * w * np.cos(w * t + p) for a, w, p in waves)
-    a = sum(-a * w**2 * np.sin(w * t + p) for a, w, p in waves)
-    return Joint(np.asarray(q), np.asarray(v), np.asarray(a))
+    phases = dice.uniform(0, 2 * np.pi, 4)
+    hertz = [f * dice.uniform(0.85, 1.15) for f in (0.15, 0.4, 0.9, 1.9)]
+    return Joint(*swing(t, [(size / k, f, p) for k, f, p in zip((1, 2, 4, 8), hertz, phases, strict=True)]))
 
 
 def still(t: Array) -> Joint:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
+from wandering import swing
 
 import cosim
 import pyfmi_models
@@ -104,11 +105,7 @@ def test_the_property_tests_meet_them_by_themselves(copy: Path) -> None:
 def in_the_wind(seed: int, gusts: float) -> str:
     """20 s of the guide's tube under a gusty wind, by the guide's own equations, as the text of a CSV."""
     t = np.arange(4000) / 200
-    tones = [(0.5, 0.11, seed), (0.1, 0.37, 1.0 + seed), (0.03, 0.9, 2.0)]
-    angles = [(a, 2 * np.pi * f, 2 * np.pi * f * t + phase) for a, f, phase in tones]
-    q = sum(a * np.sin(x) for a, _, x in angles)
-    v = sum(a * w * np.cos(x) for a, w, x in angles)
-    acceleration = sum(-a * w**2 * np.sin(x) for a, w, x in angles)
+    q, v, acceleration = swing(t, [(0.5, 0.11, seed), (0.1, 0.37, 1.0 + seed), (0.03, 0.9, 2.0)])
     wind = 9.0 + 4.0 * np.sin(2 * np.pi * gusts * t)
     tau = 30.0 * acceleration + (2.0 + 12.0 * np.sqrt(np.abs(v))) * np.sign(v) + 0.02 * wind**2 * np.sin(q - 0.4)
     noisy = tau + 0.02 * np.random.default_rng(seed).standard_normal(len(t))

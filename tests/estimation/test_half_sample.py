@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from wandering import swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.effects.candidates import span_of
@@ -23,11 +24,7 @@ def run(
 ) -> Recording:
     """A motion of three lines; torque as loggers stamp it, `delay` rows later; `missing` N m of unbalance."""
     random, t = np.random.default_rng(4), np.arange(int(30 * rate) * FINE) / (rate * FINE)
-    waves = [(2 * np.pi * f, a, phase) for (f, a), phase in zip(LINES, (0.4, 2.0, 4.0), strict=True)]
-    q, v, a = (
-        sum(amount * w**order * np.sin(w * t + phase + order * np.pi / 2) for w, amount, phase in waves)
-        for order in range(3)
-    )
+    q, v, a = swing(t, [(size, f, phase) for (f, size), phase in zip(LINES, (0.4, 2.0, 4.0), strict=True)])
     tau = 30 * a + 2.5 * np.tanh(v / 1e-3) + 30 * v + missing * np.sin(q)
     mean = np.convolve(tau, np.ones(FINE) / FINE, "same")  # over the row that is centred at each moment
     late = {"centred": 0.0, "ordered": 0.5, "mean since": -0.5}[stamp] + delay

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from wandering import swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.decide.policy import POLICY
@@ -40,8 +41,7 @@ TONE = PeriodicDisturbance(frequency_hz=3.0, amplitude=0.3)
 def prepared() -> Prepared:
     """A wandering motion with friction, a ripple and noise."""
     t = np.arange(8000) / 500
-    tones = [(0.5, 0.11, 0.0), (0.1, 0.37, 1.0), (0.02, 0.9, 2.0)]
-    q = sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in tones)
+    q = swing(t, [(0.5, 0.11, 0.0), (0.1, 0.37, 1.0), (0.02, 0.9, 2.0)])[0]
     v, a = np.gradient(q, t), np.gradient(np.gradient(q, t), t)
     noise = 0.02 * np.random.default_rng(3).standard_normal(len(t))
     tau = 5 * a + 2 * np.tanh(v / 0.01) + 1.5 * v + 0.4 * np.sin(20 * q) + noise

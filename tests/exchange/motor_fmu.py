@@ -7,15 +7,13 @@
 inertia 2 % larger, 7 a speed that ends at 2, 8 an angle by Euler's rule, 9 degrees, 10 an input one step late.
 """
 
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
-import fmpy
 import numpy as np
-from compiling import compiled
+from compiling import compiled, with_stubs
+from compiling import packed as pack
 from tiny_fmu import SOURCE as TINY
-from tiny_fmu import _stubs
 
 SOURCE = (
     TINY[: TINY.index("enum {")]
@@ -81,13 +79,8 @@ def packed(
     directory: Path, stem: str, source: str, variables: Sequence[Row], version: int, name: str, *options: str
 ) -> Path:
     """Compile and pack an FMU written like the motor, whose value references are the places of its variables."""
-    library = compiled(stem, source + _stubs(version), *options)
-    platform = fmpy.platform if version == 2 else fmpy.platform_tuple
-    path = directory / f"{stem}.fmu"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", description(version, variables, name))
-        archive.write(library, f"binaries/{platform}/{name}{fmpy.sharedLibraryExtension}")
-    return path
+    library = compiled(name, with_stubs(source), *options)
+    return pack(directory / f"{stem}.fmu", version, description(version, variables, name), library)
 
 
 def description(version: int, variables: Sequence[Row] = VARIABLES, model: str = "motor") -> str:

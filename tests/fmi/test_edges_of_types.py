@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mirror_fmu import mirror, named
-from simulating import simulate
+from simulating import pair, simulate
 
 from cosim.fmi.component import Port
 from cosim.fmi.types import limits, refusal
@@ -72,14 +72,9 @@ def test_a_parameter_takes_the_edges_of_each_integer_and_nothing_beyond(kind: st
     into, out = named(kind)
 
     def read(value: int) -> object:
-        found = simulate(
-            {"one": mirror[3], "two": mirror[3]},
-            [Wire(f"one.{out}", f"two.{into}")],
-            record={"y": f"two.{out}"},
-            step=0.1,
-            ticks=4,
-            parameters={"one": {into: value}},
-        ).recording
+        found = pair(
+            mirror[3], [Wire(f"one.{out}", f"two.{into}")], {"y": f"two.{out}"}, parameters={"one": {into: value}}
+        )
         return (found.others["y"] if "y" in found.others else found["y"])[-1]
 
     assert [read(low), read(high)] == [low, high]

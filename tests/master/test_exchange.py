@@ -1,6 +1,5 @@
 """Model-exchange FMUs step like any other: the built-in solver meets co-simulation, CVode, and the times of events."""
 
-import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +7,7 @@ import export_models as models
 import fmpy
 import numpy as np
 import pytest
-from compiling import compiled
+from compiling import compiled, packed, with_stubs
 from simulating import simulate
 from tiny_fmu import tiny
 
@@ -136,15 +135,8 @@ DESCRIPTION = """<fmiModelDescription fmiVersion="2.0" modelName="ball" guid="b"
 @pytest.fixture(scope="module")
 def ball(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A ball that bounces (state events) and is pushed at 1.50005 s (a time event between two ticks)."""
-    from fmpy.fmi2 import FMU2Model
-
-    folder = tmp_path_factory.mktemp("ball")
-    wanted = [name for name in dir(FMU2Model) if name.startswith("fmi2") and f"{name}(" not in BALL]
-    library = compiled("ball", BALL + "".join(f"API int {name}(void) {{ return 3; }}\n" for name in wanted))
-    with zipfile.ZipFile(folder / "ball.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", DESCRIPTION)
-        archive.write(library, f"binaries/{fmpy.platform}/{library.name}")
-    return folder / "ball.fmu"
+    path = tmp_path_factory.mktemp("ball") / "ball.fmu"
+    return packed(path, 2, DESCRIPTION, compiled("ball", with_stubs(BALL)))
 
 
 def flight(t: np.ndarray) -> np.ndarray:

@@ -1,13 +1,10 @@
 """FMUs for scheduled execution: their partitions run when their clocks tick, in the order of time and priority."""
 
-import zipfile
 from pathlib import Path
 
-import fmpy
 import numpy as np
 import pytest
-from compiling import compiled
-from fmpy.fmi3 import FMU3ScheduledExecution
+from compiling import compiled, packed, with_stubs
 from simulating import simulate
 from tiny_fmu import tiny
 
@@ -68,15 +65,8 @@ DESCRIPTION = """<fmiModelDescription fmiVersion="3.0" modelName="parts" instant
 @pytest.fixture(scope="session")
 def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An FMU with four partitions."""
-    folder = tmp_path_factory.mktemp("parts")
-    wanted = [name for name in dir(FMU3ScheduledExecution) if name.startswith("fmi3")]
-    stubs = [f"API int {name}(void) {{ return 3; }}" for name in wanted if name not in SOURCE]
-    library = compiled("parts", "\n".join([SOURCE, *stubs]))
-    path = folder / "parts.fmu"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", DESCRIPTION)
-        archive.write(library, f"binaries/{fmpy.platform_tuple}/{library.name}")
-    return path
+    path = tmp_path_factory.mktemp("parts") / "parts.fmu"
+    return packed(path, 3, DESCRIPTION, compiled("parts", with_stubs(SOURCE)))
 
 
 def test_partitions_run_in_the_order_of_time_and_priority(parts: Path) -> None:

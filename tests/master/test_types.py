@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mirror_fmu import KINDS, description, mirror, named
-from simulating import simulate
+from simulating import pair, simulate
 from tiny_fmu import described, tiny
 
 from cosim.data.recording import Recording
@@ -51,15 +51,13 @@ def test_a_value_of_each_type_goes_from_end_to_end_and_into_the_recording(
     kind: str, compiled: bool, mirror: dict[int, Path]
 ) -> None:
     into, out = named(kind)
-    recording = simulate(
-        {"one": mirror[3], "two": mirror[3]},
+    recording = pair(
+        mirror[3],
         chain(kind),
-        record={"there": f"two.{out}", "on the way": f"two.{into}"},
-        step=0.1,
-        ticks=4,
+        {"there": f"two.{out}", "on the way": f"two.{into}"},
         parameters={"one": {into: VALUES[kind]}},
         compiled=compiled,
-    ).recording
+    )
     for name, since in (("there", 2), ("on the way", 1)):
         column = recording.others.get(name, recording.table.get(name))
         assert list(column[since:]) == [ARRIVES[kind]] * (4 - since)
@@ -71,15 +69,13 @@ def test_a_value_of_each_type_goes_from_end_to_end_and_into_the_recording(
 def test_fmi_2_has_value_references_for_each_type_apart(kind: str, compiled: bool, mirror: dict[int, Path]) -> None:
     values = {"Real": 0.25, "Integer": -7, "Boolean": True, "String": "told"}
     wires = [Wire(f"one.{one}_out", f"two.{one}_in") for one in ("real", "integer", "boolean", "string")]
-    recording = simulate(
-        {"one": mirror[2], "two": mirror[2]},
+    recording = pair(
+        mirror[2],
         wires,
-        record={name: f"two.{name}_out" for name in ("real", "integer", "boolean", "string")},
-        step=0.1,
-        ticks=4,
+        {name: f"two.{name}_out" for name in ("real", "integer", "boolean", "string")},
         parameters={"one": {f"{one.lower()}_in": value for one, value in values.items()}},
         compiled=compiled,
-    ).recording
+    )
     column = recording.others if kind == "String" else recording.table
     assert column[kind.lower()][-1] == values[kind]
 
@@ -98,15 +94,13 @@ def test_an_item_may_have_any_value_of_its_version(
         xml = xml.replace("<Integer/>", '<Enumeration declaredType="Mood"/>')
     name = {2: "integer", 3: "enumeration"}[fmi]
     moody = described(mirror[fmi], tmp_path / "moody.fmu", xml)
-    recording = simulate(
-        {"one": moody, "two": moody},
+    recording = pair(
+        moody,
         [Wire(f"one.{name}_out", f"two.{name}_in")],
-        record={"mood": f"two.{name}_out"},
-        step=0.1,
-        ticks=4,
+        {"mood": f"two.{name}_out"},
         parameters={"one": {f"{name}_in": "angry"}},
         compiled=compiled,
-    ).recording
+    )
     assert recording["mood"][-1] == angry
 
 

@@ -5,18 +5,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mirror_fmu import mirror, named
-from simulating import simulate
+from mirror_fmu import description, mirror, named
+from simulating import pair, simulate
 from test_types import LOOPS
+from tiny_fmu import described
 
+from cosim.fmi.types import elements, indexed
 from cosim.master.simulate import Options, run
-from cosim.support.errors import StepError, WiringError
+from cosim.support.errors import FmuError, StepError, WiringError
 from cosim.system.algorithm import GaussSeidel
 from cosim.system.scenario import parse_scenario
 from cosim.system.wire import Record, Wire
 
 __all__ = ["mirror"]
-
 WIDER = [
     ("Float32", "Float64"),
     ("Int8", "Int16"),
@@ -48,15 +49,13 @@ NARROWER = {
 @pytest.mark.parametrize(("source", "target"), WIDER)
 def test_a_type_that_holds_all_values_of_another_takes_them(source: str, target: str, mirror: dict[int, Path]) -> None:
     value = {"Boolean": True, "Enumeration": 30}.get(source, 30 if target == "Enumeration" else 100)
-    recording = simulate(
-        {"one": mirror[3], "two": mirror[3]},
+    recording = pair(
+        mirror[3],
         [Wire(f"one.{named(source)[1]}", f"two.{named(target)[0]}")],
-        record={"y": f"two.{named(target)[1]}"},
-        step=0.1,
-        ticks=4,
+        {"y": f"two.{named(target)[1]}"},
         parameters={"one": {named(source)[0]: value}},
-        algorithm=GaussSeidel(kind="gauss-seidel", order=["one", "two"]),  # no item is 0, which an output begins with
-    ).recording
+        algorithm=GaussSeidel(kind="gauss-seidel", order=["one", "two"]),
+    )
     assert recording["y"][-1] == value
 
 
@@ -64,7 +63,7 @@ def test_a_type_that_holds_all_values_of_another_takes_them(source: str, target:
 def test_a_type_that_does_not_is_refused_in_a_sentence(source: str, target: str, mirror: dict[int, Path]) -> None:
     wire = Wire(f"one.{named(source)[1]}", f"two.{named(target)[0]}")
     with pytest.raises(WiringError, match=NARROWER[source, target]) as raised:
-        simulate({"one": mirror[3], "two": mirror[3]}, [wire], record={"y": "two.float64_out"}, step=0.1, ticks=4)
+        pair(mirror[3], [wire], {"y": "two.float64_out"})
     assert wire.target in str(raised.value)
     assert wire.source in str(raised.value)
 
@@ -126,14 +125,12 @@ def test_a_signal_that_does_not_fit_ends_the_run_with_the_variable_and_the_value
 
 def test_an_integer_beyond_2_53_is_exact_or_an_error_but_never_rounded(mirror: dict[int, Path]) -> None:
     def through(target: str, record: str | Record, value: int) -> Any:
-        return simulate(
-            {"one": mirror[3], "two": mirror[3]},
+        return pair(
+            mirror[3],
             [Wire("one.int64_out", f"two.{target}_in")],
-            record={"y": record},
-            step=0.1,
-            ticks=4,
+            {"y": record},
             parameters={"one": {"int64_in": value}},
-        ).recording
+        )
 
     assert through("int64", "two.int64_out", 2**53 + 1).others["y"][-1] == 2**53 + 1
     assert through("float64", "two.float64_out", 2**53 - 1)["y"][-1] == 2**53 - 1
@@ -179,3 +176,64 @@ def test_a_map_puts_values_and_items_in_the_place_of_others(compiled: bool, mirr
     for wrong, said in wrongs.items():
         with pytest.raises(WiringError, match=said):
             run(parse_scenario(text.replace('angry = "calm", calm = "angry"', wrong), "x.toml", Path()))
+
+
+# Arrays of FMI 3: wired whole and by index, sized by structural parameters, given start values.
+
+
+@LOOPS
+def test_arrays_are_wired_whole_and_by_index_and_recorded_as_columns(compiled: bool, mirror: dict[int, Path]) -> None:
+    recording = pair(
+        mirror[3],
+        [Wire("one.y", "two.u"), Wire("one.z[2,1]", "two.w[1,2]"), Wire("one.y[2]", "two.float64_in", gain=10.0)],
+        {"y": "two.y", "z": "two.z", "x": "two.float64_out", "u": "two.u"},
+        parameters={"one": {"u": [7, 8, 9], "w": [[10, 20, 30], [40, 50, 60]]}},
+        compiled=compiled,
+    )
+    names = [indexed("y", one) for one in elements((3,))] + [indexed("z", one) for one in elements((2, 3))]
+    assert list(recording)[1:] == [*names, "x", "u[1]", "u[2]", "u[3]"]
+    assert [recording[name][-1] for name in names] == [7, 8, 9, 1, 40, 3, 4, 5, 6]
+    assert recording["x"][-1] == 80
+    assert [recording[f"u[{n}]"][-1] for n in (1, 2, 3)] == [7, 8, 9]
+
+
+@LOOPS
+def test_structural_parameters_size_arrays_before_they_are_wired(compiled: bool, mirror: dict[int, Path]) -> None:
+    big = {"n": 5, "u": [1, 2, 3, 4, 5]}
+    recording = pair(
+        mirror[3], [Wire("one.y", "two.u")], {"y": "two.y"}, parameters={"one": big, "two": {"n": 5}}, compiled=compiled
+    )
+    assert [recording[f"y[{n}]"][-1] for n in range(1, 6)] == [1, 2, 3, 4, 5]
+    with pytest.raises(WiringError, match=r'"two.u" has 3 elements and "one.y" 5 elements; wire arrays of one shape'):
+        pair(mirror[3], [Wire("one.y", "two.u")], {"y": "two.y"}, parameters={"one": big})
+
+
+def test_an_element_of_an_array_is_set_beside_the_start_values_of_the_others(mirror: dict[int, Path]) -> None:
+    recording = simulate(
+        {"m": mirror[3]}, [], record={"y": "m.y"}, step=0.1, ticks=2, parameters={"m": {"u[2]": 9.0}}
+    ).recording
+    assert [recording[f"y[{n}]"][-1] for n in (1, 2, 3)] == [1, 9, 3]
+
+
+@pytest.mark.parametrize("start", ["1 x 3", f"1 {'9' * 5000} 3", "1 ² 3"])
+def test_start_values_of_an_array_that_are_no_numbers_are_refused(
+    mirror: dict[int, Path], tmp_path: Path, start: str
+) -> None:
+    bad = described(mirror[3], tmp_path / "bad.fmu", description(3).replace('start="1 2 3"', f'start="{start}"'))
+    with pytest.raises(FmuError, match="must be a number"):
+        simulate({"m": bad}, [], record={"y": "m.y"}, step=0.1, ticks=2, parameters={"m": {"u[3]": 9.0}})
+
+
+@pytest.mark.parametrize(
+    ("wire", "said"),
+    [
+        (Wire("one.y", "two.float64_in"), '"two.float64_in" has one value and "one.y" 3 elements'),
+        (Wire("one.float64_out", "two.u"), '"two.u" has 3 elements and "one.float64_out" one value'),
+        (Wire("one.z", "two.u"), '"two.u" has 3 elements and "one.z" 2 x 3 elements'),
+        (Wire("one.y[4]", "two.u[1]"), "which is not an output"),
+        (Wire("one.y[1]", "two.u[0]"), r'"two.u\[0\]" cannot be fed: it does not exist'),
+    ],
+)
+def test_arrays_that_do_not_fit_are_refused(wire: Wire, said: str, mirror: dict[int, Path]) -> None:
+    with pytest.raises(WiringError, match=said):
+        pair(mirror[3], [wire], {"x": "two.float64_out"}, ticks=2)

@@ -1,13 +1,25 @@
 """Found means more likely than not: word, count and probability agree on page, terminal and in the data."""
 
+import re
 from dataclasses import replace
+from typing import Any
 
+import matplotlib as mpl
+import numpy as np
 import pytest
-from report_example import FOUND, REST, RIVALS, diagnosis
+from learned_told import TOLD
+from report_example import FOUND, REST, RIVALS, diagnosis, report_of
+from report_text import text_of
 
 from cosim.diagnosis.answer.result import Diagnosis, Finding
-from cosim.report import lead, words
+from cosim.diagnosis.measure.breakdown import samples
+from cosim.plots.style import STYLE
+from cosim.report import lead, render, words
+from cosim.report.figures_own import own, own_torque
+from cosim.report.learned import nameless
+from cosim.report.page import payload
 from cosim.report.quantities import Scales
+from cosim.report.sheet import Picture
 from cosim.report.terminal import summary
 from cosim_serve.work import in_words
 from pyfmi_models.effects import Cogging
@@ -88,3 +100,115 @@ def test_the_lead_names_every_open_question() -> None:
 def test_a_ripple_is_told_with_the_digits_that_a_mechanic_reads() -> None:
     assert "399.8 times per metre" in Cogging(cycles_per_rev=399.8213, amplitude=2.0).statement("N")
     assert "24 times per turn" in Cogging(cycles_per_rev=24.0, amplitude=2.0).statement()
+
+
+# The report and the terminal on what has no name: learned as a table, or tried and left out.
+
+
+def learned() -> Diagnosis:
+    improved: Any = {"card": "card.toml", "fmu": "m_improved.fmu", "speed": [0.3, 1.5], "position": [-1.0, 1.0]}
+    return replace(diagnosis("unknown"), learned=TOLD, improved=improved)
+
+
+def section(html: str) -> str:
+    found = re.search(r'<section class="nameless".*?</section>', html, re.DOTALL)
+    assert found
+    return found[0]
+
+
+def test_what_was_learned_is_said_with_size_error_range_and_band() -> None:
+    said = re.sub(r"<[^>]*>", " ", section(render(learned()))).replace("\N{NO-BREAK SPACE}", " ")
+    for part in ("position and temperature", "0.31 N·m", "0.42 → 0.15 N·m", "0.21 to 0.33 N·m", "below 10 Hz"):
+        assert part in said
+    assert "temperature 18 to 26 °C" in said
+    assert "torque = k1 q³; k1 0.310 N·m/rad³ (0.290 to 0.330)" in said
+
+
+def test_each_table_has_a_figure_with_the_data_beside() -> None:
+    found = nameless(learned(), Scales.of(learned()))
+    assert found is not None
+    assert [one.heading for one in found.pictures] == [
+        "Torque over position", "Friction over position and temperature", "Drive over command", "Hysteresis",
+    ]  # fmt: skip
+    assert all("training recordings" in one.caption for one in found.pictures)
+
+
+def test_a_model_with_a_table_is_not_called_unchanged() -> None:
+    html, text = render(learned()), " ".join(summary(learned()).split())
+    assert "No improved model was written" not in html
+    assert "there is no gain to prove" not in html
+    assert "with what was learned" in html
+    assert TOLD["statement"] in text
+    assert "As good, and shorter: torque = k1 q³; k1 0.31 N.m/rad3" in text
+    assert "→ 0.39 (with what was learned)" in text
+
+
+@pytest.mark.parametrize("kind", ["two", "none", "unknown"])
+def test_where_nothing_was_asked_nothing_is_said(kind: str) -> None:
+    assert 'class="nameless"' not in report_of(kind)
+
+
+def test_a_table_that_does_not_help_is_said_to_be_left_out() -> None:
+    said = "A table over position was tried for what has no name and is not in the model."
+    told = replace(diagnosis("unknown"), not_learned={"quantities": ["position"], "statement": said})
+    assert said in section(render(told))
+    assert said in " ".join(summary(told).split())
+
+
+# The figure of one effect shows that effect: its curve, and what was measured of it with the others taken out.
+
+Q, V = np.linspace(-3.0, 3.0, 200), np.where(np.arange(200) % 2, 0.4, -0.4)
+RIPPLE = Finding(
+    effect="position_friction", title="Position-dependent friction", answer="found", probability=0.9, gain=0.2,
+    parameters={"cycles_per_rev": 2.0, "relative_amplitude": 0.25, "phase": 0.0}, size="25 %",
+)  # fmt: skip
+LAW = {"friction.Fc": (2.0, 2.0, 2.0), "friction.sigma2": (0.0, 0.0, 0.0)}
+
+
+def drawn(finding: Finding, of: Diagnosis) -> Picture | None:
+    with mpl.rc_context(STYLE):
+        return own(finding, of, samples(of.traces), Scales.of(of))
+
+
+def with_law(finding: Finding) -> Diagnosis:
+    whole = diagnosis("two")
+    return replace(
+        whole, findings=(finding,), delivered=(finding.effect,), friction_law={"base": "coulomb"}, base_parameters=LAW
+    )
+
+
+def test_the_torque_of_a_ripple_is_its_wave_with_the_harmonics() -> None:
+    torque = own_torque(FOUND[0], diagnosis("two"))
+    assert torque is not None
+    expected = 0.42 * np.cos(24 * Q + 0.4) + 0.125 * np.cos(48 * Q - 0.3)
+    assert torque(Q, V) == pytest.approx(expected, abs=1e-9)
+
+
+def test_friction_over_position_resists_by_its_share_of_the_level() -> None:
+    torque = own_torque(RIPPLE, with_law(RIPPLE))
+    assert torque is not None
+    change = torque(Q, V) * np.sign(V)
+    assert change.max() == pytest.approx(0.25 * 2.0, rel=0.05)
+    assert torque(Q, -V) == pytest.approx(-torque(Q, V))
+
+
+def test_an_effect_of_the_model_is_drawn_by_itself_and_one_that_is_not_there_is_not() -> None:
+    whole = diagnosis("two")
+    picture = drawn(FOUND[0], whole)
+    assert picture is not None
+    assert "other effects taken out" in picture.caption
+    assert drawn(FOUND[0], replace(whole, delivered=())) is None
+    assert drawn(RIPPLE, with_law(RIPPLE)) is not None
+
+
+def test_where_nothing_was_added_one_model_is_drawn_and_named_once() -> None:
+    whole = diagnosis("none")
+    lines = [line[0] for sheet in payload(whole, Scales.of(whole))["sheets"] for line in sheet["lines"]]  # type: ignore[index,union-attr,call-overload]
+    assert lines == ["tau", "before", "lost", "q"]
+    text = text_of(report_of("none"))
+    assert "Worst seconds" in text
+    assert "Worst before" not in text
+
+
+def test_the_box_says_which_model_to_use_outside_the_range() -> None:
+    assert "Outside this range it is not validated: use the original model there." in text_of(report_of("two"))

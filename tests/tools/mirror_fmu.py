@@ -4,12 +4,10 @@ Value references count anew for each type in FMI 2, and through all types in FMI
 step, and the enumeration's values are not 1, 2, 3.
 """
 
-import zipfile
 from pathlib import Path
 
-import fmpy
 import pytest
-from compiling import compiled
+from compiling import compiled, packed, with_stubs
 
 SOURCE = r"""
 #include <stdbool.h>
@@ -18,7 +16,6 @@ SOURCE = r"""
 #include <stdlib.h>
 #include <string.h>
 #define API __attribute__((visibility("default")))
-#define UNUSED(name) API int name(void) { return 3; }
 #define NONE(name) API int name(void *m) { (void)m; return 0; }
 enum { MOST = 16, VARIABLES = 64 };
 /* Every variable has room for MOST elements of 8 bytes; an output stands 32 behind its input. */
@@ -166,22 +163,10 @@ def _mood(tag: str) -> str:
 @pytest.fixture(scope="session")
 def mirror(tmp_path_factory: pytest.TempPathFactory) -> dict[int, Path]:
     """The mirror FMU for FMI 2 and 3."""
-    from fmpy.fmi2 import FMU2Slave
-    from fmpy.fmi3 import FMU3Slave
-
     folder = tmp_path_factory.mktemp("mirror")
-    wanted = [name for kind in (FMU2Slave, FMU3Slave) for name in dir(kind) if name.startswith("fmi")]
-    known = SOURCE + "".join(f"fmi3{access}{kind}(" for access in ("Set", "Get") for kind in KINDS)
-    known += "".join(f"fmi2{access}{kind}(" for access in ("Set", "Get") for kind in ("Real", "Integer", "Boolean"))
-    missing = [name for name in wanted if f"{name}(" not in known and f"({name})" not in known]
-    library = compiled("mirror", SOURCE + "".join(f"UNUSED({name})\n" for name in missing))
-    return {version: _packed(folder, library, version) for version in (2, 3)}
-
-
-def _packed(folder: Path, library: Path, version: int) -> Path:
-    platform = fmpy.platform if version == 2 else fmpy.platform_tuple
-    path = folder / f"mirror{version}.fmu"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", description(version))
-        archive.write(library, f"binaries/{platform}/mirror{fmpy.sharedLibraryExtension}")
-    return path
+    made = "".join(f"fmi3{access}{kind}(" for access in ("Set", "Get") for kind in KINDS)
+    made += "".join(f"fmi2{access}{kind}(" for access in ("Set", "Get") for kind in ("Real", "Integer", "Boolean"))
+    library = compiled("mirror", with_stubs(SOURCE, made))
+    return {
+        version: packed(folder / f"mirror{version}.fmu", version, description(version), library) for version in (2, 3)
+    }

@@ -4,35 +4,13 @@ The output `third` is always 1/3 and the state's rate `rate` too, so that what a
 whether its arithmetic was left alone.
 """
 
-import zipfile
 from pathlib import Path
 
-import fmpy
-from compiling import compiled
+from compiling import compiled, packed, with_stubs
 
 DEEDS = (
-    "nothing",
-    "directory",
-    "umask",
-    "locale",
-    "environment",
-    "ignore",
-    "handle",
-    "alarm",
-    "block",
-    "close",
-    "redirect",
-    "limit",
-    "cores",
-    "upward",
-    "flush",
-    "traps",
-    "precision",
-    "thread",
-    "hang",
-    "exit",
-    "crash",
-    "read",
+    *("nothing", "directory", "umask", "locale", "environment", "ignore", "handle", "alarm", "block", "close"),
+    *("redirect", "limit", "cores", "upward", "flush", "traps", "precision", "thread", "hang", "exit", "crash", "read"),
     "fail",
 )
 STAGES = ("load", "instantiate", "setup", "initialise", "set", "get", "step", "save", "terminate", "free", "rates")
@@ -111,7 +89,6 @@ static int get(M *m, const unsigned *r, size_t n, double *x) {
 }
 #define API __attribute__((visibility("default")))
 #define NONE(name) API int name(void *m) { (void)m; return 0; }
-#define UNUSED(name) API int name(void) { return 3; }
 typedef struct { int newly, terminate, nominals, values, next; double time; } Event;
 API void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, void *c, int v, int l) { return make(g); }
 API int fmi2SetupExperiment(M *m, int a, double b, double c, int d, double e) { return at(m, SETUP); }
@@ -157,23 +134,9 @@ def rude_fmu(
     """Write an FMU that does a deed in a stage by itself; with its parameters it can be told to do more."""
     path = folder / f"rude_{version}_{kind}_{deed}_{stage}.fmu"
     loaded = deed if stage == "load" else "nothing"
-    library = compiled("rude", f"#define LOADED {loaded.upper()}\n{SOURCE}{_stubs(version)}", "-lm", "-lpthread")
-    platform = fmpy.platform if version == 2 else fmpy.platform_tuple
+    library = compiled("rude", f"#define LOADED {loaded.upper()}\n{with_stubs(SOURCE)}", "-lm", "-lpthread")
     guid = f"{DEEDS.index(deed)}:{STAGES.index(stage)}"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", _description(version, guid, kind))
-        archive.write(library, f"binaries/{platform}/{library.name}")
-    return path
-
-
-def _stubs(version: int) -> str:
-    """Define the functions that FMPy asks for and no test calls."""
-    from fmpy.fmi2 import FMU2Model, FMU2Slave
-    from fmpy.fmi3 import FMU3Slave
-
-    names = {*dir(FMU2Slave), *dir(FMU2Model)} if version == 2 else set(dir(FMU3Slave))
-    wanted = [name for name in sorted(names) if name.startswith(f"fmi{version}")]
-    return "".join(f"UNUSED({name})\n" for name in wanted if f"{name}(" not in SOURCE and f"({name})" not in SOURCE)
+    return packed(path, version, _description(version, guid, kind), library)
 
 
 def _description(version: int, guid: str, kind: str) -> str:

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
+from cosim.data.recording import Recording
 from cosim.master.result import RunResult
 from cosim.master.simulate import Options
 from cosim.master.simulate import simulate as simulate_system
@@ -29,3 +30,11 @@ def simulate(
         **{key: value for key, value in given.items() if key not in _OPTIONS},
     )
     return simulate_system(system, Options(**{key: value for key, value in given.items() if key in _OPTIONS}))
+
+
+def pair(
+    fmu: Any, wires: Sequence[Wire | tuple[str, str]], record: Mapping[str, str | Record], **given: Any
+) -> Recording:
+    """Simulate an FMU that is there twice, as "one" and "two", for four steps of 0.1 s unless told otherwise."""
+    found = simulate({"one": fmu, "two": fmu}, wires, record=record, **({"step": 0.1, "ticks": 4} | given))
+    return found.recording

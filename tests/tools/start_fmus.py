@@ -15,14 +15,13 @@
 - `single`: y = k u + c in Float32 (FMI 3)
 """
 
-import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import fmpy
 import pytest
-from compiling import compiled
+from compiling import compiled, with_stubs
+from compiling import packed as pack
 
 SOURCE = r"""
 #include <stdbool.h>
@@ -142,7 +141,6 @@ API int fmi3SetContinuousStates(M *m, const double *x, size_t n) { m->r[X] = x[0
 API int fmi3GetContinuousStates(M *m, double *x, size_t n) { compute(m); x[0] = m->r[X]; return 0; }
 API int fmi3GetContinuousStateDerivatives(M *m, double *x, size_t n) { compute(m); x[0] = m->r[DX]; return 0; }
 API int fmi3GetNominalsOfContinuousStates(M *m, double *x, size_t n) { x[0] = 1; return 0; }
-#define UNUSED(name) API int name(void) { return 3; }
 """
 
 
@@ -206,14 +204,9 @@ def make(tmp_path: Path) -> Make:
 
 def packed(folder: Path, model: str, version: int = 2, **description: str) -> Path:
     """Pack one of them; the rest says what its description shall say, see `described`."""
-    platform = fmpy.platform if version == 2 else fmpy.platform_tuple
     number = len(list(folder.glob("*.fmu")))
-    path = folder / f"{model}{number}.fmu"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", described(model, version, **description))
-        library = compiled("start", SOURCE + _stubs())
-        archive.write(library, f"binaries/{platform}/{library.name}")
-    return path
+    text = described(model, version, **description)
+    return pack(folder / f"{model}{number}.fmu", version, text, compiled("start", with_stubs(SOURCE)))
 
 
 def described(
@@ -278,14 +271,3 @@ def _variable(one: V, version: int, index: Mapping[str, int]) -> str:
         return f"<ScalarVariable {common}><{OF_FMI2.get(one.type, one.type)} {start} {more}/></ScalarVariable>"
     size = f'<Dimension start="{one.size}"/>' if one.size else ""
     return f"<{one.type} {common} {start} {more}>{size}</{one.type}>"
-
-
-def _stubs() -> str:
-    """Define the functions that FMPy asks for and nobody calls."""
-    from fmpy.fmi2 import FMU2Model, FMU2Slave
-    from fmpy.fmi3 import FMU3Model, FMU3Slave
-
-    kinds = {2: (FMU2Model, FMU2Slave), 3: (FMU3Model, FMU3Slave)}
-    named = {name: version for version, both in kinds.items() for one in both for name in dir(one)}
-    wanted = [name for name, version in named.items() if name.startswith(f"fmi{version}")]
-    return "".join(f"UNUSED({name})\n" for name in sorted(wanted) if f"{name}(" not in SOURCE)

@@ -9,9 +9,8 @@ From fail_at on a step returns the number `status`; 11 crashes the process, 12 n
 import zipfile
 from pathlib import Path
 
-import fmpy
 import pytest
-from compiling import compiled
+from compiling import compiled, packed, with_stubs
 
 SOURCE = r"""
 #include <math.h>
@@ -55,7 +54,6 @@ static int step(M *m, double t, double h) {
 #define NONE(name) API int name(void *m) { (void)m; return 0; }
 API char calls[9]; /* what was called at the end: T terminate, F free */
 static int noted(char c) { calls[strlen(calls)] = c; return 0; }
-#define UNUSED(name) API int name(void) { return 3; }
 typedef struct { Log2 *log; } Callbacks;
 API void *fmi2Instantiate(const char *n, int k, const char *g, const char *r, Callbacks *c, int v, int l) {
   M *m = make(); m->log = (void *)c->log; strncpy(m->name, n, 98); return m; }
@@ -116,13 +114,8 @@ VARIABLES = [
 
 def build(directory: Path, version: int) -> Path:
     """Compile and pack the tiny FMU for one FMI version."""
-    platform = fmpy.platform if version == 2 else fmpy.platform_tuple
-    library = compiled("tiny", SOURCE + _stubs(version))
-    path = directory / f"tiny{version}.fmu"
-    with zipfile.ZipFile(path, "w") as archive:
-        archive.writestr("modelDescription.xml", description(version))
-        archive.write(library, f"binaries/{platform}/{library.name}")
-    return path
+    library = compiled("tiny", with_stubs(SOURCE))
+    return packed(directory / f"tiny{version}.fmu", version, description(version), library)
 
 
 def described(fmu: Path, path: Path, xml: str) -> Path:
@@ -165,13 +158,3 @@ def _variable(version: int, number: int, name: str, causality: str, unit: str, s
     return (
         f"<Float64 {common} {value}/>" if version == 3 else f"<ScalarVariable {common}><Real {value}/></ScalarVariable>"
     )
-
-
-def _stubs(version: int) -> str:
-    """Define the functions that FMPy asks for and no test calls."""
-    from fmpy.fmi2 import FMU2Slave
-    from fmpy.fmi3 import FMU3Slave
-
-    kind = FMU2Slave if version == 2 else FMU3Slave
-    wanted = [name for name in dir(kind) if name.startswith(f"fmi{version}")]
-    return "".join(f"UNUSED({name})\n" for name in wanted if f"{name}(" not in SOURCE and f"({name})" not in SOURCE)

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from closed_loop import recorded
+from wandering import swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.diagnose import Outcome, diagnose
@@ -30,8 +31,7 @@ BASE = Mount(name="axis", axis=Axis(inertia=5.0), friction=Coulomb(Fc=2.0, sigma
 def run(name: str, amplitude: float, phase: float, seed: int, seconds: float = 12.0) -> Recording:
     """A wandering motion of the base, disturbed by two tones, with a little noise."""
     t, rng = np.arange(int(seconds * 250)) / 250, np.random.default_rng(seed)
-    tones = [(a, 2 * np.pi * f, p) for a, f, p in zip((0.2, 0.1, 0.03), rng.uniform(0.1, 1, 3), (0, 1, 2), strict=True)]
-    q, v, a = (sum(s * w**k * np.sin(w * t + p + k * np.pi / 2) for s, w, p in tones) for k in range(3))
+    q, v, a = swing(t, list(zip((0.2, 0.1, 0.03), rng.uniform(0.1, 1, 3), (0, 1, 2), strict=True)))
     disturbed = amplitude * (np.sin(2 * np.pi * HERTZ * t + phase) + 0.6 * np.sin(2 * np.pi * SECOND * t + 2 * phase))
     noise = 0.05 * rng.standard_normal(len(t))
     return Recording(name, {"t": t, "tau": 5.0 * a + 2.0 * np.sign(v) + 1.0 * v + disturbed + noise, "q": q})

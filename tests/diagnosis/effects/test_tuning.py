@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from wandering import swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.ledger import all_pass
@@ -37,11 +38,7 @@ from pyfmi_models.mount import Axis, Mount
 def warmed(name: str, coldest: float, phase: float) -> Recording:
     """20 s in air and grease that thins as it warms up."""
     t = np.arange(4000) / 200
-    tones = [(0.5, 0.11, phase), (0.1, 0.37, 1.0 + phase), (0.02, 0.9, 2.0)]
-    waves = [(a, 2 * np.pi * f, 2 * np.pi * f * t + p) for a, f, p in tones]
-    q = sum(a * np.sin(x) for a, _, x in waves)
-    v = sum(a * w * np.cos(x) for a, w, x in waves)
-    acceleration = sum(-a * w**2 * np.sin(x) for a, w, x in waves)
+    q, v, acceleration = swing(t, [(0.5, 0.11, phase), (0.1, 0.37, 1.0 + phase), (0.02, 0.9, 2.0)])
     temperature = coldest + 8 * t / t[-1]
     thinner = np.exp(-0.04 * (temperature - 20))
     tau = 5 * acceleration + 2 * np.sign(v) + 3 * v * thinner + 1.5 * v * np.abs(v)
@@ -245,11 +242,7 @@ SLOPE = 0.4
 def motion(size: float, phase: float) -> tuple[Array, Array, Array, Array]:
     """Time, position, speed and acceleration of 20 s at 500 Hz."""
     t = np.arange(10_000) / 500
-    tones = [(0.5, 0.11, phase), (0.1, 0.37, 1.0 + phase), (0.02, 0.9, 2.0)]
-    waves = [(size * a, 2 * np.pi * f, 2 * np.pi * f * t + p) for a, f, p in tones]
-    q = sum(a * np.sin(x) for a, _, x in waves)
-    v = sum(a * w * np.cos(x) for a, w, x in waves)
-    return t, q, v, sum(-a * w**2 * np.sin(x) for a, w, x in waves)
+    return t, *swing(t, [(0.5 * size, 0.11, phase), (0.1 * size, 0.37, 1.0 + phase), (0.02 * size, 0.9, 2.0)])
 
 
 def saturated(knee: float, sizes: tuple[float, float]) -> tuple[Comparison, Fit]:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from wandering import swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.result import Diagnosis
@@ -15,14 +16,10 @@ def recorded(name: str, phase: float, level: float, viscosity: float, seconds: f
     """40 s of motion; level and viscosity fall by these shares, with a time constant."""
     t = np.arange(8_000) / 200
     rng = np.random.default_rng(int(10 * phase) + 1)
-    tones = [(0.6, 0.11, phase), (0.25, 0.37, 1 + phase), (0.02, 0.9, 2.0)]
-    w = [(a, 2 * np.pi * f, 2 * np.pi * f * t + p) for a, f, p in tones]
-    q = sum(a * np.sin(x) for a, _, x in w)
-    v = sum(a * o * np.cos(x) for a, o, x in w)
+    q, v, a = swing(t, [(0.6, 0.11, phase), (0.25, 0.37, 1 + phase), (0.02, 0.9, 2.0)])
     gone = 1 - np.exp(-t / seconds)
     friction = 2 * np.sign(v) * (1 - level * gone) + 2 * v * (1 - viscosity * gone)
-    inertial = sum(-5 * a * o**2 * np.sin(x) for a, o, x in w)
-    return Recording(name, {"t": t, "tau": inertial + friction + 0.02 * rng.standard_normal(len(t)), "q": q})
+    return Recording(name, {"t": t, "tau": 5 * a + friction + 0.02 * rng.standard_normal(len(t)), "q": q})
 
 
 def diagnosed(level: float, viscosity: float) -> Diagnosis:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from wandering import swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.decide.policy import POLICY
@@ -44,10 +45,7 @@ def compared(extra: object) -> tuple[Comparison, Fit]:
     t = np.arange(10_000) / 500
     recordings, rng = [], np.random.default_rng(1)
     for run in (0.0, 2.0):
-        tones = [(0.5, 0.11, run), (0.1, 0.37, 1.0 + run), (0.02, 0.9, 2.0)]
-        q = sum(a * np.sin(2 * np.pi * f * t + p) for a, f, p in tones)
-        v = sum(a * 2 * np.pi * f * np.cos(2 * np.pi * f * t + p) for a, f, p in tones)
-        acceleration = sum(-a * (2 * np.pi * f) ** 2 * np.sin(2 * np.pi * f * t + p) for a, f, p in tones)
+        q, v, acceleration = swing(t, [(0.5, 0.11, run), (0.1, 0.37, 1.0 + run), (0.02, 0.9, 2.0)])
         noise = 0.002 * rng.standard_normal(len(t))
         tau = 5 * acceleration + LEVEL * np.sign(v) + v + extra(q, v) + noise  # type: ignore[operator]
         recordings.append(Recording(f"run_{run}", {"t": t, "tau": tau, "q": q}))

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from wandering import swing
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.doubt_entry import Sanity
@@ -231,14 +232,13 @@ def shaken(seed: int, late: float, shake: float) -> Recording:
     t = np.arange(3_000) / 250
     w = 2 * np.pi * 7.3
     tones = [(0.5, 0.7 + 0.1 * seed, 0.0), (0.2, 1.9, seed), (0.08, 5.3, 2 * seed), (0.006 * shake, w, 0.9)]
-    moves = [[size * o**k * np.sin(o * t + p + k * np.pi / 2) for size, o, p in tones] for k in range(3)]
-    q, v, a = (np.sum(one, axis=0) for one in moves)
+    q, v, a = swing(t, tones, per=1)
     ground = 0.25 * shake * np.sin(w * t + 1.4)
     noise = 0.03 * np.random.default_rng(seed).standard_normal(len(t))
     tau = 0.6 * a + 1.1 * np.tanh(v / 2e-4) + 0.3 * v + ground + noise
     rows = round(250 * late)
     read = np.concatenate([np.repeat(q[:1], rows), q[: len(q) - rows]])
-    return Recording(f"run{seed}", {"t": t, "tau": tau, "q": read, "q_d": np.sum(moves[0][:3], axis=0)})
+    return Recording(f"run{seed}", {"t": t, "tau": tau, "q": read, "q_d": swing(t, tones[:3], per=1)[0]})
 
 
 @pytest.mark.parametrize(("late", "shake"), [(0.0, 1.0), (0.028, 0.0)])
