@@ -6,7 +6,6 @@ they keep an imprecise friction law from being taken for a missing effect; so do
 """
 
 from dataclasses import replace
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +13,7 @@ import numpy.typing as npt
 
 from cosim.estimation.inverse import Inverse, stacked
 from cosim.estimation.prepare import Array, Piece, Prepared
+from cosim.support.kept import kept_with
 from pyfmi_models.effects import PeriodicFriction
 from pyfmi_models.mount import Mount
 
@@ -77,7 +77,7 @@ def speed_shapes(piece: Piece, top: float) -> Array:
     return np.asarray(sign[:, None] * np.exp(-((piece.v[:, None] / scales) ** 2)))
 
 
-@lru_cache(maxsize=4)
+@kept_with()
 def discrepancy_basis(prepared: Prepared) -> tuple[Array, Array]:
     """Return the stop operators and the speed shapes at the kept rows, filtered: (rows, 8) and (rows, 3)."""
     distances = stop_distances(prepared)

@@ -7,7 +7,7 @@ is stiffer than the band of a diagnosis, so one implicit step a row is enough; e
 """
 
 from collections.abc import Sequence
-from functools import cache, lru_cache
+from functools import cache
 from typing import Any
 
 import casadi as ca
@@ -16,6 +16,7 @@ import numpy as np
 from cosim.estimation.kernels import done, library
 from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.rowwise import Stepwise
+from cosim.support.kept import kept_with
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.base import Coupling
 from pyfmi_models.model import fields_of
@@ -68,7 +69,7 @@ def _searched(piece: Piece, plays: Sequence[Backlash]) -> Array:
     return piece.lowpass(fine.T)[piece.kept]
 
 
-@lru_cache(maxsize=2)
+@kept_with(most=2)
 def torques_of_grid(prepared: Prepared, plays: tuple[tuple[float, float], ...], ratio: float) -> Array:
     """The same for a grid that is looked at again: the last two are kept."""
     return far_torques(prepared, plays, ratio)

@@ -13,7 +13,6 @@ that a loop may trail by itself, so either may be true; and without a recorded s
 """
 
 from collections.abc import Iterator
-from functools import lru_cache
 from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
@@ -24,6 +23,7 @@ from cosim.diagnosis.effects.candidates import Candidate, Span, has
 from cosim.estimation.filters import derivative, lowpass
 from cosim.estimation.prepare import Array, Piece, Prepared
 from cosim.estimation.problem import Problem
+from cosim.support.kept import kept_with
 from cosim.support.statistics import SURELY
 from pyfmi_models.effects import ActuatorLag, Delay, DriveEffect, Effect
 from pyfmi_models.mount import Mount
@@ -130,7 +130,7 @@ def attributed(prepared: Prepared, seconds: float, sample_time: float) -> Litera
     return "drive" if late.seconds < seconds / 2 else "either"
 
 
-@lru_cache(maxsize=4)
+@kept_with()
 def reading_lag(prepared: Prepared) -> ReadingLag | None:
     """Measure it on all pieces together; None where position or set point was not recorded, or nothing moved."""
     if not prepared.has_position or any("q_d" not in piece.extras for piece in prepared.pieces):
