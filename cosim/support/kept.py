@@ -20,13 +20,13 @@ def kept_with(most: int = 1) -> Callable[[Callable[Concatenate[K, P], R]], Calla
         known: WeakKeyDictionary[K, dict[Any, R]] = WeakKeyDictionary()
 
         @wraps(find)
-        def found(of: K, /, *more: P.args, **named: P.kwargs) -> R:
+        def remembered(of: K, /, *more: P.args, **named: P.kwargs) -> R:
             own = known.setdefault(of, {})
             own[more] = own.pop(more) if more in own else find(of, *more, **named)
             for old in list(own)[:-most]:
                 del own[old]
             return own[more]
 
-        return found
+        return remembered
 
     return decorate
