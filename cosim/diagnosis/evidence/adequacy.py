@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.diagnosis.evidence.comparison import Comparison
+from cosim.diagnosis.evidence.forms import forms
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.estimation.fit import Fit
 from cosim.estimation.least_squares import projected
@@ -60,14 +61,23 @@ def _moved(residual: Array, columns: Array, weight: Array, prepared: Prepared, w
 def share_beside(comparison: Comparison, found: Fit, residual_there: Array, held: Predictive) -> float:
     """Slow part beside what friction laws cannot agree on and a level that wanders; in training or held out, the more.
 
-    What is left of either cannot be friction of another law, so that little of it is no misfit.
+    What is left of either cannot be friction of another law, so that little of it is no misfit. Nor is what the
+    equations of the named effects may miss of their machine's.
     """
-    prepared, nuisances = comparison.problem.prepared, comparison.nuisances.columns
+    prepared, here, there = comparison.problem.prepared, comparison.nuisances.columns, held.nuisances.columns
     trained, clear_there = comparison.problem.weight * far_from_turns(prepared), _clear_there(comparison, held)
-    left = _unexplained(found.residual, trained, nuisances)
-    there = _unexplained(residual_there, clear_there, held.nuisances.columns)
-    sizes = (_lasting(left, trained, prepared), _lasting(there, clear_there, held.prepared))
-    return max(sizes) / _friction(comparison, trained)
+    friction = _friction(comparison, trained)
+    sizes = []
+    for residual, weight, rows, nuisances in (
+        (found.residual, trained, prepared, here),
+        (residual_there, clear_there, held.prepared, there),
+    ):
+        missed = forms(found, len(comparison.problem.mount.effects), rows)
+        if missed:
+            wrong = max(_slow(residual, weight, rows), LEAST_WRONG * friction)
+            residual = residual - _moved(residual, comparison.policy.misfit * missed.columns, weight, rows, wrong)
+        sizes.append(_lasting(_unexplained(residual, weight, nuisances), weight, rows))
+    return max(sizes) / friction
 
 
 def over_time(comparison: Comparison, found: Fit) -> str:

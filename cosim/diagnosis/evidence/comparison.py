@@ -289,19 +289,22 @@ class Comparison:
     def group(self, found: Fit, columns: Array) -> tuple[float, Array]:
         """Evidence of columns whose coefficients share an unknown size, and those coefficients, shrunk as that says.
 
-        Columns have unit RMS in training; the prior of the size is `policy.misfit` of the friction level.
+        Columns have unit RMS in training; the prior of the size is `policy.misfit` of the friction level. What the
+        effects of the structure may miss of their machine's stands beside them.
         """
-        own = self._own(found)
-        grams, placed, free, now = self._ready(found, own, NONE)
-        bands = self.bands
+        own, missed, policy = self._own(found), self.missed_by(found), self.policy
+        grams, placed = self._joined(found, own, NONE)
         level = rms(self.nuisances.level) or float(np.std(self.problem.prepared.stacked("tau")))
-        scaled = columns * level
-        grown = self._grown(grams, own, NONE, self.bands.transform(scaled))
-        many = len(free)
-        added = Group(np.arange(many, many + columns.shape[1]), self.policy.misfit)
-        both = np.concatenate([free, np.ones(columns.shape[1])])
-        after = marginal(grown, both, [*placed, added], bands.count, bands.effective, self.floor)
-        return after.log_likelihood - now.log_likelihood, after.beta[many:] * level
+        added, free = self.bands.transform(columns * level), self._free(found, grams)
+        if missed:
+            added = np.column_stack([self._kept(missed, lambda: self.bands.transform(missed.columns)), added])
+            placed = [*placed, *(Group(len(free) + np.array(one), policy.misfit) for one in missed.groups)]
+        free = np.concatenate([free, np.ones(added.shape[1])])
+        term = Group(np.arange(len(free) - columns.shape[1], len(free)), policy.misfit)
+        grown = self._grown(grams, own, NONE, added)
+        after = marginal(grown, free, [*placed, term], self.bands.count, self.bands.effective, self.floor)
+        gain = after.log_likelihood - self._marginal(found, NONE, False, missed).log_likelihood
+        return gain, after.beta[len(free) - columns.shape[1] :] * level
 
     def above_noise(self, found: Fit, without: Fit) -> float:
         """Energy that an effect removes, over the least noise: the reading's in the torque, and any model's accuracy.
