@@ -13,7 +13,7 @@ import numpy as np
 
 from cosim.data import questions
 from cosim.data.checks import renamed, renamed_units
-from cosim.data.columns import Columns
+from cosim.data.columns import Columns, Request
 from cosim.data.limits import short
 from cosim.data.roles import counts, guess, suits
 from cosim.data.text.names import bracketed, unit_of_name
@@ -41,28 +41,20 @@ class Assigned:
     notes: tuple[str, ...] = ()
 
 
-def assign(
-    path: Path, found: Columns, columns: Mapping[str, str], units: Mapping[str, str], required: Sequence[str]
-) -> Assigned:
-    """Give columns our names.
-
-    Args:
-        path: the file, for messages.
-        found: its columns.
-        columns: what the user says, our name to the file's; `#3` is the third column.
-        units: what the user says of units, by our name.
-        required: columns that are needed, `q|v` for one of two; nothing but the time where it is empty.
+def assign(request: Request, found: Columns) -> Assigned:
+    """Give the columns of a file our names.
 
     Raises:
         RecordingError: a name is not there, or a meaning is ambiguous; the message names the option that decides.
     """
-    stated = {ours: numbered(theirs, found) for ours, theirs in columns.items()}
+    path = request.path
+    stated = {ours: numbered(theirs, found) for ours, theirs in request.columns.items()}
     named = {name: units_stated(found, name) for name in found.values}
     values, had = renamed(path, found.values, stated), renamed_units(named, stated)
-    roles = _missing(path, found, values, had, [*stated], required, units)
+    roles = _missing(path, found, values, had, [*stated], request.required, request.units)
     sources = {**{ours: theirs for ours, theirs in stated.items()}, **roles}
     values = renamed(path, values, roles)
-    given = {name: spelled(text) for name, text in units.items()}
+    given = {name: spelled(text) for name, text in request.units.items()}
     had = renamed_units({name: text for name, text in found.units.items() if is_known(text)}, stated | roles)
     for ours in [name for name in values if name in OURS and name not in given]:
         text = _unit_of(path, found, ours, sources.get(ours, ours))

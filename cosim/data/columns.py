@@ -1,7 +1,8 @@
 """What a file holds before anything is judged: columns by name, units and origin where they are stated."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,27 @@ class Columns:
     clocks: dict[str, np.ndarray] = field(default_factory=dict)
     contradictions: dict[str, tuple[str, str]] = field(default_factory=dict)
     header: str = ""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is wanted of a file: which recording of it, what the user says of it, and the columns that are needed.
+
+    Args:
+        path: the file, and which recording of it; messages and notes name it.
+        columns: what the user says of names, ours to the file's; `#3` is the third column.
+        units: what the user says of units, by our name.
+        layout: what the user says of rows: `period`, their distance where there is no time; `nan` ("gap"), which leaves
+            out those in which a column that is needed has no value; `repeated` ("first", "last"), which of those of one
+            time that differ is kept: none is left out without.
+        required: columns that are needed, `q|v` for one of two; nothing but the time where it is empty.
+    """
+
+    path: Path
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    layout: Mapping[str, str] = field(default_factory=dict)
+    required: tuple[str, ...] = ()
 
 
 def doubles(chunks: Sequence[Any]) -> np.ndarray:

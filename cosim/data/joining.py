@@ -29,7 +29,7 @@ import numpy.typing as npt
 from cosim.data import questions
 from cosim.data.assign import OURS, assign
 from cosim.data.checks import chosen
-from cosim.data.columns import Columns
+from cosim.data.columns import Columns, Request
 from cosim.data.limits import listed, short
 from cosim.data.order import order_of, single
 from cosim.data.registers import register_of
@@ -108,23 +108,10 @@ class Read:
     how: str
 
 
-def on_one_time(
-    path: Path,
-    found: Columns,
-    columns: Mapping[str, str],
-    units: Mapping[str, str],
-    required: Sequence[str],
-    repeated: str = "",
-) -> Columns:
-    """Put channels with times of their own on one time base; a table whose columns share their times stays as it is.
+def on_one_time(request: Request, found: Columns) -> Columns:
+    """Put channels with times of their own on one time base, which is that of columns that are needed.
 
-    Args:
-        path: the file, for messages.
-        found: columns, and the times of those that have their own.
-        columns: what the user says of names, as `assign` takes it.
-        units: what the user says of units.
-        required: columns that are needed; the base is taken from them.
-        repeated: which of the samples of one time that differ is kept, "first" or "last".
+    A table whose columns share their times stays as it is.
 
     Returns:
         Columns of equal length with the time `t` [s], and a note that says what was read at which times.
@@ -134,17 +121,19 @@ def on_one_time(
     """
     if not found.clocks:
         return found
-    found = _of_one_clock(found, columns["t"]) if "t" in columns else _without_times(found)
+    path, own = request.path, request.columns.get("t")
+    found = _of_one_clock(found, own) if own is not None else _without_times(found)
     if (table := _as_table(found)) is not None:
         return table
+    repeated = request.layout.get(questions.REPEATED, "")
     channels = {name: one for name in found.clocks if (one := _channel(found, name, repeated))}
     if not channels:
         return replace(found, values={}, clocks={})
     longest = max(channels.values(), key=lambda one: len(one.t))
     named = replace(found, values={"t": longest.t} | {name: one.x for name, one in channels.items()}, clocks={})
-    served = assign(path, named, columns, units, required)
+    served = assign(request, named)
     roles = {theirs: ours for ours, theirs in served.sources.items() if theirs in channels and ours in OURS}
-    needed = [served.sources[ours] for ours in chosen(served.values, tuple(required)) if ours != "t"]
+    needed = [served.sources[ours] for ours in chosen(served.values, request.required) if ours != "t"]
     for name in needed:
         _check_times(path, channels[name])
     if not any(one.grows for one in channels.values()):

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cosim.data.assign import assign
-from cosim.data.columns import Columns
+from cosim.data.columns import Columns, Request
 from cosim.data.joining import on_one_time
 from cosim.data.limits import listed, short
 from cosim.data.order import in_order
@@ -26,58 +26,26 @@ MANY = 1000
 """Values of a column beyond which it is a measurement, and no name of a recording."""
 
 
-def rows_of_one(
-    path: Path,
-    found: Columns,
-    columns: Mapping[str, str],
-    units: Mapping[str, str],
-    layout: Mapping[str, str],
-    required: Sequence[str],
-) -> Columns:
+def rows_of_one(request: Request, found: Columns) -> Columns:
     """Return what a file holds as a table with one row for each time, and of many recordings the one that is named.
-
-    Args:
-        path: the file, and which recording of it.
-        found: all that the file holds.
-        columns: what the user says of names, as `assign` takes it.
-        units: what the user says of units.
-        layout: what the user says of rows: `period`, their distance where there is no time; `nan`, `repeated`.
-        required: columns that are needed; see `on_one_time`.
 
     Raises:
         RecordingError: as `on_one_time`, `with_time` and `one_run`.
     """
-    rows = timed(path, found, columns, units, layout, required)
-    one = one_run(path, rows, columns, units)
-    return rows if one is rows else _full(path, one, columns, units, layout, required)
+    rows = timed(request, found)
+    one = one_run(request, rows)
+    return rows if one is rows else _full(request, one)
 
 
-def timed(
-    path: Path,
-    found: Columns,
-    columns: Mapping[str, str],
-    units: Mapping[str, str],
-    layout: Mapping[str, str],
-    required: Sequence[str],
-) -> Columns:
+def timed(request: Request, found: Columns) -> Columns:
     """Return all rows of a table or file, as `rows_of_one` does of one recording of it."""
-    _check_layout(layout)
-    found = with_time(on_one_time(path, found, columns, units, required, layout.get(REPEATED, "")), layout)
-    found = _full(path, found, columns, units, layout, required)
-    return in_order(path, found, columns, units, required, layout.get(REPEATED, ""))
+    _check_layout(request.layout)
+    return in_order(request, _full(request, with_time(on_one_time(request, found), request.layout)))
 
 
-def _full(
-    path: Path,
-    found: Columns,
-    columns: Mapping[str, str],
-    units: Mapping[str, str],
-    layout: Mapping[str, str],
-    required: Sequence[str],
-) -> Columns:
+def _full(request: Request, found: Columns) -> Columns:
     """Return a table whose rows have what is needed, as far as that is known."""
-    found = filled(path, found, columns, units, required, layout.get(REPEATED, ""))
-    return without_empty(path, found, columns, units, required, layout)
+    return without_empty(request, filled(request, found))
 
 
 def _check_layout(layout: Mapping[str, str]) -> None:
@@ -87,26 +55,22 @@ def _check_layout(layout: Mapping[str, str]) -> None:
             raise RecordingError(text, culprit=key, value=layout[key], choices=choices)
 
 
-def one_run(path: Path, found: Columns, columns: Mapping[str, str], units: Mapping[str, str]) -> Columns:
+def one_run(request: Request, found: Columns) -> Columns:
     """Return the rows of the recording that a path names, all rows where it names a whole file.
 
-    Args:
-        path: the file, and which recording of it: `column=value`, several with commas, `#number`, or both.
-        found: all rows of the file.
-        columns: what the user says of names, as `assign` takes it: which column is the time.
-        units: what the user says of units.
+    Behind the file's name stands `column=value`, several with commas, `#number`, or both.
 
     Raises:
         RecordingError: there is no such column, value or number.
     """
-    file, which = split(path)
+    path, (file, which) = request.path, split(request.path)
     if file == path:
         return found
     rows, told_by = np.arange(len(next(iter(found.values.values())))), set()
     for part in which.split(","):
         name, _, text = part.partition("=")
         number, within = part.startswith("#"), _at(found, rows)
-        rows = rows[_numbered(path, within, part, columns, units) if number else _chosen(path, within, name, text)]
+        rows = rows[_numbered(request, within, part) if number else _chosen(path, within, name, text)]
         told_by |= {name}
     cut = _at(found, rows)
     values = {name: column for name, column in cut.values.items() if name not in told_by}
@@ -135,22 +99,20 @@ def _chosen(path: Path, found: Columns, name: str, text: str) -> np.ndarray:
     return rows
 
 
-def _numbered(
-    path: Path, found: Columns, number: str, columns: Mapping[str, str], units: Mapping[str, str]
-) -> np.ndarray:
+def _numbered(request: Request, found: Columns, number: str) -> np.ndarray:
     """Return the rows of a recording by its number, `#3`; a new one begins where time runs backwards."""
-    begins = np.append(_begins(path, found, columns, units), len(next(iter(found.values.values()))))
+    begins = np.append(_begins(request, found), len(next(iter(found.values.values()))))
     count, wanted = len(begins) - 1, whole(number[1:]) or 0
     if not 0 < wanted <= count:
         have = f"{count:,} recordings, #1 to #{count}" if count > 1 else "one recording"
         rule = "another begins where time runs backwards"
-        message = f"{path}: there is no {short(number)}; the file holds {have} ({rule})."
-        raise RecordingError(message, culprit=str(path), value=number)
+        message = f"{request.path}: there is no {short(number)}; the file holds {have} ({rule})."
+        raise RecordingError(message, culprit=str(request.path), value=number)
     return np.arange(begins[wanted - 1], begins[wanted])
 
 
-def _begins(path: Path, found: Columns, columns: Mapping[str, str], units: Mapping[str, str]) -> Sequence[int]:
-    served = assign(path, found, columns, units, ())
+def _begins(request: Request, found: Columns) -> Sequence[int]:
+    path, served = request.path, assign(replace(request, required=()), found)
     if "t" not in served.values:
         return [0]
     t = read_clock(path, served.values["t"], served.sources["t"], served.units.get("t", ""), servo=False).values

@@ -15,15 +15,15 @@ of one time that differ are refused when they are judged (`checks.check_time`).
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from cosim.data.assign import assign
 from cosim.data.checks import COARSE
-from cosim.data.columns import Columns
+from cosim.data.columns import Columns, Request
 from cosim.data.limits import short
+from cosim.data.questions import REPEATED
 from cosim.data.times import DAY, read_clock
 
 Array = npt.NDArray[np.float64]
@@ -54,28 +54,13 @@ class Ordered:
     done: tuple[str, ...] = ()
 
 
-def in_order(
-    path: Path,
-    found: Columns,
-    columns: Mapping[str, str],
-    units: Mapping[str, str],
-    required: Sequence[str],
-    repeated: str = "",
-) -> Columns:
+def in_order(request: Request, found: Columns) -> Columns:
     """Return a table with its rows in the order of their times, and a note for each thing that was done.
-
-    Args:
-        path: the file, for messages and notes.
-        found: its columns, of equal length.
-        columns: what the user says of names, as `assign` takes it: which column is the time.
-        units: what the user says of units.
-        required: columns that are needed.
-        repeated: which of the rows of one time that differ is kept, "first" or "last"; none is left out without.
 
     Raises:
         RecordingError: as `assign`, where it is open which column is the time.
     """
-    served = assign(path, found, columns, units, required)
+    path, served = request.path, assign(request, found)
     if "t" not in served.values:
         return found
     name, column = served.sources["t"], served.values["t"]
@@ -83,7 +68,7 @@ def in_order(
     if clock.dtype.kind not in "iuf":
         return found
     others = {key: one for key, one in found.values.items() if key != name}
-    ordered = single(order_of(clock.astype(np.float64), others, found.restarts), repeated)
+    ordered = single(order_of(clock.astype(np.float64), others, found.restarts), request.layout.get(REPEATED, ""))
     if not ordered.done:
         return found
     values = {key: one[ordered.rows] for key, one in found.values.items()}

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cosim.data.assign import assign, units_stated
-from cosim.data.columns import Columns
+from cosim.data.columns import Columns, Request
 from cosim.data.formats import is_recording, read_columns
 from cosim.data.limits import check_cells, listed, short
 from cosim.data.roles import guess, is_named
@@ -128,7 +128,7 @@ def _time_of(path: Path, found: Columns, columns: Mapping[str, str]) -> str:
     if columns.get("t") in found.values:
         return columns["t"]
     if not found.numbered:
-        return assign(path, found, {}, {}, ()).sources.get("t", "")
+        return assign(Request(path), found).sources.get("t", "")
     return "#1" if len(found.values) == 1 and is_named(path.stem, "time") else ""
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from shlex import quote
 
 from cosim.data.assign import assign
-from cosim.data.columns import Columns
+from cosim.data.columns import Columns, Request
 from cosim.data.one_run import rows_of_one
 from cosim.data.parts import options_within, read_run
 from cosim.data.recording import REQUIRED, Recording
@@ -99,12 +99,13 @@ def _read(
     required: tuple[str, ...],
     refused: str = "",
 ) -> Preview:
-    timed = rows_of_one(path, found, said["columns"], said["units"], said["layout"], required)
+    request = Request(path, **said, required=required)
+    timed = rows_of_one(request, found)
     if refused:
-        table = assign(path, timed, said["columns"], said["units"], required)
+        table = assign(request, timed)
         if "t" in table.values:
             check_slow(path, table.values["t"], table.sources["t"], table.units.get("t", ""))
-    recording = Recording.judged(path, named(path), timed, own, said["columns"], said["units"], required)
-    served = assign(path, timed, said["columns"], said["units"], required)
+    recording = Recording.judged(request, named(path), timed, own)
+    served = assign(request, timed)
     served = with_speed(path, timed, served, said["units"]) if required == REQUIRED else served
     return Preview(recording, timed, served.sources, said, undecided, refused)

@@ -18,7 +18,7 @@ from cosim.data.arrays import as_columns, sha256_of
 from cosim.data.assign import assign
 from cosim.data.assumed import assumed
 from cosim.data.checks import check_motion, check_names, check_sampling, check_time, chosen, numbers
-from cosim.data.columns import Columns
+from cosim.data.columns import Columns, Request
 from cosim.data.one_run import rows_of_one, timed
 from cosim.data.parts import options_within, read_run
 from cosim.data.registers import at_an_end, continued
@@ -95,8 +95,8 @@ class Recording:
         path, layout = Path(path), dict(layout or {})
         found, own = read_run(path, columns or {}, units or {}, layout)
         columns, units = options_within(path, columns or {}, units or {})
-        found = rows_of_one(path, found, columns, units, layout, required)
-        one = cls.judged(path, named(path), found, own, columns, units, required)
+        request = Request(path, columns, units, layout, required)
+        one = cls.judged(request, named(path), rows_of_one(request, found), own)
         return replace(one, origin=one.origin | {"period": layout["period"]}) if "period" in layout else one
 
     @classmethod
@@ -115,23 +115,14 @@ class Recording:
             UnitError: a unit is unknown.
         """
         values = as_columns(name, table)
-        found = timed(Path(name), Columns(values), columns or {}, units or {}, {}, required)
-        return cls.judged(Path(name), name, found, sha256_of(values), columns or {}, units or {}, required)
+        request = Request(Path(name), columns or {}, units or {}, required=required)
+        return cls.judged(request, name, timed(request, Columns(values)), sha256_of(values))
 
     @classmethod
-    def judged(
-        cls,
-        path: Path,
-        name: str,
-        found: Columns,
-        sha256: str,
-        columns: Mapping[str, str],
-        units: Mapping[str, str],
-        required: tuple[str, ...],
-    ) -> "Recording":
-        """Judge columns that were read, as `read` does; `path` is what messages call them, `sha256` their hash."""
-        served = assign(path, found, columns, units, required)
-        served = with_speed(path, found, served, units) if required else served
+    def judged(cls, request: Request, name: str, found: Columns, sha256: str) -> "Recording":
+        """Judge columns that were read, as `read` does; `sha256` is their hash."""
+        path, required, served = request.path, request.required, assign(request, found)
+        served = with_speed(path, found, served, request.units) if required else served
         values, stated = served.values, served.units
         stated |= {"q_d": stated["q"]} if "q" in stated and "q_d" in values and "q_d" not in stated else {}
         check_names(path, values, required, stated)

@@ -8,7 +8,7 @@ those before the first and after the last in which all that is needed has a valu
 the devices that it asks. Others are left out, a gap in time, if the user says so.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +16,7 @@ import numpy as np
 
 from cosim.data.assign import assign
 from cosim.data.checks import chosen
-from cosim.data.columns import Columns
+from cosim.data.columns import Columns, Request
 from cosim.data.joining import LEAST, on_one_time
 from cosim.data.limits import LARGEST, listed
 from cosim.data.order import order_of
@@ -28,35 +28,20 @@ SPARSE = 0.2
 """Share of the rows without a value from which on they are no invalid samples: the column has times of its own."""
 
 
-def filled(
-    path: Path,
-    found: Columns,
-    columns: Mapping[str, str],
-    units: Mapping[str, str],
-    required: Sequence[str],
-    repeated: str = "",
-) -> Columns:
+def filled(request: Request, found: Columns) -> Columns:
     """Return a table whose rows are full: one with own times of its columns is put on one time base.
-
-    Args:
-        path: the file, for messages and notes.
-        found: its columns, of equal length.
-        columns: what the user says of names, as `assign` takes it.
-        units: what the user says of units.
-        required: columns that are needed; the base is taken from them.
-        repeated: which of the samples of one time that differ is kept, "first" or "last".
 
     Raises:
         RecordingError: as `assign`, `read_clock` and `on_one_time`.
     """
     if not any(_is_sparse(one) for one in found.values.values()):
         return found
-    served = assign(path, found, columns, units, required)
-    needed = chosen(served.values, tuple(required)) or tuple(one for one in served.values if one != "t")
+    served, units = assign(request, found), request.units
+    needed = chosen(served.values, request.required) or tuple(one for one in served.values if one != "t")
     if "t" not in served.values or not any(_is_sparse(served.values[name]) for name in needed):
         return found
     name = served.sources["t"]
-    clock = read_clock(path, served.values["t"], name, served.units.get("t", ""), servo=bool(required))
+    clock = read_clock(request.path, served.values["t"], name, served.units.get("t", ""), servo=bool(request.required))
     if clock.values.dtype.kind not in "iuf":
         return found
     size = unit(clock.unit).factor if clock.unit else 1.0
@@ -72,9 +57,9 @@ def filled(
         start=found.start or clock.start,
         notes=(*found.notes, *clock.notes),
     )
-    said = {key: text for key, text in columns.items() if key != "t"}
+    said = {key: text for key, text in request.columns.items() if key != "t"}
     scales = {key: text for key, text in units.items() if key != "t"}
-    joined = on_one_time(path, parted, said, scales, required, repeated)
+    joined = on_one_time(replace(request, columns=said, units=scales), parted)
     if "t" not in joined.values:
         return found
     own = joined.values["t"] / size if "t" in units else joined.values["t"]
@@ -82,36 +67,24 @@ def filled(
     return replace(joined, values=values, units=joined.units | {name: clock.unit if "t" in units else "s"})
 
 
-def without_empty(
-    path: Path,
-    found: Columns,
-    columns: Mapping[str, str],
-    units: Mapping[str, str],
-    required: Sequence[str],
-    layout: Mapping[str, str],
-) -> Columns:
+def without_empty(request: Request, found: Columns) -> Columns:
     """Return a table without rows that hold no sample, with a note.
 
-    Args:
-        path: the file, for messages and notes.
-        found: its columns, of equal length.
-        columns: what the user says of names, as `assign` takes it.
-        units: what the user says of units.
-        required: columns that are needed.
-        layout: what the user says of rows: `nan=gap` leaves those between others out too in which a column that is
-            needed has no value, or one beyond any axis; with a `period` time is none of the file's values.
+    With `nan=gap` those between others are left out too in which a column that is needed has no value, or one beyond
+    any axis; with a `period` time is none of the file's values.
 
     Raises:
         RecordingError: as `assign`.
     """
+    path, layout = request.path, request.layout
     empty = {name: _is_empty(column, EMPTY in layout) for name, column in found.values.items()}
     if not any(rows.any() for name, rows in empty.items() if found.values[name].dtype != object):
         return found
-    served = assign(path, found, columns, units, required)
+    served = assign(request, found)
     made = served.sources.get("t") if PERIOD in layout else None
     others = [rows for name, rows in empty.items() if name != made]
     blank = np.logical_and.reduce(others) if others else np.zeros(len(next(iter(empty.values()))), bool)
-    needed = [name for name in ("t", *chosen(served.values, tuple(required))) if name in served.values]
+    needed = [name for name in ("t", *chosen(served.values, request.required)) if name in served.values]
     lacks = {theirs: empty[theirs] for theirs in (served.sources[name] for name in needed)}
     bad = np.logical_or.reduce([*lacks.values()]) if lacks else blank
     whole = np.flatnonzero(~bad)

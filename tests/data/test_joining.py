@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cosim.data.columns import Columns
+from cosim.data.columns import Columns, Request
 from cosim.data.joining import on_one_time
 from cosim.data.recording import REQUIRED, Recording
 from cosim.support.errors import RecordingError
@@ -30,7 +30,7 @@ def channels(**own: tuple[np.ndarray, np.ndarray]) -> Columns:
 
 
 def joined(found: Columns, required: tuple[str, ...] = REQUIRED, **columns: str) -> Columns:
-    return on_one_time(PATH, found, columns, {}, required)
+    return on_one_time(Request(PATH, columns, required=required), found)
 
 
 @pytest.mark.parametrize("part", [slice(1000, None), slice(0, 2500), slice(700, 3100)], ids=["late", "early", "both"])
@@ -181,6 +181,6 @@ def test_mdf_groups_of_two_devices_are_joined_and_bits_of_invalidity_count(tmp_p
 
 def test_a_channel_that_holds_a_text_is_left_out_and_the_others_are_joined() -> None:
     words = np.array(["bad" if k == 7 else 0.0 for k in range(len(T))], dtype=object)
-    found = on_one_time(PATH, channels(tau=(T, torque(T)), q=(T, position(T)), word=(T, words)), {}, {}, REQUIRED)
+    found = joined(channels(tau=(T, torque(T)), q=(T, position(T)), word=(T, words)))
     assert {"tau", "q"} <= set(found.values)
     assert "word" not in found.values

@@ -11,6 +11,7 @@ from pyarrow import parquet
 from scipy.io import savemat
 
 from cosim.data.binary.messages import Message, columns_of
+from cosim.data.columns import Request
 from cosim.data.one_run import rows_of_one
 from cosim.data.recording import REQUIRED, Recording
 from cosim.support.errors import UndecidedError
@@ -167,8 +168,8 @@ def joints(t: float, name: str = "az", **values: float) -> tuple[str, str, int, 
 
 def read(messages: list[tuple[str, str, int, object]], **columns: str) -> Recording:
     packed = [Message(topic, kind, logged, 100, lambda given=given: given) for topic, kind, logged, given in messages]
-    found = rows_of_one(PATH, columns_of(PATH, packed), columns, {}, {}, REQUIRED)
-    return Recording.judged(PATH, "run", found, "", columns, {}, REQUIRED)
+    request = Request(PATH, columns, required=REQUIRED)
+    return Recording.judged(request, "run", rows_of_one(request, columns_of(PATH, packed)), "")
 
 
 def test_a_stamp_of_0_is_a_stamp() -> None:
