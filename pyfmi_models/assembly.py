@@ -8,8 +8,9 @@ transmission in front of the axis, others behind it; sensor effects make the rea
 the equations together, `mount.py` is the whole.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import pi
 from typing import Any, ClassVar, Literal, Self, TypeVar
 
@@ -95,7 +96,24 @@ class Assembly:
 
     def inputs(self) -> tuple[Variable, ...]:
         """List the inputs that effects read, each once."""
-        return tuple({one.name: one for effect in self.effects for one in effect.inputs()}.values())
+        return tuple({one.name: one for read in self._read.values() for one in read.values()}.values())
+
+    def recorded_as(self) -> dict[str, str]:
+        """Inputs that a recording holds under another name, by their own."""
+        known = ((self._read[name], effect.recorded_as()) for name, effect in self.of_kind(Effect))
+        return {read[own].name: column for read, columns in known for own, column in columns.items()}
+
+    @cached_property
+    def _read(self) -> dict[str, dict[str, Variable]]:
+        """Inputs by the names that each effect has for them, by its prefix; those of a further source count up."""
+        sources: dict[str, list[str]] = {}
+        for effect in self.effects:
+            known = sources.setdefault(effect.id, [])
+            known += [effect.source] if effect.source not in known else []
+        return {
+            name: {one.name: _numbered(one, effect.source, sources[effect.id]) for one in effect.inputs()}
+            for name, effect in self.of_kind(Effect)
+        }
 
     def in_axis_units(self, variable: Variable) -> Variable:
         """Turn rotary units into those of a linear axis where that is what this is; phases and bandwidths stay."""
@@ -136,7 +154,8 @@ class Assembly:
         """Yield the effects of a kind, each with the motion as it sees it: its own states beside."""
         for name, effect in self.of_kind(kind):
             start = [variable.start for variable in effect.states()]
-            yield effect, motion._replace(state=states.get(name, start))
+            own = {known: motion.inputs[one.name] for known, one in self._read[name].items() if one.name != known}
+            yield effect, motion._replace(state=states.get(name, start), inputs={**motion.inputs, **own})
 
     def applied(self, command: Scalar, states: Mapping[str, Any], motion: Motion) -> tuple[Scalar, dict[str, Scalar]]:
         """Torque path: limit, then the drive effects in series. Return the applied torque and the rates of states."""
@@ -197,3 +216,11 @@ class Assembly:
     def ahead(self, motion: Motion, states: Mapping[str, Any] = NOTHING) -> Scalar:
         """Seconds by which a recording's readings run ahead of its torques."""
         return sum((e.ahead(seen) for e, seen in self.seeing(ClockEffect, motion, states)), start=0 * motion.t)
+
+
+def _numbered(one: Variable, source: str, sources: Sequence[str]) -> Variable:
+    """An input of one of several sources; of the first it has its own name."""
+    if len(sources) == 1:
+        return one
+    number, of = sources.index(source) + 1, f", `{source}`" if source else ""
+    return replace(one, name=one.name + (str(number) if number > 1 else ""), description=one.description + of)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from bench.net.cases import NetCase
+from cosim.diagnosis.answer.names import with_names
 
 Answer = dict[str, Any]
 
@@ -59,7 +60,7 @@ def of_document(document: dict[str, Any]) -> Answer:
         "verdict": document["verdict"],
         "sets": document["ambiguous_with"],
         "depends_on": document["depends_on"],
-        "effects": {one["effect"]: _effect(one) for one in document["effects"]},
+        "effects": {name: _effect(one) for name, one in with_names(document["effects"])},
         "heldout": {name: held[name] for name in ("nominal_rms", "before_rms", "after_rms", "floor_rms")},
         "law": document["friction_law"].get("proposed", ""),
         "sanity": sorted(one["finding"] for one in document["sanity"]),

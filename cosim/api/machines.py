@@ -54,11 +54,15 @@ class MachineResult:
         if self.error:
             return {"machine": self.name, "error": self.error}
         held = self.document["heldout"]
-        named = [one for one in self.document["effects"] if one["answer"] in ("found", "ambiguous")]
+        from cosim.diagnosis.answer.names import with_names
+
+        entries = with_names(self.document["effects"])
         return {
             "machine": self.name,
             "verdict": self.document["verdict"],
-            "probabilities": {one["effect"]: one["probability"] for one in named},
+            "probabilities": {
+                name: one["probability"] for name, one in entries if one["answer"] in ("found", "ambiguous")
+            },
             "before_rms": held["before_rms"],
             "after_rms": held["after_rms"],
             "floor_rms": held["floor_rms"],

@@ -57,6 +57,8 @@ def _document(path: Path, *keys: str) -> Parsed:
 
 
 def _diagnosis(path: Path) -> Shown:
+    from cosim.diagnosis.answer.names import with_names
+
     document = _document(path, "verdict", "effects", "heldout")
     held = document["heldout"]
     facts: dict[str, Json] = {
@@ -71,12 +73,12 @@ def _diagnosis(path: Path) -> Shown:
     words = {"found": "detected", "ambiguous": "possible", "not_proven": "not confirmed", "not_seen": "not detected"}
     rows: list[Mapping[str, Json]] = [
         {
-            "effect": one["effect"],
+            "effect": name,
             "answer": words.get(one["answer"], str(one["answer"]).replace("_", " ")),
             "probability": f"{one.get('probability', 0.0):.2f}" if one["answer"] in ("found", "ambiguous") else "",
             "statement": one.get("statement", ""),
         }
-        for one in document["effects"]
+        for name, one in with_names(document["effects"])
     ]
     return {name: value for name, value in facts.items() if value}, {"effects": rows}
 

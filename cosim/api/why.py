@@ -25,7 +25,8 @@ class Written:
 
     def check(self, effect: str) -> None:
         """Raise InputError where an effect was never looked for."""
-        names = [*(entry["effect"] for entry in self.document["effects"]), "unknown"]
+        entries = [*(entry["effect"] for entry in self.document["effects"]), "unknown"]
+        names = dict.fromkeys([*entries, *(one.effect for one in self.trials)])
         if effect not in names:
             near = get_close_matches(effect, names, 1)
             hint = f" Did you mean {near[0]}?" if near else ""

@@ -25,12 +25,13 @@ def why(
 ) -> None:
     """Rank every structure that a diagnosis fitted, and say by which rule each effect was taken or refused."""
     from cosim.api.why import read_ledger
+    from cosim.diagnosis.answer.names import is_of
 
     written = read_ledger(folder)
     if effect:
         written.check(effect)
     if as_json:
-        put_json([one.as_json() for one in written.trials if effect in ("", one.effect)])
+        put_json([one.as_json() for one in written.trials if not effect or is_of(one.effect, effect)])
         return
     console = Console(highlight=False, soft_wrap=not Console().is_terminal, emoji=False)
     if effect:
@@ -60,9 +61,12 @@ def _print_all(console: Console, written: "Written", everything: bool) -> None:
 
 
 def _print_effect(console: Console, written: "Written", effect: str) -> None:
+    from cosim.diagnosis.answer.names import is_of
     from cosim.diagnosis.answer.why import of_effect, reasons
 
-    console.print(f"{effect}: {dict(reasons(written.document, written.trials))[effect]}", markup=False)
+    for name, text in reasons(written.document, written.trials):
+        if is_of(name, effect):
+            console.print(f"{name}: {text}", markup=False)
     for trial in of_effect(written.trials, effect):
         console.print(_rules(trial))
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.entries import CardSource, Improved, Provenance, Source
+from cosim.diagnosis.answer.names import id_of
 from cosim.diagnosis.answer.result import Array, Diagnosis, Finding, HeldOut, Trace
 from cosim.diagnosis.diagnose import Outcome
 from cosim.diagnosis.effects import named
@@ -142,10 +143,10 @@ def as_json(found: Diagnosis) -> JsonObject:
     held = found.heldout
     whole = {
         "verdict": list(found.verdict),
-        "effects": [_effect(finding) for finding in (*found.findings, *_shaken(found))],
+        "effects": _effects((*found.findings, *_shaken(found))),
         "friction_law": found.friction_law,
-        "delivered": list(found.delivered),
-        "ambiguous_with": [list(group) for group in found.ambiguous_with],
+        "delivered": list(dict.fromkeys(map(id_of, found.delivered))),
+        "ambiguous_with": [list(map(id_of, group)) for group in found.ambiguous_with],
         "next_experiment": found.next_experiment,
         "heldout": _heldout(held),
         "intervals": {trace.name: [list(span) for span in trace.intervals] for trace in found.traces},
@@ -174,10 +175,22 @@ def _shaken(found: Diagnosis) -> tuple[Finding, ...]:
     return (broadband_finding(found.broadband, found.motion),) if found.broadband else ()
 
 
+def _effects(findings: Sequence[Finding]) -> list[JsonObject]:
+    """One entry for each id, in their order; further couplings, with other neighbours, are in that of the first."""
+    groups: dict[str, list[Finding]] = {}
+    for one in findings:
+        groups.setdefault(one.effect, []).append(one)
+    return [
+        _effect(first) | ({"further": [_effect(one) for one in others]} if others else {})
+        for first, *others in groups.values()
+    ]
+
+
 def _effect(finding: Finding) -> JsonObject:
     place = finding.where
     return {
         "effect": finding.effect,
+        **({"neighbour": finding.source} if ":" in finding.name else {}),
         "answer": finding.answer,
         "probability": finding.probability,
         "gain": finding.gain,
@@ -288,14 +301,14 @@ def _comment(found: Diagnosis) -> str:
 
 def chosen_of_sets(found: Diagnosis) -> Iterator[str]:
     """Say of each open question which of the possible causes the model holds."""
-    titles = {finding.effect: finding.title.lower() for finding in found.findings}
+    titles = {finding.name: finding.title.lower() for finding in found.findings}
     for finding in found.in_model:
-        group = next((group for group in found.ambiguous_with if finding.effect in group), ())
-        others = " or ".join(titles.get(name, name) for name in group if name != finding.effect)
+        group = next((group for group in found.ambiguous_with if finding.name in group), ())
+        others = " or ".join(titles.get(name, name) for name in group if name != finding.name)
         if finding.answer == "ambiguous" and others:
-            yield f"These recordings cannot tell {titles[finding.effect]} from {others}; the likelier is in the model."
+            yield f"These recordings cannot tell {titles[finding.name]} from {others}; the likelier is in the model."
         elif finding.answer == "ambiguous":
-            yield f"That it is {titles[finding.effect]} is not certain."
+            yield f"That it is {titles[finding.name]} is not certain."
 
 
 def _proven_range(found: Diagnosis) -> Improved:

@@ -8,10 +8,12 @@ from cosim.data.own_rate import as_analysed
 from cosim.data.recording import Recording
 from cosim.diagnosis.answer.doubt_entry import Sanity, not_determined_doubts
 from cosim.diagnosis.answer.entries import BroadbandEntry
+from cosim.diagnosis.answer.names import with_short_names
 from cosim.diagnosis.answer.result import Diagnosis, Finding, Trace
 from cosim.diagnosis.answer.scores import Scores
 from cosim.diagnosis.decide.decision import Decision, beyond_any_machine, decide, rest_rules, shaking_rules
 from cosim.diagnosis.decide.policy import POLICY
+from cosim.diagnosis.effects import hypothesis_of
 from cosim.diagnosis.effects.candidates import at_own_level
 from cosim.diagnosis.evidence.adequacy import friction_level
 from cosim.diagnosis.evidence.band import in_band
@@ -156,8 +158,7 @@ def diagnose(
     if any(one.blocks_naming for one in beyond_denial(sanity)):
         return _refused(refitted, without_names(problem, base.mount, train, heldout, sanity, started))
     comparison = Comparison.of(problem, base, POLICY)
-    with refits or InTurn(on_progress) as several:
-        examined = examine(comparison, search(comparison, base, several), several)
+    examined = _examined(comparison, base, refits or InTurn(on_progress))
     sanity = without_denied(sanity, examined.chosen, examined.last)
     if any(one.blocks_naming for one in sanity):
         return _refused(refitted, without_names(problem, base.mount, train, heldout, sanity, started))
@@ -165,19 +166,20 @@ def diagnose(
     answer, tried = _delivered(_answer(comparison, examined, heldout), heldout, with_possible)
     learned = tried if tried and tried.helps else None
     mounts = (learned.mount if learned else answer.chosen.mount, examined.chosen.mount, answer.chosen.mount)
-    delivered, first, named = (_improved(card, limited(problem, one)[0]) for one in mounts)
+    after, first, named = (_improved(card, limited(problem, one)[0]) for one in mounts)
     unknown = not_determined(problem, limited(problem, mounts[0])[1])
-    on_model_ready("after", delivered.plant())
+    on_model_ready("after", after.plant())
     experiment = _experiment(answer)
     described = _with_learned(_described(answer, train, heldout, card), answer, tried, train, heldout)
-    diagnosis = replace(
+    found = replace(
         _with_search(described, answer, examined, heldout),
         sanity=(*described.sanity, *of_delivered(sanity, card, problem, mounts[0]), *not_determined_doubts(unknown)),
         not_determined=unknown,
         next_experiment=in_words(experiment, card.controller is not None) if experiment else {},
         seconds=time.perf_counter() - started,
     )
-    return Outcome(diagnosis, delivered, first, refitted, named, experiment, learned.stated() if learned else ())
+    formulas = learned.stated() if learned else ()
+    return Outcome(with_short_names(found), after, first, refitted, named, experiment, formulas)
 
 
 def _admitted(
@@ -208,6 +210,12 @@ def _refitted(train: Sequence[Recording], heldout: Sequence[Recording], card: Ca
         problem = _problem([moved(one, late) for one in train], card)
         base = problem.fit(problem.mount, 75)
     return *with_held(problem, base), late
+
+
+def _examined(comparison: Comparison, base: Fit, refits: InTurn) -> Examined:
+    """What the search finds, each effect of it challenged."""
+    with refits as several:
+        return examine(comparison, search(comparison, base, several), several)
 
 
 def _refused(refitted: Card, withheld: Diagnosis) -> Outcome:
@@ -263,7 +271,7 @@ def _described(answer: Answer, train: Sequence[Recording], heldout: Sequence[Rec
         sanity=changes((problem.prepared, answer.held.prepared), answer.chosen.mount),
         mount=card.mount.name,
         delivered=tuple(
-            dict.fromkeys(effect.id for effect in answer.chosen.mount.effects[len(problem.mount.effects) :])
+            dict.fromkeys(effect.name for effect in answer.chosen.mount.effects[len(problem.mount.effects) :])
         ),
         ambiguous_with=tuple((name, *members) for name, members in decision.sets.items() if members),
         depends_on=decision.depends_on,
@@ -312,7 +320,7 @@ def _delivered(answer: Answer, heldout: Sequence[Recording], with_possible: bool
     if _is_worse(answer, fit, heldout):
         answer, fit = replace(answer, scores=replace(answer.scores, improves=False)), answer.base
     if with_possible:
-        every = structure_with(answer.comparison, answer.proof, {one.effect.id for one in answer.proof.standing})
+        every = structure_with(answer.comparison, answer.proof, {one.effect.name for one in answer.proof.standing})
         fit = fit if _is_worse(answer, every, heldout) else every
     whole = replace(answer, detected=detected(answer.comparison, answer.proof, answer.decision), delivered=fit)
     return (whole, tried) if fit is answer.proof.chosen else (whole, _learned(whole, heldout)[1])
@@ -340,8 +348,8 @@ def _experiment(answer: Answer) -> Experiment | None:
     """What would settle the first open question."""
     for one in answer.proof.standing:
         for rival in one.rivals:
-            if rival.effect.id in answer.decision.sets[one.effect.id] and not is_renamed(rival.effect):
-                pair = one.effect.id, rival.effect.id
+            if rival.effect.name in answer.decision.sets[one.effect.name] and not is_renamed(rival.effect):
+                pair = one.effect.name, rival.effect.name
                 return best(one.own.fit.mount, rival.fit.mount, pair, answer.comparison.problem.prepared)
     return None
 
@@ -353,22 +361,24 @@ def _findings(answer: Answer, signals: Sequence[Trace]) -> list[Finding]:
     errors = [standard_errors(fit, blocks, weight) for fit in fits]
     found, rivals = [], []
     for one in standing(comparison, answer.proof):
-        name = one.effect.id
+        name = one.effect.name
         shares, members, predicted = decision.probabilities[name], decision.sets[name], answer.proof.predicted[name]
-        which = 0 if any(effect.id == name for effect in fits[0].mount.effects) else 1
+        which = 0 if any(effect.name == name for effect in fits[0].mount.effects) else 1
         own = fits[which].mount, errors[which], signals
-        found.append(accepted(one, *own, members, shares[name], predicted, name in answer.detected))
-        open_ = [rival_finding(r, shares[r.effect.id], mount) for r in one.rivals if r.effect.id in members]
+        row = accepted(one, *own, members, shares[name], predicted, name in answer.detected)
+        remark = hypothesis_of(one.effect).remark(one.effect, comparison.problem.prepared)
+        found.append(replace(row, statement=f"{row.statement} {remark}".rstrip()))
+        open_ = [rival_finding(r, shares[r.effect.name], mount) for r in one.rivals if r.effect.name in members]
         rivals += [measured_as(row, found[-1], mount) for row in open_]
-    named = {finding.effect for finding in found}
-    likeliest = {finding.effect: finding for finding in sorted(rivals, key=lambda one: one.probability)}
-    rivals = [one for one in rivals if one.effect not in named and one is likeliest[one.effect]]
-    known = named | {finding.effect for finding in rivals}
+    named = {finding.name for finding in found}
+    likeliest = {finding.name: finding for finding in sorted(rivals, key=lambda one: one.probability)}
+    rivals = [one for one in rivals if one.name not in named and one is likeliest[one.name]]
+    known = named | {finding.name for finding in rivals}
     unproven = [fit for one in answer.proof.unproven for fit in by_each_name(one.own, known)]
     lost = [replace(rival_finding(fit, 0.0, mount), answer="not_proven") for fit in unproven]
     taken = [(fit, term) for one, term in answer.found.taken for fit in by_each_name(one.own, known)]
     lost += [taken_finding(fit, term.name, mount) for fit, term in taken]
-    named |= {finding.effect for finding in (*rivals, *lost)}
+    named = {finding.effect for finding in (*found, *rivals, *lost)}
     largest = max((one.own.evidence for one in answer.proof.standing), default=0.0)
     absent = not_found(comparison, answer.proof.chosen, sorted(named), largest)
     absent = [undecided(one, answer.proof.standing, comparison.policy) for one in absent]
@@ -376,10 +386,10 @@ def _findings(answer: Answer, signals: Sequence[Trace]) -> list[Finding]:
 
 
 def _verdict(found: Sequence[Finding], decision: Decision) -> tuple[str, ...]:
-    named = [f.effect for f in found if f.answer in ("found", "ambiguous") and f.where is not None]
-    sure = [name for name in named if name not in decision.doubtful]
-    doubtful = [name for name in named if name in decision.doubtful]
-    return (*sure, *(("unknown",) if decision.is_unknown else ()), *doubtful)
+    named = [f for f in found if f.answer in ("found", "ambiguous") and f.where is not None]
+    sure = [f.effect for f in named if f.name not in decision.doubtful]
+    doubtful = [f.effect for f in named if f.name in decision.doubtful]
+    return tuple(dict.fromkeys((*sure, *(("unknown",) if decision.is_unknown else ()), *doubtful)))
 
 
 def _improved(card: Card, mount: Mount) -> Card:

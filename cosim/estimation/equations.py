@@ -45,9 +45,9 @@ class Equations:
 
     def __init__(self, mount: Mount, free: tuple[str, ...], key: tuple[Any, ...]) -> None:
         self._mount, self._free, self._key = mount, free, key
-        recorded = {name: other for effect in mount.effects for name, other in effect.recorded_as().items()}
-        self._inputs = tuple(variable.name for variable in mount.inputs())
-        self._starts = tuple((recorded.get(one.name, one.name), float(one.start)) for one in mount.inputs())
+        inputs, recorded = mount.inputs(), mount.recorded_as()
+        self._inputs = tuple(variable.name for variable in inputs)
+        self._starts = tuple((recorded.get(one.name, one.name), float(one.start)) for one in inputs)
         owners = [(name, part.states()) for name, part in mount.of_kind(MotionEffect) if part.states()]
         self._owners = [*owners, ("friction", mount.law.states())]
         self.count = sum(len(states) for _, states in self._owners)

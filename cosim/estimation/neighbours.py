@@ -85,8 +85,9 @@ def _own_share(own: Array, column: Array) -> float:
 
 def as_inputs(recording: Recording, mount: Mount, cutoff: float) -> Recording:
     """A recording with the motion of neighbours under the names of a plant's inputs, in which its effects read it."""
-    wanted = {one.name: effect.recorded_as().get(one.name) for effect in mount.effects for one in effect.inputs()}
-    wanted = {name: own or name for name, own in wanted.items() if own or name not in recording}
+    known = mount.recorded_as()
+    wanted = {one.name: known.get(one.name, one.name) for one in mount.inputs()}
+    wanted = {name: own for name, own in wanted.items() if name in known or name not in recording}
     there = neighbours(recording.columns, recording.units)
     if not wanted or not there:
         return recording

@@ -154,18 +154,24 @@ class Prepared:
 
     @cached_property
     def neighbours(self) -> tuple[Neighbour, ...]:
-        """Those of them that move, and by themselves."""
-        return tuple(one for one in self.neighbours_recorded if self._moves(one))
+        """Those of them that move, and by themselves: of several that move in proportion the first."""
+        return tuple(one for one in self.neighbours_recorded if self.followed.get(one.name) == one.name)
 
-    def _moves(self, one: Neighbour) -> bool:
-        own, other = (
-            (signal(names[0]), signal(names[1]), signal(names[2]))
-            for signal, names in (
-                (self.stacked, ("q", "v", "a")),
-                (self.of_neighbour, [key(one.name, kind) for kind in KINDS]),
-            )
-        )
-        return any(one.name in piece.moving for piece in self.pieces) and is_alone(own, other)
+    @cached_property
+    def followed(self) -> dict[str, str]:
+        """By the name of each neighbour that moves, and not with the axis, the first one that moves as it does."""
+        own, known = (self.stacked("q"), self.stacked("v"), self.stacked("a")), dict[str, str]()
+        for one in self.neighbours_recorded:
+            other = self._motion_of(one.name)
+            if any(one.name in piece.moving for piece in self.pieces) and is_alone(own, other):
+                first = dict.fromkeys(known.values())
+                known[one.name] = next((n for n in first if not is_alone(self._motion_of(n), other)), one.name)
+        return known
+
+    def _motion_of(self, name: str) -> tuple[Array, Array, Array]:
+        """Position, speed and acceleration of a neighbour."""
+        q, v, a = (self.of_neighbour(key(name, kind)) for kind in KINDS)
+        return q, v, a
 
     def of_neighbour(self, name: str) -> Array:
         """A signal of a neighbour of all pieces at the kept rows."""

@@ -70,9 +70,9 @@ class Problem:
         return replace(self, enough=ROUGH)
 
     def without(self, found: Fit, name: str) -> Fit:
-        """A fitted structure without an effect that was added to the mount, by its id, refitted."""
+        """A fitted structure without an effect that was added to the mount, by its name, refitted."""
         own = len(self.mount.effects)
-        rest = tuple(one for k, one in enumerate(found.mount.effects) if k < own or one.id != name)
+        rest = tuple(one for k, one in enumerate(found.mount.effects) if k < own or one.name != name)
         self._last.append(self.fit(replace(found.mount, effects=rest), LESS))
         return self._last[-1]
 

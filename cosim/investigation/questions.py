@@ -55,7 +55,7 @@ class Duel:
         """Which of both holds the other as a special case; "" where neither does."""
         if self.question.kind in ("uncertain", "unproven"):
             return "ours" if self.question.kind == "uncertain" else "other"
-        ours, other = ({one.id: one.special_case_of for one in fit.mount.effects} for fit in (self.ours, self.other))
+        ours, other = ({one.name: one.special_case_of for one in fit.mount.effects} for fit in (self.ours, self.other))
         only, others = set(ours) - set(other), set(other) - set(ours)
         if any(others & set(ours[name]) for name in only):
             return "other"
@@ -74,13 +74,13 @@ def questions(found: Diagnosis) -> tuple[Question, ...]:
 
     "unconfirmed" is always among them: whether an answer needs another round depends on those before it.
     """
-    titles = {one.effect: one.title.lower() for one in found.findings}
+    titles = {one.name: one.title.lower() for one in found.findings}
     groups = [tuple(n for n in group if not named(n).same_as) for group in found.ambiguous_with]
     separable = [group for group in groups if len(group) > 1]  # names that no motion tells apart are no question
     sets = [Question("set", group, " or ".join(titles.get(n, n) for n in group)) for group in separable]
     paired = {name for group in found.ambiguous_with for name in group}
-    lone = [one for one in found.in_model if one.answer == "ambiguous" and one.effect not in paired]
-    unsure = [Question("uncertain", (one.effect,), f"whether it is {titles[one.effect]}") for one in lone]
+    lone = [one for one in found.in_model if one.answer == "ambiguous" and one.name not in paired]
+    unsure = [Question("uncertain", (one.name,), f"whether it is {titles[one.name]}") for one in lone]
     unknown = [Question("unknown", (), "something that has no name")] if "unknown" in found.verdict else []
     return (
         *sets,
@@ -96,7 +96,7 @@ def _unproven(found: Diagnosis) -> Iterator[Question]:
     """Effects that training proposes and the proof does not confirm, where the answer is not settled without them."""
     lost = [] if is_settled(found) else [one for one in found.findings if one.answer == "not_proven"]
     for one in sorted(lost, key=lambda one: -one.gain)[:UNPROVEN]:
-        yield Question("unproven", (one.effect,), f"whether there is {one.title.lower()}, which is not proven")
+        yield Question("unproven", (one.name,), f"whether there is {one.title.lower()}, which is not proven")
 
 
 def is_settled(found: Diagnosis) -> bool:
@@ -135,10 +135,10 @@ def _rivals(question: Question, outcome: Outcome) -> Iterator[Mount]:
         return
     mount, main = outcome.card.plant(), question.effects[0]
     own = len(mount.effects) - len(outcome.card.effects)
-    rest = (*mount.effects[:own], *(one for one in outcome.card.effects if one.id != main))
+    rest = (*mount.effects[:own], *(one for one in outcome.card.effects if one.name != main))
     if question.kind == "uncertain":
         yield replace(mount, effects=rest)
-    findings = {one.effect: one for one in outcome.diagnosis.findings}
+    findings = {one.name: one for one in outcome.diagnosis.findings}
     if question.kind == "unproven":
         yield replace(mount, effects=(*mount.effects, effect_of(findings[main])))
     for name in question.effects[1:]:
@@ -154,4 +154,5 @@ def effect_of(finding: Finding) -> Effect:
         sides = [finding.parameters.get(f"{name}.{side}") for side in Pair._fields]
         numbers[name] = Pair(*sides) if None not in sides else finding.parameters[name]  # type: ignore[arg-type]
     make: Any = form
-    return make(**numbers)  # type: ignore[no-any-return]
+    words = {"neighbour": finding.source} if finding.source else {}
+    return make(**numbers, **words)  # type: ignore[no-any-return]

@@ -21,7 +21,7 @@ HEIGHT = 232
 
 def blank(finding: Finding) -> Sheet:
     """Return the empty figure of a finding."""
-    return Sheet(f"effect-{''.join(c for c in finding.effect if c.isalnum())}", HEIGHT)
+    return Sheet(f"effect-{''.join(c for c in finding.name if c.isalnum())}", HEIGHT)
 
 
 def error_over(

@@ -134,7 +134,7 @@ def _numbers(text: str) -> list[float]:
 
 def _either(axes: "Axes", findings: tuple[Finding, ...], groups: tuple[tuple[str, ...], ...]) -> None:
     for group in groups:
-        rows = [place for place, finding in enumerate(findings) if finding.effect in group]
+        rows = [place for place, finding in enumerate(findings) if finding.name in group]
         if len(rows) < 2:
             continue
         axes.plot([19, 22, 22, 19], [rows[0], rows[0], rows[-1], rows[-1]], color=MEASURED, lw=1)

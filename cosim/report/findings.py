@@ -60,7 +60,7 @@ class Shown:
 def block(one: words.Block, diagnosis: Diagnosis, scales: Scales, picture: Picture | None) -> Shown:
     """Return what is printed of one finding; what the first screen says of it is not said again."""
     first = one.first
-    said = [words.stated(finding) for finding in one.findings if finding.effect not in led(diagnosis)]
+    said = [words.stated(finding) for finding in one.findings if finding.name not in led(diagnosis)]
     if one.answer == "not_proven":
         said = [f"In the training runs alone: {words.lowered(text)}" for text in said if text]
     if one.answer == "ambiguous":
@@ -141,7 +141,7 @@ def do(one: words.Block, diagnosis: Diagnosis) -> str:
     """Return the action; rivals ask for the next experiment, and what did not prove itself for nothing."""
     if one.answer == "not_proven":
         return NOTHING_YET
-    own = [finding.effect for finding in one.findings]
+    own = [finding.name for finding in one.findings]
     if one.answer == "ambiguous" and is_about(diagnosis, own) and (order := to_record(diagnosis)):
         return words.started(order)
     files = words.delivered(diagnosis)

@@ -156,7 +156,7 @@ def _written(diagnosis: Diagnosis) -> str:
 
 def led(diagnosis: Diagnosis) -> tuple[str, ...]:
     """Return the effects whose statement stands in the lead."""
-    found = [block.first.effect for block in blocks(diagnosis) if block.answer == "found"]
+    found = [block.first.name for block in blocks(diagnosis) if block.answer == "found"]
     return tuple(found) if len(found) == 1 and verdict(diagnosis) == "found" else ()
 
 

@@ -20,7 +20,7 @@ def next_experiment(diagnosis: Diagnosis, scales: Scales) -> dict[str, object] |
     plan = diagnosis.next_experiment
     if not plan:
         return None
-    titles = {finding.effect: words.lowered(finding.title) for finding in diagnosis.findings}
+    titles = {finding.name: words.lowered(finding.title) for finding in diagnosis.findings}
     names = [titles.get(str(name), str(name)) for name in plan.get("separates", ())]
     said = [words.started(words.closed(str(plan.get("description", ""))))]
     if how := motion(plan.get("set_point", {}), scales):

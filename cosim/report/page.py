@@ -92,7 +92,7 @@ def _rate(hertz: float) -> str:
 
 
 def _with_effects(diagnosis: Diagnosis) -> str:
-    held = len({finding.effect for finding in diagnosis.in_model})
+    held = len({finding.name for finding in diagnosis.in_model})
     if diagnosis.learned:
         return "with what was learned" if not held else "with the effects and what was learned"
     if held and words.verdict(diagnosis) == "either":

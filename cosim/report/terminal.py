@@ -203,7 +203,7 @@ def _rest(diagnosis: Diagnosis) -> list[str]:
 def _error(diagnosis: Diagnosis, scales: Scales) -> list[str]:
     held, unit = diagnosis.heldout, scales.torque
     before, after, noise = (unit.number(x) for x in (held.before_rms, held.after_rms, held.floor_rms))
-    added = len({finding.effect for finding in diagnosis.in_model})
+    added = len({finding.name for finding in diagnosis.in_model})
     improved = f" → {after} (with the effect{'s' if added > 1 else ''})" if added else ""
     improved = f" → {after} (with what was learned)" if diagnosis.learned else improved
     possible = f"; {unit.number(held.possible_rms)} with what is only possible" if held.possible_rms is not None else ""

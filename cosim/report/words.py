@@ -84,7 +84,7 @@ class Block:
     @property
     def anchor(self) -> str:
         """The place of the block in the page."""
-        return "finding-" + "".join(letter for letter in self.first.effect if letter.isalnum() or letter == "_")
+        return "finding-" + "".join(letter for letter in self.first.name if letter.isalnum() or letter == "_")
 
 
 NAMES = ("Stribeck",)
@@ -127,18 +127,18 @@ def blocks(diagnosis: Diagnosis) -> tuple[Block, ...]:
     grouped: list[Block] = []
     taken: set[str] = set()
     for finding in diagnosis.findings:
-        if finding.answer in ABSENT or finding.effect in taken:
+        if finding.answer in ABSENT or finding.name in taken:
             continue
         rivals = (finding,) if finding.answer != "ambiguous" else _rivals(finding, diagnosis)
-        taken |= {rival.effect for rival in rivals}
+        taken |= {rival.name for rival in rivals}
         grouped.append(_block(rivals))
     order = {"found": 0, "ambiguous": 1}
     return tuple(sorted(grouped, key=lambda block: order.get(block.answer, 2)))
 
 
 def _rivals(finding: Finding, diagnosis: Diagnosis) -> tuple[Finding, ...]:
-    group = next((group for group in diagnosis.ambiguous_with if finding.effect in group), (finding.effect,))
-    others = (other for other in diagnosis.findings if other.effect in group and other.effect != finding.effect)
+    group = next((group for group in diagnosis.ambiguous_with if finding.name in group), (finding.name,))
+    others = (other for other in diagnosis.findings if other.name in group and other.name != finding.name)
     return (finding, *(other for other in others if other.answer == "ambiguous"))
 
 
@@ -181,7 +181,7 @@ def delivered(diagnosis: Diagnosis) -> tuple[str, ...]:
 def left_out(diagnosis: Diagnosis) -> list[str]:
     """Say what a correction lacks, and why there is no SSP."""
     made = diagnosis.improved
-    titles = {finding.effect: lowered(finding.title) for finding in diagnosis.findings}
+    titles = {finding.name: lowered(finding.title) for finding in diagnosis.findings}
     names = [titles.get(name, str(name)) for name in made.get("not_in_correction", ())]
     said = [f"A torque cannot stand for {' and '.join(names)}: that is in the card only."] if names else []
     return said + ([f"There is no SSP: {closed(str(made['no_ssp']))}"] if made.get("no_ssp") else [])

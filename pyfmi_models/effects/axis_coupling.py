@@ -1,8 +1,9 @@
 """What a neighbouring axis does to this one: by its acceleration, its speed and its position.
 
 The neighbour's motion comes from outside: the plant's inputs are `neighbour_acceleration`, `neighbour_speed` and
-`neighbour_position`, as far as a form reads them. In a recording they are columns of the neighbour that the word
-`neighbour` names; where it is empty, columns of those names.
+`neighbour_position`, as far as a form reads them; of a second neighbour of the mount `neighbour_acceleration2` and so
+on. In a recording they are columns of the neighbour that the word `neighbour` names; where it is empty, columns of
+those names.
 """
 
 from collections.abc import Mapping
@@ -48,6 +49,11 @@ class AxisCoupling(LoadEffect):
         """The neighbour's motion, under its name."""
         names = {one.name: one.name.replace("neighbour_", f"{self.neighbour} ") for one in self.inputs()}
         return names if self.neighbour else {}
+
+    @property
+    def source(self) -> str:
+        """The neighbour."""
+        return self.neighbour
 
     def load(self, motion: Motion) -> Scalar:
         """`h a_n`."""

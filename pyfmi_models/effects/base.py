@@ -101,12 +101,22 @@ class Effect(Part):
         return ()
 
     def inputs(self) -> tuple[Variable, ...]:
-        """Name the plant inputs that the effect reads; effects that name the same input share it."""
+        """Name the plant inputs that the effect reads; effects that name the same input of one source share it."""
         return ()
 
     def recorded_as(self) -> Mapping[str, str]:
         """Inputs that a recording holds under another name, by their own."""
         return {}
+
+    @property
+    def source(self) -> str:
+        """What an effect's inputs are of, where others of its id may read the same of something else."""
+        return ""
+
+    @property
+    def name(self) -> str:
+        """Its id, and its source where it has one: "axis_coupling:q2"."""
+        return f"{self.id}:{self.source}" if self.source else self.id
 
     def broken_rule(self) -> str:
         """Say which rule between the parameters these numbers break; empty if none."""

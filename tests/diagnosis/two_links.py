@@ -6,6 +6,7 @@ q_2 counts from the direction of the first link, both hang down at 0. Reference:
 Modeling and Control (2006), section 7.4.
 """
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -54,6 +55,32 @@ def elbow(seed: int, neighbour: str = "tones", seconds: float = 12.0, columns: b
     tau = tau + WEIGHT * np.sin(other.q + own.q) + FC * np.tanh(own.v / 1e-3) + VISCOUS * own.v
     table = {"t": t, "tau": tau + dice.normal(0, NOISE, len(t)), "q": own.q + dice.normal(0, READING, len(t))}
     table |= {"q1": other.q + dice.normal(0, READING, len(t))} if columns else {}
+    return Recording.of(table, f"run {seed}")
+
+
+def joint(
+    seed: int, acting: Mapping[int, tuple[float, float]], noise: float = 0.02, spare: float | None = None
+) -> Recording:
+    """A joint among three neighbours `q1`, `q2`, `q3` that all move.
+
+        tau = .3 a + .5 sign(v) + .3 v + sum_n [ h_n a_n + w_n sin(q + q_n) ]
+
+    Args:
+        seed: of motion and noise.
+        acting: h_n and w_n of those neighbours that act, by their numbers.
+        noise: RMS of the torque's noise [N m].
+        spare: where given, `q2` moves as `q1` does, but for so much of a motion of its own.
+    """
+    t, dice = np.arange(0.0, 16.0, 1 / 250), np.random.default_rng(seed)
+    own, *others = (tones(t, 1000 * seed + k, 0.8) for k in range(4))
+    if spare is not None:
+        others[1] = Joint(*(both + spare * one for both, one in zip(others[0], others[1], strict=True)))
+    tau = 0.3 * own.a + 0.5 * np.tanh(own.v / 1e-3) + 0.3 * own.v
+    for number, (inertia, weight) in acting.items():
+        one = others[number - 1]
+        tau = tau + inertia * one.a + weight * np.sin(own.q + one.q)
+    table = {"t": t, "tau": tau + dice.normal(0, noise, len(t)), "q": own.q + dice.normal(0, READING, len(t))}
+    table |= {f"q{k}": one.q + dice.normal(0, READING, len(t)) for k, one in enumerate(others, 1)}
     return Recording.of(table, f"run {seed}")
 
 

@@ -70,6 +70,10 @@ class Finding:
     """One effect that was looked for, and the answer."""
 
     effect: str
+    source: str = ""
+    """Of a coupling the neighbour."""
+    alone: bool = False
+    """Whether no other of its id is in question: then its id is its name."""
     title: str
     answer: Answer
     probability: float
@@ -100,6 +104,11 @@ class Finding:
     """Smallest size of the main parameter that these recordings would have shown (unit as in `size`)."""
     bound: Bound | None = None
     """Of an effect that was not seen or cannot be tested."""
+
+    @property
+    def name(self) -> str:
+        """What the ledger calls it: its id, and its source where it has one."""
+        return f"{self.effect}:{self.source}" if self.source and not self.alone else self.effect
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -197,7 +206,7 @@ class Diagnosis:
     mount: str
     motion: Literal["rotary", "linear"]
     delivered: tuple[str, ...] = ()
-    """Effects that the delivered card holds beside its base."""
+    """Names of the effects that the delivered card holds beside its base."""
     ambiguous_with: tuple[tuple[str, ...], ...] = ()
     next_experiment: NextExperiment = field(default_factory=NextExperiment)
     depends_on: tuple[str, ...] = ()
@@ -232,7 +241,7 @@ class Diagnosis:
     @property
     def in_model(self) -> tuple[Finding, ...]:
         """Effects that the delivered model holds: those detected, the likelier of sets, or what was asked for."""
-        return tuple(one for one in self.findings if one.effect in self.delivered)
+        return tuple(one for one in self.findings if one.name in self.delivered)
 
     @property
     def adds_physics(self) -> bool:

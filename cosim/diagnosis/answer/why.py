@@ -6,6 +6,7 @@ from math import exp
 from typing import Any
 
 from cosim.diagnosis.answer.ledger import Rule, Trial
+from cosim.diagnosis.answer.names import is_of, with_names
 
 UNKNOWN = "unknown"
 BASE = "refitted base"
@@ -76,7 +77,7 @@ def label(effects: Sequence[str]) -> str:
 
 def of_effect(trials: Sequence[Trial], effect: str) -> list[Trial]:
     """The trials in which an effect is in question, the one of the largest evidence first."""
-    return sorted((one for one in trials if one.effect == effect), key=lambda one: -one.train.nats)
+    return sorted((one for one in trials if is_of(one.effect, effect)), key=lambda one: -one.train.nats)
 
 
 def decisive(trials: Sequence[Trial], effect: str, delivered: Sequence[str] = ()) -> Trial | None:
@@ -84,8 +85,8 @@ def decisive(trials: Sequence[Trial], effect: str, delivered: Sequence[str] = ()
 
     Furthest is through most rules, then with most evidence.
     """
-    tried, others = of_effect(trials, effect), set(delivered) - {effect}
-    final = [one for one in tried if set(one.effects) - {effect} == others]
+    tried = of_effect(trials, effect)
+    final = [one for one in tried if {*one.effects} - {one.effect} == {*delivered} - {one.effect}]
     return max(final or tried, key=lambda one: (_passed(one), one.train.nats), default=None)
 
 
@@ -96,8 +97,8 @@ def _passed(one: Trial) -> int:
 def reasons(document: Mapping[str, Any], trials: Sequence[Trial]) -> Iterator[tuple[str, str]]:
     """Of each effect that was looked for its id and one sentence: taken, refused or left open, by which rule."""
     delivered = delivered_of(trials)
-    for entry in document["effects"]:
-        yield entry["effect"], _reason(entry, decisive(trials, entry["effect"], delivered))
+    for name, entry in with_names(document["effects"]):
+        yield name, _reason(entry, decisive(trials, name, delivered))
     rest = decisive(trials, UNKNOWN, delivered)
     if rest:
         yield UNKNOWN, _of_rest(rest, UNKNOWN in document["verdict"])

@@ -42,8 +42,8 @@ def hypothesis_of(effect: Effect) -> Hypothesis[Any]:
 
 
 def named(effect: str) -> Hypothesis[Any]:
-    """The first hypothesis of an effect by its id; one that proposes nothing for an id that is none."""
-    return _NAMED.get(effect, _NONE)
+    """The first hypothesis of an effect by its id or name; one that proposes nothing for an id that is none."""
+    return _NAMED.get(effect.partition(":")[0], _NONE)
 
 
 def namesakes(effect: Effect, mount: Mount) -> list[Effect]:

@@ -2,14 +2,14 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from math import atan2, hypot, inf, pi
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from cosim.data.neighbours import Neighbour
 from cosim.diagnosis.answer.result import Where
-from cosim.diagnosis.effects.base import Evidence, Hypothesis, Reach
-from cosim.diagnosis.effects.candidates import Candidate, Span, has
+from cosim.diagnosis.effects.base import HELD, UNSEEN, Evidence, Hypothesis, Reach
+from cosim.diagnosis.effects.candidates import Candidate, Span
 from cosim.diagnosis.effects.tuning import restarted
 from cosim.estimation.fit import Fit
 from cosim.estimation.neighbours import key
@@ -37,16 +37,15 @@ class NeighbouringAxis(Hypothesis[AxisCoupling]):
 
     def candidates(self, mount: Mount, span: Span) -> Iterator[Candidate]:
         """Each neighbour: its acceleration, with its speed, and the weight that turns with it."""
-        if has(mount, AxisCoupling):
-            return
-        for one in span.prepared.neighbours:
+        for one in _free(span.prepared.neighbours, mount):
             yield from _moved_by(one, mount)
 
     def tuned(self, problem: Problem, found: Fit, start: AxisCoupling, evidence: Evidence) -> Fit:
         """The simplest form that explains it: a damping or a weight only where it adds evidence to the inertia."""
         one = next((one for one in problem.prepared.neighbours if one.name == start.neighbour), None)
         fits = {type(start): found}
-        inertia = AxisCoupling(inertia=found.parameters()[f"{start.id}.inertia"], neighbour=start.neighbour)
+        fitted: Any = found.mount.effects[-1]
+        inertia = AxisCoupling(inertia=fitted.inertia, neighbour=start.neighbour)
         if AxisCoupling not in fits:
             fits[AxisCoupling] = restarted(problem, found, inertia)
         else:
@@ -71,9 +70,22 @@ class NeighbouringAxis(Hypothesis[AxisCoupling]):
         """It needs columns of a neighbour that moves by itself."""
         if not prepared.neighbours_recorded:
             return "no column of a neighbour"
-        if not prepared.neighbours and not self.is_settled(mount):
-            return f"{_listed(prepared.neighbours_recorded)} stands still, is this axis itself, or follows its motion"
-        return super().why_not(mount, prepared)
+        free = _free(prepared.neighbours_recorded, mount)
+        if free and not _free(prepared.neighbours, mount):
+            return f"{_listed(free)} stands still, is this axis itself, or follows its motion"
+        return UNSEEN if free else HELD
+
+    def remark(self, effect: AxisCoupling, prepared: Prepared) -> str:
+        """Neighbours that move in proportion to this one: no recording of both tells which of them acts."""
+        alike = [one for one in prepared.neighbours_recorded if prepared.followed.get(one.name) == effect.neighbour]
+        others = _listed([one for one in alike if one.name != effect.neighbour], " or ")
+        return f"It may as well be {others}: {effect.called} moves in proportion to that." if others else ""
+
+
+def _free(several: Sequence[Neighbour], mount: Mount) -> list[Neighbour]:
+    """Neighbours with which a mount has no coupling yet; one that names none is that with the only neighbour."""
+    taken = {one.source for one in mount.effects if one.id == AxisCoupling.id}
+    return [one for one in several if not taken & {one.name, ""}]
 
 
 def _moved_by(one: Neighbour, mount: Mount) -> Iterator[Candidate]:
@@ -116,5 +128,5 @@ def _weight_left(problem: Problem, found: Fit, coupling: AxisCoupling, follows: 
     return WeightCoupling(inertia=coupling.inertia, weight=load, phase=phase, follows=follows, neighbour=name)
 
 
-def _listed(several: Sequence[Neighbour]) -> str:
-    return ", ".join(f"`{one.name}`" for one in several)
+def _listed(several: Sequence[Neighbour], between: str = ", ") -> str:
+    return between.join(f"`{one.name}`" for one in several)

@@ -172,6 +172,10 @@ class Hypothesis(Generic[Form]):
         said = ", ".join(f"{wave.cycles_per_rev:.4g} ({_size(wave):.2g})" for wave in told)
         return f" Further waves, cycles (size): {said}." if said else ""
 
+    def remark(self, effect: Form, prepared: Prepared) -> str:
+        """A sentence on what these recordings cannot tell from an effect that was found."""
+        return ""
+
     def card_note(self, first: str) -> str:
         """What the improved card must say beside the effect; `first` names the first recording."""
         return ""

@@ -168,7 +168,7 @@ class Comparison:
 
     def trial_of(self, found: Fit) -> Trial:
         """A structure and what it gains in training, looked at for no effect."""
-        added = tuple(one.id for one in found.mount.effects[len(self.problem.mount.effects) :])
+        added = tuple(one.name for one in found.mount.effects[len(self.problem.mount.effects) :])
         return Trial(added, "", found.parameters(), self.gain(found), blocks=self._by_block(found))
 
     def judge(self, effect: str, found: Fit, rules: Sequence[Rule]) -> None:

@@ -45,7 +45,7 @@ def forms(found: Fit, own: int, prepared: Prepared) -> Forms | None:
     mount = found.mount
     groups: dict[str, list[Effect]] = {}
     for effect in mount.effects[own:]:
-        groups.setdefault(effect.id, []).append(effect)
+        groups.setdefault(effect.name, []).append(effect)
     if not groups:
         return None
     columns, placed, first = [], [], 0

@@ -44,7 +44,7 @@ def accepted(
     is_detected: bool,
 ) -> Finding:
     """Describe an effect that stands, with the further waves of a ripple; `members` are rivals that stay open."""
-    alike = [effect for effect in mount.effects if effect.id == one.effect.id][-len(one.effects) :]
+    alike = [effect for effect in mount.effects if effect.name == one.effect.name][-len(one.effects) :]
     effect = max(alike, key=lambda own: float(getattr(own, "amplitude", 0.0)))
     harmonics = [other for other in alike if other is not effect]
     effect, numbers = _at_own_level(effect, numbers_of(effect, mount, errors), mount)
@@ -53,7 +53,8 @@ def accepted(
     size, size_range = _size(effect, numbers, mount)
     return Finding(
         effect=effect.id,
-        title=effect.title,
+        source=effect.source,
+        title=titled(effect),
         answer="found" if is_detected else "ambiguous",
         probability=probability,
         gain=one.own.plain_gain,
@@ -76,9 +77,14 @@ def accepted(
     )
 
 
+def titled(effect: Effect) -> str:
+    """Its title, and its source where it has one."""
+    return f"{effect.title} ({effect.source})" if effect.source else effect.title
+
+
 def _apart(one: AcceptedEffect, members: Sequence[str]) -> str:
     """How the effect is told from its rivals; from another name of itself first, and alone where that is all."""
-    same = [rival.effect for rival in one.rivals if rival.effect.id in members and is_renamed(rival.effect)]
+    same = [rival.effect for rival in one.rivals if rival.effect.name in members and is_renamed(rival.effect)]
     own = [one.effect.told_apart_by] if len(members) > len(same) or not same else []
     return "; ".join([*(other.told_apart_by for other in same), *own])
 
@@ -87,11 +93,11 @@ def _behind(one: AcceptedEffect, members: Sequence[str], far: bool) -> Iterator[
     """Say by how much the rivals outside the set are behind: those far behind by both measures, or the others."""
     for rival in one.rivals:
         margin, lead = one.margin(rival), one.own.plain_gain - rival.plain_gain
-        if rival.effect.id not in one.effect.rivals or rival.effect.id in members:
+        if rival.effect.id not in (*one.effect.rivals, one.effect.id) or rival.effect.name in members:
             continue
         if (margin >= POLICY.clear and lead >= POLICY.negligible) == far:
             both = f"{100 * rival.plain_gain:.1f} % of the error energy, this {100 * one.own.plain_gain:.1f} %"
-            yield f"{rival.effect.title}: removes {both} ({margin:.0f} nats behind)"
+            yield f"{titled(rival.effect)}: removes {both} ({margin:.0f} nats behind)"
 
 
 def visible_from(effect: Effect, numbers: Numbers) -> float | None:
@@ -108,7 +114,8 @@ def rival_finding(rival: CandidateFit, probability: float, mount: Mount) -> Find
     size, _ = _size(effect, Numbers(values, {}), mount)
     return Finding(
         effect=effect.id,
-        title=effect.title,
+        source=effect.source,
+        title=titled(effect),
         answer="ambiguous",
         probability=probability,
         gain=rival.plain_gain,

@@ -32,19 +32,19 @@ def _ways(
     comparison: Comparison, examined: Examined, proof: Proof, refused: AcceptedEffect, held: Predictive
 ) -> Iterator[tuple[Examined, Proof]]:
     """Proofs in which a rival stands in the place of what was refused, and all that stood still does."""
-    stood = {one.effect.id for one in proof.standing}
+    stood = {one.effect.name for one in proof.standing}
     for rival in _near(examined, refused, comparison.policy):
         swapped = _in_place(comparison, examined, refused, rival)
         again = prove(comparison, swapped, held)
-        if stood | {rival.effect.id} <= {one.effect.id for one in again.standing}:
+        if stood | {rival.effect.name} <= {one.effect.name for one in again.standing}:
             yield swapped, replace(again, unproven=(refused, *again.unproven))
 
 
 def _near(examined: Examined, refused: AcceptedEffect, policy: Policy) -> list[CandidateFit]:
     """Rivals with evidence of their own that are not clearly behind, as names are weighed beside something unknown."""
-    listed, behind = {one.effect.id for one in examined.effects}, margins(refused)
-    others = [one for one in refused.rivals if one.effect.id not in listed and not is_renamed(one.effect)]
-    return [one for one in others if behind[one.effect.id] < policy.clear <= one.evidence]
+    listed, behind = {one.effect.name for one in examined.effects}, margins(refused)
+    others = [one for one in refused.rivals if one.effect.name not in listed and not is_renamed(one.effect)]
+    return [one for one in others if behind[one.effect.name] < policy.clear <= one.evidence]
 
 
 def _in_place(comparison: Comparison, examined: Examined, out: AcceptedEffect, rival: CandidateFit) -> Examined:
@@ -52,12 +52,12 @@ def _in_place(comparison: Comparison, examined: Examined, out: AcceptedEffect, r
     own, mount = len(comparison.problem.mount.effects), rival.fit.mount
     others = tuple(one for one in out.rivals if one is not rival)
     accepted = AcceptedEffect(
-        tuple(effect for effect in mount.effects[own:] if effect.id == rival.effect.id),
+        tuple(effect for effect in mount.effects[own:] if effect.name == rival.effect.name),
         rival,
         out.without,
         others,
-        {one.effect.id: out.margin(one) - out.margin(rival) for one in others},
-        {one.effect.id: contest(comparison, rival, one) for one in others},
+        {one.effect.name: out.margin(one) - out.margin(rival) for one in others},
+        {one.effect.name: contest(comparison, rival, one) for one in others},
         misfits_of(comparison.problem.prepared, mount, rival.effect),
     )
     effects = tuple(accepted if one is out else one for one in examined.effects)

@@ -53,8 +53,8 @@ def enter_answer(
     """
     for one in findings:
         if one.where is not None:
-            comparison.enter(one.effect, chosen, one.gain)
-            comparison.judge(one.effect, chosen, list(_answer_rules(one, improves)))
+            comparison.enter(one.name, chosen, one.gain)
+            comparison.judge(one.name, chosen, list(_answer_rules(one, improves)))
     learned = Rule(LEARNED, True) if is_unknown and not any(rule.outcome for rule in rest) else None
     comparison.enter(UNKNOWN, chosen, 0.0)
     comparison.judge(UNKNOWN, chosen, [*rest, *([learned] if learned else [])])

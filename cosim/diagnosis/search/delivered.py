@@ -20,11 +20,11 @@ from cosim.estimation.problem import LESS
 
 def detected(comparison: Comparison, proof: Proof, decision: Decision) -> frozenset[str]:
     """Effects that no rival can be, that are more likely there than not, and whose size is told."""
-    told = {one.effect.id: decision.probabilities[one.effect.id][one.effect.id] for one in proof.standing}
+    told = {one.effect.name: decision.probabilities[one.effect.name][one.effect.name] for one in proof.standing}
     likely = {name for name, p in told.items() if p >= LIKELY and not decision.sets[name]}
-    sure = [one for one in proof.standing if one.effect.id in likely - {*decision.doubtful}]
+    sure = [one for one in proof.standing if one.effect.name in likely - {*decision.doubtful}]
     return frozenset(
-        one.effect.id for one in sure if tells(comparison.problem, proof.chosen, one.within(proof.chosen.mount))
+        one.effect.name for one in sure if tells(comparison.problem, proof.chosen, one.within(proof.chosen.mount))
     )
 
 
@@ -43,7 +43,7 @@ def with_only(comparison: Comparison, proof: Proof, names: Collection[str]) -> F
     """The structure that stands with just some of its effects, refitted where others go."""
     problem, chosen = comparison.problem, proof.chosen
     own = len(problem.mount.effects)
-    kept = tuple(one for k, one in enumerate(chosen.mount.effects) if k < own or one.id in names)
+    kept = tuple(one for k, one in enumerate(chosen.mount.effects) if k < own or one.name in names)
     if len(kept) == len(chosen.mount.effects):
         return chosen
     return problem.fit(replace(chosen.mount, effects=kept), LESS)
@@ -75,7 +75,7 @@ def standing(comparison: Comparison, proof: Proof) -> Sequence[AcceptedEffect]:
 
 def _weighed(comparison: Comparison, proof: Proof, one: AcceptedEffect) -> AcceptedEffect:
     problem, chosen = comparison.problem, proof.chosen
-    without = problem.without(chosen, one.effect.id)
+    without = problem.without(chosen, one.effect.name)
     added = chosen.mount.effects[len(problem.mount.effects) :]
-    (first, *_) = (effect for effect in added if effect.id == one.effect.id)
+    (first, *_) = (effect for effect in added if effect.name == one.effect.name)
     return replace(one, own=weighed(comparison, chosen, without, effect=first), without=without)

@@ -87,12 +87,12 @@ def nameless(comparison: Comparison, examined: Examined, proof: Proof, held: Pre
         challenges = [_challenge(comparison, found, one, own, offered) for one in found.proof.standing]
         worst = max(challenges, key=lambda one: one.lead)
         leads = worst.lead >= least and _holds(comparison, found, worst, held)
-        name, chosen = worst.effect.effect.id, found.proof.chosen
+        name, chosen = worst.effect.effect.name, found.proof.chosen
         rule = Rule(f"not explained better by {worst.term.name}", not leads, worst.lead, least, "nats")
         comparison.judge(name, chosen, [rule])
         if not leads:
             met = [one for one in challenges if one.lead > -inf and not hypothesis_of(one.effect.effect).is_fine]
-            return replace(found, ahead={one.effect.effect.id: -one.lead for one in met})
+            return replace(found, ahead={one.effect.effect.name: -one.lead for one in met})
         left = without(comparison, examined, found.proof, worst.effect, held)
         found = Nameless(left, (*found.taken, (worst.effect, worst.term)))
     return found
@@ -105,9 +105,9 @@ def _without_misnamed(
     for one in found.proof.standing:
         chosen = found.proof.chosen
         goes = goes_its_way(comparison.problem, chosen, one.within(chosen.mount))
-        comparison.judge(one.effect.id, chosen, [Rule("its numbers surely have the sign of such an effect", goes)])
+        comparison.judge(one.effect.name, chosen, [Rule("its numbers surely have the sign of such an effect", goes)])
         if not goes and offered.free:
-            grams = _grams(comparison, comparison.problem.without(found.proof.chosen, one.effect.id), offered.free)
+            grams = _grams(comparison, comparison.problem.without(found.proof.chosen, one.effect.name), offered.free)
             term = offered.free[max(range(len(offered.free)), key=lambda k: _worth(grams, [k]))]
             left = without(comparison, examined, found.proof, one, held)
             return _without_misnamed(comparison, examined, Nameless(left, (*found.taken, (one, term))), held, offered)
@@ -118,7 +118,7 @@ def _challenge(
     comparison: Comparison, found: Nameless, one: AcceptedEffect, own: float, offered: _Offered
 ) -> _Challenge:
     """What leads an effect by most, beside the terms that took a name already; `own`: the worth of all that stands."""
-    beside = comparison.problem.without(found.proof.chosen, one.effect.id)
+    beside = comparison.problem.without(found.proof.chosen, one.effect.name)
     tables = hypothesis_of(one.effect).tables
     law, free = offered.law, [term for term in offered.free if term.name not in found.quantities]
     alike = [term for term in free if term.name in tables]
@@ -127,7 +127,7 @@ def _challenge(
         return _Challenge(one, offered.free[0], -inf, beside)
     grams, known = _grams(comparison, beside, [*law, *terms, *alike]), range(len(law) + len(found.terms))
     worth = [_worth(grams, {*known, k + len(law)}) for k in range(len(terms) + len(alike))]
-    own += comparison.form_gain(found.proof.chosen, one.effect.id)
+    own += comparison.form_gain(found.proof.chosen, one.effect.name)
     kind = max([own, *(value - log(len(alike)) for value in worth[len(terms) :])])
     best = max(range(len(terms)), key=lambda k: worth[k])
     return _Challenge(one, terms[best], worth[best] - log(len(terms)) - kind, beside)
@@ -156,6 +156,6 @@ def _holds(comparison: Comparison, found: Nameless, one: _Challenge, held: Predi
     if not effects:
         return False
     gain = held.likelihood_of(whole) - held.likelihood_of(one.beside.mount)
-    lead = gain - found.proof.predicted[one.effect.effect.id]
+    lead = gain - found.proof.predicted[one.effect.effect.name]
     raises = gained(lead, with_name, whole, held).raises(policy)
     return gain >= policy.fair and lead >= -policy.clear and not raises

@@ -39,7 +39,7 @@ def prove(comparison: Comparison, examined: Examined, held: Predictive) -> Proof
     order = sorted(examined.effects, key=lambda one: -one.own.evidence)
     chosen, some = _longest(comparison, examined, order, held)
     chosen, standing, gains = _with_size(comparison, examined, chosen, some, held)
-    predicted = {one.effect.id: 0.0 for one in order} | {name: gain.nats for name, gain in gains.items()}
+    predicted = {one.effect.name: 0.0 for one in order} | {name: gain.nats for name, gain in gains.items()}
     removes = {name: gain.narrow for name, gain in gains.items()}
     return Proof(chosen, tuple(standing), predicted, tuple(one for one in order if one not in standing), removes)
 
@@ -59,7 +59,7 @@ def _with_size(
 ) -> tuple[Fit, list[AcceptedEffect], dict[str, Gain]]:
     """The effects that stand, but for those of which recordings tell no size, unless they surely predict."""
     chosen, standing, gains = _standing(comparison, examined, chosen, some, held)
-    told = [one for one in standing if _is_sure(comparison, chosen, one, gains[one.effect.id])]
+    told = [one for one in standing if _is_sure(comparison, chosen, one, gains[one.effect.name])]
     if len(told) == len(standing):
         return chosen, standing, gains
     fit, kept, known = _standing(comparison, examined, _with(comparison.problem, examined, told), told, held)
@@ -77,20 +77,20 @@ def _standing(
     ahead there, and leave the error as it was.
     """
     problem, policy = comparison.problem, comparison.policy
-    gains = {one.effect.id: _gain(problem, chosen, one, some, held) for one in some}
-    nats = {one.effect.id: gains[one.effect.id].nats for one in some}
-    falling = [one for one in some if not _is_validated(comparison, examined, chosen, one, gains[one.effect.id])]
+    gains = {one.effect.name: _gain(problem, chosen, one, some, held) for one in some}
+    nats = {one.effect.name: gains[one.effect.name].nats for one in some}
+    falling = [one for one in some if not _is_validated(comparison, examined, chosen, one, gains[one.effect.name])]
     if not falling:
         return chosen, list(some), gains
-    out = {min(group, key=lambda one: nats[one.effect.id]).effect.id for group in (falling, some)}
+    out = {min(group, key=lambda one: nats[one.effect.name]).effect.name for group in (falling, some)}
     ways = []
     for name in sorted(out):
-        rest = [one for one in some if one.effect.id != name]
+        rest = [one for one in some if one.effect.name != name]
         ways.append(_standing(comparison, examined, _with(problem, examined, rest), rest, held))
 
     def worth(way: tuple[Fit, list[AcceptedEffect], dict[str, Gain]]) -> tuple[bool, float]:
         fit, those, known = way
-        return any(known[one.effect.id].matters_alone(policy) for one in those), held.predicted(fit)
+        return any(known[one.effect.name].matters_alone(policy) for one in those), held.predicted(fit)
 
     best, kept, known = max(ways, key=worth)
     return best, kept, gains | known
@@ -99,8 +99,8 @@ def _standing(
 def _is_validated(comparison: Comparison, examined: Examined, chosen: Fit, one: AcceptedEffect, gain: Gain) -> bool:
     """Whether an effect stands on the held-out recordings, and is still what its name says in the structure there."""
     rules = until_refused(_validation(comparison, examined, chosen, one, gain))
-    comparison.enter(one.effect.id, chosen, one.own.plain_gain)
-    comparison.judge(one.effect.id, chosen, rules)
+    comparison.enter(one.effect.name, chosen, one.own.plain_gain)
+    comparison.judge(one.effect.name, chosen, rules)
     return all_pass(rules)
 
 
@@ -123,7 +123,7 @@ def _is_sure(comparison: Comparison, chosen: Fit, one: AcceptedEffect, gain: Gai
     if sure.outcome:
         return True
     told = Rule("its size differs from none", tells(comparison.problem, chosen, one.within(chosen.mount)))
-    comparison.judge(one.effect.id, chosen, [told])
+    comparison.judge(one.effect.name, chosen, [told])
     return told.outcome
 
 
@@ -161,7 +161,7 @@ def _gain(
     """What the held-out recordings lose without an effect."""
     without = one.without
     if len(standing) != 1 or len(without.mount.effects) != len(problem.mount.effects):
-        without = problem.without(chosen, one.effect.id)
+        without = problem.without(chosen, one.effect.name)
     after, before = (held.predicted(fit) for fit in (chosen, without))
     return gained(after - before, without.mount, chosen.mount, held)
 

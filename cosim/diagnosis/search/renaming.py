@@ -22,7 +22,7 @@ def renamed(one: CandidateFit) -> list[CandidateFit]:
 
 def by_each_name(one: CandidateFit, known: Collection[str]) -> list[CandidateFit]:
     """A candidate, and the same by each other name that is not among those that are `known`."""
-    return [one, *(other for other in renamed(one) if other.effect.id not in known)]
+    return [one, *(other for other in renamed(one) if other.effect.name not in known)]
 
 
 def is_renamed(effect: Effect) -> bool:

@@ -47,6 +47,8 @@ class AcceptedEffect:
     contests: Mapping[str, float]
     """Nats by which its name beats that of each rival, see `stages.contest`."""
     misfits: Misfits = field(default_factory=dict)
+    simpler: tuple[CandidateFit, ...] = ()
+    """The same coupling in forms of fewer numbers: those it has may have stood in for a coupling that came later."""
 
     @property
     def effect(self) -> Effect:
@@ -55,11 +57,11 @@ class AcceptedEffect:
 
     def within(self, mount: Mount) -> Effect:
         """The same effect as a mount has it, whose effects were fitted anew."""
-        return _strongest([one for one in mount.effects if one.id == self.effect.id][-len(self.effects) :])
+        return _strongest([one for one in mount.effects if one.name == self.effect.name][-len(self.effects) :])
 
     def margin(self, rival: CandidateFit) -> float:
         """Nats by which this effect is better than a rival."""
-        return self.margins[rival.effect.id]
+        return self.margins[rival.effect.name]
 
 
 def _strongest(waves: Sequence[Effect]) -> Effect:
@@ -118,6 +120,8 @@ def _round(
         if one.own.evidence < comparison.policy.clear and len(grouped(comparison, chosen)) > 1:
             return [], one.without
         best = settled(one.misfits, one.own, one.rivals)
+        least = one.own.evidence - comparison.policy.fair
+        best = next((form for form in one.simpler if form.evidence > least), best)
         if best is one.own:
             free = [r for r in one.rivals if excludes(one.misfits, one.effect, r.effect) is None]
             best = next((rival for rival in free if _takes(rival, one, comparison.policy)), best)
@@ -137,9 +141,9 @@ def _takes(rival: CandidateFit, one: AcceptedEffect, policy: Policy) -> bool:
     """
     waves = _is_wave(one.effect) - _is_wave(rival.effect)
     if waves:
-        return one.contests[rival.effect.id] < waves * policy.fair
+        return one.contests[rival.effect.name] < waves * policy.fair
     fewer = one.own.fit.count - rival.fit.count
-    if fewer and one.contests[rival.effect.id] == 0.0:
+    if fewer and one.contests[rival.effect.name] == 0.0:
         return fewer > 0
     margin = one.margin(rival)
     return margin < (policy.fair if fewer > 0 else -policy.fair if fewer < 0 else 0.0)
@@ -150,10 +154,10 @@ def _is_wave(effect: Effect) -> bool:
 
 
 def grouped(comparison: Comparison, chosen: Fit) -> list[tuple[Effect, ...]]:
-    """Effects that were added, those of one kind together."""
+    """Effects that were added, the waves of one ripple together."""
     groups: dict[str, list[Effect]] = {}
     for effect in chosen.mount.effects[len(comparison.problem.mount.effects) :]:
-        groups.setdefault(effect.id, []).append(effect)
+        groups.setdefault(effect.name, []).append(effect)
     return [tuple(group) for group in groups.values()]
 
 
@@ -167,9 +171,9 @@ def _challenged(
     problem = comparison.problem
     refits.on_progress(group[0].title)
     rest = tuple(effect for effect in chosen.mount.effects if not any(effect is one for one in group))
-    beside = _stage_after(comparison, problem.without(chosen, group[0].id), known, refits)
+    beside = _stage_after(comparison, problem.without(chosen, group[0].name), known, refits)
     own = weighed(comparison, chosen, beside.current, effect=group[0])
-    others = [one for one in beside.tried if one.effect.id != group[0].id]
+    others = [one for one in beside.tried if one.effect.name != group[0].name]
     if len(rest) > len(problem.mount.effects):
         standing = replace(chosen.mount, effects=rest)
         # Another start gained 71 nats once and 2 at most else (65 fits of 30 cases): no rival comes back from so far.
@@ -182,15 +186,17 @@ def _challenged(
     rivals = [one for one in others if _is_admissible(comparison, one)]
     best: dict[str, CandidateFit] = {}
     for rival in rivals:
-        if rival.effect.id not in best or rival.evidence > best[rival.effect.id].evidence:
-            best[rival.effect.id] = rival
+        if rival.effect.name not in best or rival.evidence > best[rival.effect.name].evidence:
+            best[rival.effect.name] = rival
     near = [name for name, rival in best.items() if contest(comparison, own, rival) < comparison.policy.clear]
     best |= {name: at_its_end(comparison, best[name], beside.current) for name in near}
     misfits = misfits_of(problem.prepared, chosen.mount, group[0])
-    margins = {rival.effect.id: margin(comparison, own, rival) for rival in best.values()}
-    ranked = sorted(best.values(), key=lambda rival: margins[rival.effect.id])
-    contests = {rival.effect.id: contest(comparison, own, rival) for rival in ranked}
-    found = with_names(AcceptedEffect(group, own, beside.current, tuple(ranked), margins, contests, misfits))
+    margins = {rival.effect.name: margin(comparison, own, rival) for rival in best.values()}
+    ranked = sorted(best.values(), key=lambda rival: margins[rival.effect.name])
+    contests = {rival.effect.name: contest(comparison, own, rival) for rival in ranked}
+    fewer = [one for one in beside.tried if one.effect.name == group[0].name and one.fit.count < own.fit.count]
+    simpler = tuple(fewer) if group[0].source else ()
+    found = with_names(AcceptedEffect(group, own, beside.current, tuple(ranked), margins, contests, misfits, simpler))
     _enter(comparison, found)
     return found
 
@@ -210,30 +216,30 @@ def with_names(one: AcceptedEffect) -> AcceptedEffect:
     own, rivals = renamed(one.own), [(rival, other) for rival in one.rivals for other in renamed(rival)]
     if not own and not rivals:
         return one
-    margins, contests = {other.effect.id: 0.0 for other in own}, {other.effect.id: 0.0 for other in own}
-    margins |= {other.effect.id: one.margins[rival.effect.id] for rival, other in rivals}
-    contests |= {other.effect.id: one.contests[rival.effect.id] for rival, other in rivals}
+    margins, contests = {other.effect.name: 0.0 for other in own}, {other.effect.name: 0.0 for other in own}
+    margins |= {other.effect.name: one.margins[rival.effect.name] for rival, other in rivals}
+    contests |= {other.effect.name: one.contests[rival.effect.name] for rival, other in rivals}
     everyone = [*own, *one.rivals, *(other for _, other in rivals)]
     margins, contests = margins | dict(one.margins), contests | dict(one.contests)
-    ranked = tuple(sorted(everyone, key=lambda rival: margins[rival.effect.id]))
+    ranked = tuple(sorted(everyone, key=lambda rival: margins[rival.effect.name]))
     return replace(one, rivals=ranked, margins=margins, contests=contests)
 
 
 def _is_admissible(comparison: Comparison, one: CandidateFit) -> bool:
     rules = until_refused(admission(comparison, one))
-    comparison.judge(one.effect.id, one.fit, rules)
+    comparison.judge(one.effect.name, one.fit, rules)
     return all_pass(rules)
 
 
 def _enter(comparison: Comparison, found: AcceptedEffect) -> None:
     """Enter an effect that was challenged into the ledger: what it is worth beside the others, and each rival."""
-    name, own, policy = found.effect.id, found.own, comparison.policy
+    name, own, policy = found.effect.name, found.own, comparison.policy
     comparison.enter(name, own.fit, own.plain_gain)
     kept = at_least("evidence beside the other effects", own.evidence, policy.clear, "nats")
     comparison.judge(name, own.fit, [kept, *(_ahead(found, rival, policy) for rival in found.rivals)])
     for rival in found.rivals:
-        comparison.enter(rival.effect.id, rival.fit, rival.plain_gain)
-        behind = found.contests[rival.effect.id]
+        comparison.enter(rival.effect.name, rival.fit, rival.plain_gain)
+        behind = found.contests[rival.effect.name]
         rule = Rule(
             f"less than the margin of a set behind {name}",
             behind < policy.fair,
@@ -241,24 +247,24 @@ def _enter(comparison: Comparison, found: AcceptedEffect) -> None:
             policy.fair,
             "nats",
         )
-        comparison.judge(rival.effect.id, rival.fit, [rule])
+        comparison.judge(rival.effect.name, rival.fit, [rule])
 
 
 def _ahead(found: AcceptedEffect, rival: CandidateFit, policy: Policy) -> Rule:
-    return at_least(f"ahead of {rival.effect.id}", found.contests[rival.effect.id], policy.fair, "nats")
+    return at_least(f"ahead of {rival.effect.name}", found.contests[rival.effect.name], policy.fair, "nats")
 
 
 def _names(found: Fit) -> tuple[str, ...]:
     """Which effects a structure holds."""
-    return tuple(sorted(effect.id for effect in found.mount.effects))
+    return tuple(sorted(effect.name for effect in found.mount.effects))
 
 
 def margins(one: AcceptedEffect) -> dict[str, float]:
     """Nats by which a name beats that of each rival; where the set point speaks of both, by that."""
-    told = {rival.effect.id: excludes(one.misfits, one.effect, rival.effect) for rival in one.rivals}
+    told = {rival.effect.name: excludes(one.misfits, one.effect, rival.effect) for rival in one.rivals}
     return {name: one.contests[name] if by is None else by / 2 for name, by in told.items()}
 
 
 def explains(one: AcceptedEffect) -> dict[str, float]:
     """Share of the plain residual energy that an effect, or a rival in its place, removes."""
-    return {candidate.effect.id: max(candidate.plain_gain, 0.0) for candidate in (one.own, *one.rivals)}
+    return {candidate.effect.name: max(candidate.plain_gain, 0.0) for candidate in (one.own, *one.rivals)}

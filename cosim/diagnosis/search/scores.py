@@ -21,13 +21,13 @@ def effect_scores(found: Nameless) -> list[EffectScores]:
     proof = found.proof
     return [
         EffectScores(
-            one.effect.id,
+            one.effect.name,
             one.own.evidence,
             margins(one),
             explains(one),
-            proof.predicted[one.effect.id],
-            proof.removes[one.effect.id],
-            found.ahead.get(one.effect.id, 0.0),
+            proof.predicted[one.effect.name],
+            proof.removes[one.effect.name],
+            found.ahead.get(one.effect.name, 0.0),
         )
         for one in proof.standing
     ]

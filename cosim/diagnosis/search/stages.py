@@ -107,7 +107,7 @@ def stage(comparison: Comparison, current: Fit, refits: InTurn = IN_TURN) -> Sta
     near = max(comparison.policy.fair, top - comparison.policy.clear)
     fits = [at_its_end(comparison, one, current) if one.evidence > near else one for one in fits]
     for one in fits:
-        comparison.enter(one.effect.id, one.fit, one.plain_gain)
+        comparison.enter(one.effect.name, one.fit, one.plain_gain)
     return Stage(current, tuple(sorted(fits, key=lambda one: -one.evidence)))
 
 
@@ -122,12 +122,22 @@ def starts(screened: Sequence[Screened], policy: Policy) -> list[Start]:
         best = {form: max(members, key=lambda one: getattr(one, statistic)) for form, members in hopeful.items()}
         order = sorted(best, key=lambda form: -getattr(best[form], statistic))
         ranked.append([best[form] for form in order[: policy.refitted]])
-    chosen = list({_key(one): one for group in ranked for one in group}.values())
+    near = [one for best in ranked[0] for one in _of_others(best, hopeful[best.form], policy)]
+    chosen = list({_key(one): one for group in (*ranked, near) for one in group}.values())
     found = [(one.candidate.start(one.coefficients), len(forms[one.form])) for one in chosen]
     kinds = {type(effect) for effect, _ in found}
     # Twins are alike at first order: where one is tried, the other must be, whatever a linear score says.
     twins = [(twin, many) for effect, many in found for twin in hypothesis_of(effect).twins(effect)]
     return found + [(twin, many) for twin, many in twins if type(twin) not in kinds]
+
+
+def _of_others(best: Screened, members: Sequence[Screened], policy: Policy) -> list[Screened]:
+    """Of a form the best of another source, where a linear step hardly tells them apart."""
+    (own,) = {each.source for each in best.candidate.instances}
+    others = [one for one in members if one.candidate.instances[0].source != own]
+    return [
+        one for one in sorted(others, key=lambda one: -one.evidence)[:1] if one.evidence > best.evidence - policy.clear
+    ]
 
 
 def is_hopeful(one: Screened, policy: Policy) -> bool:
@@ -229,13 +239,13 @@ def best_of(comparison: Comparison, now: Stage, largest: float = 0.0) -> Candida
     policy = comparison.policy
     asked = {id(one): until_refused(_search_rules(comparison, one, largest)) for one in now.tried}
     for one in now.tried:
-        comparison.judge(one.effect.id, one.fit, asked[id(one)])
+        comparison.judge(one.effect.name, one.fit, asked[id(one)])
     fit = [one for one in now.tried if all_pass(asked[id(one)])]
     best = _demanded(comparison, [one for one in fit if not is_small(one, policy)])
     if best is None and not largest:
         best = _demanded(comparison, fit)
     for one in fit:
-        comparison.judge(one.effect.id, one.fit, list(_choice(one, best, policy)))
+        comparison.judge(one.effect.name, one.fit, list(_choice(one, best, policy)))
     return best
 
 
@@ -260,7 +270,7 @@ def _demanded(comparison: Comparison, fit: Sequence[CandidateFit]) -> CandidateF
     timed = [one for one in fit if misfits[id(one)]]
     rules = {id(one): Rule("the set point demands it", is_told(misfits[id(one)], one)) for one in timed}
     for one in timed:
-        comparison.judge(one.effect.id, one.fit, [rules[id(one)]])
+        comparison.judge(one.effect.name, one.fit, [rules[id(one)]])
     demanded = [one for one in fit if id(one) not in rules or rules[id(one)].outcome]
     if not demanded:
         return None
