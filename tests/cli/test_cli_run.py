@@ -235,9 +235,10 @@ def test_wrong_use_is_exit_code_2_and_help_lists_the_verbs(capsys: pytest.Captur
     capsys.readouterr()
     assert call("--help") == 0
     shown = capsys.readouterr().out
-    assert all(verb in shown for verb in ("export", "run", "show"))
-    assert call("--version") == 0
-    assert capsys.readouterr().out == f"mount-cosim {cosim.__version__}\n"
+    assert all(word in shown for word in ("export", "run", "show", "--install-completion"))
+    for option in ("--version", "-V"):
+        assert call(option) == 0
+        assert capsys.readouterr().out == f"mount-cosim {cosim.__version__}\n"
 
 
 def test_importing_the_package_is_quick_and_a_warm_run_needs_no_casadi(tmp_path: Path) -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from browsing import browser, check_by_axe
+from commands import call
 
 import cosim
-from cosim.cli import main
 from cosim.support.errors import InputError, OutputError, RecordingError
 
 
@@ -76,9 +76,7 @@ def test_the_command_writes_a_page_that_needs_no_network_a_figure_and_numbers(
     for name, extra in (("a", 0.0), ("b", 0.5)):
         table(100.0, extra=extra).to_csv(tmp_path / f"{name}.csv", index=False)
     out = tmp_path / "out"
-    with pytest.raises(SystemExit) as left:
-        main(["compare", str(tmp_path / "a.csv"), str(tmp_path / "b.csv"), "--out", str(out), "--json"])
-    assert not left.value.code
+    assert call("compare", tmp_path / "a.csv", tmp_path / "b.csv", "--out", out, "--json") == 0
     told = json.loads(capsys.readouterr().out)
     assert told == json.loads((out / "compare.json").read_text())
     assert [one["rms"] for one in told["differences"] if one["column"] == "tau"] == [pytest.approx(0.5)]

@@ -5,16 +5,10 @@ from importlib import metadata
 from pathlib import Path
 
 import pytest
+from commands import call
 
 from cosim.api import doctor as looked
-from cosim.cli import main
 from cosim.support.version import __version__
-
-
-def call(*arguments: str) -> int:
-    with pytest.raises(SystemExit) as left:
-        main(list(arguments))
-    return int(left.value.code or 0)
 
 
 def test_versions_abilities_extras_and_caches_are_listed(
@@ -44,8 +38,3 @@ def test_what_is_missing_comes_with_the_command_that_installs_it(monkeypatch: py
     assert found.extras["mdf"] == "MDF4 recordings: not installed (pip install asammdf)"
     assert found.works["export"] == "no compiler: pip install ziglang"
     assert found.versions["casadi"] == "missing: reinstall the package"
-
-
-def test_the_short_option_shows_the_version(capsys: pytest.CaptureFixture[str]) -> None:
-    assert call("-V") == 0
-    assert capsys.readouterr().out == f"mount-cosim {__version__}\n"

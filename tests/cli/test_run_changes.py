@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import call
 from small_loop import TEXT
 from tiny_fmu import tiny
 
 import cosim
-from cosim.cli import main
 
 __all__ = ["tiny"]
 
@@ -20,12 +20,6 @@ def scenario(tiny: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPa
     path.write_text(TEXT.replace('"tiny', f'"{tiny[2].parent}/tiny'))
     monkeypatch.chdir(tmp_path)
     return path
-
-
-def call(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as left:
-        main([str(argument) for argument in arguments])
-    return int(left.value.code or 0)
 
 
 def test_numbers_are_changed_for_one_run_and_the_recording_says_so(scenario: Path, tmp_path: Path) -> None:

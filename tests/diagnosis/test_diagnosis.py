@@ -10,11 +10,11 @@ import jsonschema
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+from commands import call
 from fmpy import read_model_description
 from measured_like import read
 from wandering import axis, recorded, wander
 
-from cosim.cli import main
 from cosim.diagnosis.diagnose import diagnose
 from cosim.diagnosis.measure.protocol import Structures, judge, traces
 from cosim.estimation.blocks import Blocks
@@ -71,9 +71,7 @@ class TestCommand:
         return ["diagnose", *train, *held, "--card", str(folder / "card.toml"), "--out", str(out), *more]
 
     def run(self, arguments: list[str]) -> int:
-        with pytest.raises(SystemExit) as left:
-            main(arguments)
-        return int(left.value.code or 0)
+        return call(*arguments)
 
     def test_files_json_and_improved_card(
         self, folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from commands import call
 from two_links import OWN, elbow
 from wandering import swing
 
 import cosim
 from cosim.api.defaults import split
-from cosim.cli import main
 from cosim.data.recording import Recording
 from cosim.diagnosis.first_card import first_card
 from cosim.support.errors import InputError
@@ -116,9 +116,7 @@ def test_a_kind_of_axis_that_is_none_is_one_sentence(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     table(1, seconds=5.0).to_csv("run.csv", index=False)
-    with pytest.raises(SystemExit) as left:
-        main([*command, "--motion", "sideways"])
-    assert left.value.code == 2
+    assert call(*command, "--motion", "sideways") == 2
     assert 'motion "sideways" is no kind of axis; there are: rotary, linear.' in capsys.readouterr().err
 
 
@@ -139,9 +137,7 @@ def test_two_files_and_no_option_give_an_answer(
     monkeypatch.chdir(tmp_path)
     for seed in (1, 2):
         table(seed, seconds=15.0).to_csv(f"run{seed}.csv", index=False)
-    with pytest.raises(SystemExit) as left:
-        main(["diagnose", "run1.csv", "run2.csv", "--quick", "--json"])
-    assert not left.value.code
+    assert call("diagnose", "run1.csv", "run2.csv", "--quick", "--json") == 0
     said = capsys.readouterr()
     assert json.loads(said.out)["verdict"] == []
     assert "run2, the last of 2 recordings, is for validation and not fitted" in said.err

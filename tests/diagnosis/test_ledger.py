@@ -6,9 +6,9 @@ from typing import Any
 
 import pandas as pd
 import pytest
+from commands import call
 
 import cosim
-from cosim.cli import main
 from cosim.diagnosis.answer.ledger import Gain, Ledger, Rule, Trial, at_least, error_of_sum, until_refused
 from cosim.diagnosis.answer.why import BASE, decisive, ranked, reasons, sentence
 from cosim_studies.proof.generator import make_case, write_given
@@ -31,9 +31,7 @@ def diagnosed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, cosim.Dia
 
 def why(*words: str) -> None:
     """Run `cosim why`, which ends with 0."""
-    with pytest.raises(SystemExit) as ended:
-        main(["why", *words])
-    assert not ended.value.code
+    assert call("why", *words) == 0
 
 
 def rows(folder: Path) -> list[dict[str, Any]]:
@@ -113,9 +111,7 @@ def test_why_refuses_what_is_no_diagnosis(
 ) -> None:
     if content is not None:
         (tmp_path / "diagnosis.json").write_text(content, "utf-8")
-    with pytest.raises(SystemExit) as ended:
-        main(["why", str(tmp_path)])
-    assert ended.value.code == 2
+    assert call("why", tmp_path) == 2
     said = capsys.readouterr().err
     assert words in said
     assert "Traceback" not in said
@@ -124,8 +120,7 @@ def test_why_refuses_what_is_no_diagnosis(
 def test_why_names_the_effects_where_one_is_misspelt(
     diagnosed: tuple[Path, Any], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    with pytest.raises(SystemExit):
-        main(["why", str(diagnosed[0]), "coging"])
+    call("why", diagnosed[0], "coging")
     assert "Did you mean cogging?" in capsys.readouterr().err
 
 

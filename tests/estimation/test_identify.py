@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import call
 
 from bench.identification import POSITIVE, multisine, the_card
-from cosim.cli import main
 from cosim.data.recording import Recording
 from cosim.estimation.identify.deliver import summary
 from cosim.estimation.identify.estimate import Outputs, estimate, explore, settle
@@ -218,14 +218,10 @@ def test_the_verb_writes_card_numbers_and_pictures(recording: Recording, step: R
     card.write_text(card_text(the_card()), "utf-8")
     out = tmp_path / "out"
     arguments = ["identify", *map(str, paths), "--card", str(card), "--out", str(out), "--starts", "1"]
-    with pytest.raises(SystemExit) as done:
-        main([*arguments, "--free", "sigma0", "--free", "sigma1"])
-    assert done.value.code == 0
+    assert call(*arguments, "--free", "sigma0", "--free", "sigma1") == 0
     found = json.loads((out / "identify.json").read_text("utf-8"))
     assert found["output_error"][0]["standard_errors"]["friction.sigma0"] > 0
     assert set(found["presliding"]) == {"step"}
     assert read_card(out / "card.toml").origin["recordings"][0]["name"] == "loop"
     assert {"friction_map.svg", "presliding.svg", "output_error.svg"} <= {path.name for path in out.iterdir()}
-    with pytest.raises(SystemExit) as again:
-        main(arguments)
-    assert again.value.code == 2
+    assert call(*arguments) == 2

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from commands import call as verb
 from motor_fmu import motor, recorded
 
 import cosim
-from cosim.cli import main
 
 TRUTH = {"J": 0.013, "d": 0.08, "Fc": 0.16}
 
@@ -24,12 +24,6 @@ def folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def fmus(folder) -> dict[int, Path]:
     return {version: motor(folder, version) for version in (2, 3)}
-
-
-def verb(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as ended:
-        main([str(one) for one in arguments])
-    return int(ended.value.code or 0)
 
 
 def found(*given, **options):

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from commands import call
 from experiment_archives import bundle, with_files
 from motor_fmu import motor, recorded
 
 import cosim
 from cosim.calibration.store import Store
-from cosim.cli import main
 from cosim.support.errors import InputError, OutputError, SweepError
 
 TRUTH = {"J": 0.013, "d": 0.08, "Fc": 0.16}
@@ -177,8 +177,7 @@ def test_the_folder_of_a_check_is_shown_and_its_picture_has_units(folder, capsys
     (row,) = cosim.show(folder / "checked").tables["variables"]
     assert not done.passed
     assert (row["variable"], row[""], row["largest difference"]) == ("w", "FAIL", "0.5")
-    with pytest.raises(SystemExit):
-        main(["show", str(folder / "checked")])
+    call("show", folder / "checked")
     assert "at [s]" in capsys.readouterr().out, "what stands in brackets is no markup"
     svg = (folder / "checked" / "experiment_1.svg").read_text()
     assert "w [rad/s]" in svg
@@ -203,15 +202,12 @@ def test_a_folder_is_no_fmu(folder):
 
 
 def test_a_calibration_without_a_model_says_which_options_there_are(run, capsys):
-    with pytest.raises(SystemExit) as ended:
-        main(["identify", "--free", "J", str(run)])
-    assert ended.value.code == 2
+    assert call("identify", "--free", "J", run) == 2
     assert "One of --card, --fmu and --system" in capsys.readouterr().err
 
 
 def test_names_of_a_schedule_are_not_broken_on_a_terminal_of_80_columns(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
-    with pytest.raises(SystemExit):
-        main(["show", "sidereal", "--schedule"])
+    call("show", "sidereal", "--schedule")
     lines = capsys.readouterr().out.splitlines()
     assert any(line.split()[:2] == ["controller.a_d", "reference.acceleration"] for line in lines)

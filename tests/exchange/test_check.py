@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import call as verb
 from experiment_archives import bundle, experiments, manifest, with_files
 from motor_fmu import motor
 
 import cosim
-from cosim.cli import main
 from cosim.master.simulate import simulate
 from cosim.system.system import System
 from cosim.system.wire import Record, Wire
@@ -69,12 +69,6 @@ def here(monkeypatch) -> None:
 
 
 HERE = pytest.mark.usefixtures("here")
-
-
-def verb(*arguments: object) -> int:
-    with pytest.raises(SystemExit) as ended:
-        main([str(one) for one in arguments])
-    return int(ended.value.code or 0)
 
 
 @pytest.mark.parametrize("version", ["1.0.0-alpha.1", "1.0.0-beta.1"])

@@ -1,26 +1,15 @@
 """The binary behind the archive: exact memory, counted time, honest errors, the order of the solver."""
 
 import ctypes
-from functools import cache
 from math import inf, nan
 
 import casadi as ca
 import export_models as models
 import numpy as np
 import pytest
+from export_models import everything, instance, library
 
-from pyfmi_models.export import build_library
-
-library = cache(lambda make: build_library(make()))
 pytestmark = pytest.mark.parametrize("fmi", [2, 3])
-
-
-def instance(make, fmi, kind="CS", **start):
-    return models.Driver(make(), library(make), fmi, kind).start(**start)
-
-
-def everything(driver):
-    return driver.get(*driver.references).tobytes()
 
 
 @pytest.mark.parametrize("make", [models.lugre, models.controller, models.oscillator])

@@ -9,10 +9,10 @@ from pathlib import Path
 import firmware_tools as tools
 import numpy as np
 import pytest
+from commands import call
 from firmware_tools import ENABLE, FAULT, OFF, ON, RESET
 from on_hardware import recorded, session
 
-from cosim.cli import main
 from cosim.hardware.session import run_session
 from pyfmi_models.card import Card, read_card
 from pyfmi_models.errors import ExportError
@@ -178,26 +178,20 @@ def test_the_deepest_chain_of_calls_and_what_is_reached_are_added_up(name: str) 
         footprint(objects, "start")
 
 
-def run(*words: str) -> int:
-    with pytest.raises(SystemExit) as left:
-        main(list(words))
-    return int(left.value.code or 0)
-
-
 def test_the_command_writes_a_project_that_names_its_size_and_overwrites_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ("hardware", "firmware", "paper_mount", "--target", "host", "--out", str(tmp_path / "out"))
-    assert run(*words, "--json") == 0
+    assert call(*words, "--json") == 0
     found = json.loads(capsys.readouterr().out)
     assert found["variables"] < 1000 < found["code"]
     assert not [name for name in found["outside"] if "alloc" in name or name == "free"]
     page = (tmp_path / "out" / "README.md").read_text("utf-8")
     assert f"| stack, deepest chain of calls | {found['stack']} |" in page
     assert target_of("host").command("zig") in page
-    assert run(*words) == 2
+    assert call(*words) == 2
     assert "exists already; give --force" in capsys.readouterr().err
-    assert run(*words, "--force") == 0
+    assert call(*words, "--force") == 0
 
 
 def test_what_cannot_be_firmware_is_refused_in_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -209,7 +203,7 @@ def test_what_cannot_be_firmware_is_refused_in_one_sentence(tmp_path: Path, caps
         ((str(card),), "[encoder] counts_per_rev is missing; a firmware reads counts"),
         (("paper_mount", "--target", "vax"), 'firmware target "vax" is unknown; there are: cortex-a9, host'),
     ):
-        assert run("hardware", "firmware", *words, "--out", out) == 2
+        assert call("hardware", "firmware", *words, "--out", out) == 2
         assert sentence in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "out").exists()
 

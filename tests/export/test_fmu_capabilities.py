@@ -6,29 +6,18 @@ import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
 from pathlib import Path
 
 import export_models as models
 import numpy as np
 import pytest
+from export_models import everything, instance, library
 
-from pyfmi_models.export import build_library
 from pyfmi_models.export.build import compile_shared
 from pyfmi_models.export.codegen import SHIM, generate
 from pyfmi_models.export.platforms import PLATFORMS, host
 
 both = pytest.mark.parametrize("fmi", [2, 3])
-library = cache(lambda make: build_library(make()))
-
-
-def instance(make, fmi, kind="CS", **start):
-    return models.Driver(make(), library(make), fmi, kind).start(**start)
-
-
-def everything(driver):
-    return driver.get(*driver.references).tobytes()
-
 
 CONTINUE = """
 import json, sys

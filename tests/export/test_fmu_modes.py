@@ -4,8 +4,9 @@ import ctypes
 
 import export_models as models
 import pytest
+from export_models import everything, instance, library
 from fuzz_rules import sealed
-from test_fmu_capabilities import both, everything, instance, library
+from test_fmu_capabilities import both
 
 # call: in which modes of model exchange and of co-simulation it is allowed, as the standards' tables say
 READ = ("rates", "indicators", "nominals", "states read")

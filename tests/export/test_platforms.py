@@ -7,8 +7,8 @@ from functools import cache
 
 import export_models as models
 import pytest
+from commands import call
 
-from cosim.cli import main
 from pyfmi_models.errors import ExportError
 from pyfmi_models.export import build_library, export_fmu
 from pyfmi_models.export.platforms import PLATFORMS, host, platforms_of
@@ -133,9 +133,7 @@ def test_fmi_2_for_aarch64_linux_alone_lies_where_importers_there_look(tmp_path)
 
 
 def test_the_command_gives_aarch64_linux_an_fmi_2_archive_of_its_own(tmp_path):
-    with pytest.raises(SystemExit) as left:
-        main(["export", "emps", "--fmi", "2", "--platform", "x86_64-linux,aarch64-linux", "--out", str(tmp_path)])
-    assert left.value.code in (0, None)
+    assert call("export", "emps", "--fmi", "2", "--platform", "x86_64-linux,aarch64-linux", "--out", tmp_path) == 0
     plants = [tmp_path / "emps_plant_fmi2.fmu", tmp_path / "aarch64-linux" / "emps_plant_fmi2.fmu"]
     for path, machine in zip(plants, (62, 183), strict=True):
         with zipfile.ZipFile(path) as archive:
@@ -143,9 +141,7 @@ def test_the_command_gives_aarch64_linux_an_fmi_2_archive_of_its_own(tmp_path):
 
 
 def test_an_unknown_platform_leaves_nothing_behind(tmp_path):
-    with pytest.raises(SystemExit) as left:
-        main(["export", "emps", "--platform", "vax", "--out", str(tmp_path / "out")])
-    assert left.value.code == 2
+    assert call("export", "emps", "--platform", "vax", "--out", tmp_path / "out") == 2
     assert list(tmp_path.iterdir()) == []
 
 

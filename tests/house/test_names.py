@@ -7,17 +7,9 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from imports import PACKAGES
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = (
-    "cosim",
-    "cosim_ethercat",
-    "cosim_formulas",
-    "cosim_observatory",
-    "cosim_serve",
-    "cosim_studies",
-    "pyfmi_models",
-)
 SOURCES = sorted(path for folder in (*PACKAGES, "bench", "tests") for path in (ROOT / folder).rglob("*.py"))
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "results").glob("*.md")])
 MODULES = {".".join(one.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): one for one in SOURCES}

@@ -8,10 +8,10 @@ from shlex import split
 
 import numpy as np
 import pytest
+from commands import call
 from investigations import CABLE, LIMITS, STIFFENING, written
 
 from cosim.api.investigate import investigate
-from cosim.cli import main
 from cosim.cli.investigate import seconds_of
 from cosim.data.recording import Recording
 from cosim.investigation.design import torque_predicted
@@ -27,9 +27,7 @@ from pyfmi_models.card import read_card
 def test_one_answer_needs_no_further_motion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scenario, card, machine = written(tmp_path, STIFFENING)
     words = ["investigate", scenario, "--card", card, "--machine", machine, "--out", str(tmp_path / "out")]
-    with pytest.raises(SystemExit) as ended:
-        main([*words, "--seconds", "10", "--budget", "1min", "--json"])
-    assert not ended.value.code
+    assert call(*words, "--seconds", "10", "--budget", "1min", "--json") == 0
     told = json.loads(capsys.readouterr().out)
     assert told["verdict"] == ["cable_wrap"]
     assert told["ended"] == "answered"
@@ -158,11 +156,9 @@ def test_the_command_that_is_recorded_asks_for_the_same(options: str, monkeypatc
 
     monkeypatch.setattr(sys.modules["cosim.api.investigate"], "investigate", noted)
     monkeypatch.setattr("cosim.cli.investigate.machine_of", lambda *given: given)
-    with pytest.raises(SystemExit):
-        main(["investigate", "axis.toml", *split(options)])
+    call("investigate", "axis.toml", *split(options))
     recorded = str(asked[0]["command"])
-    with pytest.raises(SystemExit):
-        main(split(recorded)[1:])
+    call(*split(recorded)[1:])
     assert asked[0] == asked[1]
     assert not [one for one in split(options) if one not in recorded]
 

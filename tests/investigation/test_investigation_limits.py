@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import call
 from investigations import CABLE, on_a_drive, written
 
 from cosim.api.investigate import investigate
-from cosim.cli import main
 from cosim.cli.investigate import seconds_of
 from cosim.data.recording import Recording
 from cosim.hardware.machine import Machine, changed, read_machine
@@ -172,9 +172,7 @@ def test_limits_are_no_wider_than_the_drive(tmp_path: Path) -> None:
 def test_nothing_moves_on_a_drive_without_leave(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     given = on_a_drive(tmp_path, CABLE)
     words = ["investigate", given[0], "--card", given[1], "--drive", "udp://127.0.0.1:4020"]
-    with pytest.raises(SystemExit) as ended:
-        main([*words, "--out", str(tmp_path / "out")])
-    assert ended.value.code == 2
+    assert call(*words, "--out", tmp_path / "out") == 2
     assert "give --move to allow it" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
 

@@ -4,21 +4,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_loop import TEXT
+from commands import scenario
 from tiny_fmu import tiny
 
 import cosim
 from cosim.fmi.fmu import FmuComponent
 from cosim.support.errors import StepError, WiringError
 
-__all__ = ["tiny"]
-
-
-@pytest.fixture
-def scenario(tiny: dict[int, Path], tmp_path: Path) -> Path:
-    path = tmp_path / "loop.toml"
-    path.write_text(TEXT.replace('"tiny', f'"{tiny[2].parent}/tiny'))
-    return path
+__all__ = ["scenario", "tiny"]
 
 
 @pytest.mark.parametrize("compiled", [True, False])

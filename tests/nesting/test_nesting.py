@@ -10,12 +10,12 @@ from typing import Any
 import fmu_tools
 import numpy as np
 import pytest
+from commands import call
 from fmpy.validation import validate_fmu
 from nested_runs import assert_same_bits, both, nested
 from tiny_fmu import described, description, tiny
 
 from cosim.api.export import export
-from cosim.cli import main
 from cosim.data.signals import Noise, Steps
 from cosim.master.simulate import simulate
 from cosim.models.cache import with_fmus
@@ -259,12 +259,6 @@ def test_what_cannot_be_nested_is_said_in_a_sentence(tiny: Tiny, tmp_path: Path)
     assert not list(tmp_path.glob("system*.fmu"))
 
 
-def code_of(command: list[str]) -> object:
-    with pytest.raises(SystemExit) as left:
-        main(command)
-    return left.value.code
-
-
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -278,14 +272,14 @@ def code_of(command: list[str]) -> object:
 def test_wrong_use_of_the_command_is_a_sentence(
     words: list[str], sentence: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert code_of(["export", *words, "--out", str(tmp_path)]) == 2
+    assert call("export", *words, "--out", tmp_path) == 2
     assert sentence in capsys.readouterr().err
 
 
 def test_the_command_prints_the_path_and_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     asked = ["export", "sidereal", "--as-fmu", "--fmi", "3", "--json", "--out", str(tmp_path)]
-    assert code_of(asked) == 0
+    assert call(*asked) == 0
     (path,) = json.loads(capsys.readouterr().out)["fmus"]
     assert Path(path).is_file()
-    assert code_of(asked) == 2
+    assert call(*asked) == 2
     assert "exists already" in capsys.readouterr().err

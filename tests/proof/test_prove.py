@@ -5,11 +5,11 @@ from pathlib import Path
 
 import prove_tool
 import pytest
+from commands import call
 from imports import imports
 from prove_rows import ROWS, row
 from report_example import diagnosis
 
-from cosim.cli import main
 from cosim.support.errors import OutputError, ProofError
 from cosim.sweeps.journal import RUNS
 from cosim_studies.proof import baselines, marks
@@ -167,9 +167,7 @@ def test_a_folder_with_something_else_in_it_is_left_alone(tmp_path: Path) -> Non
     ],
 )
 def test_wrong_wishes_end_with_one_sentence(wrong, message, tmp_path, capsys) -> None:
-    with pytest.raises(SystemExit) as ended:
-        main(["prove", "--out", str(tmp_path / "out"), "--decks", str(tmp_path / "decks.md"), *wrong])
-    assert ended.value.code == 2
+    assert call("prove", "--out", tmp_path / "out", "--decks", tmp_path / "decks.md", *wrong) == 2
     said = capsys.readouterr().err
     assert said.startswith(f"cosim: {message}")
     assert said.count("\n") == 1

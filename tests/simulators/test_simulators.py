@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import call
 from joint_loops import PERIOD, apart, in_fmu, in_mujoco
 
 from cosim.api.export import export
-from cosim.cli import main
 from cosim.simulators import FORMATS
 from cosim.simulators.measure import Held, hold
 from cosim.simulators.motion import along_default
@@ -177,28 +177,22 @@ def test_isaac_text_is_usd_with_friction_per_degree(tmp_path: Path) -> None:
     assert numbers["viscousFrictionCoefficient"] == pytest.approx(law.sigma2 * np.pi / 180)
 
 
-def code_of(command: list[str]) -> object:
-    with pytest.raises(SystemExit) as left:
-        main(command)
-    return left.value.code
-
-
 def test_the_command_writes_files_and_a_table_and_overwrites_nothing(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     asked = ["export", "paper_mount", "--fmi", "3", "--mujoco", "--urdf", "--isaac", "--json", "--out", str(tmp_path)]
-    assert code_of(asked) == 0
+    assert call(*asked) == 0
     told = json.loads(capsys.readouterr().out)
     assert {Path(told[name]).name for name in ("mujoco", "urdf", "isaac", "table")} <= {
         one.name for one in tmp_path.iterdir()
     }
     assert [one["simulator"] for one in told["held"]] == ["mujoco", "urdf", "isaac"]
-    assert code_of(asked) == 2
+    assert call(*asked) == 2
     assert "exists already" in capsys.readouterr().err
 
 
 def test_a_recording_that_is_none_is_a_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     asked = ["export", "paper_mount", "--urdf", "--recording", str(tmp_path / "none.csv"), "--out", str(tmp_path / "o")]
-    assert code_of(asked) == 2
+    assert call(*asked) == 2
     assert "none.csv" in capsys.readouterr().err
     assert not (tmp_path / "o").exists()

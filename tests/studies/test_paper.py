@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import call
 
-from cosim.cli import main
 from cosim.support.errors import CosimError
 from cosim_studies.paper.checks import checks
 from cosim_studies.paper.conditions import CASES, Condition, condition, conditions, definitions, scaled
@@ -228,8 +228,6 @@ def test_what_is_not_as_expected_is_said(written: Written) -> None:
 
 def test_nothing_is_overwritten_without_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "table4.json").write_text("{}")
-    with pytest.raises(SystemExit) as caught:
-        main(["paper", "--out", str(tmp_path)])
-    assert caught.value.code == 2
+    assert call("paper", "--out", tmp_path) == 2
     assert "table4.json exists already" in capsys.readouterr().err
     assert (tmp_path / "table4.json").read_text() == "{}"

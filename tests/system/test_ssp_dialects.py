@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from foreign_fmu import foreign
-from ssp_files import SPACES, component, connector, pack, parameter_set, real, system, values, wire
+from ssp_files import SPACES, component, connector, pack, parameter_set, read, real, system, values, wire
 from tiny_fmu import tiny
 
 from cosim.cli import main
@@ -14,22 +14,12 @@ from cosim.master.simulate import run
 from cosim.support.errors import ScenarioError
 from cosim.system.scenario import read_scenario
 
-__all__ = ["tiny"]
+__all__ = ["read", "tiny"]
 
 DRIVEN = values(real("mode", 1) + real("a", 0.5))
 """Settings that make y = 0.5 at the end of each step."""
 FOLLOWS = values(real("mode", 1))
 """Settings that make y = a at the end of each step."""
-
-
-@pytest.fixture
-def read(tiny: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
-
-    def reader(inside: str, **more: str):
-        return read_scenario(pack(tmp_path / "t.ssp", tiny[2], inside, **more))
-
-    return reader
 
 
 def last(scenario, name: str) -> float:

@@ -5,30 +5,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from commands import call
 from foreign_fmu import foreign
-from ssp_files import SPACES, component, connector, pack, parameter_set, real, system, values, wire
+from ssp_files import SPACES, component, connector, pack, parameter_set, read, real, system, values, wire
 from tiny_fmu import tiny
 
-from cosim.cli import main
 from cosim.data.recording import Recording
 from cosim.master.simulate import run
 from cosim.support.errors import ScenarioError
 from cosim.system.scenario import read_scenario
 
-__all__ = ["tiny"]
+__all__ = ["read", "tiny"]
 
 DRIVEN = values(real("mode", 1) + real("a", 0.5))
 """Settings that make y = 0.5 at the end of each step."""
-
-
-@pytest.fixture
-def read(tiny: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
-
-    def reader(inside: str, **more: str):
-        return read_scenario(pack(tmp_path / "t.ssp", tiny[2], inside, **more))
-
-    return reader
 
 
 def test_transformations_parameters_and_the_experiment_are_those_of_the_archive(read) -> None:
@@ -140,9 +130,7 @@ def test_run_and_show_take_an_ssp(
     monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
     path = pack(tmp_path / "a b.ssp", tiny[2], system(component("one", DRIVEN + values(real("kk", 1)))))
     for command in (["show", str(path)], ["run", str(path), "--out", str(tmp_path / "out")]):
-        with pytest.raises(SystemExit) as left:
-            main(command)
-        assert not left.value.code
+        assert call(*command) == 0
     said = capsys.readouterr()
     assert "one.y" in said.out
     assert "one.kk" in said.err

@@ -1,11 +1,13 @@
 """Small models with known answers, and a bare driver of the two C interfaces, for the tests of the export."""
 
 import ctypes
+from functools import cache
 from pathlib import Path
 
 import casadi as ca
 import numpy as np
 
+from pyfmi_models.export import build_library
 from pyfmi_models.export.codegen import generate
 from pyfmi_models.model import Model, Variable
 
@@ -208,3 +210,19 @@ class Driver:
         state, name = ctypes.c_void_p(), "DeSerializeFMUstate" if self.fmi == 2 else "DeserializeFMUState"
         status = self.call(name, content, ctypes.c_size_t(len(content)), ctypes.byref(state))
         return state if status == "ok" else status
+
+
+@cache
+def library(make):
+    """The compiled library of a model, built once."""
+    return build_library(make())
+
+
+def instance(make, fmi, kind="CS", **start):
+    """An instance that has been started, with these values."""
+    return Driver(make(), library(make), fmi, kind).start(**start)
+
+
+def everything(driver):
+    """The bytes of all its variables."""
+    return driver.get(*driver.references).tobytes()

@@ -1,7 +1,12 @@
 """SSP archives written by hand around the tiny FMU."""
 
 import zipfile
+from collections.abc import Callable
 from pathlib import Path
+
+import pytest
+
+from cosim.system.scenario import Scenario, read_scenario
 
 NAMES = {
     "ssd": "Description",
@@ -80,3 +85,10 @@ def pack(
         for name, content in files.items():
             archive.writestr(f"resources/{name.replace('_', '.')}", content)
     return path
+
+
+@pytest.fixture
+def read(tiny: dict[int, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Scenario]:
+    """Pack an archive and read it, with a cache of its own."""
+    monkeypatch.setenv("MOUNT_COSIM_CACHE", str(tmp_path / "cache"))
+    return lambda inside, **more: read_scenario(pack(tmp_path / "t.ssp", tiny[2], inside, **more))
