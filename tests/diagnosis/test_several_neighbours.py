@@ -8,10 +8,11 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from two_links import joint
+from two_links import elbow, joint, tones
 
 import cosim.delivery
 from cosim.api.why import Written
+from cosim.data.recording import Recording
 from cosim.delivery.deliver import as_json
 from cosim.diagnosis.answer.why import reasons
 from cosim.diagnosis.diagnose import Outcome, diagnose
@@ -63,6 +64,22 @@ def test_each_neighbour_that_acts_is_found_with_its_own_size_and_delivered() -> 
     said = dict(reasons(document, answer.ledger))
     assert "fitted together with axis_coupling:q1" in said["axis_coupling:q3"]
     Written(document, answer.ledger).check("axis_coupling:q3")
+
+
+def test_weak_couplings_beside_a_strong_one_are_found_too() -> None:
+    answer = found({1: (0.2, 1.5), 2: (0.012, 0.0), 3: (0.012, 0.0)}, noise=0.3).diagnosis
+    assert {one.source for one in answer.findings if one.answer == "found"} == {"q1", "q2", "q3"}
+    assert answer.heldout.after_rms < 1.1 * answer.heldout.floor_rms
+
+
+def test_what_the_equation_of_a_coupling_lacks_makes_no_other_neighbour_a_cause() -> None:
+    runs = []
+    for seed in (1, 2, 3):
+        run = elbow(seed)
+        idle = {f"q{k}": tones(run.t, 100 * k + seed, 0.7).q for k in (3, 4)}
+        runs.append(Recording.of({**run.table, **idle}, run.name))
+    answer = diagnose(runs[:2], runs[2:], parse_card(CARD.replace("0.3", "0.064"), "card.toml")).diagnosis
+    assert {one.source for one in answer.findings if one.effect == "axis_coupling" and one.parameters} == {"q1"}
 
 
 def test_neighbours_that_move_and_do_nothing_are_not_named() -> None:
