@@ -30,6 +30,8 @@ class EffectScores:
     """... and the share of their residual energy that it removes."""
     ahead: float = 0.0
     """By how much it is better than the best term of another kind in its place, which has no name."""
+    waves: Sequence[str] = ()
+    """Rivals that are waves over position with any number of cycles, where it is none itself."""
 
     def with_margins_of(self, share: float) -> "EffectScores":
         """The same with so much of each margin."""

@@ -111,7 +111,7 @@ def beside_rest(effects: Sequence[EffectScores], follows: tuple[str, ...], polic
 
 def _named(effects: Sequence[EffectScores], policy: Policy) -> Decision:
     sets = {one.effect: open_rivals(one, policy) for one in effects}
-    return Decision(sets, {one.effect: _probabilities(one, sets[one.effect]) for one in effects}, False, ())
+    return Decision(sets, {one.effect: _probabilities(one, sets[one.effect], policy) for one in effects}, False, ())
 
 
 def leave_much(effects: Sequence[EffectScores], policy: Policy) -> list[EffectScores]:
@@ -253,9 +253,13 @@ def followed(residual: ResidualScores, policy: Policy) -> tuple[str, ...]:
     return tuple(one.name for one in ranked if one.share > least) or (residual.over_time,)
 
 
-def _probabilities(one: EffectScores, members: Sequence[str]) -> dict[str, float]:
-    """Posterior shares of an effect, its rivals and "none" (equal priors), times what each explains, calibrated."""
-    odds = {one.effect: 0.0, **{name: -margin for name, margin in one.margins.items()}}
+def _probabilities(one: EffectScores, members: Sequence[str], policy: Policy) -> dict[str, float]:
+    """Posterior shares of an effect, its rivals and "none", times what each explains, calibrated.
+
+    Priors are equal, but for a wave behind a name of one shape: it would have to be ahead by `fair` to take its place.
+    """
+    lower = dict.fromkeys(one.waves, policy.fair)
+    odds = {one.effect: 0.0, **{name: -margin - lower.get(name, 0.0) for name, margin in one.margins.items()}}
     top = max(odds.values())
     weights = {name: exp(value - top) for name, value in odds.items()}
     total = sum(weights.values()) + exp(-min(one.evidence, 700.0) - top)

@@ -265,6 +265,11 @@ def margins(one: AcceptedEffect) -> dict[str, float]:
     return {name: one.contests[name] if by is None else by / 2 for name, by in told.items()}
 
 
+def waves(one: AcceptedEffect) -> tuple[str, ...]:
+    """Rivals that are waves over position, where the effect is none."""
+    return () if _is_wave(one.effect) else tuple(r.effect.name for r in one.rivals if _is_wave(r.effect))
+
+
 def explains(one: AcceptedEffect) -> dict[str, float]:
     """Share of the plain residual energy that an effect, or a rival in its place, removes."""
     return {candidate.effect.name: max(candidate.plain_gain, 0.0) for candidate in (one.own, *one.rivals)}

@@ -11,7 +11,7 @@ from cosim.diagnosis.evidence.comparison import Comparison
 from cosim.diagnosis.evidence.predictive import Predictive
 from cosim.diagnosis.search.nameless import Nameless
 from cosim.diagnosis.search.proof import Proof
-from cosim.diagnosis.search.rivals import explains, margins
+from cosim.diagnosis.search.rivals import explains, margins, waves
 from cosim.diagnosis.terms.flexible import flexible_terms
 from cosim.estimation.fit import Fit
 
@@ -28,6 +28,7 @@ def effect_scores(found: Nameless) -> list[EffectScores]:
             proof.predicted[one.effect.name],
             proof.removes[one.effect.name],
             found.ahead.get(one.effect.name, 0.0),
+            waves(one),
         )
         for one in proof.standing
     ]

@@ -145,6 +145,17 @@ def test_beside_what_has_no_name_a_margin_counts_for_a_share() -> None:
     assert alone.probabilities["cable_wrap"]["cable_wrap"] > odds["cable_wrap"] > odds["gravity_unbalance"] > 0.02
 
 
+def test_a_wave_behind_a_name_of_one_shape_is_as_likely_as_what_is_further_behind_by_what_it_would_be_asked() -> None:
+    near, far = (effect("cable_wrap", 60.0, cogging=margin) for margin in (1.0, 1.0 + ROUND.fair))
+    equal, wave = (
+        decide(Scores([one], left()), ROUND).probabilities["cable_wrap"]
+        for one in (near, replace(near, waves=("cogging",)))
+    )
+    assert wave["cable_wrap"] == decide(Scores([far], left()), ROUND).probabilities["cable_wrap"]["cable_wrap"]
+    assert equal["cogging"] > 0.3 * equal["cable_wrap"]
+    assert 0 < wave["cogging"] < 0.05 * wave["cable_wrap"], "it stays in the set"
+
+
 def test_what_was_learned_for_what_has_no_name_leaves_rivals_as_open_as_what_is_left() -> None:
     explained = {"cable_wrap": 0.95, "gravity_unbalance": 0.95}
     one = EffectScores("cable_wrap", 60.0, {"gravity_unbalance": 9.0}, explained)
