@@ -22,6 +22,10 @@ class Named:
 
     id: str
 
+    @property
+    def name(self) -> str:
+        return self.id
+
 
 @pytest.fixture(autouse=True)
 def all_are_what_they_say(monkeypatch: pytest.MonkeyPatch) -> None:

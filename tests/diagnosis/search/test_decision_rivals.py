@@ -21,10 +21,13 @@ RULES = replace(POLICY, fair=3.0, clear=8.0)
 class Named:
     id: str
     amplitude: float = 0.0
+    source: str = ""
 
     @property
     def title(self) -> str:
         return self.id
+
+    name = title
 
 
 @dataclass(frozen=True)
