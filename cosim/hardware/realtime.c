@@ -9,6 +9,10 @@
 #include <sys/mman.h>
 #include <time.h>
 
+#ifndef MCL_ONFAULT /* older headers; the system has it since Linux 4.4 */
+#define MCL_ONFAULT 4
+#endif
+
 int64_t now(void)
 {
     struct timespec t;
@@ -96,12 +100,20 @@ bool be_urgent(void)
     return pthread_setschedparam(pthread_self(), SCHED_FIFO, &high) == 0;
 }
 
-/* Asks the system for what real time needs; a session runs without where it says no. */
+/* Asks the system for what real time needs; a session runs without where it says no. Locked is what is in use, now
+   and later: what is only reserved, gigabytes of a process of Python, would be made resident and stay so. */
 static void prepare(Session *session)
 {
     session->fifo = be_urgent();
-    session->locked = mlockall(MCL_CURRENT) == 0;
+    session->locked = mlockall(MCL_CURRENT | MCL_ONFAULT) == 0;
     session->next = now() + session->period;
+}
+
+static void unlock(const Session *session)
+{
+    if (session->locked) {
+        munlockall();
+    }
 }
 
 EXPORT int64_t hardware_layout(void)
@@ -138,6 +150,7 @@ EXPORT void hardware_bare(Session *session, int64_t cycles)
         session->late += late;
         session->tick += late;
     }
+    unlock(session);
 }
 
 /* The last order of a session: no voltage, no torque, whatever the axis was in. */
@@ -145,9 +158,7 @@ EXPORT void hardware_release(Session *session)
 {
     Order order = {session->tick, DISABLE_VOLTAGE, 0, 0.0};
     session->adapter->write(session->adapter->self, &order);
-    if (session->locked) {
-        munlockall();
-    }
+    unlock(session);
 }
 
 /* Takes recorded samples through an axis: what the black box kept of a session becomes what it would keep again. */

@@ -6,9 +6,7 @@ from pathlib import Path
 import pytest
 from exchange_archives import page, rows_of
 from exchange_truth import differ
-from tiny_fmu import described, tiny
-
-__all__ = ["tiny"]
+from tiny_fmu import described
 
 
 @pytest.fixture

@@ -9,14 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import ENVIRONMENT, cache, call, scenario
-from tiny_fmu import tiny
+from commands import ENVIRONMENT, cache, call
 
 import cosim.models.cache
 from cosim.cli import main
 from cosim.data.recording import Recording
 
-__all__ = ["cache", "scenario", "tiny"]
+__all__ = ["cache"]
 
 
 def test_run_writes_a_recording_and_prints_its_path(

@@ -11,15 +11,14 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from commands import ENVIRONMENT, cache, call, scenario
+from commands import ENVIRONMENT, cache, call
 from on_hardware import SCENARIO
-from tiny_fmu import tiny
 
 import cosim.support.cell
 from cosim.data.recording import Recording
 from cosim.support.system_errors import surroundings
 
-__all__ = ["cache", "scenario", "tiny"]
+__all__ = ["cache"]
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits and folders of Linux")
 LONG = "x" * 300

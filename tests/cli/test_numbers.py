@@ -6,10 +6,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
-from commands import call, scenario
+from commands import call
 from simulating import simulate
 from small_loop import TEXT
-from tiny_fmu import tiny
 
 from cosim.data.signals import Samples, Slews, Stream
 from cosim.hardware.machine import parse_machine
@@ -19,8 +18,6 @@ from cosim.sweeps.file import read_sweep
 from cosim.system.scenario import parse_scenario
 from pyfmi_models.card import parse_card
 from pyfmi_models.errors import CardError
-
-__all__ = ["scenario", "tiny"]
 
 DIGITS, NESTED = "1" + "0" * 5000, "[" * 2000 + "]" * 2000
 FAULT = '[[faults]]\non = "plant.a"\nkind = "offset"\nvalue = 1.0\n'

@@ -7,11 +7,8 @@ import numpy as np
 import pytest
 from commands import call
 from small_loop import TEXT
-from tiny_fmu import tiny
 
 import cosim
-
-__all__ = ["tiny"]
 
 
 @pytest.fixture

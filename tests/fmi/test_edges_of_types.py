@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mirror_fmu import mirror, named
+from mirror_fmu import named
 from simulating import pair, simulate
 
 from cosim.fmi.component import Port
@@ -14,8 +14,6 @@ from cosim.fmi.values import prepared
 from cosim.support.errors import FmuError, StepError, WiringError
 from cosim.system.conversions import check_wire
 from cosim.system.wire import Wire
-
-__all__ = ["mirror"]
 
 EDGES = {
     "Int8": (-128, 127),

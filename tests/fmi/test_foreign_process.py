@@ -15,14 +15,11 @@ import pytest
 from commands import ENVIRONMENT, call
 from pyarrow.parquet import read_table
 from rude_fmu import DEEDS, STAGES, rude_fmu
-from tiny_fmu import tiny
 
 import cosim
 from cosim.data.recording import Recording
 from cosim.fmi.guard import Guard
 from cosim.fmi.process import Variables
-
-__all__ = ["tiny"]
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what the FMU of the test changes is there on Linux")
 PROBE = Path(__file__).parents[1] / "tools" / "rude_probe.py"

@@ -8,15 +8,13 @@ from pathlib import Path
 import pytest
 from commands import call
 from ssp_files import component, pack, system
-from tiny_fmu import described, description, tiny
+from tiny_fmu import described, description
 
 import cosim.support.archive
 from cosim.fmi.fmu import FmuComponent
 from cosim.support.archive import BOMB, contents
 from cosim.support.errors import FmuError, ScenarioError
 from cosim.system.scenario import read_scenario
-
-__all__ = ["tiny"]
 
 
 def changed(good: Path, bad: Path, *more: tuple[zipfile.ZipInfo | str, bytes]) -> Path:

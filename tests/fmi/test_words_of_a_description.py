@@ -6,12 +6,11 @@ from dataclasses import replace
 import pytest
 from commands import call
 from simulating import simulate
-from start_fmus import C, K, Make, U, V, Y, make
+from start_fmus import C, K, Make, U, V, Y
 
 from cosim.api.show import show
 from cosim.support.errors import FmuError
 
-__all__ = ["make"]
 VERSIONS = pytest.mark.parametrize("version", [2, 3])
 
 

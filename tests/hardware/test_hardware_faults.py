@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 from on_hardware import AT, INJECTED, SCENARIO, SIMULATED, assert_safe, machine, recorded, scenario, session
-from tiny_fmu import described, description, tiny
+from tiny_fmu import described, description
 
 from cosim.hardware.replay import replay
 from cosim.hardware.session import Session, run_session
@@ -17,8 +17,6 @@ from cosim.support.errors import HardwareError
 from cosim.system.scenario import parse_scenario
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the loop needs absolute sleeps")
-
-__all__ = ["tiny"]
 
 
 @pytest.mark.parametrize("fault", INJECTED)

@@ -7,17 +7,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oscillators import BOND, BOTH, VERSIONS, H, Tiny, oscillator, plain
+from oscillators import BOND, BOTH, VERSIONS, H, Tiny, oscillator
 from simulating import pair, simulate
-from tiny_fmu import described, description, tiny
+from tiny_fmu import described, description
 from two_mass import START, export
 
 from cosim.master.result import RunResult
 from cosim.support.errors import StepError, WiringError
 from cosim.system.algorithm import Energy, GaussSeidel, Iterated, Jacobi
 from cosim.system.wire import Wire
-
-__all__ = ["plain", "tiny"]
 
 
 def recursion(advance: Any, ticks: int) -> tuple[np.ndarray, np.ndarray]:

@@ -4,13 +4,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oscillators import BOND, Tiny, oscillator, plain
-from tiny_fmu import tiny
+from oscillators import BOND, Tiny, oscillator
 
 from cosim.master.loop.coupling import _fitting, _growth
 from cosim.system.algorithm import Energy, Iterated
-
-__all__ = ["plain", "tiny"]
 
 
 @pytest.mark.parametrize("error", [0.03, 0.4, 1.0, 3.0, 20.0])

@@ -5,15 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from simulating import simulate
-from tiny_fmu import tiny
 
 from cosim.data.recording import Recording
 from cosim.master.simulate import Options, run
 from cosim.support.errors import StepError
 from cosim.system.scenario import parse_scenario
 from cosim.system.wire import Record
-
-__all__ = ["tiny"]
 
 LOOPS = pytest.mark.parametrize("compiled", [True, False])
 VERSIONS = pytest.mark.parametrize("fmi", [2, 3])

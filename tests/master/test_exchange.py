@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from compiling import compiled, packed, with_stubs
 from simulating import simulate
-from tiny_fmu import tiny
 
 from cosim.fmi.fmu import FmuComponent
 from cosim.master.exchange import ExchangeComponent, open_fmu
@@ -17,8 +16,6 @@ from cosim.master.simulate import run
 from cosim.support.errors import FmuError, StepError
 from cosim.system.scenario import parse_scenario
 from pyfmi_models.export import export_fmu
-
-__all__ = ["tiny"]
 
 WIRES = [
     ("controller.command", "plant.drive"),

@@ -8,15 +8,12 @@ import numpy as np
 import pytest
 from pydantic import TypeAdapter, ValidationError
 from simulating import simulate
-from tiny_fmu import tiny
 
 from cosim.data.recording import Recording
 from cosim.support.errors import ScenarioError, WiringError
 from cosim.system.faults import Fault
 from cosim.system.scenario import parse_scenario
 from cosim.system.wire import Wire
-
-__all__ = ["tiny"]
 
 Tiny = dict[int, Path]
 RAMP = np.arange(50.0)

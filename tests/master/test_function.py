@@ -7,15 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 from simulating import simulate
-from tiny_fmu import tiny
 
 from cosim.fmi.function import FunctionComponent
 from cosim.master.result import RunResult
 from cosim.master.simulate import run
 from cosim.support.errors import ScenarioError, StepError, WiringError
 from cosim.system.scenario import parse_scenario
-
-__all__ = ["tiny"]
 
 Tiny = dict[int, Path]
 BOTH = pytest.mark.parametrize("compiled", [True, False])

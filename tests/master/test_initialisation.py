@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from simulating import simulate
-from start_fmus import Make, U, V, Y, make
+from start_fmus import Make, U, V, Y
 
 from cosim.fmi.alias import Alias
 from cosim.fmi.function import FunctionComponent
@@ -16,7 +16,6 @@ from cosim.system.system import Fmu
 from cosim.system.wire import Wire
 
 BOTH = pytest.mark.parametrize("compiled", [True, False])
-__all__ = ["make"]
 VERSIONS = pytest.mark.parametrize("version", [2, 3])
 PYTHON = "It was asked for: the loop ran in Python."
 ANY = V("any", 4, "input", start="0")

@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from commands import scenario
-from tiny_fmu import tiny
 
 from cosim.master.isolated import CALL_TIMEOUT, GRACE, Call, Watch, run_isolated
 from cosim.master.loop.structures import CLoop
@@ -15,8 +13,6 @@ from cosim.master.simulate import Options
 from cosim.support.activity import Board
 from cosim.support.cell import LostError
 from cosim.system.scenario import Scenario, read_scenario
-
-__all__ = ["scenario", "tiny"]
 
 
 class Clock:

@@ -11,16 +11,13 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from commands import ENVIRONMENT, call, scenario
-from tiny_fmu import tiny
+from commands import ENVIRONMENT, call
 
 from cosim.data.recording import Recording
 from cosim.master.isolated import run_isolated
 from cosim.master.simulate import Options
 from cosim.support.errors import LostComponentError
 from cosim.system.scenario import read_scenario
-
-__all__ = ["scenario", "tiny"]
 
 FUNCTION = """
 [components.odd]

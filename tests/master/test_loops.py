@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from oscillators import BOTH, Tiny
 from pydantic import TypeAdapter
 from simulating import simulate
-from tiny_fmu import described, description, tiny
+from tiny_fmu import described, description
 
 from cosim.fmi.fmu import FmuComponent
 from cosim.master.result import RunResult
@@ -22,7 +22,6 @@ from cosim.system.faults import Fault
 from cosim.system.schedule import delays
 from cosim.system.wire import Record, Wire
 
-__all__ = ["tiny"]
 NAMES = ("one", "two", "three")
 SOURCES = ("r", "n", *(f"{name}.y" for name in NAMES))
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from simulating import simulate
-from tiny_fmu import description, tiny
+from tiny_fmu import description
 
 import cosim.master.execution
 import cosim.master.loop
@@ -22,8 +22,6 @@ from cosim.fmi.fmu import FmuComponent
 from cosim.master.result import RunResult
 from cosim.support.errors import FmuError, OutputError, StepError
 from cosim.system.wire import Record, Wire
-
-__all__ = ["tiny"]
 
 VERSIONS = pytest.mark.parametrize("version", [2, 3])
 CONTROL = {"controller": {"mode": 1.0, "k": 5.0}}

@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from simulating import simulate
 from test_master import VERSIONS, Tiny, control_loop, packed
-from tiny_fmu import description, tiny
+from tiny_fmu import description
 
 from cosim.fmi.fmu import FmuComponent
 from cosim.support.errors import FmuError, SignalError, WiringError
 from cosim.system.wire import Wire
-
-__all__ = ["tiny"]
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from oscillators import BOND, BOTH, H, Tiny, oscillator, plain
+from oscillators import BOND, BOTH, H, Tiny, oscillator
 from simulating import simulate
-from tiny_fmu import tiny
 
 import cosim.master.execution
 from cosim.fmi.component import Port
@@ -22,8 +21,6 @@ from cosim.master.typed import _digits, _rule
 from cosim.support.errors import StepError
 from cosim.system.algorithm import Energy, GaussSeidel, Iterated, Jacobi
 from cosim.system.wire import Wire
-
-__all__ = ["plain", "tiny"]
 
 HALVES = Energy(kind="energy", bonds=BOND, tolerance=1e-12, max_pieces=2)
 """So little energy may be lost that each step is taken in two pieces."""

@@ -5,12 +5,11 @@ from pathlib import Path
 
 import pytest
 from simulating import simulate
-from start_fmus import C, K, Make, U, V, Y, make
+from start_fmus import C, K, Make, U, V, Y
 
 from cosim.api.show import show
 from cosim.fmi.function import FunctionComponent
 
-__all__ = ["make"]
 VERSIONS = pytest.mark.parametrize("version", [2, 3])
 
 

@@ -6,12 +6,9 @@ import numpy as np
 import pytest
 from compiling import compiled, packed, with_stubs
 from simulating import simulate
-from tiny_fmu import tiny
 
 from cosim.support.errors import FmuError, StepError, WiringError
 from cosim.system.wire import Wire
-
-__all__ = ["tiny"]
 
 SOURCE = r"""
 #include <stdbool.h>

@@ -4,14 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import scenario
-from tiny_fmu import tiny
 
 import cosim
 from cosim.fmi.fmu import FmuComponent
 from cosim.support.errors import StepError, WiringError
-
-__all__ = ["scenario", "tiny"]
 
 
 @pytest.mark.parametrize("compiled", [True, False])

@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mirror_fmu import KINDS, description, mirror, named
+from mirror_fmu import KINDS, description, named
 from simulating import pair, simulate
-from tiny_fmu import described, tiny
+from tiny_fmu import described
 
 from cosim.data.recording import Recording
 from cosim.fmi.fmu import FmuComponent
@@ -17,8 +17,6 @@ from cosim.support.errors import FmuError, WiringError
 from cosim.system.algorithm import Iterated
 from cosim.system.faults import Freeze
 from cosim.system.wire import Record, Wire
-
-__all__ = ["mirror", "tiny"]
 
 LOOPS = pytest.mark.parametrize("compiled", [True, False])
 VALUES: dict[str, Any] = {

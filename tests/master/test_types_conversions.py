@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from mirror_fmu import description, mirror, named
+from mirror_fmu import description, named
 from simulating import pair, simulate
 from test_types import LOOPS
 from tiny_fmu import described
@@ -17,7 +17,6 @@ from cosim.system.algorithm import GaussSeidel
 from cosim.system.scenario import parse_scenario
 from cosim.system.wire import Record, Wire
 
-__all__ = ["mirror"]
 WIDER = [
     ("Float32", "Float64"),
     ("Int8", "Int16"),

@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 from scipy.integrate import solve_ivp
 from simulating import simulate
-from tiny_fmu import tiny
 
 import cosim.models.cache
 from cosim.data.star import SIDEREAL_RATE
@@ -26,8 +25,6 @@ from pyfmi_models.friction.coulomb import Frictionless
 from pyfmi_models.model import Model
 from pyfmi_models.mount import Axis, Mount
 from pyfmi_models.pointing import PointingError
-
-__all__ = ["tiny"]
 
 ARCSEC = pi / 648000
 TUBE, ZENITH_INERTIA, TUBE_INERTIA = 12.0, 24.0, 20.0

@@ -13,7 +13,7 @@ import pytest
 from commands import call
 from fmpy.validation import validate_fmu
 from nested_runs import assert_same_bits, both, nested
-from tiny_fmu import described, description, tiny
+from tiny_fmu import described, description
 
 from cosim.api.export import export
 from cosim.data.signals import Noise, Steps
@@ -26,8 +26,6 @@ from cosim.system.faults import Freeze
 from cosim.system.scenario import read_scenario
 from cosim.system.system import Fmu, Function, System
 from cosim.system.wire import Record, Wire
-
-__all__ = ["tiny"]
 
 Tiny = dict[int, Path]
 STEP, TICKS = 0.05, 120

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from browsing import PATIENCE, VIEWS, browser, check_by_axe
-from commands import call, scenario
+from commands import call
 from report_example import report_of
-from tiny_fmu import tiny
 
 from cosim.data.recording import Recording
 from cosim.investigation.page import write_page
@@ -21,7 +20,7 @@ from pyfmi_models.card import read_card
 from pyfmi_models.export.codegen import generate
 from pyfmi_models.export.documentation import documentation
 
-__all__ = ["browser", "scenario", "tiny"]
+__all__ = ["browser"]
 
 
 @cache

@@ -7,11 +7,10 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from commands import call, scenario
+from commands import call
 from hypothesis import given, settings
 from hypothesis import strategies as some
 from small_loop import TEXT
-from tiny_fmu import tiny
 
 from cosim.data.recording import Recording
 from cosim.data.writer import StreamWriter
@@ -19,8 +18,6 @@ from cosim.plots.chart import Chart, Ruler
 from cosim.plots.digest import BUCKETS, DOTS, Digest, axes_of, condense
 from cosim.plots.run_page import write_page
 from cosim.system.scenario import parse_scenario
-
-__all__ = ["scenario", "tiny"]
 
 STATISTICS = {
     "simulated_seconds": 1.0,

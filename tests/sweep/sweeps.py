@@ -5,13 +5,10 @@ from typing import Any
 
 import pandas as pd
 import pytest
-from tiny_fmu import tiny
 
 from cosim.sweeps.conduct import Summary, conduct
 from cosim.sweeps.file import read_sweep
 from cosim.system.scenario import Scenario, read_scenario
-
-__all__ = ["tiny"]
 
 SCENARIO = """
 step = 1e-3

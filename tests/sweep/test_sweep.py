@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as some
 from pyarrow import parquet
 from sweeps import K, R, folder, run, written
-from tiny_fmu import tiny
 
 from cosim.data.columns import ORIGIN_KEY, UNIT_KEY
 from cosim.data.recording import Recording
@@ -20,7 +19,7 @@ from cosim.sweeps.file import read_sweep
 from cosim.sweeps.statistics import KINDS, Statistic
 from cosim.sweeps.variation import Normal, Range, Values, Variation
 
-__all__ = ["folder", "tiny"]
+__all__ = ["folder"]
 
 
 def test_a_grid_is_every_combination_and_each_row_is_its_own_run(folder: Path) -> None:

@@ -13,12 +13,11 @@ import pandas as pd
 import pytest
 from commands import ENVIRONMENT
 from sweeps import SCENARIO, K, folder, run, written
-from tiny_fmu import tiny
 
 import cosim.sweeps.cluster
 from cosim.support.errors import OutputError, SweepError
 
-__all__ = ["folder", "tiny"]
+__all__ = ["folder"]
 
 
 def test_a_finished_sweep_is_not_run_again_and_failures_only_when_asked(folder: Path) -> None:

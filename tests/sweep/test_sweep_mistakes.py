@@ -6,13 +6,12 @@ from pathlib import Path
 import pytest
 from commands import call
 from sweeps import SCENARIO, K, R, folder, run, written
-from tiny_fmu import tiny
 
 from cosim.support.errors import FmuError, SweepError, WiringError
 from cosim.sweeps.cluster import ADDRESS, _client
 from cosim.sweeps.file import read_sweep
 
-__all__ = ["folder", "tiny"]
+__all__ = ["folder"]
 
 
 @pytest.mark.parametrize(

@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from foreign_fmu import foreign
-from mirror_fmu import mirror
 from small_loop import TEXT
-from tiny_fmu import described, description, tiny
+from tiny_fmu import described, description
 
 from cosim.fmi.description import describe
 from cosim.fmi.variables import ports_of, variables_of
@@ -18,8 +17,6 @@ from cosim.master.simulate import run
 from cosim.models.cache import with_fmus
 from cosim.support.errors import FmuError, ScenarioError, WiringError
 from cosim.system.scenario import parse_scenario
-
-__all__ = ["mirror", "tiny"]
 
 MAPPING = 'variables = { a = "Motor.torque", b = "Brake.torque", y = "Encoder.angle" }'
 

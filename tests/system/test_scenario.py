@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from small_loop import TEXT
-from tiny_fmu import tiny
 
 from cosim.master.simulate import Options, run
 from cosim.support.errors import RecordingError, ScenarioError, SignalError
@@ -17,8 +16,6 @@ from cosim.system.algorithm import Energy, Iterated
 from cosim.system.ports import PortRef
 from cosim.system.scenario import parse_scenario, read_scenario, shipped_scenarios
 from cosim.system.wire import Record, Wire
-
-__all__ = ["tiny"]
 
 
 def test_a_scenario_is_read_as_written(tmp_path: Path) -> None:

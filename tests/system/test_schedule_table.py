@@ -5,12 +5,10 @@ from pathlib import Path
 
 import pytest
 from commands import call
-from tiny_fmu import described, description, tiny
+from tiny_fmu import described, description
 
 from cosim.api.show import show
 from cosim.support.errors import InputError
-
-__all__ = ["tiny"]
 
 SCENARIO = """name = "loop"
 step = 0.1

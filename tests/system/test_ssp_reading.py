@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 from commands import call
 from foreign_fmu import foreign
-from ssp_files import SPACES, component, connector, pack, parameter_set, read, real, system, values, wire
-from tiny_fmu import tiny
+from ssp_files import SPACES, component, connector, pack, parameter_set, real, system, values, wire
 
 from cosim.data.recording import Recording
 from cosim.master.simulate import run
 from cosim.support.errors import ScenarioError
 from cosim.system.scenario import read_scenario
-
-__all__ = ["read", "tiny"]
 
 DRIVEN = values(real("mode", 1) + real("a", 0.5))
 """Settings that make y = 0.5 at the end of each step."""

@@ -2,14 +2,10 @@
 
 from pathlib import Path
 
-from mirror_fmu import mirror
 from ssp_files import pack, system, values, wire
-from tiny_fmu import tiny
 
 from cosim.master.simulate import run
 from cosim.system.scenario import read_scenario
-
-__all__ = ["mirror", "tiny"]
 
 
 def typed(name: str, kind: str, type_: str, more: str = "") -> str:

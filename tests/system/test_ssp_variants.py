@@ -6,14 +6,12 @@ from pathlib import Path
 import pytest
 from commands import call
 from ssp_files import SPACES, component, pack, real, system, values, wire
-from tiny_fmu import tiny
 
 from cosim.api.show import show
 from cosim.master.simulate import run
 from cosim.support.errors import ScenarioError
 from cosim.system.scenario import read_scenario
 
-__all__ = ["tiny"]
 DRIVEN = values(real("mode", 1) + real("a", 0.5))
 
 

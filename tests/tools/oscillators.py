@@ -6,11 +6,9 @@ from typing import Any
 
 import pytest
 from simulating import simulate
-from tiny_fmu import described, description, tiny
+from tiny_fmu import described, description
 
 from cosim.master.result import RunResult
-
-__all__ = ["tiny"]
 
 Tiny = dict[int, Path]
 BOTH = pytest.mark.parametrize("compiled", [True, False])
