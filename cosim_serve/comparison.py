@@ -103,7 +103,7 @@ def _effect(one: Finding) -> Effect:
     if one.answer == "not_seen" and (least := limit(one)):
         span = f"upper limit {least}"
     return Effect(
-        id=one.effect,
+        id=one.name,
         title=one.title,
         answer=ANSWERS.get(one.answer, one.answer),
         shows=shows,
