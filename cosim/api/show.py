@@ -321,7 +321,7 @@ def _card(file: str) -> tuple[Facts, Tables]:
         "name": card.mount.name,
         "motion": card.mount.motion,
         "friction": card.friction.key,
-        "effects": ", ".join(effect.id for effect in card.effects) or "none",
+        "effects": ", ".join(effect.name for effect in card.effects) or "none",
         "controller": card.controller.compensation if card.controller else "none",
     }
     domains = domains_of(card.origin.get(KEY))
