@@ -21,11 +21,11 @@ def kept_with(most: int = 1) -> Callable[[Callable[Concatenate[K, P], R]], Calla
 
         @wraps(find)
         def remembered(of: K, /, *more: P.args, **named: P.kwargs) -> R:
-            own = known.setdefault(of, {})
-            own[more] = own.pop(more) if more in own else find(of, *more, **named)
+            own, asked = known.setdefault(of, {}), (more, tuple(sorted(named.items())))
+            own[asked] = own.pop(asked) if asked in own else find(of, *more, **named)
             for old in list(own)[:-most]:
                 del own[old]
-            return own[more]
+            return own[asked]
 
         return remembered
 

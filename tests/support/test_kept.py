@@ -33,7 +33,8 @@ def test_only_what_was_asked_last_is_kept_and_all_of_it_goes_with_its_object() -
     assert find(one, 1) is first, "it was asked for last but one"
     find(one, 2)
     find(other, 2)
-    assert asked == [1, 2, 3, 2, 2]
+    assert find(other, number=3) is find(other, number=3) is not find(other, 2), "a name is asked for too"
+    assert asked == [1, 2, 3, 2, 2, 3]
     there = ref(first)
     del one, first
     gc.collect()
