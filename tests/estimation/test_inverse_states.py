@@ -16,9 +16,7 @@ from pyfmi_models.card import read_card
 from pyfmi_models.effects import ActuatorLag, Delay, FrictionAsymmetry
 from pyfmi_models.effects.compliance import Compliance
 from pyfmi_models.effects.encoder_eccentricity import EncoderEccentricity
-from pyfmi_models.effects.thermal_viscosity import RubbedViscosity
 from pyfmi_models.friction import FrictionLaw
-from pyfmi_models.model import Recorded, parameters_of
 
 
 def walked(law: FrictionLaw, v: np.ndarray, dt: float) -> np.ndarray:
@@ -102,12 +100,6 @@ class TestInverse:
         first = torque(0.05, here)
         np.testing.assert_array_equal(torque(0.01, here), torque(0.01, anew))
         assert not np.allclose(first, torque(0.01, here), rtol=1e-3)
-
-    @pytest.mark.parametrize(("given", "low"), [(600.0, 2.0), (0.5, 0.5)])
-    def test_a_warm_up_that_the_card_gives_is_not_moved_by_a_bound(self, given: float, low: float) -> None:
-        effect = RubbedViscosity(viscous_per_degC=0.0, heat_degC_per_rad=1.0, cooling_s=given)
-        (variable,) = [one for one in parameters_of(effect) if one.name == "cooling_s"]
-        assert effect.fit_bounds(variable, Recorded(speed=1.0, torque=1.0)) == (low, variable.high)
 
     def test_a_fit_recovers_what_made_the_torque(self) -> None:
         t, q, v, a = wander()
