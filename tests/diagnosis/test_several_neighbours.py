@@ -89,10 +89,14 @@ def test_neighbours_that_move_and_do_nothing_are_not_named() -> None:
     assert row.answer == "not_seen"
 
 
-def test_one_of_several_that_acts_alone_has_its_id_for_its_name() -> None:
-    answer = found({3: (0.1, 0.0)}).diagnosis
+def test_one_of_several_that_acts_alone_has_its_id_for_its_name_whatever_its_column_is_called() -> None:
+    called = {"q3": "joint 3 position"}
+    runs = [joint(seed, {3: (0.1, 0.0)}) for seed in (1, 2, 3)]
+    runs = [Recording.of({called.get(k, k): one[k] for k in one.columns}, one.name) for one in runs]
+    answer = diagnose(runs[:2], runs[2:], parse_card(CARD, "card.toml")).diagnosis
     (row,) = (one for one in answer.findings if one.answer == "found")
-    assert (row.name, row.title, row.source) == ("axis_coupling", "Axis coupling", "q3")
+    assert (row.name, row.title, row.source) == ("axis_coupling", "Axis coupling", "joint 3 position")
+    assert not any("axis_coupling:" in rule.name for one in answer.ledger for rule in one.rules)
     assert {one.effect for one in answer.ledger if one.effect.startswith("axis")} == {"axis_coupling"}
     assert [one.effect for one in answer.scores.effects] == ["axis_coupling"] if answer.scores else False
 

@@ -59,12 +59,16 @@ def _short(names: Iterable[str]) -> dict[str, str]:
 
 
 def _trial(trial: Trial, short: Mapping[str, str]) -> Trial:
-    rules = []
-    for rule in trial.rules:
-        words = rule.name.split(" ")
-        rules.append(replace(rule, name=" ".join(short.get(word, word) for word in words)))
+    rules = tuple(replace(rule, name=_shortened(rule.name, short)) for rule in trial.rules)
     effects = tuple(short.get(name, name) for name in trial.effects)
-    return replace(trial, effects=effects, effect=short.get(trial.effect, trial.effect), rules=tuple(rules))
+    return replace(trial, effects=effects, effect=short.get(trial.effect, trial.effect), rules=rules)
+
+
+def _shortened(text: str, short: Mapping[str, str]) -> str:
+    """A rule's name, in which a name may have spaces, as columns have; it is the only one of its id."""
+    for name, own in short.items():
+        text = text.replace(name, own)
+    return text
 
 
 def _scores(one: EffectScores, short: Mapping[str, str]) -> EffectScores:
