@@ -6,18 +6,18 @@ base, so a fit of it that ends worse than the fit of the base, in training or on
 has nothing to tell: it is rejected, and the case counts as one without a gap.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
+from functools import partial
 from math import pi
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from cosim.data.recording import Recording
 from cosim.diagnosis.evidence.band import in_band
-from cosim.diagnosis.measure.protocol import heldout_rms
+from cosim.diagnosis.measure.protocol import CUTOFF, heldout_rms
 from cosim.estimation.fit import fit
-from cosim.estimation.prepare import Array, Prepared
+from cosim.estimation.prepare import Array, Band, Prepared
 from cosim.estimation.row_weights import described_rows
 from cosim.support.plain import Parsed
 from cosim_studies.proof.tool import given
@@ -52,12 +52,22 @@ def in_card_words(entry: Mapping[str, Any]) -> Parsed:
     return numbers
 
 
-def ceiling(folder: str, entries: Sequence[Mapping[str, Any]], truth: Mapping[str, Any] | None = None) -> Parsed:
+def ceiling(
+    folder: str,
+    entries: Sequence[Mapping[str, Any]],
+    truth: Mapping[str, Any] | None = None,
+    band: tuple[float, float] = (CUTOFF, CUTOFF),
+) -> Parsed:
     """{"heldout_rms": x, "base_rms": y}, or {"reason": why there is no x}, for the effects of a truth.
 
     Of several effects also {"without": {effect: held-out RMS of the same structure without that effect}}.
 
-    `truth` holds the true numbers of the machine, one more place to start from.
+    Args:
+        folder: where card and recordings are.
+        entries: the effects.
+        truth: the true numbers of the machine, one more place to start from.
+        band: cutoff of the torque and of the motion in which errors are told [Hz]: those of the answer beside which the
+            ceiling stands, as 30 Hz are mostly noise of the reading on some machines.
     """
     if foreign := [entry["effect"] for entry in entries if not entry["listed"]]:
         return {"reason": f"{foreign[0]} has no structure in the library"}
@@ -69,16 +79,17 @@ def ceiling(folder: str, entries: Sequence[Mapping[str, Any]], truth: Mapping[st
     def refitted(those: Sequence[Mapping[str, Any]]) -> tuple[Found, Found]:
         return _refitted(starts, [_rubbing(true_effect(entry), mount) for entry in those], prepared)
 
-    found = judged([held], *refitted(entries))
+    judge = partial(heldout_rms, [held], band=Band(*band))
+    found = judged(judge, *refitted(entries))
     if "reason" in found or len(entries) < 2:
         return found
     without = {one["effect"]: refitted([entry for entry in entries if entry is not one])[1].mount for one in entries}
-    return found | {"without": {name: heldout_rms([held], mount) for name, mount in without.items()}}
+    return found | {"without": {name: judge(mount) for name, mount in without.items()}}
 
 
-def judged(held: Sequence[Recording], base: Found, best: Found) -> Parsed:
+def judged(judge: Callable[[Mount], float], base: Found, best: Found) -> Parsed:
     """The held-out RMS of the best fit, unless it is worse than the base that it contains."""
-    reached, contained = heldout_rms(held, best.mount), heldout_rms(held, base.mount)
+    reached, contained = judge(best.mount), judge(base.mount)
     if best.cost > base.cost * (1 + 1e-9):
         return {"reason": "its fit ended worse than that of the base it contains", "base_rms": contained}
     if reached > contained:

@@ -71,7 +71,7 @@ class CaseRunner:
             opened = self._sealed(case, truth)
             said = _call_tool(user, self.tool, folder)
             knows = bool(truth["effects"]) and said["status"] == "ok"
-            best = _call_tool(user, ceiling, folder, truth["effects"], truth["mount"]) if knows else {"seconds": 0.0}
+            best = _ceiling(user, folder, truth, said) if knows else {"seconds": 0.0}
         seconds = {"make": made, "tool": said.pop("seconds"), "ceiling": best.pop("seconds")}
         return head | opened | said | {"ceiling": best.get("answer", best), "seconds": seconds}
 
@@ -102,6 +102,12 @@ def _made(maker: Cell, case: CaseSpec, seconds: float, folder: str, rough: bool)
     except LostError as loss:
         raise ProofError(f"Case {case.number} could not be made: {loss}", culprit=case.label) from loss
     return truth
+
+
+def _ceiling(user: Cell, folder: str, truth: Parsed, said: Parsed) -> Parsed:
+    """The ceiling of a case, its errors in the band in which the answer tells its own."""
+    held = said["answer"]["heldout"]
+    return _call_tool(user, ceiling, folder, truth["effects"], truth["mount"], (held["cutoff_hz"], held["motion_hz"]))
 
 
 def _call_tool(user: Cell, function: Callable[..., Any], *arguments: Any) -> Parsed:

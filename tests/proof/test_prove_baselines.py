@@ -1,11 +1,13 @@
 """What a diagnosis is compared with: black boxes, sparse regression over a library, the true structure refitted."""
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 from test_prove import row
 
+from cosim.diagnosis.measure.protocol import heldout_rms
 from cosim.estimation.prepare import prepare
 from cosim_studies.proof import baselines, marks
 from cosim_studies.proof.ceiling import _refitted, ceiling, in_card_words, judged, true_effect
@@ -31,6 +33,8 @@ def test_the_true_structure_refitted_leaves_less_than_the_base(tmp_path: Path) -
     write_given(case, tmp_path)
     best = ceiling(str(tmp_path), case.truth["effects"])["heldout_rms"]
     base = ceiling(str(tmp_path), [])["heldout_rms"]
+    narrow = ceiling(str(tmp_path), case.truth["effects"], band=(8.0, 11.0))
+    assert narrow["heldout_rms"] < 0.99 * best, "less of the reading's noise"
     assert best < 0.8 * base
     assert (
         "no structure" in ceiling(str(tmp_path), [{"effect": "rubbing", "listed": False, "parameters": {}}])["reason"]
@@ -53,10 +57,11 @@ def test_a_ceiling_that_is_worse_than_the_base_it_contains_is_rejected(tmp_path:
     card, train, held = given(str(tmp_path))
     base, best = _refitted([card.plant()], [true_effect(case.truth["effects"][0])], prepare(train, 20.0))
     assert best.cost < base.cost
-    good = judged([held], base, best)
+    judge = partial(heldout_rms, [held])
+    good = judged(judge, base, best)
     assert good["heldout_rms"] < good["base_rms"]
-    assert "worse than that of the base" in judged([held], base, best._replace(cost=2 * base.cost))["reason"]
-    assert "predicts less than the base" in judged([held], best, base._replace(cost=0.5 * best.cost))["reason"]
+    assert "worse than that of the base" in judged(judge, base, best._replace(cost=2 * base.cost))["reason"]
+    assert "predicts less than the base" in judged(judge, best, base._replace(cost=0.5 * best.cost))["reason"]
     rejected = row("one", ["torque_offset"], []) | {"ceiling": {"reason": "refitted it predicts less"}}
     assert (marks.gap_closed(rejected), marks.has_gap(rejected), marks.removable(rejected)) == (None, False, None)
 
