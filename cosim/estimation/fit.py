@@ -38,6 +38,9 @@ INDEPENDENT = 400.0
 """Independent rows beyond which more say nothing new, as there the model's own misfit is the limit (Miller and Dunson,
 J. Am. Stat. Assoc. 114 (2019) 1113; evidence counts no more either). With 100 or 25 two more of ten strong effects that
 a base without prior absorbed are named, and of a measured axis one is lost, whose truth is far from the card."""
+FAR = 1 / float(np.finfo(float).eps)
+"""No number goes further than this many of its units, beyond which a step of one unit is lost in rounding: what the
+recordings say nothing of (a rough spot beyond what was visited) went on to infinity, where it has no derivatives."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -307,7 +310,7 @@ def coordinates(mount: Mount, free: Sequence[str], scale: Array, edges: tuple[Ar
     for lower, upper, factor in _ordered(mount, free):
         matrix[upper, lower] = factor * scale[lower]
         low[upper], high[upper] = 0.0, (edges[1][upper] - factor * edges[0][lower]) / scale[upper]
-    return Coordinates(matrix, low, high)
+    return Coordinates(matrix, np.maximum(low, -FAR), np.minimum(high, FAR))
 
 
 def _ordered(mount: Mount, free: Sequence[str]) -> list[tuple[int, int, float]]:

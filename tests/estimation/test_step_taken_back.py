@@ -28,6 +28,7 @@ from cosim_studies.proof.tool import given
 from pyfmi_models.effects import Cogging, Delay, Effect, TorqueOffset
 from pyfmi_models.effects.backlash import Backlash
 from pyfmi_models.effects.periodic_disturbance import PeriodicDisturbance
+from pyfmi_models.effects.position_friction import LocalFriction
 from pyfmi_models.friction import Coulomb, FrictionLaw, LuGre, Stribeck
 from pyfmi_models.mount import Axis, Mount
 
@@ -59,6 +60,14 @@ def test_torque_alone_has_the_bits_of_torque_with_its_derivatives(prepared: Prep
     assert np.array_equal(model.torque(there), expected)  # as after a step that was taken back
     assert np.array_equal(model.whole(there)[0], expected)
     assert not np.array_equal(model.torque(inverse.present), expected)
+
+
+def test_a_place_that_recordings_say_nothing_of_does_not_go_on_to_infinity(prepared: Prepared) -> None:
+    spot = LocalFriction(q_center=2.9, width=0.1, relative_amplitude=1.6)
+    start = replace(MOUNT, friction=Coulomb(Fc=0.3, sigma2=1.5), effects=(spot,))
+    found = fit(start, prepared.pieces, np.ones(len(prepared.recording_of)), evaluations=60)
+    assert abs(found.parameters()["position_friction.q_center"]) <= 2.9 * fitting.FAR
+    assert np.isfinite(found.slopes).all()
 
 
 def test_after_a_step_taken_back_torque_comes_alone(prepared: Prepared, monkeypatch: pytest.MonkeyPatch) -> None:
